@@ -1,348 +1,501 @@
 //! A learned correction of any kind (networks, a Gaussian process, or linear terms), its scaling, inputs and valid region.
 //!
-//! The rows of a correction by their key: every number is there once, or the table is refused.
+//! What a correction consists of stands in the rows of [`marks`] and is found again by [`shaped`]; [`visit`] names every number of it
+//! once, for writing and for reading. A number that is missing or stands twice refuses the table.
 
 use super::{Network, NetworkRow};
-use crate::error::{Error, Result};
-use crate::estimate::network::arm::ScrewArm;
+use crate::error::{Error, Result, counted};
+use crate::estimate::network::arm::{Hinge, ScrewArm};
 use crate::estimate::network::basis::{BasisTerm, OutputMotion, Wave};
-use crate::estimate::network::correction::{Body, Correction, Feature, Map, NetworkScaling};
+use crate::estimate::network::correction::{
+    Body, Correction, Feature, JointMotion, Map, NetworkScaling, Networks, Scaling,
+};
 use crate::estimate::network::linear::Linear;
-use crate::estimate::network::region::Region;
-use crate::estimate::network::{Activation, LayerSizes};
+use crate::estimate::network::process::Process;
+use crate::estimate::network::region::{Jointly, Region, Valid};
+use crate::estimate::network::{Activation, LayerSizes, OUTPUTS};
 use std::collections::BTreeMap;
-
-mod reading;
 
 /// mm per m.
 const MILLI: f64 = 1e3;
 
+const MAPS: [(Map, &str); 3] = [
+    (Map::Value, "input_value"),
+    (Map::Sin, "input_sin"),
+    (Map::Cos, "input_cos"),
+];
+
+const ACTIVATIONS: [(Activation, &str); 2] =
+    [(Activation::Sigmoid, "sigmoid"), (Activation::Tanh, "tanh")];
+
+/// Member (0: shared), part, and layer, to, from.
+type Key = (usize, &'static str, [usize; 3]);
+
+/// What is done with a number, whose stored value is `unit` times as large.
+type Each<'a> = dyn FnMut(Key, f64, &mut f64) -> Result<()> + 'a;
+
 impl Network {
     /// The table of a correction; `prismatic` says which sources are lengths.
     pub fn of(correction: &Correction, prismatic: &[bool]) -> Self {
-        let mut table = Self(Vec::new());
-        table.put(0, "left", [0, 0, 0], correction.left * MILLI);
-        table.region(&correction.region, prismatic);
-        match &correction.body {
-            Body::Networks(dress, networks) => {
-                table.dress(dress, prismatic);
-                table.put(
-                    0,
-                    activation_name(networks.shape.activation),
-                    [0, 0, 0],
-                    1.0,
-                );
-                if let Some(motion) = &networks.joints {
-                    table.arm(&motion.arm);
-                    for (joint, scale) in motion.scales.iter().enumerate() {
-                        table.put(
-                            0,
-                            "joint_scale",
-                            [0, joint + 1, 0],
-                            scale * source_unit(joint, prismatic),
-                        );
-                    }
-                }
-                for (m, parameters) in networks.members.iter().enumerate() {
-                    for (index, value) in parameters.iter().enumerate() {
-                        let (part, place) = place(networks.shape, index);
-                        table.put(m + 1, part, place, *value);
-                    }
-                }
-            }
-            Body::Process(dress, process) => {
-                table.dress(dress, prismatic);
-                table.put(0, "signal", [0, 0, 0], process.signal);
-                table.put(0, "noise", [0, 0, 0], process.noise);
-                table.row("length", 0, 0, &process.lengths);
-                for (r, (row, alpha)) in process.rows.iter().zip(&process.alpha).enumerate() {
-                    table.row("row", 0, r + 1, row);
-                    table.row("alpha", 0, r + 1, alpha);
-                }
-            }
-            Body::Linear(linear) => table.linear(linear),
-        }
-        table
-    }
-
-    fn put(&mut self, member: usize, part: &str, place: [usize; 3], value: f64) {
-        let number = |n: usize| i64::try_from(n).expect("a small number");
-        let [layer, to, from] = place.map(number);
-        self.0.push(NetworkRow {
-            member: number(member),
-            part: part.into(),
-            layer,
-            to,
-            from,
-            value,
-        });
-    }
-
-    /// Values in a row of an array, `from` 1, 2, ...
-    fn row(&mut self, part: &str, layer: usize, to: usize, values: &[f64]) {
-        for (k, value) in values.iter().enumerate() {
-            self.put(0, part, [layer, to, k + 1], *value);
-        }
-    }
-
-    fn region(&mut self, region: &Region, prismatic: &[bool]) {
-        for (source, valid) in region.ranges.iter().enumerate() {
-            let unit = source_unit(source, prismatic);
-            self.put(0, "valid_lower", [0, source + 1, 0], valid.lower * unit);
-            self.put(0, "valid_upper", [0, source + 1, 0], valid.upper * unit);
-            self.put(0, "valid_margin", [0, source + 1, 0], valid.margin * unit);
-        }
-        let Some(jointly) = &region.jointly else {
-            return;
+        let mut rows = Vec::new();
+        let mut put = |(member, part, place): Key, value: f64| {
+            let number = |n: usize| i64::try_from(n).expect("a small number");
+            let [layer, to, from] = place.map(number);
+            rows.push(NetworkRow {
+                member: number(member),
+                part: part.into(),
+                layer,
+                to,
+                from,
+                value,
+            });
         };
-        self.put(0, "joint_limit", [0, 0, 0], jointly.limit);
-        self.put(0, "joint_margin", [0, 0, 0], jointly.margin);
-        for (i, (mean, factor)) in jointly.mean.iter().zip(&jointly.factor).enumerate() {
-            self.put(
-                0,
-                "joint_mean",
-                [0, i + 1, 0],
-                mean * source_unit(i, prismatic),
-            );
-            for (j, value) in factor.iter().enumerate() {
-                self.put(
-                    0,
-                    "joint_factor",
-                    [0, i + 1, j + 1],
-                    value / source_unit(j, prismatic),
-                );
+        marks(&correction.body, |part, place| put((0, part, place), 1.0));
+        let mut write = |key: Key, unit: f64, value: &mut f64| {
+            put(key, *value * unit);
+            Ok(())
+        };
+        visit(&mut correction.clone(), prismatic, &mut write).expect("every number has a place");
+        Self(rows)
+    }
+
+    /// The correction that the rows hold, of whatever kind, or none where there are no rows; [`Correction::at`] applies it.
+    ///
+    /// `prismatic` says which joints are. Fails where a number is missing or stands twice.
+    pub fn correction(&self, prismatic: &[bool]) -> Result<Option<Correction>> {
+        if self.0.is_empty() {
+            return Ok(None);
+        }
+        let numbers = Numbers::new(&self.0)?;
+        let mut correction = shaped(&numbers, prismatic)?;
+        let mut read = |key: Key, unit: f64, value: &mut f64| {
+            *value = numbers.of(key)? / unit;
+            Ok(())
+        };
+        visit(&mut correction, prismatic, &mut read)?;
+        if let Body::Process(_, process) = &mut correction.body {
+            let Process { rows, alpha, .. } = process;
+            let (rows, alpha) = (std::mem::take(rows), std::mem::take(alpha));
+            let lengths = std::mem::take(&mut process.lengths);
+            *process = Process::remember(lengths, process.signal, process.noise, rows, alpha)
+                .ok_or_else(|| fault("the rows of the process depend on each other"))?;
+        }
+        Ok(Some(correction))
+    }
+}
+
+fn fault(message: impl Into<String>) -> Error {
+    Error::data("network", message.into())
+}
+
+/// Every number of a correction with its place and unit: a length is stored in mm, everything else in SI.
+fn visit(correction: &mut Correction, prismatic: &[bool], each: &mut Each) -> Result<()> {
+    let source_unit = |source: usize| match prismatic.get(source) {
+        Some(true) => MILLI,
+        _ => 1.0,
+    };
+    each((0, "left", [0, 0, 0]), MILLI, &mut correction.left)?;
+    for (source, valid) in correction.region.ranges.iter_mut().enumerate() {
+        let (place, unit) = ([0, source + 1, 0], source_unit(source));
+        each((0, "valid_lower", place), unit, &mut valid.lower)?;
+        each((0, "valid_upper", place), unit, &mut valid.upper)?;
+        each((0, "valid_margin", place), unit, &mut valid.margin)?;
+    }
+    if let Some(jointly) = &mut correction.region.jointly {
+        each((0, "joint_limit", [0, 0, 0]), 1.0, &mut jointly.limit)?;
+        each((0, "joint_margin", [0, 0, 0]), 1.0, &mut jointly.margin)?;
+        for (i, (mean, factor)) in jointly.mean.iter_mut().zip(&mut jointly.factor).enumerate() {
+            each((0, "joint_mean", [0, i + 1, 0]), source_unit(i), mean)?;
+            for (j, value) in factor.iter_mut().enumerate() {
+                *value /= source_unit(j);
+                each((0, "joint_factor", [0, i + 1, j + 1]), 1.0, value)?;
+                *value *= source_unit(j);
             }
         }
     }
-
-    fn dress(&mut self, dress: &NetworkScaling, prismatic: &[bool]) {
-        for (i, (feature, scaling)) in dress.features.iter().zip(&dress.inputs).enumerate() {
-            let unit = feature_unit(*feature, prismatic);
-            self.put(
-                0,
-                map_name(feature.map),
-                [0, i + 1, feature.source + 1],
-                1.0,
-            );
-            self.put(0, "input_mean", [0, i + 1, 0], scaling.mean * unit);
-            self.put(0, "input_scale", [0, i + 1, 0], scaling.scale * unit);
-        }
-        for (k, scaling) in dress.outputs.iter().enumerate() {
-            self.put(0, "output_mean", [0, k + 1, 0], scaling.mean * MILLI);
-            self.put(0, "output_scale", [0, k + 1, 0], scaling.scale * MILLI);
-        }
-    }
-
-    fn linear(&mut self, linear: &Linear) {
-        self.put(0, "terms_noise", [0, 0, 0], linear.noise * MILLI);
-        if let Some(arm) = &linear.arm {
-            self.arm(arm);
-        }
-        for (t, term) in linear.terms.iter().enumerate() {
-            let (part, layer, from) = match term.way {
-                OutputMotion::Along(axis) => ("along", 0, axis),
-                OutputMotion::Turn(joint) => ("turn", 0, joint),
-                OutputMotion::Shift(station, axis) => ("shift", station, axis),
-                OutputMotion::Tilt(station, axis) => ("tilt", station, axis),
-            };
-            self.put(0, part, [layer, t + 1, from + 1], 1.0);
-            for wave in &term.waves {
-                let (part, layer, joint) = match *wave {
-                    Wave::Sin(joint, order) => ("sin", order, joint),
-                    Wave::Cos(joint, order) => ("cos", order, joint),
-                    Wave::Value(joint) => ("value", 0, joint),
-                    Wave::Torque(joint, body) => ("torque", body + 1, joint),
-                };
-                self.put(0, part, [layer, t + 1, joint + 1], 1.0);
+    match &mut correction.body {
+        Body::Networks(scaling, networks) => {
+            visit_scaling(scaling, source_unit, each)?;
+            if let Some(motion) = &mut networks.joints {
+                visit_arm(&mut motion.arm, each)?;
+                for (joint, scale) in motion.scales.iter_mut().enumerate() {
+                    each(
+                        (0, "joint_scale", [0, joint + 1, 0]),
+                        source_unit(joint),
+                        scale,
+                    )?;
+                }
             }
-            for (m, member) in linear.members.iter().enumerate() {
-                self.put(
-                    m + 1,
-                    "coefficient",
-                    [0, t + 1, 0],
-                    member[t] * coefficient_unit(term),
-                );
+            for (m, parameters) in networks.members.iter_mut().enumerate() {
+                for (index, value) in parameters.iter_mut().enumerate() {
+                    let (part, place) = place(networks.shape, index);
+                    each((m + 1, part, place), 1.0, value)?;
+                }
+            }
+        }
+        Body::Process(scaling, process) => {
+            visit_scaling(scaling, source_unit, each)?;
+            each((0, "signal", [0, 0, 0]), 1.0, &mut process.signal)?;
+            each((0, "noise", [0, 0, 0]), 1.0, &mut process.noise)?;
+            visit_row("length", 0, 1.0, &mut process.lengths, each)?;
+            for (r, (row, alpha)) in process.rows.iter_mut().zip(&mut process.alpha).enumerate() {
+                visit_row("row", r + 1, 1.0, row, each)?;
+                visit_row("alpha", r + 1, 1.0, alpha, each)?;
+            }
+        }
+        Body::Linear(linear) => {
+            each((0, "terms_noise", [0, 0, 0]), MILLI, &mut linear.noise)?;
+            if let Some(arm) = &mut linear.arm {
+                visit_arm(arm, each)?;
+            }
+            for (m, member) in linear.members.iter_mut().enumerate() {
+                for (t, (value, term)) in member.iter_mut().zip(&linear.terms).enumerate() {
+                    // Shifts in mm, turns in rad; per m of torque or travel where a wave is one.
+                    let unit = match term.way {
+                        OutputMotion::Along(_) | OutputMotion::Shift(..) => MILLI,
+                        OutputMotion::Turn(_) | OutputMotion::Tilt(..) => 1.0,
+                    };
+                    each((m + 1, "coefficient", [0, t + 1, 0]), unit, value)?;
+                }
             }
         }
     }
+    Ok(())
+}
 
-    fn arm(&mut self, arm: &ScrewArm) {
-        for (j, hinge) in arm.hinges.iter().enumerate() {
-            self.row("axis", 0, j + 1, &hinge.axis);
-            self.row("point", 0, j + 1, &hinge.point.map(|value| value * MILLI));
-            self.put(
-                0,
-                "slides",
-                [0, j + 1, 0],
-                if hinge.slides { 1.0 } else { 0.0 },
-            );
-        }
-        self.row("tool", 0, 0, &arm.tool.map(|value| value * MILLI));
-        self.row("down", 0, 0, &arm.down);
+/// Values in a row of an array, `from` 1, 2, ...
+fn visit_row(
+    part: &'static str,
+    to: usize,
+    unit: f64,
+    values: &mut [f64],
+    each: &mut Each,
+) -> Result<()> {
+    let mut values = values.iter_mut().enumerate();
+    values.try_for_each(|(k, value)| each((0, part, [0, to, k + 1]), unit, value))
+}
+
+fn visit_scaling(
+    scaling: &mut NetworkScaling,
+    source_unit: impl Fn(usize) -> f64,
+    each: &mut Each,
+) -> Result<()> {
+    for (i, (feature, input)) in scaling.features.iter().zip(&mut scaling.inputs).enumerate() {
+        let unit = match feature.map {
+            Map::Value => source_unit(feature.source),
+            Map::Sin | Map::Cos => 1.0,
+        };
+        each((0, "input_mean", [0, i + 1, 0]), unit, &mut input.mean)?;
+        each((0, "input_scale", [0, i + 1, 0]), unit, &mut input.scale)?;
     }
+    for (k, output) in scaling.outputs.iter_mut().enumerate() {
+        each((0, "output_mean", [0, k + 1, 0]), MILLI, &mut output.mean)?;
+        each((0, "output_scale", [0, k + 1, 0]), MILLI, &mut output.scale)?;
+    }
+    Ok(())
+}
+
+fn visit_arm(arm: &mut ScrewArm, each: &mut Each) -> Result<()> {
+    for (j, hinge) in arm.hinges.iter_mut().enumerate() {
+        visit_row("axis", j + 1, 1.0, &mut hinge.axis, each)?;
+        visit_row("point", j + 1, MILLI, &mut hinge.point, each)?;
+        let mut slides = if hinge.slides { 1.0 } else { 0.0 };
+        each((0, "slides", [0, j + 1, 0]), 1.0, &mut slides)?;
+        hinge.slides = slides != 0.0;
+    }
+    visit_row("tool", 0, MILLI, &mut arm.tool, each)?;
+    visit_row("down", 0, 1.0, &mut arm.down, each)
 }
 
 /// Where parameter `index` of a network stands in the table: part, and layer, to, from.
 fn place(shape: LayerSizes, index: usize) -> (&'static str, [usize; 3]) {
+    let weight = |layer, index: usize, width| {
+        let place = [layer, index / width + 1, index % width + 1];
+        ("weight", place)
+    };
     if shape.hidden_weights().contains(&index) {
-        (
-            "weight",
-            [1, index / shape.inputs + 1, index % shape.inputs + 1],
-        )
+        weight(1, index, shape.inputs)
     } else if shape.hidden_biases().contains(&index) {
         ("bias", [1, index - shape.hidden_biases().start + 1, 0])
     } else if shape.output_weights().contains(&index) {
-        let index = index - shape.output_weights().start;
-        (
-            "weight",
-            [2, index / shape.hidden + 1, index % shape.hidden + 1],
-        )
+        weight(2, index - shape.output_weights().start, shape.hidden)
     } else {
         ("bias", [2, index - shape.output_biases().start + 1, 0])
     }
 }
 
-/// Stored per SI: a length is stored in mm, everything else as it is.
-fn source_unit(source: usize, prismatic: &[bool]) -> f64 {
-    if prismatic.get(source).copied().unwrap_or(false) {
-        MILLI
+/// What a correction consists of, apart from its numbers: part, and layer, to, from.
+fn marks(body: &Body, mut mark: impl FnMut(&'static str, [usize; 3])) {
+    match body {
+        Body::Networks(scaling, _) | Body::Process(scaling, _) => {
+            for (i, feature) in scaling.features.iter().enumerate() {
+                mark(name(&MAPS, feature.map), [0, i + 1, feature.source + 1]);
+            }
+        }
+        Body::Linear(linear) => {
+            for (t, term) in linear.terms.iter().enumerate() {
+                let (part, layer, from) = match term.way {
+                    OutputMotion::Along(axis) => ("along", 0, axis),
+                    OutputMotion::Turn(joint) => ("turn", 0, joint),
+                    OutputMotion::Shift(station, axis) => ("shift", station, axis),
+                    OutputMotion::Tilt(station, axis) => ("tilt", station, axis),
+                };
+                mark(part, [layer, t + 1, from + 1]);
+                for wave in &term.waves {
+                    let (part, layer, joint) = match *wave {
+                        Wave::Sin(joint, order) => ("sin", order, joint),
+                        Wave::Cos(joint, order) => ("cos", order, joint),
+                        Wave::Value(joint) => ("value", 0, joint),
+                        Wave::Torque(joint, body) => ("torque", body + 1, joint),
+                    };
+                    mark(part, [layer, t + 1, joint + 1]);
+                }
+            }
+        }
+    }
+    if let Body::Networks(_, networks) = body {
+        mark(name(&ACTIVATIONS, networks.shape.activation), [0, 0, 0]);
+    }
+}
+
+fn name<T: PartialEq>(names: &[(T, &'static str)], of: T) -> &'static str {
+    let found = names.iter().find(|(one, _)| *one == of);
+    found.expect("a name for each").1
+}
+
+/// A correction of the shape that the rows have, its numbers still zero.
+fn shaped(numbers: &Numbers, prismatic: &[bool]) -> Result<Correction> {
+    let nothing = Valid {
+        lower: 0.0,
+        upper: 0.0,
+        margin: 0.0,
+    };
+    let (sources, joints) = (numbers.count("valid_lower"), numbers.count("joint_mean"));
+    if joints > sources {
+        return Err(fault("more joints than sources"));
+    }
+    numbers.hold(joints.saturating_mul(joints + 1) / 2)?;
+    let jointly = (joints > 0).then(|| Jointly {
+        mean: vec![0.0; joints],
+        factor: (1..=joints).map(|width| vec![0.0; width]).collect(),
+        limit: 0.0,
+        margin: 0.0,
+    });
+    let body = if numbers.has("coefficient") {
+        Body::Linear(linear(numbers, sources)?)
     } else {
-        1.0
+        let scaling = scaling(numbers, sources)?;
+        let inputs = scaling.features.len();
+        if numbers.has("signal") {
+            let rows = numbers.count("row") / inputs;
+            let (blank, alpha) = (vec![vec![0.0; inputs]; rows], vec![[0.0; OUTPUTS]; rows]);
+            let process = Process::remember(vec![1.0; inputs], 1.0, 1.0, blank, alpha);
+            Body::Process(
+                scaling,
+                process.expect("a matrix of noise alone is not singular"),
+            )
+        } else {
+            Body::Networks(scaling, networks(numbers, inputs, prismatic)?)
+        }
+    };
+    Ok(Correction {
+        body,
+        region: Region {
+            ranges: vec![nothing; sources],
+            jointly,
+        },
+        left: 0.0,
+    })
+}
+
+fn scaling(numbers: &Numbers, sources: usize) -> Result<NetworkScaling> {
+    let mut features = BTreeMap::new();
+    for (map, part) in MAPS {
+        for (_, to, from) in numbers.shared(part) {
+            let source = index(from, 1)?;
+            features.insert(to, Feature { source, map });
+        }
+    }
+    let features: Vec<Feature> = features.into_values().collect();
+    if features.is_empty() || features.iter().any(|feature| feature.source >= sources) {
+        return Err(fault("an input without a valid range"));
+    }
+    let nothing = Scaling {
+        mean: 0.0,
+        scale: 0.0,
+    };
+    Ok(NetworkScaling {
+        inputs: vec![nothing; features.len()],
+        outputs: [nothing; OUTPUTS],
+        features,
+    })
+}
+
+fn networks(numbers: &Numbers, inputs: usize, prismatic: &[bool]) -> Result<Networks> {
+    let activation = ACTIVATIONS.iter().find(|(_, name)| numbers.has(name));
+    let (activation, _) = activation.ok_or_else(|| fault("neither `sigmoid` nor `tanh`"))?;
+    let joints = numbers.has("joint_scale").then(|| JointMotion {
+        arm: arm(numbers),
+        scales: vec![0.0; numbers.count("slides")],
+    });
+    let outputs = joints
+        .as_ref()
+        .map_or(OUTPUTS, |motion| motion.scales.len());
+    if joints.is_some() && outputs != prismatic.len() {
+        return Err(fault(format!(
+            "motions of {}, of a robot that has {}",
+            counted(outputs, "joint"),
+            prismatic.len()
+        )));
+    }
+    let shape = LayerSizes {
+        inputs,
+        // The first member's biases are those of the hidden layer and of the outputs.
+        hidden: numbers.of_member(1, "bias").saturating_sub(outputs),
+        outputs,
+        activation: *activation,
+    };
+    let members = numbers.members("bias");
+    numbers.hold(members.saturating_mul(shape.parameters()))?;
+    Ok(Networks {
+        shape,
+        joints,
+        members: vec![vec![0.0; shape.parameters()]; members],
+    })
+}
+
+fn linear(numbers: &Numbers, sources: usize) -> Result<Linear> {
+    let arm = numbers.has("tool").then(|| arm(numbers));
+    let joints = arm
+        .as_ref()
+        .map_or(sources, |arm| arm.hinges.len().min(sources));
+    let within = |value: i64, count: usize| {
+        let found = index(value, 1)?;
+        let known = (found < count).then_some(found);
+        known.ok_or_else(|| fault(format!("no joint, body or axis {value}")))
+    };
+    let mut terms: BTreeMap<i64, BasisTerm> = BTreeMap::new();
+    for part in ["along", "turn", "shift", "tilt"] {
+        for (layer, to, from) in numbers.shared(part) {
+            let station = index(layer, 0)?;
+            if station > joints {
+                return Err(fault(format!("no station {station}")));
+            }
+            let way = match part {
+                "along" => OutputMotion::Along(within(from, 3)?),
+                "turn" => OutputMotion::Turn(within(from, joints)?),
+                "shift" => OutputMotion::Shift(station, within(from, 3)?),
+                _ => OutputMotion::Tilt(station, within(from, 3)?),
+            };
+            let waves = Vec::new();
+            terms.insert(to, BasisTerm { way, waves });
+        }
+    }
+    for part in ["sin", "cos", "value", "torque"] {
+        for (layer, to, from) in numbers.shared(part) {
+            let joint = within(from, joints)?;
+            let wave = match part {
+                "sin" => Wave::Sin(joint, index(layer, 0)?),
+                "cos" => Wave::Cos(joint, index(layer, 0)?),
+                "value" => Wave::Value(joint),
+                _ => Wave::Torque(joint, within(layer, joints)?),
+            };
+            let term = terms.get_mut(&to);
+            let term = term.ok_or_else(|| fault(format!("a wave of term {to}, which is none")))?;
+            term.waves.push(wave);
+        }
+    }
+    let terms: Vec<BasisTerm> = terms.into_values().collect();
+    let members = numbers.members("coefficient");
+    numbers.hold(members.saturating_mul(terms.len()))?;
+    Ok(Linear {
+        arm,
+        members: vec![vec![0.0; terms.len()]; members],
+        noise: 0.0,
+        terms,
+    })
+}
+
+fn arm(numbers: &Numbers) -> ScrewArm {
+    let nothing = Hinge {
+        axis: [0.0; 3],
+        point: [0.0; 3],
+        slides: false,
+    };
+    ScrewArm {
+        hinges: vec![nothing; numbers.count("slides")],
+        tool: [0.0; 3],
+        down: [0.0; 3],
     }
 }
 
-fn feature_unit(feature: Feature, prismatic: &[bool]) -> f64 {
-    if feature.map == Map::Value {
-        source_unit(feature.source, prismatic)
-    } else {
-        1.0
-    }
-}
+/// Layer, to, from.
+type Place = (i64, i64, i64);
 
-/// Shifts are stored in mm, turns in rad; per m of torque or travel where a wave is one.
-fn coefficient_unit(term: &BasisTerm) -> f64 {
-    if matches!(term.way, OutputMotion::Along(_) | OutputMotion::Shift(..)) {
-        MILLI
-    } else {
-        1.0
-    }
-}
-
-fn map_name(map: Map) -> &'static str {
-    match map {
-        Map::Value => "input_value",
-        Map::Sin => "input_sin",
-        Map::Cos => "input_cos",
-    }
-}
-
-fn activation_name(activation: Activation) -> &'static str {
-    match activation {
-        Activation::Sigmoid => "sigmoid",
-        Activation::Tanh => "tanh",
-    }
-}
-
-type NumberKey = (i64, i64, i64);
-
-/// Values by part, then by member, and layer, to, from.
-pub(super) struct Numbers<'a>(BTreeMap<&'a str, BTreeMap<i64, BTreeMap<NumberKey, f64>>>);
+/// Values by part and member.
+struct Numbers<'a>(BTreeMap<(&'a str, i64), BTreeMap<Place, f64>>);
 
 impl<'a> Numbers<'a> {
     /// Fails where a key stands twice.
-    pub fn new(rows: &'a [NetworkRow]) -> Result<Self> {
-        let mut parts: BTreeMap<&str, BTreeMap<i64, BTreeMap<NumberKey, f64>>> = BTreeMap::new();
+    fn new(rows: &'a [NetworkRow]) -> Result<Self> {
+        let mut parts: BTreeMap<(&str, i64), BTreeMap<Place, f64>> = BTreeMap::new();
         for row in rows {
-            let part = parts
-                .entry(&row.part)
-                .or_default()
-                .entry(row.member)
-                .or_default();
-            if part
-                .insert((row.layer, row.to, row.from), row.value)
-                .is_some()
-            {
-                let place = (row.layer, row.to, row.from);
-                return Err(Error::data(
-                    "network",
-                    format!(
-                        "`{}` {place:?} of member {} stands twice",
-                        row.part, row.member
-                    ),
-                ));
+            let place = (row.layer, row.to, row.from);
+            let part = parts.entry((&row.part, row.member)).or_default();
+            if part.insert(place, row.value).is_some() {
+                let (part, member) = (&row.part, row.member);
+                return Err(fault(format!(
+                    "`{part}` {place:?} of member {member} stands twice"
+                )));
             }
         }
         Ok(Self(parts))
     }
 
-    pub(crate) fn has(&self, part: &str) -> bool {
-        self.0.contains_key(part)
+    fn has(&self, part: &str) -> bool {
+        self.0.keys().any(|(name, _)| *name == part)
     }
 
-    /// Highest number of a member that has such a part.
-    pub(crate) fn members(&self, part: &str) -> usize {
-        let last = self
-            .0
-            .get(part)
-            .and_then(|members| members.keys().next_back().copied());
-        last.and_then(|last| usize::try_from(last).ok())
-            .unwrap_or(0)
+    /// How many members have such a part.
+    fn members(&self, part: &str) -> usize {
+        let members = self.0.keys().filter(|(name, _)| *name == part);
+        members.filter(|(_, member)| *member > 0).count()
     }
 
-    /// All shared rows of a part: layer, to, from and value.
-    pub fn all(&self, part: &str) -> impl Iterator<Item = (NumberKey, f64)> {
-        self.0
-            .get(part)
-            .and_then(|members| members.get(&0))
-            .into_iter()
-            .flatten()
-            .map(|(place, value)| (*place, *value))
+    /// Places of all shared rows of a part.
+    fn shared(&self, part: &str) -> Vec<Place> {
+        let places = self.0.get(&(part, 0)).into_iter().flatten();
+        places.map(|(place, _)| *place).collect()
     }
 
-    pub(crate) fn count(&self, part: &str) -> usize {
-        self.all(part).count()
+    /// Fails where so many numbers cannot be there: nothing is made room for that a table only claims.
+    fn hold(&self, count: usize) -> Result<()> {
+        let all: usize = self.0.values().map(BTreeMap::len).sum();
+        let missing = || fault(format!("{count} numbers are needed, {all} are there"));
+        (count <= all).then_some(()).ok_or_else(missing)
     }
 
-    /// Numbers of a part that the first member has.
-    pub(crate) fn first_member(&self, part: &str) -> usize {
-        self.0
-            .get(part)
-            .and_then(|members| members.get(&1))
-            .map_or(0, BTreeMap::len)
+    fn count(&self, part: &str) -> usize {
+        self.of_member(0, part)
+    }
+
+    /// How many numbers of a part a member has.
+    fn of_member(&self, member: i64, part: &str) -> usize {
+        self.0.get(&(part, member)).map_or(0, BTreeMap::len)
     }
 
     /// A number; fails where it is missing.
-    pub fn of(&self, member: usize, part: &str, [layer, to, from]: [usize; 3]) -> Result<f64> {
+    fn of(&self, (member, part, [layer, to, from]): Key) -> Result<f64> {
         let place = (layer as i64, to as i64, from as i64);
-        let found = self
-            .0
-            .get(part)
-            .and_then(|members| members.get(&(member as i64))?.get(&place));
-        found.copied().ok_or_else(|| {
-            Error::data(
-                "network",
-                format!("no `{part}` {place:?} of member {member}"),
-            )
-        })
-    }
-
-    /// A shared number of entry `to`.
-    pub(crate) fn shared(&self, part: &str, to: usize) -> Result<f64> {
-        self.of(0, part, [0, to, 0])
-    }
-
-    /// Shared numbers of entry `to`, `from` 1 to `N`.
-    pub(crate) fn row<const N: usize>(&self, part: &str, to: usize) -> Result<[f64; N]> {
-        let mut values = [0.0; N];
-        for (k, value) in values.iter_mut().enumerate() {
-            *value = self.of(0, part, [0, to, k + 1])?;
-        }
-        Ok(values)
+        let numbers = self.0.get(&(part, member as i64));
+        let found = numbers.and_then(|numbers| numbers.get(&place));
+        found
+            .copied()
+            .ok_or_else(|| fault(format!("no `{part}` {place:?} of member {member}")))
     }
 }
 
 /// A number of the table that counts from `least`, from 0; fails below.
-pub(super) fn index(value: i64, least: i64) -> Result<usize> {
-    usize::try_from(value - least)
-        .map_err(|_| Error::data("network", format!("{value} counts from {least}")))
+fn index(value: i64, least: i64) -> Result<usize> {
+    usize::try_from(value - least).map_err(|_| fault(format!("{value} counts from {least}")))
 }

@@ -127,6 +127,11 @@ fn fixed(value: f64, decimals: usize) -> String {
 
 /// robot.json: mm, kg, Nm/A, joints from 0. Fails with what of the robot this layout cannot state.
 pub fn robot(robot: &RobotDescription) -> Result<String, String> {
+    Ok(format!("{:#}\n", robot_json(robot)?))
+}
+
+/// The same as a document, to which more may be added.
+pub(crate) fn robot_json(robot: &RobotDescription) -> Result<Value, String> {
     let joints = &robot.joints;
     if let Some(number) = joints
         .iter()
@@ -185,5 +190,5 @@ pub fn robot(robot: &RobotDescription) -> Result<String, String> {
             .map(|joint| joint.motor_constant.map(|constant| json!(constant)))
             .collect(),
     );
-    Ok(format!("{out:#}\n"))
+    Ok(out)
 }

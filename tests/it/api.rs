@@ -1,6 +1,7 @@
 //! calib from arrays: to the last digit what a pipeline gives for the same numbers in a file.
 
-use crate::compensate::{ROBOT, calib, cell};
+use crate::answer::{calib, ends_with, fed, has, put, starts_with};
+use crate::compensate::{ROBOT, cell};
 use calib::api::{CalibRun, Options, Poses, Recording, Robot, Sigma, diagnose, identify};
 use calib::error::{Error, Result};
 use calib::pipeline::StageTables;
@@ -36,18 +37,18 @@ stages:
 ";
 
 fn robot() -> Robot {
-    Robot::from_text("robot.yaml", ROBOT).expect("a robot")
+    Robot::from_text("robot.yaml", ROBOT).unwrap()
 }
 
 fn run(folder: &Path) -> CalibRun {
-    let store = Store::open(folder.join(".calib")).expect("a store");
-    CalibRun::open(store, "HEAD").expect("a run")
+    let store = Store::open(folder.join(".calib")).unwrap();
+    CalibRun::open(store, "HEAD").unwrap()
 }
 
 /// The recording of the cell that all tests share, as arrays.
 fn arrays() -> Recording {
-    let frame = run(cell()).table("recording").expect("a table");
-    let table = RecordingTable::from_frame(&frame).expect("a recording");
+    let frame = run(cell()).table("recording").unwrap();
+    let table = RecordingTable::from_frame(&frame).unwrap();
     let rows = table.rows() as u32;
     let temperature = (0..rows).map(|row| 21.0 + f64::from(row) / 7.0).collect();
     Recording {
@@ -67,7 +68,7 @@ fn arrays() -> Recording {
 
 #[test]
 fn arrays_give_to_the_last_digit_what_a_pipeline_gives_for_the_same_numbers_in_a_file() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let recording = arrays();
     let mut csv = "q1,q2,q3,q4,q5,q6,x,y,z,temp\n".to_string();
     let temperature = &recording.poses.columns["temp_c"];
@@ -79,34 +80,33 @@ fn arrays_give_to_the_last_digit_what_a_pipeline_gives_for_the_same_numbers_in_a
     for ((q, point), temperature) in rows.zip(temperature) {
         q.iter()
             .chain(point)
-            .for_each(|value| write!(csv, "{value},").expect("a text"));
-        writeln!(csv, "{temperature}").expect("a text");
+            .for_each(|value| write!(csv, "{value},").unwrap());
+        writeln!(csv, "{temperature}").unwrap();
     }
     for (name, text) in [
         ("robot.yaml", ROBOT),
         ("pipeline.yaml", PIPELINE),
         ("measured.csv", &csv),
     ] {
-        std::fs::write(folder.path().join(name), text).expect("a file");
+        put(folder.path(), name, text);
     }
-    let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{stderr}");
+    let output = calib(folder.path(), "run pipeline.yaml --quiet");
+    let stderr = output.err;
+    assert!(output.code == Some(0), "{stderr}");
     let run = run(folder.path());
-    let identified = identify(&robot(), &recording, &Options::with(json!({}))).expect("a model");
-    let diagnosed = diagnose(&robot(), &recording, &Options::with(json!({}))).expect("a diagnosis");
+    let identified = identify(&robot(), &recording, &Options::with(json!({}))).unwrap();
+    let diagnosed = diagnose(&robot(), &recording, &Options::with(json!({}))).unwrap();
     let same = |stage: &str, given: &StageTables| {
         for (port, frame) in &given.tables {
-            let stored = run.table(&format!("{stage}.{port}")).expect("a table");
+            let stored = run.table(&format!("{stage}.{port}")).unwrap();
             assert_eq!(&stored, frame, "{stage}.{port}");
         }
     };
     same("identify", &identified.given);
     same("diagnose", &diagnosed.given);
-    let stored = run.table("identify.prediction").expect("a table");
-    let [x, y, z] =
-        ["x_mm", "y_mm", "z_mm"].map(|name| stored.read::<f64>(name).expect("a column"));
-    let predicted = identified.model.predict(&recording.poses).expect("points");
+    let stored = run.table("identify.prediction").unwrap();
+    let [x, y, z] = ["x_mm", "y_mm", "z_mm"].map(|name| stored.read::<f64>(name).unwrap());
+    let predicted = identified.model.predict(&recording.poses).unwrap();
     for (row, point) in predicted.iter().enumerate() {
         let off =
             |(axis, value_mm): (usize, &f64)| (value_mm - [x[row], y[row], z[row]][axis]).abs();
@@ -136,15 +136,13 @@ fn arrays_that_are_no_recording_are_refused_with_row_and_what_is_allowed() {
             .iter_mut()
             .for_each(|q| *q = q.to_degrees())
     });
-    assert!(
-        degrees.starts_with("joints, row 0: `joints` is declared in rad, but 8"),
-        "{degrees}"
+    starts_with(
+        &degrees,
+        "joints, row 0: `joints` is declared in rad, but 8",
     );
-    assert!(
-        degrees.ends_with(
-            "allowed: up to 9.42 rad; if the array holds degrees, convert it to radians"
-        ),
-        "{degrees}"
+    ends_with(
+        &degrees,
+        "allowed: up to 9.42 rad; if the array holds degrees, convert it to radians",
     );
     let faults = [
         with(&|one| one.poses.joints_rad[14] = f64::NAN),
@@ -175,27 +173,25 @@ fn arrays_that_are_no_recording_are_refused_with_row_and_what_is_allowed() {
         "NAME: no arm `ur5ee` in the library; did you mean `ur5e`?",
     ];
     for (fault, start) in faults.iter().zip(starts) {
-        assert!(fault.starts_with(start), "{fault}");
+        starts_with(fault, start);
     }
 }
 
-fn served(arguments: &[&str], input: &str) -> Vec<Value> {
-    let arguments = [&["serve-model", "HEAD", "--quiet"], arguments].concat();
-    let output = calib(cell(), &arguments, input);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    let text = String::from_utf8(output.stdout).expect("a text");
+fn served(arguments: &str, input: &str) -> Vec<Value> {
+    let text = fed(
+        cell(),
+        &format!("serve-model HEAD --quiet {arguments}"),
+        input,
+    )
+    .ok();
     text.lines()
-        .map(|line| serde_json::from_str(line).expect("a line of JSON"))
+        .map(|line| serde_json::from_str(line).unwrap())
         .collect()
 }
 
 #[test]
 fn a_served_model_answers_every_line_with_what_the_library_computes() {
-    let model = run(cell()).model(None).expect("a model");
+    let model = run(cell()).model(None).unwrap();
     let poses = Poses {
         joints_rad: vec![
             0.3, 0.2, -0.4, 0.5, 0.8, -1.0, 0.1, -0.3, 0.4, 0.2, -0.6, 1.1,
@@ -208,8 +204,8 @@ fn a_served_model_answers_every_line_with_what_the_library_computes() {
         json!(first),
         json!({ "joints_rad": second, "id": "b" })
     );
-    let commands = model.compensate(&poses, false).expect("commands");
-    let answers = served(&[], &input);
+    let commands = model.compensate(&poses, false).unwrap();
+    let answers = served("", &input);
     assert_eq!(answers.len(), 3);
     assert_eq!(answers[0]["joints_rad"], json!(commands.joints_rad[..6]));
     assert_eq!(answers[2]["joints_rad"], json!(commands.joints_rad[6..]));
@@ -218,16 +214,16 @@ fn a_served_model_answers_every_line_with_what_the_library_computes() {
         answers[1]["error"],
         "line 2: joints_rad: 2 numbers; the robot has 6 joints"
     );
-    let points = model.predict(&poses).expect("points");
-    let answers = served(&["--predict"], &input);
+    let points = model.predict(&poses).unwrap();
+    let answers = served("--predict", &input);
     for (answer, point) in [&answers[0], &answers[2]].into_iter().zip(points) {
         for (axis, value) in point.iter().enumerate() {
-            let value_mm = answer["point_mm"][axis].as_f64().expect("a number");
+            let value_mm = answer["point_mm"][axis].as_f64().unwrap();
             assert!((value_mm - value).abs() < 1e-9, "{value_mm} {value}");
         }
     }
     // No row was measured with joint 1 turned by 170 degrees.
-    let far = served(&["--predict"], "[2.97, 0.2, -0.4, 0.5, 0.8, -1.0]\n");
-    let remark = far[0]["remark"].as_str().expect("a remark");
-    assert!(remark.contains("joint 1"), "{remark}");
+    let far = served("--predict", "[2.97, 0.2, -0.4, 0.5, 0.8, -1.0]\n");
+    let remark = far[0]["remark"].as_str().unwrap();
+    has(remark, "joint 1");
 }

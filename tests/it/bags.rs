@@ -2,7 +2,7 @@
 
 mod write;
 
-use crate::compensate::calib;
+use crate::answer::{calib, has, put};
 use calib::error::Result;
 use calib::raw::{BagRows, InputSource, Record, RecordFault, RecordReader, source};
 use calib::table::{Intake, Recording, Rejected, from_file};
@@ -137,9 +137,9 @@ fn transforms_are_read_by_their_frames() {
         let answer = rows_of(Box::new(Cursor::new(bag)), None)
             .unwrap_err()
             .to_string();
-        assert!(
-            answer.contains("`topic: NAME`; allowed: `/tf base->tool0`, `/tf map->base`"),
-            "{answer}"
+        has(
+            &answer,
+            "`topic: NAME`; allowed: `/tf base->tool0`, `/tf map->base`",
         );
     }
 }
@@ -160,24 +160,22 @@ fn a_topic_that_is_not_there_or_not_read_is_named_with_those_that_are() {
                 .to_string()
         };
         let answer = refused("/joint_state");
-        assert!(
-            answer.contains("no messages of a topic `/joint_state`; allowed: `/joint_states`; of other types: `/plan`"),
-            "{answer}"
+        has(
+            &answer,
+            "no messages of a topic `/joint_state`; allowed: `/joint_states`; of other types: `/plan`",
         );
         let answer = refused("/plan");
-        assert!(
-            answer.contains(
-                "holds trajectory_msgs/msg/JointTrajectory, which is not read; allowed: sensor_msgs"
-            ),
-            "{answer}"
+        has(
+            &answer,
+            "holds trajectory_msgs/msg/JointTrajectory, which is not read; allowed: sensor_msgs",
         );
     }
     let answer = rows_of(Box::new(Cursor::new(db3(&messages[3..]))), None)
         .unwrap_err()
         .to_string();
-    assert!(
-        answer.contains("has no topic that is read; none of its topics is read"),
-        "{answer}"
+    has(
+        &answer,
+        "has no topic that is read; none of its topics is read",
     );
 }
 
@@ -203,8 +201,8 @@ fn a_bag_that_is_cut_gives_its_beginning_and_says_that_the_rest_is_lost() {
                 found.len(),
                 all.len()
             );
-            let loss = loss.expect("a loss");
-            assert!(loss.contains("lost") && loss.contains("cut"), "{loss}");
+            let loss = loss.unwrap();
+            has(&loss, ["lost", "cut"]);
             before = found.len();
         }
     }
@@ -267,17 +265,13 @@ fn a_folder_of_parts_is_one_recording_in_the_order_of_their_numbers() {
             };
             // One recorder was stopped by force.
             let end = if part == 4 { bag.len() / 2 } else { bag.len() };
-            std::fs::write(
-                folder.path().join(format!("run_{part}.{kind}")),
-                &bag[..end],
-            )
-            .unwrap();
+            put(folder.path(), format!("run_{part}.{kind}"), &bag[..end]);
         }
-        std::fs::write(
-            folder.path().join("metadata.yaml"),
+        put(
+            folder.path(),
+            "metadata.yaml",
             "rosbag2_bagfile_information: {}\n",
-        )
-        .unwrap();
+        );
         let (names, found, loss) = rows_of(source(folder.path()).unwrap(), None).unwrap();
         let x = names
             .iter()
@@ -303,10 +297,10 @@ fn run(here: &Path, pipeline: &str) -> (Recording, Rejected, Intake, String) {
     )
     .unwrap();
     let head = "calib: 1\nname: p\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml}\n  - uses: ingest\n    with:\n";
-    std::fs::write(here.join("p.yaml"), format!("{head}{pipeline}")).unwrap();
-    let output = calib(here, &["run", "p.yaml", "--store", "s"], "");
-    let answer = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{answer}");
+    put(here, "p.yaml", format!("{head}{pipeline}"));
+    let output = calib(here, "run p.yaml --store s");
+    let answer = output.err.clone();
+    assert!(output.code == Some(0), "{answer}");
     let at = |name: &str| {
         here.join("s/tables/p")
             .join(format!("ingest.{name}.parquet"))
@@ -377,11 +371,11 @@ fn each_message_that_is_not_used_has_its_reason() {
         )
     }));
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(
-        folder.path().join("run.mcap"),
+    put(
+        folder.path(),
+        "run.mcap",
         mcap(Some(Compression::Lz4), &messages),
-    )
-    .unwrap();
+    );
     let (recording, rejected, intake, _) = run(folder.path(), POSES);
     assert_eq!(recording.rows(), 20);
     let reasons: Vec<(&str, i64)> = rejected
@@ -441,17 +435,17 @@ fn a_folder_of_parts_is_run_as_one_file_and_a_part_that_changed_is_read_again() 
     let parts = folder.path().join("run");
     std::fs::create_dir(&parts).unwrap();
     for (part, messages) in messages.chunks(8).enumerate() {
-        std::fs::write(
-            parts.join(format!("run_{part}.mcap")),
+        put(
+            &parts,
+            format!("run_{part}.mcap"),
             mcap(Some(Compression::Zstd), messages),
-        )
-        .unwrap();
+        );
     }
     let pipeline = POSES.replace("run.mcap", "run");
     let (recording, _, intake, _) = run(folder.path(), &pipeline);
     assert_eq!((recording.rows(), intake.0[0].read), (40, 40));
     let (.., answer) = run(folder.path(), &pipeline);
-    assert!(answer.contains("ingest  cached"), "{answer}");
+    has(&answer, "ingest  cached");
     let last = parts.join("run_9.mcap");
     std::fs::write(&last, &std::fs::read(&last).unwrap()[..300]).unwrap();
     let (recording, .., answer) = run(folder.path(), &pipeline);
@@ -460,11 +454,11 @@ fn a_folder_of_parts_is_run_as_one_file_and_a_part_that_changed_is_read_again() 
         "{answer}"
     );
     // Two kinds of parts are no recording, nor is a folder of anything else.
-    std::fs::write(parts.join("run_3.db3"), db3(&messages[..8])).unwrap();
-    let output = calib(folder.path(), &["check", "p.yaml"], "");
-    let answer = String::from_utf8_lossy(&output.stderr);
+    put(&parts, "run_3.db3", db3(&messages[..8]));
+    let output = calib(folder.path(), "check p.yaml");
+    let answer = output.err;
     assert!(
-        output.status.code() == Some(2) && answer.contains("all .mcap or all .db3"),
+        output.code == Some(2) && answer.contains("all .mcap or all .db3"),
         "{answer}"
     );
 }
@@ -498,7 +492,7 @@ fn two_robots_in_one_topic_are_told_by_their_joints() {
         )
     }));
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("run.mcap"), mcap(None, &messages)).unwrap();
+    put(folder.path(), "run.mcap", mcap(None, &messages));
     let (recording, rejected, intake, _) = run(folder.path(), POSES);
     assert_eq!(
         (recording.rows(), rejected.0.len(), intake.0[0].read),
@@ -535,19 +529,17 @@ fn init_reads_a_bag_and_its_pipeline_runs() {
     ] {
         let here = folder.path().join(name.replace('.', "_"));
         std::fs::create_dir(&here).unwrap();
-        std::fs::write(here.join(name), bag).unwrap();
-        let output = calib(&here, &["init", "--robot", "ur10", "--data", name], "");
-        let answer = String::from_utf8_lossy(&output.stdout);
-        assert!(output.status.success(), "{answer}");
-        assert!(
-            answer.contains(
-                "topic `/image`: sensor_msgs/msg/Image, 1 message; this type is not read"
-            ),
-            "{answer}"
+        put(&here, name, bag);
+        let output = calib(&here, &format!("init --robot ur10 --data {name}"));
+        let answer = output.out;
+        assert!(output.code == Some(0), "{answer}");
+        has(
+            &answer,
+            "topic `/image`: sensor_msgs/msg/Image, 1 message; this type is not read",
         );
-        assert!(
-            answer.contains("topic `/reflector`: geometry_msgs/msg/PointStamped, 60 messages, 2.0000 Hz, longest gap 0.5000 s"),
-            "{answer}"
+        has(
+            &answer,
+            "topic `/reflector`: geometry_msgs/msg/PointStamped, 60 messages, 2.0000 Hz, longest gap 0.5000 s",
         );
         let pipeline = std::fs::read_to_string(here.join("pipeline.yaml")).unwrap();
         for line in [
@@ -558,16 +550,7 @@ fn init_reads_a_bag_and_its_pipeline_runs() {
         ] {
             assert!(pipeline.contains(line), "{line} in\n{pipeline}");
         }
-        let output = calib(
-            &here,
-            &["run", "pipeline.yaml", "--until", "ingest", "--store", "s"],
-            "",
-        );
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        calib(&here, "run pipeline.yaml --until ingest --store s").code(0);
         let recordings = glob::glob(
             here.join("s/tables/*/ingest.recording.parquet")
                 .to_str()

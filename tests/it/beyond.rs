@@ -280,7 +280,7 @@ fn warm_air_stretches_ranges_after_the_arm_has_settled() {
         Physical::TrackerRefraction(air),
     ];
     let warm = moves(&[0.0; 5]);
-    let memory = recall(&effects, &warm).pop().expect("a row");
+    let memory = recall(&effects, &warm).pop().unwrap();
     let row = row(&[0.0; 5], memory);
     let rest: Equilibrium = settle(&arm, &row, &effects);
     let seen = sighted(&rest, &IDENTITY, &row, &effects);
@@ -329,8 +329,8 @@ fn beyond_the_library_every_family_is_plain_in_both_forms() {
                 collection,
                 ..Design::default()
             };
-            let case = Case::make(&design, row, Content::Single(row)).expect("a case");
-            let first = case.concealed.first().expect("an effect");
+            let case = Case::make(&design, row, Content::Single(row)).unwrap();
+            let first = case.concealed.first().unwrap();
             let name = format!("{} ({}, {})", family.name, first.form, case.kind.name());
             assert!(
                 first.cause.effect == family.name && case.want().len() == 1,
@@ -360,7 +360,7 @@ fn beyond_the_library_arms_have_five_joints_too_and_come_from_near_by() {
     let contents = design.contents();
     let rows: std::collections::BTreeSet<_> = contents.iter().collect();
     assert_eq!(rows.len(), BEYOND.len(), "each family in turn");
-    let case = Case::make(&design, 3, contents[3]).expect("a case");
+    let case = Case::make(&design, 3, contents[3]).unwrap();
     assert_eq!(case.robot.joints.len(), 5);
     assert!(case.recording().is_ok() && case.climate.swing_k > 0.0);
     let far = |pair: &[calib::twin::recorder::Shot]| {
@@ -401,7 +401,7 @@ fn the_librarys_recordings_are_those_of_before() {
         let cases = contents
             .iter()
             .enumerate()
-            .map(|(number, content)| Case::make(&design, number, *content).expect("a case"));
+            .map(|(number, content)| Case::make(&design, number, *content).unwrap());
         let line = |case: Case| {
             let causes = case.concealed.iter();
             let causes: Vec<String> = causes

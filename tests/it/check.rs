@@ -1,6 +1,6 @@
 //! `check` reads what it reports on: the robot file, the headers of the data files, and the marks that `init` left.
 
-use crate::compensate::calib;
+use crate::answer::{calib, has, put};
 
 const ROBOT: &str = "calib_robot: 1
 name: arm
@@ -35,26 +35,21 @@ stages:
 
 /// Exit code, stdout and stderr of `check` with these files.
 fn checked(robot: &str, pipeline: &str, arm: &str, points: &str) -> (i32, String, String) {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     for (name, text) in [
         ("robot.yaml", robot),
         ("pipeline.yaml", pipeline),
         ("arm.csv", arm),
         ("points.csv", points),
     ] {
-        std::fs::write(folder.path().join(name), text).expect("a file");
+        put(folder.path(), name, text);
     }
-    let output = calib(folder.path(), &["check", "pipeline.yaml"], "");
+    let output = calib(folder.path(), "check pipeline.yaml");
     assert!(
         !folder.path().join(".calib").exists(),
         "check writes nothing"
     );
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
-    (
-        output.status.code().expect("a code"),
-        text(output.stdout),
-        text(output.stderr),
-    )
+    (output.code.unwrap(), output.out, output.err)
 }
 
 const ARM: &str = "id,q1,q2\nA,1,2\n";
@@ -71,31 +66,27 @@ fn a_sound_pipeline_is_ready_and_shows_its_graph_on_demand() {
             "ready     2 stages can run: calib run pipeline.yaml\n"
         )
     );
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     for (name, text) in [
         ("robot.yaml", ROBOT),
         ("pipeline.yaml", PIPELINE),
         ("arm.csv", ARM),
         ("points.csv", POINTS),
     ] {
-        std::fs::write(folder.path().join(name), text).expect("a file");
+        put(folder.path(), name, text);
     }
-    let out = calib(folder.path(), &["check", "pipeline.yaml", "--details"], "").stdout;
-    let out = String::from_utf8_lossy(&out).into_owned();
-    assert!(out.contains("reads   robot  <- robot.robot"), "{out}");
+    let out = calib(folder.path(), "check pipeline.yaml --details").out;
+    has(&out, "reads   robot  <- robot.robot");
 }
 
 #[test]
 fn a_broken_robot_file_is_a_fault_with_its_place() {
     let (code, _, err) = checked(&ROBOT.replace("tool:", "tol:"), PIPELINE, ARM, POINTS);
     assert_eq!(code, 2, "{err}");
-    assert!(
-        err.contains("robot.yaml:8") && err.contains("did you mean `tool`"),
-        "{err}"
-    );
+    has(&err, ["robot.yaml:8", "did you mean `tool`"]);
     let (code, _, err) = checked("\0 {no YAML: [", PIPELINE, ARM, POINTS);
     assert_eq!(code, 2, "{err}");
-    assert!(err.contains("robot.yaml:1"), "{err}");
+    has(&err, "robot.yaml:1");
 }
 
 #[test]
@@ -104,10 +95,7 @@ fn faults_of_the_yaml_and_of_the_robot_file_are_told_in_one_pass() {
     assert_ne!(pipeline, PIPELINE);
     let (code, _, err) = checked(&ROBOT.replace("tool:", "tol:"), &pipeline, ARM, POINTS);
     assert_eq!(code, 2, "{err}");
-    assert!(
-        err.contains("did you mean `tool`") && err.contains("did you mean `split`"),
-        "{err}"
-    );
+    has(&err, ["did you mean `tool`", "did you mean `split`"]);
 }
 
 #[test]
@@ -129,10 +117,7 @@ fn columns_that_are_not_there_are_named_with_the_nearest_all_at_once() {
         "id,x,y,Z\n",
     );
     assert_eq!(code, 2, "the robot's fault decides: {err}");
-    assert!(
-        err.contains("robot.yaml:7") && err.contains("points.csv:1: no column `z`"),
-        "{err}"
-    );
+    has(&err, ["robot.yaml:7", "points.csv:1: no column `z`"]);
     let (code, _, err) = checked(ROBOT, PIPELINE, "", POINTS);
     assert_eq!(
         (code, err.as_str()),
@@ -166,8 +151,8 @@ fn lines_that_init_marked_are_listed_and_are_no_faults() {
 
 /// Exit code and stderr of a command on the pipeline, with a good robot and data of two days.
 fn told(command: &str, pipeline: &str, tuesday: &str) -> (i32, String) {
-    let folder = tempfile::tempdir().expect("a folder");
-    std::fs::create_dir(folder.path().join("tue")).expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("tue")).unwrap();
     let files = [
         ("robot.yaml", ROBOT),
         ("pipeline.yaml", pipeline),
@@ -178,13 +163,10 @@ fn told(command: &str, pipeline: &str, tuesday: &str) -> (i32, String) {
         .into_iter()
         .chain([("tue/arm.csv", ARM), ("tue/points.csv", tuesday)])
     {
-        std::fs::write(folder.path().join(name), text).expect("a file");
+        put(folder.path(), name, text);
     }
-    let output = calib(folder.path(), &[command, "pipeline.yaml"], "");
-    (
-        output.status.code().expect("a code"),
-        String::from_utf8(output.stderr).expect("UTF-8"),
-    )
+    let output = calib(folder.path(), &[command, "pipeline.yaml"]);
+    (output.code.unwrap(), output.err)
 }
 
 #[test]
@@ -271,11 +253,9 @@ fn a_name_that_is_too_long_says_how_long_it_may_be() {
         code == 2 && err.contains(&format!("name: `{name}`: 65 letters; allowed: up to 64")),
         "{err}"
     );
-    assert!(
-        err.contains(&format!(
-            "stages[0].id: `{id}`: 70 letters; allowed: up to 64"
-        )),
-        "{err}"
+    has(
+        &err,
+        &format!("stages[0].id: `{id}`: 70 letters; allowed: up to 64"),
     );
 }
 
@@ -288,7 +268,7 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
         let (s, c) = q[0].to_radians().sin_cos();
         let (t, d) = q[1].to_radians().sin_cos();
         let (along, up) = (800.0 * d, 400.0 - 800.0 * t);
-        writeln!(arm, "P{k},{},{}", q[0], q[1]).expect("text");
+        writeln!(arm, "P{k},{},{}", q[0], q[1]).unwrap();
         // The last five were measured under other names.
         let name = if k < 35 {
             format!("P{k}")
@@ -302,9 +282,9 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
             along * s + 50.0 * c,
             up
         )
-        .expect("text");
+        .unwrap();
     }
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let fits = "  - uses: split\n    with: {by: every, n: 4}\n  - id: nominal\n    uses: identify\n    with: {effects: [base_frame]}\n\
                 \x20 - id: geometry\n    uses: identify\n    with: {effects: [base_frame, tool_offset, joint_offset, link_geometry]}\n";
     let pipeline = format!("{PIPELINE}{fits}");
@@ -314,20 +294,11 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
         ("arm.csv", &arm),
         ("points.csv", &points),
     ] {
-        std::fs::write(folder.path().join(name), text).expect("a file");
+        put(folder.path(), name, text);
     }
-    let output = calib(
-        folder.path(),
-        &["check", "pipeline.yaml", "--data", "--store", "kept"],
-        "",
-    );
-    let out = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{out}{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    let output = calib(folder.path(), "check pipeline.yaml --data --store kept");
+    let out = output.out.clone();
+    assert_eq!(output.code, Some(0), "{out}{}", output.err);
     for part in [
         "rows      35 used, of 35 points\n",
         "ranges    J1 -60.0 deg to 53.0 deg\n",
@@ -339,30 +310,20 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
         assert!(out.contains(part), "{part} in\n{out}");
     }
     assert!(folder.path().join("kept").exists() && !folder.path().join(".calib").exists());
-    let run = calib(
-        folder.path(),
-        &["run", "pipeline.yaml", "--store", "kept"],
-        "",
-    );
-    let told = String::from_utf8_lossy(&run.stderr).into_owned();
-    assert!(told.contains("geometry  cached"), "{told}");
+    let run = calib(folder.path(), "run pipeline.yaml --store kept");
+    let told = run.err.clone();
+    has(&told, "geometry  cached");
     let diagnosed =
         format!("{PIPELINE}  - uses: split\n    with: {{by: every, n: 4}}\n  - uses: diagnose\n");
-    std::fs::write(folder.path().join("diagnosed.yaml"), diagnosed).expect("a file");
+    put(folder.path(), "diagnosed.yaml", diagnosed);
     assert_eq!(
-        calib(
-            folder.path(),
-            &["run", "diagnosed.yaml", "--store", "kept"],
-            ""
-        )
-        .status
-        .code(),
+        calib(folder.path(), "run diagnosed.yaml --store kept").code,
         Some(0)
     );
     for what in ["diagnosed.yaml", "HEAD"] {
-        let output = calib(folder.path(), &["diagnose", what, "--store", "kept"], "");
-        let out = String::from_utf8_lossy(&output.stdout).into_owned();
-        let told = String::from_utf8_lossy(&output.stderr);
+        let output = calib(folder.path(), &format!("diagnose {what} --store kept"));
+        let out = output.out.clone();
+        let told = output.err;
         assert!(
             out.contains("rejected  10 rows, each with its reason in kept/tables/"),
             "{out}{told}"

@@ -2,6 +2,7 @@
 //!
 //! `CALIB_UPDATE=1 cargo test --test it columns` writes the fields that `schemas/recording.json` lacks.
 
+use crate::answer::{self, put, read, root};
 use crate::fixture::{poses, spread};
 use crate::identify::normal;
 use crate::twin::sr210d;
@@ -10,8 +11,6 @@ use calib::robot::RobotModel;
 use calib::spatial::{Pose, Twist};
 use calib::table::{Recording, from_file, recording_columns};
 use serde_json::{Value, json};
-use std::path::Path;
-use std::process::Command;
 
 /// Fields that the recording's schema must have for a column: name, unit, and range in that unit.
 fn fields(column: &DeclaredColumn) -> Vec<Value> {
@@ -51,7 +50,7 @@ fn line(field: &Value, about: &str) -> String {
                 "0.001"
             };
             let [least, most] =
-                ["min", "max"].map(|end| field["constraints"][end].as_f64().expect("a number"));
+                ["min", "max"].map(|end| field["constraints"][end].as_f64().unwrap());
             format!(
                 "\"constraints\": {{\"min\": {least}, \"max\": {most}}}, \"diff\": {{\"atol\": {close}}}, "
             )
@@ -69,8 +68,8 @@ fn line(field: &Value, about: &str) -> String {
 
 #[test]
 fn every_declared_column_is_stored() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/recording.json");
-    let text = std::fs::read_to_string(&path).unwrap();
+    let path = root("schemas/recording.json");
+    let text = read(&path);
     let schema: Value = serde_json::from_str(&text).unwrap();
     let stored = schema["fields"].as_array().unwrap();
     let mut missing = Vec::new();
@@ -125,39 +124,24 @@ fn recording() -> String {
 fn a_circumstance_that_is_declared_in_one_line_is_a_law_of_a_users_own_effect() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("recording.csv"), recording()).unwrap();
-    std::fs::write(
-        here.join("robot.yaml"),
-        std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml"))
-            .unwrap(),
-    )
-    .unwrap();
+    put(here, "recording.csv", recording());
+    put(
+        here,
+        "robot.yaml",
+        std::fs::read(root("pipelines/sr210d/robot.yaml")).unwrap(),
+    );
     let effect = "calib_effect: 1\nname: swelling\nplace: joint\nmotion: angle\nlaw: humidity - 50\nunit: arcsec\nsize: 1\nper: percent\n\
                   sentence: \"{place} follows the humidity: {value}\"\n";
-    std::fs::write(here.join("swelling.yaml"), effect).unwrap();
+    put(here, "swelling.yaml", effect);
     let pipeline = "calib: 1\nname: humid\nseed: 1\nstages:\n  - {uses: robot, with: {file: robot.yaml}}\n  - uses: ingest\n    with:\n      \
                     files: [{file: recording.csv, columns: {q: {column: \"q{j}\", unit: rad}, humidity: {column: rh}, x: {column: x, unit: m}, \
                     y: {column: y, unit: m}, z: {column: z, unit: m}}}]\n      instrument: {constant_um: 20, per_metre_um: 0, coverage: 1}\n  \
                     - {uses: split, with: {by: every, n: 5}}\n  - {uses: diagnose, with: {effects: [swelling.yaml]}}\n";
-    std::fs::write(here.join("p.yaml"), pipeline).unwrap();
-    let calib = |arguments: &[&str]| {
-        let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-            .args(arguments)
-            .current_dir(here)
-            .output()
-            .unwrap();
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        String::from_utf8(output.stdout).unwrap()
-    };
-    calib(&["run", "p.yaml", "--quiet", "--store", "s"]);
-    let said: Value = serde_json::from_str(&calib(&[
-        "diagnose", "p.yaml", "--json", "--quiet", "--store", "s",
-    ]))
-    .unwrap();
+    put(here, "p.yaml", pipeline);
+    let calib = |words: &str| answer::calib(here, words).ok();
+    calib("run p.yaml --quiet --store s");
+    let said: Value =
+        serde_json::from_str(&calib("diagnose p.yaml --json --quiet --store s")).unwrap();
     let findings = said["findings"].as_array().unwrap();
     let named: Vec<[&Value; 2]> = findings
         .iter()

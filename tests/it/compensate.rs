@@ -14,15 +14,16 @@ mod round_trip;
 mod sides;
 mod standing;
 mod stated;
-mod true_error;
+pub mod true_error;
 mod within;
 
+use crate::answer::{self, ends_with, fed, has, put, read, starts_with};
 use calib::compensate::{Chain, Nominal, SETTLED, ToolGoal, inverse, least_change};
 use calib::robot::RobotModel;
 use calib::twin::conceal::robots::Kind;
 use nalgebra::Vector3;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
 use std::sync::OnceLock;
 
 #[test]
@@ -38,7 +39,7 @@ fn a_cartesian_pose_is_found_and_reached_within_the_limits() {
     assert!((placed.translation - wanted.pose.translation).norm() < 1e-9);
     assert!((placed.rotation - wanted.pose.rotation).norm() < 1e-9);
     for (joint, q) in robot.description().joints.iter().zip(&found) {
-        let [lower, upper] = joint.limits.expect("limits");
+        let [lower, upper] = joint.limits.unwrap();
         assert!((lower..=upper).contains(q));
     }
 }
@@ -75,7 +76,7 @@ fn a_redundant_arm_moves_its_joints_no_more_than_needed() {
         .clone()
         .svd(true, true)
         .solve(&(&jacobian * nalgebra::DVector::from_vec(change)), 1e-12)
-        .expect("a solution");
+        .unwrap();
     assert!((solved.norm_squared() / length - 1.0).abs() < 1e-6);
 }
 
@@ -121,51 +122,25 @@ stages:
 pub fn cell() -> &'static Path {
     static CELL: OnceLock<tempfile::TempDir> = OnceLock::new();
     let folder = CELL.get_or_init(|| {
-        let folder = tempfile::tempdir().expect("a folder");
-        std::fs::write(folder.path().join("robot.yaml"), ROBOT).expect("a file");
-        std::fs::write(folder.path().join("pipeline.yaml"), PIPELINE).expect("a file");
-        let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        let folder = tempfile::tempdir().unwrap();
+        put(folder.path(), "robot.yaml", ROBOT);
+        put(folder.path(), "pipeline.yaml", PIPELINE);
+        answer::calib(folder.path(), "run pipeline.yaml --quiet").ok();
         folder
     });
     folder.path()
 }
 
-/// Runs calib in a folder with a text on its stdin.
+/// Runs calib as [`answer::fed`] does, for those that look at bytes.
 pub fn calib(folder: &Path, arguments: &[&str], input: &str) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .current_dir(folder)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("calib");
-    let mut pipe = child.stdin.take().expect("a pipe");
-    // A program that refuses its arguments does not read.
-    let _ = std::io::Write::write_all(&mut pipe, input.as_bytes());
-    drop(pipe);
-    child.wait_with_output().expect("calib ends")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("UTF-8")
+    answer::output(folder, arguments, input)
 }
 
 #[test]
 fn only_the_numbers_of_joints_change_in_a_text_of_targets() {
     let input = "\u{feff}name;A1_deg;A2_deg;A3_deg;A4_deg;A5_deg;A6_deg;note\r\nP1;10,5;20;-30;5;40;0;\"a;b\"\r\n\r\nP2; -10;  20.25;3e1;5;40;1; x \r\n";
-    let output = calib(
-        cell(),
-        &["compensate", "latest", "--plain", "--quiet"],
-        input,
-    );
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let corrected = text(&output.stdout);
+    let output = fed(cell(), "compensate latest --plain --quiet", input).code(0);
+    let corrected = output.out;
     assert_eq!(corrected.matches('\n').count(), 4);
     let (before, after): (Vec<&str>, Vec<&str>) = (
         input.split("\r\n").collect(),
@@ -175,23 +150,17 @@ fn only_the_numbers_of_joints_change_in_a_text_of_targets() {
         (before[0], before[2], before[4]),
         (after[0], after[2], after[4])
     );
-    assert!(
-        after[1].starts_with("P1;10,") && after[1].ends_with(";\"a;b\""),
-        "{}",
-        after[1]
-    );
-    assert!(
-        after[3].starts_with("P2;-") && after[3].ends_with("; x "),
-        "{}",
-        after[3]
-    );
+    starts_with(after[1], "P1;10,");
+    ends_with(after[1], ";\"a;b\"");
+    starts_with(after[3], "P2;-");
+    ends_with(after[3], "; x ");
     let first: f64 = after[1]
         .split(';')
         .nth(1)
-        .expect("a field")
+        .unwrap()
         .replace(',', ".")
         .parse()
-        .expect("a number");
+        .unwrap();
     assert!((first - 10.5).abs() > 1e-3 && (first - 10.5).abs() < 0.5);
 }
 
@@ -200,17 +169,8 @@ fn units_of_targets_are_written_as_in_headers_of_recordings() {
     let row = "10,20,-30,5,40,0\n";
     let joints = |header: fn(usize) -> String| {
         let input = (1..=6).map(header).collect::<Vec<_>>().join(",") + "\n" + row;
-        let output = calib(
-            cell(),
-            &["compensate", "latest", "--plain", "--quiet"],
-            &input,
-        );
-        assert!(output.status.success(), "{input}{}", text(&output.stderr));
-        text(&output.stdout)
-            .lines()
-            .nth(1)
-            .expect("a row")
-            .to_string()
+        let output = fed(cell(), "compensate latest --plain --quiet", &input).code(0);
+        output.out.lines().nth(1).unwrap().to_string()
     };
     let expected = joints(|n| format!("q{n}_deg"));
     assert_ne!(expected, row.trim_end());
@@ -227,26 +187,24 @@ fn units_of_targets_are_written_as_in_headers_of_recordings() {
     }
     let point = |name: &str| format!("{name} [Millimeter]");
     let input = ["x", "y", "z"].map(point).join(",") + ",x_c\n900,40,930,7\n";
-    let output = calib(cell(), &["compensate", "latest", "--quiet"], &input);
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    fed(cell(), "compensate latest --quiet", &input).code(0);
 }
 
 #[test]
 fn what_is_known_of_a_target_stands_behind_it() {
     let input =
         "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n119.999,20,-30,5,40,179\n";
-    let output = calib(cell(), &["compensate", "pipeline.yaml", "-"], input);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let said = text(&output.stdout);
+    let output = fed(cell(), "compensate pipeline.yaml -", input).code(0);
+    let said = output.out;
     let mut lines = said.lines();
     assert!(
         lines
             .next()
-            .expect("a header")
+            .unwrap()
             .ends_with("q6_deg,uncorrected_mm,residual_mm,iterations,sigma_mm,u95_mm,remark")
     );
-    let first: Vec<&str> = lines.next().expect("a row").split(',').collect();
-    let number = |k: usize| first[k].parse::<f64>().expect("a number");
+    let first: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let number = |k: usize| first[k].parse::<f64>().unwrap();
     assert!((0.1..3.0).contains(&number(6)), "{first:?}");
     assert!(
         number(7) < 1e-5 && (2.0..8.0).contains(&number(8)),
@@ -257,13 +215,10 @@ fn what_is_known_of_a_target_stands_behind_it() {
     assert!((1.6..2.0).contains(&(number(10) / number(9))), "{first:?}");
     assert_eq!(first[11], "");
     assert!(
-        lines
-            .next()
-            .expect("a row")
-            .contains("joint 6 beyond its limits"),
+        lines.next().unwrap().contains("joint 6 beyond its limits"),
         "{said}"
     );
-    assert!(text(&output.stderr).contains("1 of them leaves the joint limits"));
+    has(&output.err, "1 of them leaves the joint limits");
 }
 
 #[test]
@@ -276,32 +231,28 @@ fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
         },
         None,
     )
-    .expect("a robot");
+    .unwrap();
     let q = [10.0f64, 20.0, -30.0, 25.0, 40.0, 10.0].map(f64::to_radians);
     let pose = RobotModel::new(robot.robot).forward(&q);
     let [x, y, z]: [f64; 3] = (pose.translation * 1e3).into();
     let turn = nalgebra::UnitQuaternion::from_matrix(&pose.rotation);
     let [qx, qy, qz, qw]: [f64; 4] = turn.coords.into();
     let cartesian = format!("x_mm,y_mm,z_mm,qw,qx,qy,qz\n{x},{y},{z},{qw},{qx},{qy},{qz}\n");
-    let quiet = ["compensate", "latest", "--plain", "--quiet"];
-    let by_joints = calib(
+    let quiet = "compensate latest --plain --quiet";
+    let by_joints = fed(cell(), &format!("{quiet} --orientation keep"), joints);
+    let by_pose = fed(
         cell(),
-        &[&quiet[..], &["--orientation", "keep"]].concat(),
-        joints,
-    );
-    let by_pose = calib(
-        cell(),
-        &[&quiet[..], &["--start", "12,18,-28,20,45,5"]].concat(),
+        &format!("{quiet} --start 12,18,-28,20,45,5"),
         &cartesian,
     );
-    let last = |output: &Output| -> Vec<f64> {
-        let said = text(&output.stdout);
-        let row: Vec<f64> = said
+    let last = |output: &answer::Answer| -> Vec<f64> {
+        let row: Vec<f64> = output
+            .out
             .lines()
             .nth(1)
-            .expect("a row")
+            .unwrap()
             .split(',')
-            .map(|cell| cell.parse().expect("a number"))
+            .map(|cell| cell.parse().unwrap())
             .collect();
         row[row.len() - 6..].to_vec()
     };
@@ -313,24 +264,14 @@ fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
 #[test]
 fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
     let run = |input: &str| {
-        let output = calib(cell(), &["compensate", "latest", "--quiet"], input);
-        (
-            output.status.code(),
-            text(&output.stderr),
-            text(&output.stdout),
-        )
+        let output = fed(cell(), "compensate latest --quiet", input);
+        (output.code, output.err, output.out)
     };
     let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n";
     let (code, said, _) = run(&format!("{header}1,2,3,4,5,6\n1,2,x,4,5,6\n1,2\n"));
     assert_eq!(code, Some(10));
-    assert!(
-        said.contains("stdin:3: column 5: field 3 is `x`, no number"),
-        "{said}"
-    );
-    assert!(
-        said.contains("stdin:4: has 2 fields, the header 6"),
-        "{said}"
-    );
+    has(&said, "stdin:3: column 5: field 3 is `x`, no number");
+    has(&said, "stdin:4: has 2 fields, the header 6");
     // A quote inside a field is a letter of it; one that begins a field ends it.
     let open = header.replace("q6_deg", "q6_deg,note");
     let (code, said, _) = run(&format!(
@@ -338,44 +279,30 @@ fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
     ));
     assert_eq!(code, Some(10));
     assert_eq!(said.matches("stdin:").count(), 1, "{said}");
-    assert!(
-        said.contains("stdin:3: column 13: `\"` is not closed on its line"),
-        "{said}"
-    );
+    has(&said, "stdin:3: column 13: `\"` is not closed on its line");
     let (code, said, _) = run(&format!("{header}1,2,3,4,5,\"0.25\"0\n"));
     assert_eq!(code, Some(10));
-    assert!(
-        said.contains("stdin:2: column 17: text behind the closing `\"` of a field; allowed:"),
-        "{said}"
+    has(
+        &said,
+        "stdin:2: column 17: text behind the closing `\"` of a field; allowed:",
     );
     let (code, said, _) = run(&header.replace("q6_deg", "\"q6_deg"));
     assert_eq!(code, Some(10));
-    assert!(
-        said.contains("stdin:1: column 36: `\"` is not closed on its line"),
-        "{said}"
-    );
+    has(&said, "stdin:1: column 36: `\"` is not closed on its line");
     let (code, said, _) = run("A1,A2,A3,A4,A5,A6\n1,2,3,4,5,6\n");
     assert_eq!(code, Some(2));
-    assert!(
-        said.contains("`A1` has no unit") && said.contains("--angle deg"),
-        "{said}"
-    );
+    has(&said, ["`A1` has no unit", "--angle deg"]);
     let (code, said, _) = run("foo,bar\n1,2\n");
     assert_eq!(code, Some(2));
-    assert!(said.contains("no targets found"), "{said}");
+    has(&said, "no targets found");
 }
 
 #[test]
 fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
     let input = "id,x_mm,y_mm,z_mm\nnear,800,40,900\nfar,7800,40,900\nnear,810,40,900\n";
-    for more in [&[][..], &["--one-step"]] {
-        let output = calib(
-            cell(),
-            &[&["compensate", "latest", "--quiet"], more].concat(),
-            input,
-        );
-        assert_eq!(output.status.code(), Some(10));
-        let (said, told) = (text(&output.stdout), text(&output.stderr));
+    for more in ["", "--one-step"] {
+        let output = fed(cell(), &format!("compensate latest --quiet {more}"), input).code(10);
+        let (said, told) = (output.out, output.err);
         let rows: Vec<Vec<&str>> = said.lines().map(|line| line.split(',').collect()).collect();
         assert_eq!(
             (rows.len(), rows[0][4], rows[0][9]),
@@ -391,7 +318,7 @@ fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
         }
         assert_eq!(rows[2][4..10], [""; 6]);
         // The arm reaches 1.4 m from its second axis, which stands 0.4 m above the base.
-        let off: f64 = rows[2][11].parse().expect("a residual");
+        let off: f64 = rows[2][11].parse().unwrap();
         assert!((6000.0..7000.0).contains(&off), "{said}");
         assert!(
             said.lines()
@@ -399,37 +326,26 @@ fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
                 .is_some_and(|row| row.contains(",\"not reached, 6") && row.ends_with(" mm off\"")),
             "{said}"
         );
-        assert!(
-            told.contains("stdin:3: not reached, 6")
-                && told.contains(" mm off: no joints are written"),
-            "{told}"
+        has(
+            &told,
+            ["stdin:3: not reached, 6", " mm off: no joints are written"],
         );
-        assert!(
-            told.contains(
-                "warning: 1 of them could not be reached and has no joints (column `remark`)"
-            ),
-            "{told}"
+        has(
+            &told,
+            "warning: 1 of them could not be reached and has no joints (column `remark`)",
         );
     }
-    let plain = calib(
-        cell(),
-        &["compensate", "latest", "--quiet", "--plain"],
-        input,
-    );
-    assert_eq!(plain.status.code(), Some(10));
-    assert_eq!(
-        text(&plain.stdout).lines().nth(2),
-        Some("far,7800,40,900,,,,,,")
-    );
+    let plain = fed(cell(), "compensate latest --quiet --plain", input).code(10);
+    assert_eq!(plain.out.lines().nth(2), Some("far,7800,40,900,,,,,,"));
 }
 
 #[test]
 fn a_pose_that_only_another_orientation_reaches_gets_no_joints() {
     // The wrist's limits do not bind the search: what is out of reach is the point 1.4 m away, with the tool turned back.
     let input = "x_mm,y_mm,z_mm,qw,qx,qy,qz\n1230,0,900,1,0,0,0\n1230,0,900,0,0,0,1\n";
-    let output = calib(cell(), &["compensate", "latest", "--quiet"], input);
-    let (said, told) = (text(&output.stdout), text(&output.stderr));
-    assert_eq!(output.status.code(), Some(10), "{said}{told}");
+    let output = fed(cell(), "compensate latest --quiet", input);
+    let (said, told) = (output.out, output.err);
+    assert_eq!(output.code, Some(10), "{said}{told}");
     assert!(
         said.lines()
             .nth(2)
@@ -450,67 +366,40 @@ fn a_target_that_is_not_reached_is_null_in_parquet() {
         ("y_mm", column([40.0; 2])),
         ("z_mm", column([900.0; 2])),
     ];
-    let batch = RecordBatch::try_from_iter(axes).expect("a batch");
-    let file = std::fs::File::create(cell().join("points.parquet")).expect("a file");
-    let mut writer =
-        parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).expect("a writer");
+    let batch = RecordBatch::try_from_iter(axes).unwrap();
+    let file = std::fs::File::create(cell().join("points.parquet")).unwrap();
+    let mut writer = parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).unwrap();
     writer
         .write(&batch)
         .and_then(|()| writer.close().map(|_| ()))
-        .expect("written");
-    let output = calib(
+        .unwrap();
+    let output = answer::calib(
         cell(),
-        &[
-            "compensate",
-            "latest",
-            "points.parquet",
-            "--out",
-            "points_c.parquet",
-            "--quiet",
-        ],
-        "",
-    );
-    assert_eq!(output.status.code(), Some(10));
-    assert!(
-        text(&output.stderr).contains("points.parquet: row 2: not reached, 6"),
-        "{}",
-        text(&output.stderr)
-    );
-    let file = std::fs::File::open(cell().join("points_c.parquet"))
-        .expect("written though a row is not reached");
-    let builder = parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder::try_new(file)
-        .expect("Parquet");
-    let batch = builder
-        .build()
-        .expect("a reader")
-        .next()
-        .expect("a batch")
-        .expect("rows");
+        "compensate latest points.parquet --out points_c.parquet --quiet",
+    )
+    .code(10);
+    has(&output.err, "points.parquet: row 2: not reached, 6");
+    let file = std::fs::File::open(cell().join("points_c.parquet")).unwrap();
+    let builder =
+        parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
+    let batch = builder.build().unwrap().next().unwrap().unwrap();
     for joint in 1..=6 {
         let q = batch
             .column_by_name(&format!("q{joint}_rad"))
-            .expect("a joint")
+            .unwrap()
             .as_primitive::<Float64Type>();
         assert!(q.is_valid(0) && q.value(0).is_finite() && q.is_null(1));
     }
-    let remark = batch
-        .column_by_name("remark")
-        .expect("remarks")
-        .as_string::<i32>();
+    let remark = batch.column_by_name("remark").unwrap().as_string::<i32>();
     assert!(remark.value(0).is_empty() && remark.value(1).starts_with("not reached, 6"));
 }
 
 #[test]
 fn quiet_keeps_warnings_and_takes_the_summary() {
     let input = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n119.999,20,-30,5,40,179\n";
-    let told = |more: &[&str]| {
-        text(&calib(cell(), &[&["compensate", "latest"], more].concat(), input).stderr)
-    };
-    let (loud, quiet) = (told(&[]), told(&["-q"]));
-    assert!(
-        loud.contains("model: ") && loud.contains("1 target; "),
-        "{loud}"
-    );
+    let told = |more: &str| fed(cell(), &format!("compensate latest {more}"), input).err;
+    let (loud, quiet) = (told(""), told("-q"));
+    has(&loud, ["model: ", "1 target; "]);
     let warnings: String = loud
         .lines()
         .filter(|line| line.starts_with("warning: "))
@@ -526,63 +415,44 @@ fn quiet_keeps_warnings_and_takes_the_summary() {
 #[test]
 fn partial_targets_of_a_program_stay_where_that_is_wished_and_nothing_is_written_otherwise() {
     let program = "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n";
-    std::fs::write(cell().join("partial.src"), program).expect("a file");
-    let run = |more: &[&str]| {
-        let output = calib(
+    put(cell(), "partial.src", program);
+    let run = |more: &str| {
+        let output = answer::calib(
             cell(),
-            &[
-                &[
-                    "compensate",
-                    "latest",
-                    "partial.src",
-                    "--out",
-                    "partial_c.src",
-                    "-q",
-                ],
-                more,
-            ]
-            .concat(),
-            "",
+            &format!("compensate latest partial.src --out partial_c.src -q {more}"),
         );
-        (output.status.code(), text(&output.stderr))
+        (output.code, output.err)
     };
     let whole = "a target is corrected whole or not at all";
-    let (code, told) = run(&[]);
+    let (code, told) = run("");
     assert_eq!(code, Some(10));
-    assert!(
-        told.contains(&format!(
-            "partial.src:2:5: the target has no Z, A, B, C; {whole}"
-        )),
-        "{told}"
+    has(
+        &told,
+        &format!("partial.src:2:5: the target has no Z, A, B, C; {whole}"),
     );
-    assert!(
-        told.contains(&format!(
-            "partial.src:3:5: the target has no A2, A3, A4, A5, A6; {whole}"
-        )),
-        "{told}"
+    has(
+        &told,
+        &format!("partial.src:3:5: the target has no A2, A3, A4, A5, A6; {whole}"),
     );
-    assert!(
-        told.contains("partial.src: partial targets stay as they are with --leave-partial"),
-        "{told}"
+    has(
+        &told,
+        "partial.src: partial targets stay as they are with --leave-partial",
     );
     assert!(!cell().join("partial_c.src").exists());
-    let (code, told) = run(&["--leave-partial"]);
+    let (code, told) = run("--leave-partial");
     assert_eq!(code, Some(0), "{told}");
-    assert!(
-        told.contains(&format!(
+    has(
+        &told,
+        &format!(
             "warning: partial.src:3:5: left as it is: the target has no A2, A3, A4, A5, A6; {whole}"
-        )),
-        "{told}"
+        ),
     );
-    let written = std::fs::read_to_string(cell().join("partial_c.src")).expect("written");
-    let (mark, rest) = written.split_once('\n').expect("lines");
-    assert!(mark.starts_with("; corrected by calib"), "{mark}");
+    let written = read(cell().join("partial_c.src"));
+    let (mark, rest) = written.split_once('\n').unwrap();
+    starts_with(mark, "; corrected by calib");
     assert!(
         rest.starts_with("PTP {A1 10.") || rest.starts_with("PTP {A1 9."),
         "{written}"
     );
-    assert!(
-        written.ends_with("\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n"),
-        "{written}"
-    );
+    ends_with(&written, "\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n");
 }

@@ -1,28 +1,25 @@
 //! HEAD is the last complete run; runs of other commands are listed as such, addressed by id, and displace no kept run.
 
-use crate::compensate::{calib, cell};
+use crate::answer::{calib, fed, has, read};
+use crate::compensate::cell;
 use serde_json::Value;
 use std::path::Path;
 
-fn said(here: &Path, arguments: &[&str]) -> (Option<i32>, String) {
-    let output = calib(
+fn said(here: &Path, arguments: &str) -> (Option<i32>, String) {
+    let output = fed(
         here,
         arguments,
         "A1_deg,A2_deg,A3_deg,A4_deg,A5_deg,A6_deg\n10,20,-30,5,40,0\n",
     );
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (
-        output.status.code(),
-        text(&output.stdout) + &text(&output.stderr),
-    )
+    (output.code, output.out + &output.err)
 }
-fn done(here: &Path, arguments: &[&str]) -> String {
+fn done(here: &Path, arguments: &str) -> String {
     let (code, said) = said(here, arguments);
     assert_eq!(code, Some(0), "{arguments:?}: {said}");
     said
 }
-fn json(here: &Path, arguments: &[&str]) -> Value {
-    serde_json::from_str(&done(here, &[arguments, &["--json"]].concat())).unwrap()
+fn json(here: &Path, arguments: &str) -> Value {
+    serde_json::from_str(&done(here, &format!("{arguments} --json"))).unwrap()
 }
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -33,7 +30,7 @@ fn folder() -> tempfile::TempDir {
 }
 /// What every run of the log is, the last first.
 fn kinds(here: &Path) -> Vec<String> {
-    let runs = json(here, &["log"]);
+    let runs = json(here, "log");
     runs.as_array()
         .unwrap()
         .iter()
@@ -45,67 +42,36 @@ fn kinds(here: &Path) -> Vec<String> {
 fn what_other_verbs_run_is_not_head_and_is_listed_as_what_it_is() {
     let folder = folder();
     let here = folder.path();
-    let (code, text) = said(here, &["explain", "identify"]);
+    let (code, text) = said(here, "explain identify");
     assert_eq!(
         (code, text.contains("has no runs")),
         (Some(2), true),
         "{text}"
     );
-    done(here, &["compensate", "pipeline.yaml", "--quiet"]);
-    let (code, text) = said(here, &["explain", "identify"]);
+    done(here, "compensate pipeline.yaml --quiet");
+    let (code, text) = said(here, "explain identify");
     assert_eq!(code, Some(2));
-    let only = json(here, &["log"])[0]["run"].as_str().unwrap().to_string();
-    assert!(
-        text.contains("no complete run of `calib run`") && text.contains(&only),
-        "{text}"
-    );
+    let only = json(here, "log")[0]["run"].as_str().unwrap().to_string();
+    has(&text, ["no complete run of `calib run`", &only]);
     for seed in ["seed=1", "seed=2"] {
-        done(here, &["run", "pipeline.yaml", "--quiet", "--set", seed]);
+        done(here, &format!("run pipeline.yaml --quiet --set {seed}"));
     }
     let runs = ["HEAD~1", "HEAD"].map(|name| {
-        json(here, &["show", name])["run_id"]
+        json(here, &format!("show {name}"))["run_id"]
             .as_str()
             .unwrap()
             .to_string()
     });
+    done(here, "compensate pipeline.yaml --quiet --set seed=5");
     done(
         here,
-        &["compensate", "pipeline.yaml", "--quiet", "--set", "seed=5"],
+        "export pipeline.yaml --format urdf --quiet --set seed=6",
     );
-    done(
-        here,
-        &[
-            "export",
-            "pipeline.yaml",
-            "--format",
-            "urdf",
-            "--quiet",
-            "--set",
-            "seed=6",
-        ],
-    );
-    done(
-        here,
-        &[
-            "run",
-            "pipeline.yaml",
-            "--quiet",
-            "--until",
-            "split",
-            "--set",
-            "seed=7",
-        ],
-    );
+    done(here, "run pipeline.yaml --quiet --until split --set seed=7");
     assert_eq!(
         said(
             here,
-            &[
-                "run",
-                "pipeline.yaml",
-                "--quiet",
-                "--set",
-                "identify.on=[fit, none]"
-            ]
+            "run pipeline.yaml --quiet --set 'identify.on=[fit, none]'"
         )
         .0,
         Some(10)
@@ -113,38 +79,23 @@ fn what_other_verbs_run_is_not_head_and_is_listed_as_what_it_is() {
     assert_eq!(
         said(
             here,
-            &[
-                "compensate",
-                "pipeline.yaml",
-                "--quiet",
-                "--set",
-                "identify.on=[fit, none]"
-            ]
+            "compensate pipeline.yaml --quiet --set 'identify.on=[fit, none]'"
         )
         .0,
         Some(10)
     );
     assert_eq!(
-        kinds(here),
-        [
-            "compensate",
-            "failed",
-            "partial",
-            "export",
-            "compensate",
-            "run",
-            "run",
-            "compensate"
-        ]
+        kinds(here).join(" "),
+        "compensate failed partial export compensate run run compensate"
     );
     for (name, run) in ["HEAD~1", "HEAD"].iter().zip(&runs) {
-        assert_eq!(json(here, &["show", name])["run_id"], run.as_str());
+        assert_eq!(json(here, &format!("show {name}"))["run_id"], run.as_str());
     }
-    assert!(done(here, &["tag", "HEAD", "released"]).contains(&runs[1]));
-    assert!(done(here, &["lineage", "HEAD/identify/parameters"]).contains(&runs[1]));
-    let exported = |name: &str| done(here, &["export", name, "--format", "json", "--quiet"]);
+    assert!(done(here, "tag HEAD released").contains(&runs[1]));
+    assert!(done(here, "lineage HEAD/identify/parameters").contains(&runs[1]));
+    let exported = |name: &str| done(here, &format!("export {name} --format json --quiet"));
     assert_eq!(exported("latest"), exported(&runs[1]));
-    let (code, text) = said(here, &["show", "HEAD~2"]);
+    let (code, text) = said(here, "show HEAD~2");
     assert_eq!(
         (
             code,
@@ -154,17 +105,11 @@ fn what_other_verbs_run_is_not_head_and_is_listed_as_what_it_is() {
         "{text}"
     );
     // What was run between two complete runs is no part of how they differ.
-    done(
-        here,
-        &["run", "pipeline.yaml", "--quiet", "--set", "seed=8"],
-    );
-    assert_eq!(
-        json(here, &["explain", "simulate"])["before"],
-        runs[1].as_str()
-    );
-    assert_eq!(json(here, &["show", "HEAD~1"])["run_id"], runs[1].as_str());
+    done(here, "run pipeline.yaml --quiet --set seed=8");
+    assert_eq!(json(here, "explain simulate")["before"], runs[1].as_str());
+    assert_eq!(json(here, "show HEAD~1")["run_id"], runs[1].as_str());
     // By its id every run is reached.
-    let log = json(here, &["log"]);
+    let log = json(here, "log");
     let partial = log
         .as_array()
         .unwrap()
@@ -174,8 +119,8 @@ fn what_other_verbs_run_is_not_head_and_is_listed_as_what_it_is() {
         .as_str()
         .unwrap()
         .to_string();
-    assert_eq!(json(here, &["show", &partial])["seed"], 7);
-    let text = done(here, &["log"]);
+    assert_eq!(json(here, &format!("show {partial}"))["seed"], 7);
+    let text = done(here, "log");
     let line = text
         .lines()
         .find(|line| line.starts_with(&runs[1]))
@@ -197,13 +142,13 @@ fn what_other_verbs_run_is_not_head_and_is_listed_as_what_it_is() {
 fn a_manifest_that_names_no_purpose_is_of_a_run_of_its_own() {
     let folder = folder();
     let here = folder.path();
-    done(here, &["run", "pipeline.yaml", "--quiet"]);
-    let run = json(here, &["show", "HEAD"])["run_id"]
+    done(here, "run pipeline.yaml --quiet");
+    let run = json(here, "show HEAD")["run_id"]
         .as_str()
         .unwrap()
         .to_string();
     let path = here.join(".calib/runs").join(&run).join("manifest.json");
-    let text = std::fs::read_to_string(&path).unwrap();
+    let text = read(&path);
     let body =
         text.split(",\n  \"sealed\"")
             .next()
@@ -219,10 +164,7 @@ fn a_manifest_that_names_no_purpose_is_of_a_run_of_its_own() {
     )
     .unwrap();
     assert_eq!(
-        (
-            json(here, &["show", "HEAD"])["run_id"].as_str(),
-            kinds(here)
-        ),
+        (json(here, "show HEAD")["run_id"].as_str(), kinds(here)),
         (Some(run.as_str()), vec!["run".to_string()])
     );
 }
@@ -231,28 +173,18 @@ fn a_manifest_that_names_no_purpose_is_of_a_run_of_its_own() {
 fn a_sweep_keeps_the_last_complete_runs_whatever_else_was_run_since() {
     let folder = folder();
     let here = folder.path();
-    done(
-        here,
-        &["run", "pipeline.yaml", "--quiet", "--set", "seed=1"],
-    );
+    done(here, "run pipeline.yaml --quiet --set seed=1");
     for seed in ["seed=5", "seed=6", "seed=7"] {
         done(
             here,
-            &["compensate", "pipeline.yaml", "--quiet", "--set", seed],
+            &format!("compensate pipeline.yaml --quiet --set {seed}"),
         );
     }
-    done(here, &["gc", "--keep-runs", "1", "--grace-hours", "0"]);
+    done(here, "gc --keep-runs 1 --grace-hours 0");
     let executed = |seed: &str| {
         let stages = json(
             here,
-            &[
-                "run",
-                "pipeline.yaml",
-                "--quiet",
-                "--dry-run",
-                "--set",
-                seed,
-            ],
+            &format!("run pipeline.yaml --quiet --dry-run --set {seed}"),
         )["stages"]
             .clone();
         stages
@@ -262,17 +194,7 @@ fn a_sweep_keeps_the_last_complete_runs_whatever_else_was_run_since() {
             .filter(|stage| stage["status"] != "cached")
             .count()
     };
-    let forecast = json(
-        here,
-        &[
-            "run",
-            "pipeline.yaml",
-            "--quiet",
-            "--dry-run",
-            "--set",
-            "seed=1",
-        ],
-    );
+    let forecast = json(here, "run pipeline.yaml --quiet --dry-run --set seed=1");
     assert_eq!(executed("seed=1"), 0, "the complete run: {forecast}");
     assert_eq!(executed("seed=7"), 0, "the last of the others");
     assert!(
@@ -285,17 +207,16 @@ fn a_sweep_keeps_the_last_complete_runs_whatever_else_was_run_since() {
 fn a_run_that_does_nothing_logs_one_line_a_stage() {
     let folder = folder();
     let here = folder.path();
-    done(here, &["run", "pipeline.yaml"]);
-    let output = calib(here, &["run", "pipeline.yaml"], "");
-    let log = String::from_utf8(output.stderr).unwrap();
+    done(here, "run pipeline.yaml");
+    let output = calib(here, "run pipeline.yaml");
+    let log = output.err;
     let stages: Vec<&str> = log
         .lines()
         .map(|line| line.split_whitespace().next().unwrap_or_default())
         .collect();
-    assert_eq!(stages, ["robot", "simulate", "split", "identify"], "{log}");
+    assert_eq!(stages.join(" "), "robot simulate split identify", "{log}");
     assert!(log.lines().all(|line| line.ends_with("  cached")), "{log}");
-    let run = json(here, &["log"])[0]["run"].as_str().unwrap().to_string();
-    let events =
-        std::fs::read_to_string(here.join(".calib/runs").join(run).join("events.jsonl")).unwrap();
+    let run = json(here, "log")[0]["run"].as_str().unwrap().to_string();
+    let events = read(here.join(".calib/runs").join(run).join("events.jsonl"));
     assert_eq!(events.lines().count(), 4, "{events}");
 }

@@ -1,6 +1,6 @@
 //! Points that were computed and not measured are told from measured ones by a residual that no instrument has.
 
-use crate::compensate::calib;
+use crate::answer::{calib, put};
 use crate::fixture;
 use crate::identify::normal;
 use calib::robot::RobotModel;
@@ -58,9 +58,9 @@ fn told(minus: &str, noise_mm: f64) -> String {
             point.y,
             point.z
         )
-        .expect("text");
+        .unwrap();
     }
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let minus = if minus.is_empty() {
         String::new()
     } else {
@@ -71,19 +71,10 @@ fn told(minus: &str, noise_mm: f64) -> String {
         ("pipeline.yaml", &PIPELINE.replace("MINUS", &minus)),
         ("data.csv", &text),
     ] {
-        std::fs::write(folder.path().join(name), text).expect("a file");
+        put(folder.path(), name, text);
     }
-    let output = calib(
-        folder.path(),
-        &["run", "pipeline.yaml", "--json", "--quiet"],
-        "",
-    );
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    String::from_utf8_lossy(&output.stdout).into_owned()
+    let output = calib(folder.path(), "run pipeline.yaml --json --quiet").code(0);
+    output.out.clone()
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! Concealed recordings: what they hide is there, nulls hide nothing, and a seed gives the same bytes whoever works on it.
 
+use crate::answer::{calib, has, put, read};
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
 use calib::twin::conceal::family::FAMILIES;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 /// Names of the list of effects that a diagnosis may use.
 const NAMES: [&str; 20] = [
@@ -59,7 +59,7 @@ fn every_family_moves_the_tool_and_is_wanted_by_a_canonical_name() {
                 faulty: 0.0,
                 ..Design::default()
             };
-            let case = Case::make(&design, row, Content::Single(row)).expect("a case");
+            let case = Case::make(&design, row, Content::Single(row)).unwrap();
             let name = format!(
                 "{} ({})",
                 family.name,
@@ -100,7 +100,7 @@ fn an_effect_is_as_visible_as_the_seal_says() {
     let row = FAMILIES
         .iter()
         .position(|family| family.name == "gear_cyclic")
-        .expect("a family");
+        .unwrap();
     let design = Design {
         seed: 3,
         points: Some(120),
@@ -109,7 +109,7 @@ fn an_effect_is_as_visible_as_the_seal_says() {
         other_forms: 0.0,
         ..Design::default()
     };
-    let case = Case::make(&design, 0, Content::Single(row)).expect("a case");
+    let case = Case::make(&design, 0, Content::Single(row)).unwrap();
     let one = &case.concealed[0];
     let from_sizes = 3.0 * 120.0 * (one.visible_mm / case.noise_mm[0]).powi(2);
     assert!(
@@ -132,7 +132,7 @@ fn a_wrong_metre_is_there_and_cannot_be_seen() {
     let row = FAMILIES
         .iter()
         .position(|family| family.name == "tracker_scale")
-        .expect("a family");
+        .unwrap();
     for number in 0..3 {
         let design = Design {
             seed: 6,
@@ -140,7 +140,7 @@ fn a_wrong_metre_is_there_and_cannot_be_seen() {
             faulty: 0.0,
             ..Design::default()
         };
-        let case = Case::make(&design, number, Content::Single(row)).expect("a case");
+        let case = Case::make(&design, number, Content::Single(row)).unwrap();
         assert!(
             case.concealed[0].raw_mm > 1e-3 && case.concealed[0].strength < 0.01,
             "{:?}",
@@ -158,7 +158,7 @@ fn a_null_hides_nothing_and_wants_nothing() {
         ..Design::default()
     };
     for number in 0..4 {
-        let case = Case::make(&design, number, Content::Null).expect("a case");
+        let case = Case::make(&design, number, Content::Null).unwrap();
         assert!(case.concealed.is_empty() && case.want().is_empty() && case.tampered.is_empty());
     }
 }
@@ -188,7 +188,7 @@ fn shares_are_kept_and_pairs_sit_in_two_places() {
         .enumerate()
         .filter(|(_, content)| matches!(content, Content::Pair(..)))
     {
-        let case = Case::make(&design, number, *content).expect("a case");
+        let case = Case::make(&design, number, *content).unwrap();
         let places: Vec<&str> = case
             .concealed
             .iter()
@@ -198,28 +198,21 @@ fn shares_are_kept_and_pairs_sit_in_two_places() {
     }
 }
 
-fn calib(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .output()
-        .expect("the binary")
-}
-
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut out = Vec::new();
     let mut folders = vec![folder.to_path_buf()];
     while let Some(next) = folders.pop() {
-        for entry in std::fs::read_dir(next).expect("a folder") {
-            let path = entry.expect("an entry").path();
+        for entry in std::fs::read_dir(next).unwrap() {
+            let path = entry.unwrap().path();
             if path.is_dir() {
                 folders.push(path);
             } else {
                 let name = path
                     .strip_prefix(folder)
-                    .expect("below")
+                    .unwrap()
                     .to_string_lossy()
                     .into_owned();
-                out.push((name, std::fs::read(&path).expect("a file")));
+                out.push((name, std::fs::read(&path).unwrap()));
             }
         }
     }
@@ -229,20 +222,16 @@ fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
 
 #[test]
 fn a_seed_gives_the_same_bytes_on_one_and_two_threads() {
-    let root = tempfile::tempdir().expect("a folder");
+    let root = tempfile::tempdir().unwrap();
     let made: Vec<Vec<(String, Vec<u8>)>> = ["1", "2"]
         .map(|jobs| {
             let out = root.path().join(jobs);
             let text = out.to_string_lossy().into_owned();
-            let done = calib(&[
-                "simulate", "conceal", "--out", &text, "--cases", "4", "--points", "30", "--jobs",
-                jobs,
-            ]);
-            assert!(
-                done.status.success(),
-                "{}",
-                String::from_utf8_lossy(&done.stderr)
-            );
+            calib(
+                ".",
+                &format!("simulate conceal --out {text} --cases 4 --points 30 --jobs {jobs}"),
+            )
+            .code(0);
             files(&out)
         })
         .into();
@@ -253,32 +242,18 @@ fn a_seed_gives_the_same_bytes_on_one_and_two_threads() {
 /// Recordings with single effects, pairs, open ones and nulls, and verdicts that say what `say` makes of each truth.
 fn judged(root: &Path, say: impl Fn(&Value) -> Vec<Value>) -> (PathBuf, PathBuf) {
     let (set, verdicts) = (root.join("set"), root.join("verdicts"));
-    let done = calib(&[
-        "simulate",
-        "conceal",
-        "--out",
-        &set.to_string_lossy(),
-        "--cases",
-        "12",
-        "--points",
-        "30",
-        "--nulls",
-        "0.25",
-        "--pairs",
-        "0.25",
-        "--open",
-        "0.1",
-    ]);
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
-    std::fs::create_dir(&verdicts).expect("a folder");
-    for entry in std::fs::read_dir(set.join("sealed")).expect("truths") {
-        let path = entry.expect("a truth").path();
-        let truth: Value =
-            serde_json::from_slice(&std::fs::read(&path).expect("a file")).expect("JSON");
+    calib(
+        ".",
+        &format!(
+            "simulate conceal --out {} --cases 12 --points 30 --nulls 0.25 --pairs 0.25 --open 0.1",
+            set.display()
+        ),
+    )
+    .code(0);
+    std::fs::create_dir(&verdicts).unwrap();
+    for entry in std::fs::read_dir(set.join("sealed")).unwrap() {
+        let path = entry.unwrap().path();
+        let truth: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
         let findings = say(&truth);
         let verdict = if findings.is_empty() {
             "nothing_missing"
@@ -286,54 +261,46 @@ fn judged(root: &Path, say: impl Fn(&Value) -> Vec<Value>) -> (PathBuf, PathBuf)
             "explained"
         };
         let answer = json!({ "verdict": verdict, "findings": findings });
-        std::fs::write(
-            verdicts.join(path.file_name().expect("a name")),
-            answer.to_string(),
-        )
-        .expect("written");
+        put(&verdicts, path.file_name().unwrap(), answer.to_string());
     }
     (set, verdicts)
 }
 
 fn wanted(truth: &Value) -> Vec<Value> {
-    truth["want"].as_array().expect("a list").clone()
+    truth["want"].as_array().unwrap().clone()
 }
 
 fn score(set: &Path, verdicts: &Path) -> Value {
-    let done = calib(&[
-        "simulate",
-        "reveal",
-        &set.to_string_lossy(),
-        "--verdicts",
-        &verdicts.to_string_lossy(),
-        "--json",
-    ]);
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
-    serde_json::from_slice(&done.stdout).expect("JSON")
+    let done = calib(
+        ".",
+        &format!(
+            "simulate reveal {} --verdicts {} --json",
+            set.display(),
+            verdicts.display()
+        ),
+    )
+    .code(0);
+    done.json()
 }
 
 fn total(board: &Value, outcome: &str) -> u64 {
     let bins = ["alone", "beside"]
         .into_iter()
-        .flat_map(|company| board[company].as_array().expect("bins").clone());
-    bins.map(|bin| bin["outcomes"][outcome].as_u64().expect("a count"))
+        .flat_map(|company| board[company].as_array().unwrap().clone());
+    bins.map(|bin| bin["outcomes"][outcome].as_u64().unwrap())
         .sum()
 }
 
 #[test]
 fn who_says_the_truth_gets_full_marks_and_who_says_nothing_none() {
-    let root = tempfile::tempdir().expect("a folder");
+    let root = tempfile::tempdir().unwrap();
     let (set, verdicts) = judged(root.path(), wanted);
     let board = score(&set, &verdicts);
     assert_eq!(board["recordings"], 12);
     assert_eq!(board["failures"], json!([]));
     assert!(total(&board, "exact") >= 9 && total(&board, "exact") == total(&board, "n"));
 
-    let silent = tempfile::tempdir().expect("a folder");
+    let silent = tempfile::tempdir().unwrap();
     let (set, verdicts) = judged(silent.path(), |_| vec![]);
     let board = score(&set, &verdicts);
     assert_eq!(total(&board, "silent"), total(&board, "n"));
@@ -342,7 +309,7 @@ fn who_says_the_truth_gets_full_marks_and_who_says_nothing_none() {
 
 #[test]
 fn a_false_name_is_wrong_and_in_a_null_a_false_alarm() {
-    let root = tempfile::tempdir().expect("a folder");
+    let root = tempfile::tempdir().unwrap();
     let (set, verdicts) = judged(root.path(), |_| {
         vec![json!({ "effect": "joint_table", "where": "joint 9" })]
     });
@@ -353,7 +320,7 @@ fn a_false_name_is_wrong_and_in_a_null_a_false_alarm() {
         json!({ "count": 3, "of": 3, "wilson_95": board["shares"][0]["share"]["wilson_95"] })
     );
     // Said beside the truth it leaves the outcomes alone, but no recording is right.
-    let both = tempfile::tempdir().expect("a folder");
+    let both = tempfile::tempdir().unwrap();
     let (set, verdicts) = judged(both.path(), |truth| {
         let mut findings = wanted(truth);
         findings.push(json!({ "effect": "joint_table", "where": "joint 9" }));
@@ -371,7 +338,7 @@ fn a_false_name_is_wrong_and_in_a_null_a_false_alarm() {
 
 #[test]
 fn a_rival_and_a_run_of_links_count_as_the_set() {
-    let root = tempfile::tempdir().expect("a folder");
+    let root = tempfile::tempdir().unwrap();
     let (set, verdicts) = judged(root.path(), |truth| {
         let as_rival =
             |name: &Value| json!({ "effect": "joint_table", "where": "joint 9", "rivals": [name] });
@@ -389,15 +356,15 @@ fn a_rival_and_a_run_of_links_count_as_the_set() {
 fn placed(board: &Value, what: &str) -> (u64, u64) {
     let share = &board["places"]["all"][what];
     (
-        share["count"].as_u64().expect("a count"),
-        share["of"].as_u64().expect("a count"),
+        share["count"].as_u64().unwrap(),
+        share["of"].as_u64().unwrap(),
     )
 }
 
 #[test]
 fn the_place_counts_apart_from_the_name_and_unknown_is_no_wrong_name() {
     let score_of = |say: &dyn Fn(&Value) -> Vec<Value>| {
-        let root = tempfile::tempdir().expect("a folder");
+        let root = tempfile::tempdir().unwrap();
         let (set, verdicts) = judged(root.path(), say);
         let board = score(&set, &verdicts);
         let [place, name, wrong] =
@@ -435,72 +402,68 @@ fn the_place_counts_apart_from_the_name_and_unknown_is_no_wrong_name() {
 
 #[test]
 fn one_changed_byte_breaks_the_seal() {
-    let root = tempfile::tempdir().expect("a folder");
+    let root = tempfile::tempdir().unwrap();
     let (set, verdicts) = judged(root.path(), wanted);
     for name in ["sealed/c0003.json", "recordings/c0002/tracker.csv"] {
         let path = set.join(name);
-        let before = std::fs::read(&path).expect("a file");
+        let before = std::fs::read(&path).unwrap();
         let mut after = before.clone();
-        let last = after.iter().rposition(u8::is_ascii_digit).expect("a digit");
+        let last = after.iter().rposition(u8::is_ascii_digit).unwrap();
         after[last] = if after[last] == b'1' { b'2' } else { b'1' };
-        std::fs::write(&path, after).expect("written");
-        let done = calib(&[
-            "simulate",
-            "reveal",
-            &set.to_string_lossy(),
-            "--verdicts",
-            &verdicts.to_string_lossy(),
-        ]);
-        let said = String::from_utf8_lossy(&done.stderr).into_owned();
-        assert_eq!(done.status.code(), Some(10), "{said}");
+        std::fs::write(&path, after).unwrap();
+        let done = calib(
+            ".",
+            &format!(
+                "simulate reveal {} --verdicts {}",
+                set.display(),
+                verdicts.display()
+            ),
+        );
+        let said = done.err.clone();
+        assert_eq!(done.code, Some(10), "{said}");
         assert!(
             said.contains(&format!("{name}: was changed since it was sealed"))
-                && done.stdout.is_empty(),
+                && done.out.is_empty(),
             "{said}"
         );
-        std::fs::write(&path, before).expect("written");
+        std::fs::write(&path, before).unwrap();
     }
-    std::fs::remove_file(set.join("recordings/c0001/robot.json")).expect("removed");
-    let done = calib(&[
-        "simulate",
-        "reveal",
-        &set.to_string_lossy(),
-        "--verdicts",
-        &verdicts.to_string_lossy(),
-    ]);
+    std::fs::remove_file(set.join("recordings/c0001/robot.json")).unwrap();
+    let done = calib(
+        ".",
+        &format!(
+            "simulate reveal {} --verdicts {}",
+            set.display(),
+            verdicts.display()
+        ),
+    );
     assert!(
-        String::from_utf8_lossy(&done.stderr)
+        done.err
             .contains("recordings/c0001/robot.json: was sealed, but cannot be read")
     );
 }
 
 #[test]
 fn the_scoreboard_is_a_table_with_a_row_for_each_effect() {
-    let root = tempfile::tempdir().expect("a folder");
+    let root = tempfile::tempdir().unwrap();
     let (set, verdicts) = judged(root.path(), wanted);
     let out = root.path().join("scoreboard.parquet");
     let text = out.to_string_lossy();
-    let done = calib(&[
-        "simulate",
-        "reveal",
-        &set.to_string_lossy(),
-        "--verdicts",
-        &verdicts.to_string_lossy(),
-        "--out",
-        &text,
-    ]);
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    calib(
+        ".",
+        &format!(
+            "simulate reveal {} --verdicts {} --out {text}",
+            set.display(),
+            verdicts.display()
+        ),
+    )
+    .code(0);
     let reader =
-        ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(&out).expect("a file"))
-            .expect("Parquet");
+        ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(&out).unwrap()).unwrap();
     let rows: usize = reader
         .build()
-        .expect("a reader")
-        .map(|batch| batch.expect("rows").num_rows())
+        .unwrap()
+        .map(|batch| batch.unwrap().num_rows())
         .sum();
     let board = score(&set, &verdicts);
     assert_eq!(
@@ -513,45 +476,32 @@ fn the_scoreboard_is_a_table_with_a_row_for_each_effect() {
 /// What is diagnosed already is not diagnosed again: with all verdicts at hand a proof reveals at once.
 #[test]
 fn an_interrupted_proof_goes_on_where_it_stood_and_only_with_the_same_set() {
-    let root = tempfile::tempdir().expect("a folder");
+    let root = tempfile::tempdir().unwrap();
     let (set, verdicts) = judged(root.path(), wanted);
-    std::fs::rename(verdicts, set.join("verdicts")).expect("moved");
+    std::fs::rename(verdicts, set.join("verdicts")).unwrap();
     let pipeline = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines/case/pipeline.yaml");
     let prove = |cases: &str| {
-        calib(&[
-            "simulate",
-            "prove",
-            "--out",
-            &set.to_string_lossy(),
-            "--cases",
-            cases,
-            "--points",
-            "30",
-            "--nulls",
-            "0.25",
-            "--pairs",
-            "0.25",
-            "--open",
-            "0.1",
-            "--pipeline",
-            pipeline,
-            "--json",
-        ])
+        calib(
+            ".",
+            &format!(
+                "simulate prove --out {} --cases {cases} --points 30 --nulls 0.25 --pairs 0.25 --open 0.1 --pipeline {pipeline} --json",
+                set.display()
+            ),
+        )
     };
     let done = prove("12");
-    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    let said = done.err.clone();
     assert!(
-        done.status.success() && said.matches("diagnosed before").count() == 12,
+        done.code == Some(0) && said.matches("diagnosed before").count() == 12,
         "{said}"
     );
-    let board: Value = serde_json::from_slice(&done.stdout).expect("JSON");
+    let board: Value = done.json();
     assert_eq!(
         (&board["recordings"], &board["failures"]),
         (&json!(12), &json!([]))
     );
-    let other = prove("11");
-    assert_eq!(other.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&other.stderr).contains("holds a set made with other options"));
+    let other = prove("11").code(2);
+    has(&other.err, "holds a set made with other options");
 }
 
 const STATED: &str = "
@@ -573,83 +523,43 @@ stages:
 /// simulated.
 #[test]
 fn a_stated_twin_is_written_as_a_case_folder_that_the_estimator_reads() {
-    let root = tempfile::tempdir().expect("a folder");
+    let root = tempfile::tempdir().unwrap();
     let path = |name: &str| root.path().join(name).to_string_lossy().into_owned();
     let pipelines = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines");
-    std::fs::copy(format!("{pipelines}/sr210d/robot.yaml"), path("robot.yaml")).expect("a robot");
-    std::fs::write(path("stated.yaml"), STATED).expect("a pipeline");
+    std::fs::copy(format!("{pipelines}/sr210d/robot.yaml"), path("robot.yaml")).unwrap();
+    std::fs::write(path("stated.yaml"), STATED).unwrap();
     let record = |out: &str, remainder: &str| {
-        let remainder = format!("simulate.remainder={remainder}");
-        calib(&[
-            "simulate",
-            "record",
-            &path("stated.yaml"),
-            "--out",
-            &path(out),
-            "--store",
-            &path("store"),
-            "--set",
-            &remainder,
-            "--quiet",
-        ])
+        let set = format!("--set simulate.remainder={remainder} --store store --quiet");
+        let words = format!("simulate record stated.yaml --out {out} {set}");
+        calib(root.path(), &words)
     };
     let held_out = |out: &str| {
-        let (case, variable) = (
-            format!("{pipelines}/case/pipeline.yaml"),
-            format!("case={}", path(out)),
+        let words = format!(
+            "run {pipelines}/case/pipeline.yaml --set case={} --store store --until validate --json --quiet",
+            path(out)
         );
-        let done = calib(&[
-            "run",
-            &case,
-            "--set",
-            &variable,
-            "--store",
-            &path("store"),
-            "--until",
-            "validate",
-            "--json",
-            "--quiet",
-        ]);
-        assert!(
-            done.status.success(),
-            "{}",
-            String::from_utf8_lossy(&done.stderr)
-        );
-        let document: Value = serde_json::from_slice(&done.stdout).expect("JSON");
-        let rows = document["statistics"]
-            .as_array()
-            .expect("statistics")
-            .clone();
+        let done = calib(root.path(), &words).code(0);
+        let document: Value = done.json();
+        let rows = document["statistics"].as_array().unwrap().clone();
         let row = rows
             .iter()
             .find(|row| row["step"] == "geometry" && row["set"] == "validate")
-            .expect("a row")
+            .unwrap()
             .clone();
-        row["rms_mm"].as_f64().expect("a number") / row["noise_rms_mm"].as_f64().expect("a number")
+        row["rms_mm"].as_f64().unwrap() / row["noise_rms_mm"].as_f64().unwrap()
     };
     for (out, remainder) in [("bare", "none"), ("worn", "all")] {
-        let done = record(out, remainder);
-        assert!(
-            done.status.success(),
-            "{}",
-            String::from_utf8_lossy(&done.stderr)
-        );
+        record(out, remainder).code(0);
     }
     // 60 points leave the 34 numbers of geometry uncertain by a quarter of the noise; 30 arcsec at 2 m are 0.3 mm.
     let (bare, worn) = (held_out("bare"), held_out("worn"));
     assert!((0.85..1.35).contains(&bare), "{bare}");
     assert!(worn > 5.0 * bare, "{worn} against {bare}");
 
-    let truth = std::fs::read_to_string(root.path().join("worn/truth.csv")).expect("true numbers");
-    assert!(
-        truth.contains("\nbacklash.j2.gap,backlash,joint 2,arcsec,60\n"),
-        "{truth}"
-    );
+    let truth = read(root.path().join("worn/truth.csv"));
+    has(&truth, "\nbacklash.j2.gap,backlash,joint 2,arcsec,60\n");
     let again = record("worn", "all");
-    assert!(
-        again.status.code() == Some(2)
-            && String::from_utf8_lossy(&again.stderr).contains("is not empty")
-    );
+    assert!(again.code == Some(2) && again.err.contains("is not empty"));
 }
 
 #[test]
@@ -664,7 +574,7 @@ fn a_path_and_its_shuffled_rows_have_the_same_poses_and_only_the_path_is_smooth(
             layout,
             ..Design::default()
         };
-        let case = Case::make(&design, 0, Content::Null).expect("a case");
+        let case = Case::make(&design, 0, Content::Null).unwrap();
         case.shots
             .iter()
             .take(case.fit)
@@ -689,7 +599,7 @@ fn a_path_and_its_shuffled_rows_have_the_same_poses_and_only_the_path_is_smooth(
         step(&path),
         step(&shuffled)
     );
-    let order = |a: &Vec<f64>, b: &Vec<f64>| a.partial_cmp(b).expect("numbers");
+    let order = |a: &Vec<f64>, b: &Vec<f64>| a.partial_cmp(b).unwrap();
     path.sort_by(order);
     shuffled.sort_by(order);
     assert_eq!(path, shuffled);

@@ -1,6 +1,6 @@
 //! The covariance of a fit as a table: the same numbers on the way to and from it, and what `compensate` makes of it.
 
-use crate::fixture;
+use crate::fixture::{self, fit_all};
 use crate::identify::{GEOMETRY, model, recording};
 use calib::compensate::{Circumstance, IdentifiedArm, Scatter, Uncertainty};
 use calib::effect::Load;
@@ -11,15 +11,7 @@ use calib::table::{CovarianceTable, Parameters, Table};
 fn fitted(data: &Measurements, robot: &calib::robot::RobotModel) -> (Model, Fitted) {
     let rows: Vec<usize> = (0..data.rows()).collect();
     let model = model(robot, align(robot, data, &rows), &GEOMETRY);
-    let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(
-        &model,
-        data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        },
-    )
+    fit_all(&model, data, &rows)
 }
 
 #[test]
@@ -40,8 +32,8 @@ fn the_table_has_the_variances_of_the_parameters_and_every_pair_once() {
             .0
             .iter()
             .find(|pair| pair.parameter == row.name && pair.other == row.name)
-            .expect("its variance");
-        let sigma = row.sigma.expect("free");
+            .unwrap();
+        let sigma = row.sigma.unwrap();
         assert!(
             (own.covariance.sqrt() / sigma - 1.0).abs() < 1e-9,
             "{}: {} and {sigma}",
@@ -56,7 +48,7 @@ fn the_table_has_the_variances_of_the_parameters_and_every_pair_once() {
                 .0
                 .iter()
                 .find(|row| row.parameter == name && row.other == name)
-                .expect("there")
+                .unwrap()
                 .covariance
         };
         let bound = (variance(&pair.parameter) * variance(&pair.other)).sqrt();
@@ -65,11 +57,8 @@ fn the_table_has_the_variances_of_the_parameters_and_every_pair_once() {
             "{pair:?}"
         );
     }
-    let frame = table.to_frame().expect("a frame that its schema allows");
-    assert_eq!(
-        CovarianceTable::from_frame(&frame).expect("reads back"),
-        table
-    );
+    let frame = table.to_frame().unwrap();
+    assert_eq!(CovarianceTable::from_frame(&frame).unwrap(), table);
 }
 
 #[test]
@@ -79,14 +68,14 @@ fn a_stored_covariance_says_of_every_point_what_the_fit_said() {
     let parameters = Parameters::of("geometry", &model, &fitted, &[], None);
     let read = parameters
         .model(truth.robot.clone(), &[], Load::GravityTorque)
-        .expect("a model");
+        .unwrap();
     let covariance = CovarianceTable::of(&model, &fitted, None)
         .of_model(&read)
-        .expect("a covariance");
+        .unwrap();
     let want = fitted
         .covariance
         .as_ref()
-        .expect("a covariance")
+        .unwrap()
         .of_predictions(&model, &data);
     let arm = IdentifiedArm::new(read, None);
     let uncertainty = Uncertainty::new(&arm, covariance, Scatter::default());

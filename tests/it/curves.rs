@@ -54,8 +54,8 @@ fn curves_of(
     let robot = RobotModel::new(description.clone());
     let mut parameters = Parameters::default();
     for (form, sizes) in forms {
-        let parsed: Form = serde_json::from_value((*form).clone()).expect("a form");
-        let text = serde_json::to_string(&parsed).expect("text");
+        let parsed: Form = serde_json::from_value((*form).clone()).unwrap();
+        let text = serde_json::to_string(&parsed).unwrap();
         for (spec, size) in parsed.parameters(&robot).into_iter().zip(*sizes) {
             parameters.0.push(ParameterRow {
                 name: spec.name,
@@ -77,9 +77,7 @@ fn curves_of(
         }
     }
     parameters.0.sort_by(|a, b| a.name.cmp(&b.name));
-    let model = parameters
-        .model(robot, &[], Load::GravityTorque)
-        .expect("a model");
+    let model = parameters.model(robot, &[], Load::GravityTorque).unwrap();
     let joints = description.joints.len();
     let mut recording = Recording {
         joints,
@@ -140,9 +138,7 @@ fn curves_of(
         cells: Vec::new(),
         suspects: Vec::new(),
     };
-    let tables = Desk::default()
-        .run(&Report::default(), reads)
-        .expect("a report");
+    let tables = Desk::default().run(&Report::default(), reads).unwrap();
     (recording, table(&tables).remove(0))
 }
 

@@ -1,5 +1,6 @@
 //! Effects of a user's own: laws as formulas do what the library's do, and declarations survive as JSON.
 
+use crate::answer::has;
 use crate::fixture;
 use calib::effect::{
     Axes, AxisPoint, Basis, DeclaredCause, DeclaredForm, EffectDeclaration, EffectStack, Form, Law,
@@ -74,7 +75,7 @@ fn moved(robot: &RobotModel, data: &Measurements, form: &Form) -> Vec<Vec<Vector
 }
 
 fn term(name: &str, motion: Motion, law: Law) -> Form {
-    Term::new(cause(name).expect("a cause"), motion, law).into()
+    Term::new(cause(name).unwrap(), motion, law).into()
 }
 
 #[test]
@@ -228,15 +229,15 @@ fn a_form_carries_its_declaration_wherever_its_json_goes() {
     let all = forms(&declared, &robot, &data);
     assert_eq!(all.len(), 2 * robot.joints());
     for form in &all {
-        let text = serde_json::to_string(form).expect("JSON");
-        let again: Form = serde_json::from_str(&text).expect("the same");
+        let text = serde_json::to_string(form).unwrap();
+        let again: Form = serde_json::from_str(&text).unwrap();
         assert!(
             again == *form
                 && again.key() == form.key()
-                && serde_json::to_string(&again).expect("JSON") == text
+                && serde_json::to_string(&again).unwrap() == text
         );
     }
-    let text = serde_json::to_string(&all[0]).expect("JSON");
+    let text = serde_json::to_string(&all[0]).unwrap();
     for (from, to, said) in [
         ("abs(q", "abs(p", "`p` is no name"),
         (
@@ -255,7 +256,7 @@ fn a_form_carries_its_declaration_wherever_its_json_goes() {
         let error = serde_json::from_str::<Form>(&text.replace(from, to))
             .expect_err("not a form")
             .to_string();
-        assert!(error.contains(said), "{error}");
+        has(&error, said);
     }
 }
 
@@ -264,7 +265,7 @@ fn a_declaration_says_what_it_needs_and_is_not_tried_without() {
     let robot = RobotModel::new(fixture::spherical());
     let mut data = data(&robot);
     let declared = declaration("joint", "angle", &["lagging(300) * q"]);
-    let about = DeclaredCause::of(&declared).expect("a cause").about();
+    let about = DeclaredCause::of(&declared).unwrap().about();
     assert_eq!(
         (about.name, about.needs, about.formula),
         ("own_effect", "temperature", "lagging(300) * q")

@@ -2,11 +2,11 @@
 
 use calib::error::{Error, Result};
 use calib::stage::{
-    Context, ErasedStage, InputTable, OpenedInput, Output, Port, RawFile, Services, Sink, Stage,
-    StageEntry, Streamed, Writes,
+    Context, DiagnoseReads, ErasedStage, IdentifyReads, InputTable, OpenedInput, Output, Port,
+    RawFile, Services, Sink, Stage, StageEntry, Streamed, Writes,
 };
 use calib::store::frame::Frame;
-use calib::table::Table;
+use calib::table::{Recording, Robot, Split, Table};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -170,15 +170,28 @@ pub fn missing(why: &str) {
 /// Notes that this test, or a part of it, has nothing to test.
 pub fn skipped(why: &str) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("skipped");
-    std::fs::create_dir_all(&folder).expect("a folder");
-    let test = std::thread::current()
-        .name()
-        .expect("a test")
-        .replace("::", " ");
+    std::fs::create_dir_all(&folder).unwrap();
+    let test = std::thread::current().name().unwrap().replace("::", " ");
     let mut notes = std::fs::OpenOptions::new()
         .create(true)
         .append(true)
         .open(folder.join(test))
-        .expect("a note");
-    writeln!(notes, "{why}").expect("a note");
+        .unwrap();
+    writeln!(notes, "{why}").unwrap();
+}
+
+pub fn identify_reads(robot: Robot, recording: Recording, split: Split) -> IdentifyReads {
+    IdentifyReads {
+        robot,
+        recording,
+        split,
+    }
+}
+
+pub fn diagnose_reads(robot: Robot, recording: Recording, split: Split) -> DiagnoseReads {
+    DiagnoseReads {
+        robot,
+        recording,
+        split,
+    }
 }

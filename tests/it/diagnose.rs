@@ -12,7 +12,8 @@ mod tool_mass;
 mod weight;
 mod without;
 
-use crate::desk::{Desk, shared, table};
+use crate::answer::{self, has, put, read, root};
+use crate::desk::{Desk, diagnose_reads, shared, table};
 use crate::suspects::{Inputs, pipeline};
 use calib::effect::{Form, Load};
 use calib::estimate::choose::{Site, median};
@@ -24,15 +25,14 @@ use nalgebra::Vector3;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::process::Command;
 
 type Named = BTreeSet<(String, String)>;
 
 fn wanted(value: &Value) -> Named {
-    let text = |entry: &Value, key: &str| entry[key].as_str().expect("a name").to_string();
+    let text = |entry: &Value, key: &str| entry[key].as_str().unwrap().to_string();
     value
         .as_array()
-        .expect("a list")
+        .unwrap()
         .iter()
         .map(|entry| (text(entry, "effect"), text(entry, "where")))
         .collect()
@@ -45,23 +45,23 @@ fn the_practice_cases_are_solved() {
     };
     let mut wrong = Vec::new();
     for case in std::fs::read_dir(&folder)
-        .expect("the folder")
-        .map(|entry| entry.expect("an entry").path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
     {
         let Ok(want) = std::fs::read_to_string(case.join("want.json")) else {
             continue;
         };
-        let want: Value = serde_json::from_str(&want).expect("JSON");
+        let want: Value = serde_json::from_str(&want).unwrap();
         let (inputs, stage): (Inputs, Diagnose) =
             pipeline("case", &[("case", &case.display().to_string())], "diagnose");
-        let robot = RobotModel::new(inputs.robot.to_description().expect("a robot"));
+        let robot = RobotModel::new(inputs.robot.to_description().unwrap());
         let data = inputs.recording.measurements();
-        let reads = DiagnoseReads {
-            robot: inputs.robot,
-            recording: inputs.recording,
-            split: inputs.split,
-        };
-        let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+        let tables = Desk::default()
+            .run(
+                &stage,
+                diagnose_reads(inputs.robot, inputs.recording, inputs.split),
+            )
+            .unwrap();
         let findings: Findings = table(&tables).remove(0);
         let found: Named = findings
             .0
@@ -71,10 +71,7 @@ fn the_practice_cases_are_solved() {
         let verdict: Verdict = table(&tables).remove(0);
         let row = &verdict.0[0];
         // Held-out rows come down to what a complete model of so many parameters leaves.
-        let (after, floor) = (
-            row.after_rms_mm.expect("held-out rows"),
-            row.noise_floor_mm.expect("lengths"),
-        );
+        let (after, floor) = (row.after_rms_mm.unwrap(), row.noise_floor_mm.unwrap());
         let wanted = wanted(&want["effects"]);
         let is = |(effect, place): &(String, String), found: &(String, String)| {
             effect
@@ -106,9 +103,7 @@ fn the_practice_cases_are_solved() {
         assert!(predictions.0.len() >= 160);
         // The table of parameters alone is the corrected model, but for products of small motions of the base.
         let parameters: Parameters = table(&tables).remove(0);
-        let model = parameters
-            .model(robot, &[], Load::GravityTorque)
-            .expect("a model");
+        let model = parameters.model(robot, &[], Load::GravityTorque).unwrap();
         for (point, row) in model.predict(&data).iter().zip(&predictions.0) {
             let apart = (point * 1e3 - Vector3::new(row.x_mm, row.y_mm, row.z_mm)).norm();
             assert!(
@@ -123,64 +118,39 @@ fn the_practice_cases_are_solved() {
     assert!(wrong.len() <= 1, "{}", wrong.join("\n"));
 }
 
-fn calib(arguments: &[&str], folder: &Path) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("calib");
-    assert!(
-        output.status.success(),
-        "{arguments:?}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    String::from_utf8(output.stdout).expect("UTF-8")
+fn calib(words: &str, folder: &Path) -> String {
+    answer::calib(folder, words).ok()
 }
 
 /// The exit code and what is printed on stdout.
-fn ended(arguments: &[&str], folder: &Path) -> (Option<i32>, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("calib");
-    (
-        output.status.code(),
-        String::from_utf8(output.stdout).expect("UTF-8"),
-    )
+fn ended(words: &str, folder: &Path) -> (Option<i32>, String) {
+    let answer = answer::calib(folder, words);
+    (answer.code, answer.out)
 }
 
 /// Diagnoses a concealed recording of the twin: the document, and what the seal holds.
 fn blind(family: &str, seed: &str) -> (Value, Value) {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut arguments = vec![
-        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", seed, "--points", "120",
-    ];
-    match family {
-        "nothing" => arguments.extend(["--nulls", "1"]),
-        "wandering" => arguments.extend(["--nulls", "1", "--scatter", "wandering"]),
-        family => arguments.extend(["--family", family]),
-    }
-    arguments.extend(["--robot", "compact6", "--faulty", "0"]);
-    calib(&arguments, folder.path());
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml");
-    let pipeline = pipeline.display().to_string();
-    let said = calib(
-        &[
-            "diagnose",
-            &pipeline,
-            "--set",
-            "case=sealed/recordings/c0001",
-            "--json",
-            "--quiet",
-        ],
+    let folder = tempfile::tempdir().unwrap();
+    let hidden = match family {
+        "nothing" => "--nulls 1".into(),
+        "wandering" => "--nulls 1 --scatter wandering".into(),
+        family => format!("--family {family}"),
+    };
+    let made = format!("simulate conceal --out sealed --cases 1 --seed {seed} --points 120");
+    calib(
+        &format!("{made} {hidden} --robot compact6 --faulty 0"),
         folder.path(),
     );
-    let truth =
-        std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).expect("the truth");
+    let pipeline = root("pipelines/case/pipeline.yaml");
+    let pipeline = pipeline.display();
+    let said = calib(
+        &format!("diagnose {pipeline} --set case=sealed/recordings/c0001 --json --quiet"),
+        folder.path(),
+    );
+    let truth = read(folder.path().join("sealed/sealed/c0001.json"));
     (
-        serde_json::from_str(&said).expect("JSON"),
-        serde_json::from_str(&truth).expect("JSON"),
+        serde_json::from_str(&said).unwrap(),
+        serde_json::from_str(&truth).unwrap(),
     )
 }
 
@@ -192,7 +162,7 @@ fn a_recording_without_a_missing_effect_has_no_findings() {
     assert!(
         said["not_observable"]
             .as_array()
-            .expect("a list")
+            .unwrap()
             .iter()
             .any(|line| line.as_str().unwrap().contains("tracker_scale"))
     );
@@ -215,12 +185,8 @@ fn effects_of_the_twin_are_named_and_placed() {
         let (said, truth) = blind(family, seed);
         let found = wanted(&said["findings"]);
         assert_eq!(found, wanted(&truth["want"]), "{family}: {said:#}");
-        let rms = |when: &str| {
-            said[when]["validate_rms_mm"]
-                .as_f64()
-                .expect("held-out rows")
-        };
-        let floor = said["noise_floor_mm"].as_f64().expect("a number");
+        let rms = |when: &str| said[when]["validate_rms_mm"].as_f64().unwrap();
+        let floor = said["noise_floor_mm"].as_f64().unwrap();
         // What is hardly larger than the noise may gain nothing on some fifty points.
         let visible = rms("before") > 1.2 * floor;
         assert!(
@@ -260,12 +226,8 @@ stages:
 "
     );
     let folder = concealed("backlash", "31", "40");
-    std::fs::write(folder.path().join("p.yaml"), pipeline).expect("written");
-    serde_json::from_str(&calib(
-        &["diagnose", "p.yaml", "--json", "--quiet"],
-        folder.path(),
-    ))
-    .expect("JSON")
+    put(folder.path(), "p.yaml", pipeline);
+    serde_json::from_str(&calib("diagnose p.yaml --json --quiet", folder.path())).unwrap()
 }
 
 #[test]
@@ -275,7 +237,7 @@ fn lost_motion_that_heavy_loads_decide_is_one_cause_with_its_gap_and_its_torque(
         3,
         120,
     );
-    let findings = said["findings"].as_array().expect("a list");
+    let findings = said["findings"].as_array().unwrap();
     assert_eq!(
         wanted(&said["findings"]),
         Named::from([("backlash".into(), "joint 3".into())]),
@@ -283,64 +245,51 @@ fn lost_motion_that_heavy_loads_decide_is_one_cause_with_its_gap_and_its_torque(
     );
     let gap = &findings[0]["parameters"][0];
     let (value, sigma) = (
-        gap["value"].as_f64().expect("a number"),
-        gap["sigma"].as_f64().expect("a number"),
+        gap["value"].as_f64().unwrap(),
+        gap["sigma"].as_f64().unwrap(),
     );
     assert!((value - 30.0).abs() < 3.0 * sigma && sigma < 3.0, "{gap}");
-    let statement = findings[0]["statement"].as_str().expect("a sentence");
+    let statement = findings[0]["statement"].as_str().unwrap();
     let torque: f64 = statement
         .split(" Nm")
         .next()
         .and_then(|text| text.rsplit(' ').next())
-        .expect("Nm")
+        .unwrap()
         .parse()
-        .expect("a number");
+        .unwrap();
     assert!((9.0..=15.0).contains(&torque), "{statement}");
 }
 
 #[test]
 fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let arguments = [
-        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "901", "--points",
-        "120", "--nulls", "1",
-    ];
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = "simulate conceal --out sealed --cases 1 --seed 901 --points 120 --nulls 1";
     calib(
-        &[&arguments[..], &["--robot", "compact6", "--faulty", "0"]].concat(),
+        &format!("{arguments} --robot compact6 --faulty 0"),
         folder.path(),
     );
     let file = folder.path().join("sealed/recordings/c0001/controller.csv");
-    let text = std::fs::read_to_string(&file).expect("the log");
+    let text = read(&file);
     let column = text
         .lines()
         .next()
         .and_then(|head| head.split(',').position(|name| name == "q4_deg"))
-        .expect("q4_deg");
+        .unwrap();
     let reverse = |(row, line): (usize, &str)| -> String {
         let mut cells: Vec<String> = line.split(',').map(String::from).collect();
         if row > 0 {
-            cells[column] = (-cells[column].parse::<f64>().expect("a number")).to_string();
+            cells[column] = (-cells[column].parse::<f64>().unwrap()).to_string();
         }
         cells.join(",")
     };
     let turned: Vec<String> = text.lines().enumerate().map(reverse).collect();
-    std::fs::write(&file, turned.join("\n")).expect("written");
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("pipelines/case/pipeline.yaml")
-        .display()
-        .to_string();
-    let asked = [
-        "diagnose",
-        &pipeline,
-        "--set",
-        "case=sealed/recordings/c0001",
-        "--json",
-        "--quiet",
-    ];
-    let (code, said) = ended(&asked, folder.path());
+    std::fs::write(&file, turned.join("\n")).unwrap();
+    let pipeline = root("pipelines/case/pipeline.yaml").display().to_string();
+    let asked = &format!("diagnose {pipeline} --set case=sealed/recordings/c0001 --json --quiet");
+    let (code, said) = ended(asked, folder.path());
     assert_eq!(code, Some(10), "{said}");
-    let said: Value = serde_json::from_str(&said).expect("JSON");
-    let findings = said["findings"].as_array().expect("a list");
+    let said: Value = serde_json::from_str(&said).unwrap();
+    let findings = said["findings"].as_array().unwrap();
     assert_eq!(findings.len(), 1, "{said:#}");
     assert_eq!(
         (&said["verdict"], &findings[0]["effect"]),
@@ -348,10 +297,7 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
     );
     let sign = "sign: [1, 1, 1, -1, 1, 1]";
     assert!(
-        findings[0]["statement"]
-            .as_str()
-            .expect("a sentence")
-            .contains(sign),
+        findings[0]["statement"].as_str().unwrap().contains(sign),
         "{said:#}"
     );
     // The line of YAML mends it, and physics is asked.
@@ -363,11 +309,8 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
             &format!("unit: deg, linear_unit: mm, {sign}}}"),
         )],
     );
-    let mended = calib(
-        &[&["diagnose", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(),
-        here,
-    );
-    let mended: Value = serde_json::from_str(&mended).expect("JSON");
+    let mended = calib(&format!("diagnose p.yaml --json --quiet {CASE}"), here);
+    let mended: Value = serde_json::from_str(&mended).unwrap();
     assert_eq!(
         (&mended["verdict"], &mended["findings"]),
         (&"nothing_missing".into(), &serde_json::json!([])),
@@ -377,31 +320,17 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
 
 #[test]
 fn what_another_simulation_knows_is_not_missing_from_it() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let arguments = [
-        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "931", "--points",
-        "120",
-    ];
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = "simulate conceal --out sealed --cases 1 --seed 931 --points 120";
     calib(
-        &[
-            &arguments[..],
-            &[
-                "--family",
-                "joint_compliance",
-                "--robot",
-                "compact6",
-                "--faulty",
-                "0",
-            ],
-        ]
-        .concat(),
+        &format!("{arguments} --family joint_compliance --robot compact6 --faulty 0"),
         folder.path(),
     );
     let case = folder.path().join("sealed/recordings/c0001");
     let diagnosed = |simulated: Option<Vec<[f64; 3]>>| {
         let (inputs, stage): (Inputs, Diagnose) =
             pipeline("case", &[("case", &case.display().to_string())], "diagnose");
-        let robot = RobotModel::new(inputs.robot.to_description().expect("a robot"));
+        let robot = RobotModel::new(inputs.robot.to_description().unwrap());
         let data = inputs.recording.measurements();
         let reads = DiagnoseReads {
             recording: inputs.recording,
@@ -415,7 +344,7 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
             },
             ..reads
         };
-        let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+        let tables = Desk::default().run(&stage, reads).unwrap();
         let findings: Findings = table(&tables).remove(0);
         let found: Named = findings
             .0
@@ -425,16 +354,13 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
         let parameters: Parameters = table(&tables).remove(0);
         (
             found,
-            parameters
-                .model(robot, &[], Load::GravityTorque)
-                .expect("a model"),
+            parameters.model(robot, &[], Load::GravityTorque).unwrap(),
             data,
         )
     };
     let (alone, mut model, data) = diagnosed(None);
-    let truth =
-        std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).expect("the truth");
-    let truth: Value = serde_json::from_str(&truth).expect("JSON");
+    let truth = read(folder.path().join("sealed/sealed/c0001.json"));
+    let truth: Value = serde_json::from_str(&truth).unwrap();
     assert_eq!(alone, wanted(&truth["want"]));
     // Beside a rigid arm in a frame of its own the same is missing.
     let rigid = |row: usize| model.robot.forward(data.q(row)).translation;
@@ -465,60 +391,39 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
 
 /// A recording of the twin in `sealed/recordings/c0001` of a new folder.
 fn concealed(family: &str, seed: &str, points: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().expect("a folder");
-    let arguments = [
-        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", seed, "--points",
-        points,
-    ];
+    let folder = tempfile::tempdir().unwrap();
+    let arguments =
+        &format!("simulate conceal --out sealed --cases 1 --seed {seed} --points {points}");
     calib(
-        &[
-            &arguments[..],
-            &["--family", family, "--robot", "compact6", "--faulty", "0"],
-        ]
-        .concat(),
+        &format!("{arguments} --family {family} --robot compact6 --faulty 0"),
         folder.path(),
     );
     folder
 }
 
-fn refused(arguments: &[&str], folder: &Path) -> (Option<i32>, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("calib");
-    (
-        output.status.code(),
-        String::from_utf8_lossy(&output.stderr).into_owned(),
-    )
+fn refused(words: &str, folder: &Path) -> (Option<i32>, String) {
+    let answer = answer::calib(folder, words);
+    (answer.code, answer.err)
 }
 
 /// The pipeline of cases, with one text in place of another.
 fn case_with(folder: &Path, changes: &[(&str, &str)]) {
-    let text = std::fs::read_to_string(
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml"),
-    )
-    .expect("it");
+    let text = read(root("pipelines/case/pipeline.yaml"));
     let text = changes.iter().fold(text, |text, (from, to)| {
         assert!(text.contains(from), "{from}");
         text.replacen(from, to, 1)
     });
-    std::fs::write(folder.join("p.yaml"), text).expect("written");
+    put(folder, "p.yaml", text);
 }
 
-const CASE: [&str; 2] = ["--set", "case=sealed/recordings/c0001"];
+const CASE: &str = "--set case=sealed/recordings/c0001";
 
 /// The last run of a folder's store, whatever it was for.
 fn newest(folder: &Path) -> String {
-    let runs = std::fs::read_dir(folder.join(".calib/runs")).expect("runs");
-    runs.map(|run| {
-        run.expect("a run")
-            .file_name()
-            .into_string()
-            .expect("UTF-8")
-    })
-    .max()
-    .expect("a run")
+    let runs = std::fs::read_dir(folder.join(".calib/runs")).unwrap();
+    runs.map(|run| run.unwrap().file_name().into_string().unwrap())
+        .max()
+        .unwrap()
 }
 
 #[test]
@@ -530,85 +435,59 @@ fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
         "  - {id: again, uses: diagnose}\n\n  - uses: validate\n",
     );
     case_with(here, &[]);
-    let told = calib(
-        &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
-        here,
-    );
-    let made = [told, calib(&["diagnose", &newest(here), "--json"], here)];
-    let runs = std::fs::read_dir(here.join(".calib/runs"))
-        .expect("runs")
-        .count();
-    assert_eq!(calib(&["diagnose", &newest(here)], here), made[0]);
+    let told = calib(&format!("diagnose p.yaml --quiet {CASE}"), here);
+    let made = [
+        told,
+        calib(&format!("diagnose {} --json", newest(here)), here),
+    ];
+    let runs = std::fs::read_dir(here.join(".calib/runs")).unwrap().count();
+    assert_eq!(calib(&format!("diagnose {}", newest(here)), here), made[0]);
     // Nothing was run, and nothing was computed anew.
     assert_eq!(
-        std::fs::read_dir(here.join(".calib/runs"))
-            .expect("runs")
-            .count(),
+        std::fs::read_dir(here.join(".calib/runs")).unwrap().count(),
         runs
     );
     assert_eq!(
-        calib(
-            &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
-            here
-        ),
+        calib(&format!("diagnose p.yaml --quiet --json {CASE}"), here),
         made[1]
     );
-    calib(&["tag", &newest(here), "found"], here);
+    calib(&format!("tag {} found", newest(here)), here);
     calib(
-        &[
-            &[
-                "run", "p.yaml", "--quiet", "--until", "geometry", "--set", "seed=9",
-            ],
-            &CASE[..],
-        ]
-        .concat(),
+        &format!("run p.yaml --quiet --until geometry --set seed=9 {CASE}"),
         here,
     );
-    let (code, said) = refused(&["diagnose", &newest(here)], here);
+    let (code, said) = refused(&format!("diagnose {}", newest(here)), here);
     assert_eq!(code, Some(2), "{said}");
-    assert!(
-        said.contains("never came to its stage `diagnose`"),
-        "{said}"
+    has(&said, "never came to its stage `diagnose`");
+    has(
+        &said,
+        "calib diagnose p.yaml --set seed=9 --set case=sealed/recordings/c0001",
     );
-    assert!(
-        said.contains("calib diagnose p.yaml --set seed=9 --set case=sealed/recordings/c0001"),
-        "{said}"
-    );
-    assert_eq!(calib(&["diagnose", "found", "--json"], here), made[1]);
+    assert_eq!(calib("diagnose found --json", here), made[1]);
     case_with(here, &[("  - uses: diagnose\n", "")]);
-    calib(
-        &[
-            &["run", "p.yaml", "--quiet", "--until", "geometry"],
-            &CASE[..],
-        ]
-        .concat(),
-        here,
-    );
-    let (code, said) = refused(&["diagnose", &newest(here)], here);
+    calib(&format!("run p.yaml --quiet --until geometry {CASE}"), here);
+    let (code, said) = refused(&format!("diagnose {}", newest(here)), here);
     assert_eq!(code, Some(2), "{said}");
-    assert!(
-        said.contains("has no stage `diagnose`: put `- uses: diagnose` after the split of p.yaml"),
-        "{said}"
+    has(
+        &said,
+        "has no stage `diagnose`: put `- uses: diagnose` after the split of p.yaml",
     );
     case_with(here, &[twice]);
-    calib(
-        &[&["run", "p.yaml", "--quiet", "--until", "again"], &CASE[..]].concat(),
-        here,
-    );
+    calib(&format!("run p.yaml --quiet --until again {CASE}"), here);
     let run = newest(here);
-    for place in [&[run.as_str()][..], &[&["p.yaml"], &CASE[..]].concat()] {
-        let (code, said) = refused(&[&["diagnose"], place].concat(), here);
+    for place in [run.clone(), format!("p.yaml {CASE}")] {
+        let (code, said) = refused(&format!("diagnose {place}"), here);
         assert_eq!(code, Some(2), "{said}");
-        assert!(
-            said.contains("has several diagnoses; say which with --step: diagnose, again"),
-            "{said}"
+        has(
+            &said,
+            "has several diagnoses; say which with --step: diagnose, again",
         );
     }
     assert_eq!(
-        calib(&["diagnose", &format!("{run}/again"), "--json"], here),
-        calib(&["diagnose", &run, "--step", "again", "--json"], here)
+        calib(&format!("diagnose {run}/again --json"), here),
+        calib(&format!("diagnose {run} --step again --json"), here)
     );
-    let (code, said) = refused(&["diagnose", &run, "--set", "seed=2"], here);
+    let (code, said) = refused(&format!("diagnose {run} --set seed=2"), here);
     assert_eq!(
         (code, said.contains("a finished run cannot be changed")),
         (Some(2), true),
@@ -621,18 +500,18 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
     let folder = concealed("joint_compliance", "931", "60");
     let here = folder.path();
     let file = here.join("sealed/recordings/c0001/tracker.csv");
-    let text = std::fs::read_to_string(&file).expect("the tracker's");
+    let text = read(&file);
     let column = text
         .lines()
         .next()
         .and_then(|head| head.split(',').position(|name| name == "x_mm"))
-        .expect("x_mm");
+        .unwrap();
     let beside = |(row, line): (usize, &str)| match row {
         0 => format!("{line},sx,sy,sz\n"),
         _ => {
             let cells: Vec<&str> = line.split(',').collect();
             let near = |k: usize| {
-                cells[column + k].parse::<f64>().expect("a number")
+                cells[column + k].parse::<f64>().unwrap()
                     + 0.05 * (row as f64 * (k + 1) as f64).sin()
             };
             format!("{line},{},{},{}\n", near(0), near(1), near(2))
@@ -642,51 +521,35 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
         &file,
         text.lines().enumerate().map(beside).collect::<String>(),
     )
-    .expect("written");
+    .unwrap();
     let z = "            z: {column: z_mm, unit: mm}\n";
     let simulated = ["x", "y", "z"]
         .map(|axis| format!("            sim_{axis}: {{column: s{axis}, unit: mm}}\n"))
         .concat();
     case_with(here, &[(z, &format!("{z}{simulated}"))]);
-    calib(
-        &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
-        here,
-    );
-    std::fs::write(here.join("t.csv"), "x_mm,y_mm,z_mm\n600,0,700\n").expect("written");
+    calib(&format!("diagnose p.yaml --quiet {CASE}"), here);
+    put(here, "t.csv", "x_mm,y_mm,z_mm\n600,0,700\n");
     let table = ".calib/tables/case/diagnose.parameters.parquet";
     let robot = "sealed/recordings/c0001/robot.json";
     let run = newest(here);
     for verb in [
-        &["compensate", &run, "t.csv"][..],
-        &["export", &run, "--format", "json"],
-        &["export", table, "--robot", robot, "--format", "json"],
+        format!("compensate {run} t.csv"),
+        format!("export {run} --format json"),
+        format!("export {table} --robot {robot} --format json"),
     ] {
-        let (code, said) = refused(verb, here);
+        let (code, said) = refused(&verb, here);
         assert_eq!(code, Some(2), "{said}");
-        assert!(
-            said.contains("correct the simulation of sim_x, sim_y, sim_z")
-                && said.contains("--step"),
-            "{said}"
+        has(
+            &said,
+            ["correct the simulation of sim_x, sim_y, sim_z", "--step"],
         );
     }
+    calib(&format!("run p.yaml --quiet --until geometry {CASE}"), here);
     calib(
-        &[
-            &["run", "p.yaml", "--quiet", "--until", "geometry"],
-            &CASE[..],
-        ]
-        .concat(),
-        here,
-    );
-    calib(
-        &[
-            "export",
-            &newest(here),
-            "--step",
-            "geometry",
-            "--format",
-            "json",
-            "--quiet",
-        ],
+        &format!(
+            "export {} --step geometry --format json --quiet",
+            newest(here)
+        ),
         here,
     );
 }
@@ -694,8 +557,8 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
 /// A table that a run of the pipeline of cases wrote.
 fn table_of<T: calib::table::Table>(folder: &Path, name: &str) -> T {
     let path = folder.join(".calib/tables/case").join(name);
-    calib::table::from_parquet(name, std::fs::read(path).expect("a table"))
-        .expect("a sound table")
+    calib::table::from_parquet(name, std::fs::read(path).unwrap())
+        .unwrap()
         .table
 }
 
@@ -751,28 +614,20 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     let folder = concealed("base_compliance", "14", "60");
     let here = folder.path();
     case_with(here, &[]);
-    let said = calib(
-        &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
-        here,
-    );
+    let said = calib(&format!("diagnose p.yaml --quiet {CASE}"), here);
     // The command is printed as it is to be typed.
     let command = said
         .lines()
         .find_map(|line| line.trim_start().strip_prefix("calib "))
-        .expect("a command");
+        .unwrap();
     assert!(
         command.ends_with("--separate 1 'link_compliance@link 1'"),
         "{said}"
     );
-    let words: Vec<&str> = command
-        .trim_end_matches(" 'link_compliance@link 1'")
-        .split(' ')
-        .collect();
-    let more = ["link_compliance@link 1", "--count", "50", "--json"];
     let told: Value =
-        serde_json::from_str(&calib(&[&words[..], &more].concat(), here)).expect("JSON");
-    let number = |value: &Value| value.as_f64().expect("a number");
-    let sides = told["separation"].as_array().expect("both");
+        serde_json::from_str(&calib(&format!("{command} --count 50 --json"), here)).unwrap();
+    let number = |value: &Value| value.as_f64().unwrap();
+    let sides = told["separation"].as_array().unwrap();
     assert_eq!(sides[0]["if"], "base_compliance at base");
     for side in sides {
         assert!(
@@ -784,24 +639,24 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     // Measured: recordings without noise, made by the diagnosed model at these poses, and the rival fitted to them with all else.
     let robot = table_of::<Robot>(here, "robot.robot.parquet")
         .to_description()
-        .expect("a robot");
+        .unwrap();
     let parameters: Parameters = table_of(here, "diagnose.parameters.parquet");
     let truth = parameters
         .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
-        .expect("a model");
+        .unwrap();
     let data = table_of::<Recording>(here, "ingest.recording.parquet").measurements();
     let prediction: Prediction = table_of(here, "diagnose.prediction.parquet");
     let rows: Vec<usize> = (0..data.rows())
         .filter(|row| !prediction.0[*row].held_out && !prediction.0[*row].suspect)
         .collect();
     let form = told["rival"]["form"].to_string();
-    let parsed: Form = serde_json::from_str(&form).expect("a form");
+    let parsed: Form = serde_json::from_str(&form).unwrap();
     let mut table = parameters.clone();
     let own = table
         .0
         .iter()
         .position(|row| row.effect == "base_compliance")
-        .expect("the finding");
+        .unwrap();
     let row = table.0.remove(own);
     table.0.retain(|row| row.effect != "base_compliance");
     for spec in parsed.parameters(&RobotModel::new(robot.clone())) {
@@ -819,7 +674,7 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     }
     let other = table
         .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
-        .expect("a model");
+        .unwrap();
     let estimated = |name: &String| {
         table
             .0
@@ -836,7 +691,7 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
         joints: 6,
         ..Measurements::default()
     };
-    for pose in told["poses"].as_array().expect("poses") {
+    for pose in told["poses"].as_array().unwrap() {
         proposed
             .q
             .extend((1..=6).map(|joint| number(&pose[format!("q{joint}_deg")]).to_radians()));
@@ -861,9 +716,7 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
         payloads,
     };
     let random = (0..9).map(|seed| {
-        let mut drawn = site
-            .draw(&truth.robot, COUNT, sigma, 70 + seed)
-            .expect("poses");
+        let mut drawn = site.draw(&truth.robot, COUNT, sigma, 70 + seed).unwrap();
         // One payload a pose.
         let count = site.payloads.len();
         let kept: Vec<usize> = (0..COUNT).map(|k| k * count + k % count).collect();
@@ -898,11 +751,8 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
     let here = folder.path();
     case_with(here, &[]);
     let found = |here: &Path| -> Value {
-        let said = calib(
-            &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
-            here,
-        );
-        serde_json::from_str(&said).expect("JSON")
+        let said = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), here);
+        serde_json::from_str(&said).unwrap()
     };
     // A balancer at a joint of unknown stiffness is a gear error of order 1.
     assert_eq!(
@@ -910,24 +760,17 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
         "counterbalance"
     );
     let said = calib(
-        &[
-            "poses",
-            "--run",
-            &newest(here),
-            "--separate",
-            "gear_cyclic",
-            "counterbalance@j4",
-        ],
+        &format!(
+            "poses --run {} --separate gear_cyclic counterbalance@j4",
+            newest(here)
+        ),
         here,
     );
-    assert!(
-        said.contains("no pose separates gear_cyclic at joint 4 from counterbalance at joint 4"),
-        "{said}"
+    has(
+        &said,
+        "no pose separates gear_cyclic at joint 4 from counterbalance at joint 4",
     );
-    assert!(
-        said.contains("instead: log motor currents at rest"),
-        "{said}"
-    );
+    has(&said, "instead: log motor currents at rest");
     let folder = concealed("zero_shift", "9", "60");
     let here = folder.path();
     case_with(here, &[]);
@@ -936,27 +779,24 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
         found(here)["findings"][0]["rivals"][0]["effect"],
         "base_shift"
     );
-    let said = calib(&["poses", "--run", &newest(here), "--separate"], here);
-    assert!(
-        said.contains("base_shift at base can imitate zero_shift at joint 1 completely"),
-        "{said}"
+    let said = calib(&format!("poses --run {} --separate", newest(here)), here);
+    has(
+        &said,
+        "base_shift at base can imitate zero_shift at joint 1 completely",
     );
-    assert!(
-        said.contains("instead: return to a few anchor poses"),
-        "{said}"
-    );
+    has(&said, "instead: return to a few anchor poses");
     for (names, wanted) in [
-        (&["9"][..], "`9` matches no finding of run"),
-        (&["zero_shift@joint 7"], "matches no finding of run"),
-        (&["1", "gear_cyclc@joint 1"], "did you mean `gear_cyclic`?"),
+        ("9", "`9` matches no finding of run"),
+        ("'zero_shift@joint 7'", "matches no finding of run"),
+        ("1 'gear_cyclc@joint 1'", "did you mean `gear_cyclic`?"),
         (
-            &["1", "gear_cyclic@joint 9"],
+            "1 'gear_cyclic@joint 9'",
             "gear_cyclic has no place `joint 9` here; allowed: joint 1, joint 2",
         ),
-        (&["1", "gear_cyclic"], "say where, e.g. 'gear_cyclic@"),
+        ("1 gear_cyclic", "say where, e.g. 'gear_cyclic@"),
     ] {
         let (code, said) = refused(
-            &[&["poses", "--run", &newest(here), "--separate"], names].concat(),
+            &format!("poses --run {} --separate {names}", newest(here)),
             here,
         );
         assert_eq!((code, said.contains(wanted)), (Some(2), true), "{said}");
@@ -966,20 +806,20 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
 #[test]
 fn of_few_rows_no_law_takes_a_size_that_no_gear_has() {
     // 51 rows of an arm with four soft joints and a wrong mass, 34 parameters of the base: gears of 2700 arcsec explained as much of them.
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     case_with(folder.path(), &[]);
     let rows = format!(
         "case={}/tests/it/diagnose/few_rows",
         env!("CARGO_MANIFEST_DIR")
     );
     let said = calib(
-        &["diagnose", "p.yaml", "--set", &rows, "--json", "--quiet"],
+        &format!("diagnose p.yaml --set {rows} --json --quiet"),
         folder.path(),
     );
-    let said: Value = serde_json::from_str(&said).expect("JSON");
+    let said: Value = serde_json::from_str(&said).unwrap();
     let findings = said["findings"]
         .as_array()
-        .expect("a list")
+        .unwrap()
         .iter()
         .filter(|finding| finding["effect"] != "outlier");
     let names: Vec<String> = findings

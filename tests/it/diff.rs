@@ -1,11 +1,11 @@
 //! `calib diff` of two files: classes of rows, units, angles, rotations, duplicates, exit codes.
 
+use crate::answer::{Answer, calib, read};
 use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow::datatypes::{Field, Schema};
 use parquet::arrow::ArrowWriter;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 use std::sync::Arc;
 
 /// A column with its unit and semantic.
@@ -49,22 +49,10 @@ fn file(folder: &Path, name: &str, columns: Vec<Col>) -> PathBuf {
     writer.close().unwrap();
     path
 }
-fn diff(a: &Path, b: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib"))
-        .arg("diff")
-        .args([a, b])
-        .args(arguments)
-        .output()
-        .unwrap()
+fn diff(a: &Path, b: &Path, words: &[&str]) -> Answer {
+    let files = [a, b].map(|path| path.to_str().unwrap());
+    calib(".", &[&["diff"], &files[..], words].concat())
 }
-fn json(output: &Output) -> Value {
-    serde_json::from_slice(&output.stdout)
-        .unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)))
-}
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
-}
-
 #[test]
 fn every_class_of_row_is_counted_whatever_the_order() {
     let folder = tempfile::tempdir().unwrap();
@@ -98,8 +86,8 @@ fn every_class_of_row_is_counted_whatever_the_order() {
         &b,
         &["--key", "robot,pose", "--atol", "x=0.1um", "--json"],
     );
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    let found = json(&output);
+    assert_eq!(output.code, Some(1), "{}", output.both());
+    let found = output.json();
     // r1/1 and r3/7 same; r1/2 and r2/2 by x; r1/3 by a null; r2/1 only in A; r9/9 only in B.
     let rows = &found["rows"];
     assert_eq!(
@@ -133,7 +121,7 @@ fn every_class_of_row_is_counted_whatever_the_order() {
         (&0.5.into(), &"robot r2, pose 2".into())
     );
     assert!((x["statistics"]["bias"].as_f64().unwrap() - 0.5005 / 5.0).abs() < 1e-12);
-    let within = json(&diff(
+    let within = diff(
         &a,
         &b,
         &[
@@ -145,7 +133,8 @@ fn every_class_of_row_is_counted_whatever_the_order() {
             "0.2",
             "--json",
         ],
-    ));
+    )
+    .json();
     assert_eq!(
         [
             &within["rows"]["within_tolerance"],
@@ -153,11 +142,12 @@ fn every_class_of_row_is_counted_whatever_the_order() {
         ],
         [2, 1]
     );
-    let back = json(&diff(
+    let back = diff(
         &b,
         &a,
         &["--key", "robot,pose", "--atol", "x=0.1um", "--json"],
-    ));
+    )
+    .json();
     assert_eq!(
         [
             &back["rows"]["changed"],
@@ -166,14 +156,9 @@ fn every_class_of_row_is_counted_whatever_the_order() {
         ],
         [3, 1, 1]
     );
+    assert_eq!(diff(&a, &a, &["--key", "robot,pose"]).code, Some(0));
     assert_eq!(
-        diff(&a, &a, &["--key", "robot,pose"]).status.code(),
-        Some(0)
-    );
-    assert_eq!(
-        diff(&a, &b, &["--key", "robot,pose", "--exit-zero"])
-            .status
-            .code(),
+        diff(&a, &b, &["--key", "robot,pose", "--exit-zero"]).code,
         Some(0)
     );
 }
@@ -199,12 +184,10 @@ fn angles_wrap_and_a_rotation_has_two_quaternions() {
         side("b.parquet", -180.0, -1.0),
     );
     assert_eq!(
-        diff(&a, &b, &["--key", "pose", "--atol", "rz=0.0002"])
-            .status
-            .code(),
+        diff(&a, &b, &["--key", "pose", "--atol", "rz=0.0002"]).code,
         Some(0)
     );
-    let exact = json(&diff(&a, &b, &["--key", "pose", "--json"]));
+    let exact = diff(&a, &b, &["--key", "pose", "--json"]).json();
     let angle = exact["columns"]
         .as_array()
         .unwrap()
@@ -236,7 +219,7 @@ fn angles_wrap_and_a_rotation_has_two_quaternions() {
             real("qz", &[0.0], &[]),
         ],
     );
-    let turned = json(&diff(&b, &c, &["--key", "pose", "--json"]));
+    let turned = diff(&b, &c, &["--key", "pose", "--json"]).json();
     let turn = turned["worst"][0]["cells"][0]["difference"]
         .as_f64()
         .unwrap();
@@ -257,13 +240,13 @@ fn a_copy_is_the_same_byte_by_byte_and_one_flipped_bit_is_not() {
     std::fs::copy(&a, &b).unwrap();
     let output = diff(&a, &b, &["--key", "pose"]);
     assert_eq!(
-        (output.status.code(), said(&output)),
+        (output.code, output.both()),
         (
             Some(0),
             "same: 400000 rows, equal byte by byte\n".to_string()
         )
     );
-    let reread = json(&diff(&a, &b, &["--key", "pose", "--json", "--reread"]));
+    let reread = diff(&a, &b, &["--key", "pose", "--json", "--reread"]).json();
     assert_eq!(
         (&reread["equal"], &reread["rows"]["same"]),
         (&Value::Null, &400_000.into())
@@ -275,7 +258,7 @@ fn a_copy_is_the_same_byte_by_byte_and_one_flipped_bit_is_not() {
         .unwrap();
     bytes[place] ^= 1;
     std::fs::write(&b, bytes).unwrap();
-    let changed = json(&diff(&a, &b, &["--key", "pose", "--json"]));
+    let changed = diff(&a, &b, &["--key", "pose", "--json"]).json();
     assert_eq!(
         (&changed["rows"]["changed"], &changed["rows"]["same"]),
         (&1.into(), &399_999.into())
@@ -305,8 +288,8 @@ fn another_unit_is_one_finding_and_not_a_change_of_every_value() {
     );
     for other in [b, c] {
         let output = diff(&a, &other, &["--key", "row", "--json"]);
-        let found = json(&output);
-        assert_eq!(output.status.code(), Some(1));
+        let found = output.json();
+        assert_eq!(output.code, Some(1));
         assert_eq!(found["findings"].as_array().unwrap().len(), 1, "{found}");
         assert_eq!(found["findings"][0]["what"], "unit");
         assert_eq!(found["rows"]["changed"], 0, "{found}");
@@ -333,22 +316,20 @@ fn equal_keys_are_reported_unless_told_how_to_pair_them() {
         ],
     );
     let output = diff(&a, &b, &["--key", "pose"]);
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert_eq!(output.code, Some(2), "{}", output.both());
     assert!(
-        said(&output).contains("duplicate keys: 1 key, 2 rows of A, 2 of B"),
+        output
+            .both()
+            .contains("duplicate keys: 1 key, 2 rows of A, 2 of B"),
         "{}",
-        said(&output)
+        output.both()
     );
     assert_eq!(
-        diff(&a, &b, &["--key", "pose", "--exit-zero"])
-            .status
-            .code(),
+        diff(&a, &b, &["--key", "pose", "--exit-zero"]).code,
         Some(2)
     );
     assert_eq!(
-        diff(&a, &b, &["--key", "pose", "--occurrence"])
-            .status
-            .code(),
+        diff(&a, &b, &["--key", "pose", "--occurrence"]).code,
         Some(0)
     );
 }
@@ -368,7 +349,7 @@ fn differences_beyond_what_a_float_can_tell_are_seen() {
         vec![whole("row", &[0]), whole("n", &[big + 1])],
     );
     assert_eq!(
-        json(&diff(&a, &b, &["--key", "row", "--json"]))["worst"][0]["cells"][0]["difference"],
+        diff(&a, &b, &["--key", "row", "--json"]).json()["worst"][0]["cells"][0]["difference"],
         1.0
     );
 }
@@ -408,16 +389,11 @@ fn what_cannot_be_compared_says_why() {
         ),
     ] {
         let output = diff(&a, b, arguments);
-        assert_eq!(
-            output.status.code(),
-            Some(2),
-            "{arguments:?}: {}",
-            said(&output)
-        );
+        assert_eq!(output.code, Some(2), "{arguments:?}: {}", output.both());
         assert!(
-            said(&output).contains(says),
+            output.both().contains(says),
             "{arguments:?}: {}",
-            said(&output)
+            output.both()
         );
     }
 }
@@ -455,8 +431,8 @@ fn the_page_escapes_names_and_the_table_of_cells_has_a_row_for_each() {
         cells.to_str().unwrap(),
     ];
     let output = diff(&a, &b, &arguments);
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    let html = std::fs::read_to_string(&page).unwrap();
+    assert_eq!(output.code, Some(1), "{}", output.both());
+    let html = read(&page);
     assert!(
         html.contains("&lt;script&gt;") && !html.contains("<script>"),
         "{html}"
@@ -467,5 +443,5 @@ fn the_page_escapes_names_and_the_table_of_cells_has_a_row_for_each() {
     let batch = reader.unwrap().build().unwrap().next().unwrap().unwrap();
     assert_eq!(batch.num_rows(), 3, "only in A, only in B, changed");
     let refused = diff(&a, &b, &["--key", "id", "--out", a.to_str().unwrap()]);
-    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert_eq!(refused.code, Some(2), "{}", refused.both());
 }

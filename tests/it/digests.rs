@@ -7,6 +7,7 @@
 //! `CALIB_UPDATE=1 cargo test --test it digests` writes the file anew, except for a stage whose number did not move with its tables.
 //! Where a schema has a new major version, run the pipelines in `digests/` and take their tables from the folder `tables` of the store.
 
+use crate::answer::{put, root};
 use crate::desk::Desk;
 use arrow::array::{Array, AsArray};
 use arrow::datatypes::{DataType, Float64Type};
@@ -83,7 +84,7 @@ const TRIALS: &[(&str, &str, &str)] = &[
 ];
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/digests")
+    root("tests/it/digests")
 }
 fn short(hasher: &blake3::Hasher) -> String {
     hasher.finalize().to_hex()[..16].to_string()
@@ -299,7 +300,7 @@ fn run(entry: &StageEntry, name: &str, settings: &str) -> StageDigest {
             &files
                 .iter()
                 .find(|(name, _)| Path::new(name) == file.0)
-                .expect("a file of the test")
+                .unwrap()
                 .1,
         );
     }
@@ -350,10 +351,7 @@ fn run(entry: &StageEntry, name: &str, settings: &str) -> StageDigest {
 fn equal_inputs_give_equal_tables_unless_the_implementation_has_another_number() {
     let (mut kept, mut unnumbered, mut stale) = (stored(), Vec::new(), Vec::new());
     for (name, folder, settings) in TRIALS {
-        let entry = STAGES
-            .iter()
-            .find(|entry| entry.name == *name)
-            .expect("a stage");
+        let entry = STAGES.iter().find(|entry| entry.name == *name).unwrap();
         let now = run(entry, folder, settings);
         let before = kept.get(*name);
         let moved: Vec<String> = before.map_or(Vec::new(), |before| {
@@ -383,7 +381,7 @@ fn equal_inputs_give_equal_tables_unless_the_implementation_has_another_number()
             .iter()
             .map(|(name, digest)| format!("{name} {digest}"))
             .collect();
-        std::fs::write(folder().join("digests.txt"), format!("{head}{text}")).unwrap();
+        put(folder(), "digests.txt", format!("{head}{text}"));
         stale.clear();
     }
     assert!(

@@ -1,10 +1,11 @@
 //! A disk that refuses: the run says what to do, keeps what is finished and goes on when it can.
 
+use crate::answer::{has, root};
 use std::path::Path;
 use std::process::{Command, Output};
 
 fn pipeline() -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml")
+    root("tests/it/resume/pipeline.yaml")
 }
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
@@ -39,10 +40,7 @@ fn a_full_disk_is_said_so_and_loses_nothing() {
             text(&full.stderr)
         );
         let said = text(&full.stderr);
-        assert!(
-            said.contains("free some space there") && said.contains("--store DIR"),
-            "{said}"
-        );
+        has(&said, ["free some space there", "--store DIR"]);
         let failure: serde_json::Value = serde_json::from_slice(&full.stdout).unwrap();
         assert_eq!(
             (&failure["status"], &failure["exit_code"]),
@@ -57,11 +55,7 @@ fn a_full_disk_is_said_so_and_loses_nothing() {
         .output()
         .unwrap();
     assert!(after.status.success(), "{}", text(&after.stderr));
-    assert!(
-        text(&after.stderr).contains("robot     cached"),
-        "{}",
-        text(&after.stderr)
-    );
+    has(&text(&after.stderr), "robot     cached");
     let left: Vec<_> = std::fs::read_dir(store.join("tmp"))
         .unwrap()
         .flatten()
@@ -83,9 +77,11 @@ fn a_read_only_place_for_the_store_is_said_so() {
         .unwrap();
     assert_eq!(refused.status.code(), Some(75));
     let said = text(&refused.stderr);
-    assert!(
-        said.contains("/sys/calib-store: cannot make the folder")
-            && said.contains("choose another with --store DIR"),
-        "{said}"
+    has(
+        &said,
+        [
+            "/sys/calib-store: cannot make the folder",
+            "choose another with --store DIR",
+        ],
     );
 }

@@ -141,7 +141,7 @@ fn the_order_of_effects_is_irrelevant() {
                 .specs()
                 .iter()
                 .position(|other| other.name == spec.name)
-                .expect("same parameters")]
+                .unwrap()]
         })
         .collect();
     let (mut a, mut b) = (forward.scratch(&robot), reversed.scratch(&robot));

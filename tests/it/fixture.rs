@@ -1,6 +1,11 @@
-//! Robots that tests share: four kinematics, as plain data.
+//! What tests share: four kinematics as plain data, fits, and what a diagnosis is asked.
 
 use calib::description::{Coupling, JointDescription, JointKind, RobotDescription};
+use calib::diagnose::{Diagnosis, Question, diagnose};
+use calib::estimate::{FitOptions, Fitted, Model, fit, gauge};
+use calib::robot::import::{RobotFileText, read_calib};
+use calib::robot::{Measurements, RobotModel};
+use std::collections::BTreeMap;
 
 /// Axis, point (mm), kind per joint.
 type Chain<'a> = &'a [([f64; 3], [f64; 3], JointKind)];
@@ -154,4 +159,54 @@ pub fn poses(robot: &RobotDescription, count: usize) -> Vec<f64> {
             lower + (upper - lower) * spread(k / n, k % n)
         })
         .collect()
+}
+
+/// The robot of a file in calib's format.
+pub fn robot_of(text: &str) -> RobotDescription {
+    let label = "robot.yaml";
+    read_calib(RobotFileText { label, text }, None)
+        .unwrap()
+        .robot
+}
+
+/// Fits all parameters of a model to rows.
+pub fn fit_all(start: &Model, data: &Measurements, rows: &[usize]) -> (Model, Fitted) {
+    let candidates: Vec<usize> = (0..start.x.len()).collect();
+    let candidates = &candidates;
+    fit(start, data, &FitOptions { rows, candidates })
+}
+
+pub fn all_rows(data: &Measurements) -> Vec<usize> {
+    (0..data.rows()).collect()
+}
+
+/// What a diagnosis is asked of rows to fit that are one set, with nothing held out.
+pub fn question<'a>(
+    robot: &'a RobotModel,
+    data: &'a Measurements,
+    fit: &'a [usize],
+) -> Question<'a> {
+    static ONE_SET: [usize; 10_000] = [0; 10_000];
+    Question {
+        robot,
+        data,
+        fit,
+        validate: &[],
+        set: &ONE_SET[..data.rows()],
+        prior_weight: 1.0,
+        open_world: 0.3,
+        without: &[],
+        own: &[],
+        beside_simulation: false,
+        known: &[],
+        seed: 1,
+    }
+}
+
+/// What a diagnosis of all rows says of an arm.
+pub fn diagnosed(arm: &RobotDescription, data: &Measurements) -> Diagnosis {
+    let all = all_rows(data);
+    let arm = RobotModel::new(arm.clone());
+    let (robot, _) = gauge(arm, data, &all, &BTreeMap::new()).unwrap();
+    diagnose(&question(&robot, data, &all), |_| ())
 }

@@ -8,6 +8,7 @@ mod names;
 mod recalibrated;
 mod rosters;
 
+use crate::answer::{has, put, read, root, starts_with};
 use crate::held_locks;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 fn pipeline() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/fleet/pipeline.yaml")
+    root("pipelines/fleet/pipeline.yaml")
 }
 
 fn calib(words: &[&str]) -> Command {
@@ -102,11 +103,7 @@ fn broken_robots_are_listed_with_their_reasons_and_the_others_finish() {
     let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
     recordings(&cases, 5);
     let recordings = cases.join("recordings");
-    std::fs::write(
-        recordings.join("c0002/tracker.csv"),
-        "point_id,x_mm\n1,wrong\n",
-    )
-    .unwrap();
+    put(&recordings, "c0002/tracker.csv", "point_id,x_mm\n1,wrong\n");
     std::fs::remove_file(recordings.join("c0003/robot.json")).unwrap();
     let file = file(
         folder.path(),
@@ -152,10 +149,8 @@ fn broken_robots_are_listed_with_their_reasons_and_the_others_finish() {
     assert_eq!(told["computed"].as_u64(), Some(1));
     let (result, _) = output(fleet("status", &file, &store).args(["--robot", "c0002"]));
     let text = String::from_utf8(result.stdout).unwrap();
-    assert!(
-        text.starts_with("c0002: rejected\n") && text.contains("manifest.json"),
-        "{text}"
-    );
+    starts_with(&text, "c0002: rejected\n");
+    has(&text, "manifest.json");
 }
 
 #[test]
@@ -171,7 +166,7 @@ fn a_sweep_leaves_what_the_records_of_a_fleet_need() {
     run(&file, &store, 0);
     // The same robot with other data: of two runs of its pipeline the earlier is a record's as well.
     let tracker = |case: &str| cases.join("recordings").join(case).join("tracker.csv");
-    let before = std::fs::read_to_string(tracker("c0001")).unwrap();
+    let before = read(tracker("c0001"));
     let shorter = before.trim_end().rsplit_once('\n').unwrap().0;
     std::fs::write(tracker("c0001"), format!("{shorter}\n")).unwrap();
     assert_eq!(run(&file, &store, 0)["computed"].as_u64(), Some(1));
@@ -268,9 +263,11 @@ fn every_fault_of_a_fleet_file_comes_at_once_with_its_place() {
         "robots:\n  - folders: nothing/*\noverrides:\n  - {robots: [r7]}\n",
     );
     let (_, said) = output(&mut fleet("run", &file, &store));
-    assert!(
-        said.contains("robots[0].folders: no folder matches")
-            && said.contains("overrides[0].robots[0]: no robot"),
-        "{said}"
+    has(
+        &said,
+        [
+            "robots[0].folders: no folder matches",
+            "overrides[0].robots[0]: no robot",
+        ],
     );
 }

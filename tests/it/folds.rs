@@ -1,31 +1,20 @@
 //! Cross-validation: as honest as held-out points, repeats together, and the same on any number of threads.
 
-use crate::desk::{Desk, table};
-use crate::fixture;
+use crate::answer::has;
+use crate::desk::{Desk, identify_reads, table};
+use crate::fixture::{self, fit_all};
 use crate::identify::{GEOMETRY, SIGMA, model, recording};
 use crate::sr210d::{experiment, settings};
-use calib::estimate::{
-    FitOptions, Fitted, Folds, Model, Session, align, cross_validate, fit, leave_one_out,
-};
+use calib::estimate::{Fitted, Folds, Model, Session, align, cross_validate, leave_one_out};
 use calib::robot::{Measurements, RobotModel};
-use calib::stage::{
-    FoldSetting, Identify, IdentifyReads, Labelled, Stage, Validate, ValidateReads,
-};
+use calib::stage::{FoldSetting, Identify, Labelled, Stage, Validate, ValidateReads};
 use calib::table::{Observability, Prediction, Statistics};
 
 fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
     let robot = RobotModel::new(fixture::offset_wrist());
     let rows: Vec<usize> = (0..data.rows()).collect();
     let model = model(&robot, align(&robot, data, &rows), effects);
-    let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(
-        &model,
-        data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        },
-    )
+    fit_all(&model, data, &rows)
 }
 
 fn folds(data: &Measurements, effects: &[&str], count: usize) -> Option<Folds> {
@@ -53,7 +42,7 @@ fn folds_of_a_complete_model_show_the_noise_and_what_its_parameters_cost() {
     let (mut random, mut blocks, mut training) = (Vec::new(), Vec::new(), Vec::new());
     for seed in 200..220 {
         let (data, _) = recording(&fixture::offset_wrist(), &effects, 80, seed);
-        let found = folds(&data, &effects, 5).expect("enough poses");
+        let found = folds(&data, &effects, 5).unwrap();
         random.extend(found.random);
         blocks.extend(found.blocks);
         let (model, _) = identify(&data, &effects);
@@ -84,21 +73,13 @@ fn a_fold_is_what_a_fit_without_its_rows_says() {
     for (seed, outlier) in [(230, 0.0), (231, 6e-4)] {
         let (mut data, _) = recording(&fixture::offset_wrist(), &effects, 80, seed);
         data.points.position[33].x += outlier;
-        let found = folds(&data, &effects, 5).expect("enough poses").blocks;
+        let found = folds(&data, &effects, 5).unwrap().blocks;
         let robot = RobotModel::new(fixture::offset_wrist());
         let mut differences = Vec::new();
         for block in 0..5 {
             let kept: Vec<usize> = (0..80).filter(|row| row / 16 != block).collect();
             let start = model(&robot, align(&robot, &data, &kept), &effects);
-            let candidates: Vec<usize> = (0..start.x.len()).collect();
-            let (model, _) = fit(
-                &start,
-                &data,
-                &FitOptions {
-                    rows: &kept,
-                    candidates: &candidates,
-                },
-            );
+            let (model, _) = fit_all(&start, &data, &kept);
             let predicted = model.predict(&data);
             differences.extend(
                 (16 * block..16 * (block + 1))
@@ -120,8 +101,8 @@ fn rows_of_one_pose_are_never_on_both_sides() {
     twice.points.sigma.extend_from_within(..);
     twice.payload.extend_from_within(..);
     let (one, two) = (
-        folds(&once, &GEOMETRY, 6).expect("poses"),
-        folds(&twice, &GEOMETRY, 6).expect("poses"),
+        folds(&once, &GEOMETRY, 6).unwrap(),
+        folds(&twice, &GEOMETRY, 6).unwrap(),
     );
     // A row whose twin was fitted would be predicted far better.
     for (one, two) in [(one.random, two.random), (one.blocks, two.blocks)] {
@@ -150,7 +131,7 @@ fn any_number_of_threads_gives_the_same_folds() {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
-            .expect("threads");
+            .unwrap();
         pool.install(|| folds(&data, &GEOMETRY, 5))
     };
     assert_eq!(on(1), on(2));
@@ -160,12 +141,12 @@ fn any_number_of_threads_gives_the_same_folds() {
 fn statistics_have_the_folds_of_fitted_rows_and_of_no_others() {
     let of = experiment("none", 5);
     let stage: Identify = settings("geometry", "none");
-    let reads = IdentifyReads {
-        robot: of.robot.clone(),
-        recording: of.recording.clone(),
-        split: of.split.clone(),
-    };
-    let tables = Desk::default().run(&stage, reads).expect("identify runs");
+    let tables = Desk::default()
+        .run(
+            &stage,
+            identify_reads(of.robot.clone(), of.recording.clone(), of.split.clone()),
+        )
+        .unwrap();
     let prediction: Prediction = table(&tables).remove(0);
     assert!(
         prediction
@@ -185,12 +166,8 @@ fn statistics_have_the_folds_of_fitted_rows_and_of_no_others() {
             table: observability,
         }],
     };
-    let statistics: Statistics = table(
-        &Desk::default()
-            .run(&Validate::default(), reads)
-            .expect("validate runs"),
-    )
-    .remove(0);
+    let statistics: Statistics =
+        table(&Desk::default().run(&Validate::default(), reads).unwrap()).remove(0);
     for row in &statistics.0 {
         assert_eq!(
             row.fold_rms_mm.is_some(),
@@ -203,7 +180,7 @@ fn statistics_have_the_folds_of_fitted_rows_and_of_no_others() {
         .0
         .iter()
         .find(|row| row.set == "unloaded_fit")
-        .expect("the set");
+        .unwrap();
     let errors: Vec<f64> = prediction
         .0
         .iter()
@@ -245,21 +222,13 @@ fn with_one_fold_a_pose_each_is_predicted_by_a_fit_to_all_others() {
             fitted: &fitted,
         })
     };
-    let found = one_out(&data).expect("enough poses");
+    let found = one_out(&data).unwrap();
     assert_eq!((found.count, &found.random), (40, &found.blocks));
     let robot = RobotModel::new(fixture::offset_wrist());
     for left in [0, 17, 39] {
         let kept: Vec<usize> = (0..40).filter(|row| *row != left).collect();
         let start = model(&robot, align(&robot, &data, &kept), &GEOMETRY);
-        let candidates: Vec<usize> = (0..start.x.len()).collect();
-        let (model, _) = fit(
-            &start,
-            &data,
-            &FitOptions {
-                rows: &kept,
-                candidates: &candidates,
-            },
-        );
+        let (model, _) = fit_all(&start, &data, &kept);
         let error = (data.points.position[left] - model.predict(&data)[left]).norm();
         assert!(
             (found.random[left] - error).abs() < 0.02 * SIGMA,
@@ -273,7 +242,7 @@ fn with_one_fold_a_pose_each_is_predicted_by_a_fit_to_all_others() {
     twice.points.sigma.extend_from_within(..);
     twice.payload.extend_from_within(..);
     assert_eq!(
-        one_out(&twice).expect("enough poses").count,
+        one_out(&twice).unwrap().count,
         40,
         "a pose that is measured twice is one"
     );
@@ -285,12 +254,12 @@ fn with_one_fold_a_pose_each_is_predicted_by_a_fit_to_all_others() {
 fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
     let of = experiment("none", 5);
     let yaml = |folds: &str| serde_json::from_str::<FoldSetting>(folds);
-    assert_eq!(yaml("\"n\"").expect("a setting"), FoldSetting::EachPose);
-    assert_eq!(yaml("5").expect("a setting"), FoldSetting::default());
+    assert_eq!(yaml("\"n\"").unwrap(), FoldSetting::EachPose);
+    assert_eq!(yaml("5").unwrap(), FoldSetting::default());
     let wrong = yaml("\"all\"").expect_err("no setting").to_string();
-    assert!(
-        wrong.contains("a number of folds (0 for none), or n for one a pose"),
-        "{wrong}"
+    has(
+        &wrong,
+        "a number of folds (0 for none), or n for one a pose",
     );
     let run = |folds: FoldSetting| {
         let desk = Desk::default();
@@ -298,12 +267,12 @@ fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
             folds,
             ..settings("geometry", "none")
         };
-        let reads = IdentifyReads {
-            robot: of.robot.clone(),
-            recording: of.recording.clone(),
-            split: of.split.clone(),
-        };
-        let tables = desk.run(&stage, reads).expect("identify runs");
+        let tables = desk
+            .run(
+                &stage,
+                identify_reads(of.robot.clone(), of.recording.clone(), of.split.clone()),
+            )
+            .unwrap();
         let observability: Observability = table(&tables).remove(0);
         let value = |quantity: &str| {
             observability
@@ -315,7 +284,7 @@ fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
         let warned: Vec<String> = desk
             .warnings
             .lock()
-            .expect("warnings")
+            .unwrap()
             .iter()
             .filter(|line| line.contains("cross"))
             .cloned()
@@ -323,7 +292,7 @@ fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
         (value("folds"), value("unfolded"), warned)
     };
     let each = run(FoldSetting::EachPose);
-    let poses = each.0.expect("folds");
+    let poses = each.0.unwrap();
     assert_eq!((each.1, each.2.len()), (None, 0));
     let (folds, unfolded, warned) = run(FoldSetting::Parts(100));
     assert_eq!((folds, unfolded), (None, Some(poses)));

@@ -1,5 +1,6 @@
 //! The laws that every form of every cause obeys, on all fixture arms, standing and moving, with all columns that a recording may have.
 
+use crate::answer::starts_with;
 use crate::fixture;
 use calib::effect::{
     Axes, AxisPoint, Basis, CAUSES, Clock, Effect, EffectContext, EffectStack, Form, Hypothesis,
@@ -10,7 +11,7 @@ use calib::robot::{LoadCorrection, Measurements, PointReadings, Posture, RobotMo
 use calib::spatial::{Pose, Twist};
 use calib::units::Unit;
 use nalgebra::Vector3;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 const ROWS: usize = 120;
 /// Rows at which a form is evaluated; the first has no way to it.
@@ -58,7 +59,7 @@ fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
     let stack = EffectStack::new(
         robot,
         Pose::identity(),
-        vec![arm_effect("joint_compliance", &setting()).expect("a cause")],
+        vec![arm_effect("joint_compliance", &setting()).unwrap()],
     );
     let mut scratch = stack.scratch(robot);
     for row in 0..data.rows() {
@@ -249,15 +250,15 @@ fn over_all(mut law: impl FnMut(&Survey, &Hypothesis)) -> usize {
 fn stack(robot: &RobotModel, form: &Form, first: bool) -> (EffectStack, std::ops::Range<usize>) {
     let setting = setting();
     let mut effects = vec![
-        arm_effect("joint_compliance", &setting).expect("a cause"),
-        arm_effect("joint_offset", &setting).expect("a cause"),
+        arm_effect("joint_compliance", &setting).unwrap(),
+        arm_effect("joint_offset", &setting).unwrap(),
     ];
     effects.insert(if first { 0 } else { 2 }, Box::new(form.clone()));
     let stack = EffectStack::new(robot, setting.base, effects);
     let range = stack
         .effects()
         .find(|(effect, _)| effect.form().is_some())
-        .expect("the form")
+        .unwrap()
         .1;
     (stack, range)
 }
@@ -301,7 +302,7 @@ fn a_form_without_size_moves_nothing_and_its_partials_are_central_differences() 
         let without = EffectStack::new(robot, setting().base, {
             let names = ["joint_compliance", "joint_offset"];
             names
-                .map(|name| arm_effect(name, &setting()).expect("a cause"))
+                .map(|name| arm_effect(name, &setting()).unwrap())
                 .into()
         });
         let none = at(&stack, &own, &vec![0.0; own.len()]);
@@ -365,14 +366,11 @@ fn the_order_of_forms_is_irrelevant() {
 fn a_form_is_the_same_after_it_was_stored_and_its_neighbours_are_of_its_kind() {
     over_all(|survey, hypothesis| {
         let form = &hypothesis.form;
-        let text = serde_json::to_string(form).expect("numbers and names");
+        let text = serde_json::to_string(form).unwrap();
         let read: Form =
             serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text}: {error}"));
         assert_eq!(read, *form, "{text}");
-        assert_eq!(
-            serde_json::to_string(&read).expect("numbers and names"),
-            text
-        );
+        assert_eq!(serde_json::to_string(&read).unwrap(), text);
         for near in form.near(survey, 0) {
             assert_eq!(
                 (near.name(), near.place()),
@@ -402,11 +400,9 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
             "{form:?} has two numbers of one name"
         );
         for spec in &specs {
-            assert!(
-                spec.name
-                    .starts_with(&format!("{}.{}", form.name(), form.place().tag())),
-                "{}",
-                spec.name
+            starts_with(
+                &spec.name,
+                &format!("{}.{}", form.name(), form.place().tag()),
             );
             assert!(spec.prior_sigma > 0.0 && spec.prior_sigma.is_finite());
             assert_eq!(spec.place, form.place());
@@ -424,7 +420,7 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
             parameters: &numbers,
             clock: Clock::Seconds { first: 0.0 },
         };
-        let sentence = cause(form.name()).expect("a cause").sentence(&summary);
+        let sentence = cause(form.name()).unwrap().sentence(&summary);
         assert!(sentence.len() > 20, "{sentence}");
     });
     for place in [Place::Base, Place::Tool, Place::Tracker, Place::Recording] {
@@ -493,7 +489,7 @@ fn every_sentence_is_as_it_was_read() {
     let read = include_str!("forms/sentences.txt");
     if said != read {
         let path = std::env::temp_dir().join("sentences.txt");
-        std::fs::write(&path, &said).expect("a file");
+        std::fs::write(&path, &said).unwrap();
         panic!(
             "read {} and put it in place of tests/it/forms/sentences.txt if it reads well",
             path.display()
@@ -530,100 +526,6 @@ fn a_joint_that_slides_errs_at_millimetres_and_has_no_turns() {
         })
     };
     assert!(by_length(0) && !by_length(1));
-}
-
-/// A form with its prior weight and its bounds, numbers to five digits: what differs in one of them is another proposal.
-fn in_full(hypothesis: &Hypothesis) -> String {
-    fn rounded(value: &serde_json::Value) -> String {
-        match value {
-            serde_json::Value::Number(number) => {
-                format!("{:.4e}", number.as_f64().expect("a number"))
-            }
-            serde_json::Value::Array(all) => format!(
-                "[{}]",
-                all.iter().map(rounded).collect::<Vec<_>>().join(",")
-            ),
-            serde_json::Value::Object(all) => {
-                let each = all
-                    .iter()
-                    .map(|(key, value)| format!("{key}:{}", rounded(value)));
-                format!("{{{}}}", each.collect::<Vec<_>>().join(","))
-            }
-            other => other.to_string(),
-        }
-    }
-    let Hypothesis {
-        form,
-        tried,
-        prior_penalty,
-        positive,
-        largest,
-        ..
-    } = hypothesis;
-    let body = rounded(&form.body());
-    format!(
-        "{} {body} {tried} {prior_penalty:.3} {positive} {largest:.3e}",
-        form.key()
-    )
-}
-
-/// Fowler, Noll and Vo's hash of some lines (FNV-1a, 64 bits).
-fn digest(lines: &[String]) -> u64 {
-    let bytes = lines.iter().flat_map(|line| line.bytes());
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    })
-}
-
-#[test]
-fn every_cause_proposes_the_forms_that_are_listed() {
-    let mut cells: BTreeMap<String, usize> = BTreeMap::new();
-    let mut full: BTreeMap<&str, Vec<String>> = CAUSES
-        .iter()
-        .map(|cause| (cause.name(), Vec::new()))
-        .collect();
-    over_all(|survey, hypothesis| {
-        let form = &hypothesis.form;
-        if form.name() == "unknown" {
-            return;
-        }
-        full.get_mut(form.name())
-            .expect("a cause")
-            .push(in_full(hypothesis));
-        if survey.robot.description().name == "spherical"
-            && survey.robot.has_masses()
-            && !survey.moves()
-        {
-            *cells
-                .entry(format!("{}@{}", form.name(), form.place()))
-                .or_default() += 1;
-        }
-    });
-    let mut out = String::new();
-    for (name, all) in &mut full {
-        all.sort();
-        out.push_str(&format!(
-            "{name}: {} forms, {:016x}\n",
-            all.len(),
-            digest(all)
-        ));
-    }
-    out.push_str("\nOf an arm that stands:\n");
-    for (cell, count) in cells {
-        out.push_str(&format!("{cell} {count}\n"));
-    }
-    if out != include_str!("forms/proposed.txt") {
-        let [list, all] =
-            ["proposed.txt", "proposed_in_full.txt"].map(|name| std::env::temp_dir().join(name));
-        let text: Vec<String> = full.into_values().flatten().collect();
-        std::fs::write(&list, &out).expect("a file");
-        std::fs::write(&all, text.join("\n")).expect("a file");
-        panic!(
-            "other forms are proposed: read {} and {}",
-            list.display(),
-            all.display()
-        );
-    }
 }
 
 #[test]

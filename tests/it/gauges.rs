@@ -212,7 +212,7 @@ fn honesty(model: &Model, fitted: &Fitted, at: &Measurements) -> f64 {
     let sigma = fitted
         .covariance
         .as_ref()
-        .expect("not singular")
+        .unwrap()
         .of_predictions(model, at);
     off / sigma.iter().map(|sigma| sigma * sigma).sum::<f64>()
 }
@@ -295,7 +295,7 @@ fn targets_known_from_elsewhere_show_the_zero_of_the_last_joint() {
     let zero = specs
         .iter()
         .position(|spec| spec.name == "joint_offset.j6")
-        .expect("a parameter");
+        .unwrap();
     let ParameterStatus::Free(sigma) = fitted.statuses[zero] else {
         panic!("{:?}", fitted.statuses[zero])
     };
@@ -395,12 +395,8 @@ fn an_anchor_beside_a_tracker_is_placed_where_it_is() {
         let axis = ['x', 'y', 'z']
             .iter()
             .position(|known| *known == axis)
-            .expect("an axis");
-        let truth = anchors
-            .iter()
-            .find(|(known, _)| *known == name)
-            .expect("an anchor")
-            .1[axis];
+            .unwrap();
+        let truth = anchors.iter().find(|(known, _)| *known == name).unwrap().1[axis];
         let ParameterStatus::Free(sigma) = fitted.statuses[k] else {
             panic!("{}: {:?}", spec.name, fitted.statuses[k])
         };
@@ -443,7 +439,7 @@ fn rows_of_one_axis_count_for_that_axis_alone() {
         let all = fitted
             .covariance
             .as_ref()
-            .expect("not singular")
+            .unwrap()
             .of_predictions(&model, &fresh);
         all.iter().map(|sigma| sigma * sigma).sum::<f64>()
     };

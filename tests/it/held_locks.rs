@@ -33,7 +33,7 @@ fn take(store: &Path, folder: &Path, name: &str) -> Held {
         .append(true)
         .open(folder.join(format!("{name}.lock")))
         .unwrap();
-    file.try_lock().expect("nobody else has it");
+    file.try_lock().unwrap();
     Held { _file: file }
 }
 

@@ -31,7 +31,7 @@ pub fn model(robot: &RobotModel, base: Pose, effects: &[&str]) -> Model {
     };
     let made = effects
         .iter()
-        .map(|name| arm_effect(name, &setting).expect("registered"))
+        .map(|name| arm_effect(name, &setting).unwrap())
         .collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
 }
@@ -265,7 +265,7 @@ fn a_point_on_the_last_axis_leaves_the_last_ratio_unseen() {
         .specs()
         .iter()
         .position(|spec| spec.name == "reduction_ratio.j6")
-        .expect("joint 6");
+        .unwrap();
     assert_eq!(fitted.statuses[k], ParameterStatus::Unseen);
     assert_eq!(model.x[k], 0.0);
 }

@@ -17,6 +17,7 @@ mod together;
 mod wide;
 mod workbooks;
 
+use crate::answer::read;
 use crate::desk::{Desk, shared, table};
 use calib::error::{Error, Result};
 use calib::robot::SigmaSource;
@@ -67,6 +68,11 @@ pub fn robot(kinds: &str, half_turns: f64) -> Robot {
     Robot(kinds.chars().zip(1..).map(row).collect())
 }
 
+/// Two revolute joints of half a turn either way.
+fn rr() -> Robot {
+    robot("rr", 1.0)
+}
+
 /// What a run of the stage gives.
 struct Taken {
     recording: Recording,
@@ -77,6 +83,11 @@ struct Taken {
 fn settings(yaml: &str) -> Ingest {
     let options = serde_saphyr::options! { strict_booleans: true };
     serde_saphyr::from_str_with_options(yaml, options).unwrap()
+}
+
+fn faults_of(yaml: &str) -> Vec<String> {
+    let faults = calib::stage::Stage::check(&settings(yaml));
+    faults.iter().map(ToString::to_string).collect()
 }
 
 fn take(desk: &Desk, yaml: &str, robot: Robot) -> Result<Taken> {
@@ -152,7 +163,7 @@ fn quantities_arrive_in_si_under_the_names_of_the_file() {
     let taken = take(
         &rows("P1,180,-90,1000,-2000.5,3\nP2,10,20,4,5,6\n"),
         TWO,
-        robot("rr", 1.0),
+        rr(),
     )
     .unwrap();
     let recording = &taken.recording;
@@ -216,7 +227,7 @@ fn every_refused_row_has_its_line_reason_and_text() {
     let taken = take(
         &rows(&format!("{text}{}T1,1,2,3,4,5,,\n", good(20))),
         TWO,
-        robot("rr", 1.0),
+        rr(),
     );
     let taken = match taken {
         Ok(taken) => taken,
@@ -289,7 +300,7 @@ fn the_practice_recordings_join_fully() {
     folders.sort();
     assert_eq!(folders.len(), 28);
     for folder in folders {
-        let arm = std::fs::read_to_string(folder.join("robot.json")).unwrap();
+        let arm = read(folder.join("robot.json"));
         let arm: serde_json::Value = serde_json::from_str(&arm).unwrap();
         let joints = arm["axes"].as_array().unwrap().len();
         let desk = Desk::default();

@@ -5,37 +5,29 @@ mod layouts;
 mod lists;
 mod torques;
 
-use crate::compensate::calib;
+use crate::answer::{calib, has, put, read};
 use std::fmt::Write;
 
 #[test]
 fn what_init_writes_is_understood_and_never_overwrites() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let mut controller = String::from("Controller log\n\nPoint;A1;A2;A3;A4;A5;A6;load;remark\n");
     let mut tracker = String::from("name,X,Y,Z\n");
     for k in 0..40 {
         let q: Vec<String> = (0..6)
             .map(|j| format!("{:.2}", 50.0 * f64::from(k * 7 + j).sin()).replace('.', ","))
             .collect();
-        writeln!(controller, "P{k};{};10,0;ok", q.join(";")).expect("text");
-        writeln!(tracker, "P{k},{}.5,-200,900", 1500 + k).expect("text");
+        writeln!(controller, "P{k};{};10,0;ok", q.join(";")).unwrap();
+        writeln!(tracker, "P{k},{}.5,-200,900", 1500 + k).unwrap();
     }
-    std::fs::write(folder.path().join("controller.csv"), controller).expect("a file");
-    std::fs::write(folder.path().join("tracker.csv"), tracker).expect("a file");
-    let arguments = ["init", ".", "--data", "controller.csv", "tracker.csv"];
-    let output = calib(folder.path(), &arguments, "");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    assert!(
-        said.contains("6 joints (A1 to A6)") && said.contains("not used: remark"),
-        "{said}"
-    );
-    let pipeline =
-        std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
+    put(folder.path(), "controller.csv", controller);
+    put(folder.path(), "tracker.csv", tracker);
+    let arguments = "init . --data controller.csv tracker.csv";
+    let output = calib(folder.path(), arguments);
+    let said = output.out.clone();
+    assert!(output.code == Some(0), "{}", output.err);
+    has(&said, ["6 joints (A1 to A6)", "not used: remark"]);
+    let pipeline = read(folder.path().join("pipeline.yaml"));
     for part in [
         "file: \"controller.csv\"",
         "delimiter: \";\"",
@@ -46,43 +38,20 @@ fn what_init_writes_is_understood_and_never_overwrites() {
     ] {
         assert!(pipeline.contains(part), "{part} in\n{pipeline}");
     }
-    let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
-    assert!(
-        check.status.success(),
-        "{}",
-        String::from_utf8_lossy(&check.stderr)
-    );
-    let ingest = calib(
-        folder.path(),
-        &["run", "pipeline.yaml", "--until", "split", "--quiet"],
-        "",
-    );
-    assert!(
-        ingest.status.success(),
-        "{}",
-        String::from_utf8_lossy(&ingest.stderr)
-    );
-    let again = calib(folder.path(), &arguments, "");
-    assert_eq!(again.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&again.stderr).contains("is already there"));
+    calib(folder.path(), "check pipeline.yaml").code(0);
+    calib(folder.path(), "run pipeline.yaml --until split --quiet").code(0);
+    let again = calib(folder.path(), arguments).code(2);
+    assert!(again.err.contains("is already there"));
     let seven = calib(
         folder.path(),
-        &[
-            "init",
-            "other",
-            "--data",
-            "controller.csv",
-            "--robot",
-            "seven",
-        ],
-        "",
+        "init other --data controller.csv --robot seven",
     );
-    assert!(String::from_utf8_lossy(&seven.stderr).contains("seven has 7 joints, the recording 6"));
+    assert!(seven.err.contains("seven has 7 joints, the recording 6"));
 }
 
 #[test]
 fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let mut table = String::from(
         "Messpunkt;Achse1 [\u{b0}];Achse2 [\u{b0}];Achse3 [\u{b0}];Achse4 [\u{b0}];Achse5 [\u{b0}];Achse6 [\u{b0}];X_soll [mm];Y_soll [mm];Z_soll [mm];X_ist [mm];Y_ist [mm];Z_ist [mm];Bemerkung\r\n",
     );
@@ -95,17 +64,11 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
             "P{k:03};{};1000,5;{k},0;900,0;1000,7;{k},1;900,2;ok\r\n",
             q.join(";")
         )
-        .expect("text");
+        .unwrap();
     }
-    std::fs::write(folder.path().join("messung.csv"), table).expect("a file");
-    let output = calib(folder.path(), &["init", ".", "--data", "messung.csv"], "");
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    let pipeline =
-        std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
+    put(folder.path(), "messung.csv", table);
+    calib(folder.path(), "init . --data messung.csv").code(0);
+    let pipeline = read(folder.path().join("pipeline.yaml"));
     for part in [
         "point_id: {column: \"Messpunkt\"}",
         "q: {column: \"Achse{j} [\u{b0}]\", unit: deg}\n",
@@ -115,46 +78,32 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
     ] {
         assert!(pipeline.contains(part), "{part} in\n{pipeline}");
     }
-    let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
-    assert!(
-        check.status.success(),
-        "{}",
-        String::from_utf8_lossy(&check.stderr)
-    );
-    let said = String::from_utf8_lossy(&check.stdout).into_owned();
-    assert!(
-        said.contains("replace   5 lines: ") && said.contains("          robot.yaml:"),
-        "{said}"
-    );
+    let check = calib(folder.path(), "check pipeline.yaml").code(0);
+    let said = check.out.clone();
+    has(&said, ["replace   5 lines: ", "          robot.yaml:"]);
     let identified = pipeline
         .replace("# limits:", "limits:")
         .replace("# identity:", "identity:");
-    std::fs::write(folder.path().join("pipeline.yaml"), identified).expect("a file");
-    let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
-    assert!(
-        check.status.success(),
-        "the commented settings are none: {}",
-        String::from_utf8_lossy(&check.stderr)
-    );
+    put(folder.path(), "pipeline.yaml", identified);
+    calib(folder.path(), "check pipeline.yaml").code(0);
 
-    std::fs::write(folder.path().join("bare.csv"), "a;b;c;d\n1;2;3;4\n").expect("a file");
-    let output = calib(folder.path(), &["init", "bare", "--data", "bare.csv"], "");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(
-        said.contains("name columns of joints and the measured point where it says REPLACE"),
-        "{said}"
+    put(folder.path(), "bare.csv", "a;b;c;d\n1;2;3;4\n");
+    let output = calib(folder.path(), "init bare --data bare.csv");
+    let said = output.out.clone();
+    has(
+        &said,
+        "name columns of joints and the measured point where it says REPLACE",
     );
-    let check = calib(folder.path(), &["check", "bare/pipeline.yaml"], "");
-    assert!(String::from_utf8_lossy(&check.stdout).contains("replace   9 lines: "));
+    let check = calib(folder.path(), "check bare/pipeline.yaml");
+    assert!(check.out.contains("replace   9 lines: "));
 }
 
 #[test]
 fn every_kind_of_robot_that_init_writes_is_read() {
     for kind in ["spherical6", "offset6", "seven", "dh6"] {
-        let folder = tempfile::tempdir().expect("a folder");
-        let output = calib(folder.path(), &["init", "--robot", kind], "");
-        assert!(output.status.success());
-        let text = std::fs::read_to_string(folder.path().join("robot.yaml")).expect("a robot file");
+        let folder = tempfile::tempdir().unwrap();
+        calib(folder.path(), &format!("init --robot {kind}")).code(0);
+        let text = read(folder.path().join("robot.yaml"));
         let file = calib::robot::import::RobotFileText {
             label: "robot.yaml",
             text: &text,
@@ -166,16 +115,12 @@ fn every_kind_of_robot_that_init_writes_is_read() {
 
 #[test]
 fn shells_and_readers_of_manuals_are_served() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish", "powershell"] {
-        let output = calib(folder.path(), &["completions", shell], "");
-        assert!(
-            String::from_utf8_lossy(&output.stdout).contains("compensate"),
-            "{shell}"
-        );
+        let output = calib(folder.path(), &format!("completions {shell}"));
+        assert!(output.out.contains("compensate"), "{shell}");
     }
-    let page = calib(folder.path(), &["man", "compensate"], "");
-    assert!(String::from_utf8_lossy(&page.stdout).contains(".TH calib-compensate"));
-    let wrong = calib(folder.path(), &["man", "compensat"], "");
-    assert_eq!(wrong.status.code(), Some(2));
+    let page = calib(folder.path(), "man compensate");
+    assert!(page.out.contains(".TH calib-compensate"));
+    calib(folder.path(), "man compensat").code(2);
 }

@@ -1,11 +1,12 @@
 //! The stage `learn`: what it gains on the twin, what it refuses, and what it says.
 
-use crate::desk::{Desk, table};
+use crate::answer::{has, root};
+use crate::desk::{Desk, identify_reads, table};
+use crate::fixture::robot_of;
 use calib::error::Result;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::stage::split::{SplitBy, SplitReads};
 use calib::stage::{Context, Learn, LearnReads, LearnWrites, Stage};
-use calib::stage::{Identify, IdentifyReads, Simulate, SimulateReads, Stiffness, StiffnessReads};
+use calib::stage::{Identify, Simulate, SimulateReads, Stiffness, StiffnessReads};
 use calib::store::frame::Frame;
 use calib::table::{
     Parameters, Prediction, PredictionRow, Recording, Robot, Split, SplitRow, Table,
@@ -14,7 +15,6 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::path::Path;
 
 fn settings<S: Stage>(value: Value) -> S {
     serde_json::from_value(value).unwrap()
@@ -36,17 +36,9 @@ fn mean_error(prediction: &Prediction, set: &str) -> f64 {
 
 /// The paper's sequence on the twin of `pipelines/sr210d` up to the network.
 fn paper_sequence(seed: u64) -> (Recording, Split, Prediction) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d");
+    let folder = root("pipelines/sr210d");
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
-    let description = read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: &read("robot.yaml"),
-        },
-        None,
-    )
-    .unwrap()
-    .robot;
+    let description = robot_of(&read("robot.yaml"));
     let robot = Robot::from_description(&description);
     let yaml: Value =
         serde_saphyr::from_str(&read("pipeline.yaml").replace("${remainder}", "all")).unwrap();
@@ -84,12 +76,12 @@ fn paper_sequence(seed: u64) -> (Recording, Split, Prediction) {
         "on": ["unloaded_fit"], "load": "current",
         "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"],
     }));
-    let reads = IdentifyReads {
-        robot: robot.clone(),
-        recording: recording.clone(),
-        split: split.clone(),
-    };
-    let tables = desk.run(&geometry, reads).unwrap();
+    let tables = desk
+        .run(
+            &geometry,
+            identify_reads(robot.clone(), recording.clone(), split.clone()),
+        )
+        .unwrap();
     let reads = StiffnessReads {
         robot,
         recording: recording.clone(),
@@ -305,10 +297,7 @@ fn gross_errors_are_not_learnt_and_rows_outside_the_range_are_left_alone() {
     assert!(ratio < 0.5, "{ratio}");
     assert_eq!(after.0[299].dx_mm, arm.2.0[299].dx_mm);
     let notes = desk.notes.lock().unwrap().join("\n");
-    assert!(
-        notes.contains("1 of 200 rows are not learnt from") && notes.contains("silent on 1"),
-        "{notes}"
-    );
+    has(&notes, ["1 of 200 rows are not learnt from", "silent on 1"]);
 }
 
 #[test]
@@ -344,15 +333,12 @@ fn settings_and_sets_that_make_no_sense_are_named() {
         .err()
         .unwrap()
         .to_string();
-    assert!(
-        message.contains("`training`") && message.contains("check, fit"),
-        "{message}"
-    );
+    has(&message, ["`training`", "check, fit"]);
     let message = learn(json!({"payload": true}), &arm, 1, &desk)
         .err()
         .unwrap()
         .to_string();
-    assert!(message.contains("with.payload"), "{message}");
+    has(&message, "with.payload");
     let written = learn(quick(), &arm, 1, &desk).unwrap();
     assert!(written.network.0.is_empty());
     assert!(

@@ -4,19 +4,17 @@ mod diagnose;
 mod identify;
 mod tables;
 
-use crate::fixture;
+use crate::answer::{calib, has, read, root};
+use crate::fixture::{self, robot_of};
 use crate::identify::{model, normal};
 use crate::readme::example;
 use calib::api::{Poses, Recording, Robot, Sigma};
 use calib::effect::{Effect, EffectContext, EffectStack, Form, Load, arm_effect};
 use calib::estimate::Model;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
 use serde_json::json;
-use std::path::Path;
-use std::process::Command;
 
 /// m, per axis.
 const NOISE: f64 = 10e-6;
@@ -38,17 +36,7 @@ fn rows(robot: &RobotModel, count: usize) -> Measurements {
 #[test]
 fn an_arm_is_identified_from_arrays() {
     let text = example("calib_robot:");
-    let robot = RobotModel::new(
-        read_calib(
-            RobotFileText {
-                label: "page",
-                text: &text,
-            },
-            None,
-        )
-        .expect("a robot")
-        .robot,
-    );
+    let robot = RobotModel::new(robot_of(&text));
     let mut data = rows(&robot, 60);
     let mut truth = model(&robot, base(), &["joint_offset"]);
     let third = truth
@@ -56,19 +44,19 @@ fn an_arm_is_identified_from_arrays() {
         .specs()
         .iter()
         .position(|spec| spec.name == "joint_offset.j3")
-        .expect("a zero");
+        .unwrap();
     truth.x[third] = 1.5e-3;
     data.points.position = truth.predict(&data);
     let noisy = |(row, point): (usize, &Vector3<f64>)| {
         [0, 1, 2].map(|axis: usize| 1e3 * (point[axis] + NOISE * normal(3 * row + axis)))
     };
     let points: Vec<[f64; 3]> = data.points.position.iter().enumerate().map(noisy).collect();
-    let found = identify::parameters(&text, data.q, points).expect("enough rows");
+    let found = identify::parameters(&text, data.q, points).unwrap();
     let zero = found
         .iter()
         .find(|one| one.name == "joint_offset.j3")
-        .expect("the zero of joint 3");
-    let sigma = zero.sigma.expect("an estimate");
+        .unwrap();
+    let sigma = zero.sigma.unwrap();
     assert!(
         (zero.value - 1.5e-3).abs() < 4.0 * sigma && sigma < 1e-4,
         "{} +- {sigma}",
@@ -86,12 +74,12 @@ fn missing_physics_is_named_from_arrays() {
         "motion": {"joint": {"joint": 2}},
         "law": {"of": {"angle": {"joint": 2}}, "basis": {"wave": {"order": 5, "overtone": false}}},
     }});
-    let gear: Box<dyn Effect> = Box::new(serde_json::from_value::<Form>(gear).expect("a form"));
+    let gear: Box<dyn Effect> = Box::new(serde_json::from_value::<Form>(gear).unwrap());
     let context = EffectContext {
         base: base(),
         load: Load::GravityTorque,
     };
-    let effects = vec![arm_effect("joint_offset", &context).expect("a cause"), gear];
+    let effects = vec![arm_effect("joint_offset", &context).unwrap(), gear];
     let mut truth = Model::nominal(robot.clone(), EffectStack::new(&robot, base(), effects));
     let sine = truth.x.len() - 2;
     truth.x[sine] = 1e-4;
@@ -113,7 +101,7 @@ fn missing_physics_is_named_from_arrays() {
         description: robot.description().clone(),
         notes: Vec::new(),
     };
-    let found = diagnose::missing_physics(&robot, &recording).expect("enough rows");
+    let found = diagnose::missing_physics(&robot, &recording).unwrap();
     let said = found.summary.document("");
     let finding = &said["findings"][0];
     assert_eq!(
@@ -132,30 +120,20 @@ fn missing_physics_is_named_from_arrays() {
         "{said}"
     );
     let statement = finding["statement"].as_str().unwrap_or_default();
-    assert!(
-        statement.contains("5 times a turn by 21 arcsec"),
-        "{statement}"
-    );
+    has(statement, "5 times a turn by 21 arcsec");
 }
 
 #[test]
 fn the_tables_of_a_run_are_read_as_rust_values() {
-    let store = tempfile::tempdir().expect("a folder");
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    let output = command
-        .arg("run")
-        .arg(pipeline)
-        .args(["--quiet", "--store"])
-        .arg(store.path())
-        .output()
-        .expect("calib");
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    let worst = |step| tables::worst_points(store.path(), "HEAD", step).expect("a table");
+    let store = tempfile::tempdir().unwrap();
+    let pipeline = root("tests/it/resume/pipeline.yaml");
+    let store_name = store.path().display();
+    calib(
+        ".",
+        &format!("run {} --quiet --store {store_name}", pipeline.display()),
+    )
+    .ok();
+    let worst = |step| tables::worst_points(store.path(), "HEAD", step).unwrap();
     let (nominal, geometry) = (worst("nominal"), worst("geometry"));
     assert_eq!((nominal.len(), geometry.len()), (20, 20));
     assert!(geometry.windows(2).all(|pair| pair[0].1 >= pair[1].1));
@@ -170,8 +148,7 @@ fn the_tables_of_a_run_are_read_as_rust_values() {
 
 #[test]
 fn the_documentation_shows_these_files() {
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/lib.rs"))
-        .expect("the library");
+    let text = read(root("src/lib.rs"));
     for name in ["identify", "diagnose", "tables"] {
         assert!(
             text.contains(&format!(

@@ -1,6 +1,6 @@
 //! The library of arms: reach as published, axes as public models have them, and a run of each from `init --robot`.
 
-use crate::compensate::calib;
+use crate::answer::{calib, put};
 use calib::robot::{LIBRARY, RobotModel};
 use calib::spatial::Pose;
 use calib::table::{Prediction, from_parquet};
@@ -13,7 +13,7 @@ fn reference() -> Value {
         env!("CARGO_MANIFEST_DIR"),
         "/tests/reference/library/poses.json"
     );
-    serde_json::from_str(&std::fs::read_to_string(path).expect("the reference")).expect("JSON")
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 /// mm between a public model and the file, where they are known to differ: shifts of meshes, angles of three decimals.
@@ -46,9 +46,9 @@ fn arms_of_the_library_stand_where_public_models_put_them() {
             let numbers = |key: &str| {
                 pose[key]
                     .as_array()
-                    .expect("numbers")
+                    .unwrap()
                     .iter()
-                    .map(|x| x.as_f64().expect("a number"))
+                    .map(|x| x.as_f64().unwrap())
                     .collect()
             };
             let (q, there): (Vec<f64>, Vec<f64>) = (numbers("q_rad"), numbers("point_mm"));
@@ -76,9 +76,9 @@ const RADIUS: [&str; 9] = [
 
 #[test]
 fn lengths_reach_as_far_as_makers_publish() {
-    for (name, known) in reference().as_object().expect("arms") {
+    for (name, known) in reference().as_object().unwrap() {
         let [here, published] =
-            ["reach_mm", "published_mm"].map(|key| known[key].as_f64().expect("mm"));
+            ["reach_mm", "published_mm"].map(|key| known[key].as_f64().unwrap());
         let off = (here - published) / published;
         assert!(
             if RADIUS.contains(&name.as_str()) {
@@ -128,12 +128,12 @@ pub(super) fn on_flange(text: &str, arm: &str, robot: &RobotModel) -> String {
 pub(super) fn recording(robot: &RobotModel, coupled: &[calib::robot::CountedCoupling]) -> String {
     let joints = robot.joints();
     let mut text = String::from("point");
-    (1..=joints).for_each(|j| write!(text, ",A{j}").expect("text"));
+    (1..=joints).for_each(|j| write!(text, ",A{j}").unwrap());
     text.push_str(",x,y,z\n");
     for k in 0..160_u32 {
         // A sequence that fills the ranges evenly.
         let drawn = |j: usize| {
-            (f64::from(k) * f64::from(2 * u32::try_from(j).expect("few") + 3).sqrt() + 0.13).fract()
+            (f64::from(k) * f64::from(2 * u32::try_from(j).unwrap() + 3).sqrt() + 0.13).fract()
         };
         let range = |j: usize| {
             robot.description().joints[j]
@@ -148,10 +148,10 @@ pub(super) fn recording(robot: &RobotModel, coupled: &[calib::robot::CountedCoup
         for coupling in coupled.iter().rev() {
             shown[coupling.joint] += coupling.ratio * q[coupling.by];
         }
-        write!(text, "P{k}").expect("text");
+        write!(text, "P{k}").unwrap();
         shown
             .iter()
-            .for_each(|q| write!(text, ",{:.5}", q.to_degrees()).expect("text"));
+            .for_each(|q| write!(text, ",{:.5}", q.to_degrees()).unwrap());
         writeln!(
             text,
             ",{:.4},{:.4},{:.4}",
@@ -159,7 +159,7 @@ pub(super) fn recording(robot: &RobotModel, coupled: &[calib::robot::CountedCoup
             1e3 * point.y,
             1e3 * point.z
         )
-        .expect("text");
+        .unwrap();
     }
     text
 }
@@ -167,49 +167,27 @@ pub(super) fn recording(robot: &RobotModel, coupled: &[calib::robot::CountedCoup
 #[test]
 fn every_arm_of_the_library_goes_from_init_to_a_run() {
     for arm in LIBRARY {
-        let read = arm.read().expect("a robot");
+        let read = arm.read().unwrap();
         let robot = RobotModel::new(read.robot.clone());
-        let folder = tempfile::tempdir().expect("a folder");
-        std::fs::write(
-            folder.path().join("measured.csv"),
-            recording(&robot, &read.about.coupled),
-        )
-        .expect("a file");
-        let run = |arguments: &[&str]| {
-            let output = calib(folder.path(), arguments, "");
-            let said = [output.stdout, output.stderr]
-                .map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
-                .concat();
-            assert!(
-                output.status.success(),
-                "{}: {arguments:?}: {said}",
-                arm.name
-            );
-            said
-        };
-        run(&[
-            "init",
-            "cell",
-            "--data",
+        let folder = tempfile::tempdir().unwrap();
+        put(
+            folder.path(),
             "measured.csv",
-            "--robot",
-            arm.name,
-        ]);
+            recording(&robot, &read.about.coupled),
+        );
+        let run = |arguments: &str| calib(folder.path(), arguments).code(0).both();
+        run(&format!(
+            "init cell --data measured.csv --robot {}",
+            arm.name
+        ));
         let file = folder.path().join("cell/robot.yaml");
-        let text = std::fs::read_to_string(&file).expect("a robot file");
-        std::fs::write(&file, on_flange(&text, arm.name, &robot)).expect("a file");
-        run(&["check", "cell/pipeline.yaml"]);
-        run(&[
-            "run",
-            "cell/pipeline.yaml",
-            "--until",
-            "geometry",
-            "--quiet",
-        ]);
+        let text = std::fs::read_to_string(&file).unwrap();
+        std::fs::write(&file, on_flange(&text, arm.name, &robot)).unwrap();
+        run("check cell/pipeline.yaml");
+        run("run cell/pipeline.yaml --until geometry --quiet");
         let name = "geometry.prediction.parquet";
-        let bytes =
-            std::fs::read(folder.path().join(".calib/tables/cell").join(name)).expect("a table");
-        let prediction: Prediction = from_parquet(name, bytes).expect("a sound table").table;
+        let bytes = std::fs::read(folder.path().join(".calib/tables/cell").join(name)).unwrap();
+        let prediction: Prediction = from_parquet(name, bytes).unwrap().table;
         let rows = prediction
             .0
             .iter()

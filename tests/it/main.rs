@@ -9,12 +9,12 @@
 
 #[cfg(target_os = "linux")]
 mod alone;
+mod answer;
 mod api;
 mod arms;
 mod bags;
 mod beyond;
 mod bucket;
-mod cause_names;
 mod check;
 mod circles;
 mod cmd;
@@ -43,7 +43,6 @@ mod held_locks;
 mod identify;
 mod ingest;
 mod init;
-mod kinds;
 mod layers;
 mod learn;
 mod library;

@@ -1,23 +1,17 @@
 //! Recordings of a moving arm: clocks apart and joints that trail are named with their size, and a sound arm has nothing missing,
 //! whether the controller logs velocities or they follow from the joints over time.
 
+use crate::answer::{self, has, read, root, starts_with};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::PathBuf;
 
-fn calib(arguments: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .output()
-        .expect("the binary");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{said}");
-    String::from_utf8(output.stdout).expect("UTF-8")
+fn calib(words: &str) -> String {
+    answer::calib(".", words).ok()
 }
 
 /// Something wrong everywhere that a rigid model takes up, and what `effects` and `motion` say besides.
 fn twin(seed: u64, effects: &str, motion: &str, more: &str) -> String {
-    let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
+    let robot = root("pipelines/sr210d/robot.yaml");
     let links = (1..=6).map(|link| {
         format!("{{link: {link}, shift_mm: [0.3, -0.2, 0.4], tilt_arcsec: [40, -60, 20]}}")
     });
@@ -33,14 +27,14 @@ struct Case {
 
 impl Case {
     fn record(twin: &str) -> Self {
-        let folder = tempfile::tempdir().expect("a folder");
+        let folder = tempfile::tempdir().unwrap();
         let case = Self { folder };
-        std::fs::write(case.path("twin.yaml"), twin).expect("written");
+        std::fs::write(case.path("twin.yaml"), twin).unwrap();
         let [twin, out, store] =
             ["twin.yaml", "case", "store"].map(|name| case.path(name).display().to_string());
-        calib(&[
-            "simulate", "record", &twin, "--out", &out, "--store", &store, "--quiet",
-        ]);
+        calib(&format!(
+            "simulate record {twin} --out {out} --store {store} --quiet"
+        ));
         case
     }
 
@@ -50,37 +44,25 @@ impl Case {
 
     /// `more` are lines of `ingest` beyond those of `pipelines/case`.
     fn diagnose(&self, more: &str) -> Value {
-        let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml");
-        let text = std::fs::read_to_string(own).expect("the pipeline").replace(
+        let own = root("pipelines/case/pipeline.yaml");
+        let text = read(own).replace(
             "      join: {by: id}\n",
             &format!("      join: {{by: id}}\n{more}"),
         );
-        std::fs::write(self.path("pipeline.yaml"), text).expect("written");
+        std::fs::write(self.path("pipeline.yaml"), text).unwrap();
         let [pipeline, case, store] =
             ["pipeline.yaml", "case", "store"].map(|name| self.path(name).display().to_string());
-        let said = calib(&[
-            "diagnose",
-            &pipeline,
-            "--set",
-            &format!("case={case}"),
-            "--store",
-            &store,
-            "--json",
-            "--quiet",
-        ]);
-        serde_json::from_str(&said).expect("JSON")
+        let said = calib(&format!(
+            "diagnose {pipeline} --set case={case} --store {store} --json --quiet"
+        ));
+        serde_json::from_str(&said).unwrap()
     }
 }
 
 fn names(diagnosis: &Value) -> Vec<(&str, &str)> {
-    let findings = diagnosis["findings"].as_array().expect("findings").iter();
+    let findings = diagnosis["findings"].as_array().unwrap().iter();
     findings
-        .map(|f| {
-            (
-                f["effect"].as_str().expect("a name"),
-                f["where"].as_str().expect("a place"),
-            )
-        })
+        .map(|f| (f["effect"].as_str().unwrap(), f["where"].as_str().unwrap()))
         .collect()
 }
 
@@ -88,8 +70,8 @@ fn names(diagnosis: &Value) -> Vec<(&str, &str)> {
 fn first(diagnosis: &Value) -> (f64, f64) {
     let number = &diagnosis["findings"][0]["parameters"][0];
     (
-        number["value"].as_f64().expect("a value"),
-        number["sigma"].as_f64().expect("a sigma"),
+        number["value"].as_f64().unwrap(),
+        number["sigma"].as_f64().unwrap(),
     )
 }
 
@@ -108,14 +90,9 @@ fn clocks_that_are_apart_are_named_with_their_milliseconds() {
         (value - 2.0).abs() < 3.0 * sigma && sigma < 0.05,
         "{value} +- {sigma} ms"
     );
-    let said = found["findings"][0]["statement"]
-        .as_str()
-        .expect("a sentence");
-    assert!(
-        said.starts_with("the tracker's clock is ")
-            && said.contains("ms late relative to the controller's"),
-        "{said}"
-    );
+    let said = found["findings"][0]["statement"].as_str().unwrap();
+    starts_with(said, "the tracker's clock is ");
+    has(said, "ms late relative to the controller's");
     assert_eq!(found["verdict"], "explained");
     // Told so, ingest carries the joints there and nothing is left.
     let cured = case.diagnose(&format!("      motion: {{later_s: {}}}\n", 1e-3 * value));
@@ -198,10 +175,7 @@ fn nothing_is_named_on_a_way_though_its_noise_lasts_from_row_to_row() {
 fn what_too_short_a_way_would_hide_is_said() {
     let hidden = |rate: &str| {
         let found = Case::record(&twin(18, "", rate, "")).diagnose("");
-        let said = found["not_observable"]
-            .as_array()
-            .expect("sentences")
-            .clone();
+        let said = found["not_observable"].as_array().unwrap().clone();
         let about = |name: &str| {
             said.iter()
                 .any(|line| line.as_str().is_some_and(|line| line.starts_with(name)))
@@ -214,7 +188,7 @@ fn what_too_short_a_way_would_hide_is_said() {
 
 #[test]
 fn what_a_standing_arm_cannot_show_is_refused_in_its_twin() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("twin.yaml");
     let text = twin(
         17,
@@ -223,30 +197,12 @@ fn what_a_standing_arm_cannot_show_is_refused_in_its_twin() {
         "",
     )
     .replace("      motion: {}\n", "");
-    std::fs::write(&path, text).expect("written");
+    std::fs::write(&path, text).unwrap();
     let (path, out) = (
         path.display().to_string(),
         folder.path().join("out").display().to_string(),
     );
-    let arguments = [
-        "simulate",
-        "record",
-        &path,
-        "--out",
-        &out,
-        "--store",
-        &format!("{out}-store"),
-        "--quiet",
-    ];
-    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .output()
-        .expect("the binary");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        output.status.code() == Some(2)
-            && said.contains("effects[0]")
-            && said.contains("moving arm only"),
-        "{said}"
-    );
+    let arguments = &format!("simulate record {path} --out {out} --store {out}-store --quiet");
+    let refused = answer::calib(".", arguments).code(2);
+    has(&refused.err, ["effects[0]", "moving arm only"]);
 }

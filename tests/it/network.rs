@@ -1,5 +1,7 @@
 //! The perceptron, its gradient, its training, its valid range and the judge of whether it helps.
 
+use crate::answer::{has, read, root};
+use crate::fixture::robot_of;
 use calib::estimate::network::arm::ScrewArm;
 use calib::estimate::network::correction::{Body, NetworkScaling, Networks, Scaling, features};
 use calib::estimate::network::loss::{Batch, Loss, LossBuffers};
@@ -11,7 +13,6 @@ use calib::estimate::network::{
 };
 use calib::estimate::swarm::Algorithm;
 use calib::robot::RobotModel;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
 use calib::table::{Network, Table};
 use rand::rngs::ChaCha8Rng;
@@ -205,19 +206,9 @@ fn a_smooth_remainder_is_learnt_and_the_noise_is_not() {
 
 /// The SR210D, its base turned and shifted in the tracker's frame.
 fn sr210d() -> ScrewArm {
-    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
-    let text = std::fs::read_to_string(file).unwrap();
-    let robot = RobotModel::new(
-        read_calib(
-            RobotFileText {
-                label: "robot.yaml",
-                text: &text,
-            },
-            None,
-        )
-        .unwrap()
-        .robot,
-    );
+    let file = root("pipelines/sr210d/robot.yaml");
+    let text = read(file);
+    let robot = RobotModel::new(robot_of(&text));
     ScrewArm::of(
         &robot,
         &Pose::from_rotation_vector([0.02, -0.03, 2.0].into(), [4.5, -1.8, 0.9].into()),
@@ -597,6 +588,28 @@ fn a_correction_comes_back_from_its_table() {
         left: 1e-4,
     };
     let table = Network::of(&correction, &prismatic);
+    // Lengths are stored in mm, their factors per mm.
+    let stored = |part: &str, place: [i64; 3]| {
+        let mut rows = table.0.iter().filter(|row| row.member == 0);
+        let found = rows.find(|row| row.part == part && [row.layer, row.to, row.from] == place);
+        found.unwrap().value
+    };
+    let valid = correction.region.ranges[0].upper;
+    let factor = &correction.region.jointly.as_ref().unwrap().factor[1];
+    let Body::Networks(scaling, _) = &correction.body else {
+        unreachable!()
+    };
+    let (input, output) = (scaling.inputs[0].scale, scaling.outputs[2].mean);
+    for (part, place, value) in [
+        ("left", [0, 0, 0], 0.1),
+        ("valid_upper", [0, 1, 0], valid * 1e3),
+        ("joint_factor", [0, 2, 1], factor[0] / 1e3),
+        ("joint_factor", [0, 2, 2], factor[1]),
+        ("input_scale", [0, 1, 0], input * 1e3),
+        ("output_mean", [0, 3, 0], output * 1e3),
+    ] {
+        assert_eq!(stored(part, place), value, "{part}");
+    }
     let back = Network::from_frame(&table.to_frame().unwrap())
         .unwrap()
         .correction(&prismatic)
@@ -622,7 +635,7 @@ fn a_correction_comes_back_from_its_table() {
         .0
         .retain(|row| !(row.member == 2 && row.part == "bias" && row.layer == 1 && row.to == 3));
     let message = holed.correction(&prismatic).unwrap_err().to_string();
-    assert!(message.contains("bias"), "{message}");
+    has(&message, "bias");
 }
 
 #[test]

@@ -1,33 +1,15 @@
 //! A user's own effect in YAML: found by its name on concealed recordings, and kept with its run.
 
+use crate::answer::{self, has, put, read, root, starts_with};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+fn calib(words: &str, folder: &Path) -> String {
+    answer::calib(folder, words).ok()
 }
 
-fn output(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("calib")
-}
-
-fn calib(arguments: &[&str], folder: &Path) -> String {
-    let output = output(arguments, folder);
-    assert!(
-        output.status.success(),
-        "{arguments:?}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    String::from_utf8(output.stdout).expect("UTF-8")
-}
-
-fn diagnosed(arguments: &[&str], folder: &Path) -> Value {
-    serde_json::from_str(&calib(arguments, folder)).expect("JSON")
+fn diagnosed(arguments: &str, folder: &Path) -> Value {
+    serde_json::from_str(&calib(arguments, folder)).unwrap()
 }
 
 /// Findings as `effect at place`.
@@ -41,7 +23,7 @@ fn found(said: &Value) -> Vec<String> {
     };
     said["findings"]
         .as_array()
-        .expect("findings")
+        .unwrap()
         .iter()
         .map(one)
         .collect()
@@ -49,59 +31,29 @@ fn found(said: &Value) -> Vec<String> {
 
 /// The pipeline of cases without its reports, with an effect of one's own.
 fn pipeline(folder: &Path, effect: &str) {
-    let text =
-        std::fs::read_to_string(root().join("pipelines/case/pipeline.yaml")).expect("a pipeline");
-    let (head, _) = text.split_once("  - uses: validate").expect("its end");
+    let text = read(root("pipelines/case/pipeline.yaml"));
+    let (head, _) = text.split_once("  - uses: validate").unwrap();
     let text = head.replace(
         "  - uses: diagnose\n",
         &format!("  - uses: diagnose\n    with: {{effects: [{effect}]}}\n"),
     );
-    assert!(text.contains(effect));
-    std::fs::write(folder.join("p.yaml"), text).expect("written");
+    has(&text, effect);
+    put(folder, "p.yaml", text);
 }
 
 /// Concealed recordings with a local error at some joint, which the library does not name: their numbers and joints.
 fn bumps(folder: &Path) -> Vec<(String, String)> {
-    let cases = [
-        "--cases",
-        "12",
-        "--open",
-        "1",
-        "--seed",
-        "41",
-        "--points",
-        "120",
-        "--robot",
-        "compact6",
-        "--faulty",
-        "0",
-        "--natural",
-        "1",
-    ];
-    calib(
-        &[&["simulate", "conceal", "--out", "sealed"], &cases[..]].concat(),
-        folder,
-    );
+    let cases =
+        "--cases 12 --open 1 --seed 41 --points 120 --robot compact6 --faulty 0 --natural 1";
+    calib(&format!("simulate conceal --out sealed {cases}"), folder);
     let mut sealed: Vec<PathBuf> = std::fs::read_dir(folder.join("sealed/sealed"))
-        .expect("the truth")
-        .map(|file| file.expect("a file").path())
+        .unwrap()
+        .map(|file| file.unwrap().path())
         .collect();
     sealed.sort();
-    let truth = |file: &PathBuf| -> Value {
-        serde_json::from_str(&std::fs::read_to_string(file).unwrap()).expect("JSON")
-    };
-    let name = |file: &PathBuf| {
-        file.file_stem()
-            .expect("a name")
-            .to_string_lossy()
-            .into_owned()
-    };
-    let place = |truth: &Value| {
-        truth["want"][0]["where"]
-            .as_str()
-            .expect("a place")
-            .to_string()
-    };
+    let truth = |file: &PathBuf| -> Value { serde_json::from_str(&read(file)).unwrap() };
+    let name = |file: &PathBuf| file.file_stem().unwrap().to_string_lossy().into_owned();
+    let place = |truth: &Value| truth["want"][0]["where"].as_str().unwrap().to_string();
     let of_bumps = sealed
         .iter()
         .map(|file| (name(file), truth(file)))
@@ -113,27 +65,20 @@ fn bumps(folder: &Path) -> Vec<(String, String)> {
 
 #[test]
 fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::copy(
-        root().join("pipelines/case/effects/worn_tooth.yaml"),
+        root("pipelines/case/effects/worn_tooth.yaml"),
         here.join("worn_tooth.yaml"),
     )
-    .expect("a copy");
+    .unwrap();
     pipeline(here, "worn_tooth.yaml");
     let bumps = bumps(here);
     assert_eq!(bumps.len(), 3, "{bumps:?}");
     let case = |name: &str| format!("case=sealed/recordings/{name}");
     for (name, place) in &bumps {
         let said = diagnosed(
-            &[
-                "diagnose",
-                "p.yaml",
-                "--json",
-                "--quiet",
-                "--set",
-                &case(name),
-            ],
+            &format!("diagnose p.yaml --json --quiet --set {}", case(name)),
             here,
         );
         assert_eq!(
@@ -141,71 +86,47 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
             [format!("worn_tooth at {place}")],
             "{name}: {said:#}"
         );
-        let statement = said["findings"][0]["statement"]
-            .as_str()
-            .expect("a sentence");
-        assert!(
-            statement.starts_with(&format!("a tooth of {place} is worn near ")),
-            "{statement}"
-        );
+        let statement = said["findings"][0]["statement"].as_str().unwrap();
+        starts_with(statement, &format!("a tooth of {place} is worn near "));
         assert_eq!(said["findings"][0]["parameters"][0]["unit"], "arcsec");
     }
 
     // From the store, and without the file.
-    let set = ["--set", &case(&bumps[0].0)];
-    calib(&[&["run", "p.yaml", "--quiet"], &set[..]].concat(), here);
-    let again: Value = serde_json::from_str(&calib(
-        &[&["run", "p.yaml", "--quiet", "--json"], &set[..]].concat(),
-        here,
-    ))
-    .unwrap();
+    let set = format!("--set {}", case(&bumps[0].0));
+    calib(&format!("run p.yaml --quiet {set}"), here);
+    let again: Value =
+        serde_json::from_str(&calib(&format!("run p.yaml --quiet --json {set}"), here)).unwrap();
     assert!(
         again["stages"]
             .as_array()
-            .expect("stages")
+            .unwrap()
             .iter()
             .all(|stage| stage["status"] == "cached"),
         "{again:#}"
     );
     let targets = "name,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,10,-100,20,5,30,0\nb,-20,-70,40,15,-25,60\n";
-    std::fs::write(here.join("targets.csv"), targets).expect("written");
-    let corrected = || calib(&["compensate", "HEAD", "targets.csv"], here);
+    put(here, "targets.csv", targets);
+    let corrected = || calib("compensate HEAD targets.csv", here);
     let with_the_file = corrected();
     assert_ne!(
         with_the_file,
-        calib(
-            &["compensate", "HEAD", "--step", "geometry", "targets.csv"],
-            here
-        )
+        calib("compensate HEAD --step geometry targets.csv", here)
     );
-    std::fs::remove_file(here.join("worn_tooth.yaml")).expect("gone");
+    std::fs::remove_file(here.join("worn_tooth.yaml")).unwrap();
     assert_eq!(corrected(), with_the_file);
     assert_eq!(
-        found(&diagnosed(&["diagnose", "HEAD", "--json"], here)),
+        found(&diagnosed("diagnose HEAD --json", here)),
         [format!("worn_tooth at {}", bumps[0].1)]
     );
-    calib(&["diff", "HEAD~1", "HEAD"], here);
-    for verb in [
-        &["show", "HEAD"][..],
-        &["log"],
-        &["export", "HEAD", "--format", "json"],
-        &["verify"],
-    ] {
+    calib("diff HEAD~1 HEAD", here);
+    for verb in ["show HEAD", "log", "export HEAD --format json", "verify"] {
         calib(verb, here);
     }
     // The law as it stood is part of what decides whether a run is the same.
-    let law =
-        std::fs::read_to_string(root().join("pipelines/case/effects/worn_tooth.yaml")).expect("it");
-    std::fs::write(
-        here.join("worn_tooth.yaml"),
-        law.replace("to: 1.2", "to: 1.1"),
-    )
-    .expect("written");
-    let other: Value = serde_json::from_str(&calib(
-        &[&["run", "p.yaml", "--quiet", "--json"], &set[..]].concat(),
-        here,
-    ))
-    .unwrap();
+    let law = read(root("pipelines/case/effects/worn_tooth.yaml"));
+    put(here, "worn_tooth.yaml", law.replace("to: 1.2", "to: 1.1"));
+    let other: Value =
+        serde_json::from_str(&calib(&format!("run p.yaml --quiet --json {set}"), here)).unwrap();
     let computed: Vec<&Value> = other["stages"]
         .as_array()
         .unwrap()
@@ -221,25 +142,18 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
 /// What a diagnosis has no name for gets a formula; that one, declared, is the name in the next recording.
 #[test]
 fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     pipeline(here, "");
     let bumps = bumps(here);
     let case = |name: &str| format!("case=sealed/recordings/{name}");
     let said = diagnosed(
-        &[
-            "diagnose",
-            "p.yaml",
-            "--json",
-            "--quiet",
-            "--set",
-            &case(&bumps[2].0),
-        ],
+        &format!("diagnose p.yaml --json --quiet --set {}", case(&bumps[2].0)),
         here,
     );
     let finding = &said["findings"][0];
     assert_eq!(finding["where"], bumps[2].1.as_str(), "{said:#}");
-    let forms = finding["forms"].as_array().expect("formulas");
+    let forms = finding["forms"].as_array().unwrap();
     assert!((1..=3).contains(&forms.len()), "{finding:#}");
     let proposed: Vec<&Value> = forms
         .iter()
@@ -260,20 +174,16 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
                 .iter()
                 .find(|number| number["name"] == name)
                 .expect(name);
-            number[key].as_f64().expect("a number")
+            number[key].as_f64().unwrap()
         };
         [of("value"), of("sigma")]
     };
     // The twin's own: -41 deg, 34 deg.
-    let truth = std::fs::read_to_string(here.join(format!("sealed/sealed/{}.json", bumps[2].0)))
-        .expect("the truth");
-    let truth: Value = serde_json::from_str(&truth).expect("JSON");
+    let truth = read(here.join(format!("sealed/sealed/{}.json", bumps[2].0)));
+    let truth: Value = serde_json::from_str(&truth).unwrap();
     let bump = &truth["effects"][0]["physical"][0]["joint_bump"];
     for (name, key) in [("centre", "centre_deg"), ("width", "width_deg")] {
-        let ([value, sigma], expected) = (
-            number(name),
-            bump[key].as_f64().expect("degrees").to_radians(),
-        );
+        let ([value, sigma], expected) = (number(name), bump[key].as_f64().unwrap().to_radians());
         assert!(
             (value - expected).abs() < 4.0 * sigma && sigma < 0.1,
             "{name}: {value} +- {sigma}, truth {expected}"
@@ -296,40 +206,15 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
     );
 
     let set = case(&bumps[2].0);
-    let export = [
-        "diagnose",
-        "p.yaml",
-        "--quiet",
-        "--set",
-        &set,
-        "--export-effect",
-        "mine.yaml",
-    ];
-    calib(&export, here);
-    let refused = output(&export, here);
-    assert_eq!(
-        refused.status.code(),
-        Some(2),
-        "{}",
-        String::from_utf8_lossy(&refused.stderr)
-    );
-    let text = std::fs::read_to_string(here.join("mine.yaml")).expect("a file");
-    std::fs::write(
-        here.join("mine.yaml"),
-        text.replace("bump_of_q", "soft_spot"),
-    )
-    .expect("written");
+    let export = &format!("diagnose p.yaml --quiet --set {set} --export-effect mine.yaml");
+    calib(export, here);
+    answer::calib(here, export).code(2);
+    let text = read(here.join("mine.yaml"));
+    put(here, "mine.yaml", text.replace("bump_of_q", "soft_spot"));
     pipeline(here, "mine.yaml");
     for (name, place) in &bumps {
         let said = diagnosed(
-            &[
-                "diagnose",
-                "p.yaml",
-                "--json",
-                "--quiet",
-                "--set",
-                &case(name),
-            ],
+            &format!("diagnose p.yaml --json --quiet --set {}", case(name)),
             here,
         );
         assert_eq!(
@@ -342,34 +227,31 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
 
 #[test]
 fn a_fleet_finds_an_effect_of_ones_own() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::copy(
-        root().join("pipelines/case/effects/worn_tooth.yaml"),
+        root("pipelines/case/effects/worn_tooth.yaml"),
         here.join("worn_tooth.yaml"),
     )
-    .expect("a copy");
+    .unwrap();
     pipeline(here, "worn_tooth.yaml");
     let bumps = bumps(here);
     let robots: Vec<String> = bumps
         .iter()
         .map(|(name, _)| format!("  - folders: sealed/recordings/{name}\n"))
         .collect();
-    std::fs::write(
-        here.join("f.yaml"),
+    put(
+        here,
+        "f.yaml",
         format!(
             "calib: 1\nname: line\npipeline: p.yaml\nrobots:\n{}",
             robots.concat()
         ),
-    )
-    .unwrap();
-    let said: Value = serde_json::from_str(&calib(
-        &["fleet", "run", "f.yaml", "--json", "--quiet"],
-        here,
-    ))
-    .expect("JSON");
+    );
+    let said: Value =
+        serde_json::from_str(&calib("fleet run f.yaml --json --quiet", here)).unwrap();
     assert_eq!(said["done"], 3, "{said:#}");
-    for ((name, place), robot) in bumps.iter().zip(said["robots"].as_array().expect("robots")) {
+    for ((name, place), robot) in bumps.iter().zip(said["robots"].as_array().unwrap()) {
         assert!(
             robot
                 .to_string()
@@ -378,7 +260,7 @@ fn a_fleet_finds_an_effect_of_ones_own() {
         );
     }
     assert_eq!(
-        diagnosed(&["fleet", "run", "f.yaml", "--json", "--quiet"], here)["computed"],
+        diagnosed("fleet run f.yaml --json --quiet", here)["computed"],
         0
     );
 }
@@ -386,7 +268,7 @@ fn a_fleet_finds_an_effect_of_ones_own() {
 /// The same law under a name of the library's and under one's own: declared, it is found where the library may not look for it.
 #[test]
 fn a_cause_left_out_is_found_by_its_declaration() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let declared = "calib_effect: 1
 name: late_zero
@@ -396,42 +278,18 @@ shape:
   moment: {from: 0, to: 3400}
 unit: arcsec
 ";
-    std::fs::write(here.join("late_zero.yaml"), declared).expect("written");
+    put(here, "late_zero.yaml", declared);
     pipeline(here, "late_zero.yaml], without: [zero_shift");
-    let arguments = [
-        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "923", "--points",
-        "120",
-    ];
+    let arguments = "simulate conceal --out sealed --cases 1 --seed 923 --points 120";
     calib(
-        &[
-            &arguments[..],
-            &[
-                "--family",
-                "zero_shift",
-                "--robot",
-                "compact6",
-                "--faulty",
-                "0",
-            ],
-        ]
-        .concat(),
+        &format!("{arguments} --family zero_shift --robot compact6 --faulty 0"),
         here,
     );
-    let truth: Value = serde_json::from_str(
-        &std::fs::read_to_string(here.join("sealed/sealed/c0001.json")).unwrap(),
-    )
-    .expect("JSON");
+    let truth: Value = serde_json::from_str(&read(here.join("sealed/sealed/c0001.json"))).unwrap();
     let said = diagnosed(
-        &[
-            "diagnose",
-            "p.yaml",
-            "--json",
-            "--quiet",
-            "--set",
-            "case=sealed/recordings/c0001",
-        ],
+        "diagnose p.yaml --json --quiet --set case=sealed/recordings/c0001",
         here,
     );
-    let place = truth["want"][0]["where"].as_str().expect("a place");
+    let place = truth["want"][0]["where"].as_str().unwrap();
     assert_eq!(found(&said), [format!("late_zero at {place}")], "{said:#}");
 }

@@ -1,6 +1,6 @@
 //! Parameters free, held, bounded or known beforehand, by name: in the numerics, and as settings of a stage.
 
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, identify_reads, table};
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, recording};
 use crate::sr210d::experiment;
@@ -8,7 +8,7 @@ use calib::estimate::{
     Bounds, CONFLICT, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, align, fit,
 };
 use calib::robot::{Measurements, RobotModel};
-use calib::stage::{Identify, IdentifyReads, Stage};
+use calib::stage::{Identify, Stage};
 use calib::table::{ParameterRow, Parameters};
 use serde_json::json;
 
@@ -39,7 +39,7 @@ impl Case {
             .specs()
             .iter()
             .position(|spec| spec.name == name)
-            .expect("a parameter of this robot")
+            .unwrap()
     }
     fn fit(&mut self, known: &[(usize, Known)], fixed: &[(usize, f64)]) -> (Vec<f64>, Fitted) {
         let rows: Vec<usize> = (0..self.data.rows()).collect();
@@ -196,7 +196,7 @@ fn a_prior_and_the_data_meet_where_their_sigmas_say_and_the_data_alone_can_be_to
     };
     assert!((narrow / (weight(sigma) + weight(own)).powf(-0.5) - 1.0).abs() < 0.02);
     let prior_check = fitted.prior_checks[&k];
-    let (without, spread) = prior_check.without.expect("the data see it");
+    let (without, spread) = prior_check.without.unwrap();
     assert!((without - free[k]).abs() < 0.05 * sigma && (spread / sigma - 1.0).abs() < 0.03);
     assert!(
         (prior_check.conflict - 3.0 / f64::hypot(1.0, 0.7)).abs() < 0.05,
@@ -233,15 +233,11 @@ fn what_only_a_prior_tells_keeps_its_mean_and_its_sigma() {
 }
 
 fn stage(settings: serde_json::Value) -> Identify {
-    serde_json::from_value(settings).expect("settings")
+    serde_json::from_value(settings).unwrap()
 }
 
 fn row<'a>(table: &'a Parameters, name: &str) -> &'a ParameterRow {
-    table
-        .0
-        .iter()
-        .find(|row| row.name == name)
-        .expect("a parameter")
+    table.0.iter().find(|row| row.name == name).unwrap()
 }
 
 #[test]
@@ -257,16 +253,16 @@ fn settings_by_name_are_found_again_in_the_table_and_what_matches_nothing_is_sai
     let run = |settings: serde_json::Value| {
         let mut all = json!({"on": ["unloaded_fit"], "effects": effects});
         all.as_object_mut()
-            .expect("a map")
-            .extend(settings.as_object().cloned().expect("a map"));
+            .unwrap()
+            .extend(settings.as_object().cloned().unwrap());
         let desk = Desk::default();
-        let reads = IdentifyReads {
-            robot: of.robot.clone(),
-            recording: of.recording.clone(),
-            split: of.split.clone(),
-        };
-        let tables = desk.run(&stage(all), reads).expect("identify runs");
-        let warnings = desk.warnings.lock().expect("one thread").clone();
+        let tables = desk
+            .run(
+                &stage(all),
+                identify_reads(of.robot.clone(), of.recording.clone(), of.split.clone()),
+            )
+            .unwrap();
+        let warnings = desk.warnings.lock().unwrap().clone();
         (table::<Parameters>(&tables).remove(0), warnings)
     };
     let free = ["base_frame.*", "tool_offset.*", "reduction_ratio.*"];

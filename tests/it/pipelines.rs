@@ -1,5 +1,6 @@
 //! Every pipeline of the repository: checked, and run where its data are at hand.
 
+use crate::answer::{put, read};
 use crate::desk;
 use calib::error::Error;
 use calib::pipeline::Plan;
@@ -53,15 +54,13 @@ fn shorter(name: &str, folder: &Path) -> Vec<String> {
     match name {
         "pipelines/swarm/pipeline.yaml" => [set("table2.seeds=20"), set("ten.seeds=3")].concat(),
         "pipelines/ur10/pipeline.yaml" => {
-            let whole =
-                std::fs::read_to_string(root().join("../shared/data/ipa_ur10").join(SERIES))
-                    .unwrap();
+            let whole = read(root().join("../shared/data/ipa_ur10").join(SERIES));
             let (header, rows) = whole.split_once('\n').unwrap();
             let kept: Vec<&str> = std::iter::once(header)
                 .chain(rows.lines().step_by(6))
                 .collect();
             std::fs::create_dir_all(folder.join("Series_C")).unwrap();
-            std::fs::write(folder.join(SERIES), kept.join("\n")).unwrap();
+            put(folder, SERIES, kept.join("\n"));
             set(&format!("data={}", folder.display())).to_vec()
         }
         _ => Vec::new(),
@@ -130,7 +129,7 @@ fn every_pipeline_is_sound_and_runs_where_its_data_are() {
 #[test]
 fn every_pipeline_names_its_schema_for_editors() {
     for file in pipelines() {
-        let text = std::fs::read_to_string(&file).unwrap();
+        let text = read(&file);
         let first = text.lines().next().unwrap_or_default();
         let path = first
             .strip_prefix("# yaml-language-server: $schema=")

@@ -20,7 +20,7 @@ fn site(robot: &RobotDescription) -> Site {
         ranges: robot
             .joints
             .iter()
-            .map(|joint| joint.limits.expect("limits"))
+            .map(|joint| joint.limits.unwrap())
             .collect(),
         bounds: [[f64::NEG_INFINITY, f64::INFINITY]; 3],
         floor: f64::NEG_INFINITY,
@@ -46,7 +46,7 @@ fn model(robot: &RobotDescription, effects: &[&str]) -> Model {
     };
     let made = effects
         .iter()
-        .map(|name| arm_effect(name, &setting).expect("registered"))
+        .map(|name| arm_effect(name, &setting).unwrap())
         .collect();
     let stack = EffectStack::new(&robot, setting.base, made);
     Model::nominal(robot, stack)
@@ -216,7 +216,7 @@ fn simulated_fits_scatter_as_predicted_and_less_than_with_random_poses() {
                 SIGMA,
                 900 + seed,
             )
-            .expect("poses");
+            .unwrap();
         median(scatter(&robot, &random, free, &proposal.score.sigma, 2))
     });
     let theirs = mean.sum::<f64>() / 12.0;
@@ -240,7 +240,7 @@ fn the_same_seed_gives_the_same_poses_and_another_seed_others() {
             seed,
             ..wish(Aim::Information)
         };
-        let proposal = propose(model(&robot, &GEOMETRY), &site(&robot), &wish).expect("poses");
+        let proposal = propose(model(&robot, &GEOMETRY), &site(&robot), &wish).unwrap();
         (proposal.poses.q, proposal.poses.payload, proposal.direction)
     };
     assert_eq!(poses(5), poses(5));
@@ -257,7 +257,7 @@ fn limits_box_floor_and_payloads_are_kept() {
         candidates: 200,
         ..wish(Aim::Information)
     };
-    let proposal = propose(model(&robot, &all_effects()), &site, &wish).expect("poses");
+    let proposal = propose(model(&robot, &all_effects()), &site, &wish).unwrap();
     let nominal = RobotModel::new(robot.clone());
     for row in 0..COUNT {
         let q = proposal.poses.q(row);

@@ -53,17 +53,13 @@ fn moved(program: &Program, by: f64) -> Vec<u8> {
         .iter()
         .map(|literal| Ok(answer(literal)))
         .collect();
-    program
-        .rewritten(answers)
-        .expect("every target has an answer")
-        .bytes
+    program.rewritten(answers).unwrap().bytes
 }
 
 #[test]
 fn a_number_stays_as_it_was_written_where_nothing_is_to_be_corrected() {
     let text = "DECL E6AXIS H={A1 -0,A2 - 10.50,A3 2E1,A4 +5,A5 30.0000004,A6 1e-3,E1 0}\r\n";
-    let program =
-        Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
+    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).unwrap();
     assert_eq!(String::from_utf8_lossy(&moved(&program, 0.0)), text);
     assert_eq!(String::from_utf8_lossy(&moved(&program, 4e-7)), text);
     assert_eq!(
@@ -75,8 +71,7 @@ fn a_number_stays_as_it_was_written_where_nothing_is_to_be_corrected() {
 #[test]
 fn a_number_that_loses_its_sign_does_not_run_into_its_name() {
     let text = "PTP {A1-0.1,A2-0.3,A3+0,A4 0,A5 0,A6-9}";
-    let program =
-        Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
+    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).unwrap();
     assert_eq!(
         program.literals()[0].values,
         [-0.1, -0.3, 0.0, 0.0, 0.0, -9.0]
@@ -88,8 +83,7 @@ fn a_number_that_loses_its_sign_does_not_run_into_its_name() {
 #[test]
 fn a_program_with_one_target_without_an_answer_is_refused_whole() {
     let text = "PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 7}\n";
-    let program =
-        Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
+    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).unwrap();
     let good = SolvedLiteral {
         values: vec![1.0; 6],
         posture: PostureStatement::Unstated,
@@ -154,8 +148,7 @@ fn brackets_without_end_are_a_fault_and_no_overflow() {
 #[test]
 fn configurations_and_turns_are_read_as_postures() {
     let postures = |language: Language, text: &str| -> Vec<PostureStatement> {
-        let program =
-            Program::parse(text.as_bytes(), language, Partial::Refused).expect("accepted");
+        let program = Program::parse(text.as_bytes(), language, Partial::Refused).unwrap();
         program
             .literals()
             .iter()

@@ -1,5 +1,6 @@
 //! `calib query`: SQL over the tables of a run gives what the tables hold.
 
+use crate::answer::{self, Answer, ends_with, has, root};
 use calib::audit::{self, QueryTables};
 use calib::pipeline::{Manifest, find_run};
 use calib::store::Store;
@@ -7,7 +8,6 @@ use calib::table::{Prediction, PredictionRow, Recording, Table};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 use std::sync::LazyLock;
 
 use crate::bucket::bucket_of;
@@ -15,40 +15,23 @@ use crate::bucket::bucket_of;
 /// One run that all tests ask.
 static STORE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml");
-    let output = calib(
-        folder.path(),
-        &["run", pipeline.to_str().unwrap(), "--quiet"],
-    );
-    assert!(output.status.success(), "{}", text(&output));
+    let pipeline = root("tests/it/resume/pipeline.yaml");
+    let run = ["run", pipeline.to_str().unwrap(), "--quiet"];
+    calib(folder.path(), &run).ok();
     folder
 });
 
-fn calib(store: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .arg("--store")
-        .arg(store)
-        .output()
-        .unwrap()
+fn calib(store: &Path, words: &[&str]) -> Answer {
+    let store = store.to_str().unwrap();
+    answer::calib(".", &[words, &["--store", store]].concat())
 }
-fn text(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
-}
-fn ask(arguments: &[&str]) -> String {
-    let output = calib(STORE.path(), &[&["query", "HEAD"], arguments].concat());
-    assert!(output.status.success(), "{arguments:?}: {}", text(&output));
-    String::from_utf8(output.stdout).unwrap()
+fn ask(words: &[&str]) -> String {
+    calib(STORE.path(), &[&["query", "HEAD"], words].concat()).ok()
 }
 fn refused(sql: &str) -> String {
-    let output = calib(STORE.path(), &["query", "HEAD", sql]);
-    assert_eq!(
-        (output.status.code(), output.stdout.len()),
-        (Some(2), 0),
-        "{sql}: {}",
-        text(&output)
-    );
-    String::from_utf8(output.stderr).unwrap()
+    let answer = calib(STORE.path(), &["query", "HEAD", sql]).code(2);
+    assert_eq!(answer.out, "", "{sql}");
+    answer.err
 }
 /// The objects of `--json`.
 fn rows(sql: &str) -> Vec<Value> {
@@ -258,9 +241,9 @@ fn fifty_rows_are_shown_and_the_others_counted() {
     let sql = "SELECT sequence, error_mm FROM geometry_prediction";
     let told = ask(&[sql]);
     assert_eq!(told.lines().count(), 52);
-    assert!(
-        told.ends_with("\n30 more rows: --rows N shows N of them, --csv and --json all\n"),
-        "{told}"
+    ends_with(
+        &told,
+        "\n30 more rows: --rows N shows N of them, --csv and --json all\n",
     );
     assert_eq!(ask(&[sql, "--rows", "0"]).lines().count(), 81);
     assert_eq!(ask(&[sql, "--rows", "3"]).lines().count(), 5);
@@ -273,35 +256,32 @@ fn fifty_rows_are_shown_and_the_others_counted() {
 #[test]
 fn what_is_not_there_is_named_with_what_is() {
     let told = refused("SELECT * FROM geometry_predicton");
-    assert!(
-        told.contains(
-            "no table `geometry_predicton`; did you mean `geometry_prediction`? Its tables: "
-        ),
-        "{told}"
+    has(
+        &told,
+        "no table `geometry_predicton`; did you mean `geometry_prediction`? Its tables: ",
     );
-    assert!(
-        told.contains("simulate_recording") && told.contains("nominal_parameters"),
-        "{told}"
-    );
+    has(&told, ["simulate_recording", "nominal_parameters"]);
     let told = refused("SELECT eror_mm FROM geometry_prediction");
-    assert!(told.contains("no column `eror_mm`; did you mean `error_mm`? Columns of geometry_prediction: sequence, "), "{told}");
+    has(
+        &told,
+        "no column `eror_mm`; did you mean `error_mm`? Columns of geometry_prediction: sequence, ",
+    );
     let told =
         refused("SELECT g.eror_mm FROM geometry_prediction g JOIN recording USING (sequence)");
-    assert!(
-        told.contains("no column `eror_mm`; did you mean `error_mm`?")
-            && told.contains("of recording: "),
-        "{told}"
+    has(
+        &told,
+        [
+            "no column `eror_mm`; did you mean `error_mm`?",
+            "of recording: ",
+        ],
     );
     let told = refused("SELECT sequence FROM prediction");
-    assert!(
-        told.contains("`prediction` is written by several stages; say which: nominal.prediction, geometry.prediction"),
-        "{told}"
+    has(
+        &told,
+        "`prediction` is written by several stages; say which: nominal.prediction, geometry.prediction",
     );
     let told = refused("SELECT step, sum(error_mm FROM geometry_prediction");
-    assert!(
-        told.contains("SQL: Expected: ") && told.contains("Line: 1, Column: "),
-        "{told}"
-    );
+    has(&told, ["SQL: Expected: ", "Line: 1, Column: "]);
     let told = refused("SELECT step FROM geometry_prediction ORDER BY 0");
     assert!(
         told.starts_with("error: SQL: ") && told.lines().count() == 1,
@@ -316,14 +296,14 @@ fn under_json_a_fault_is_a_document_too() {
         STORE.path(),
         &["query", "HEAD", "SELECT * FROM nosuch", "--json"],
     );
-    let said: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let said = output.json();
     assert_eq!(
-        (output.status.code(), &said["status"], &said["exit_code"]),
+        (output.code, &said["status"], &said["exit_code"]),
         (Some(2), &"failed".into(), &2.into())
     );
     let message = said["faults"][0]["message"].as_str().unwrap();
     assert!(message.contains("no table `nosuch`"), "{said}");
-    assert!(String::from_utf8_lossy(&output.stderr).contains(message));
+    has(&output.err, message);
 }
 
 #[test]
@@ -366,15 +346,10 @@ fn nothing_but_the_tables_of_the_run_is_read_and_nothing_changed() {
         assert!(refused(sql).contains("expected one SELECT"), "{sql}");
     }
     let told = refused("SELECT * FROM read_parquet('other.parquet')");
-    assert!(told.contains("no table `read_parquet`"), "{told}");
+    has(&told, "no table `read_parquet`");
     assert_eq!(objects(STORE.path()), before);
     let output = calib(STORE.path(), &["query", "SELECT * FROM recording"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(
-        text(&output).contains("the run comes before the SQL"),
-        "{}",
-        text(&output)
-    );
+    has(&output.code(2).err, "the run comes before the SQL");
 }
 
 #[test]

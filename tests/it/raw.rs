@@ -1,11 +1,12 @@
 //! Files that others made: damaged ones are refused with their name, endless ones are not opened, a bug is one line and code 70.
 
-use crate::compensate::{calib, cell};
+use crate::answer::{Answer, command, fed, has, put};
+use crate::compensate::cell;
 use arrow::array::{ArrayRef, Float64Array, RecordBatch};
 use calib::raw;
 use parquet::arrow::ArrowWriter;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 use std::sync::Arc;
 
 /// Targets of six joints as Parquet.
@@ -24,18 +25,11 @@ fn targets() -> Vec<u8> {
     writer.into_inner().unwrap()
 }
 
-fn message(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
 /// With the backtraces that somebody may have asked for.
-fn run(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .current_dir(folder)
-        .env("RUST_BACKTRACE", "1")
-        .output()
-        .unwrap()
+fn run(folder: &Path, words: &str) -> Answer {
+    let mut command = command(words);
+    let command = command.current_dir(folder).env("RUST_BACKTRACE", "1");
+    Answer::of(command.output().unwrap())
 }
 
 #[test]
@@ -67,56 +61,36 @@ fn a_decoder_that_gives_up_is_a_fault_of_the_file() {
     // Else this test tests nothing: take other bits.
     assert!(!gives_up.is_empty());
     let folder = cell();
-    std::fs::write(folder.join("damaged.parquet"), &gives_up[0]).unwrap();
-    std::fs::write(
-        folder.join("raw.yaml"),
+    put(folder, "damaged.parquet", &gives_up[0]);
+    put(
+        folder,
+        "raw.yaml",
         "calib: 1\nname: raw\nstages:\n  - uses: robot\n    with: {file: robot.yaml}\n  - uses: ingest\n    with:\n      files:\n        \
          - file: damaged.parquet\n          columns: {q: {column: \"q{j}_rad\", unit: rad}, x: {column: q1_rad, unit: mm}, \
          y: {column: q2_rad, unit: mm}, z: {column: q3_rad, unit: mm}}\n",
-    )
-    .unwrap();
-    for (arguments, code) in [
+    );
+    for (words, code) in [
         (
-            &[
-                "compensate",
-                "latest",
-                "damaged.parquet",
-                "--out",
-                "raw_out.parquet",
-            ][..],
+            "compensate latest damaged.parquet --out raw_out.parquet",
             10,
         ),
         (
-            &[
-                "compensate",
-                "damaged.parquet",
-                "--robot",
-                "robot.yaml",
-                "damaged.parquet",
-            ],
+            "compensate damaged.parquet --robot robot.yaml damaged.parquet",
             10,
         ),
-        (&["poses", "robot.yaml", "--against", "damaged.parquet"], 10),
-        (
-            &["schema", "check", "damaged.parquet", "--as", "recording"],
-            10,
-        ),
-        (&["run", "raw.yaml", "--quiet", "--store", "raw_store"], 10),
-        (
-            &["diff", "damaged.parquet", "robot.yaml", "--key", "q1_rad"],
-            2,
-        ),
+        ("poses robot.yaml --against damaged.parquet", 10),
+        ("schema check damaged.parquet --as recording", 10),
+        ("run raw.yaml --quiet --store raw_store", 10),
+        ("diff damaged.parquet robot.yaml --key q1_rad", 2),
     ] {
-        let output = run(folder, arguments);
-        let told = message(&output);
-        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {told}");
+        let told = run(folder, words).code(code).err;
         assert!(
             code == 2 || told.contains("damaged.parquet") && told.contains("gives up"),
-            "{arguments:?}: {told}"
+            "{words}: {told}"
         );
         assert!(
             !told.contains("panicked") && !told.contains("backtrace"),
-            "{arguments:?}: {told}"
+            "{words}: {told}"
         );
     }
     assert!(!folder.join("raw_out.parquet").exists());
@@ -135,68 +109,55 @@ fn what_never_ends_is_not_opened_where_a_file_is_needed() {
     assert!(made.unwrap().success());
     std::fs::copy(cell().join("robot.yaml"), folder.join("robot.yaml")).unwrap();
     let pipeline = "calib: 1\nname: raw\nstages:\n  - uses: robot\n    with: {file: FILE}\n";
-    std::fs::write(
-        folder.join("of_pipe.yaml"),
+    put(
+        folder,
+        "of_pipe.yaml",
         pipeline.replace("FILE", "pipe.yaml"),
-    )
-    .unwrap();
-    std::fs::write(
-        folder.join("of_device.yaml"),
+    );
+    put(
+        folder,
+        "of_device.yaml",
         pipeline.replace("FILE", "/dev/zero"),
-    )
-    .unwrap();
-    std::fs::write(folder.join("of_folder.yaml"), pipeline.replace("FILE", "/")).unwrap();
-    let model = ["compensate", "pipe.parquet", "--robot", "robot.yaml"];
-    for (arguments, what) in [
+    );
+    put(folder, "of_folder.yaml", pipeline.replace("FILE", "/"));
+    for (words, what) in [
         (
-            &["check", "pipe.yaml"][..],
+            "check pipe.yaml",
             "pipe.yaml: is a named pipe, not a regular file",
         ),
         (
-            &["run", "/dev/zero"],
+            "run /dev/zero",
             "/dev/zero: is a device, not a regular file",
         ),
         (
-            &["run", "of_pipe.yaml", "--quiet"],
+            "run of_pipe.yaml --quiet",
             "pipe.yaml: cannot be read: is a named pipe",
         ),
         (
-            &["run", "of_device.yaml", "--quiet"],
+            "run of_device.yaml --quiet",
             "/dev/zero: cannot be read: is a device",
         ),
-        (&["run", "of_folder.yaml", "--quiet"], "`/` is a folder"),
+        ("run of_folder.yaml --quiet", "`/` is a folder"),
+        ("poses /dev/zero", "/dev/zero: cannot be read: is a device"),
+        ("poses robot.yaml --against pipe.parquet", "is a named pipe"),
         (
-            &["poses", "/dev/zero"],
-            "/dev/zero: cannot be read: is a device",
-        ),
-        (
-            &["poses", "robot.yaml", "--against", "pipe.parquet"],
-            "is a named pipe",
-        ),
-        (&model, "pipe.parquet: cannot be read: is a named pipe"),
-        (
-            &["diff", "pipe.parquet", "pipe.parquet"],
+            "compensate pipe.parquet --robot robot.yaml",
             "pipe.parquet: cannot be read: is a named pipe",
         ),
         (
-            &["schema", "check", "pipe.parquet"],
+            "diff pipe.parquet pipe.parquet",
             "pipe.parquet: cannot be read: is a named pipe",
         ),
-        (&["init", "made", "--data", "pipe.csv"], "is a named pipe"),
-        (&["fleet", "run", "pipe.yaml"], "is a named pipe"),
+        (
+            "schema check pipe.parquet",
+            "pipe.parquet: cannot be read: is a named pipe",
+        ),
+        ("init made --data pipe.csv", "is a named pipe"),
+        ("fleet run pipe.yaml", "is a named pipe"),
     ] {
-        let output = run(folder, arguments);
-        assert!(
-            matches!(output.status.code(), Some(2 | 10)),
-            "{arguments:?}: {:?} {}",
-            output.status,
-            message(&output)
-        );
-        assert!(
-            message(&output).contains(what),
-            "{arguments:?}: {}",
-            message(&output)
-        );
+        let answer = run(folder, words);
+        assert!(matches!(answer.code, Some(2 | 10)), "{words}: {answer:?}");
+        has(&answer.err, what);
     }
     let made = Command::new("mkfifo")
         .arg(cell().join("pipe.csv"))
@@ -204,62 +165,40 @@ fn what_never_ends_is_not_opened_where_a_file_is_needed() {
         .status();
     assert!(made.unwrap().success());
     for targets in ["/dev/zero", "pipe.csv", "pipe.src"] {
-        let output = run(cell(), &["compensate", "latest", targets]);
-        assert!(
-            matches!(output.status.code(), Some(2 | 10))
-                && message(&output).contains("not a regular file"),
-            "{}",
-            message(&output)
-        );
+        let answer = run(cell(), &format!("compensate latest {targets}"));
+        assert!(matches!(answer.code, Some(2 | 10)), "{answer:?}");
+        has(&answer.err, "not a regular file");
     }
 }
 
 #[cfg(unix)]
 #[test]
 fn a_pipe_of_targets_is_read_and_one_line_without_end_refused() {
-    let output = calib(
-        cell(),
-        &["compensate", "latest"],
-        "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n1,2,3,4,5,6\n",
-    );
-    assert!(output.status.success(), "{}", message(&output));
+    let sound = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n1,2,3,4,5,6\n";
+    fed(cell(), "compensate latest", sound).ok();
     let zero = std::fs::File::open("/dev/zero").unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(["compensate", "latest"])
-        .current_dir(cell())
-        .stdin(zero)
-        .output()
-        .unwrap();
-    assert_eq!(output.status.code(), Some(10), "{}", message(&output));
-    assert!(
-        message(&output).contains("stdin: has a line of more than 16 MB"),
-        "{}",
-        message(&output)
-    );
+    let mut endless = command("compensate latest");
+    let endless = endless.current_dir(cell()).stdin(zero).output().unwrap();
+    let refused = Answer::of(endless).code(10);
+    has(&refused.err, "stdin: has a line of more than 16 MB");
 }
 
 #[test]
 fn a_target_that_no_robot_has_is_refused_with_its_line() {
     let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n1,2,3,4,5,6\n";
-    let output = calib(
-        cell(),
-        &["compensate", "latest"],
-        &format!("{header}1,2,3,4,5,1e308\n"),
-    );
-    assert_eq!(output.status.code(), Some(10));
-    assert!(
-        message(&output).contains("stdin:3: 1.7453292519943295e306 rad is more than 63 rad"),
-        "{}",
-        message(&output)
-    );
-    let output = calib(
-        cell(),
-        &["compensate", "latest"],
-        "x_mm,y_mm,z_mm\n1e308,0,0\n",
-    );
-    assert!(
-        message(&output).contains("stdin:2: 1e305 m is more than 1000 m"),
-        "{}",
-        message(&output)
-    );
+    for (input, fault) in [
+        (
+            format!("{header}1,2,3,4,5,1e308\n"),
+            "stdin:3: 1.7453292519943295e306 rad is more than 63 rad",
+        ),
+        (
+            "x_mm,y_mm,z_mm\n1e308,0,0\n".into(),
+            "stdin:2: 1e305 m is more than 1000 m",
+        ),
+    ] {
+        has(
+            &fed(cell(), "compensate latest", &input).code(10).err,
+            fault,
+        );
+    }
 }

@@ -1,11 +1,9 @@
 //! What would show a parameter that the data do not: tried on the model, and true when measured.
 
-use crate::fixture;
+use crate::fixture::{self, fit_all};
 use crate::identify::{GEOMETRY, model, recording};
 use calib::description::RobotDescription;
-use calib::estimate::{
-    FitOptions, Fitted, Model, ParameterStatus, Remedy, Session, align, fit, remedies,
-};
+use calib::estimate::{Fitted, Model, ParameterStatus, Remedy, Session, align, remedies};
 use calib::robot::{Measurements, RobotModel};
 
 fn identify(
@@ -16,15 +14,7 @@ fn identify(
     let robot = RobotModel::new(description.clone());
     let rows: Vec<usize> = (0..data.rows()).collect();
     let model = model(&robot, align(&robot, data, &rows), effects);
-    let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(
-        &model,
-        data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        },
-    )
+    fit_all(&model, data, &rows)
 }
 
 /// What would show the named parameter, which must be hidden now.
@@ -41,7 +31,7 @@ fn remedy(
         .specs()
         .iter()
         .position(|spec| spec.name == name)
-        .expect("a parameter");
+        .unwrap();
     assert!(
         !matches!(fitted.statuses[k], ParameterStatus::Free(_)),
         "{name} is seen"
@@ -53,7 +43,7 @@ fn remedy(
         fitted: &fitted,
     })
     .remove(&k)
-    .expect("hidden parameters have one")
+    .unwrap()
 }
 
 /// A recording of the nominal robot with joints and payload bent.

@@ -1,13 +1,13 @@
 //! Poses measured more than once: the joints' repeatability, the floor, lack of fit, and sigmas that allow for shared errors.
 
-use crate::desk::{Desk, table};
-use crate::fixture;
+use crate::desk::{Desk, identify_reads, table};
+use crate::fixture::{self, all_rows, fit_all, question};
 use crate::identify::{GEOMETRY, SIGMA, model, normal, recording};
 use crate::sr210d::experiment;
-use calib::diagnose::{Diagnosis, Question, diagnose};
-use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Poses, align, fit, spread};
+use calib::diagnose::{Diagnosis, diagnose};
+use calib::estimate::{Fitted, Model, ParameterStatus, Poses, align, spread};
 use calib::robot::{Measurements, NoiseBasis, PointReadings, RobotModel};
-use calib::stage::{Identify, IdentifyReads, Stage};
+use calib::stage::{Identify, Stage};
 use calib::table::{Observability, Parameters, Split};
 use nalgebra::Vector3;
 use serde_json::json;
@@ -67,15 +67,7 @@ fn start(data: &Measurements, effects: &[&str]) -> Model {
 fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
     let model = start(data, effects);
     let rows: Vec<usize> = (0..data.rows()).collect();
-    let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(
-        &model,
-        data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        },
-    )
+    fit_all(&model, data, &rows)
 }
 
 #[test]
@@ -86,7 +78,7 @@ fn joint_repeatability_comes_back_from_returns_and_is_not_seen_where_there_is_no
     assert_eq!((poses.all().len(), poses.repeated().count()), (60, 60));
     let found = poses
         .joint_repeatability(&start(&data, &["base_frame"]), &data)
-        .expect("it is there");
+        .unwrap();
     assert!(
         (found / (5.0 * ARCSEC) - 1.0).abs() < 0.12,
         "{:.2} arcsec",
@@ -115,7 +107,7 @@ fn two_exchanged_returns_do_not_spoil_the_repeatability() {
     let rows: Vec<usize> = (0..data.rows()).collect();
     let found = Poses::of(&data, &rows)
         .joint_repeatability(&start(&data, &["base_frame"]), &data)
-        .expect("it is there");
+        .unwrap();
     assert!(
         (found / (5.0 * ARCSEC) - 1.0).abs() < 0.12,
         "{:.2} arcsec",
@@ -129,7 +121,7 @@ fn lack_of_fit_tells_a_complete_model_from_one_without_ratios() {
     let mut chances = Vec::new();
     for seed in 10..30 {
         let (data, _) = visited(40, 2, 1, 0.0, seed);
-        let repeated = identify(&data, &effects).1.repeated.expect("repeats");
+        let repeated = identify(&data, &effects).1.repeated.unwrap();
         assert_eq!(
             (repeated.poses, repeated.freedom, repeated.revisited),
             (40, 120, true)
@@ -139,7 +131,7 @@ fn lack_of_fit_tells_a_complete_model_from_one_without_ratios() {
             "{:e}",
             repeated.noise
         );
-        chances.push(repeated.lack_of_fit.expect("more poses than parameters").1);
+        chances.push(repeated.lack_of_fit.unwrap().1);
     }
     // Uniform under a complete model.
     let below = chances.iter().filter(|chance| **chance < 0.5).count();
@@ -152,7 +144,7 @@ fn lack_of_fit_tells_a_complete_model_from_one_without_ratios() {
         .1
         .repeated
         .and_then(|repeated| repeated.lack_of_fit)
-        .expect("repeats");
+        .unwrap();
     assert!(ratio > 10.0 && chance < 1e-9, "F {ratio}, p {chance:e}");
 }
 
@@ -164,22 +156,8 @@ fn diagnosed(data: &Measurements, stated: f64) -> Diagnosis {
         .sigma
         .iter_mut()
         .for_each(|sigma| *sigma *= stated);
-    let fit: Vec<usize> = (0..data.rows()).collect();
-    let question = Question {
-        robot: &robot,
-        data: &data,
-        fit: &fit,
-        validate: &[],
-        set: &vec![0; data.rows()],
-        prior_weight: 1.0,
-        open_world: 0.3,
-        without: &[],
-        own: &[],
-        beside_simulation: false,
-        known: &[],
-        seed: 1,
-    };
-    diagnose(&question, |_| ())
+    let fit = all_rows(&data);
+    diagnose(&question(&robot, &data, &fit), |_| ())
 }
 
 #[test]
@@ -286,15 +264,15 @@ fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
     let mut settings = json!({"on": ["unloaded_fit"], "effects": ["base_frame", "tool_offset"], "repeatability": {"arcsec": 4.0}});
     let run = |settings: &serde_json::Value, recording: &calib::table::Recording, split: &Split| {
         let desk = Desk::default();
-        let stage: Identify = serde_json::from_value(settings.clone()).expect("settings");
+        let stage: Identify = serde_json::from_value(settings.clone()).unwrap();
         assert!(stage.check().is_empty());
-        let reads = IdentifyReads {
-            robot: of.robot.clone(),
-            recording: recording.clone(),
-            split: split.clone(),
-        };
-        let tables = desk.run(&stage, reads).expect("identify runs");
-        let notes = desk.notes.lock().expect("one thread").clone();
+        let tables = desk
+            .run(
+                &stage,
+                identify_reads(of.robot.clone(), recording.clone(), split.clone()),
+            )
+            .unwrap();
+        let notes = desk.notes.lock().unwrap().clone();
         (
             table::<Observability>(&tables).remove(0),
             table::<Parameters>(&tables).remove(0),
@@ -340,7 +318,7 @@ fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
         "{notes:#?}"
     );
     let wrong: Identify =
-        serde_json::from_value(json!({"repeatability": {"arcsec": 0.0}})).expect("settings");
+        serde_json::from_value(json!({"repeatability": {"arcsec": 0.0}})).unwrap();
     assert!(wrong.check().iter().any(|fault| {
         fault
             .to_string()

@@ -1,5 +1,6 @@
 //! A run that is killed goes on where it stood, and ends with the tables of an undisturbed one.
 
+use crate::answer::{has, root};
 use crate::held_locks;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
@@ -10,7 +11,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 fn pipeline() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml")
+    root("tests/it/resume/pipeline.yaml")
 }
 fn calib(store: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
@@ -246,8 +247,5 @@ fn the_log_counts_the_stages_that_a_killed_run_finished() {
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&log.stdout).into_owned();
-    assert!(
-        said.contains("running or killed, 3 run, 0 cached"),
-        "{said}"
-    );
+    has(&said, "running or killed, 3 run, 0 cached");
 }

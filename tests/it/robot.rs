@@ -1,5 +1,6 @@
 //! Robot files: every description of one arm is the same arm, and the same as another program's.
 
+use crate::answer::root;
 use crate::arms::{ARMS, Arm};
 use crate::desk::{Desk, shared};
 use calib::description::{Coupling, JointKind, RobotDescription};
@@ -12,7 +13,6 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde_json::Value;
 use std::f64::consts::FRAC_PI_2;
-use std::path::Path;
 
 // m: 1e-9 mm.
 const EXACT: f64 = 1e-12;
@@ -20,9 +20,7 @@ const EXACT: f64 = 1e-12;
 const HEAD: &str = "calib_robot: 1\nunits: {length: mm, angle: deg}\n";
 
 fn reference(file: &str) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/reference/kinematics")
-        .join(file);
+    let path = root("tests/reference/kinematics").join(file);
     std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
@@ -117,9 +115,9 @@ fn every_description_of_an_arm_moves_alike() {
 fn numbers(value: &Value) -> Vec<f64> {
     value
         .as_array()
-        .expect("a list")
+        .unwrap()
         .iter()
-        .map(|x| x.as_f64().expect("a number"))
+        .map(|x| x.as_f64().unwrap())
         .collect()
 }
 
@@ -127,18 +125,17 @@ fn numbers(value: &Value) -> Vec<f64> {
 #[test]
 fn forward_kinematics_and_link_masses_agree_with_pinocchio() {
     for arm in &ARMS {
-        let file: Value =
-            serde_json::from_str(&reference(&format!("{}.json", arm.name))).expect("JSON");
+        let file: Value = serde_json::from_str(&reference(&format!("{}.json", arm.name))).unwrap();
         for (form, robot) in all_forms(arm) {
             let model = RobotModel::new(robot);
-            for pose in file["poses"].as_array().expect("poses") {
+            for pose in file["poses"].as_array().unwrap() {
                 let found = model.forward(&numbers(&pose["q"]));
                 let away =
                     (found.translation - Vector3::from_vec(numbers(&pose["position"]))).norm();
                 let rotation = Matrix3::from_row_iterator(
                     pose["rotation"]
                         .as_array()
-                        .expect("rows")
+                        .unwrap()
                         .iter()
                         .flat_map(numbers),
                 );
@@ -150,18 +147,18 @@ fn forward_kinematics_and_link_masses_agree_with_pinocchio() {
                 );
             }
         }
-        let bodies = file["bodies"].as_array().expect("bodies");
+        let bodies = file["bodies"].as_array().unwrap();
         let robot = read_urdf(arm.name);
         assert_eq!(robot.joints.len(), bodies.len());
         for (joint, body) in robot.joints.iter().zip(bodies) {
-            let mass = joint.mass.expect("the URDF has masses");
+            let mass = joint.mass.unwrap();
             assert!(
-                (mass - body["mass"].as_f64().expect("kg")).abs() < 1e-12,
+                (mass - body["mass"].as_f64().unwrap()).abs() < 1e-12,
                 "{} {}: {mass} kg",
                 arm.name,
                 joint.name
             );
-            let centre = Vector3::from(joint.centre.expect("the URDF has centres"));
+            let centre = Vector3::from(joint.centre.unwrap());
             assert!(
                 (centre - Vector3::from_vec(numbers(&body["centre"]))).norm() < EXACT,
                 "{} {}",
@@ -169,7 +166,7 @@ fn forward_kinematics_and_link_masses_agree_with_pinocchio() {
                 joint.name
             );
         }
-        let [lower, upper] = robot.joints[1].limits.expect("the URDF has limits");
+        let [lower, upper] = robot.joints[1].limits.unwrap();
         assert_eq!((lower, upper), (-3.1, 3.1));
     }
 }
@@ -232,8 +229,8 @@ fn axes_that_are_nearly_parallel_stand_at_the_arm_whose_kinematics_they_keep() {
     let back = Robot::from_description(&robot)
         .to_frame()
         .and_then(|frame| Robot::from_frame(&frame))
-        .expect("a table");
-    assert!(distance(&back.to_description().expect("a robot"), &robot) < 1e-12);
+        .unwrap();
+    assert!(distance(&back.to_description().unwrap(), &robot) < 1e-12);
     // Points along an axis make no difference: the same table with the axes where the convention puts them.
     let mut far = robot.clone();
     for joint in &mut far.joints {
@@ -300,7 +297,7 @@ fn a_link_frame_carries_its_centre() {
         "{HEAD}kinematics: {{dh: [{{d: 100, a: 200, alpha: 90}}]}}\nlinks: [{{mass: 1, centre: [10, 20, 30], frame: link}}]\n"
     );
     // Frame 1 stands at (200, 0, 100) with y up and z along -y of the base.
-    let found = Vector3::from(read(&text).joints[0].centre.expect("a centre"));
+    let found = Vector3::from(read(&text).joints[0].centre.unwrap());
     assert!(
         (found - Vector3::new(0.210, -0.030, 0.120)).norm() < 1e-15,
         "{found}"
@@ -352,12 +349,10 @@ fn the_table_keeps_the_description() {
         .iter()
         .flat_map(|arm| all_forms(arm).into_iter().map(|(_, robot)| robot));
     for robot in forms.chain([read(FULL)]) {
-        let frame = Robot::from_description(&robot)
-            .to_frame()
-            .expect("within the schema");
+        let frame = Robot::from_description(&robot).to_frame().unwrap();
         let again = Robot::from_frame(&frame)
             .and_then(|table| table.to_description())
-            .expect("a robot");
+            .unwrap();
         assert!(distance(&robot, &again) < 1e-12, "{}", robot.name);
         assert_eq!(robot.name, again.name);
         assert!(
@@ -379,7 +374,7 @@ fn a_practice_robot_is_read_in_its_units() {
         label: "robot.json",
         text,
     })
-    .expect("readable");
+    .unwrap();
     assert_eq!(robot.joints[1].axis, [0.0, -1.0, 0.0]);
     assert_eq!(robot.joints[1].point, [0.312, 0.0, 0.0]);
     assert_eq!(
@@ -411,8 +406,8 @@ fn the_stage_reads_every_practice_robot() {
         return;
     };
     let mut cases: Vec<_> = std::fs::read_dir(folder)
-        .expect("a folder")
-        .map(|entry| entry.expect("an entry").path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
         .collect();
     cases.retain(|path| path.is_dir());
     cases.sort();
@@ -420,7 +415,7 @@ fn the_stage_reads_every_practice_robot() {
     for case in cases {
         let desk = Desk::default().with(
             "robot.json",
-            std::fs::read(case.join("robot.json")).expect("a robot.json"),
+            std::fs::read(case.join("robot.json")).unwrap(),
         );
         let stage = ReadRobot {
             file: RawFile("robot.json".into()),
@@ -432,7 +427,7 @@ fn the_stage_reads_every_practice_robot() {
             .unwrap_or_else(|e| panic!("{}: {e}", case.display()));
         let robot = Robot::from_frame(&tables["robot"][0])
             .and_then(|table| table.to_description())
-            .expect("a robot");
+            .unwrap();
         assert!(matches!(robot.joints.len(), 5..=7), "{}", case.display());
         assert!(
             robot
@@ -461,9 +456,9 @@ fn the_stage_reads_the_urdf_beside_a_robot_file() {
         urdf,
     };
     assert_eq!(stage.files().len(), 2, "both contents are part of the key");
-    let tables = desk.run(&stage, RobotReads {}).expect("a robot");
+    let tables = desk.run(&stage, RobotReads {}).unwrap();
     let robot = Robot::from_frame(&tables["robot"][0])
         .and_then(|table| table.to_description())
-        .expect("a robot");
+        .unwrap();
     assert!(distance(&robot, &read_urdf("seven")) < 1e-12);
 }

@@ -1,5 +1,6 @@
 //! What a faulty robot file says: every fault at once, each with its place and what is allowed.
 
+use crate::answer::{has, starts_with};
 use calib::robot::import::{RobotFileText, read_calib, read_case};
 
 const GOOD: &str = "calib_robot: 1
@@ -189,26 +190,18 @@ fn a_file_describes_one_arm_once() {
     let urdf = calib(
         "calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {urdf: {base: a, tip: b}}\n",
     );
-    assert!(
-        urdf.starts_with(
-            "robot.yaml:3:20: kinematics.urdf: the URDF itself is missing; name it in the pipeline"
-        ),
-        "{urdf}"
+    starts_with(
+        &urdf,
+        "robot.yaml:3:20: kinematics.urdf: the URDF itself is missing; name it in the pipeline",
     );
 }
 
 #[test]
 fn a_key_twice_and_broken_yaml_show_the_line() {
     let twice = added("tool: {point: [0, 0, 0]}");
-    assert!(
-        twice.starts_with("robot.yaml:8:1: key `tool` is given twice"),
-        "{twice}"
-    );
+    starts_with(&twice, "robot.yaml:8:1: key `tool` is given twice");
     let broken = changed("tool: {point: [900, 0, 0]}", "tool: {point: [900, 0, 0]");
-    assert!(
-        broken.starts_with("robot.yaml:7:7: unclosed bracket"),
-        "{broken}"
-    );
+    starts_with(&broken, "robot.yaml:7:7: unclosed bracket");
     for text in ["", "just text", "[1, 2]", "# nothing\n"] {
         assert!(
             calib(text).contains("expected a map with the keys calib_robot, name"),
@@ -328,16 +321,14 @@ fn a_practice_robot_is_checked_too() {
          robot.json:1:87: coupling[0]: expected two different joints (moved, by) counted from 0, below 2"
     );
     let not_a_number = case("{\"axes\": [[0, 0, NaN]]}");
-    assert!(
-        not_a_number.contains(
-            "robot.json:1:18: axes[0][2]: expected a finite number, found the text `NaN`"
-        ),
-        "{not_a_number}"
+    has(
+        &not_a_number,
+        "robot.json:1:18: axes[0][2]: expected a finite number, found the text `NaN`",
     );
     let twice = case("{\"tool\": 1, \"tool\": 2}");
-    assert!(
-        twice.starts_with("robot.json:1:13: key `tool` is given twice in this block\n"),
-        "{twice}"
+    starts_with(
+        &twice,
+        "robot.json:1:13: key `tool` is given twice in this block\n",
     );
     assert_eq!(case("{\"axes\": 1"), "robot.json:1:1: unclosed bracket '{'");
     for text in ["[]", ""] {

@@ -1,14 +1,15 @@
 //! The JSON Schema of the pipeline's YAML: what editors complete from.
 
+use crate::answer::{read, root};
 use calib::pipeline::json_schema;
 use calib::stage::STAGES;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[test]
 fn the_schema_in_the_repository_is_that_of_the_code() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/pipeline.v1.schema.json");
-    let kept = std::fs::read_to_string(&path).unwrap();
+    let path = root("schemas/pipeline.v1.schema.json");
+    let kept = read(&path);
     assert!(
         kept == json_schema(STAGES),
         "out of date; make it anew with: cargo run -- schema pipeline > schemas/pipeline.v1.schema.json"
@@ -38,8 +39,7 @@ fn every_stage_is_registered_once_and_documented() {
 
 #[test]
 fn every_stage_is_in_the_list() {
-    let folders = ["src/stage", "src/stage/ingest"]
-        .map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder));
+    let folders = ["src/stage", "src/stage/ingest"].map(root);
     let entries = folders
         .iter()
         .flat_map(|folder| std::fs::read_dir(folder).unwrap());
@@ -47,7 +47,7 @@ fn every_stage_is_in_the_list() {
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.is_file());
     let declared = |path: PathBuf| {
-        let text = std::fs::read_to_string(path).unwrap();
+        let text = read(path);
         text.matches("\nimpl Stage for ").count()
     };
     let stages: usize = files.map(declared).sum();
@@ -60,10 +60,10 @@ fn every_stage_is_in_the_list() {
 
 #[test]
 fn the_schema_of_fleet_files_is_that_of_their_type() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/fleet.v1.schema.json");
+    let file = root("schemas/fleet.v1.schema.json");
     let fresh = calib::fleet::file::json_schema();
     assert!(
-        std::fs::read_to_string(file).unwrap() == fresh,
+        read(file) == fresh,
         "run: calib schema fleet > schemas/fleet.v1.schema.json"
     );
 }

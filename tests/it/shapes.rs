@@ -54,7 +54,7 @@ fn refinement_never_leaves_the_bounds_of_a_shape() {
                 let Some(next) = pick(&near) else { break };
                 form = next.clone();
             }
-            let text = serde_json::to_value(&form).expect("numbers and names");
+            let text = serde_json::to_value(&form).unwrap();
             for ((name, low, high), seen) in bounds.iter().zip(&mut seen) {
                 let mut found = Vec::new();
                 numbers(&text, name, &mut found);

@@ -11,7 +11,7 @@ mod postures;
 mod rank;
 mod twins;
 
-use crate::fixture;
+use crate::fixture::{self, fit_all};
 use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
 use calib::effect::names;
@@ -123,11 +123,11 @@ fn touched_with(
     seed: usize,
 ) -> Recording {
     let settings = Simulate {
-        effects: serde_saphyr::from_str(effects).expect("effects of the twin"),
+        effects: serde_saphyr::from_str(effects).unwrap(),
         truth: truth.clone(),
         fixtures: fixtures.to_vec(),
         seed: Some(seed as u64),
-        ..serde_saphyr::from_str("{}").expect("every setting has a default")
+        ..serde_saphyr::from_str("{}").unwrap()
     };
     assert_eq!(settings.check(), []);
     let context = Context {
@@ -143,7 +143,7 @@ fn touched_with(
             },
             &context,
         )
-        .expect("all in reach")
+        .unwrap()
         .recording
 }
 
@@ -175,13 +175,13 @@ fn calibrated_knowing(
         &rows,
         &BTreeMap::new(),
     )
-    .expect("placed");
+    .unwrap();
     let mut model = model(
         &robot,
         base,
         &[&["anchor"][..], &GEOMETRY, effects].concat(),
     );
-    let number = |name: &str| robot.setup().anchor(name).expect("a fixture");
+    let number = |name: &str| robot.setup().anchor(name).unwrap();
     model.lengths = lengths
         .iter()
         .map(|Length(from, to, length, sigma)| KnownLength {
@@ -196,7 +196,7 @@ fn calibrated_knowing(
             .specs()
             .iter()
             .position(|spec| spec.name == *name)
-            .expect("a parameter");
+            .unwrap();
         let mean = value - model.standing(k).0;
         model.known.insert(
             k,
@@ -209,15 +209,7 @@ fn calibrated_knowing(
             },
         );
     }
-    let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(
-        &model,
-        data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        },
-    )
+    fit_all(&model, data, &rows)
 }
 
 /// What a socket's known place (mm) says of its parameters.
@@ -262,7 +254,7 @@ fn fitted_with(
     prior: impl Fn(&str) -> Option<f64>,
 ) -> (Model, Fitted) {
     let (robot, base) =
-        gauge(RobotModel::new(robot.clone()), data, rows, &BTreeMap::new()).expect("placed");
+        gauge(RobotModel::new(robot.clone()), data, rows, &BTreeMap::new()).unwrap();
     let mut model = model(
         &robot,
         base,
@@ -283,7 +275,7 @@ fn fitted_with(
         rows.iter()
             .any(|row| data.anchor(*row) == Some(name.as_str()))
     };
-    let number = |name: &String| robot.setup().anchor(name).expect("a socket");
+    let number = |name: &String| robot.setup().anchor(name).unwrap();
     let there: Vec<&[String; 2]> = pairs
         .iter()
         .filter(|[from, to]| seen(from) && seen(to))
@@ -311,11 +303,7 @@ fn fitted_with(
 
 /// Where a fit has the sockets, m.
 fn places_of(model: &Model) -> BTreeMap<String, Vector3<f64>> {
-    let first = model
-        .stack
-        .parameters_of(names::ANCHOR)
-        .next()
-        .expect("anchors");
+    let first = model.stack.parameters_of(names::ANCHOR).next().unwrap();
     let all = model.robot.setup().anchors.iter().enumerate();
     all.map(|(k, anchor)| {
         (

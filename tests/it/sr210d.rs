@@ -1,27 +1,27 @@
 //! The paper's experiment on the twin, stage by stage from the settings of `pipelines/sr210d`.
 
-use crate::desk::{Desk, table};
-use calib::stage::{Identify, IdentifyReads, ReadRobot, RobotReads, Simulate, SimulateReads};
+use crate::answer::{read, root};
+use crate::desk::{Desk, identify_reads, table};
+use calib::stage::{Identify, ReadRobot, RobotReads, Simulate, SimulateReads};
 use calib::stage::{Stiffness, StiffnessReads};
 use calib::table::{Parameters, Prediction, Recording, Robot, Split, SplitRow, Truth};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d")
+    root("pipelines/sr210d")
 }
 
 /// The settings of a stage of the pipeline, with the variable `remainder` put in.
 pub fn settings<T: DeserializeOwned>(id: &str, remainder: &str) -> T {
-    let text = std::fs::read_to_string(folder().join("pipeline.yaml")).expect("the pipeline");
-    let whole: Value =
-        serde_saphyr::from_str(&text.replace("${remainder}", remainder)).expect("YAML");
-    let stages = whole["stages"].as_array().expect("stages");
+    let text = read(folder().join("pipeline.yaml"));
+    let whole: Value = serde_saphyr::from_str(&text.replace("${remainder}", remainder)).unwrap();
+    let stages = whole["stages"].as_array().unwrap();
     let stage = stages
         .iter()
         .find(|stage| stage["id"] == id || (stage["id"].is_null() && stage["uses"] == id));
-    serde_json::from_value(stage.expect("the stage")["with"].clone()).expect("settings")
+    serde_json::from_value(stage.unwrap()["with"].clone()).unwrap()
 }
 
 pub struct Experiment {
@@ -42,8 +42,7 @@ fn experiment_on(twin: Simulate) -> Experiment {
     let desk = Desk::default();
     let mut robot: ReadRobot = settings("robot", "none");
     robot.file.0 = folder().join(&robot.file.0);
-    let robot: Robot =
-        table(&desk.run(&robot, RobotReads {}).expect("a good robot file")).remove(0);
+    let robot: Robot = table(&desk.run(&robot, RobotReads {}).unwrap()).remove(0);
     let tables = desk
         .run(
             &twin,
@@ -51,7 +50,7 @@ fn experiment_on(twin: Simulate) -> Experiment {
                 robot: robot.clone(),
             },
         )
-        .expect("the twin runs");
+        .unwrap();
     let recording: Recording = table(&tables).remove(0);
     let rows = recording
         .sequence
@@ -61,7 +60,7 @@ fn experiment_on(twin: Simulate) -> Experiment {
     let rows = rows.map(|((sequence, id), set)| SplitRow {
         sequence: *sequence,
         point_id: id.clone(),
-        set: set.clone().expect("every row has a usage"),
+        set: set.clone().unwrap(),
     });
     let split = Split(rows.collect());
     Experiment {
@@ -90,12 +89,12 @@ fn identified(of: &Experiment, id: &str, remainder: &str) -> (Parameters, Predic
         split,
         ..
     } = of;
-    let reads = IdentifyReads {
-        robot: robot.clone(),
-        recording: recording.clone(),
-        split: split.clone(),
-    };
-    let tables = Desk::default().run(&stage, reads).expect("identify runs");
+    let tables = Desk::default()
+        .run(
+            &stage,
+            identify_reads(robot.clone(), recording.clone(), split.clone()),
+        )
+        .unwrap();
     (table(&tables).remove(0), table(&tables).remove(0))
 }
 
@@ -120,7 +119,7 @@ fn papers_sequence(of: &Experiment, remainder: &str) -> (Prediction, Prediction)
     };
     (
         prediction,
-        table(&Desk::default().run(&stage, reads).expect("stiffness runs")).remove(0),
+        table(&Desk::default().run(&stage, reads).unwrap()).remove(0),
     )
 }
 
@@ -218,15 +217,13 @@ fn where_gears_are_exact_and_only_the_arms_weight_bends_it_ratios_are_not_believ
         twin["truth"]["ratio"] = serde_json::json!([1, 1, 1, 1, 1, 1]);
         twin["truth"]["couplings"] = serde_json::json!([]);
         twin["seed"] = seed.into();
-        let of = experiment_on(serde_json::from_value(twin).expect("settings"));
+        let of = experiment_on(serde_json::from_value(twin).unwrap());
         let desk = Desk::default();
-        let reads = IdentifyReads {
-            robot: of.robot,
-            recording: of.recording,
-            split: of.split,
-        };
-        desk.run(&settings::<Identify>("geometry", "none"), reads)
-            .expect("identify runs");
+        desk.run(
+            &settings::<Identify>("geometry", "none"),
+            identify_reads(of.robot, of.recording, of.split),
+        )
+        .unwrap();
         let warned = desk.warnings.lock().unwrap().join("\n");
         assert!(
             warned.contains("the data favour compliance"),

@@ -1,5 +1,6 @@
 //! The store: identity, the commit protocol, and what is done about damage, rivals and refusals.
 
+use crate::answer::{has, put, read};
 use arrow::array::{ArrayRef, Float64Array, Int64Array, StringArray};
 use calib::error::{Error, Result};
 use calib::store::frame::{Frame, FrameBuilder};
@@ -190,7 +191,7 @@ fn a_streamed_table_whose_keys_turn_back_is_refused() {
     let mut writer = store.writer("split").unwrap();
     writer.push(&split(0..10)).unwrap();
     let error = writer.push(&split(9..12)).unwrap_err().to_string();
-    assert!(error.contains("key sequence 9 after sequence 9"), "{error}");
+    has(&error, "key sequence 9 after sequence 9");
 }
 
 #[test]
@@ -300,10 +301,7 @@ fn the_first_record_stands_and_another_content_is_reported() {
     let second = publish(&store, &key("split", 1), &split(0..8)).unwrap();
     assert_eq!(second.record, first.record);
     let conflict = second.conflict.unwrap();
-    assert!(
-        conflict.contains("stage split is not deterministic") && conflict.contains("out"),
-        "{conflict}"
-    );
+    has(&conflict, ["stage split is not deterministic", "out"]);
 }
 
 #[test]
@@ -335,7 +333,7 @@ fn a_torn_record_or_a_damaged_object_is_as_good_as_absent_and_healed_by_publishi
         let Lookup::Damaged(why) = store.action(&key("split", 1)).unwrap() else {
             panic!("damage not seen")
         };
-        assert!(why.contains("the stage runs again"), "{why}");
+        has(&why, "the stage runs again");
         assert_eq!(
             publish(&store, &key("split", 1), &split(0..900))
                 .unwrap()
@@ -381,11 +379,11 @@ fn a_flipped_byte_is_found_on_reading_and_the_object_is_set_aside() {
 #[test]
 fn a_store_of_a_newer_calib_and_a_folder_that_is_no_store_are_left_alone() {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(
-        folder.path().join("format.json"),
+    put(
+        folder.path(),
+        "format.json",
         r#"{"calib_store": 2, "new": true}"#,
-    )
-    .unwrap();
+    );
     let error = Store::open(folder.path()).unwrap_err();
     assert_eq!(error.exit_code(), 2);
     assert!(
@@ -394,7 +392,7 @@ fn a_store_of_a_newer_calib_and_a_folder_that_is_no_store_are_left_alone() {
             .contains("newer calib (format 2, this one knows 1)"),
         "{error}"
     );
-    fs::write(folder.path().join("format.json"), "{").unwrap();
+    put(folder.path(), "format.json", "{");
     assert_eq!(Store::open(folder.path()).unwrap_err().exit_code(), 75);
     fs::rename(
         folder.path().join("format.json"),
@@ -414,7 +412,7 @@ fn a_place_that_cannot_be_written_says_what_to_do() {
     let (_folder, store) = place();
     publish(&store, &key("split", 1), &split(0..9)).unwrap();
     fs::remove_dir_all(store.root().join("actions")).unwrap();
-    fs::write(store.root().join("actions"), "in the way").unwrap();
+    put(store.root(), "actions", "in the way");
     let error = publish(&store, &key("split", 2), &split(0..9)).unwrap_err();
     assert_eq!(error.exit_code(), 75, "{error}");
     assert!(error.to_string().contains("--store DIR"), "{error}");
@@ -518,13 +516,7 @@ fn a_run_leaves_a_manifest_from_its_first_moment_and_events_line_by_line() {
         .finish_run(run, &serde_json::json!({"status": "done"}))
         .unwrap();
     assert_eq!(store.manifest(id).unwrap()["status"], "done");
-    assert_eq!(
-        fs::read_to_string(dir.join("events.jsonl"))
-            .unwrap()
-            .lines()
-            .count(),
-        2
-    );
+    assert_eq!(read(dir.join("events.jsonl")).lines().count(), 2);
     assert_eq!(store.runs().unwrap(), [id]);
     assert!(
         store.begin_run(id, &serde_json::json!({})).is_err(),
@@ -540,8 +532,8 @@ fn what_a_dead_process_left_is_swept_and_what_a_living_one_uses_stays() {
     writer.push(&split(0..9)).unwrap();
     let tmp = store.root().join("tmp");
     fs::create_dir(tmp.join("4000000.0")).unwrap();
-    fs::write(tmp.join("4000000.0/0"), "half a table").unwrap();
-    fs::write(tmp.join("4000000.0.lock"), "").unwrap();
+    put(&tmp, "4000000.0/0", "half a table");
+    put(&tmp, "4000000.0.lock", "");
     publish(
         &Store::open(store.root()).unwrap(),
         &key("split", 2),
@@ -564,8 +556,7 @@ fn a_million_rows_stream_in_bounded_memory() {
     let (_folder, store) = place();
     let mut writer = store.writer("prediction").unwrap();
     let resident = || -> u64 {
-        let pages: u64 = fs::read_to_string("/proc/self/statm")
-            .unwrap()
+        let pages: u64 = read("/proc/self/statm")
             .split(' ')
             .nth(1)
             .unwrap()

@@ -1,14 +1,14 @@
 //! What the stages say of rows that do not belong: tables, notes, and silence on good recordings.
 
-use crate::desk::{Desk, shared, table};
+use crate::answer::{has, read, root};
+use crate::desk::{Desk, identify_reads, shared, table};
 use crate::sr210d::{experiment, settings};
 use calib::stage::ingest::{Ingest, IngestReads};
 use calib::stage::split::{SplitBy, SplitReads};
-use calib::stage::{Identify, IdentifyReads, ReadRobot, RobotReads};
+use calib::stage::{Identify, ReadRobot, RobotReads};
 use calib::table::{Prediction, PredictionRow, Recording, Robot, Split, Suspects};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use std::path::Path;
 
 pub struct Inputs {
     pub robot: Robot,
@@ -22,19 +22,17 @@ pub fn pipeline<T: DeserializeOwned>(
     variables: &[(&str, &str)],
     stage: &str,
 ) -> (Inputs, T) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("pipelines")
-        .join(name);
-    let text = std::fs::read_to_string(folder.join("pipeline.yaml")).expect("the pipeline");
+    let folder = root("pipelines").join(name);
+    let text = read(folder.join("pipeline.yaml"));
     let text = variables.iter().fold(text, |text, (key, value)| {
         text.replace(&format!("${{{key}}}"), value)
     });
-    let whole: Value = serde_saphyr::from_str(&text).expect("YAML");
+    let whole: Value = serde_saphyr::from_str(&text).unwrap();
     let with = |id: &str| {
-        let mut stages = whole["stages"].as_array().expect("stages").iter();
+        let mut stages = whole["stages"].as_array().unwrap().iter();
         let found = stages
             .find(|stage| stage["id"] == id || (stage["id"].is_null() && stage["uses"] == id));
-        let with = found.expect("the stage")["with"].clone();
+        let with = found.unwrap()["with"].clone();
         if with.is_null() {
             serde_json::json!({})
         } else {
@@ -42,11 +40,10 @@ pub fn pipeline<T: DeserializeOwned>(
         }
     };
     let desk = Desk::default();
-    let mut robot: ReadRobot = serde_json::from_value(with("robot")).expect("settings");
+    let mut robot: ReadRobot = serde_json::from_value(with("robot")).unwrap();
     robot.file.0 = folder.join(&robot.file.0);
-    let robot: Robot =
-        table(&desk.run(&robot, RobotReads {}).expect("a good robot file")).remove(0);
-    let ingest: Ingest = serde_json::from_value(with("ingest")).expect("settings");
+    let robot: Robot = table(&desk.run(&robot, RobotReads {}).unwrap()).remove(0);
+    let ingest: Ingest = serde_json::from_value(with("ingest")).unwrap();
     let chunks = table(
         &desk
             .run(
@@ -55,13 +52,13 @@ pub fn pipeline<T: DeserializeOwned>(
                     robot: robot.clone(),
                 },
             )
-            .expect("good files"),
+            .unwrap(),
     );
     let recording: Recording = match <[Recording; 1]>::try_from(chunks) {
         Ok([recording]) => recording,
         Err(chunks) => panic!("{} chunks of a small recording", chunks.len()),
     };
-    let split: SplitBy = serde_json::from_value(with("split")).expect("settings");
+    let split: SplitBy = serde_json::from_value(with("split")).unwrap();
     let split = table(
         &desk
             .run(
@@ -70,7 +67,7 @@ pub fn pipeline<T: DeserializeOwned>(
                     recording: recording.clone(),
                 },
             )
-            .expect("a split"),
+            .unwrap(),
     )
     .remove(0);
     (
@@ -79,7 +76,7 @@ pub fn pipeline<T: DeserializeOwned>(
             recording,
             split,
         },
-        serde_json::from_value(with(stage)).expect("settings"),
+        serde_json::from_value(with(stage)).unwrap(),
     )
 }
 
@@ -90,15 +87,8 @@ fn identify(desk: &Desk, stage: &Identify, inputs: Inputs) -> (Suspects, Predict
         split,
     } = inputs;
     let tables = desk
-        .run(
-            stage,
-            IdentifyReads {
-                robot,
-                recording,
-                split,
-            },
-        )
-        .expect("identify runs");
+        .run(stage, identify_reads(robot, recording, split))
+        .unwrap();
     (table(&tables).remove(0), table(&tables).remove(0))
 }
 
@@ -154,7 +144,7 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
             .iter()
             .filter(|row| row.set == set)
             .nth(k)
-            .expect("a row")
+            .unwrap()
             .sequence as usize
     };
     let rows = [
@@ -169,7 +159,7 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
             .sequence
             .iter()
             .position(|s| *s as usize == sequence)
-            .expect("a row")
+            .unwrap()
     });
     let mut recording = clean.recording.clone();
     recording.position.swap(a, b);
@@ -210,7 +200,7 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
         id(inch),
         id(lost)
     );
-    assert!(said.contains(&sentence), "{said}");
+    has(&said, &sentence);
     let marked = prediction.0.iter().filter(|row| row.suspect).count();
     assert_eq!((prediction.0.len(), marked), (recording.rows(), 4));
     // A row that was looked at to set it aside is no held-out row of the fit's own set.
@@ -237,7 +227,7 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
         (0, 0)
     );
     // Rows that are not set aside count the less the farther off they are, and the note names them.
-    let least = prediction.0[inch].weight.expect("a fitted row");
+    let least = prediction.0[inch].weight.unwrap();
     assert!(
         least < 0.01
             && prediction
@@ -248,9 +238,11 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
         "{least}"
     );
     let said = desk.notes.lock().unwrap().join("\n");
-    assert!(
-        said.contains("far off and down-weighted: ")
-            && said.contains(&format!("({} to 0.0", id(inch))),
-        "{said}"
+    has(
+        &said,
+        [
+            "far off and down-weighted: ",
+            &*format!("({} to 0.0", id(inch)),
+        ],
     );
 }

@@ -1,5 +1,6 @@
 //! Every table kind: one schema, and a round trip through the store for no row, one row and extreme values.
 
+use crate::answer::{has, root};
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, Int64Array, StringArray};
 use calib::store::frame::{Frame, FrameBuilder};
 use calib::store::schema::{self, ColumnType, FieldSchema};
@@ -162,7 +163,7 @@ fn every_table_is_tested_and_has_exactly_one_schema() {
         table::TABLES,
         "SCHEMAS of src/store/schema.rs and TABLES of src/table/mod.rs, by name"
     );
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas");
+    let folder = root("schemas");
     let mut files: Vec<String> = std::fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
@@ -282,14 +283,10 @@ fn duckdb_pandas_pyarrow_and_polars_read_every_table_with_its_units_and_key() {
                 .unwrap();
         }
     }
-    let script =
-        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/read_tables.py");
+    let script = root("tests/reference/read_tables.py");
     let output = run(&[script.as_os_str(), folder.path().as_os_str()]).unwrap();
     let said = String::from_utf8_lossy(&output.stdout).into_owned()
         + &String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
-    assert!(
-        said.contains(&format!("{} tables read alike", 2 * KINDS.len())),
-        "{said}"
-    );
+    has(&said, &format!("{} tables read alike", 2 * KINDS.len()));
 }

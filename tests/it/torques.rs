@@ -10,6 +10,7 @@ mod masses;
 mod results;
 mod rigid;
 
+use crate::answer::{Answer, calib, put, read, root};
 use crate::desk::shared;
 use calib::dynamics::{
     DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow,
@@ -17,7 +18,6 @@ use calib::dynamics::{
 use calib::twin::torque::{TorqueCase, TorqueDesign, TorqueFile};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 /// An effect and where it sits.
 type Named = (String, String);
@@ -37,31 +37,23 @@ fn nothing(seed: u64) -> TorqueDesign {
 }
 
 fn named(entry: &Value) -> Named {
-    let text = |key: &str| entry[key].as_str().expect("a name").to_string();
+    let text = |key: &str| entry[key].as_str().unwrap().to_string();
     (text("effect"), text("where"))
 }
 
 /// `calib diagnose` of a folder, with a store beside it.
-fn diagnose(case: &Path, store: &Path, more: &[&str]) -> Output {
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics/pipeline.yaml");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    command
-        .args(["diagnose", "--quiet", "--set"])
-        .arg(format!("case={}", case.display()))
-        .arg("--store")
-        .arg(store);
-    command.args(more).arg(pipeline).output().expect("calib")
+fn diagnose(case: &Path, store: &Path, more: &str) -> Answer {
+    let pipeline = root("pipelines/dynamics/pipeline.yaml");
+    let (case, store, pipeline) = (case.display(), store.display(), pipeline.display());
+    calib(
+        ".",
+        &format!("diagnose --quiet --set case={case} --store {store} {more} {pipeline}"),
+    )
 }
 
 /// The document of a diagnosis that succeeds.
 fn document(case: &Path, store: &Path) -> Value {
-    let output = diagnose(case, store, &["--json"]);
-    let (out, told) = (
-        String::from_utf8_lossy(&output.stdout),
-        String::from_utf8_lossy(&output.stderr),
-    );
-    assert!(output.status.success(), "{}: {out}{told}", case.display());
-    serde_json::from_str(&out).expect("one JSON document")
+    serde_json::from_str(&diagnose(case, store, "--json").ok()).unwrap()
 }
 
 /// What of a diagnosis is missed, and what is named beside.
@@ -73,7 +65,7 @@ struct Marks {
 fn mark(want: &Value, told: &Value) -> Marks {
     let all: Vec<Named> = told["findings"]
         .as_array()
-        .expect("findings")
+        .unwrap()
         .iter()
         .map(named)
         .collect();
@@ -81,16 +73,16 @@ fn mark(want: &Value, told: &Value) -> Marks {
         missed: Vec::new(),
         beside: all.clone(),
     };
-    for entry in want["effects"].as_array().expect("effects") {
+    for entry in want["effects"].as_array().unwrap() {
         let pair = |pair: &Value| {
             (
-                pair[0].as_str().expect("a name").to_string(),
-                pair[1].as_str().expect("a place").to_string(),
+                pair[0].as_str().unwrap().to_string(),
+                pair[1].as_str().unwrap().to_string(),
             )
         };
         let accepted: Vec<Named> = entry["accept"]
             .as_array()
-            .expect("names")
+            .unwrap()
             .iter()
             .map(pair)
             .collect();
@@ -110,14 +102,14 @@ fn mark(want: &Value, told: &Value) -> Marks {
 }
 
 fn write(folder: &Path, files: &[TorqueFile]) {
-    std::fs::create_dir_all(folder).expect("a folder");
+    std::fs::create_dir_all(folder).unwrap();
     files
         .iter()
-        .for_each(|(name, text)| std::fs::write(folder.join(name), text).expect("a file"));
+        .for_each(|(name, text)| put(folder, name, text));
 }
 
 fn json(path: PathBuf) -> Value {
-    serde_json::from_str(&std::fs::read_to_string(path).expect("a file")).expect("JSON")
+    serde_json::from_str(&read(path)).unwrap()
 }
 
 #[test]
@@ -125,11 +117,11 @@ fn the_practice_recordings_of_torques_are_solved() {
     let Some(folder) = shared("practice_dynamics") else {
         return;
     };
-    let store = tempfile::tempdir().expect("a folder");
+    let store = tempfile::tempdir().unwrap();
     let mut wrong = Vec::new();
     let mut cases: Vec<PathBuf> = std::fs::read_dir(&folder)
-        .expect("the folder")
-        .map(|entry| entry.expect("one").path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
         .collect();
     cases.sort();
     for case in cases.iter().filter(|case| case.join("want.json").is_file()) {
@@ -147,17 +139,16 @@ fn the_practice_recordings_of_torques_are_solved() {
         // A push begins within 0.3 s of when it did.
         for entry in want["effects"]
             .as_array()
-            .expect("effects")
+            .unwrap()
             .iter()
             .filter(|entry| entry["window"].is_array())
         {
-            let began = entry["window"][0].as_f64().expect("s");
-            let findings = told["findings"].as_array().expect("findings");
+            let began = entry["window"][0].as_f64().unwrap();
+            let findings = told["findings"].as_array().unwrap();
             let contact = findings
                 .iter()
                 .filter(|finding| finding["effect"] == "contact");
-            let starts =
-                contact.flat_map(|finding| finding["parameters"].as_array().expect("numbers"));
+            let starts = contact.flat_map(|finding| finding["parameters"].as_array().unwrap());
             let near = starts
                 .filter(|number| number["name"] == "start")
                 .any(|number| {
@@ -173,36 +164,34 @@ fn the_practice_recordings_of_torques_are_solved() {
 
 #[test]
 fn the_example_of_torques_is_solved_and_reported() {
-    let store = tempfile::tempdir().expect("a folder");
+    let store = tempfile::tempdir().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let example = root.join("pipelines/dynamics/example");
     let told = document(&example, store.path());
     let found: Vec<Named> = told["findings"]
         .as_array()
-        .expect("findings")
+        .unwrap()
         .iter()
         .map(named)
         .collect();
     let hidden = json(example.join("truth.json"));
     let mut wanted: Vec<Named> = hidden["effects"]
         .as_array()
-        .expect("effects")
+        .unwrap()
         .iter()
         .map(named)
         .collect();
     wanted.retain(|one| !found.contains(one));
     assert_eq!(wanted, Vec::<Named>::new(), "hidden and not found");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    let run = command
-        .args(["run", "--quiet", "--store"])
-        .arg(store.path())
-        .arg(root.join("pipelines/dynamics/pipeline.yaml"));
-    let run = run.output().expect("calib");
-    assert!(
-        run.status.success(),
-        "{}",
-        String::from_utf8_lossy(&run.stderr)
+    let (store, pipeline) = (
+        store.path().display(),
+        root.join("pipelines/dynamics/pipeline.yaml"),
     );
+    calib(
+        ".",
+        &format!("run --quiet --store {store} {}", pipeline.display()),
+    )
+    .ok();
 }
 
 /// Two mathematics that share nothing: sums over the bodies beyond each joint, and the estimator's recursion.
@@ -265,16 +254,16 @@ fn declared(case: &TorqueCase) -> (DynamicArm, Vec<f64>) {
     for (link, (joint, moments)) in robot.joints.iter().zip(&robot.inertias.links).enumerate() {
         add(
             link,
-            joint.mass.expect("a mass"),
-            joint.centre.expect("a centre"),
-            moments.expect("an inertia"),
+            joint.mass.unwrap(),
+            joint.centre.unwrap(),
+            moments.unwrap(),
         );
     }
     add(
         last,
         robot.payload_mass,
         robot.payload_centre,
-        robot.inertias.payload.expect("an inertia"),
+        robot.inertias.payload.unwrap(),
     );
     let arm = DynamicArm {
         axes: robot.joints.iter().map(|joint| joint.axis.into()).collect(),

@@ -1,39 +1,37 @@
 //! The audit trail: runs listed, explained, compared, traced; a store verified bit by bit, and swept.
 
+use crate::answer::Words;
+use crate::answer::{self, Answer, ends_with, has, put, root, starts_with};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 fn pipeline() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml")
+    root("tests/it/resume/pipeline.yaml")
 }
-fn calib(store: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .arg("--store")
-        .arg(store)
-        .output()
-        .unwrap()
+fn calib(store: &Path, words: &str) -> Answer {
+    stored(store, words.words())
 }
-fn run(store: &Path, arguments: &[&str]) {
-    let pipeline = pipeline();
-    let output = calib(
+fn stored(store: &Path, mut words: Vec<OsString>) -> Answer {
+    words.extend(["--store".into(), store.into()]);
+    answer::calib(".", &words)
+}
+fn run(store: &Path, more: &str) {
+    calib(
         store,
-        &[&["run", pipeline.to_str().unwrap(), "--quiet"], arguments].concat(),
-    );
-    assert!(output.status.success(), "{}", text(&output));
+        &format!("run {} --quiet {more}", pipeline().display()),
+    )
+    .ok();
 }
-fn text(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+fn text(answer: &Answer) -> String {
+    answer.both()
 }
-fn said(store: &Path, arguments: &[&str]) -> String {
-    let output = calib(store, arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", text(&output));
-    text(&output)
+fn said(store: &Path, words: &str) -> String {
+    calib(store, words).code(0).both()
 }
-fn json(store: &Path, arguments: &[&str]) -> Value {
-    serde_json::from_slice(&calib(store, &[arguments, &["--json"]].concat()).stdout).unwrap()
+fn json(store: &Path, words: &str) -> Value {
+    calib(store, &format!("{words} --json")).json()
 }
 /// All files of a store but its locks.
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -66,56 +64,40 @@ fn overwrite(path: &Path, bytes: &[u8]) {
 fn a_changed_setting_is_told_with_its_stage_and_by_how_much() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();
-    run(store, &[]);
+    run(store, "");
     run(
         store,
-        &[
-            "--set",
-            "geometry.effects=[base_frame, tool_offset, joint_offset]",
-        ],
+        "--set 'geometry.effects=[base_frame, tool_offset, joint_offset]'",
     );
-    let output = calib(store, &["diff", "HEAD~1", "HEAD"]);
+    let output = calib(store, "diff HEAD~1 HEAD");
     let told = text(&output);
-    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert_eq!(output.code, Some(1), "{told}");
     assert!(told.lines().count() < 20, "{told}");
-    assert!(told.contains("settings geometry.effects: "), "{told}");
-    assert!(
-        told.contains("geometry.parameters") && told.contains("geometry.prediction"),
-        "{told}"
-    );
-    assert!(
-        told.contains("error_mm by ")
-            && told.contains(" mm rms, at most ")
-            && told.contains(" mm (")
-            && told.contains(" sigma)"),
-        "{told}"
+    has(&told, "settings geometry.effects: ");
+    has(&told, ["geometry.parameters", "geometry.prediction"]);
+    has(
+        &told,
+        ["error_mm by ", " mm rms, at most ", " mm (", " sigma)"],
     );
     assert!(
         !told.contains("nominal."),
         "what is the same is not told: {told}"
     );
-    let explained = said(store, &["explain", "geometry"]);
-    assert!(
-        explained.contains("executed, because: settings changed: geometry.effects"),
-        "{explained}"
+    let explained = said(store, "explain geometry");
+    has(
+        &explained,
+        "executed, because: settings changed: geometry.effects",
     );
-    let explained = said(store, &["explain", "validate"]);
+    let explained = said(store, "explain validate");
     assert!(
         explained.contains("input prediction (geometry): ") && !explained.contains("(nominal)"),
         "{explained}"
     );
-    assert!(said(store, &["explain", "nominal"]).contains("nothing that it depends on changed"));
-    assert_eq!(
-        calib(store, &["diff", "HEAD", "HEAD"]).status.code(),
-        Some(0)
-    );
+    assert!(said(store, "explain nominal").contains("nothing that it depends on changed"));
+    assert_eq!(calib(store, "diff HEAD HEAD").code, Some(0));
     let table = json(
         store,
-        &[
-            "diff",
-            "HEAD~1/geometry/prediction",
-            "HEAD/geometry/prediction",
-        ],
+        "diff HEAD~1/geometry/prediction HEAD/geometry/prediction",
     );
     assert_eq!(
         (&table["rows"]["changed"], &table["key"][0]),
@@ -127,43 +109,26 @@ fn a_changed_setting_is_told_with_its_stage_and_by_how_much() {
 fn of_two_runs_tolerances_hold_in_every_table_that_has_the_column() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();
-    run(store, &[]);
-    run(store, &["--set", "seed=12"]);
-    let with = |more: &[&str]| {
-        calib(
-            store,
-            &[&["diff", "HEAD~1/validate", "HEAD/validate"], more].concat(),
-        )
-    };
-    assert_eq!(with(&[]).status.code(), Some(1));
-    let within = with(&["--atol", "1e6"]);
-    assert_eq!(within.status.code(), Some(0), "{}", text(&within));
-    assert!(
-        text(&within).contains("within tolerance"),
-        "{}",
-        text(&within)
-    );
+    run(store, "");
+    run(store, "--set seed=12");
+    let with = |more: &str| calib(store, &format!("diff HEAD~1/validate HEAD/validate {more}"));
+    assert_eq!(with("").code, Some(1));
+    let within = with("--atol 1e6").code(0);
+    has(&text(&within), "within tolerance");
     assert_eq!(
-        with(&["--atol", "mean_mm=1m", "--rtol", "1e-9"])
-            .status
-            .code(),
+        with("--atol mean_mm=1m --rtol 1e-9").code,
         Some(1),
         "the other columns differ"
     );
     // Of the run's tables few have the column.
     assert_eq!(
-        calib(store, &["diff", "HEAD~1", "HEAD", "--ignore", "mean_mm"])
-            .status
-            .code(),
+        calib(store, "diff HEAD~1 HEAD --ignore mean_mm").code,
         Some(1)
     );
     let refused = |flag: &str, value: &str, why: &str| {
-        let output = calib(store, &["diff", "HEAD~1", "HEAD", flag, value]);
+        let output = calib(store, &format!("diff HEAD~1 HEAD {flag} {value}"));
         let said = text(&output);
-        assert!(
-            output.status.code() == Some(2) && said.contains(why),
-            "{said}"
-        );
+        assert!(output.code == Some(2) && said.contains(why), "{said}");
     };
     refused(
         "--ignore",
@@ -192,27 +157,24 @@ fn a_limit_that_is_exceeded_is_said_and_ends_with_code_1() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();
     let file = pipeline();
-    let with = |limits: &str, more: &[&str]| {
-        let set = format!("report.limits={limits}");
+    let with = |limits: &str, more: &str| {
+        let set = format!("--set 'report.limits={limits}'");
         calib(
             store,
-            &[
-                &["run", file.to_str().unwrap(), "--quiet", "--set", &set],
-                more,
-            ]
-            .concat(),
+            &format!("run {} --quiet {set} {more}", file.display()),
         )
     };
     for _ in 0..2 {
-        let beyond = with("{mean_mm: 0.000001, max_mm: 500}", &[]);
+        let beyond = with("{mean_mm: 0.000001, max_mm: 500}", "");
         let said = text(&beyond);
-        assert_eq!(beyond.status.code(), Some(1), "{said}");
+        assert_eq!(beyond.code, Some(1), "{said}");
         let line = said
             .lines()
             .find(|line| line.starts_with("limits    "))
             .unwrap_or_else(|| panic!("{said}"));
-        assert!(
-            line.starts_with("limits    not accepted: beyond the limits at 20 held-out points of set validate, step geometry")
+        starts_with(
+            line,
+            "limits    not accepted: beyond the limits at 20 held-out points of set validate, step geometry",
         );
         assert!(
             line.contains("mean 0.")
@@ -221,26 +183,26 @@ fn a_limit_that_is_exceeded_is_said_and_ends_with_code_1() {
             "{line}"
         );
     }
-    let document = with("{mean_mm: 0.000001}", &["--json"]);
-    let read: Value = serde_json::from_slice(&document.stdout).unwrap();
+    let document = with("{mean_mm: 0.000001}", "--json");
+    let read: Value = document.json();
     assert_eq!(
-        (document.status.code(), &read["status"], &read["accepted"]),
+        (document.code, &read["status"], &read["accepted"]),
         (Some(1), &"done".into(), &false.into())
     );
     assert_eq!(
         (&read["limits"][0]["stage"], &read["limits"][0]["kept"]),
         (&"report".into(), &false.into())
     );
-    let kept = with("{mean_mm: 500}", &[]);
+    let kept = with("{mean_mm: 500}", "");
     let said = text(&kept);
     assert!(
-        kept.status.success()
+        kept.code == Some(0)
             && said.contains("limits    accepted: within the limits at 20 held-out points"),
         "{said}"
     );
-    let none = calib(store, &["run", file.to_str().unwrap(), "--quiet"]);
+    let none = calib(store, &format!("run {} --quiet", file.display()));
     assert!(
-        none.status.success() && text(&none).lines().all(|line| !line.starts_with("limits")),
+        none.code == Some(0) && text(&none).lines().all(|line| !line.starts_with("limits")),
         "{}",
         text(&none)
     );
@@ -250,10 +212,10 @@ fn a_limit_that_is_exceeded_is_said_and_ends_with_code_1() {
 fn runs_are_listed_shown_tagged_and_their_tables_traced() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();
-    run(store, &["--set", "seed=12"]);
-    run(store, &[]);
-    assert!(said(store, &["tag", "HEAD~1", "first"]).starts_with("first is run "));
-    let log = said(store, &["log"]);
+    run(store, "--set seed=12");
+    run(store, "");
+    assert!(said(store, "tag HEAD~1 first").starts_with("first is run "));
+    let log = said(store, "log");
     assert_eq!(log.lines().count(), 2, "{log}");
     assert!(
         log.lines()
@@ -263,51 +225,45 @@ fn runs_are_listed_shown_tagged_and_their_tables_traced() {
             && log.contains("[first]"),
         "{log}"
     );
-    let shown = said(store, &["show", "first"]);
-    assert!(
-        shown.contains("set on the command line: seed = 12")
-            && shown.contains("because: never run"),
-        "{shown}"
+    let shown = said(store, "show first");
+    has(
+        &shown,
+        ["set on the command line: seed = 12", "because: never run"],
     );
     assert!(
-        said(store, &["show", "first/geometry"])
+        said(store, "show first/geometry")
             .contains("reads   recording <- simulate.recording, 80 rows")
     );
     assert_eq!(
-        said(store, &["show", "HEAD", "--yaml"]),
+        said(store, "show HEAD --yaml"),
         std::fs::read_to_string(pipeline()).unwrap()
     );
-    let manifest = json(store, &["show", "HEAD"]);
+    let manifest = json(store, "show HEAD");
     assert_eq!(
         manifest["previous"]["run"],
-        json(store, &["show", "first"])["run_id"]
+        json(store, "show first")["run_id"]
     );
-    let traced = said(store, &["lineage", "HEAD/validate/statistics"]);
-    assert!(
-        traced.contains("recording <- simulate.recording") && traced.contains("file robot.yaml"),
-        "{traced}"
+    let traced = said(store, "lineage HEAD/validate/statistics");
+    has(
+        &traced,
+        ["recording <- simulate.recording", "file robot.yaml"],
     );
     let table = store.join("tables/resume/validate.statistics.parquet");
-    assert_eq!(said(store, &["lineage", table.to_str().unwrap()]), traced);
-    let refused = calib(store, &["show", "fisrt"]);
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(
-        text(&refused).contains("did you mean the tag `first`?"),
-        "{}",
-        text(&refused)
-    );
-    assert_eq!(said(store, &["tag", "--delete", "first"]), "");
-    assert_eq!(said(store, &["tag"]), "");
+    assert_eq!(said(store, &format!("lineage {}", table.display())), traced);
+    let refused = calib(store, "show fisrt").code(2);
+    has(&text(&refused), "did you mean the tag `first`?");
+    assert_eq!(said(store, "tag --delete first"), "");
+    assert_eq!(said(store, "tag"), "");
 }
 
 #[test]
 fn a_tag_has_not_the_form_of_an_id_and_says_which_run_it_left() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();
-    run(store, &["--set", "seed=12"]);
-    run(store, &[]);
+    run(store, "--set seed=12");
+    run(store, "");
     let [old, new] = ["HEAD~1", "HEAD"].map(|name| {
-        json(store, &["show", name])["run_id"]
+        json(store, &format!("show {name}"))["run_id"]
             .as_str()
             .unwrap()
             .to_string()
@@ -317,25 +273,23 @@ fn a_tag_has_not_the_form_of_an_id_and_says_which_run_it_left() {
         old.to_lowercase(),
         ulid::Ulid::from_parts(1 << 45, 7).to_string(),
     ] {
-        let refused = calib(store, &["tag", "HEAD", &name]);
-        assert_eq!(refused.status.code(), Some(2), "{}", text(&refused));
-        assert!(
-            text(&refused).contains(&format!("tag {name}: has the form of a run's id")),
-            "{}",
-            text(&refused)
+        let refused = calib(store, &format!("tag HEAD {name}")).code(2);
+        has(
+            &text(&refused),
+            &format!("tag {name}: has the form of a run's id"),
         );
     }
-    assert_eq!(json(store, &["show", &old])["run_id"], old.as_str());
+    assert_eq!(json(store, &format!("show {old}"))["run_id"], old.as_str());
     assert_eq!(
-        said(store, &["tag", "HEAD~1", "first"]),
+        said(store, "tag HEAD~1 first"),
         format!("first is run {old}\n")
     );
     assert_eq!(
-        said(store, &["tag", "HEAD", "first"]),
+        said(store, "tag HEAD first"),
         format!("first is run {new}, was run {old}\n")
     );
     assert_eq!(
-        said(store, &["tag", "HEAD", "first"]),
+        said(store, "tag HEAD first"),
         format!("first is run {new}\n")
     );
 }
@@ -348,22 +302,19 @@ fn folders_whose_names_are_no_text_are_used_all_the_same() {
     let named = |bytes: &[u8]| folder.path().join(std::ffi::OsStr::from_bytes(bytes));
     let (cell, store) = (named(b"cell\xff\xfe"), named(b"store\xff"));
     std::fs::create_dir(&cell).unwrap();
-    let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
+    let robot = root("pipelines/sr210d/robot.yaml");
     std::fs::copy(robot, cell.join("robot.yaml")).unwrap();
     let yaml = std::fs::read_to_string(pipeline())
         .unwrap()
         .replace("../../../pipelines/sr210d/robot.yaml", "robot.yaml");
-    std::fs::write(cell.join("p.yaml"), yaml).unwrap();
-    let mut run = Command::new(env!("CARGO_BIN_EXE_calib"));
-    let output = run
-        .arg("run")
-        .arg(cell.join("p.yaml"))
-        .args(["-q", "--json", "--store"])
-        .arg(&store)
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}", text(&output));
-    let document: Value = serde_json::from_slice(&output.stdout).unwrap();
+    put(&cell, "p.yaml", yaml);
+    let run = [
+        "run".into(),
+        cell.join("p.yaml").into_os_string(),
+        "-q".into(),
+        "--json".into(),
+    ];
+    let document = stored(&store, run.into()).code(0).json();
     assert!(
         document["report"]
             .as_str()
@@ -371,24 +322,22 @@ fn folders_whose_names_are_no_text_are_used_all_the_same() {
             .contains("/store\u{fffd}/documents/"),
         "{document}"
     );
-    let manifest = json(&store, &["show", "HEAD"]);
+    let manifest = json(&store, "show HEAD");
     let path = manifest["stages"][0]["files"][0]["path"].as_str().unwrap();
-    assert!(path.ends_with("/cell\u{fffd}\u{fffd}/robot.yaml"), "{path}");
-    assert!(said(&store, &["log"]).contains("resume  done, 7 run, 0 cached"));
+    ends_with(path, "/cell\u{fffd}\u{fffd}/robot.yaml");
+    assert!(said(&store, "log").contains("resume  done, 7 run, 0 cached"));
 }
 
 #[test]
 fn one_flipped_bit_in_any_file_is_found() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();
-    run(store, &[]);
-    run(store, &["--set", "split.by=every", "--set", "split.n=4"]);
-    said(store, &["tag", "HEAD", "kept"]);
-    let clean = said(store, &["verify"]);
-    assert!(
-        clean.contains("2 runs, 1 tag,") && clean.ends_with("all as they were written\n"),
-        "{clean}"
-    );
+    run(store, "");
+    run(store, "--set split.by=every --set split.n=4");
+    said(store, "tag HEAD kept");
+    let clean = said(store, "verify");
+    ends_with(&clean, "all as they were written\n");
+    has(&clean, "2 runs, 1 tag,");
     let mut random = ChaCha8Rng::seed_from_u64(6);
     let files: Vec<PathBuf> = files(store)
         .into_iter()
@@ -401,17 +350,10 @@ fn one_flipped_bit_in_any_file_is_found() {
         let bit = random.random_range(0..whole.len() * 8);
         flipped[bit / 8] ^= 1 << (bit % 8);
         overwrite(&path, &flipped);
-        let output = calib(store, &["verify"]);
-        assert_eq!(
-            output.status.code(),
-            Some(1),
-            "bit {bit} of {}: {}",
-            path.display(),
-            text(&output)
-        );
+        calib(store, "verify").code(1);
         overwrite(&path, &whole);
     }
-    assert_eq!(said(store, &["verify"]), clean);
+    assert_eq!(said(store, "verify"), clean);
     // A manifest that was written anew, seal and all, is not the one that the next run saw.
     let runs: Vec<PathBuf> = self::files(&store.join("runs"))
         .into_iter()
@@ -428,13 +370,8 @@ fn one_flipped_bit_in_any_file_is_found() {
         blake3::hash(body.as_bytes()).to_hex()
     );
     overwrite(&runs[0], forged.as_bytes());
-    let output = calib(store, &["verify"]);
-    assert_eq!(output.status.code(), Some(1));
-    assert!(
-        text(&output).contains("has changed since this run began"),
-        "{}",
-        text(&output)
-    );
+    let output = calib(store, "verify").code(1);
+    has(&text(&output), "has changed since this run began");
 }
 
 #[test]
@@ -442,18 +379,18 @@ fn a_sweep_leaves_what_tags_and_the_last_runs_need() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();
     for seed in ["1", "2", "3"] {
-        run(store, &["--set", &format!("seed={seed}")]);
+        run(store, &format!("--set seed={seed}"));
     }
-    said(store, &["tag", "HEAD~2", "released"]);
-    let sweep = ["gc", "--keep-runs", "1", "--grace-hours", "0"];
+    said(store, "tag HEAD~2 released");
+    let sweep = "gc --keep-runs 1 --grace-hours 0";
     assert_eq!(
-        json(store, &["gc", "--keep-runs", "1"])["actions"],
+        json(store, "gc --keep-runs 1")["actions"],
         0,
         "what is young stays"
     );
-    let would = json(store, &[&sweep[..], &["--dry-run"]].concat());
+    let would = json(store, &format!("{sweep} --dry-run"));
     let before = files(&store.join("objects")).len();
-    let swept = json(store, &sweep);
+    let swept = json(store, sweep);
     assert_eq!(would, swept);
     assert_eq!(
         files(&store.join("objects")).len() as u64,
@@ -464,13 +401,7 @@ fn a_sweep_leaves_what_tags_and_the_last_runs_need() {
         let pipeline = pipeline();
         let result = json(
             store,
-            &[
-                "run",
-                pipeline.to_str().unwrap(),
-                "--quiet",
-                "--set",
-                &format!("seed={seed}"),
-            ],
+            &format!("run {} --quiet --set seed={seed}", pipeline.display()),
         );
         result["stages"]
             .as_array()
@@ -479,7 +410,7 @@ fn a_sweep_leaves_what_tags_and_the_last_runs_need() {
             .filter(|stage| stage["status"] == "executed")
             .count()
     };
-    said(store, &["verify"]);
+    said(store, "verify");
     assert_eq!((executed("1"), executed("3"), executed("2")), (0, 0, 7));
 }
 
@@ -487,7 +418,7 @@ fn a_sweep_leaves_what_tags_and_the_last_runs_need() {
 fn the_last_run_is_the_last_also_where_the_clock_went_backwards() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();
-    run(store, &[]);
+    run(store, "");
     // A run of the far future, as a clock that was wrong leaves it.
     let runs = store.join("runs");
     let real = std::fs::read_dir(&runs)
@@ -498,8 +429,8 @@ fn the_last_run_is_the_last_also_where_the_clock_went_backwards() {
         .path();
     let future = ulid::Ulid::from_parts(1 << 45, 7).to_string();
     std::fs::rename(real, runs.join(&future)).unwrap();
-    run(store, &["--set", "seed=5"]);
-    let manifest = json(store, &["show", "HEAD"]);
+    run(store, "--set seed=5");
+    let manifest = json(store, "show HEAD");
     assert_eq!(
         (
             &manifest["seed"],

@@ -1,6 +1,7 @@
 //! A correction carried to another series of the same robot, only the base refitted: never worse than none.
 
-use crate::desk::{Desk, shared, table};
+use crate::answer::{calib, has, put};
+use crate::desk::{Desk, diagnose_reads, identify_reads, shared, table};
 use calib::effect::Load;
 use calib::error::Result;
 use calib::estimate::Model;
@@ -9,8 +10,8 @@ use calib::spatial::Pose;
 use calib::stage::ingest::{Ingest, IngestReads};
 use calib::stage::split::{SplitBy, SplitReads};
 use calib::stage::{
-    Context, Diagnose, DiagnoseReads, Identify, IdentifyReads, Labelled, Learn, LearnReads,
-    LearnWrites, ReadRobot, RobotReads, Simulate, SimulateReads, Stage, Transfer, TransferReads,
+    Context, Diagnose, Identify, Labelled, Learn, LearnReads, LearnWrites, ReadRobot, RobotReads,
+    Simulate, SimulateReads, Stage, Transfer, TransferReads,
 };
 use calib::store::frame::Frame;
 use calib::table::{Parameters, Prediction, Recording, Robot, Split};
@@ -50,7 +51,7 @@ fn series(file: &str, every: usize) -> Result<Series> {
         .find(|stage| stage["uses"] == "ingest")
         .unwrap();
     let mut with = stage["with"].clone();
-    with["files"][0]["file"] = json!(root.join("../shared/data/ipa_ur10").join(file));
+    with["files"][0]["file"] = json!(shared("data/ipa_ur10").unwrap().join(file));
     let whole: Recording = table(&desk.run(
         &settings::<Ingest>(with),
         IngestReads {
@@ -86,12 +87,10 @@ fn series(file: &str, every: usize) -> Result<Series> {
     let geometry = settings::<Identify>(json!({
         "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry"], "folds": 0,
     }));
-    let reads = IdentifyReads {
-        robot: robot.clone(),
-        recording: recording.clone(),
-        split: split.clone(),
-    };
-    let tables = desk.run(&geometry, reads)?;
+    let tables = desk.run(
+        &geometry,
+        identify_reads(robot.clone(), recording.clone(), split.clone()),
+    )?;
     let parameters: Parameters = table(&tables).remove(0);
     let prediction: Prediction = table(&tables).remove(0);
     let learn = settings::<Learn>(
@@ -176,7 +175,7 @@ fn carried(from: &Series, to: &Series) -> [[f64; 2]; 2] {
         .network
         .correction(&from.recording.prismatic)
         .unwrap()
-        .expect("something was learnt");
+        .unwrap();
     let corrected: Vec<Vector3<f64>> = plain
         .iter()
         .enumerate()
@@ -212,12 +211,15 @@ fn transferred(parameters: &Parameters, to: &Series) -> Result<[f64; 2]> {
 
 /// The model with the causes that were found in a series.
 fn diagnosed(series: &Series) -> Result<Parameters> {
-    let reads = DiagnoseReads {
-        robot: series.robot.clone(),
-        recording: series.recording.clone(),
-        split: series.split.clone(),
-    };
-    Ok(table(&Desk::default().run(&settings::<Diagnose>(json!({})), reads)?).remove(0))
+    Ok(table(&Desk::default().run(
+        &settings::<Diagnose>(json!({})),
+        diagnose_reads(
+            series.robot.clone(),
+            series.recording.clone(),
+            series.split.clone(),
+        ),
+    )?)
+    .remove(0))
 }
 
 #[test]
@@ -321,12 +323,9 @@ fn a_model_holds_on_a_later_recording_from_where_the_tracker_stands_then() {
         "coupling_ratio",
     ];
     let identify = settings::<Identify>(json!({"effects": effects, "folds": 0}));
-    let reads = IdentifyReads {
-        robot: robot.clone(),
-        recording,
-        split,
-    };
-    let tables = desk.run(&identify, reads).unwrap();
+    let tables = desk
+        .run(&identify, identify_reads(robot.clone(), recording, split))
+        .unwrap();
     let parameters: Parameters = table(&tables).remove(0);
     let unseen = |tables: &BTreeMap<&'static str, Vec<Frame>>| {
         let prediction: Prediction = table(tables).remove(0);
@@ -391,12 +390,15 @@ fn a_carried_model_says_that_its_geometry_alone_is_better() {
     let robot: Robot = table(&desk.run(&read, RobotReads {}).unwrap()).remove(0);
     let (recording, split) = measured(&robot, 3);
     let identify = settings::<Identify>(json!({"folds": 0}));
-    let reads = IdentifyReads {
-        robot: robot.clone(),
-        recording: recording.clone(),
-        split: split.clone(),
-    };
-    let mut parameters: Parameters = table(&desk.run(&identify, reads).unwrap()).remove(0);
+    let mut parameters: Parameters = table(
+        &desk
+            .run(
+                &identify,
+                identify_reads(robot.clone(), recording.clone(), split.clone()),
+            )
+            .unwrap(),
+    )
+    .remove(0);
     // Where the first joint stood on its negative side, as if nothing else had been measured.
     let there: Vec<usize> = (0..recording.rows())
         .filter(|row| recording.q(*row)[0] < 0.0)
@@ -457,7 +459,7 @@ fn a_carried_model_says_that_its_geometry_alone_is_better() {
         .filter(|row| row.effect == "joint_compliance");
     compliance.for_each(|row| row.value = 3e-6);
     let (_, warnings) = carry(&parameters);
-    assert!(warnings.contains(worse), "{warnings}");
+    has(&warnings, worse);
 }
 
 fn labelled<T>(stage: &str, table: T) -> Labelled<T> {
@@ -500,12 +502,12 @@ impl Carrying {
         ];
         let model = |effects: &[&str]| {
             let identify = settings::<Identify>(json!({"effects": effects, "folds": 0}));
-            let reads = IdentifyReads {
-                robot: robot.clone(),
-                recording: here.clone(),
-                split: split.clone(),
-            };
-            let tables = Desk::default().run(&identify, reads).unwrap();
+            let tables = Desk::default()
+                .run(
+                    &identify,
+                    identify_reads(robot.clone(), here.clone(), split.clone()),
+                )
+                .unwrap();
             (table(&tables).remove(0), table(&tables).remove(0))
         };
         let geometry = model(&effects);
@@ -569,11 +571,7 @@ fn findings_that_make_another_recording_worse_than_geometry_alone_are_not_used_t
     let carrying = Carrying::new();
     let held = carrying.carry(&carrying.found.0, true);
     assert!(!held.warnings.contains("not used"), "{}", held.warnings);
-    assert!(
-        held.notes.contains("the geometry alone") && held.notes.contains("visited cells"),
-        "{}",
-        held.notes
-    );
+    has(&held.notes, ["the geometry alone", "visited cells"]);
     assert_eq!(of_joints(&held.parameters), of_joints(&carrying.found.0));
     // Too much wind-up: still better than the geometry without it, which left room for it, and worse than geometry found by itself.
     let mut wrong = carrying.found.0.clone();
@@ -623,9 +621,9 @@ fn findings_that_make_another_recording_worse_than_geometry_alone_are_not_used_t
 
 #[test]
 fn the_closing_lines_state_the_carried_figure() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d");
-    std::fs::copy(root.join("robot.yaml"), folder.path().join("robot.yaml")).expect("the robot");
+    std::fs::copy(root.join("robot.yaml"), folder.path().join("robot.yaml")).unwrap();
     let simulate = |id: &str, seed: u64| {
         format!(
             "  - id: {id}\n    uses: simulate\n    with:\n      truth: {{offset_deg: [0.1, 0.2, -0.1, 0.1, 0.1, 0]}}\n      \
@@ -648,18 +646,8 @@ fn the_closing_lines_state_the_carried_figure() {
         simulate("there", 2),
         split("placed", "there")
     );
-    std::fs::write(folder.path().join("p.yaml"), pipeline).expect("written");
-    let run = std::process::Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(["run", "p.yaml", "--quiet"])
-        .current_dir(folder.path())
-        .output()
-        .expect("calib");
-    let told = String::from_utf8_lossy(&run.stdout);
-    assert!(
-        run.status.success(),
-        "{told}{}",
-        String::from_utf8_lossy(&run.stderr)
-    );
+    put(folder.path(), "p.yaml", pipeline);
+    let told = calib(folder.path(), "run p.yaml --quiet").ok();
     let carried = told
         .lines()
         .find(|line| line.starts_with("carried"))

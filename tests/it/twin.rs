@@ -1,8 +1,9 @@
 //! The twin: its own kinematics and statics against numbers worked out by hand, its noise, its seeds, and the stage.
 
+use crate::answer::{read, root};
+use crate::fixture::robot_of;
 use calib::description::{JointDescription, JointKind, RobotDescription};
 use calib::error::Result;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::stage::{
     Context, OpenedInput, RawFile, Remainder, Services, Simulate, SimulateReads, SimulateWrites,
     Sink, Stage,
@@ -18,22 +19,13 @@ use calib::twin::statics::Row;
 use calib::twin::tracker::{Beam, Scatter, Tracker};
 use calib::twin::truth::{CouplingError, LinkError, TrueRobot};
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::path::Path;
 
 const ARCSEC: f64 = PI / 648_000.0;
 
 pub fn sr210d() -> RobotDescription {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
-    let text = std::fs::read_to_string(&path).expect("the pipeline's robot file");
-    read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: &text,
-        },
-        None,
-    )
-    .expect("a good robot file")
-    .robot
+    let path = root("pipelines/sr210d/robot.yaml");
+    let text = read(&path);
+    robot_of(&text)
 }
 
 /// One joint with axis -y at the origin and 2 m of massless arm along x, 100 kg at its end: a weight turns it by -m g r cos q.
@@ -380,7 +372,7 @@ motors: {sign: [1, -1, 1, 1, 1, 1]}
 poses: {range_deg: [[-90, 90], [-40, 60], [-55, 55], [-120, 120], [-75, 75], [-160, 160]], floor_mm: 300, clearance_mm: 1000}
 blocks: [{usage: fit, points: 12}, {usage: check, points: 8, payload_kg: 210}]
 ";
-    serde_saphyr::from_str(text).expect("good settings")
+    serde_saphyr::from_str(text).unwrap()
 }
 
 #[test]
@@ -399,11 +391,7 @@ fn a_seed_gives_one_recording_and_another_seed_another() {
         simulate(&settings(), 5),
         simulate(&settings(), 6),
     );
-    let (first, again, other) = (
-        first.expect("runs"),
-        again.expect("runs"),
-        other.expect("runs"),
-    );
+    let (first, again, other) = (first.unwrap(), again.unwrap(), other.unwrap());
     assert_eq!(first.recording, again.recording);
     assert_eq!(first.truth, again.truth);
     assert_ne!(first.recording.q, other.recording.q);
@@ -424,11 +412,7 @@ fn without_its_remainder_a_twin_is_its_parameters() {
         simulate(&without, 5),
         simulate(&bare, 5),
     );
-    let (all, without, bare) = (
-        all.expect("runs"),
-        without.expect("runs"),
-        bare.expect("runs"),
-    );
+    let (all, without, bare) = (all.unwrap(), without.unwrap(), bare.unwrap());
     assert_eq!(without.recording, bare.recording);
     assert_eq!(
         all.recording.q, without.recording.q,
@@ -457,14 +441,14 @@ fn without_its_remainder_a_twin_is_its_parameters() {
         .0
         .iter()
         .find(|row| row.name == "reduction_ratio.j2")
-        .expect("a true ratio");
+        .unwrap();
     assert!((ratio.value - 0.0013).abs() < 1e-12);
 }
 
 #[test]
 fn a_plan_keeps_to_limits_floor_and_blocks() {
     let settings = settings();
-    let recording = simulate(&settings, 5).expect("runs").recording;
+    let recording = simulate(&settings, 5).unwrap().recording;
     assert_eq!(recording.rows(), 20);
     let robot = sr210d();
     for index in 0..recording.rows() {
@@ -478,11 +462,11 @@ fn a_plan_keeps_to_limits_floor_and_blocks() {
             "{tool:?}"
         );
     }
-    let payload = recording.payload.expect("a payload");
+    let payload = recording.payload.unwrap();
     assert_eq!((payload[11], payload[12]), (0.0, 210.0));
     assert_eq!(recording.usage[12].as_deref(), Some("check"));
     assert_eq!(recording.point_id[12], "check-0001");
-    let time = recording.time.expect("a clock");
+    let time = recording.time.unwrap();
     assert!(time.windows(2).all(|pair| pair[1] > pair[0]));
 }
 
@@ -493,8 +477,8 @@ fn currents_carry_the_load_in_the_controllers_sign() {
         remainder: Remainder::None,
         ..settings()
     };
-    let recording = simulate(&settings, 5).expect("runs").recording;
-    let current = recording.current.clone().expect("currents");
+    let recording = simulate(&settings, 5).unwrap().recording;
+    let current = recording.current.clone().unwrap();
     let robot = sr210d();
     let arm = Arm::new(&robot, &settings.truth);
     let spring = |joint: usize, factor: f64| {
@@ -506,7 +490,7 @@ fn currents_carry_the_load_in_the_controllers_sign() {
     };
     for index in 0..recording.rows() {
         let q = recording.q(index);
-        let payload = recording.payload.as_ref().expect("a payload")[index];
+        let payload = recording.payload.as_ref().unwrap()[index];
         let mut row = row(q, payload);
         row.drive = settings.truth.drive(&robot, q);
         let found = settle(&arm, &row, &[spring(2, 1.89e-5), spring(3, 2.49e-5)]);
@@ -528,7 +512,7 @@ effects: [{backlash: {joint: 7, gap_arcsec: 10}}]
 motors: {sign: [1, -1, 1, 1, 1, 1]}
 blocks: [{usage: fit, points: 5}]
 ";
-    let settings: Simulate = serde_saphyr::from_str(text).expect("well formed");
+    let settings: Simulate = serde_saphyr::from_str(text).unwrap();
     let Err(error) = simulate(&settings, 1) else {
         panic!("must not run")
     };
@@ -575,19 +559,17 @@ blocks:
       - {joints_deg: [10, 0, 0, 0, 0, 0], direction: [-1, -1, 1, 0, 1, 1], payload_kg: 0}
       - {joints_deg: [20, -10, 0, 0, 0, 5]}
 ";
-    let settings: Simulate = serde_saphyr::from_str(text).expect("good settings");
+    let settings: Simulate = serde_saphyr::from_str(text).unwrap();
     assert!(settings.check().is_empty());
-    let recording = simulate(&settings, 3).expect("runs").recording;
+    let recording = simulate(&settings, 3).unwrap().recording;
     assert_eq!(recording.rows(), 5);
-    let side = |row: usize| {
-        recording.direction.as_ref().expect("directions")[6 * row..6 * row + 6].to_vec()
-    };
+    let side = |row: usize| recording.direction.as_ref().unwrap()[6 * row..6 * row + 6].to_vec();
     assert_eq!(side(0), [-1.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
     assert_eq!(side(1), [-1.0, -1.0, 1.0, 0.0, 1.0, 1.0]);
     // Straight from the pose before.
     assert_eq!(side(2), [1.0, -1.0, 0.0, 0.0, 0.0, 1.0]);
     assert_eq!(
-        recording.payload.as_ref().expect("loads")[..4],
+        recording.payload.as_ref().unwrap()[..4],
         [210.0, 0.0, 210.0, 210.0]
     );
     assert!(
@@ -598,7 +580,7 @@ blocks:
         recording
             .time
             .as_ref()
-            .expect("a clock")
+            .unwrap()
             .iter()
             .all(|time| *time > 7200.0)
     );
@@ -627,7 +609,7 @@ blocks:
       - {joints_deg: []}
       - {joints_deg: [0, 0, 0, 0, 0, 0], direction: [2, 0, 0, 0, 0, 0], payload_kg: -1}
 ";
-    let settings: Simulate = serde_saphyr::from_str(text).expect("well formed");
+    let settings: Simulate = serde_saphyr::from_str(text).unwrap();
     let places: Vec<String> = settings
         .check()
         .into_iter()
@@ -643,7 +625,7 @@ blocks:
     ];
     assert_eq!(places, expected);
     let text = "blocks: [{usage: fit, given: [{joints_deg: [0, 500, 0, 0, 0, 0], direction: [1]}, {joints_deg: [0, 0]}]}]";
-    let settings: Simulate = serde_saphyr::from_str(text).expect("well formed");
+    let settings: Simulate = serde_saphyr::from_str(text).unwrap();
     let Err(error) = simulate(&settings, 1) else {
         panic!("must not run")
     };

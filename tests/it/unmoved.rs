@@ -1,8 +1,9 @@
 //! What stands while an arm is measured: one pose is no geometry, and a joint that never moves is said.
 
-use crate::compensate::{ROBOT, calib};
+use crate::answer::{calib, has, put};
+use crate::compensate::ROBOT;
+use crate::fixture::robot_of;
 use calib::robot::RobotModel;
-use calib::robot::import::{RobotFileText, read_calib};
 use std::path::Path;
 
 const PIPELINE: &str = "calib: 1
@@ -34,17 +35,7 @@ fn told(
     joints: impl Fn(usize) -> [f64; 6],
     creep: impl Fn(usize) -> f64,
 ) -> (Option<i32>, String) {
-    let arm = RobotModel::new(
-        read_calib(
-            RobotFileText {
-                label: "robot.yaml",
-                text: ROBOT,
-            },
-            None,
-        )
-        .expect("a robot")
-        .robot,
-    );
+    let arm = RobotModel::new(robot_of(ROBOT));
     let mut text = String::from("q1,q2,q3,q4,q5,q6,x,y,z\n");
     for row in 0..50 {
         let q = joints(row);
@@ -61,24 +52,21 @@ fn told(
                 + "\n"),
         );
     }
-    std::fs::write(folder.join("poses.csv"), text).expect("a file");
-    std::fs::write(folder.join("robot.yaml"), ROBOT).expect("a file");
-    std::fs::write(
-        folder.join("pipeline.yaml"),
+    put(folder, "poses.csv", text);
+    put(folder, "robot.yaml", ROBOT);
+    put(
+        folder,
+        "pipeline.yaml",
         PIPELINE.replace("USES", uses).replace("STEP", uses),
-    )
-    .expect("a file");
-    let output = calib(folder, &["run", "pipeline.yaml"], "");
-    (
-        output.status.code(),
-        String::from_utf8_lossy(&output.stderr).into_owned(),
-    )
+    );
+    let output = calib(folder, "run pipeline.yaml");
+    (output.code, output.err.clone())
 }
 
 #[test]
 fn one_pose_measured_fifty_times_is_no_geometry_and_its_creep_is_told() {
     for uses in ["identify", "diagnose"] {
-        let folder = tempfile::tempdir().expect("a folder");
+        let folder = tempfile::tempdir().unwrap();
         let (code, said) = told(
             folder.path(),
             uses,
@@ -86,7 +74,10 @@ fn one_pose_measured_fifty_times_is_no_geometry_and_its_creep_is_told() {
             |row| 0.2 * row as f64 / 49.0,
         );
         assert_eq!(code, Some(10), "{said}");
-        assert!(said.contains("all 40 rows to fit are of one pose: geometry needs poses in which every joint moves"), "{said}");
+        has(
+            &said,
+            "all 40 rows to fit are of one pose: geometry needs poses in which every joint moves",
+        );
         let drift = said
             .split("the point drifts by ")
             .nth(1)
@@ -96,7 +87,7 @@ fn one_pose_measured_fifty_times_is_no_geometry_and_its_creep_is_told() {
             .unwrap_or_else(|| panic!("{said}"));
         assert!((drift - 0.2).abs() < 0.01, "{said}");
     }
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let (code, said) = told(folder.path(), "identify", |_| [10.0; 6], |_| 0.0);
     assert!(
         code == Some(10) && said.contains("the point does not drift beyond noise"),
@@ -106,15 +97,15 @@ fn one_pose_measured_fifty_times_is_no_geometry_and_its_creep_is_told() {
 
 #[test]
 fn a_joint_that_never_moves_is_said() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let swing = |row: usize, joint: usize| 50.0 * ((1.3 * row as f64 + 0.9 * joint as f64).sin());
     let joints = |row: usize| {
         [0, 1, 2, 3, 4, 5].map(|joint| if joint == 3 { 12.5 } else { swing(row, joint) })
     };
     let (code, said) = told(folder.path(), "identify", joints, |_| 0.0);
     assert_eq!(code, Some(0), "{said}");
-    assert!(
-        said.contains("never moves in the 40 rows to fit: joint 4 (at 12.500 deg)"),
-        "{said}"
+    has(
+        &said,
+        "never moves in the 40 rows to fit: joint 4 (at 12.500 deg)",
     );
 }

@@ -1,8 +1,9 @@
 //! The help of every verb: its examples are commands that calib takes.
 
+use crate::answer::root;
 use calib::pipeline::{Override, Plan};
 use calib::stage::STAGES;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
 fn help(verb: &[String]) -> String {
@@ -41,7 +42,7 @@ fn verbs(above: &[String]) -> Vec<Vec<String>> {
 }
 
 fn shipped() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines");
+    let folder = root("pipelines");
     let mut pipelines: Vec<PathBuf> = std::fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().path().join("pipeline.yaml"))

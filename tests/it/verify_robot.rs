@@ -1,6 +1,6 @@
 //! `verify-robot`: what compensation achieved, from points measured at corrected targets.
 
-use crate::compensate::calib;
+use crate::answer::{calib, has, put};
 use crate::library_of_arms::{REFLECTOR, on_flange, real, recording, tracker};
 use calib::robot::{LibraryArm, RobotModel};
 use serde_json::Value;
@@ -8,48 +8,40 @@ use std::fmt::Write;
 
 #[test]
 fn what_compensation_achieved_is_measured_against_the_wanted_points() {
-    let arm = LibraryArm::find("lrmate_200id").expect("an arm");
-    let read = arm.read().expect("a robot");
+    let arm = LibraryArm::find("lrmate_200id").unwrap();
+    let read = arm.read().unwrap();
     let robot = RobotModel::new(read.robot.clone());
-    let folder = tempfile::tempdir().expect("a folder");
-    let run = |arguments: &[&str]| {
-        let output = calib(folder.path(), arguments, "");
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success(), "{arguments:?}: {told}");
-        String::from_utf8_lossy(&output.stdout).into_owned()
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &str| {
+        let output = calib(folder.path(), arguments);
+        let told = output.err.clone();
+        assert!(output.code == Some(0), "{arguments:?}: {told}");
+        output.out.clone()
     };
-    std::fs::write(
-        folder.path().join("measured.csv"),
-        recording(&robot, &read.about.coupled),
-    )
-    .expect("a file");
-    run(&[
-        "init",
-        "cell",
-        "--data",
+    put(
+        folder.path(),
         "measured.csv",
-        "--robot",
-        arm.name,
-    ]);
+        recording(&robot, &read.about.coupled),
+    );
+    run(&format!(
+        "init cell --data measured.csv --robot {}",
+        arm.name
+    ));
     let [file, pipeline] =
         ["cell/robot.yaml", "cell/pipeline.yaml"].map(|name| folder.path().join(name));
     std::fs::write(
         &file,
-        on_flange(
-            &std::fs::read_to_string(&file).expect("a robot file"),
-            arm.name,
-            &robot,
-        ),
+        on_flange(&std::fs::read_to_string(&file).unwrap(), arm.name, &robot),
     )
-    .expect("a file");
+    .unwrap();
     // Geometry alone: what is compensated is known then.
-    let text = std::fs::read_to_string(&pipeline).expect("a pipeline");
+    let text = std::fs::read_to_string(&pipeline).unwrap();
     let text = text
         .split("  # What else is wrong")
         .next()
-        .expect("a beginning")
+        .unwrap()
         .to_string();
-    std::fs::write(&pipeline, text).expect("a file");
+    std::fs::write(&pipeline, text).unwrap();
     // Targets as the controller counts them: joint 3 from the horizontal.
     let mut targets = String::from("name,J1_deg,J2_deg,J3_deg,J4_deg,J5_deg,J6_deg\n");
     let wanted = |k: i32| {
@@ -65,25 +57,18 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
             "T{k},{}",
             wanted(k).map(|q| q.to_string()).join(",")
         )
-        .expect("text")
+        .unwrap()
     });
-    std::fs::write(folder.path().join("targets.csv"), &targets).expect("a file");
-    run(&[
-        "compensate",
-        "cell/pipeline.yaml",
-        "targets.csv",
-        "--out",
-        "corrected.csv",
-        "--quiet",
-    ]);
-    let corrected = std::fs::read_to_string(folder.path().join("corrected.csv")).expect("commands");
-    let mut second = targets.lines().next().expect("a header").to_string() + ",x_mm,y_mm,z_mm\n";
+    put(folder.path(), "targets.csv", &targets);
+    run("compensate cell/pipeline.yaml targets.csv --out corrected.csv --quiet");
+    let corrected = std::fs::read_to_string(folder.path().join("corrected.csv")).unwrap();
+    let mut second = targets.lines().next().unwrap().to_string() + ",x_mm,y_mm,z_mm\n";
     for (line, target) in corrected.lines().skip(1).zip(targets.lines().skip(1)) {
         let shown: Vec<f64> = line
             .split(',')
             .skip(1)
             .take(6)
-            .map(|cell| cell.parse::<f64>().expect("a number").to_radians())
+            .map(|cell| cell.parse::<f64>().unwrap().to_radians())
             .collect();
         // The real arm: joint 3 moves with joint 2, and zeros are off.
         let mut q = shown.clone();
@@ -96,17 +81,12 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
             1e3 * point.y,
             1e3 * point.z
         )
-        .expect("text");
+        .unwrap();
     }
-    std::fs::write(folder.path().join("second.csv"), second).expect("a file");
-    let told: Value = serde_json::from_str(&run(&[
-        "verify-robot",
-        "cell/pipeline.yaml",
-        "second.csv",
-        "--json",
-    ]))
-    .expect("JSON");
-    let figure = |row: &str, name: &str| told[row][name].as_f64().expect("mm");
+    put(folder.path(), "second.csv", second);
+    let told: Value =
+        serde_json::from_str(&run("verify-robot cell/pipeline.yaml second.csv --json")).unwrap();
+    let figure = |row: &str, name: &str| told[row][name].as_f64().unwrap();
     assert!(figure("before", "mean_mm") > 0.5, "{told:#}");
     assert!(figure("achieved", "max_mm") < 0.02, "{told:#}");
     assert!(figure("predicted_u95", "mean_mm") < 0.05, "{told:#}");
@@ -118,29 +98,19 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
         (Some(42), Some(30)),
         "{told:#}"
     );
-    let text = run(&[
-        "verify-robot",
-        "cell/pipeline.yaml",
-        "second.csv",
-        "--new-base",
-        "--quiet",
-        "--html",
-        "verified.html",
-    ]);
-    assert!(
-        text.contains("achieved  mean 0.00") && text.contains("the tracker's place found anew"),
-        "{text}"
+    let text =
+        run("verify-robot cell/pipeline.yaml second.csv --new-base --quiet --html verified.html");
+    has(
+        &text,
+        ["achieved  mean 0.00", "the tracker's place found anew"],
     );
-    assert!(
-        text.contains("ISO 9283  pose 1, 30 cycles: accuracy AP 0.0"),
-        "{text}"
-    );
+    has(&text, "ISO 9283  pose 1, 30 cycles: accuracy AP 0.0");
     // The page has the figures of the terminal.
-    let page = std::fs::read_to_string(folder.path().join("verified.html")).expect("a page");
+    let page = std::fs::read_to_string(folder.path().join("verified.html")).unwrap();
     let line = text
         .lines()
         .find(|line| line.starts_with("achieved"))
-        .expect("a line");
+        .unwrap();
     let numbers: Vec<&str> = line
         .split(' ')
         .filter(|word| word.len() > 4 && word.parse::<f64>().is_ok())

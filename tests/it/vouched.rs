@@ -1,6 +1,7 @@
 //! What reaches a robot is what was identified: tables with a changed bit are refused, or change nothing.
 
-use crate::compensate::{calib, cell};
+use crate::answer::{fed, has, put, starts_with};
+use crate::compensate::cell;
 use calib::identified::{Files, IdentifiedModel};
 use calib::pipeline::{Manifest, find_run};
 use calib::store::Store;
@@ -21,7 +22,7 @@ fn taken_along() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for name in [PARAMETERS, ROBOT] {
         let bytes = std::fs::read(cell().join(".calib/tables/small").join(name)).unwrap();
-        std::fs::write(folder.path().join(name), bytes).unwrap();
+        put(folder.path(), name, bytes);
     }
     folder
 }
@@ -34,22 +35,10 @@ fn files(folder: &Path) -> Files {
     }
 }
 
-fn compensated(folder: &Path, more: &[&str]) -> (Option<i32>, String, String) {
-    let verb = [
-        "compensate",
-        PARAMETERS,
-        "--robot",
-        ROBOT,
-        "--no-sigma",
-        "--quiet",
-    ];
-    let output = calib(folder, &[&verb, more].concat(), TARGETS);
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    (
-        output.status.code(),
-        text(output.stdout),
-        text(output.stderr),
-    )
+fn compensated(folder: &Path, more: &str) -> (Option<i32>, String, String) {
+    let verb = &format!("compensate {PARAMETERS} --robot {ROBOT} --no-sigma --quiet");
+    let output = fed(folder, &format!("{verb} {more}"), TARGETS);
+    (output.code, output.out, output.err)
 }
 
 /// `bits` bits of a file, each as the file with that one changed.
@@ -106,11 +95,11 @@ fn a_changed_bit_of_a_table_is_refused_or_changes_no_number() {
 fn the_verb_refuses_a_changed_table_with_code_10_and_writes_no_target() {
     let folder = taken_along();
     let path = folder.path().join(PARAMETERS);
-    let (code, sound, said) = compensated(folder.path(), &[]);
+    let (code, sound, said) = compensated(folder.path(), "");
     assert_eq!(code, Some(0), "{said}");
     for (bit, flipped) in flips(&path, 40, 6) {
         std::fs::write(&path, flipped).unwrap();
-        let (code, written, said) = compensated(folder.path(), &[]);
+        let (code, written, said) = compensated(folder.path(), "");
         let kept = code == Some(0) && written == sound;
         assert!(
             kept || (code == Some(10) && written.is_empty() && said.contains(PARAMETERS)),
@@ -159,38 +148,31 @@ fn written_anew(path: &Path, by: f64, metadata: bool) {
 fn a_table_of_another_program_is_taken_only_where_that_is_said() {
     let folder = taken_along();
     let path = folder.path().join(PARAMETERS);
-    let (_, sound, _) = compensated(folder.path(), &[]);
+    let (_, sound, _) = compensated(folder.path(), "");
     written_anew(&path, 0.0, true);
     assert_eq!(
-        compensated(folder.path(), &[]),
+        compensated(folder.path(), ""),
         (Some(0), sound.clone(), String::new()),
         "the same content, written anew"
     );
     let whole = std::fs::read(&path).unwrap();
     written_anew(&path, 0.0, false);
-    let (code, written, said) = compensated(folder.path(), &[]);
+    let (code, written, said) = compensated(folder.path(), "");
     assert_eq!((code, written), (Some(10), String::new()));
-    assert!(
-        said.contains(PARAMETERS)
-            && said.contains("carries no content hash")
-            && said.contains("--unchecked"),
-        "{said}"
+    has(
+        &said,
+        [PARAMETERS, "carries no content hash", "--unchecked"],
     );
-    let (code, written, said) = compensated(folder.path(), &["--unchecked"]);
+    let (code, written, said) = compensated(folder.path(), "--unchecked");
     assert_eq!((code, written), (Some(0), sound));
-    assert!(
-        said.starts_with("warning: ") && said.contains("its numbers cannot be verified"),
-        "{said}"
-    );
+    starts_with(&said, "warning: ");
+    has(&said, "its numbers cannot be verified");
     std::fs::write(&path, whole).unwrap();
     written_anew(&path, 1e-4, true);
-    for more in [&[][..], &["--unchecked"]] {
+    for more in ["", "--unchecked"] {
         let (code, written, said) = compensated(folder.path(), more);
         assert_eq!((code, written), (Some(10), String::new()));
-        assert!(
-            said.contains("does not match its numbers") && said.contains("calib run"),
-            "{said}"
-        );
+        has(&said, ["does not match its numbers", "calib run"]);
     }
 }
 

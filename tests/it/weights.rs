@@ -1,5 +1,6 @@
 //! Wind-up of arms whose masses nobody knows: gravity's torque of whatever masses is made of the moments that the form has.
 
+use crate::answer::has;
 use crate::fixture;
 use calib::description::RobotDescription;
 use calib::effect::{
@@ -30,7 +31,7 @@ fn stack(robot: &RobotModel) -> EffectStack {
     EffectStack::new(
         robot,
         setting.base,
-        vec![arm_effect("joint_compliance", &setting).expect("a cause")],
+        vec![arm_effect("joint_compliance", &setting).unwrap()],
     )
 }
 
@@ -80,7 +81,7 @@ fn surveyed<T>(robot: &RobotModel, data: &Measurements, tell: impl FnOnce(&Surve
 
 fn windups(robot: &RobotModel, data: &Measurements) -> Vec<Form> {
     let all = surveyed(robot, data, |survey| {
-        cause("joint_compliance").expect("a cause").propose(survey)
+        cause("joint_compliance").unwrap().propose(survey)
     });
     all.into_iter().map(|hypothesis| hypothesis.form).collect()
 }
@@ -121,11 +122,7 @@ fn gravity_torques_of_any_masses_are_made_of_the_moments_of_the_bodies_outwards(
                 continue;
             };
             let turns = turns(&bare, &data, widest);
-            let solved = turns
-                .clone()
-                .svd(true, true)
-                .solve(&own, 1e-10)
-                .expect("a solution");
+            let solved = turns.clone().svd(true, true).solve(&own, 1e-10).unwrap();
             let left = (turns * solved - &own).amax();
             assert!(
                 left < 1e-9 * most,
@@ -185,7 +182,7 @@ fn with_a_payload_the_stiffness_is_said_beside_the_weight() {
         windups(robot, &data)
             .into_iter()
             .find(|form| form.place() == Place::Joint(2))
-            .expect("a form")
+            .unwrap()
     };
     let (weight, load) = (at(&bare(fixture::spherical())), at(&robot));
     let said = |forms: &[Form]| {
@@ -214,15 +211,19 @@ fn with_a_payload_the_stiffness_is_said_beside_the_weight() {
     };
     // 1e-4 rad are 20.6 arcsec.
     let alone = said(std::slice::from_ref(&weight));
-    assert!(
-        alone.contains("by up to 21 arcsec")
-            && alone.contains("cannot be separated from the links' weight"),
-        "{alone}"
+    has(
+        &alone,
+        [
+            "by up to 21 arcsec",
+            "cannot be separated from the links' weight",
+        ],
     );
     let both = said(&[weight, load]);
-    assert!(
-        both.contains("1.000e-4 rad/Nm, and under its own weight")
-            && both.contains("by up to 21 arcsec"),
-        "{both}"
+    has(
+        &both,
+        [
+            "1.000e-4 rad/Nm, and under its own weight",
+            "by up to 21 arcsec",
+        ],
     );
 }

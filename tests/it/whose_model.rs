@@ -1,8 +1,10 @@
 //! A model moves the arm that it is of: tables of another robot are refused, bodies that cannot be are named, and the tool that was
 //! identified is the tool that goes out.
 
-use crate::compensate::{ROBOT, calib, cell};
+use crate::answer::{fed, has, put};
+use crate::compensate::{ROBOT, cell};
 use crate::desk::shared;
+use crate::fixture::robot_of;
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
@@ -15,51 +17,46 @@ use std::path::Path;
 const PARAMETERS: &str = "identify.parameters.parquet";
 const TARGETS: &str = "A1_deg,A2_deg,A3_deg,A4_deg,A5_deg,A6_deg\n10,20,-30,5,40,0\n";
 
-fn said(folder: &Path, verb: &[&str]) -> (Option<i32>, String, String) {
-    let output = calib(folder, verb, TARGETS);
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (
-        output.status.code(),
-        text(&output.stdout),
-        text(&output.stderr),
-    )
+fn said(folder: &Path, verb: &str) -> (Option<i32>, String, String) {
+    let output = fed(folder, verb, TARGETS);
+    (output.code, output.out, output.err)
 }
 
 #[test]
 fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whose_it_is() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::copy(
         cell().join(".calib/tables/small").join(PARAMETERS),
         here.join(PARAMETERS),
     )
-    .expect("a table");
-    std::fs::write(
-        here.join("own.yaml"),
+    .unwrap();
+    put(
+        here,
+        "own.yaml",
         ROBOT.replace("limits: [-120, 120]", "limits: [-121, 120]"),
-    )
-    .expect("a file");
-    std::fs::write(
-        here.join("renamed.yaml"),
+    );
+    put(
+        here,
+        "renamed.yaml",
         ROBOT.replace("name: small", "name: large"),
-    )
-    .expect("a file");
-    std::fs::write(
-        here.join("longer.yaml"),
+    );
+    put(
+        here,
+        "longer.yaml",
         ROBOT.replace("[0, 0, 900]", "[0, 0, 901]"),
-    )
-    .expect("a file");
+    );
     let other = ROBOT
         .replace("name: small", "name: large")
         .replace("[0, 0, 900]", "[0, 0, 901]");
-    std::fs::write(here.join("other.yaml"), other).expect("a file");
+    put(here, "other.yaml", other);
     let verbs = [
-        &["compensate", PARAMETERS][..],
-        &["export", PARAMETERS, "--format", "urdf"],
+        format!("compensate {PARAMETERS}"),
+        format!("export {PARAMETERS} --format urdf"),
     ];
     for verb in verbs {
         // Limits are no part of what a model is of.
-        let (code, _, told) = said(here, &[verb, &["--robot", "own.yaml"]].concat());
+        let (code, _, told) = said(here, &format!("{verb} --robot own.yaml"));
         assert_eq!(code, Some(0), "{told}");
         for (robot, sentence) in [
             (
@@ -75,34 +72,33 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
                 "is the model of the robot `small`, and this robot file is of `large`, whose axes are the same",
             ),
         ] {
-            let (code, out, told) = said(here, &[verb, &["--robot", robot]].concat());
+            let (code, out, told) = said(here, &format!("{verb} --robot {robot}"));
             assert_eq!((code, out.as_str()), (Some(10), ""), "{robot}: {told}");
             assert!(told.contains(sentence), "{robot}: {told}");
         }
     }
     // As an earlier calib wrote it, without a content hash.
     let mut table = from_file::<Parameters>(&here.join(PARAMETERS))
-        .expect("a table")
+        .unwrap()
         .table;
     table
         .0
         .iter_mut()
         .for_each(|row| (row.robot, row.kinematics) = (None, None));
-    let frame = table.to_frame().expect("a frame");
-    let file = std::fs::File::create(here.join("older.parquet")).expect("a file");
-    let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), None).expect("a writer");
-    writer.write(frame.batch()).expect("rows");
-    writer.close().expect("a file");
-    let unchecked = ["older.parquet", "--robot", "renamed.yaml", "--unchecked"];
-    for verb in [&["compensate"][..], &["export", "--format", "urdf"]] {
-        let (code, out, told) = said(here, &[verb, &unchecked[..3]].concat());
+    let frame = table.to_frame().unwrap();
+    let file = std::fs::File::create(here.join("older.parquet")).unwrap();
+    let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), None).unwrap();
+    writer.write(frame.batch()).unwrap();
+    writer.close().unwrap();
+    for verb in ["compensate", "export --format urdf"] {
+        let (code, out, told) = said(here, &format!("{verb} older.parquet --robot renamed.yaml"));
         assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
-        let (code, _, told) = said(here, &[verb, &unchecked].concat());
-        assert_eq!(code, Some(0), "{told}");
-        assert!(
-            told.contains("does not say which robot it is the model of"),
-            "{told}"
+        let (code, _, told) = said(
+            here,
+            &format!("{verb} older.parquet --robot renamed.yaml --unchecked"),
         );
+        assert_eq!(code, Some(0), "{told}");
+        has(&told, "does not say which robot it is the model of");
     }
 }
 
@@ -115,15 +111,14 @@ fn a_table_that_does_not_say_whose_model_it_is_is_refused_for_either_robot_unles
     let path = |name: &str| fault.join(name).display().to_string();
     let [table, targets] = ["parameters.parquet", "tg.csv"].map(path);
     for robot in ["irb.yaml", "kr6.yaml"].map(path) {
-        let ask = ["compensate", &table, "--robot", &robot, &targets];
-        let (code, out, told) = said(&fault, &ask);
+        let ask = &format!("compensate {table} --robot {robot} {targets}");
+        let (code, out, told) = said(&fault, ask);
         assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
-        assert!(
-            told.contains("does not say which robot it is the model of")
-                && told.contains("--unchecked"),
-            "{told}"
+        has(
+            &told,
+            ["does not say which robot it is the model of", "--unchecked"],
         );
-        let (code, _, told) = said(&fault, &[&ask[..], &["--unchecked"]].concat());
+        let (code, _, told) = said(&fault, &format!("{ask} --unchecked"));
         assert!(
             code == Some(0) && told.contains("does not say which robot it is the model of"),
             "{told}"
@@ -144,48 +139,33 @@ const URDF: &str = r#"<robot name="rm6"><link name="base_link"/>
 
 #[test]
 fn inertias_of_no_body_are_named_by_their_links_and_refused_for_torques_alone() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("arm.urdf"), URDF).expect("a file");
+    put(here, "arm.urdf", URDF);
     let first = "arm.urdf:2: link `Link1`: no body has a principal moment of inertia of 408.868 times the sum of the other two";
     let second = "arm.urdf:3: link `Link2`: no body has a principal moment of inertia that is zero";
-    let (code, _, told) = said(here, &["init", "cell", "--urdf", "arm.urdf"]);
+    let (code, _, told) = said(here, "init cell --urdf arm.urdf");
     assert_eq!(code, Some(0), "{told}");
-    assert!(told.contains(first) && told.contains(second), "{told}");
+    has(&told, [first, second]);
     let pipeline = "calib: 1\nname: u\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml, urdf: arm.urdf}\n";
-    std::fs::write(here.join("pipeline.yaml"), pipeline).expect("a file");
+    put(here, "pipeline.yaml", pipeline);
     let robot = "calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {urdf: {base: base_link, tip: tool0}}\n";
-    std::fs::write(here.join("robot.yaml"), robot).expect("a file");
-    let (code, out, told) = said(here, &["check", "pipeline.yaml"]);
+    put(here, "robot.yaml", robot);
+    let (code, out, told) = said(here, "check pipeline.yaml");
     let all = format!("{out}{told}");
     assert_eq!(code, Some(0), "{all}");
-    assert!(
-        all.contains(first)
-            && all.contains(second)
-            && all.contains("positions do not depend on it"),
-        "{all}"
-    );
-    let (code, _, told) = said(here, &["excite", "robot.yaml", "--urdf", "arm.urdf"]);
+    has(&all, [first, second, "positions do not depend on it"]);
+    let (code, _, told) = said(here, "excite robot.yaml --urdf arm.urdf");
     assert_eq!(code, Some(10), "{told}");
-    assert!(
-        told.contains(
-            "table robot: link 1: no body has a principal moment of inertia of 408.868 times"
-        ),
-        "{told}"
+    has(
+        &told,
+        "table robot: link 1: no body has a principal moment of inertia of 408.868 times",
     );
 }
 
 /// Poses of the cell's arm with its tool elsewhere, measured in full; the tool's point is shifted by `shift` (mm), its frame turned by 30 deg.
 fn full_poses(shift: [f64; 3]) -> (String, Vector3<f64>) {
-    let robot = read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: ROBOT,
-        },
-        None,
-    )
-    .expect("a robot")
-    .robot;
+    let robot = robot_of(ROBOT);
     let mut moved = robot.clone();
     moved.tool = [0, 1, 2].map(|k| robot.tool[k] + shift[k] * 1e-3);
     let arm = RobotModel::new(moved.clone());
@@ -246,24 +226,17 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
     for (shift, is_refused) in [([12.0, -9.0, 20.0], false), ([94.0, 11.0, -36.0], true)] {
         let (poses, tool) = full_poses(shift);
         for orientation in [ORIENTATION, ""] {
-            let folder = tempfile::tempdir().expect("a folder");
+            let folder = tempfile::tempdir().unwrap();
             let here = folder.path();
-            std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
-            std::fs::write(here.join("poses.csv"), &poses).expect("a file");
-            std::fs::write(
-                here.join("pipeline.yaml"),
-                MEASURED.replace("ORIENTATION", orientation),
-            )
-            .expect("a file");
-            let export = [
-                "export",
+            put(here, "robot.yaml", ROBOT);
+            put(here, "poses.csv", &poses);
+            put(
+                here,
                 "pipeline.yaml",
-                "--step",
-                "geometry",
-                "--format",
-                "json",
-            ];
-            let (code, out, told) = said(here, &export);
+                MEASURED.replace("ORIENTATION", orientation),
+            );
+            let export = "export pipeline.yaml --step geometry --format json";
+            let (code, out, told) = said(here, export);
             if is_refused {
                 assert_eq!(
                     (code, out.as_str()),
@@ -271,8 +244,7 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
                     "{orientation}: {told}"
                 );
                 assert!(told.contains("tool is 101."), "{orientation}: {told}");
-                let (code, _, told) =
-                    said(here, &["compensate", "pipeline.yaml", "--step", "geometry"]);
+                let (code, _, told) = said(here, "compensate pipeline.yaml --step geometry");
                 assert!(
                     code == Some(10) && told.contains("tool is 101."),
                     "{orientation}: {told}"
@@ -280,12 +252,11 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
             } else {
                 assert_eq!(code, Some(0), "{orientation}: {told}");
             }
-            let (code, out, told) = said(here, &[&export[..], &["--force"]].concat());
+            let (code, out, told) = said(here, &format!("{export} --force"));
             assert_eq!(code, Some(0), "{orientation}: {told}");
-            let model: Value = serde_json::from_str(&out).expect("JSON");
-            let found = Vector3::from(
-                [0, 1, 2].map(|k| model["tool"]["point_m"][k].as_f64().expect("a number")),
-            );
+            let model: Value = serde_json::from_str(&out).unwrap();
+            let found =
+                Vector3::from([0, 1, 2].map(|k| model["tool"]["point_m"][k].as_f64().unwrap()));
             // The last zero turns the tool about its axis, so the point is compared where it is: within what a joint's zero does.
             assert!(
                 (found - tool).norm() < 1e-4,
@@ -327,9 +298,9 @@ kinematics:
 
 #[test]
 fn every_export_of_an_arm_with_nearly_parallel_axes_is_the_same_arm_when_it_is_read_back() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), FACTORY).expect("a file");
+    put(here, "robot.yaml", FACTORY);
     let pipeline = "calib: 1
 name: factory
 seed: 2
@@ -346,11 +317,11 @@ stages:
   - uses: identify
     with: {on: [fit], effects: [base_frame, joint_offset]}
 ";
-    std::fs::write(here.join("pipeline.yaml"), pipeline).expect("a file");
+    put(here, "pipeline.yaml", pipeline);
     let exported = |format: &str| {
         let (code, out, told) = said(
             here,
-            &["export", "pipeline.yaml", "--format", format, "--force"],
+            &format!("export pipeline.yaml --format {format} --force"),
         );
         assert_eq!(code, Some(0), "{told}");
         out
@@ -368,7 +339,7 @@ stages:
                 },
                 urdf,
             )
-            .expect("a robot")
+            .unwrap()
             .robot,
         )
     };
@@ -389,12 +360,10 @@ stages:
 
 #[test]
 fn a_run_knows_its_robot() {
-    let (code, out, told) = said(cell(), &["compensate", "HEAD", "--robot", "other.yaml"]);
+    let (code, out, told) = said(cell(), "compensate HEAD --robot other.yaml");
     assert_eq!((code, out.as_str()), (Some(2), ""), "{told}");
-    assert!(
-        told.contains(
-            "--robot: is of tables of parameters alone; a run or a pipeline knows its robot"
-        ),
-        "{told}"
+    has(
+        &told,
+        "--robot: is of tables of parameters alone; a run or a pipeline knows its robot",
     );
 }

@@ -19,10 +19,10 @@ pub fn archive(parts: &[(&str, &[u8])]) -> Vec<u8> {
     for (name, content) in parts {
         archive
             .start_file(*name, SimpleFileOptions::default())
-            .expect("a part");
-        archive.write_all(content).expect("a part's content");
+            .unwrap();
+        archive.write_all(content).unwrap();
     }
-    archive.finish().expect("an archive").into_inner()
+    archive.finish().unwrap().into_inner()
 }
 
 pub fn workbook(sheets: &[SheetText]) -> Vec<u8> {

@@ -260,38 +260,6 @@ mod tests {
     }
 
     #[test]
-    fn of_equal_ids_one_or_none_stays() {
-        let stays = |duplicates| {
-            let (mut ids, mut decisions) = (FileIds::default(), [FileDecision::default()]);
-            for (id, number) in ["B", "A", "B", "B"].into_iter().zip(1..) {
-                let row = RecordedRow {
-                    id: id.into(),
-                    number,
-                    line: number + 1,
-                    ..RecordedRow::default()
-                };
-                ids.push(&row, number, "a.csv").unwrap();
-            }
-            single(&[(0, &ids)], duplicates, &mut decisions);
-            let twins: Vec<(u32, u32)> = decisions[0]
-                .twins
-                .iter()
-                .map(|(number, twin)| (*number, twin.line))
-                .collect();
-            let pairs = by_id((&ids, &decisions[0]), (&ids, &decisions[0]));
-            let mut left: Vec<u32> = pairs.iter().map(|(number, _)| *number).collect();
-            left.sort();
-            (left, twins)
-        };
-        assert_eq!(
-            stays(Duplicates::Reject),
-            (vec![2], vec![(1, 5), (3, 2), (4, 2)])
-        );
-        assert_eq!(stays(Duplicates::First), (vec![1, 2], vec![(3, 2), (4, 2)]));
-        assert_eq!(stays(Duplicates::Last), (vec![2, 4], vec![(1, 5), (3, 5)]));
-    }
-
-    #[test]
     fn ids_find_each_other_in_any_order() {
         let ids = |names: &[&str]| {
             let mut ids = FileIds::default();

@@ -3,7 +3,7 @@
 use super::draw::TorqueCase;
 use super::law::Law;
 use super::record::TorqueRows;
-use calib_foundation::description::RobotDescription;
+use crate::folder::robot_json;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -94,33 +94,17 @@ impl TorqueCase {
         text
     }
 
+    /// What the robot file of points states, and what moving bodies take.
     fn robot_json(&self) -> Value {
-        let robot: &RobotDescription = &self.robot;
-        let mm = |point: [f64; 3]| point.map(|x| (x * 1e6).round() / 1e3);
-        let each =
-            |of: &dyn Fn(usize) -> Value| (0..robot.joints.len()).map(of).collect::<Vec<Value>>();
-        let offset: [f64; 3] = std::array::from_fn(|k| robot.payload_centre[k] - robot.tool[k]);
-        let tolerance = robot
-            .inertias
-            .tolerance
-            .map(|one| json!({ "mass_rel": one.mass, "com_mm": one.centre * 1e3, "inertia_rel": one.inertia }));
-        json!({
-            "name": robot.name,
-            "axes": each(&|j| json!(robot.joints[j].axis)),
-            "points": each(&|j| json!(mm(robot.joints[j].point))),
-            "tool": mm(robot.tool),
-            "mass": each(&|j| json!(robot.joints[j].mass)),
-            "com": each(&|j| json!(robot.joints[j].centre.map(mm))),
-            "inertia": each(&|j| json!(robot.inertias.links[j])),
-            "ratio": each(&|j| json!(robot.joints[j].reduction_ratio)),
-            "kt": each(&|j| json!(robot.joints[j].motor_constant)),
-            "payload": robot.payload_mass,
-            "payload_com": mm(offset),
-            "payload_inertia": robot.inertias.payload,
-            "gravity": robot.gravity,
-            "coupling": robot.couplings.iter().map(|one| [one.moved, one.by]).collect::<Vec<_>>(),
-            "inertia_tolerance": tolerance,
-        })
+        let (robot, moments) = (&self.robot, &self.robot.inertias);
+        let mut out = robot_json(robot).expect("an arm of the library has such a file");
+        out["inertia"] = json!(moments.links);
+        out["payload_inertia"] = json!(moments.payload);
+        out["gravity"] = json!(robot.gravity);
+        out["inertia_tolerance"] = json!(moments.tolerance.map(|one| {
+            json!({ "mass_rel": one.mass, "com_mm": one.centre * 1e3, "inertia_rel": one.inertia })
+        }));
+        out
     }
 }
 

@@ -96,14 +96,14 @@ pub fn mcap(compression: Option<Compression>, messages: &[Message]) -> Vec<u8> {
         .compression(compression)
         .use_chunks(compression.is_some())
         .chunk_size(Some(4096));
-    let mut writer = options.create(Cursor::new(Vec::new())).expect("a writer");
+    let mut writer = options.create(Cursor::new(Vec::new())).unwrap();
     let mut channels = BTreeMap::new();
     for (topic, kind, received, data) in messages {
         let channel = *channels.entry(*topic).or_insert_with(|| {
-            let schema = writer.add_schema(kind, "ros2msg", b"").expect("a schema");
+            let schema = writer.add_schema(kind, "ros2msg", b"").unwrap();
             writer
                 .add_channel(schema, topic, "cdr", &BTreeMap::new())
-                .expect("a channel")
+                .unwrap()
         });
         let header = MessageHeader {
             channel_id: channel,
@@ -111,43 +111,41 @@ pub fn mcap(compression: Option<Compression>, messages: &[Message]) -> Vec<u8> {
             log_time: *received as u64,
             publish_time: 0,
         };
-        writer
-            .write_to_known_channel(&header, data)
-            .expect("a message");
+        writer.write_to_known_channel(&header, data).unwrap();
     }
-    writer.finish().expect("an end");
+    writer.finish().unwrap();
     writer.into_inner().into_inner()
 }
 
 /// A bag in SQLite, as the storage plugin of rosbag2 lays it out.
 pub fn db3(messages: &[Message]) -> Vec<u8> {
-    let file = tempfile::NamedTempFile::new().expect("a file");
-    let mut base = rusqlite::Connection::open(file.path()).expect("a database");
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let mut base = rusqlite::Connection::open(file.path()).unwrap();
     base.execute_batch(
         "CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,serialization_format TEXT NOT NULL,\
          offered_qos_profiles TEXT NOT NULL);
          CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, data BLOB NOT NULL);
          CREATE INDEX timestamp_idx ON messages (timestamp ASC);",
     )
-    .expect("tables");
+    .unwrap();
     let mut topics = BTreeMap::new();
-    let all = base.transaction().expect("a transaction");
+    let all = base.transaction().unwrap();
     for (topic, kind, received, data) in messages {
         let id = *topics.entry(*topic).or_insert_with(|| {
             all.execute(
                 "INSERT INTO topics(name,type,serialization_format,offered_qos_profiles) VALUES (?1,?2,'cdr','')",
                 (topic, kind),
             )
-            .expect("a topic");
+            .unwrap();
             all.last_insert_rowid()
         });
         all.execute(
             "INSERT INTO messages(topic_id,timestamp,data) VALUES (?1,?2,?3)",
             (id, received, data),
         )
-        .expect("a message");
+        .unwrap();
     }
-    all.commit().expect("a commit");
+    all.commit().unwrap();
     drop(base);
-    std::fs::read(file.path()).expect("bytes")
+    std::fs::read(file.path()).unwrap()
 }

@@ -2,7 +2,7 @@
 //!
 //! `CALIB_RECORDINGS=100 cargo test --release --test it -- compensate::concealed --nocapture` prints the whole table.
 
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, diagnose_reads, identify_reads, table};
 use calib::compensate::{
     CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, Coverage, IdentifiedArm,
     Scatter, Uncertainty,
@@ -11,7 +11,7 @@ use calib::description::RobotDescription;
 use calib::effect::Load;
 use calib::estimate::Model;
 use calib::robot::{JointConvention, RobotModel};
-use calib::stage::{Diagnose, DiagnoseReads, Identify, IdentifyReads};
+use calib::stage::{Diagnose, Identify};
 use calib::table::{
     CovarianceTable, Findings, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict,
 };
@@ -81,25 +81,22 @@ pub fn outcomes_at(
             .for_each(|joint| (joint.mass, joint.centre) = (None, None));
     }
     let table_of_robot = Robot::from_description(&robot);
-    let geometry: Identify =
-        serde_json::from_value(json!({"effects": GEOMETRY})).expect("settings");
-    let reads = IdentifyReads {
-        robot: table_of_robot.clone(),
-        recording: recording.clone(),
-        split: split.clone(),
-    };
+    let geometry: Identify = serde_json::from_value(json!({"effects": GEOMETRY})).unwrap();
     let tables = Desk::default()
-        .run(&geometry, reads)
-        .expect("an identification");
+        .run(
+            &geometry,
+            identify_reads(table_of_robot.clone(), recording.clone(), split.clone()),
+        )
+        .unwrap();
     let plain = IdentifiedArm::new(model(&robot, &table::<Parameters>(&tables).remove(0)), None);
 
-    let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
-    let reads = DiagnoseReads {
-        robot: table_of_robot,
-        recording: recording.clone(),
-        split,
-    };
-    let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+    let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
+    let tables = Desk::default()
+        .run(
+            &stage,
+            diagnose_reads(table_of_robot, recording.clone(), split),
+        )
+        .unwrap();
     let model = model(&robot, &table::<Parameters>(&tables).remove(0));
     let covariance = table::<CovarianceTable>(&tables).remove(0).of_model(&model);
     let verdict = table::<Verdict>(&tables).remove(0);
@@ -163,7 +160,7 @@ const GEOMETRY: [&str; 6] = [
 pub fn model(robot: &RobotDescription, parameters: &Parameters) -> Model {
     parameters
         .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
-        .expect("a model")
+        .unwrap()
 }
 
 pub fn split(case: &Case, recording: &Recording) -> Split {
@@ -231,7 +228,7 @@ pub fn targets(case: &Case) -> (Vec<Point>, Vec<bool>) {
         .robot
         .joints
         .iter()
-        .map(|joint| joint.limits.expect("limits").map(f64::to_degrees))
+        .map(|joint| joint.limits.unwrap().map(f64::to_degrees))
         .collect();
     let amount = |fit| Amount {
         fit,
@@ -249,7 +246,7 @@ pub fn targets(case: &Case) -> (Vec<Point>, Vec<bool>) {
         &case.climate,
         case.seed ^ 0xA5,
     )
-    .expect("poses");
+    .unwrap();
     let mut outside = plan(
         case.kind,
         &whole,
@@ -257,7 +254,7 @@ pub fn targets(case: &Case) -> (Vec<Point>, Vec<bool>) {
         &case.climate,
         case.seed ^ 0x5A,
     )
-    .expect("poses");
+    .unwrap();
     for (k, target) in inside.iter_mut().enumerate() {
         let shot = fitted[k * 7 % fitted.len()];
         (target.time_s, target.temperature_c) = (shot.time_s, shot.temperature_c);
@@ -400,7 +397,7 @@ fn a_correction_never_harms_unless_it_says_so() {
     };
     let mut all = Vec::new();
     for (number, content) in design.contents().into_iter().enumerate() {
-        let case = Case::make(&design, number, content).expect("a case");
+        let case = Case::make(&design, number, content).unwrap();
         let floor = case.noise_mm[0] * 3f64.sqrt();
         let (outcomes, named) = outcomes(&case);
         print(&case, floor, &outcomes, &named);
@@ -441,22 +438,10 @@ fn a_correction_never_harms_unless_it_says_so() {
 pub fn upright(seed: u64) -> Case {
     let case = nothing(seed, true);
     let mut draw = Noise::new(seed, Purpose::Design);
-    let limits: Vec<[f64; 2]> = case
-        .robot
-        .joints
-        .iter()
-        .map(|joint| joint.limits.expect("limits"))
-        .collect();
-    let arm = Arm::new(&case.robot, &case.truth);
-    let poses = Poses {
-        range_deg: Vec::new(),
-        floor_mm: 20.0,
-        clearance_mm: 150.0,
-        candidates: 1,
-    };
+    let (limits, room) = (limits(&case), Room::of(&case));
     let mut own = Noise::new(seed ^ 7, Purpose::Design);
     let q_of = |_: &Shot| loop {
-        let (mut q, _) = allowed(&arm, &poses, &limits, &mut own).expect("a pose");
+        let mut q = room.pose(&limits, &mut own);
         let turned = if own.chance(0.5) { 90.0f64 } else { -90.0 };
         q[3] = turned.to_radians() - q[1] - q[2];
         q[3] -= std::f64::consts::TAU * (q[3] / std::f64::consts::TAU).round();
@@ -481,6 +466,31 @@ pub fn upright(seed: u64) -> Case {
     again(case, effects, seed, q_of)
 }
 
+/// Of the joints, rad.
+pub fn limits(case: &Case) -> Vec<[f64; 2]> {
+    let joints = case.robot.joints.iter();
+    joints.map(|joint| joint.limits.unwrap()).collect()
+}
+
+/// Where an arm may be.
+pub struct Room(Arm, Poses);
+
+impl Room {
+    pub fn of(case: &Case) -> Self {
+        let poses = Poses {
+            range_deg: Vec::new(),
+            floor_mm: 20.0,
+            clearance_mm: 150.0,
+            candidates: 1,
+        };
+        Self(Arm::new(&case.robot, &case.truth), poses)
+    }
+
+    pub fn pose(&self, ranges: &[[f64; 2]], draw: &mut Noise) -> Vec<f64> {
+        allowed(&self.0, &self.1, ranges, draw).unwrap().0
+    }
+}
+
 /// A desktop arm with nothing concealed, unless without masses.
 pub fn nothing(seed: u64, bare: bool) -> Case {
     let design = Design {
@@ -496,7 +506,7 @@ pub fn nothing(seed: u64, bare: bool) -> Case {
     Case {
         hidden: [Column::Current].into(),
         tampered: Vec::new(),
-        ..Case::make(&design, 0, Content::Null).expect("a case")
+        ..Case::make(&design, 0, Content::Null).unwrap()
     }
 }
 

@@ -4,7 +4,7 @@
 use super::ROBOT;
 use super::maker::{Maker, PLAIN, makers, ran, recorded};
 use super::true_error::Cell;
-use calib::robot::import::{RobotFileText, read_calib};
+use crate::fixture::robot_of;
 use calib::table::{CovarianceTable, Parameters, from_file};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -22,7 +22,7 @@ fn listed(text: &str) -> ControllerList {
         let cells: Vec<&str> = line.split(',').collect();
         (
             (cells[0].to_string(), cells[1].to_string()),
-            (cells[2].parse().expect("a number"), cells[4].parse().ok()),
+            (cells[2].parse().unwrap(), cells[4].parse().ok()),
         )
     };
     rows.map(row).collect()
@@ -90,10 +90,10 @@ fn counted(maker: &Maker, own: &ControllerList) -> ControllerList {
 /// Each number by a unit of each parameter, and the parameters' covariance (deg): what sigma has to be.
 fn sigmas(maker: &Maker, tables: &Path) -> BTreeMap<(String, String), f64> {
     let parameters = from_file::<Parameters>(&tables.join("identify.parameters.parquet"))
-        .expect("parameters")
+        .unwrap()
         .table;
     let covariance = from_file::<CovarianceTable>(&tables.join("identify.covariance.parquet"))
-        .expect("a covariance")
+        .unwrap()
         .table;
     let none = counted(maker, &ControllerList::new());
     let mut by: BTreeMap<String, ControllerList> = BTreeMap::new();
@@ -131,15 +131,7 @@ fn sigmas(maker: &Maker, tables: &Path) -> BTreeMap<(String, String), f64> {
 fn numbers_for_the_controller_move_its_joints_as_the_model_does() {
     let text = ROBOT.to_string()
         + "couplings:\n  - {moved: 3, by: 2}\n  - {moved: 6, by: 5}\n  - {moved: 4, by: 1}\n";
-    let robot = read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: &text,
-        },
-        None,
-    )
-    .expect("a robot")
-    .robot;
+    let robot = robot_of(&text);
     let cell = Cell::of(robot, 1.2, [100.0, 200.0], Vec::new());
     let points = cell.points(60, &[0.0], 5);
     let stages = "  - uses: identify\n    with: {on: [fit], effects: [base_frame, tool_offset, joint_offset, link_geometry, reduction_ratio, coupling_ratio]}\n";
@@ -155,20 +147,16 @@ fn numbers_for_the_controller_move_its_joints_as_the_model_does() {
         .chain([PLAIN])
     {
         let folder = recorded(&maker, &cell, &points, &text, stages);
-        let export = |model: &[&str]| {
+        let export = |model: &str| {
             listed(&ran(
                 folder.path(),
-                &[&["export", "--format", "controller", "--quiet"], model].concat(),
+                &format!("export --format controller --quiet {model}"),
                 "",
             ))
         };
-        let list = export(&["latest"]);
+        let list = export("latest");
         // A table of parameters alone does not know the controller: its numbers are in the robot file's counting.
-        let own = export(&[
-            ".calib/tables/counted/identify.parameters.parquet",
-            "--robot",
-            "robot.yaml",
-        ]);
+        let own = export(".calib/tables/counted/identify.parameters.parquet --robot robot.yaml");
         let mut apart = 0f64;
         for k in 0..200 {
             let q: Vec<f64> = (0..6)

@@ -1,17 +1,18 @@
 //! One counting: a controller that counts its joints otherwise than the robot file gets commands as it counts them. The same simulated robot
 //! is recorded, identified and compensated under every convention; where it really goes is the same to a micrometre.
 
+use super::ROBOT;
 use super::maker::{IDENTIFY, Maker, PLAIN, makers, ran, recorded};
-use super::sides::confdata;
+use super::round_trip::{driven, pose, read};
+use super::sides::{confdata, krl, rapid, turn};
 use super::true_error::Cell;
-use super::{ROBOT, calib};
-use calib::compensate::{Nominal, ToolGoal, least_change, turns};
+use crate::answer::{fed, put};
+use crate::fixture::robot_of;
+use calib::program::{Language, Literal};
 use calib::robot::RobotModel;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
 use calib::twin::plan::Point;
-use nalgebra::{Matrix3, Rotation3, Vector3};
-use std::path::Path;
+use nalgebra::{Rotation3, UnitQuaternion};
 
 /// How far (mm) the true robot is with each command from where it was wanted, in the base as it was identified.
 fn misses(cell: &Cell, base: &Pose, wanted: &[Point], commands: &[Vec<f64>]) -> Vec<f64> {
@@ -42,253 +43,144 @@ fn compensated(
 ) -> Vec<(&'static str, Vec<f64>)> {
     let folder = recorded(maker, cell, points, ROBOT, IDENTIFY);
     let here = folder.path();
-    let numbers = |q: &[f64]| {
-        maker
-            .counted(q)
-            .iter()
-            .map(|c| format!("{c:.9}"))
-            .collect::<Vec<_>>()
-            .join(",")
-    };
-    let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg";
     let robot = RobotModel::new(cell.robot.clone());
-    let lines: String = targets
-        .iter()
-        .map(|target| numbers(&target.q) + "\n")
-        .collect();
-    let table = ran(
-        here,
-        &["compensate", "latest", "--plain"],
-        &format!("{header}\n{lines}"),
-    );
-    let said = said(here, &format!("{header}\n{lines}"));
+    let each = |of: &dyn Fn(&Point) -> String| targets.iter().map(of).collect::<String>();
+    let counted = |target: &Point| -> Vec<String> {
+        let numbers = maker.counted(&target.q).into_iter();
+        numbers.map(|number| format!("{number:.9}")).collect()
+    };
+    let list = |target: &Point| counted(target).join(",");
+    let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg";
+    let input = format!("{header}\n{}", each(&|target| list(target) + "\n"));
+    let table = ran(here, "compensate latest --plain", &input);
+    let said = fed(here, "compensate latest", &input).err;
     assert_eq!(
         said.contains("joints are counted as at the controller: "),
         maker.name != PLAIN.name,
         "{said}"
     );
-    let poses: String = targets
-        .iter()
-        .map(|target| {
-            let pose = robot.forward(&target.q);
-            let turn = nalgebra::UnitQuaternion::from_matrix(&pose.rotation);
-            let place: Vec<String> = pose
-                .translation
-                .iter()
-                .map(|x| format!("{:.9}", x * 1e3))
-                .collect();
-            format!(
-                "{},{},{:.12},{:.12},{:.12},{:.12}\n",
-                numbers(&target.q),
-                place.join(","),
-                turn.w,
-                turn.i,
-                turn.j,
-                turn.k
-            )
-        })
-        .collect();
+    let posed = each(&|target| {
+        let pose = robot.forward(&target.q);
+        let turn = UnitQuaternion::from_matrix(&pose.rotation);
+        let [x, y, z]: [f64; 3] = (pose.translation * 1e3).into();
+        let (w, i, j, k) = (turn.w, turn.i, turn.j, turn.k);
+        let joints = list(target);
+        format!("{joints},{x:.9},{y:.9},{z:.9},{w:.12},{i:.12},{j:.12},{k:.12}\n")
+    });
     let poses = ran(
         here,
-        &["compensate", "latest", "--plain", "--target", "pose"],
-        &format!("{header},x_mm,y_mm,z_mm,qw,qx,qy,qz\n{poses}"),
+        "compensate latest --plain --target pose",
+        &format!("{header},x_mm,y_mm,z_mm,qw,qx,qy,qz\n{posed}"),
     );
-    let six = |q: &[f64]| {
-        maker
-            .counted(q)
-            .iter()
-            .map(|c| format!("{c:.9}"))
-            .collect::<Vec<_>>()
-    };
-    let krl: String = targets
-        .iter()
-        .map(|target| {
-            let named = six(&target.q)
-                .iter()
-                .zip(1..)
-                .map(|(c, j)| format!("A{j} {c}"))
-                .collect::<Vec<_>>();
-            format!("PTP {{{}}}\n", named.join(","))
-        })
-        .collect();
-    std::fs::write(here.join("t.src"), krl).expect("a file");
-    let krl = ran(here, &["compensate", "latest", "t.src"], "");
-    let rapid: String = targets
-        .iter()
-        .map(|target| {
-            format!(
-                "MoveAbsJ [[{}],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\n",
-                six(&target.q).join(",")
-            )
-        })
-        .collect();
-    std::fs::write(here.join("t.mod"), format!("MODULE m\n{rapid}ENDMODULE\n")).expect("a file");
-    let rapid = ran(here, &["compensate", "latest", "t.mod"], "");
-
-    let cartesian: Vec<(Vec<f64>, [f64; 3], nalgebra::UnitQuaternion<f64>)> = targets
-        .iter()
-        .map(|target| {
-            let pose = robot.forward(&target.q);
-            (
-                maker.counted(&target.q),
-                (pose.translation * 1e3).into(),
-                nalgebra::UnitQuaternion::from_matrix(&pose.rotation),
-            )
-        })
-        .collect();
-    let krl_poses: String = cartesian
-        .iter()
-        .map(|(counted, [x, y, z], turn)| {
-            let (c, b, a) = turn.euler_angles();
-            let [a, b, c] = [a, b, c].map(|angle: f64| format!("{:.9}", angle.to_degrees()));
-            let turn: u32 = (0..6)
-                .filter(|joint| counted[*joint] < 0.0)
-                .map(|joint| 1 << joint)
-                .sum();
-            format!("LIN {{X {x:.6},Y {y:.6},Z {z:.6},A {a},B {b},C {c},T {turn}}}\n")
-        })
-        .collect();
-    std::fs::write(here.join("poses.src"), krl_poses).expect("a file");
-    let krl_poses = ran(here, &["compensate", "latest", "poses.src"], "");
-    let rapid_poses: String = cartesian
-        .iter()
-        .map(|(counted, [x, y, z], turn)| {
-            let q = format!("{:.10},{:.10},{:.10},{:.10}", turn.w, turn.i, turn.j, turn.k);
-            let [one, four, six, cfx] = confdata(maker, &maker.driven(counted));
-            format!("MoveL [[{x:.6},{y:.6},{z:.6}],[{q}],[{one},{four},{six},{cfx}],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\n")
-        })
-        .collect();
-    std::fs::write(
-        here.join("poses.mod"),
-        format!("MODULE m\n{rapid_poses}ENDMODULE\n"),
-    )
-    .expect("a file");
-    let rapid_poses = ran(here, &["compensate", "latest", "poses.mod"], "");
-
-    let listed = |text: &str, start: &str, end: &str| -> Vec<Vec<f64>> {
-        let number = |part: &str| part.trim().trim_start_matches('A').to_string();
-        text.lines()
-            .filter_map(|line| line.split_once(start))
-            .filter_map(|(_, rest)| rest.split_once(end))
-            .map(|(list, _)| {
-                let parts = list
-                    .split(',')
-                    .map(|part| number(part.rsplit(' ').next().unwrap_or(part)));
-                parts.map(|part| part.parse().expect("a number")).collect()
-            })
-            .collect()
-    };
     let rows = |text: &str| -> Vec<Vec<f64>> {
-        text.lines()
-            .skip(1)
-            .map(|line| {
-                line.split(',')
-                    .take(6)
-                    .map(|c| c.parse().expect("a number"))
-                    .collect()
-            })
-            .collect()
+        let six = |line: &str| {
+            line.split(',')
+                .take(6)
+                .map(|c| c.parse().unwrap())
+                .collect()
+        };
+        text.lines().skip(1).map(six).collect()
     };
-    let document: serde_json::Value = serde_json::from_str(&ran(
-        here,
-        &["export", "latest", "--format", "json", "--quiet"],
-        "",
-    ))
-    .expect("JSON");
-    let three = |name: &str| -> [f64; 3] {
-        serde_json::from_value(document["base_in_tracker"][name].clone()).expect("three numbers")
+    let program = |name: &str, language: Language, text: String| -> Vec<Literal> {
+        put(here, name, text);
+        let written = ran(here, &format!("compensate latest {name}"), "");
+        read(language, written.as_bytes())
     };
-    let turn = Rotation3::new(three("rotation_vector_rad").into()).into_inner();
-    let base = Pose::new(turn, three("point_m").into());
-    let before: Vec<Vec<f64>> = targets
+    let module = |text: String| format!("MODULE m\n{text}ENDMODULE\n");
+    let by_joints = [
+        (
+            "KRL",
+            "t.src",
+            Language::Krl,
+            each(&|target| {
+                let named = counted(target).into_iter().zip(1..);
+                let named = named.map(|(c, j)| format!("A{j} {c}")).collect::<Vec<_>>();
+                format!("PTP {{{}}}\n", named.join(","))
+            }),
+        ),
+        (
+            "RAPID",
+            "t.mod",
+            Language::Rapid,
+            module(each(&|target| {
+                format!(
+                    "MoveAbsJ [[{}],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\n",
+                    list(target)
+                )
+            })),
+        ),
+    ];
+    let by_joints = by_joints.map(|(output, name, language, text)| {
+        let targets = program(name, language, text).into_iter();
+        (output, targets.map(|target| target.values).collect())
+    });
+    let before = targets
         .iter()
         .map(|target| maker.counted(&target.q))
         .collect();
-    let outputs = [
+    let joints = [
         ("uncorrected", before),
         ("table of joints", rows(&table)),
         ("table of poses", rows(&poses)),
-        ("KRL", listed(&krl, "{", "}")),
-        ("RAPID", listed(&rapid, "[[", "]")),
     ];
-    let joints = outputs.map(|(output, commands)| {
-        (
-            output,
-            commands
+    let joints = joints
+        .into_iter()
+        .chain(by_joints)
+        .map(|(output, commands)| {
+            let driven: Vec<Vec<f64>> = commands
                 .iter()
                 .map(|numbers| maker.driven(numbers))
-                .collect(),
-        )
-    });
+                .collect();
+            (output, driven)
+        });
     // A controller that believes in the robot file drives to a pose from where it is near.
-    let driven = |poses: Vec<(Matrix3<f64>, [f64; 3])>| -> Vec<Vec<f64>> {
-        let near = |((rotation, place), target): ((Matrix3<f64>, [f64; 3]), &Point)| {
-            let goal = ToolGoal {
-                pose: Pose::new(rotation, Vector3::from(place) * 1e-3),
-                oriented: true,
-            };
-            let found = least_change(&mut Nominal::new(&robot), &goal, &target.q, &target.q);
-            assert!(found.residual < 1e-6, "{}", found.residual);
-            found.q
-        };
-        poses.into_iter().zip(targets).map(near).collect()
-    };
-    let of_krl = |numbers: Vec<f64>| {
-        let [a, b, c] = [3, 4, 5].map(|k| numbers[k].to_radians());
-        (turns(a, b, c), [numbers[0], numbers[1], numbers[2]])
-    };
-    let of_rapid = |numbers: Vec<f64>| {
-        let turn = nalgebra::Quaternion::new(numbers[3], numbers[4], numbers[5], numbers[6]);
-        let turn = nalgebra::UnitQuaternion::from_quaternion(turn)
-            .to_rotation_matrix()
-            .into_inner();
-        (turn, [numbers[0], numbers[1], numbers[2]])
-    };
-    let poses = [
+    let by_poses = [
         (
             "KRL, poses",
-            driven(
-                listed(&krl_poses, "{", ",T")
-                    .into_iter()
-                    .map(of_krl)
-                    .collect(),
-            ),
+            "poses.src",
+            Language::Krl,
+            each(&|target| {
+                krl(
+                    &robot.forward(&target.q),
+                    &format!(",T {}", turn(maker, &target.q)),
+                )
+            }),
         ),
         (
             "RAPID, poses",
-            driven(
-                listed(&rapid_poses.replace("],[", ","), "[[", ",9E9")
-                    .into_iter()
-                    .map(of_rapid)
-                    .collect(),
-            ),
+            "poses.mod",
+            Language::Rapid,
+            module(each(&|target| {
+                rapid(&robot.forward(&target.q), confdata(maker, &target.q))
+            })),
         ),
     ];
-    joints
-        .into_iter()
-        .chain(poses)
-        .map(|(output, driven)| {
-            assert_eq!(driven.len(), targets.len(), "{output}");
-            (output, misses(cell, &base, targets, &driven))
-        })
-        .collect()
-}
-
-fn said(here: &Path, input: &str) -> String {
-    String::from_utf8(calib(here, &["compensate", "latest"], input).stderr).expect("UTF-8")
+    let by_poses = by_poses.map(|(output, name, language, text)| {
+        let written = program(name, language, text);
+        let near = written.iter().zip(targets);
+        (
+            output,
+            near.map(|(one, target)| driven(&robot, pose(one), &target.q))
+                .collect(),
+        )
+    });
+    let document: serde_json::Value =
+        serde_json::from_str(&ran(here, "export latest --format json --quiet", "")).unwrap();
+    let three = |name: &str| -> [f64; 3] {
+        serde_json::from_value(document["base_in_tracker"][name].clone()).unwrap()
+    };
+    let turn = Rotation3::new(three("rotation_vector_rad").into()).into_inner();
+    let base = Pose::new(turn, three("point_m").into());
+    let judged = joints.chain(by_poses).map(|(output, driven)| {
+        assert_eq!(driven.len(), targets.len(), "{output}");
+        (output, misses(cell, &base, targets, &driven))
+    });
+    judged.collect()
 }
 
 #[test]
 fn commands_are_counted_as_the_controller_counts() {
-    let robot = read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: ROBOT,
-        },
-        None,
-    )
-    .expect("a robot")
-    .robot;
+    let robot = robot_of(ROBOT);
     let cell = Cell::of(robot, 1.2, [100.0, 200.0], Vec::new());
     let points = cell.points(60, &[0.0], 5);
     let targets = cell.targets_by(20, &[0.0], 99);

@@ -1,40 +1,28 @@
 //! What is not a command says in which counting its joints stand: proposed poses, comparisons of runs, the report.
 
+use super::ROBOT;
 use super::maker::{Maker, PLAIN, makers, ran, recorded};
 use super::true_error::Cell;
-use super::{ROBOT, calib};
+use crate::answer::{calib, read};
+use crate::fixture::robot_of;
 use calib::poses::{Drive, write};
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::twin::effect::{JointCompliance, Physical};
 use std::path::Path;
 
 fn robot() -> RobotModel {
-    RobotModel::new(
-        read_calib(
-            RobotFileText {
-                label: "robot.yaml",
-                text: ROBOT,
-            },
-            None,
-        )
-        .expect("a robot")
-        .robot,
-    )
+    RobotModel::new(robot_of(ROBOT))
 }
 
 fn all_at_once() -> Maker {
-    makers().pop().expect("a maker")
+    makers().pop().unwrap()
 }
 
 /// Rows of a file of poses: joints (deg), sides, point (mm).
 fn poses(file: &Path) -> Vec<[Vec<f64>; 3]> {
-    let text = std::fs::read_to_string(file).expect("poses");
+    let text = read(file);
     let row = |line: &str| {
-        let cells: Vec<f64> = line
-            .split(',')
-            .map(|cell| cell.parse().expect("a number"))
-            .collect();
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
         [
             cells[1..7].to_vec(),
             cells[8..14].to_vec(),
@@ -46,7 +34,7 @@ fn poses(file: &Path) -> Vec<[Vec<f64>; 3]> {
 
 fn within_limits(robot: &RobotModel, q: &[f64]) {
     for (joint, q) in robot.description().joints.iter().zip(q) {
-        let [low, high] = joint.limits.expect("limits");
+        let [low, high] = joint.limits.unwrap();
         assert!(
             (low - 1e-12..=high + 1e-12).contains(q),
             "{}: {q} in {low} to {high}",
@@ -63,7 +51,7 @@ fn poses_in_the_controllers_counting_keep_the_joints_within_their_limits() {
         .description()
         .joints
         .iter()
-        .map(|joint| joint.limits.expect("limits"))
+        .map(|joint| joint.limits.unwrap())
         .collect();
     // Corners of the travel, where rounding can leave it, and poses within.
     let pose = |k: usize| -> Vec<f64> {
@@ -87,7 +75,7 @@ fn poses_in_the_controllers_counting_keep_the_joints_within_their_limits() {
         payload: vec![0.0; 200],
         ..Measurements::default()
     };
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("poses.csv");
     let drive = Drive {
         robot: robot.description(),
@@ -96,7 +84,7 @@ fn poses_in_the_controllers_counting_keep_the_joints_within_their_limits() {
         direction: &direction,
         convention: &convention,
     };
-    write(&file, &drive).expect("a file");
+    write(&file, &drive).unwrap();
     for (k, [numbers, sides, _]) in poses(&file).iter().enumerate() {
         let driven = maker.driven(numbers);
         within_limits(&robot, &driven);
@@ -130,24 +118,16 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         let difference = "sign [-1, 1, 1, -1, 1, -1], zero [10, -90, 90, 30, -45, 180] deg, joint 3 with -1 times joint 2, joint 6 with 0.5 times joint 5";
         let otherwise = maker.name != PLAIN.name;
 
-        let separate = [
-            "poses",
-            "--run",
-            "HEAD",
-            "--separate",
-            "1",
-            "link_compliance@link 2",
-        ];
-        let few = ["--count", "12", "--candidates", "100", "--out", "poses.csv"];
-        let text = ran(here, &[&separate[..], &few].concat(), "");
+        let separate = "poses --run HEAD --separate 1 'link_compliance@link 2'";
+        let few = "--count 12 --candidates 100 --out poses.csv";
+        let text = ran(here, &format!("{separate} {few}"), "");
         let sentence = format!(
             "joints and directions of the poses are counted as at the controller: {difference}\n"
         );
         assert_eq!(text.contains(&sentence), otherwise, "{text}");
         assert_eq!(text.contains("counted as"), otherwise, "{text}");
         let document: serde_json::Value =
-            serde_json::from_str(&ran(here, &[&separate[..], &few, &["--json"]].concat(), ""))
-                .expect("JSON");
+            serde_json::from_str(&ran(here, &format!("{separate} {few} --json"), "")).unwrap();
         let counting = if otherwise {
             format!("controller: {difference}")
         } else {
@@ -156,9 +136,7 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         assert_eq!(document["counting"], counting.as_str());
         let rows = poses(&here.join("poses.csv"));
         assert_eq!(rows.len(), 12);
-        for ([numbers, _, point], object) in rows
-            .iter()
-            .zip(document["poses"].as_array().expect("poses"))
+        for ([numbers, _, point], object) in rows.iter().zip(document["poses"].as_array().unwrap())
         {
             assert_eq!(object["q3_deg"].as_f64(), Some(numbers[2]));
             let driven = maker.driven(numbers);
@@ -180,46 +158,40 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         let tables = ["latest/ingest/recording", "latest/ingest/recording"]
             .map(|name| name.replace("latest", "HEAD"));
         for pair in [["HEAD", "HEAD"], [tables[0].as_str(), tables[1].as_str()]] {
-            let text = ran(here, &["diff", pair[0], pair[1]], "");
+            let text = ran(here, &format!("diff {} {}", pair[0], pair[1]), "");
             assert_eq!(
                 text.lines().filter(|line| **line == said).count(),
                 usize::from(otherwise),
                 "{text}"
             );
             assert_eq!(text.contains("counting"), otherwise, "{text}");
-            let document: serde_json::Value =
-                serde_json::from_str(&ran(here, &["diff", pair[0], pair[1], "--json"], ""))
-                    .expect("JSON");
+            let document: serde_json::Value = serde_json::from_str(&ran(
+                here,
+                &format!("diff {} {} --json", pair[0], pair[1]),
+                "",
+            ))
+            .unwrap();
             assert_eq!(
                 document["counting"].as_str(),
                 otherwise.then_some(said.as_str())
             );
         }
-        let parameters = String::from_utf8(
-            calib(
-                here,
-                &[
-                    "diff",
-                    "HEAD/diagnose/parameters",
-                    "HEAD/diagnose/parameters",
-                ],
-                "",
-            )
-            .stdout,
-        );
+        let parameters = calib(
+            here,
+            "diff HEAD/diagnose/parameters HEAD/diagnose/parameters",
+        )
+        .out;
         assert!(
-            !parameters.expect("UTF-8").contains("counting"),
+            !parameters.contains("counting"),
             "joints are said of where they stand"
         );
 
-        let page = std::fs::read_to_string(here.join(".calib/documents/counted/report.html"))
-            .expect("a page");
+        let page = read(here.join(".calib/documents/counted/report.html"));
         let sentence = "Zeros, ratios and couplings of joints stand in the robot file&#x27;s counting; the controller counts otherwise";
         assert_eq!(page.matches(sentence).count(), usize::from(otherwise));
-        let report = std::fs::read_to_string(here.join(".calib/documents/counted/report.json"))
-            .expect("a document");
-        let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
-        let counting = report["parameters_counting"].as_str().expect("a text");
+        let report = read(here.join(".calib/documents/counted/report.json"));
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+        let counting = report["parameters_counting"].as_str().unwrap();
         assert_eq!(
             (
                 counting.starts_with("robot file"),

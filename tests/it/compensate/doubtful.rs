@@ -2,14 +2,16 @@
 //! instrument leaves open; such points are counted and named. A small finding beyond its range is none, and harms no target in silence.
 
 use super::concealed::{
-    Outcome, again, is_harmed, model, nothing, outcomes_at, recording, split, targets, upright,
+    Outcome, Room, again, is_harmed, limits, model, nothing, outcomes_at, recording, split,
+    targets, upright,
 };
-use crate::desk::{Desk, table};
+use super::true_error::physics;
+use crate::answer::has;
+use crate::desk::{Desk, diagnose_reads, table};
 use calib::compensate::{Chain, Circumstance, IdentifiedArm, Nominal};
 use calib::robot::{Posture, RobotModel};
-use calib::stage::{Diagnose, DiagnoseReads, Labelled, Validate, ValidateReads};
+use calib::stage::{Diagnose, Labelled, Validate, ValidateReads};
 use calib::table::{Parameters, Prediction, Robot, Statistics, StatisticsRow, Verdict};
-use calib::twin::arm::Arm;
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::points::FIT;
 use calib::twin::effect::{
@@ -17,7 +19,6 @@ use calib::twin::effect::{
 };
 use calib::twin::effect::{JointCompliance, JointHardening, Physical};
 use calib::twin::noise::{Noise, Purpose};
-use calib::twin::plan::{Poses, allowed};
 use calib::twin::recorder::Shot;
 use serde_json::json;
 
@@ -25,13 +26,13 @@ use serde_json::json;
 fn judged(case: &Case) -> (Verdict, Prediction, StatisticsRow) {
     let recording = recording(case);
     let split = split(case, &recording);
-    let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
-    let reads = DiagnoseReads {
-        robot: Robot::from_description(&case.robot),
-        recording,
-        split,
-    };
-    let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+    let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
+    let tables = Desk::default()
+        .run(
+            &stage,
+            diagnose_reads(Robot::from_description(&case.robot), recording, split),
+        )
+        .unwrap();
     let prediction = table::<Prediction>(&tables).remove(0);
     let labelled = Labelled {
         stage: "diagnose".into(),
@@ -41,15 +42,13 @@ fn judged(case: &Case) -> (Verdict, Prediction, StatisticsRow) {
         prediction: vec![labelled],
         observability: Vec::new(),
     };
-    let stated = Desk::default()
-        .run(&Validate::default(), reads)
-        .expect("statistics");
+    let stated = Desk::default().run(&Validate::default(), reads).unwrap();
     let held_out = table::<Statistics>(&stated)
         .remove(0)
         .0
         .into_iter()
         .find(|row| row.held_out)
-        .expect("held-out rows");
+        .unwrap();
     (table::<Verdict>(&tables).remove(0), prediction, held_out)
 }
 
@@ -64,7 +63,7 @@ fn counted(case: &Case) -> Vec<Option<String>> {
         .collect();
     let remarked = remarks.iter().flatten().count();
     assert_eq!(held_out.remarked, Some(remarked as i64));
-    let statement = verdict.0[0].statement.clone().expect("a statement");
+    let statement = verdict.0[0].statement.clone().unwrap();
     println!("{statement}\n{:?}", held_out.doubts());
     assert_eq!(remarked > 0, held_out.doubts().is_some());
     assert_eq!(
@@ -90,7 +89,7 @@ fn unharmed(case: &Case) -> Vec<Outcome> {
 #[test]
 fn a_zero_that_wanders_leaves_most_corrections_without_doubt_later() {
     let case = nothing(41, false);
-    let last = case.shots.last().expect("rows").time_s;
+    let last = case.shots.last().unwrap().time_s;
     let course = ForeignCourse {
         over: ForeignVariable::Time,
         between: [0.0, last],
@@ -120,7 +119,7 @@ fn what_depends_on_motor_currents_is_refused_to_targets_that_state_none() {
     let mut case = upright(500);
     case.hidden.clear();
     let (outcomes, named) = outcomes_at(&case, targets(&case));
-    assert!(named.contains("joint_compliance"), "{named}");
+    has(&named, "joint_compliance");
     assert!(
         outcomes.iter().all(|one| one.refused && one.remarked),
         "{named}"
@@ -130,19 +129,7 @@ fn what_depends_on_motor_currents_is_refused_to_targets_that_state_none() {
 #[test]
 fn loads_on_the_other_side_than_was_fitted_harm_no_target() {
     let case = nothing(43, false);
-    let limits: Vec<[f64; 2]> = case
-        .robot
-        .joints
-        .iter()
-        .map(|joint| joint.limits.expect("limits"))
-        .collect();
-    let arm = Arm::new(&case.robot, &case.truth);
-    let poses = Poses {
-        range_deg: Vec::new(),
-        floor_mm: 20.0,
-        clearance_mm: 150.0,
-        candidates: 1,
-    };
+    let (limits, room) = (limits(&case), Room::of(&case));
     let mut draw = Noise::new(43, Purpose::Design);
     // The arm leans forward in fitted rows, backward in the others.
     let lean = |shot: &Shot| {
@@ -155,20 +142,12 @@ fn loads_on_the_other_side_than_was_fitted_harm_no_target() {
         let mut ranges = limits.clone();
         ranges[1] = [limits[1][0].max(low), limits[1][1].min(high)];
         ranges[2] = [-10f64, 10.0].map(f64::to_radians);
-        allowed(&arm, &poses, &ranges, &mut draw).expect("a pose").0
+        room.pose(&ranges, &mut draw)
     };
-    let effects = vec![
-        Physical::JointCompliance(JointCompliance {
-            joint: 2,
-            rad_per_nm: 6e-6,
-        }),
-        Physical::JointHardening(JointHardening {
-            joint: 2,
-            curve: Curve::Tanh,
-            amplitude_arcsec: 80.0,
-            scale_nm: 12.0,
-        }),
-    ];
+    let effects = physics(
+        "[{joint_compliance: {joint: 2, rad_per_nm: 6.0e-6}}, \
+         {joint_hardening: {joint: 2, curve: tanh, amplitude_arcsec: 80, scale_nm: 12}}]",
+    );
     let case = again(case.clone(), effects, 43, lean);
     counted(&case);
     unharmed(&case);
@@ -185,27 +164,13 @@ fn asked_beyond_small_loads(
 ) -> [usize; 3] {
     let case = nothing(seed, false);
     let robot = RobotModel::new(case.robot.clone());
-    let limits: Vec<[f64; 2]> = case
-        .robot
-        .joints
-        .iter()
-        .map(|joint| joint.limits.expect("limits"))
-        .collect();
-    let arm = Arm::new(&case.robot, &case.truth);
-    let poses = Poses {
-        range_deg: Vec::new(),
-        floor_mm: 20.0,
-        clearance_mm: 150.0,
-        candidates: 1,
-    };
+    let (limits, room) = (limits(&case), Room::of(&case));
     let mut draw = Noise::new(seed, Purpose::Design);
     let load = |q: &[f64]| Posture::as_stated(&robot, q, 0.0).torque[1].abs();
-    let drawn: Vec<Vec<f64>> = (0..200)
-        .map(|_| allowed(&arm, &poses, &limits, &mut draw).expect("a pose").0)
-        .collect();
+    let drawn: Vec<Vec<f64>> = (0..200).map(|_| room.pose(&limits, &mut draw)).collect();
     let most = drawn.iter().map(|q| load(q)).fold(0.0, f64::max);
     let pose = |shot: &Shot| loop {
-        let (q, _) = allowed(&arm, &poses, &limits, &mut draw).expect("a pose");
+        let q = room.pose(&limits, &mut draw);
         if (load(&q) < most / 3.0) == (shot.block == FIT) {
             return q;
         }
@@ -226,13 +191,13 @@ fn asked_beyond_small_loads(
     let recording = recording(&case);
     let data = recording.measurements();
     let split = split(&case, &recording);
-    let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
-    let reads = DiagnoseReads {
-        robot: Robot::from_description(&case.robot),
-        recording,
-        split,
-    };
-    let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+    let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
+    let tables = Desk::default()
+        .run(
+            &stage,
+            diagnose_reads(Robot::from_description(&case.robot), recording, split),
+        )
+        .unwrap();
     let arm = IdentifiedArm::new(
         model(&case.robot, &table::<Parameters>(&tables).remove(0)),
         None,

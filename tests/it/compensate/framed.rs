@@ -1,10 +1,11 @@
 //! Programs with several frames and tools: every target stands in the frame, and is reached with the tool, that is in force where it is moved
 //! to. The true robot goes to the same points as with the targets stated as joints.
 
+use super::cell;
 use super::maker::{Maker, PLAIN, makers};
 use super::round_trip::{Trip, pose, read};
 use super::sides::{confdata, krl, poses, rapid, status, turn};
-use super::{calib, cell};
+use crate::answer::{calib, has};
 use calib::compensate::turns;
 use calib::program::{Companion, Language, RobotTool};
 use calib::spatial::Pose;
@@ -228,7 +229,7 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
         makers()
             .into_iter()
             .find(|maker| maker.name == name)
-            .expect("a maker")
+            .unwrap()
     };
     for maker in [PLAIN, of("KUKA"), of("signs 1, 4, 6"), of("zeros")] {
         let targets = targets(&trip, &maker);
@@ -246,9 +247,7 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
             .iter()
             .map(|q| format!("PTP {{{}}}\n", joints(q)))
             .collect();
-        let own = trip
-            .compensated(&maker, Language::Krl, &joints)
-            .expect("corrected");
+        let own = trip.compensated(&maker, Language::Krl, &joints).unwrap();
         let own: Vec<Vec<f64>> = read(Language::Krl, &own.bytes)
             .iter()
             .map(|one| maker.driven(&one.values))
@@ -267,7 +266,7 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
             } else {
                 "own"
             })
-            .expect("a tool");
+            .unwrap();
             let written = trip.compensated_by(&maker, language, &text, &companions, Some(tool));
             let written =
                 written.unwrap_or_else(|refused| panic!("{} {name}: {refused}", maker.name));
@@ -294,13 +293,13 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
 
 #[test]
 fn files_beside_a_program_are_read_with_it_in_capitals_too() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::create_dir_all(here.join("R1/Program"))
         .and_then(|()| std::fs::create_dir_all(here.join("R1/System")))
-        .expect("folders");
+        .unwrap();
     let at = |name: &str| here.join("R1").join(name);
-    let write = |name: &str, text: &str| std::fs::write(at(name), text).expect("a file");
+    let write = |name: &str, text: &str| std::fs::write(at(name), text).unwrap();
     write(
         "System/$CONFIG.DAT",
         "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n",
@@ -314,49 +313,34 @@ fn files_beside_a_program_are_read_with_it_in_capitals_too() {
         "DEFDAT WELD\nDECL E6POS XP1={X 600,Y 0,Z 430,A 0,B 0,C 0}\nDECL FDAT FP1={TOOL_NO 2,BASE_NO 3,IPO_FRAME #BASE}\nENDDAT\n",
     );
     let program = at("Program/Weld.dat").display().to_string();
-    let run = |more: &[&str]| {
-        let output = calib(
-            cell(),
-            &[&["compensate", "latest", program.as_str()], more].concat(),
-            "",
-        );
-        let [out, err] =
-            [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
-        (output.status.code(), out, err)
-    };
-    let (code, _, err) = run(&[]);
+    let run = |more: &str| calib(cell(), &format!("compensate latest {program} {more}")).parts();
+    let (code, _, err) = run("");
     assert_eq!(code, Some(0), "{err}");
-    assert!(
-        err.contains("read with the program: ")
-            && err.contains("WELD.SRC")
-            && err.contains("$CONFIG.DAT"),
-        "{err}"
+    has(&err, ["read with the program: ", "WELD.SRC", "$CONFIG.DAT"]);
+    has(
+        &err,
+        ["BASE_DATA[3] by FP1 at", "is applied, in the robot's base"],
     );
-    assert!(
-        err.contains("BASE_DATA[3] by FP1 at") && err.contains("is applied, in the robot's base"),
-        "{err}"
-    );
-    assert!(
-        err.contains("the tool TOOL_DATA[2] is taken as the robot file's"),
-        "{err}"
-    );
-    std::fs::remove_file(at("System/$CONFIG.DAT")).expect("removed");
-    let (code, out, err) = run(&[]);
+    has(&err, "the tool TOOL_DATA[2] is taken as the robot file's");
+    std::fs::remove_file(at("System/$CONFIG.DAT")).unwrap();
+    let (code, out, err) = run("");
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-    assert!(
-        err.contains("Weld.dat:2:")
-            && err.contains("BASE_DATA[3], which no file that was read declares"),
-        "{err}"
+    has(
+        &err,
+        [
+            "Weld.dat:2:",
+            "BASE_DATA[3], which no file that was read declares",
+        ],
     );
     write(
         "frames.dat",
         "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n",
     );
-    let (code, _, err) = run(&["--with", &at("frames.dat").display().to_string()]);
+    let (code, _, err) = run(&format!("--with {}", at("frames.dat").display()));
     assert_eq!(code, Some(0), "{err}");
-    let (code, _, err) = run(&["--tool", "1,2"]);
+    let (code, _, err) = run("--tool 1,2");
     assert_eq!(code, Some(2), "{err}");
-    assert!(err.contains("--tool: expected the name of a tool"), "{err}");
+    has(&err, "--tool: expected the name of a tool");
 }
 
 #[test]
@@ -376,10 +360,10 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
         text: config.as_bytes(),
     }];
     let run = |text: &str, tool: Option<&str>| {
-        let tool = tool.map(|tool| RobotTool::parse(tool).expect("a tool"));
+        let tool = tool.map(|tool| RobotTool::parse(tool).unwrap());
         trip.compensated_by(&PLAIN, Language::Krl, text, &config, tool)
     };
-    let one = run(&text(&["BAS(#TOOL,1)"]), None).expect("corrected");
+    let one = run(&text(&["BAS(#TOOL,1)"]), None).unwrap();
     assert!(
         one.warnings.iter().any(|note| note
             .message
@@ -388,18 +372,20 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
         one.warnings
     );
     let refused = run(&text(&["BAS(#TOOL,2)"]), None).expect_err("another tool");
-    assert!(
-        refused.contains("the tool stands 65.6 mm from axis 6, the robot file's 50.0 mm"),
-        "{refused}"
+    has(
+        &refused,
+        "the tool stands 65.6 mm from axis 6, the robot file's 50.0 mm",
     );
     let two = text(&["BAS(#TOOL,1)", "BAS(#TOOL,2)"]);
     let refused = run(&two, None).expect_err("two tools");
-    assert!(
-        refused.contains("program:6:")
-            && refused.contains("--tool says which of them is the robot file's"),
-        "{refused}"
+    has(
+        &refused,
+        [
+            "program:6:",
+            "--tool says which of them is the robot file's",
+        ],
     );
-    let by_number = run(&two, Some("1")).expect("corrected");
+    let by_number = run(&two, Some("1")).unwrap();
     let far = |note: &calib::program::Note| {
         note.line == 6 && note.message.contains("its tool stands 172.9 mm")
     };
@@ -413,7 +399,7 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
         "END\n",
         "BAS(#TOOL,2)\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nEND\n",
     );
-    let joints = run(&joints, Some("1")).expect("corrected").warnings;
+    let joints = run(&joints, Some("1")).unwrap().warnings;
     assert!(
         joints.iter().any(|note| note
             .message
@@ -423,23 +409,19 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
     let by_frame = numbers(&own_tool(&trip))
         .map(|number| format!("{number:.9}"))
         .join(",");
-    assert_eq!(
-        run(&two, Some(&by_frame)).expect("corrected").bytes,
-        by_number
-    );
+    assert_eq!(run(&two, Some(&by_frame)).unwrap().bytes, by_number);
     let refused = run(&two, Some("7")).expect_err("no such tool");
-    assert!(
-        refused.contains("TOOL_DATA[7]")
-            && refused.contains("declared: TOOL_DATA[1], TOOL_DATA[2]"),
-        "{refused}"
+    has(
+        &refused,
+        ["TOOL_DATA[7]", "declared: TOOL_DATA[1], TOOL_DATA[2]"],
     );
     let refused = run(&text(&["BAS(#TOOL,1)", "BAS(#TOOL,9)"]), Some("1"))
         .expect_err("a tool without a frame");
-    assert!(
-        refused.contains("TOOL_DATA[9], whose frame no file that was read declares"),
-        "{refused}"
+    has(
+        &refused,
+        "TOOL_DATA[9], whose frame no file that was read declares",
     );
-    let none = run(&text(&[""]), None).expect("corrected");
+    let none = run(&text(&[""]), None).unwrap();
     assert!(
         none.warnings
             .iter()

@@ -2,24 +2,19 @@
 
 use super::maker::{PLAIN, recorded};
 use super::true_error::Cell;
-use super::{PIPELINE, ROBOT, calib, cell};
-use calib::robot::import::{RobotFileText, read_calib};
+use super::{PIPELINE, ROBOT, cell};
+use crate::answer::{calib, ends_with, fed, has, put, read, starts_with};
+use crate::fixture::robot_of;
 
 const HEADER: &str = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n";
 
-fn run(arguments: &[&str], input: &str) -> (Option<i32>, String, String) {
-    let output = calib(cell(), arguments, input);
-    let [out, err] =
-        [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
-    (output.status.code(), out, err)
+fn run(arguments: &str, input: &str) -> (Option<i32>, String, String) {
+    fed(cell(), arguments, input).parts()
 }
 
 #[test]
 fn a_correction_above_its_limit_has_no_joints_and_one_who_insists_is_told() {
-    let (code, out, err) = run(
-        &["compensate", "latest", "--max-correction", "0.01"],
-        HEADER,
-    );
+    let (code, out, err) = run("compensate latest --max-correction 0.01", HEADER);
     assert_eq!(code, Some(10), "{err}");
     assert!(
         out.lines()
@@ -31,52 +26,28 @@ fn a_correction_above_its_limit_has_no_joints_and_one_who_insists_is_told() {
         out.contains("at most 0.01 mm allowed (--max-correction)") && err.contains("refused"),
         "{out}{err}"
     );
-    let (code, out, err) = run(
-        &[
-            "compensate",
-            "latest",
-            "--max-correction",
-            "0.01",
-            "--force",
-        ],
-        HEADER,
-    );
+    let (code, out, err) = run("compensate latest --max-correction 0.01 --force", HEADER);
     assert_eq!(code, Some(0), "{err}");
     assert!(
         out.contains("written because of --force: corrected by") && !out.contains(",,,"),
         "{out}"
     );
-    let (code, out, _) = run(&["compensate", "latest", "--max-turn", "0.0001"], HEADER);
+    let (code, out, _) = run("compensate latest --max-turn 0.0001", HEADER);
     assert_eq!(code, Some(10));
-    assert!(
-        out.contains("at most 0.0001 deg allowed (--max-turn)"),
-        "{out}"
-    );
+    has(&out, "at most 0.0001 deg allowed (--max-turn)");
     let program = "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n";
-    std::fs::write(cell().join("far.src"), program).expect("a file");
-    let (code, out, err) = run(
-        &[
-            "compensate",
-            "latest",
-            "far.src",
-            "--max-correction",
-            "0.01",
-        ],
-        "",
-    );
+    put(cell(), "far.src", program);
+    let (code, out, err) = run("compensate latest far.src --max-correction 0.01", "");
     assert_eq!((code, out.as_str()), (Some(10), ""));
-    assert!(err.contains("far.src:1:9: refused: corrected by"), "{err}");
+    has(&err, "far.src:1:9: refused: corrected by");
 }
 
 #[test]
 fn what_calib_corrected_is_not_corrected_once_more() {
-    let (_, once, err) = run(&["compensate", "latest"], HEADER);
-    let (code, out, said) = run(&["compensate", "latest"], &once);
+    let (_, once, err) = run("compensate latest", HEADER);
+    let (code, out, said) = run("compensate latest", &once);
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-    assert!(
-        said.contains("was compensated by calib already") && said.contains("--force"),
-        "{said}"
-    );
+    has(&said, ["was compensated by calib already", "--force"]);
     for (name, head, target, second) in [
         (
             "twice.src",
@@ -91,22 +62,16 @@ fn what_calib_corrected_is_not_corrected_once_more() {
             "MODULE m\n! ",
         ),
     ] {
-        std::fs::write(cell().join(name), format!("{head}{target}")).expect("a file");
-        let (code, once, err) = run(&["compensate", "latest", name], "");
+        put(cell(), name, format!("{head}{target}"));
+        let (code, once, err) = run(&format!("compensate latest {name}"), "");
         assert_eq!(code, Some(0), "{err}");
-        assert!(
-            once.starts_with(&format!("{second}corrected by calib from ")),
-            "{once}"
-        );
-        std::fs::write(cell().join(name), &once).expect("a file");
-        let (code, out, err) = run(&["compensate", "latest", name], "");
+        starts_with(&once, &format!("{second}corrected by calib from "));
+        put(cell(), name, &once);
+        let (code, out, err) = run(&format!("compensate latest {name}"), "");
         assert_eq!((code, out.as_str()), (Some(10), ""));
-        assert!(
-            err.contains(&format!("{name}: was compensated by calib already")),
-            "{err}"
-        );
+        has(&err, &format!("{name}: was compensated by calib already"));
         assert_eq!(
-            run(&["compensate", "latest", name, "--force"], "").0,
+            run(&format!("compensate latest {name} --force"), "").0,
             Some(0)
         );
     }
@@ -116,28 +81,23 @@ fn what_calib_corrected_is_not_corrected_once_more() {
 fn a_cartesian_program_in_a_frame_that_is_not_applied_is_refused_by_line() {
     let rest = "[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
     let text = format!("MODULE m\nMoveL [[900,40,930],{rest},v1,z1,t\\WObj:=fixture;\nENDMODULE\n");
-    std::fs::write(cell().join("wobj.mod"), text).expect("a file");
-    let (code, out, err) = run(&["compensate", "latest", "wobj.mod"], "");
+    put(cell(), "wobj.mod", text);
+    let (code, out, err) = run("compensate latest wobj.mod", "");
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-    assert!(
-        err.contains("wobj.mod:2:")
-            && err.contains("work object `fixture`")
-            && err.contains("--assume-frames"),
-        "{err}"
+    has(
+        &err,
+        ["wobj.mod:2:", "work object `fixture`", "--assume-frames"],
     );
-    let (code, _, err) = run(&["compensate", "latest", "wobj.mod", "--assume-frames"], "");
+    let (code, _, err) = run("compensate latest wobj.mod --assume-frames", "");
     assert_eq!(code, Some(0), "{err}");
-    assert!(err.contains("warning: wobj.mod:2:"), "{err}");
+    has(&err, "warning: wobj.mod:2:");
 }
 
 #[test]
 fn a_target_in_a_work_object_is_corrected_where_it_stands() {
     let rest = "[9E9,9E9,9E9,9E9,9E9,9E9]]";
     let numbers = |text: &str| -> Vec<f64> {
-        let line = text
-            .lines()
-            .find(|line| line.starts_with("MoveL"))
-            .expect("a motion");
+        let line = text.lines().find(|line| line.starts_with("MoveL")).unwrap();
         let cut = |c: char| !(c.is_ascii_digit() || "+-.".contains(c));
         line[5..]
             .split(cut)
@@ -148,8 +108,8 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
     let plain = format!(
         "MODULE m\nMoveL [[900,40,930],[1,0,0,0],[9E9,9E9,9E9,9E9],{rest},v1,z1,t;\nENDMODULE\n"
     );
-    std::fs::write(cell().join("plain.mod"), plain).expect("a file");
-    let (code, plain, err) = run(&["compensate", "latest", "plain.mod"], "");
+    put(cell(), "plain.mod", plain);
+    let (code, plain, err) = run("compensate latest plain.mod", "");
     assert_eq!(code, Some(0), "{err}");
     // Moved by 100, 20, -30 mm and turned by half a turn about z: x and y change their signs.
     let object =
@@ -157,12 +117,12 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
     let program = format!(
         "MODULE m\n{object}MoveL [[-800,-20,960],[0,0,0,1],[9E9,9E9,9E9,9E9],{rest},v1,z1,t\\WObj:=fixture;\nENDMODULE\n"
     );
-    std::fs::write(cell().join("object.mod"), program).expect("a file");
-    let (code, within, err) = run(&["compensate", "latest", "object.mod"], "");
+    put(cell(), "object.mod", program);
+    let (code, within, err) = run("compensate latest object.mod", "");
     assert_eq!(code, Some(0), "{err}");
-    assert!(
-        err.contains("work object `fixture` is applied, in the robot's base"),
-        "{err}"
+    has(
+        &err,
+        "work object `fixture` is applied, in the robot's base",
     );
     let (plain, within) = (numbers(&plain), numbers(&within));
     let there = [100.0 - within[0], 20.0 - within[1], within[2] - 30.0];
@@ -175,50 +135,41 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
 
 #[test]
 fn a_table_of_parameters_without_a_verdict_is_held_to_the_same_limits() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
+    put(here, "robot.yaml", ROBOT);
     let far = PIPELINE.replace("shift_mm: [0.4, 0.2, -0.3]", "shift_mm: [80.0, 0.2, -0.3]");
     for (pipeline, refused) in [(PIPELINE.to_string(), false), (far, true)] {
-        std::fs::write(here.join("pipeline.yaml"), pipeline).expect("a file");
-        calib(here, &["run", "pipeline.yaml", "--quiet"], "");
+        put(here, "pipeline.yaml", pipeline);
+        calib(here, "run pipeline.yaml --quiet");
         let tables = here.join(".calib/tables");
         let table = newest_parameters(&tables);
         let bare = here.join("bare.parquet");
-        std::fs::copy(table, &bare).expect("a copy");
-        let given = [
-            "compensate",
-            "bare.parquet",
-            "--robot",
-            "robot.yaml",
-            "--angle",
-            "deg",
-        ];
-        let said = |more: &[&str]| {
-            let output = calib(here, &[&given[..], more].concat(), HEADER);
-            (
-                output.status.code(),
-                String::from_utf8_lossy(&output.stderr).into_owned(),
-                output.stdout.len(),
-            )
+        std::fs::copy(table, &bare).unwrap();
+        let given = "compensate bare.parquet --robot robot.yaml --angle deg";
+        let said = |more: &str| {
+            let output = fed(here, &format!("{given} {more}"), HEADER);
+            (output.code, output.err.clone(), output.out.len())
         };
-        let (code, err, bytes) = said(&[]);
+        let (code, err, bytes) = said("");
         if refused {
             assert_eq!((code, bytes), (Some(10), 0), "{err}");
-            assert!(
-                err.contains("refused: joint_offset at joint 2 is")
-                    && err.contains("from the robot file's"),
-                "{err}"
+            has(
+                &err,
+                [
+                    "refused: joint_offset at joint 2 is",
+                    "from the robot file's",
+                ],
             );
-            let (code, err, _) = said(&["--force"]);
+            let (code, err, _) = said("--force");
             assert!(
                 code != Some(2) && err.contains("used because of --force: joint_offset at joint 2"),
                 "{err}"
             );
         } else {
             assert_eq!(code, Some(0), "{err}");
-            assert_eq!(said(&["--max-correction", "0.01"]).0, Some(10));
-            assert_eq!(said(&["--max-shift", "0.001"]).0, Some(10));
+            assert_eq!(said("--max-correction 0.01").0, Some(10));
+            assert_eq!(said("--max-shift 0.001").0, Some(10));
         }
     }
 }
@@ -229,8 +180,8 @@ fn newest_parameters(folder: &std::path::Path) -> std::path::PathBuf {
     let mut found = Vec::new();
     while let Some(next) = all.pop() {
         for entry in std::fs::read_dir(next)
-            .expect("a folder")
-            .map(|entry| entry.expect("an entry").path())
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
         {
             if entry.is_dir() {
                 all.push(entry);
@@ -239,134 +190,94 @@ fn newest_parameters(folder: &std::path::Path) -> std::path::PathBuf {
                 .is_some_and(|name| name.to_string_lossy().contains("parameters"))
             {
                 found.push((
-                    entry
-                        .metadata()
-                        .and_then(|data| data.modified())
-                        .expect("a time"),
+                    entry.metadata().and_then(|data| data.modified()).unwrap(),
                     entry,
                 ));
             }
         }
     }
-    found.into_iter().max().expect("a table").1
+    found.into_iter().max().unwrap().1
 }
 
 #[test]
 fn an_output_never_takes_the_place_of_a_file_that_was_read() {
     for file in ["robot.yaml", "pipeline.yaml"] {
-        let folder = tempfile::tempdir().expect("a folder");
+        let folder = tempfile::tempdir().unwrap();
         for name in ["robot.yaml", "pipeline.yaml"] {
-            std::fs::copy(cell().join(name), folder.path().join(name)).expect("a file");
+            std::fs::copy(cell().join(name), folder.path().join(name)).unwrap();
         }
-        let before = std::fs::read(folder.path().join(file)).expect("a file");
+        let before = std::fs::read(folder.path().join(file)).unwrap();
         let output = calib(
             folder.path(),
-            &["export", "pipeline.yaml", "--format", "json", "--out", file],
-            "",
+            &format!("export pipeline.yaml --format json --out {file}"),
         );
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains("that the model was made from"), "{said}");
-        assert_eq!(
-            std::fs::read(folder.path().join(file)).expect("a file"),
-            before
-        );
+        let said = output.err.clone();
+        assert_eq!(output.code, Some(2), "{said}");
+        has(&said, "that the model was made from");
+        assert_eq!(std::fs::read(folder.path().join(file)).unwrap(), before);
     }
 }
 
 #[test]
 fn an_arm_far_from_the_robot_file_is_refused_before_anything_is_written() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
+    put(here, "robot.yaml", ROBOT);
     let truth = PIPELINE.replace("shift_mm: [0.4, 0.2, -0.3]", "shift_mm: [80.0, 0.2, -0.3]");
-    std::fs::write(here.join("pipeline.yaml"), truth).expect("a file");
+    put(here, "pipeline.yaml", truth);
     for verb in [
-        &["compensate", "pipeline.yaml"][..],
-        &["export", "pipeline.yaml", "--format", "json"],
+        "compensate pipeline.yaml",
+        "export pipeline.yaml --format json",
     ] {
-        let output = calib(here, verb, HEADER);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(
-            (output.status.code(), output.stdout.len()),
-            (Some(10), 0),
-            "{said}"
+        let output = fed(here, verb, HEADER);
+        let said = output.err.clone();
+        assert_eq!((output.code, output.out.len()), (Some(10), 0), "{said}");
+        has(
+            &said,
+            [
+                " from the robot file's",
+                "refused: the set-up is wrong",
+                "--force",
+            ],
         );
-        assert!(
-            said.contains(" from the robot file's")
-                && said.contains("refused: the set-up is wrong")
-                && said.contains("--force"),
-            "{said}"
-        );
-        assert!(
-            calib(here, &[verb, &["--force"]].concat(), HEADER)
-                .status
-                .code()
-                != Some(2)
-        );
+        assert!(fed(here, &format!("{verb} --force"), HEADER).code != Some(2));
     }
 }
 
 #[test]
 fn a_table_whose_common_normals_are_far_from_the_arm_is_refused_with_the_formats_that_carry_it() {
     for format in ["dh", "mdh"] {
-        let (code, out, err) = run(&["export", "latest", "--format", format], "");
+        let (code, out, err) = run(&format!("export latest --format {format}"), "");
         assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-        assert!(
-            err.contains("axes 2 and 3 are") && err.contains("--format urdf or mjcf"),
-            "{err}"
-        );
+        has(&err, ["axes 2 and 3 are", "--format urdf or mjcf"]);
     }
 }
 
 #[test]
 fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
+    put(here, "robot.yaml", ROBOT);
     let loaded = PIPELINE
         .replace("{usage: fit, points: 60}", "{usage: fit, points: 40}, {usage: fit, points: 40, payload_kg: 50}")
         .replace("{on: [fit]}", "{on: [fit], effects: [base_frame, tool_offset, joint_offset, link_geometry, joint_compliance]}");
-    std::fs::write(here.join("pipeline.yaml"), loaded).expect("a file");
-    std::fs::write(
-        here.join("p.src"),
-        "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n",
-    )
-    .expect("a file");
+    put(here, "pipeline.yaml", loaded);
+    put(here, "p.src", "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n");
     for file in ["-", "p.src"] {
-        let output = calib(
+        let output = fed(
             here,
-            &["compensate", "pipeline.yaml", file, "--quiet"],
+            &format!("compensate pipeline.yaml {file} --quiet"),
             HEADER,
         );
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(
-            (output.status.code(), output.stdout.len()),
-            (Some(10), 0),
-            "{said}"
-        );
-        assert!(
-            said.contains("states no payload") && said.contains("measured up to 50 kg"),
-            "{said}"
-        );
-        let stated = calib(
+        let said = output.err.clone();
+        assert_eq!((output.code, output.out.len()), (Some(10), 0), "{said}");
+        has(&said, ["states no payload", "measured up to 50 kg"]);
+        fed(
             here,
-            &[
-                "compensate",
-                "pipeline.yaml",
-                file,
-                "--quiet",
-                "--payload",
-                "0",
-            ],
+            &format!("compensate pipeline.yaml {file} --quiet --payload 0"),
             HEADER,
-        );
-        assert_eq!(
-            stated.status.code(),
-            Some(0),
-            "{}",
-            String::from_utf8_lossy(&stated.stderr)
-        );
+        )
+        .code(0);
     }
     // A program says it by the tool of its motions, or by $LOAD.
     let joints = "MoveAbsJ [[10,20,-30,5,40,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,gun;\n";
@@ -379,41 +290,34 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
             "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n",
         ),
     ] {
-        let said = |text: &str, more: &[&str]| {
-            std::fs::write(here.join(file), text).expect("a file");
-            let output = calib(
-                here,
-                &[&["compensate", "pipeline.yaml", file], more].concat(),
-                "",
-            );
-            let [out, err] = [output.stdout, output.stderr]
-                .map(|text| String::from_utf8_lossy(&text).into_owned());
+        let said = |text: &str, more: &str| {
+            put(here, file, text);
+            let output = calib(here, &format!("compensate pipeline.yaml {file} {more}"));
+            let (code, out, err) = output.parts();
             (
-                output.status.code(),
+                code,
                 out.lines()
                     .filter(|line| line.contains("20.") || line.contains("19."))
                     .collect::<String>(),
                 err,
             )
         };
-        let (code, out, err) = said(target, &[]);
+        let (code, out, err) = said(target, "");
         assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-        let (code, by_program, err) = said(&format!("{stating}{target}"), &[]);
+        let (code, by_program, err) = said(&format!("{stating}{target}"), "");
         assert_eq!(code, Some(0), "{err}");
-        assert!(err.contains("payload 50 kg, as"), "{err}");
-        assert_eq!(by_program, said(target, &["--payload", "50"]).1);
-        let (_, other, err) = said(&format!("{stating}{target}"), &["--payload", "0"]);
-        assert!(
-            err.contains("the program states a payload of 50 kg, --payload 0 kg, which is used"),
-            "{err}"
+        has(&err, "payload 50 kg, as");
+        assert_eq!(by_program, said(target, "--payload 50").1);
+        let (_, other, err) = said(&format!("{stating}{target}"), "--payload 0");
+        has(
+            &err,
+            "the program states a payload of 50 kg, --payload 0 kg, which is used",
         );
         assert_ne!(by_program, other);
     }
     let column = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,payload_kg\n10,20,-30,5,40,0,50\n";
     assert_eq!(
-        calib(here, &["compensate", "pipeline.yaml", "--quiet"], column)
-            .status
-            .code(),
+        fed(here, "compensate pipeline.yaml --quiet", column).code,
         Some(0)
     );
 }
@@ -424,71 +328,54 @@ fn how_far_a_model_may_be_from_the_robot_file_is_for_the_user_to_say() {
         ("--max-shift", "0.001", "mm"),
         ("--max-tilt", "0.0001", "deg"),
     ] {
-        for verb in [
-            &["compensate", "latest"][..],
-            &["export", "latest", "--format", "json"],
-        ] {
-            let (code, out, err) = run(&[verb, &[option, limit]].concat(), HEADER);
+        for verb in ["compensate latest", "export latest --format json"] {
+            let (code, out, err) = run(&format!("{verb} {option} {limit}"), HEADER);
             assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-            assert!(
-                err.contains(&format!("at most {limit} {unit} allowed ({option})")),
-                "{err}"
-            );
+            has(&err, &format!("at most {limit} {unit} allowed ({option})"));
         }
-        let (code, _, err) = run(&["compensate", "latest", option, "-1"], HEADER);
+        let (code, _, err) = run(&format!("compensate latest {option} -1"), HEADER);
         assert_eq!(code, Some(2), "{err}");
     }
 }
 
 #[test]
 fn a_pipeline_whose_report_does_not_accept_it_is_refused_as_its_run_is() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
+    put(here, "robot.yaml", ROBOT);
     let pipeline = |limits: &str| {
         format!(
             "{PIPELINE}  - uses: validate\n  - uses: report\n    with: {{limits: {{{limits}}}}}\n"
         )
     };
-    let ran = |arguments: &[&str]| {
-        let output = calib(here, arguments, HEADER);
-        (
-            output.status.code(),
-            String::from_utf8_lossy(&output.stderr).into_owned(),
-        )
+    let ran = |arguments: &str| {
+        let output = fed(here, arguments, HEADER);
+        (output.code, output.err.clone())
     };
-    std::fs::write(here.join("strict.yaml"), pipeline("max_mm: 0.0001")).expect("a file");
-    assert_eq!(ran(&["run", "strict.yaml", "--quiet"]).0, Some(1));
+    put(here, "strict.yaml", pipeline("max_mm: 0.0001"));
+    assert_eq!(ran("run strict.yaml --quiet").0, Some(1));
     for model in ["strict.yaml", "latest"] {
-        let (code, err) = ran(&["compensate", model]);
+        let (code, err) = ran(&format!("compensate {model}"));
         assert_eq!(code, Some(10), "{model}: {err}");
         assert!(
             err.contains("refused: not accepted") && err.contains("at most 0.0001 mm allowed"),
             "{model}: {err}"
         );
-        assert_eq!(ran(&["export", model, "--format", "json"]).0, Some(10));
-        let (code, err) = ran(&["compensate", model, "--force"]);
+        assert_eq!(ran(&format!("export {model} --format json")).0, Some(10));
+        let (code, err) = ran(&format!("compensate {model} --force"));
         assert_eq!(code, Some(0), "{model}: {err}");
         assert!(
             err.contains("warning: used because of --force: not accepted"),
             "{model}: {err}"
         );
     }
-    std::fs::write(here.join("mild.yaml"), pipeline("max_mm: 10")).expect("a file");
-    assert_eq!(ran(&["compensate", "mild.yaml"]).0, Some(0));
+    put(here, "mild.yaml", pipeline("max_mm: 10"));
+    assert_eq!(ran("compensate mild.yaml").0, Some(0));
 }
 
 #[test]
 fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
-    let robot = read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: ROBOT,
-        },
-        None,
-    )
-    .expect("a robot")
-    .robot;
+    let robot = robot_of(ROBOT);
     let cell = Cell::of(robot, 1.2, [100.0, 200.0], Vec::new());
     let folder = recorded(
         &PLAIN,
@@ -499,34 +386,26 @@ fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
     );
     let here = folder.path();
     // Heights with bumps over three joints that no cause has.
-    let log = std::fs::read_to_string(here.join("log.csv")).expect("a file");
+    let log = read(here.join("log.csv"));
     let bumpy = |line: &str| {
-        let (rest, z) = line.rsplit_once(',').expect("a height");
+        let (rest, z) = line.rsplit_once(',').unwrap();
         let cells: Vec<f64> = rest
             .split(',')
             .skip(1)
-            .map(|cell| cell.parse().expect("a number"))
+            .map(|cell| cell.parse().unwrap())
             .collect();
         let bumps = (cells[0] / 7.0).sin() * (cells[1] / 5.0).sin()
             + (cells[2] / 6.0 + cells[0] / 9.0).cos();
-        format!(
-            "{rest},{:.6}\n",
-            z.parse::<f64>().expect("a number") + 0.3 * bumps
-        )
+        format!("{rest},{:.6}\n", z.parse::<f64>().unwrap() + 0.3 * bumps)
     };
-    let (header, rows) = log.split_once('\n').expect("a header");
+    let (header, rows) = log.split_once('\n').unwrap();
     let rows: String = rows.lines().map(bumpy).collect();
-    std::fs::write(here.join("log.csv"), format!("{header}\n{rows}")).expect("a file");
-    calib(here, &["run", "pipeline.yaml", "--quiet"], "");
-    std::fs::write(
-        here.join("p.src"),
-        "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n",
-    )
-    .expect("a file");
+    put(here, "log.csv", format!("{header}\n{rows}"));
+    calib(here, "run pipeline.yaml --quiet");
+    put(here, "p.src", "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n");
     for model in ["pipeline.yaml", "latest"] {
-        let output = calib(here, &["compensate", model, "p.src", "--quiet"], "");
-        let [out, err] =
-            [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+        let output = calib(here, &format!("compensate {model} p.src --quiet"));
+        let (_code, out, err) = output.parts();
         assert_eq!(
             err.matches("the verdict is `unexplained`").count(),
             1,
@@ -536,15 +415,10 @@ fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
             .lines()
             .find(|line| line.contains("corrected by calib"))
             .unwrap_or_else(|| panic!("{err}"));
-        assert!(
-            head.ends_with(", verdict of the model: unexplained"),
-            "{head}"
-        );
-        let export = calib(here, &["export", model, "--format", "json", "--quiet"], "");
+        ends_with(head, ", verdict of the model: unexplained");
+        let export = calib(here, &format!("export {model} --format json --quiet"));
         assert_eq!(
-            String::from_utf8_lossy(&export.stderr)
-                .matches("the verdict is `unexplained`")
-                .count(),
+            export.err.matches("the verdict is `unexplained`").count(),
             1
         );
     }

@@ -49,7 +49,7 @@ fn a_listing_of_fanuc_leads_the_true_robot_to_its_targets() {
     let trip = Trip::new();
     let wanted = wanted();
     for maker in three() {
-        let sides = ArmSides::of(&trip.robot, &maker.convention()).expect("an arm with sides");
+        let sides = ArmSides::of(&trip.robot, &maker.convention()).unwrap();
         let mut text = String::from("/PROG  WELD\n/ATTR\nDEFAULT_GROUP\t= 1,*,*,*,*;\n/MN\n");
         for k in 1..=2 * POSES.len() {
             text.push_str(&format!(

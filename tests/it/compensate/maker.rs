@@ -1,7 +1,7 @@
 //! Makers of controllers that count joints each in their way, and a simulated robot recorded and identified in a way of theirs.
 
-use super::calib;
 use super::true_error::Cell;
+use crate::answer::{fed, put};
 use calib::robot::{CountedCoupling, JointConvention};
 use calib::twin::plan::Point;
 use calib::units::Unit;
@@ -156,9 +156,9 @@ pub fn recorded(
     robot: &str,
     stages: &str,
 ) -> TempDir {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), robot).expect("a file");
+    put(here, "robot.yaml", robot);
     let recorded = cell.recorded_by(points.to_vec(), 77).recording;
     let rows = points
         .iter()
@@ -175,11 +175,11 @@ pub fn recorded(
             format!("P{k},{numbers},{},{x:.6},{y:.6},{z:.6}\n", point.payload_kg)
         });
     let header = "id,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,kg,x,y,z\n";
-    std::fs::write(
-        here.join("log.csv"),
+    put(
+        here,
+        "log.csv",
         header.to_string() + &rows.collect::<String>(),
-    )
-    .expect("a file");
+    );
     let q = format!(
         "{{column: \"q{{j}}_deg\", unit: deg, {}}}",
         maker.settings()
@@ -187,17 +187,12 @@ pub fn recorded(
     let pipeline = format!(
         "calib: 1\nname: counted\nseed: 3\nstages:\n  - uses: robot\n    with: {{file: robot.yaml}}\n  - uses: ingest\n    with:\n      files:\n        - file: log.csv\n          columns:\n            point_id: {{column: id}}\n            usage: {{value: fit}}\n            q: {q}\n            payload: {{column: kg, unit: kg}}\n            x: {{column: x, unit: mm}}\n            y: {{column: y, unit: mm}}\n            z: {{column: z, unit: mm}}\n      instrument: leica_at960\n  - uses: split\n    with: {{by: usage}}\n{stages}"
     );
-    std::fs::write(here.join("pipeline.yaml"), pipeline).expect("a file");
-    ran(here, &["run", "pipeline.yaml", "--quiet"], "");
+    put(here, "pipeline.yaml", pipeline);
+    ran(here, "run pipeline.yaml --quiet", "");
     folder
 }
 
-pub fn ran(here: &Path, arguments: &[&str], input: &str) -> String {
-    let output = calib(here, arguments, input);
-    assert!(
-        output.status.success(),
-        "{arguments:?}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    String::from_utf8(output.stdout).expect("UTF-8")
+pub fn ran(here: &Path, arguments: &str, input: &str) -> String {
+    let output = fed(here, arguments, input).code(0);
+    output.out
 }

@@ -1,21 +1,22 @@
 //! A Cartesian target is reached in the posture that it states, as the controller counts, or not at all.
 
 use super::maker::{Maker, makers};
-use super::{ROBOT, calib, cell};
+use super::{ROBOT, cell};
+use crate::answer::{calib, has, put};
+use crate::fixture::robot_of;
 use calib::compensate::{
     CommandTarget, CorrectionOptions, Corrector, IdentifiedArm, StatedPosture,
 };
 use calib::effect::EffectStack;
 use calib::estimate::Model;
 use calib::robot::RobotModel;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
 
 /// Poses within the limits, 5 deg off every border of a quadrant and of a limit.
 fn poses(robot: &RobotModel, maker: &Maker) -> Vec<Vec<f64>> {
     let pose = |k: usize| -> Vec<f64> {
         let at = |(j, joint): (usize, &calib::description::JointDescription)| {
-            let [low, high] = joint.limits.expect("limits");
+            let [low, high] = joint.limits.unwrap();
             low + (high - low) * (0.5 + 0.48 * (1.7 * k as f64 + 2.3 * j as f64 + 0.1).sin())
         };
         robot
@@ -37,17 +38,7 @@ fn poses(robot: &RobotModel, maker: &Maker) -> Vec<Vec<f64>> {
 
 #[test]
 fn a_pose_is_reached_in_the_posture_that_it_states() {
-    let robot = RobotModel::new(
-        read_calib(
-            RobotFileText {
-                label: "robot.yaml",
-                text: ROBOT,
-            },
-            None,
-        )
-        .expect("a robot")
-        .robot,
-    );
+    let robot = RobotModel::new(robot_of(ROBOT));
     let stack = EffectStack::new(&robot, Pose::identity(), Vec::new());
     let arm = IdentifiedArm::new(Model::nominal(robot.clone(), stack), None);
     for maker in makers()
@@ -100,7 +91,7 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
         };
         let [mut other, mut reached] = [0, 0];
         for (q, found) in poses.iter().zip(solved(&|_| None)) {
-            let (c, found) = (maker.counted(q), found.expect("a solution"));
+            let (c, found) = (maker.counted(q), found.unwrap());
             other += usize::from(
                 [0, 3, 5]
                     .iter()
@@ -131,7 +122,7 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
         }
         assert_eq!(reached, poses.len(), "{}", maker.name);
         for (q, found) in poses.iter().zip(solved(&|q| Some(by_signs(q)))) {
-            let (c, found) = (maker.counted(q), found.expect("a solution"));
+            let (c, found) = (maker.counted(q), found.unwrap());
             assert!(
                 c.iter().zip(&found).all(|(a, b)| (*a < 0.0) == (*b < 0.0)),
                 "{}: {c:?}, found {found:?}",
@@ -147,30 +138,17 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
 }
 
 fn run(name: &str, text: &str) -> (Option<i32>, String, String) {
-    std::fs::write(cell().join(name), text).expect("a file");
-    let output = calib(
+    put(cell(), name, text);
+    calib(
         cell(),
-        &["compensate", "latest", name, "--start", "2,3,4,5,40,0"],
-        "",
-    );
-    let [out, err] =
-        [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
-    (output.status.code(), out, err)
+        &format!("compensate latest {name} --start 2,3,4,5,40,0"),
+    )
+    .parts()
 }
 
 #[test]
 fn programs_state_postures_and_are_told_once_where_they_do_not() {
-    let robot = RobotModel::new(
-        read_calib(
-            RobotFileText {
-                label: "robot.yaml",
-                text: ROBOT,
-            },
-            None,
-        )
-        .expect("a robot")
-        .robot,
-    );
+    let robot = RobotModel::new(robot_of(ROBOT));
     let q = [10.0f64, 15.0, -20.0, 25.0, 40.0, 30.0].map(f64::to_radians);
     let pose = robot.forward(&q);
     let turn = nalgebra::UnitQuaternion::from_matrix(&pose.rotation);
@@ -195,9 +173,9 @@ fn programs_state_postures_and_are_told_once_where_they_do_not() {
     assert_ne!(own, over);
     let (code, out, err) = run("none.mod", &rapid("1,0,0,0"));
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-    assert!(
-        err.contains("none.mod:2:") && err.contains("not reached in the posture that is stated"),
-        "{err}"
+    has(
+        &err,
+        ["none.mod:2:", "not reached in the posture that is stated"],
     );
 
     let (c, b, a) = turn.euler_angles();
@@ -216,10 +194,7 @@ fn programs_state_postures_and_are_told_once_where_they_do_not() {
     assert!(!err.contains("posture"), "{err}");
     let (code, _, err) = run("s.src", &krl(",S 3,T 4"));
     assert_eq!(code, Some(10), "{err}");
-    assert!(
-        err.contains("not reached in the posture that is stated (S 3, T 4)"),
-        "{err}"
-    );
+    has(&err, "not reached in the posture that is stated (S 3, T 4)");
     let targets = |text: &str| {
         text.lines()
             .filter(|line| line.starts_with("LIN"))
@@ -229,10 +204,7 @@ fn programs_state_postures_and_are_told_once_where_they_do_not() {
     assert_eq!(targets(&by_number), targets(&by_bits));
     let (code, _, err) = run("below.src", &krl(",T 'B000101'"));
     assert_eq!(code, Some(10), "{err}");
-    assert!(
-        err.contains("not reached in the posture that is stated"),
-        "{err}"
-    );
+    has(&err, "not reached in the posture that is stated");
     let (code, _, err) = run("open.src", &(krl("") + &krl("")));
     assert_eq!(code, Some(0), "{err}");
     assert_eq!(
@@ -241,5 +213,5 @@ fn programs_state_postures_and_are_told_once_where_they_do_not() {
         1,
         "{err}"
     );
-    assert!(err.contains("open.src:1:"), "{err}");
+    has(&err, "open.src:1:");
 }

@@ -3,6 +3,7 @@
 use super::ROBOT;
 use super::maker::Maker;
 use super::true_error::Cell;
+use crate::fixture::robot_of;
 use calib::compensate::{
     CorrectionOptions, Corrector, Gate, IdentifiedArm, Nominal, ToolGoal, least_change, turns,
 };
@@ -11,7 +12,6 @@ use calib::program::{
     Rewritten, RobotTool, corrected,
 };
 use calib::robot::RobotModel;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
 use calib::twin::plan::Point;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -35,15 +35,7 @@ impl Trip {
         let text = wide
             .into_iter()
             .fold(ROBOT.to_string(), |text, (from, to)| text.replace(from, to));
-        let robot = read_calib(
-            RobotFileText {
-                label: "robot.yaml",
-                text: &text,
-            },
-            None,
-        )
-        .expect("a robot")
-        .robot;
+        let robot = robot_of(&text);
         let cell = Cell::of(robot.clone(), 1.2, [100.0, 200.0], Vec::new());
         let arm = IdentifiedArm::new(cell.identified(), None);
         Self {
@@ -106,17 +98,7 @@ impl Trip {
 
     /// Joints by which the controller reaches a pose of the robot file's tool, near to `near` (rad).
     pub fn driven(&self, pose: Pose, near: &[f64]) -> Vec<f64> {
-        let found = least_change(
-            &mut Nominal::new(&self.robot),
-            &ToolGoal {
-                pose,
-                oriented: true,
-            },
-            near,
-            near,
-        );
-        assert!(found.residual < 1e-6, "{}", found.residual);
-        found.q
+        driven(&self.robot, pose, near)
     }
 
     /// How far (mm) the true robot is from where each target's joints should bring a point of the tool, with the joints that are driven; the
@@ -143,10 +125,20 @@ impl Trip {
     }
 }
 
+pub fn driven(robot: &RobotModel, pose: Pose, near: &[f64]) -> Vec<f64> {
+    let goal = ToolGoal {
+        pose,
+        oriented: true,
+    };
+    let found = least_change(&mut Nominal::new(robot), &goal, near, near);
+    assert!(found.residual < 1e-6, "{}", found.residual);
+    found.q
+}
+
 /// The targets of a program, values and postures.
 pub fn read(language: Language, bytes: &[u8]) -> Vec<Literal> {
     Program::parse(bytes, language, Partial::Refused)
-        .expect("accepted")
+        .unwrap()
         .literals()
         .to_vec()
 }

@@ -1,6 +1,7 @@
 //! A step that is worse than one before it at points predicted by fits without them is withdrawn wherever a run is spoken of or used.
 
-use super::{PIPELINE, ROBOT, calib};
+use super::{PIPELINE, ROBOT};
+use crate::answer::{fed, has, put};
 use serde_json::Value;
 
 const POOR: &str = "  - {id: poor, uses: identify, with: {effects: [base_frame], on: [fit]}}
@@ -10,34 +11,23 @@ const POOR: &str = "  - {id: poor, uses: identify, with: {effects: [base_frame],
 
 #[test]
 fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
-    std::fs::write(here.join("pipeline.yaml"), format!("{PIPELINE}{POOR}")).expect("a file");
-    let said = |arguments: &[&str], input: &str| -> (String, String) {
-        let output = calib(here, arguments, input);
-        let [out, err] =
-            [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
-        assert!(output.status.success(), "{arguments:?}: {err}");
+    put(here, "robot.yaml", ROBOT);
+    put(here, "pipeline.yaml", format!("{PIPELINE}{POOR}"));
+    let said = |arguments: &str, input: &str| -> (String, String) {
+        let output = fed(here, arguments, input);
+        let (code, out, err) = output.parts();
+        assert!(code == Some(0), "{arguments:?}: {err}");
         (out, err)
     };
-    let (out, err) = said(&["run", "pipeline.yaml", "--details"], "");
-    assert!(
-        out.contains("\nwarning   poor withdrawn, identify used: "),
-        "{out}"
-    );
-    assert!(
-        out.contains(" at 60 points unseen by either fit\n"),
-        "{out}"
-    );
-    assert!(out.contains("  poor (withdrawn)  validate"), "{out}");
-    assert!(
-        err.contains("`poor` is withdrawn and `identify` used instead: "),
-        "{err}"
-    );
+    let (out, err) = said("run pipeline.yaml --details", "");
+    has(&out, "\nwarning   poor withdrawn, identify used: ");
+    has(&out, " at 60 points unseen by either fit\n");
+    has(&out, "  poor (withdrawn)  validate");
+    has(&err, "`poor` is withdrawn and `identify` used instead: ");
     let document: Value =
-        serde_json::from_str(&said(&["run", "pipeline.yaml", "--json", "--quiet"], "").0)
-            .expect("JSON");
+        serde_json::from_str(&said("run pipeline.yaml --json --quiet", "").0).unwrap();
     assert_eq!(
         (
             &document["standing"]["step"],
@@ -52,29 +42,29 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     );
     // The figures are those of the statistics.
     let rms = |step: &str| {
-        let rows = document["statistics"].as_array().expect("rows");
+        let rows = document["statistics"].as_array().unwrap();
         let row = rows
             .iter()
             .find(|row| row["step"] == step && row["held_out"] == false)
-            .expect("a row");
-        row["fold_rms_mm"].as_f64().expect("mm")
+            .unwrap();
+        row["fold_rms_mm"].as_f64().unwrap()
     };
     for (figure, step) in [("rms_mm", "poor"), ("than_rms_mm", "identify")] {
         assert!(
-            (gone[figure].as_f64().expect("mm") - rms(step)).abs() < 1e-9,
+            (gone[figure].as_f64().unwrap() - rms(step)).abs() < 1e-9,
             "{gone}"
         );
     }
-    let documents = document["documents"].as_array().expect("files");
+    let documents = document["documents"].as_array().unwrap();
     let read = |ending: &str| {
         let file = documents
             .iter()
             .filter_map(Value::as_str)
             .find(|file| file.ends_with(ending))
-            .expect("a file");
-        std::fs::read_to_string(here.join(file)).expect("a report")
+            .unwrap();
+        std::fs::read_to_string(here.join(file)).unwrap()
     };
-    let report: Value = serde_json::from_str(&read("report.json")).expect("JSON");
+    let report: Value = serde_json::from_str(&read("report.json")).unwrap();
     assert_eq!(
         (&report["standing"], &report["withdrawn"][0]["step"]),
         (&"identify".into(), &"poor".into())
@@ -82,7 +72,7 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     assert!(
         report["parameters"]
             .as_array()
-            .expect("rows")
+            .unwrap()
             .iter()
             .any(|row| row["name"] == "joint_offset.j2")
     );
@@ -94,17 +84,17 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     );
     for model in ["pipeline.yaml", "HEAD"] {
         let targets = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n";
-        let (taken, err) = said(&["compensate", model, "--quiet"], targets);
-        assert!(
-            err.contains("warning: `poor` is withdrawn and `identify` used instead"),
-            "{err}"
+        let (taken, err) = said(&format!("compensate {model} --quiet"), targets);
+        has(
+            &err,
+            "warning: `poor` is withdrawn and `identify` used instead",
         );
         let (asked, err) = said(
-            &["compensate", model, "--quiet", "--step", "identify"],
+            &format!("compensate {model} --quiet --step identify"),
             targets,
         );
         assert_eq!((taken, err.as_str()), (asked, ""));
-        let (out, err) = said(&["export", model, "--format", "json"], "");
+        let (out, err) = said(&format!("export {model} --format json"), "");
         assert!(
             out.contains("stage identify\"") && err.contains("warning: `poor` is withdrawn"),
             "{err}"

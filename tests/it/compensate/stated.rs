@@ -1,22 +1,15 @@
 //! What a table of targets, or an option, must not state; files that cannot be read or written; one of them and several.
 
-use super::{calib, cell, text};
+use super::cell;
+use crate::answer::{calib, fed, has, put};
 use calib::compensate::CorrectionTotals;
 
 const HEADER: &str = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg";
 
 /// Code, stderr and stdout of targets on stdin.
-fn corrected(input: &str, more: &[&str]) -> (Option<i32>, String, String) {
-    let output = calib(
-        cell(),
-        &[&["compensate", "latest", "--quiet"], more].concat(),
-        input,
-    );
-    (
-        output.status.code(),
-        text(&output.stderr),
-        text(&output.stdout),
-    )
+fn corrected(input: &str, more: &str) -> (Option<i32>, String, String) {
+    let output = fed(cell(), &format!("compensate latest --quiet {more}"), input);
+    (output.code, output.err, output.out)
 }
 
 #[test]
@@ -40,16 +33,13 @@ fn what_no_target_can_state_is_a_fault_with_row_and_column_and_nothing_is_writte
     ] {
         let (code, said, written) = corrected(
             &format!("{HEADER},{name}\n10,20,-30,5,40,0,1\n10,20,-30,5,40,0,{value}\n"),
-            &[],
+            "",
         );
         assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
-        assert!(
-            said.contains(&format!("stdin:3: column 18: field 7: {allowed}")),
-            "{said}"
-        );
+        has(&said, &format!("stdin:3: column 18: field 7: {allowed}"));
         let (code, said, _) = corrected(
             &format!("{HEADER},{name}\n10,20,-30,5,40,0,0\n10,20,-30,5,40,0,\n"),
-            &[],
+            "",
         );
         assert_eq!(code, Some(0), "{said}");
     }
@@ -57,9 +47,9 @@ fn what_no_target_can_state_is_a_fault_with_row_and_column_and_nothing_is_writte
         ("--payload=-5", "--payload: expected a mass"),
         ("--temperature=-500", "--temperature: expected a temp"),
     ] {
-        let (code, said, _) = corrected(&format!("{HEADER}\n10,20,-30,5,40,0\n"), &[option]);
+        let (code, said, _) = corrected(&format!("{HEADER}\n10,20,-30,5,40,0\n"), option);
         assert_eq!(code, Some(2), "{said}");
-        assert!(said.contains(allowed), "{said}");
+        has(&said, allowed);
     }
 }
 
@@ -73,95 +63,82 @@ fn a_column_of_parquet_is_held_to_the_same() {
         ("z_mm", 900.0),
         ("payload_kg", -5.0),
     ];
-    let batch = RecordBatch::try_from_iter(columns.map(|(name, value)| (name, column(value))))
-        .expect("a batch");
-    let file = std::fs::File::create(cell().join("loads.parquet")).expect("a file");
-    let mut writer =
-        parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).expect("a writer");
+    let batch =
+        RecordBatch::try_from_iter(columns.map(|(name, value)| (name, column(value)))).unwrap();
+    let file = std::fs::File::create(cell().join("loads.parquet")).unwrap();
+    let mut writer = parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).unwrap();
     writer
         .write(&batch)
         .and_then(|()| writer.close().map(|_| ()))
-        .expect("written");
-    let (code, said, _) = corrected("", &["loads.parquet", "--out", "loads_c.parquet"]);
+        .unwrap();
+    let (code, said, _) = corrected("", "loads.parquet --out loads_c.parquet");
     assert_eq!(code, Some(10), "{said}");
-    assert!(
-        said.contains(
-            "loads.parquet: row 1: column `payload_kg`: expected a mass of 0 or more, kg, found -5"
-        ),
-        "{said}"
+    has(
+        &said,
+        "loads.parquet: row 1: column `payload_kg`: expected a mass of 0 or more, kg, found -5",
     );
     assert!(!cell().join("loads_c.parquet").exists());
 }
 
 #[test]
 fn a_quaternion_of_zeros_is_no_orientation() {
-    let (code, said, written) = corrected("x_mm,y_mm,z_mm,qw,qx,qy,qz\n800,40,900,0,0,0,0\n", &[]);
+    let (code, said, written) = corrected("x_mm,y_mm,z_mm,qw,qx,qy,qz\n800,40,900,0,0,0,0\n", "");
     assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
-    assert!(
-        said.contains(
-            "stdin:2: columns qw, qx, qy, qz: the quaternion has length 0.0000, expected 1"
-        ),
-        "{said}"
+    has(
+        &said,
+        "stdin:2: columns qw, qx, qy, qz: the quaternion has length 0.0000, expected 1",
     );
     // Angles of zero are one.
-    let (_, said, written) = corrected("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n800,40,900,0,0,0\n", &[]);
+    let (_, said, written) = corrected("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n800,40,900,0,0,0\n", "");
     assert_eq!(written.lines().count(), 2, "{said}");
 }
 
 #[test]
 fn degrees_under_a_header_in_rad_are_found_by_the_turns_of_most_rows() {
     let header = HEADER.replace("deg", "rad");
-    let (code, said, written) = corrected(&format!("{header}\n10,20,30,40,50,60\n"), &[]);
+    let (code, said, written) = corrected(&format!("{header}\n10,20,30,40,50,60\n"), "");
     assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
     let turned = "stdin:2: in 1 of 1 row a joint is beyond one and a half turns, here joint 1 at 10 rad; allowed: up to 9.42 rad";
-    assert!(
-        said.contains(turned) && said.contains("if these are degrees"),
-        "{said}"
-    );
+    has(&said, [turned, "if these are degrees"]);
     let sound = "0.1,0.2,-0.3,0.1,0.4,0\n";
     let (code, said, _) = corrected(
         &format!("{header}\n{sound}{sound}0.1,0.2,-0.3,0.1,0.4,10\n"),
-        &[],
+        "",
     );
     assert_eq!(code, Some(0), "one row of three may be odd: {said}");
 }
 
 #[test]
 fn files_that_cannot_be_read_or_written_are_named_before_a_pipeline_is_run_for_them() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     for file in ["robot.yaml", "pipeline.yaml"] {
-        std::fs::copy(cell().join(file), folder.path().join(file)).expect("a copy");
+        std::fs::copy(cell().join(file), folder.path().join(file)).unwrap();
     }
-    std::fs::write(
-        folder.path().join("t.csv"),
+    put(
+        folder.path(),
+        "t.csv",
         format!("{HEADER}\n10,20,-30,5,40,0\n"),
-    )
-    .expect("a file");
-    let refused = |arguments: &[&str]| {
+    );
+    let refused = |arguments: &str| {
         let output = calib(
             folder.path(),
-            &[&["compensate", "pipeline.yaml", "-q"], arguments].concat(),
-            "",
-        );
-        assert_eq!(
-            output.status.code(),
-            Some(2),
-            "{arguments:?}: {}",
-            text(&output.stderr)
-        );
+            &format!("compensate pipeline.yaml -q {arguments}"),
+        )
+        .code(2);
         assert!(!folder.path().join(".calib").exists(), "{arguments:?}");
-        text(&output.stderr)
+        output.err
     };
-    let said = refused(&["nofile.csv", "--out", "nodir/x.csv"]);
-    assert!(
-        said.contains("nofile.csv: cannot be read: ")
-            && said.contains("--out: nodir/x.csv: there is no folder nodir;"),
-        "{said}"
+    let said = refused("nofile.csv --out nodir/x.csv");
+    has(
+        &said,
+        [
+            "nofile.csv: cannot be read: ",
+            "--out: nodir/x.csv: there is no folder nodir;",
+        ],
     );
-    assert!(refused(&["t.csv", "--out", "."]).contains("--out: . is a folder: name a file"));
+    assert!(refused("t.csv --out .").contains("--out: . is a folder: name a file"));
     assert!(
-        refused(&["t.csv", "--out", "x.parquet"])
-            .contains("--out: must have the format of the targets")
+        refused("t.csv --out x.parquet").contains("--out: must have the format of the targets")
     );
 }
 

@@ -1,24 +1,22 @@
 //! The true robot, a twin that shares no kinematics with the model, goes where it was wanted: every kind of effect that acts.
 
-use crate::desk::{Desk, table};
+use super::concealed::model;
+use crate::desk::{Desk, diagnose_reads, identify_reads, table};
 use calib::compensate::{
     Circumstance, IdentifiedArm as Identified, Nominal, Reach, SETTLED, ToolGoal, least_change,
     one_step,
 };
 use calib::description::{JointKind, RobotDescription};
-use calib::effect::Load;
 use calib::estimate::Model;
 use calib::estimate::network::Correction;
 use calib::robot::{RobotModel, RowTime};
-use calib::stage::{Diagnose, DiagnoseReads, Identify, IdentifyReads, Learn, LearnReads};
+use calib::stage::{Diagnose, Identify, Learn, LearnReads};
 use calib::table::{
     Findings, Network, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict,
 };
 use calib::twin::arm::Arm;
 use calib::twin::conceal::robots::Kind;
-use calib::twin::effect::{
-    Backlash, GearCyclic, JointCompliance, Physical, ThermalGrowth, ZeroShift,
-};
+use calib::twin::effect::Physical;
 use calib::twin::plan::{Block, Climate, Point, Poses, plan};
 use calib::twin::recorder::{Experiment, Motors, Shot};
 use calib::twin::tracker::Tracker;
@@ -104,8 +102,7 @@ impl Cell {
             })
             .collect();
         let arm = Arm::new(&self.robot, &self.truth);
-        plan(&self.robot, &arm, &self.poses, &blocks, &self.climate, seed)
-            .expect("poses are allowed")
+        plan(&self.robot, &arm, &self.poses, &blocks, &self.climate, seed).unwrap()
     }
 
     fn measure(&self, points: Vec<Point>, tracker: &Tracker, seed: u64) -> Vec<Shot> {
@@ -179,105 +176,49 @@ impl Cell {
 
     /// The model of a recording of 80 points, with the geometry alone.
     pub fn identified(&self) -> Model {
-        let Recorded {
-            robot,
-            recording,
-            split,
-        } = self.recorded(80, &[0.0]);
-        let rigid: Identify = serde_json::from_value(json!({
+        self.rigid(&self.recorded(80, &[0.0])).0
+    }
+
+    /// With the geometry alone: the model, its table, its prediction.
+    fn rigid(&self, of: &Recorded) -> (Model, Parameters, Prediction) {
+        let geometry = json!({
             "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"], "folds": 0,
-        }))
-        .expect("settings");
-        let tables = Desk::default()
-            .run(
-                &rigid,
-                IdentifyReads {
-                    robot,
-                    recording,
-                    split,
-                },
-            )
-            .expect("an identification");
+        });
+        let stage: Identify = serde_json::from_value(geometry).unwrap();
+        let (robot, recording) = (of.robot.clone(), of.recording.clone());
+        let reads = identify_reads(robot, recording, of.split.clone());
+        let tables = Desk::default().run(&stage, reads).unwrap();
         let parameters: Parameters = table(&tables).remove(0);
-        parameters
-            .model(
-                RobotModel::new(self.robot.clone()),
-                &[],
-                Load::GravityTorque,
-            )
-            .expect("a model")
+        let model = model(&self.robot, &parameters);
+        (model, parameters, table(&tables).remove(0))
     }
 
     /// What `diagnose` makes of it: the model, its findings, the noise of a measured point, mm.
-    fn diagnosed(&self, recorded: Recorded) -> (Model, Findings, f64) {
-        let stage: Diagnose = serde_json::from_value(serde_json::json!({})).expect("settings");
-        let Recorded {
-            robot,
-            recording,
-            split,
-        } = recorded;
-        let reads = DiagnoseReads {
-            robot,
-            recording,
-            split,
-        };
-        let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
-        let parameters: Parameters = table(&tables).remove(0);
+    fn diagnosed(&self, of: Recorded) -> (Model, Findings, f64) {
+        let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
+        let reads = diagnose_reads(of.robot, of.recording, of.split);
+        let tables = Desk::default().run(&stage, reads).unwrap();
         let verdict: Verdict = table(&tables).remove(0);
-        let findings: Findings = table(&tables).remove(0);
-        let model = parameters
-            .model(
-                RobotModel::new(self.robot.clone()),
-                &[],
-                Load::GravityTorque,
-            )
-            .expect("a model");
-        (
-            model,
-            findings,
-            verdict.0[0].noise_floor_mm.expect("lengths"),
-        )
+        let floor = verdict.0[0].noise_floor_mm.unwrap();
+        let model = model(&self.robot, &table(&tables).remove(0));
+        (model, table(&tables).remove(0), floor)
     }
 
     /// The rigid model, and the joint curves that are learned on top of it.
-    fn learned(&self, recorded: Recorded) -> (Model, Option<Correction>) {
-        let Recorded {
-            robot,
-            recording,
-            split,
-        } = recorded;
-        let desk = Desk::default();
-        let rigid: Identify = serde_json::from_value(json!({
-            "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"], "folds": 0,
-        }))
-        .expect("settings");
-        let reads = IdentifyReads {
-            robot: robot.clone(),
-            recording: recording.clone(),
-            split: split.clone(),
-        };
-        let tables = desk.run(&rigid, reads).expect("an identification");
-        let parameters: Parameters = table(&tables).remove(0);
-        let prediction: Prediction = table(&tables).remove(0);
-        let learn: Learn =
-            serde_json::from_value(json!({"rivals": ["curves"], "folds": 2})).expect("settings");
-        let prismatic = recording.prismatic.clone();
+    fn learned(&self, of: Recorded) -> (Model, Option<Correction>) {
+        let (model, parameters, prediction) = self.rigid(&of);
+        let learn = json!({"rivals": ["curves"], "folds": 2});
+        let learn: Learn = serde_json::from_value(learn).unwrap();
+        let prismatic = of.recording.prismatic.clone();
         let reads = LearnReads {
-            robot: Some(robot),
-            recording,
-            split,
-            parameters: Some(parameters.clone()),
+            robot: Some(of.robot),
+            recording: of.recording,
+            split: of.split,
+            parameters: Some(parameters),
             prediction,
         };
-        let network: Network = table(&desk.run(&learn, reads).expect("a correction")).remove(0);
-        let model = parameters
-            .model(
-                RobotModel::new(self.robot.clone()),
-                &[],
-                Load::GravityTorque,
-            )
-            .expect("a model");
-        (model, network.correction(&prismatic).expect("a correction"))
+        let network: Network = table(&Desk::default().run(&learn, reads).unwrap()).remove(0);
+        (model, network.correction(&prismatic).unwrap())
     }
 
     /// Where (m) the true robot puts its tool in its own base, without the noise of measurement; `base` as it was identified or set up.
@@ -362,10 +303,6 @@ impl Cell {
 }
 
 /// 500 unseen targets; what the true robot misses them by, in noise floors.
-fn proof(kind: Kind, effects: Vec<Physical>) {
-    proof_of(&Cell::new(kind, effects));
-}
-
 fn proof_of(cell: &Cell) {
     let (name, rated) = (&cell.robot.name, cell.robot.payload_mass);
     let (model, findings, floor) = cell.diagnosed(cell.recorded(200, &[0.0, rated]));
@@ -405,109 +342,59 @@ fn proof_of(cell: &Cell) {
 }
 
 #[test]
-fn a_spherical_wrist_goes_where_it_is_wanted() {
-    proof(
-        Kind::Sr210d,
-        vec![
-            Physical::GearCyclic(GearCyclic {
-                joint: 2,
-                order: 3.0,
-                amplitude_arcsec: 25.0,
-                arcsec_per_nm: 0.0,
-                phase_deg: 40.0,
-            }),
-            Physical::ZeroShift(ZeroShift {
-                joint: 3,
-                step_arcsec: 40.0,
-                at_s: 1500.0,
-            }),
-        ],
-    );
-}
-
-#[test]
-fn an_offset_wrist_goes_where_it_is_wanted() {
-    proof(
-        Kind::Compact6,
-        vec![Physical::GearCyclic(GearCyclic {
-            joint: 3,
-            order: 2.0,
-            amplitude_arcsec: 60.0,
-            arcsec_per_nm: 0.0,
-            phase_deg: 10.0,
-        })],
-    );
-}
-
-#[test]
-fn a_redundant_arm_goes_where_it_is_wanted() {
-    proof(
-        Kind::Seven7r,
-        vec![Physical::GearCyclic(GearCyclic {
-            joint: 4,
-            order: 2.0,
-            amplitude_arcsec: 80.0,
-            arcsec_per_nm: 0.0,
-            phase_deg: 10.0,
-        })],
-    );
-}
-
-#[test]
-fn wind_up_and_lost_motion_are_made_up_for_with_a_spherical_wrist() {
-    let effects = vec![
-        Physical::JointCompliance(JointCompliance {
-            joint: 2,
-            rad_per_nm: 6e-8,
-        }),
-        Physical::JointCompliance(JointCompliance {
-            joint: 3,
-            rad_per_nm: 9e-8,
-        }),
-        backlash(1, 90.0),
-    ];
-    proof(Kind::Sr210d, effects);
-}
-
-#[test]
-fn heat_and_lost_motion_are_made_up_for_with_an_offset_wrist() {
-    let growth = Physical::ThermalGrowth(ThermalGrowth {
-        link: 2,
-        um_per_m_k: 12.0,
-        reference_c: 20.0,
-    });
-    let mut cell = Cell::new(Kind::Compact6, vec![growth, backlash(1, 150.0)]);
-    cell.climate = Climate {
+fn arms_of_every_kind_go_where_they_are_wanted_by_every_kind_of_effect() {
+    let warm = Climate {
         rise_k: 20.0,
         warm_up_h: 0.7,
         ..Climate::default()
     };
-    proof_of(&cell);
-}
-
-#[test]
-fn wind_up_and_lost_motion_are_made_up_for_with_seven_joints() {
-    let effects = vec![
-        Physical::JointCompliance(JointCompliance {
-            joint: 2,
-            rad_per_nm: 4e-6,
-        }),
-        backlash(3, 200.0),
-    ];
-    proof(Kind::Seven7r, effects);
+    for (kind, climate, effects) in [
+        (
+            Kind::Sr210d,
+            None,
+            "[{gear_cyclic: {joint: 2, order: 3, amplitude_arcsec: 25, phase_deg: 40}}, \
+             {zero_shift: {joint: 3, step_arcsec: 40, at_s: 1500}}]",
+        ),
+        (
+            Kind::Compact6,
+            None,
+            "[{gear_cyclic: {joint: 3, order: 2, amplitude_arcsec: 60, phase_deg: 10}}]",
+        ),
+        (
+            Kind::Seven7r,
+            None,
+            "[{gear_cyclic: {joint: 4, order: 2, amplitude_arcsec: 80, phase_deg: 10}}]",
+        ),
+        // Wind-up, heat, lost motion.
+        (
+            Kind::Sr210d,
+            None,
+            "[{joint_compliance: {joint: 2, rad_per_nm: 6.0e-8}}, \
+             {joint_compliance: {joint: 3, rad_per_nm: 9.0e-8}}, {backlash: {joint: 1, gap_arcsec: 90}}]",
+        ),
+        (
+            Kind::Compact6,
+            Some(warm),
+            "[{thermal_growth: {link: 2, um_per_m_k: 12, reference_c: 20}}, {backlash: {joint: 1, gap_arcsec: 150}}]",
+        ),
+        (
+            Kind::Seven7r,
+            None,
+            "[{joint_compliance: {joint: 2, rad_per_nm: 4.0e-6}}, {backlash: {joint: 3, gap_arcsec: 200}}]",
+        ),
+    ] {
+        let mut cell = Cell::new(kind, physics(effects));
+        cell.climate = climate.unwrap_or_default();
+        proof_of(&cell);
+    }
 }
 
 #[test]
 fn a_learned_correction_is_made_up_for() {
-    let wave = Physical::GearCyclic(GearCyclic {
-        joint: 2,
-        order: 3.0,
-        amplitude_arcsec: 60.0,
-        arcsec_per_nm: 0.0,
-        phase_deg: 70.0,
-    });
+    let wave =
+        physics("[{gear_cyclic: {joint: 2, order: 3, amplitude_arcsec: 60, phase_deg: 70}}]");
     for kind in [Kind::Sr210d, Kind::Compact6, Kind::Seven7r] {
-        let cell = Cell::new(kind, vec![wave.clone()]);
+        let cell = Cell::new(kind, wave.clone());
         let (model, correction) = cell.learned(cell.recorded(200, &[0.0]));
         assert!(correction.is_some(), "nothing was learned");
         let arm = Identified::new(model.clone(), correction);
@@ -538,12 +425,7 @@ fn a_learned_correction_is_made_up_for() {
     }
 }
 
-fn backlash(joint: usize, gap_arcsec: f64) -> Physical {
-    Physical::Backlash(Backlash {
-        joint,
-        gap_arcsec,
-        arcsec_per_nm: 0.0,
-        closing_nm: 0.0,
-        soft_nm: 0.0,
-    })
+/// Effects of the twin, YAML.
+pub fn physics(yaml: &str) -> Vec<Physical> {
+    serde_saphyr::from_str(yaml).unwrap()
 }

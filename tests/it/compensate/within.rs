@@ -1,13 +1,13 @@
 //! Of targets that no fit has seen, the true robot hits 95 % within the radius that is stated for them.
 
 use super::true_error::Cell;
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, identify_reads, table};
 use calib::compensate::{IdentifiedArm, SETTLED, Scatter, Uncertainty, least_change};
 use calib::effect::{EffectStack, Form, Law, Load, Motion, Term, Unknown, Variable};
 use calib::estimate::Model;
 use calib::robot::{CircumstanceName, RobotModel};
 use calib::spatial::Pose;
-use calib::stage::{Identify, IdentifyReads};
+use calib::stage::Identify;
 use calib::table::{CovarianceTable, Parameters, Prediction};
 use calib::twin::conceal::robots::Kind;
 use calib::twin::effect::{JointCompliance, Physical};
@@ -18,26 +18,24 @@ const TARGETS: usize = 5;
 
 /// Share of `RECORDINGS` x `TARGETS` targets within their stated radius, each recording with poses and noise of its own.
 fn within(cell: &Cell, effects: &[&str], payload_kg: &[f64]) -> f64 {
-    let stage: Identify = serde_json::from_value(json!({"effects": effects})).expect("settings");
+    let stage: Identify = serde_json::from_value(json!({"effects": effects})).unwrap();
     let robot = RobotModel::new(cell.robot.clone());
     let mut hits = 0;
     for seed in 0..RECORDINGS {
         let recorded = cell.recorded_by(cell.points(80, payload_kg, 1000 + seed), 2000 + seed);
-        let reads = IdentifyReads {
-            robot: recorded.robot,
-            recording: recorded.recording,
-            split: recorded.split,
-        };
         let tables = Desk::default()
-            .run(&stage, reads)
-            .expect("an identification");
+            .run(
+                &stage,
+                identify_reads(recorded.robot, recorded.recording, recorded.split),
+            )
+            .unwrap();
         let parameters: Parameters = table(&tables).remove(0);
         let covariance: CovarianceTable = table(&tables).remove(0);
         let prediction: Prediction = table(&tables).remove(0);
         let model = parameters
             .model(robot.clone(), &[], Load::GravityTorque)
-            .expect("a model");
-        let covariance = covariance.of_model(&model).expect("a covariance");
+            .unwrap();
+        let covariance = covariance.of_model(&model).unwrap();
         let arm = IdentifiedArm::new(model, None);
         let scatter = Scatter {
             unexplained: prediction.unexplained_mm() * 1e-3,
@@ -109,7 +107,7 @@ fn a_finding_by_what_no_target_states_is_named_and_one_without_a_size_is_not() {
     assert_eq!(arm(stretch, 0.0), [""; 0]);
     assert_eq!(arm(Variable::Angle { joint: 2 }, 1e-4), [""; 0]);
     let humidity = Variable::Circumstance {
-        column: CircumstanceName::of("humidity").expect("a column"),
+        column: CircumstanceName::of("humidity").unwrap(),
         joint: None,
     };
     assert_eq!(arm(humidity, 1e-4), ["unknown at joint 3"]);

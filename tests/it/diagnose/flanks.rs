@@ -1,6 +1,7 @@
 //! Two flanks of a gear's teeth that err differently: an error periodic in the joint angle whose sign follows the approach.
 
 use super::{Named, simulated, wanted};
+use crate::answer::has;
 
 #[test]
 fn flanks_that_err_differently_are_named_with_their_order_and_amplitude() {
@@ -15,7 +16,7 @@ fn flanks_that_err_differently_are_named_with_their_order_and_amplitude() {
         "{said:#}"
     );
     let finding = &said["findings"][0];
-    let number = |k: usize, name: &str| finding["parameters"][k][name].as_f64().expect("a number");
+    let number = |k: usize, name: &str| finding["parameters"][k][name].as_f64().unwrap();
     // sin(5 q + 40 deg) = cos(40 deg) sin(5 q) + sin(40 deg) cos(5 q)
     let (sine, cosine) = 40f64.to_radians().sin_cos();
     for (k, truth) in [35.0 * sine, 35.0 * cosine].into_iter().enumerate() {
@@ -25,11 +26,9 @@ fn flanks_that_err_differently_are_named_with_their_order_and_amplitude() {
         );
         assert!(number(k, "sigma") < 4.0, "{finding:#}");
     }
-    let statement = finding["statement"].as_str().expect("a sentence");
-    assert!(
-        statement.contains(
-            "the two flanks of the teeth of joint 2 err differently: 5 times a turn by 3"
-        ),
-        "{statement}"
+    let statement = finding["statement"].as_str().unwrap();
+    has(
+        statement,
+        "the two flanks of the teeth of joint 2 err differently: 5 times a turn by 3",
     );
 }

@@ -51,7 +51,7 @@ fn what_is_in_no_list_is_diagnosed_and_counted() {
     ) = (0, 0, 0, 0, 0, 0, 0, 0);
     for (number, content) in design.contents().into_iter().enumerate() {
         assert_eq!(content, Content::Foreign);
-        let case = Case::make(&design, number, content).expect("a case");
+        let case = Case::make(&design, number, content).unwrap();
         let one = &case.concealed[0];
         let said = said(&case, &[]);
         let places: Vec<&str> = std::iter::once(&one.cause.place)

@@ -1,6 +1,8 @@
 //! Causes are named from whatever was measured: a level's inclinations, distances from anchors, points beside distances. The twin conceals them.
 
 use super::Named;
+use crate::compensate::true_error::physics;
+use crate::fixture::question;
 use crate::identify::normal;
 use crate::twin::sr210d;
 use calib::description::RobotDescription;
@@ -8,7 +10,7 @@ use calib::diagnose::{Diagnosis, Question, VerdictKind, diagnose, wrong_setup};
 use calib::estimate::gauge;
 use calib::observation::Dimension;
 use calib::robot::{Measurements, Named as Names, NoiseBasis, PointReadings, Readings, RobotModel};
-use calib::twin::effect::{Backlash, GearCyclic, JointCompliance, Physical};
+use calib::twin::effect::Physical;
 use calib::twin::given::GivenPose;
 use calib::twin::plan::{Block, Climate, Poses};
 use calib::twin::recorder::{Experiment, Motors, Shot};
@@ -37,35 +39,32 @@ const UPRIGHT: [[f64; 2]; 6] = [
     [-120.0, 120.0],
 ];
 
-fn gear(joint: usize, order: f64, amplitude_arcsec: f64, phase_deg: f64) -> Physical {
-    Physical::GearCyclic(GearCyclic {
-        joint,
-        order,
-        amplitude_arcsec,
-        arcsec_per_nm: 0.0,
-        phase_deg,
-    })
+/// A wave of a gear, a spring and a gap, each at a joint.
+struct Causes {
+    gear: (usize, f64, f64, f64),
+    spring: (usize, f64),
+    play: (usize, f64),
 }
 
-fn spring(joint: usize, rad_per_nm: f64) -> Physical {
-    Physical::JointCompliance(JointCompliance { joint, rad_per_nm })
-}
-
-fn play(joint: usize, gap_arcsec: f64) -> Physical {
-    Physical::Backlash(Backlash {
-        joint,
-        gap_arcsec,
-        arcsec_per_nm: 0.0,
-        closing_nm: 0.0,
-        soft_nm: 0.0,
-    })
-}
-
-fn named(causes: &[(&str, &str)]) -> Named {
-    causes
-        .iter()
-        .map(|(effect, place)| ((*effect).into(), (*place).into()))
-        .collect()
+impl Causes {
+    fn physics(&self) -> Vec<Physical> {
+        let (g, order, arcsec, phase) = self.gear;
+        let ((s, rad_per_nm), (p, gap)) = (self.spring, self.play);
+        physics(&format!(
+            "[{{gear_cyclic: {{joint: {g}, order: {order}, amplitude_arcsec: {arcsec}, phase_deg: {phase}}}}}, \
+             {{joint_compliance: {{joint: {s}, rad_per_nm: {rad_per_nm:e}}}}}, \
+             {{backlash: {{joint: {p}, gap_arcsec: {gap}}}}}]"
+        ))
+    }
+    fn named(&self) -> Named {
+        [
+            ("gear_cyclic", self.gear.0),
+            ("joint_compliance", self.spring.0),
+            ("backlash", self.play.0),
+        ]
+        .map(|(effect, joint)| (effect.to_string(), format!("joint {joint}")))
+        .into()
+    }
 }
 
 /// What the twin's arm did, without noise.
@@ -132,7 +131,7 @@ fn recorded(
             climate: &climate,
             seed: 11,
         };
-        experiment.record(|| ()).expect("poses")
+        experiment.record(|| ()).unwrap()
     };
     let drawn = [0.0, 120.0].map(|payload_kg| Block {
         points: points / 2,
@@ -289,20 +288,11 @@ impl Recorded {
             &fit,
             &BTreeMap::new(),
         )
-        .expect("anchors");
+        .unwrap();
         let question = Question {
-            robot: &robot,
-            data,
-            fit: &fit,
             validate: &validate,
-            set: &vec![0; data.rows()],
-            prior_weight: 1.0,
-            open_world: 0.3,
-            without: &[],
-            own: &[],
-            beside_simulation: false,
-            known: &[],
             seed: 7,
+            ..question(&robot, data, &fit)
         };
         assert!(wrong_setup(&question).is_none());
         diagnose(&question, |_| ())
@@ -334,10 +324,7 @@ fn explains(said: &Diagnosis, concealed: &Named) {
         VerdictKind::Explained
     };
     assert_eq!(said.verdict, verdict, "{}", said.statement);
-    let (before, after) = (
-        said.before.expect("rows").rms,
-        said.after.expect("rows").rms,
-    );
+    let (before, after) = (said.before.unwrap().rms, said.after.unwrap().rms);
     assert!(
         after < 0.5 * before && (0.7..1.3).contains(&(after / said.noise_floor)),
         "{before:e} {after:e} {:e}",
@@ -346,93 +333,68 @@ fn explains(said: &Diagnosis, concealed: &Named) {
 }
 
 #[test]
-fn causes_are_named_from_inclinations_alone() {
-    let concealed = [gear(2, 3.0, 60.0, 25.0), spring(3, 2.5e-7), play(5, 70.0)];
-    let said = recorded(&concealed, 700, &UPRIGHT, 0.0)
-        .with_a_level()
-        .diagnosed();
-    explains(
-        &said,
-        &named(&[
-            ("gear_cyclic", "joint 2"),
-            ("joint_compliance", "joint 3"),
-            ("backlash", "joint 5"),
-        ]),
+fn causes_are_named_from_every_kind_of_measurement() {
+    type Seen = fn(Recorded) -> Recorded;
+    let (level, wires, camera): (Seen, Seen, Seen) = (
+        Recorded::with_a_level,
+        Recorded::with_wires,
+        Recorded::with_a_camera,
     );
-    assert_eq!(said.dimension, Dimension::Angle);
-    assert!(
-        said.statement.contains("arcsec") && !said.statement.contains(" um"),
-        "{}",
-        said.statement
-    );
-}
-
-#[test]
-fn a_level_shows_how_well_joints_repeat_beside_the_causes() {
-    let concealed = [gear(3, 2.0, 60.0, 80.0), spring(2, 2.5e-7), play(4, 70.0)];
-    let said = recorded(&concealed, 700, &UPRIGHT, 4.0)
-        .with_a_level()
-        .diagnosed();
-    explains(
-        &said,
-        &named(&[
-            ("gear_cyclic", "joint 3"),
-            ("joint_compliance", "joint 2"),
-            ("backlash", "joint 4"),
-        ]),
-    );
-    let repeatability = said.repeatability.sigma.to_degrees() * 3600.0;
-    assert!(
-        (3.0..5.2).contains(&repeatability),
-        "{repeatability} arcsec"
-    );
-}
-
-#[test]
-fn causes_are_named_from_distances_alone() {
-    let concealed = [gear(1, 2.0, 40.0, 70.0), spring(2, 2e-7), play(3, 60.0)];
-    let said = recorded(&concealed, 480, &[], 1.5).with_wires().diagnosed();
-    explains(
-        &said,
-        &named(&[
-            ("gear_cyclic", "joint 1"),
-            ("joint_compliance", "joint 2"),
-            ("backlash", "joint 3"),
-        ]),
-    );
-    assert_eq!(said.dimension, Dimension::Length);
-}
-
-#[test]
-fn causes_are_named_from_points_and_distances() {
-    let concealed = [gear(4, 2.0, 60.0, 10.0), spring(2, 2e-7), play(1, 50.0)];
-    let said = recorded(&concealed, 240, &[], 2.0)
-        .with_wires()
-        .with_some_points()
-        .diagnosed();
-    explains(
-        &said,
-        &named(&[
-            ("gear_cyclic", "joint 4"),
-            ("joint_compliance", "joint 2"),
-            ("backlash", "joint 1"),
-        ]),
-    );
-}
-
-#[test]
-fn causes_are_named_from_the_images_of_one_camera_alone() {
-    let concealed = [gear(3, 2.0, 60.0, 40.0), spring(2, 2e-7), play(1, 50.0)];
-    let said = recorded(&concealed, 480, &[], 0.0)
-        .with_a_camera()
-        .diagnosed();
-    explains(
-        &said,
-        &named(&[
-            ("gear_cyclic", "joint 3"),
-            ("joint_compliance", "joint 2"),
-            ("backlash", "joint 1"),
-        ]),
-    );
-    assert_eq!(said.dimension, Dimension::Angle);
+    let both: Seen = |recorded| recorded.with_wires().with_some_points();
+    let causes = |gear, spring, play| Causes { gear, spring, play };
+    let (angle, length) = (Some(Dimension::Angle), Some(Dimension::Length));
+    for (causes, count, given, play_arcsec, seen, dimension) in [
+        (
+            causes((2, 3.0, 60.0, 25.0), (3, 2.5e-7), (5, 70.0)),
+            700,
+            &UPRIGHT[..],
+            0.0,
+            level,
+            angle,
+        ),
+        (
+            causes((3, 2.0, 60.0, 80.0), (2, 2.5e-7), (4, 70.0)),
+            700,
+            &UPRIGHT,
+            4.0,
+            level,
+            angle,
+        ),
+        (
+            causes((1, 2.0, 40.0, 70.0), (2, 2e-7), (3, 60.0)),
+            480,
+            &[],
+            1.5,
+            wires,
+            length,
+        ),
+        (
+            causes((4, 2.0, 60.0, 10.0), (2, 2e-7), (1, 50.0)),
+            240,
+            &[],
+            2.0,
+            both,
+            None,
+        ),
+        (
+            causes((3, 2.0, 60.0, 40.0), (2, 2e-7), (1, 50.0)),
+            480,
+            &[],
+            0.0,
+            camera,
+            angle,
+        ),
+    ] {
+        let said = seen(recorded(&causes.physics(), count, given, play_arcsec)).diagnosed();
+        explains(&said, &causes.named());
+        assert!(dimension.is_none_or(|dimension| said.dimension == dimension));
+        let in_angles = said.statement.contains("arcsec") && !said.statement.contains(" um");
+        assert!(count < 700 || in_angles, "{}", said.statement);
+        // How well joints repeat is seen, too.
+        let repeatability = said.repeatability.sigma.to_degrees() * 3600.0;
+        assert!(
+            play_arcsec < 3.0 || (3.0..5.2).contains(&repeatability),
+            "{repeatability} arcsec"
+        );
+    }
 }

@@ -3,8 +3,8 @@
 //! `CALIB_RECORDINGS=100 cargo test --test it -- diagnose::left_out --nocapture` prints every recording.
 
 use crate::compensate::concealed::{from_environment, recording, split};
-use crate::desk::{Desk, table};
-use calib::stage::{Diagnose, DiagnoseReads};
+use crate::desk::{Desk, diagnose_reads, table};
+use calib::stage::Diagnose;
 use calib::table::{Findings, Robot, Verdict};
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
@@ -63,13 +63,13 @@ impl Bins {
 pub fn said(case: &Case, without: &[&str]) -> Said {
     let recording = recording(case);
     let split = split(case, &recording);
-    let stage: Diagnose = serde_json::from_value(json!({"without": without})).expect("settings");
-    let reads = DiagnoseReads {
-        robot: Robot::from_description(&case.robot),
-        recording,
-        split,
-    };
-    let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+    let stage: Diagnose = serde_json::from_value(json!({"without": without})).unwrap();
+    let tables = Desk::default()
+        .run(
+            &stage,
+            diagnose_reads(Robot::from_description(&case.robot), recording, split),
+        )
+        .unwrap();
     let verdict = table::<Verdict>(&tables).remove(0).0.remove(0);
     let findings = table::<Findings>(&tables).remove(0);
     let found = findings.0.iter().filter(|row| row.forms != "[]");
@@ -118,7 +118,7 @@ fn what_is_left_out_is_never_named() {
         if !matches!(content, Content::Single(_)) || listed >= count {
             continue;
         }
-        let case = Case::make(&design, number, content).expect("a case");
+        let case = Case::make(&design, number, content).unwrap();
         let one = &case.concealed[0];
         if one.strength < 50.0 || case.concealed.len() > 1 {
             continue;

@@ -1,6 +1,7 @@
 //! What the numbers of a finding cannot be is no name of it: `unknown` stands at its place, and the statement says why.
 
 use super::{simulated, wanted};
+use crate::answer::{has, starts_with};
 use calib::effect::{Form, Survey};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use nalgebra::Vector3;
@@ -32,7 +33,7 @@ fn why(form: Value, numbers: &[f64], error: f64, torque: f64) -> Option<String> 
     let torques = vec![torque; 100 * robot.joints()];
     let compliance = vec![1e-6; robot.joints()];
     let survey = Survey::new(&robot, &data, &rows, &torques, &compliance);
-    let form: Form = serde_json::from_value(form).expect("a form");
+    let form: Form = serde_json::from_value(form).unwrap();
     form.impossible(numbers, &|_| error, &survey)
 }
 
@@ -46,7 +47,7 @@ fn a_bend_lies_within_the_loads_that_were_recorded() {
     for shape in ["knee", "soft_zone", "saturating"] {
         // The model's loads reach 5 Nm, and those of the robot file more.
         assert_eq!(why(bent(shape, 4.9), &[1e-6, 1e-6], 0.0, 5.0), None);
-        let said = why(bent(shape, 14.0), &[1e-6, 1e-6], 0.0, 5.0).expect("beyond");
+        let said = why(bent(shape, 14.0), &[1e-6, 1e-6], 0.0, 5.0).unwrap();
         assert_eq!(
             said,
             "its bend at 14 Nm lies beyond the largest recorded load of 5.0 Nm"
@@ -76,7 +77,7 @@ fn a_time_constant_is_less_than_ten_recordings() {
         json!({ "links": { "first": 1, "last": 1 } }), json!("time"), json!({ "settling": { "start": 0.0, "constant": constant } })) })
     };
     assert_eq!(why(growing(5000.0), &[3e-4], 0.0, 5.0), None);
-    let said = why(growing(10_000.0), &[3e-4], 0.0, 5.0).expect("at the bound");
+    let said = why(growing(10_000.0), &[3e-4], 0.0, 5.0).unwrap();
     assert_eq!(
         said,
         "its time constant of 10000 s is ten times as long as the recording (1000 s)"
@@ -88,7 +89,7 @@ fn nothing_grows_by_more_than_its_material_and_nothing_lags_by_less_than_nothing
     let linear = json!({ "linear": { "zero": 20.0, "per": 1.0 } });
     let link = json!({ "thermal_growth": law(json!({ "links": { "first": 1, "last": 1 } }), json!("temperature"), linear.clone()) });
     assert_eq!(why(link.clone(), &[24e-6], 1e-6, 5.0), None);
-    let said = why(link.clone(), &[85e-6], 1e-6, 5.0).expect("more");
+    let said = why(link.clone(), &[85e-6], 1e-6, 5.0).unwrap();
     assert_eq!(
         said,
         "85 um/m for each kelvin is more than the 70 of any material of links"
@@ -124,13 +125,10 @@ fn joints_that_lag_by_less_than_nothing_have_no_name_and_the_model_is_the_same()
         (&"unknown".into(), &"recording".into()),
         "{said:#}"
     );
-    let statement = finding["statement"].as_str().expect("a sentence");
-    assert!(
-        statement.starts_with("something unknown acts at recording")
-            && statement.contains("joint_log_lag"),
-        "{statement}"
-    );
-    let rivals = finding["rivals"].as_array().expect("a list");
+    let statement = finding["statement"].as_str().unwrap();
+    starts_with(statement, "something unknown acts at recording");
+    has(statement, "joint_log_lag");
+    let rivals = finding["rivals"].as_array().unwrap();
     assert!(
         rivals
             .iter()
@@ -138,11 +136,7 @@ fn joints_that_lag_by_less_than_nothing_have_no_name_and_the_model_is_the_same()
         "{said:#}"
     );
     // What has no name still reproduces the error.
-    let rms = |when: &str| {
-        said[when]["validate_rms_mm"]
-            .as_f64()
-            .expect("held-out rows")
-    };
+    let rms = |when: &str| said[when]["validate_rms_mm"].as_f64().unwrap();
     assert!(
         rms("after") < 0.5 * rms("before") && said["verdict"] == "unexplained",
         "{said:#}"

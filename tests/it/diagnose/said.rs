@@ -1,6 +1,7 @@
 //! What a diagnosis says where the recording is poor: without a clock no seconds, of few rows nothing.
 
 use super::{CASE, calib, case_with, concealed, refused, table_of};
+use crate::answer::{has, put, read, starts_with};
 use calib::table::{Curves, Findings};
 use serde_json::Value;
 use std::path::Path;
@@ -8,22 +9,19 @@ use std::path::Path;
 /// Rewrites the cells of the controller's log, row by row, the head first.
 fn rewritten(folder: &Path, mut change: impl FnMut(usize, &mut Vec<String>)) {
     let file = folder.join("sealed/recordings/c0001/controller.csv");
-    let text = std::fs::read_to_string(&file).expect("the log");
+    let text = read(&file);
     let mut line = |(row, line): (usize, &str)| {
         let mut cells: Vec<String> = line.split(',').map(String::from).collect();
         change(row, &mut cells);
         cells.join(",") + "\n"
     };
     let text: String = text.lines().enumerate().map(&mut line).collect();
-    std::fs::write(&file, text).expect("written");
+    std::fs::write(&file, text).unwrap();
 }
 
 fn diagnosed(folder: &Path) -> Value {
-    let said = calib(
-        &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
-        folder,
-    );
-    serde_json::from_str(&said).expect("JSON")
+    let said = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), folder);
+    serde_json::from_str(&said).unwrap()
 }
 
 #[test]
@@ -36,57 +34,44 @@ fn without_a_clock_nothing_is_said_in_seconds() {
     assert!(
         timed["findings"][0]["statement"]
             .as_str()
-            .expect("a sentence")
+            .unwrap()
             .contains(" s ("),
         "{timed:#}"
     );
     let findings: Findings = table_of(here, "diagnose.findings.parquet");
-    let forms: Value = serde_json::from_str(&findings.0[0].forms).expect("JSON");
+    let forms: Value = serde_json::from_str(&findings.0[0].forms).unwrap();
     let step = forms[0]["zero_shift"]["law"]["basis"]["after"]["at"]
         .as_f64()
-        .expect("s");
+        .unwrap();
     let mut times: Vec<f64> = Vec::new();
     let mut column = None;
     rewritten(here, |row, cells| {
-        let at = *column.get_or_insert_with(|| {
-            cells
-                .iter()
-                .position(|name| name == "time_s")
-                .expect("time_s")
-        });
+        let at =
+            *column.get_or_insert_with(|| cells.iter().position(|name| name == "time_s").unwrap());
         let cell = cells.remove(at);
         if row > 0 {
-            times.push(cell.parse().expect("s"));
+            times.push(cell.parse().unwrap());
         }
     });
     let rows = diagnosed(here);
     assert_eq!(rows["clock"], "row");
-    let first = times
-        .iter()
-        .position(|time| *time > step)
-        .expect("a row after the step")
-        + 1;
-    let statement = rows["findings"][0]["statement"]
-        .as_str()
-        .expect("a sentence");
-    assert!(
-        statement.contains(&format!(" from row {first} (")),
-        "{statement}"
-    );
-    let unseen = rows["not_observable"].as_array().expect("a list");
+    let first = times.iter().position(|time| *time > step).unwrap() + 1;
+    let statement = rows["findings"][0]["statement"].as_str().unwrap();
+    has(statement, &format!(" from row {first} ("));
+    let unseen = rows["not_observable"].as_array().unwrap();
     assert!(
         unseen
             .iter()
             .any(|line| line == "time: none was recorded; the order of the rows is used instead"),
         "{unseen:?}"
     );
-    let goes_with = rows["located"]["variables"].as_array().expect("a list");
+    let goes_with = rows["located"]["variables"].as_array().unwrap();
     assert!(
         goes_with.iter().any(|by| by["name"] == "row")
             && goes_with.iter().all(|by| by["name"] != "time"),
         "{goes_with:?}"
     );
-    calib(&[&["run", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
+    calib(&format!("run p.yaml --quiet {CASE}"), here);
     let curves: Curves = table_of(here, "report.curves.parquet");
     let own: Vec<_> = curves.0.iter().filter(|point| point.rank == 1).collect();
     assert!(!own.is_empty());
@@ -95,8 +80,8 @@ fn without_a_clock_nothing_is_said_in_seconds() {
         assert_eq!(named, ("place in the recording", "row"));
         assert!(point.x >= 1.0 && point.x.fract() == 0.0, "{}", point.x);
     }
-    std::fs::write(here.join("t.csv"), "x_mm,y_mm,z_mm\n600,0,700\n").expect("written");
-    let (code, said) = refused(&["compensate", "HEAD", "t.csv", "--time", "100"], here);
+    put(here, "t.csv", "x_mm,y_mm,z_mm\n600,0,700\n");
+    let (code, said) = refused("compensate HEAD t.csv --time 100", here);
     assert!(
         code == Some(2) && said.contains("--time: the recording of the model has no clock"),
         "{said}"
@@ -108,24 +93,20 @@ fn a_diagnosis_that_cannot_make_up_for_missing_masses_does_not_stand_for_the_run
     let folder = concealed("joint_compliance", "12", "120");
     let here = folder.path();
     let file = here.join("sealed/recordings/c0001/robot.json");
-    let mut robot: Value =
-        serde_json::from_str(&std::fs::read_to_string(&file).expect("the robot")).expect("JSON");
-    let fields = robot.as_object_mut().expect("a robot");
+    let mut robot: Value = serde_json::from_str(&read(&file)).unwrap();
+    let fields = robot.as_object_mut().unwrap();
     assert!(fields.remove("mass").is_some() && fields.remove("com").is_some());
-    std::fs::write(&file, robot.to_string()).expect("written");
+    std::fs::write(&file, robot.to_string()).unwrap();
     case_with(here, &[]);
-    let run: Value = serde_json::from_str(&calib(
-        &[&["run", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
-        here,
-    ))
-    .expect("JSON");
+    let run: Value =
+        serde_json::from_str(&calib(&format!("run p.yaml --quiet --json {CASE}"), here)).unwrap();
     let rms = |step: &Value| {
-        let rows = run["statistics"].as_array().expect("rows");
+        let rows = run["statistics"].as_array().unwrap();
         let row = rows
             .iter()
             .find(|row| row["step"] == *step && row["held_out"] == true)
-            .expect("a row");
-        row["rms_mm"].as_f64().expect("mm")
+            .unwrap();
+        row["rms_mm"].as_f64().unwrap()
     };
     // The payload alone winds up the joints of `joint`, which is all that the file lets one know.
     let standing = &run["standing"]["step"];
@@ -135,7 +116,7 @@ fn a_diagnosis_that_cannot_make_up_for_missing_masses_does_not_stand_for_the_run
         rms(standing),
         rms(&"joint".into())
     );
-    let (_, said) = refused(&["compensate", "HEAD", "--quiet", "p.yaml"], here);
+    let (_, said) = refused("compensate HEAD --quiet p.yaml", here);
     assert_eq!(
         said.contains("warning: `diagnose` is withdrawn"),
         *standing != "diagnose",
@@ -149,8 +130,8 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
     let here = folder.path();
     let (mut column, mut kept) = (None, 0);
     rewritten(here, |_, cells| {
-        let at = *column
-            .get_or_insert_with(|| cells.iter().position(|name| name == "use").expect("use"));
+        let at =
+            *column.get_or_insert_with(|| cells.iter().position(|name| name == "use").unwrap());
         if cells[at] == "fit" {
             kept += 1;
             if kept > 12 {
@@ -159,7 +140,7 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
         }
     });
     case_with(here, &[]);
-    calib(&[&["run", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
+    calib(&format!("run p.yaml --quiet {CASE}"), here);
     let said = diagnosed(here);
     assert_eq!(
         (&said["verdict"], &said["findings"]),
@@ -170,9 +151,9 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
         said["not_observable"][0],
         "what the simulation lacks: 12 rows were fitted, at least 15 are needed to separate it from geometry"
     );
-    let text = calib(&["diagnose", "HEAD", "--details"], here);
-    assert!(
-        text.starts_with("not asked (noise basis: instrument)\ntoo few rows were fitted"),
-        "{text}"
+    let text = calib("diagnose HEAD --details", here);
+    starts_with(
+        &text,
+        "not asked (noise basis: instrument)\ntoo few rows were fitted",
     );
 }

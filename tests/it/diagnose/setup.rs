@@ -1,12 +1,13 @@
 //! Set-up errors come before physics: twenty wrong set-ups of three arms, sound recordings, and a robot file of another arm.
 
 use super::{CASE, calib, case_with, concealed, ended, refused};
-use crate::desk::{Desk, table};
+use crate::answer::{has, read, starts_with};
+use crate::desk::{Desk, diagnose_reads, table};
 use crate::fixture;
 use calib::description::RobotDescription;
 use calib::error::Error;
 use calib::stage::split::{SplitBy, SplitReads};
-use calib::stage::{Diagnose, DiagnoseReads, Simulate, SimulateReads};
+use calib::stage::{Diagnose, Simulate, SimulateReads};
 use calib::table::{FindingRow, Findings, Recording, Robot, Split, Verdict};
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -72,7 +73,7 @@ fn recorded(robot: &RobotDescription, seed: u64, effects: Value) -> Inputs {
         "blocks": [{"usage": "fit", "points": 48}, {"usage": "validate", "points": 24}],
         "seed": seed,
     });
-    let stage: Simulate = serde_json::from_value(settings).expect("settings");
+    let stage: Simulate = serde_json::from_value(settings).unwrap();
     let tables = Desk::default()
         .run(
             &stage,
@@ -80,7 +81,7 @@ fn recorded(robot: &RobotDescription, seed: u64, effects: Value) -> Inputs {
                 robot: Robot::from_description(robot),
             },
         )
-        .expect("a recording");
+        .unwrap();
     Inputs {
         robot: robot.clone(),
         recording: table(&tables).remove(0),
@@ -96,8 +97,7 @@ struct Said {
 
 fn diagnosed(inputs: &Inputs) -> Result<Said, Error> {
     let desk = Desk::default();
-    let split: SplitBy =
-        serde_json::from_value(json!({"by": "usage", "blank": "fit"})).expect("settings");
+    let split: SplitBy = serde_json::from_value(json!({"by": "usage", "blank": "fit"})).unwrap();
     let split: Split = table(&desk.run(
         &split,
         SplitReads {
@@ -105,20 +105,16 @@ fn diagnosed(inputs: &Inputs) -> Result<Said, Error> {
         },
     )?)
     .remove(0);
-    let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
+    let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
     let robot = Robot::from_description(&inputs.robot);
     let tables = desk.run(
         &stage,
-        DiagnoseReads {
-            robot,
-            recording: inputs.recording.clone(),
-            split,
-        },
+        diagnose_reads(robot, inputs.recording.clone(), split),
     )?;
     let verdict: Verdict = table(&tables).remove(0);
     let findings: Findings = table(&tables).remove(0);
     let statement = verdict.0[0].statement.clone().unwrap_or_default();
-    let warnings = desk.warnings.lock().expect("warnings").clone();
+    let warnings = desk.warnings.lock().unwrap().clone();
     Ok(Said {
         verdict: verdict.0[0].verdict.clone(),
         statement,
@@ -254,7 +250,7 @@ const WRONG: [Wrong; 20] = [
         let along: [f64; 3] = std::array::from_fn(|k| to[k] - from[k]);
         let axis = (0..3)
             .max_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs()))
-            .expect("three");
+            .unwrap();
         let by = 0.1 * along[axis].signum();
         i.robot.joints[2..]
             .iter_mut()
@@ -278,7 +274,7 @@ fn twenty_wrong_set_ups_of_three_arms_are_named_before_any_physics() {
                 .and_then(|said| said.findings.first())
                 .filter(|first| first.effect == "setup");
             let forms: Option<Value> =
-                first.map(|first| serde_json::from_str(&first.forms).expect("JSON"));
+                first.map(|first| serde_json::from_str(&first.forms).unwrap());
             // What explains as well does not count.
             let said_first = first.and_then(|first| {
                 first
@@ -304,7 +300,7 @@ fn twenty_wrong_set_ups_of_three_arms_are_named_before_any_physics() {
                     "{:?}",
                     said.warnings
                 );
-                assert!(said.statement.contains("set-up"), "{}", said.statement);
+                has(&said.statement, "set-up");
             }
             assert_eq!(forms.unwrap_or_else(|| json!([])), json!([]));
             right += usize::from(named);
@@ -373,7 +369,7 @@ fn a_rounded_log_is_named_with_its_step_and_what_it_makes() {
         q.iter_mut()
             .for_each(|q| *q = rounded(q.to_degrees(), 0.1).to_radians())
     });
-    let said = diagnosed(&coarse).expect("a diagnosis");
+    let said = diagnosed(&coarse).unwrap();
     let line = said
         .warnings
         .iter()
@@ -392,14 +388,10 @@ fn a_rounded_log_is_named_with_its_step_and_what_it_makes() {
         "{:?}",
         said.warnings
     );
-    assert!(
-        said.statement.contains("rounded to 0.1 deg"),
-        "{}",
-        said.statement
-    );
+    has(&said.statement, "rounded to 0.1 deg");
     let mut coarse = recorded(&fixture::spherical(), 49, json!([]));
     points(&mut coarse, |p| p.map(|x| rounded(x, 1e-3)));
-    let said = diagnosed(&coarse).expect("a diagnosis");
+    let said = diagnosed(&coarse).unwrap();
     let line = "measured points are rounded to 1 mm, which makes up to 0.87 mm";
     assert!(
         said.warnings.iter().any(|own| own.starts_with(line)),
@@ -413,7 +405,7 @@ fn a_rounded_log_is_named_with_its_step_and_what_it_makes() {
             .for_each(|q| *q = rounded(q.to_degrees(), 1e-4).to_radians())
     });
     points(&mut fine, |p| p.map(|x| rounded(x, 1e-6)));
-    let said = diagnosed(&fine).expect("a diagnosis");
+    let said = diagnosed(&fine).unwrap();
     assert!(
         !said.warnings.iter().any(|line| line.contains("rounded")),
         "{:?}",
@@ -427,18 +419,12 @@ fn a_payload_column_that_is_never_or_seldom_filled_is_said() {
     let said = |filled: fn(usize) -> f64| {
         let mut inputs = sound.clone();
         inputs.recording.payload = Some((0..72).map(filled).collect());
-        diagnosed(&inputs).expect("a diagnosis").warnings.join("\n")
+        diagnosed(&inputs).unwrap().warnings.join("\n")
     };
     let empty = said(|_| f64::NAN);
-    assert!(
-        empty.contains("the payload column is empty in all 72 rows"),
-        "{empty}"
-    );
+    has(&empty, "the payload column is empty in all 72 rows");
     let half = said(|row| if row % 2 == 0 { 10.0 } else { f64::NAN });
-    assert!(
-        half.contains("the payload column is empty in 36 of 72 rows"),
-        "{half}"
-    );
+    has(&half, "the payload column is empty in 36 of 72 rows");
     assert!(!said(|_| 0.0).contains("payload column"));
 }
 
@@ -446,25 +432,21 @@ fn a_payload_column_that_is_never_or_seldom_filled_is_said() {
 fn two_set_up_errors_are_named_together_and_two_reflectors_hide_none() {
     let mut both = recorded(&fixture::offset_wrist(), 44, json!([]));
     joints(&mut both, |q| (q[1], q[3]) = (-q[1], -q[3]));
-    let said = diagnosed(&both).expect("a diagnosis");
+    let said = diagnosed(&both).unwrap();
     let statement = &said.findings[0].statement;
-    assert!(
-        statement.starts_with("joints 2, 4 turn the other way"),
-        "{statement}"
-    );
-    assert!(
-        statement.contains("sign: [1, -1, 1, -1, 1, 1]"),
-        "{statement}"
-    );
+    starts_with(statement, "joints 2, 4 turn the other way");
+    has(statement, "sign: [1, -1, 1, -1, 1, 1]");
     // Two of different kinds.
     let mut both = recorded(&fixture::offset_wrist(), 44, json!([]));
     joints(&mut both, |q| (q[2], q[4]) = (-q[2], q[4] + FRAC_PI_2));
-    let said = diagnosed(&both).expect("a diagnosis");
+    let said = diagnosed(&both).unwrap();
     let statement = &said.findings[0].statement;
-    assert!(
-        statement.contains("joint 3 turns the other way")
-            && statement.contains("90 deg at the zero of joint 5"),
-        "{statement}"
+    has(
+        statement,
+        [
+            "joint 3 turns the other way",
+            "90 deg at the zero of joint 5",
+        ],
     );
 
     let mut named = recorded(&shouldered(), 45, json!([]));
@@ -474,7 +456,7 @@ fn two_set_up_errors_are_named_together_and_two_reflectors_hide_none() {
             .collect(),
     );
     joints(&mut named, |q| q[2] = -q[2]);
-    let said = diagnosed(&named).expect("a diagnosis");
+    let said = diagnosed(&named).unwrap();
     assert!(
         said.findings[0]
             .statement
@@ -492,12 +474,12 @@ fn a_length_by_which_no_arm_is_made_is_an_error_of_the_robot_file() {
         .iter_mut()
         .for_each(|joint| joint.point[2] -= by);
     short.robot.tool[2] -= by;
-    let said = diagnosed(&short).expect("a diagnosis");
+    let said = diagnosed(&short).unwrap();
     assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
     let statement = &said.findings[0].statement;
-    assert!(
-        statement.starts_with("a length in the robot file from joint 2 to joint 3 is wrong"),
-        "{statement}"
+    starts_with(
+        statement,
+        "a length in the robot file from joint 2 to joint 3 is wrong",
     );
     // Two of them at once, of which no one explains the other: each is named as the identified robot has it.
     let by = 0.04;
@@ -505,18 +487,14 @@ fn a_length_by_which_no_arm_is_made_is_an_error_of_the_robot_file() {
         .iter_mut()
         .for_each(|joint| joint.point[0] -= by);
     short.robot.tool[0] -= by;
-    let said = diagnosed(&short).expect("a diagnosis");
+    let said = diagnosed(&short).unwrap();
     assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
     assert!(
         said.findings
             .iter()
             .all(|finding| finding.effect == "setup")
     );
-    assert!(
-        said.findings[0].statement.contains("link_geometry.l"),
-        "{}",
-        said.findings[0].statement
-    );
+    has(&said.findings[0].statement, "link_geometry.l");
 }
 
 #[test]
@@ -527,21 +505,19 @@ fn a_robot_file_in_another_unit_is_blamed_and_not_the_points() {
         (joint.point, joint.centre) = (small(joint.point), joint.centre.map(small))
     });
     inputs.robot.tool = small(inputs.robot.tool);
-    let said = diagnosed(&inputs).expect("a diagnosis");
+    let said = diagnosed(&inputs).unwrap();
     let statement = &said.findings[0].statement;
-    assert!(
-        statement.starts_with(
-            "the lengths of the robot file are in metres and were read in millimetres"
-        ),
-        "{statement}"
+    starts_with(
+        statement,
+        "the lengths of the robot file are in metres and were read in millimetres",
     );
     let after = statement
         .split("without it ")
         .nth(1)
         .and_then(|text| text.split(" mm").next())
-        .expect("a length");
+        .unwrap();
     assert!(
-        (0.3..3.0).contains(&after.parse::<f64>().expect("mm")),
+        (0.3..3.0).contains(&after.parse::<f64>().unwrap()),
         "{statement}"
     );
 }
@@ -550,13 +526,10 @@ fn a_robot_file_in_another_unit_is_blamed_and_not_the_points() {
 fn a_robot_file_of_another_arm_is_refused_with_what_to_look_at() {
     let mut inputs = recorded(&fixture::offset_wrist(), 7, json!([]));
     inputs.robot = fixture::spherical();
-    let error = diagnosed(&inputs).err().expect("no diagnosis");
+    let error = diagnosed(&inputs).err().unwrap();
     assert_eq!(error.exit_code(), 10, "{error}");
     let said = error.to_string();
-    assert!(
-        said.contains("% of its reach") && said.contains("REPLACE") && said.contains("robot file"),
-        "{said}"
-    );
+    has(&said, ["% of its reach", "REPLACE", "robot file"]);
 }
 
 #[test]
@@ -564,7 +537,7 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     let folder = concealed("zero_shift", "923", "60");
     let here = folder.path();
     let file = here.join("sealed/recordings/c0001/tracker.csv");
-    let text = std::fs::read_to_string(&file).expect("the log");
+    let text = read(&file);
     let inches = |line: &str| -> String {
         let cells = line.split(',').map(|cell| {
             cell.parse::<f64>()
@@ -576,52 +549,45 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
         &file,
         text.lines().map(inches).collect::<Vec<_>>().join("\n"),
     )
-    .expect("written");
+    .unwrap();
     case_with(here, &[]);
-    let (code, told) = ended(&[&["run", "p.yaml"], &CASE[..]].concat(), here);
+    let (code, told) = ended(&format!("run p.yaml {CASE}"), here);
     assert_eq!(code, Some(10), "{told}");
-    assert!(
-        told.contains("verdict   wrong set-up") && told.contains("the points are in inches"),
-        "{told}"
+    has(
+        &told,
+        ["verdict   wrong set-up", "the points are in inches"],
     );
     assert!(
         !told.lines().any(|line| line.starts_with("after")),
         "{told}"
     );
-    let (code, said) = refused(&["compensate", "HEAD", "p.yaml"], here);
+    let (code, said) = refused("compensate HEAD p.yaml", here);
     assert!(
         code == Some(10) && said.contains("the set-up is wrong: the points are in inches"),
         "{code:?} {said}"
     );
     // A step that is asked for by its name is refused as well; one who insists is told what it warned of when it ran.
-    let step = [
-        "export", "HEAD", "--step", "joint", "--format", "json", "--quiet",
-    ];
-    let (code, said) = refused(&step, here);
+    let step = "export HEAD --step joint --format json --quiet";
+    let (code, said) = refused(step, here);
     assert!(
         code == Some(10) && said.contains("refused: the set-up is wrong: the points are in inches"),
         "{code:?} {said}"
     );
-    let (code, said) = refused(&[&step[..], &["--force"]].concat(), here);
+    let (code, said) = refused(&format!("{step} --force"), here);
     assert!(
         code == Some(0)
             && said.contains("warning: joint: the set-up is wrong: the points are in inches"),
         "{code:?} {said}"
     );
-    let said: Value =
-        serde_json::from_str(&ended(&["diagnose", "HEAD", "--json"], here).1).expect("JSON");
+    let said: Value = serde_json::from_str(&ended("diagnose HEAD --json", here).1).unwrap();
     assert_eq!(
         (&said["verdict"], &said["findings"][0]["effect"]),
         (&"wrong_setup".into(), &"setup".into())
     );
-    let (code, run) = ended(
-        &[&["run", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(),
-        here,
-    );
+    let (code, run) = ended(&format!("run p.yaml --json --quiet {CASE}"), here);
     assert_eq!(code, Some(10), "{run}");
-    let run: Value = serde_json::from_str(&run).expect("JSON");
-    let page = std::fs::read_to_string(here.join(run["report"].as_str().expect("a report")))
-        .expect("the page");
+    let run: Value = serde_json::from_str(&run).unwrap();
+    let page = read(here.join(run["report"].as_str().unwrap()));
     assert!(
         page.contains("Not accepted: the set-up is wrong")
             && !page.contains("The mean position error fell"),
@@ -638,18 +604,15 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
         .map(|(from, to)| (from.as_str(), to.as_str()))
         .collect();
     case_with(here, &axes);
-    let mended = calib(
-        &[&["diagnose", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(),
-        here,
-    );
-    let mended: Value = serde_json::from_str(&mended).expect("JSON");
+    let mended = calib(&format!("diagnose p.yaml --json --quiet {CASE}"), here);
+    let mended: Value = serde_json::from_str(&mended).unwrap();
     assert_eq!(mended["findings"][0]["effect"], "zero_shift", "{mended:#}");
 }
 
 #[test]
 fn without_link_masses_a_loaded_recording_says_what_is_lost() {
     let mut inputs = recorded(&fixture::spherical(), 5, json!([]));
-    let known = diagnosed(&inputs).expect("a diagnosis");
+    let known = diagnosed(&inputs).unwrap();
     assert!(
         !known.statement.contains("link masses") && known.warnings.is_empty(),
         "{:?}",
@@ -665,9 +628,9 @@ fn without_link_masses_a_loaded_recording_says_what_is_lost() {
             .map(|row| if row % 2 == 0 { 10.0 } else { 0.0 })
             .collect(),
     );
-    let said = diagnosed(&inputs).expect("a diagnosis");
+    let said = diagnosed(&inputs).unwrap();
     let lost = "the robot file gives no link masses, yet gravity loads joints in these poses (24 rows of 48 carry a payload)";
-    assert!(said.statement.contains(lost), "{}", said.statement);
+    has(&said.statement, lost);
     assert!(
         said.warnings
             .iter()
@@ -698,17 +661,11 @@ fn two_set_ups_in_one_recording_are_named_with_the_rows_of_each() {
                 point[2],
             ];
         }
-        let said = diagnosed(&inputs).expect("a diagnosis");
+        let said = diagnosed(&inputs).unwrap();
         assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
         let statement = &said.findings[0].statement;
-        assert!(
-            statement.starts_with("two set-ups are in one recording"),
-            "{statement}"
-        );
-        assert!(
-            statement.contains(first) && statement.contains(second),
-            "{statement}"
-        );
+        starts_with(statement, "two set-ups are in one recording");
+        has(statement, [first, second]);
         assert!(
             said.findings
                 .iter()
@@ -801,9 +758,9 @@ fn a_makers_counting_is_found_whole_and_no_healthy_joint_is_mastered_again() {
                 .split("without it ")
                 .nth(1)
                 .and_then(|text| text.split(" mm").next())
-                .expect("a length");
+                .unwrap();
             assert!(
-                after.parse::<f64>().expect("mm") < 12.0,
+                after.parse::<f64>().unwrap() < 12.0,
                 "{} {name}: {statement}",
                 robot.name
             );

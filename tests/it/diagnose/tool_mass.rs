@@ -5,32 +5,16 @@ use serde_json::Value;
 
 #[test]
 fn an_unstated_tool_is_named_beside_the_compliance_that_shows_it() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    let design = [
-        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "8203", "--points",
-        "120", "--faulty", "0",
-    ];
-    let effects = [
-        "--family",
-        "joint_compliance",
-        "--robot",
-        "sr210d",
-        "--natural",
-        "1",
-        "--other-forms",
-        "0",
-        "--tool-mass",
-        "40",
-    ];
-    calib(&[&design[..], &effects].concat(), here);
+    let design = "simulate conceal --out sealed --cases 1 --seed 8203 --points 120 --faulty 0";
+    let effects =
+        "--family joint_compliance --robot sr210d --natural 1 --other-forms 0 --tool-mass 40";
+    calib(&format!("{design} {effects}"), here);
     case_with(here, &[]);
-    let said = calib(
-        &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
-        here,
-    );
-    let said: Value = serde_json::from_str(&said).expect("JSON");
-    let findings = said["findings"].as_array().expect("findings");
+    let said = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), here);
+    let said: Value = serde_json::from_str(&said).unwrap();
+    let findings = said["findings"].as_array().unwrap();
     let names: Vec<&str> = findings
         .iter()
         .filter_map(|finding| finding["effect"].as_str())

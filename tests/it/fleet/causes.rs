@@ -1,6 +1,7 @@
 //! A fleet's causes: what each recording alone hardly shows, the sum over robots names; a fleet without a cause names nothing.
 
 use super::{fleet, output, write};
+use crate::answer::{has, read, root};
 use crate::fixture::spread;
 use calib::report::fleet_causes::html;
 use calib::table::{FleetCellRow, FleetCells, FleetFindingRow, FleetFindings, FleetOutliers};
@@ -13,7 +14,7 @@ const LACKING: usize = 5;
 
 /// Twins with rigid errors of their own and what `effects` says of each.
 pub fn twins(folder: &Path, name: &str, effects: impl Fn(usize) -> String) -> std::path::PathBuf {
-    let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
+    let robot = root("pipelines/sr210d/robot.yaml");
     let pipeline = format!(
         "calib: 1\nname: twins\nseed: 5\nstages:\n  - uses: robot\n    with: {{file: {}}}\n  - uses: simulate\n    with:\n      \
          truth: {{}}\n      tracker: {{position_mm: [4500, -1800, 900], roll_pitch_yaw_deg: [0.3, -0.2, 155]}}\n      \
@@ -95,7 +96,7 @@ fn robots_together_name_a_weak_cause_its_order_and_the_robot_that_lacks_it() {
     assert_eq!(again["computed"], 0);
     assert_eq!(again["findings"], answer["findings"]);
     // The next robot of the model is expected to have it.
-    let text = std::fs::read_to_string(&file).unwrap();
+    let text = read(&file);
     let text = text.replace("name: shared", "name: next")
         + "prior: {fleet: shared, stage: diagnose, by: causes}\n";
     let next = write(folder.join("next.yaml"), &text);
@@ -116,7 +117,7 @@ fn a_prior_of_causes_of_a_fleet_that_was_not_diagnosed_is_a_fault_of_the_file() 
     let folder = tempfile::tempdir().unwrap();
     let (folder, store) = (folder.path(), folder.path().join("store"));
     let file = twins(folder, "first", |_| "[]".into());
-    let text = std::fs::read_to_string(&file).unwrap();
+    let text = read(&file);
     let with = |rest: &str| write(folder.join("next.yaml"), &format!("{text}prior: {rest}\n"));
     let said = |rest: &str| {
         let (result, said) = output(fleet("run", &with(rest), &store).arg("--quiet"));
@@ -124,9 +125,9 @@ fn a_prior_of_causes_of_a_fleet_that_was_not_diagnosed_is_a_fault_of_the_file() 
         said
     };
     let lacks = said("{fleet: other, stage: diagnose, by: causes}");
-    assert!(lacks.contains("no fleet `other` was diagnosed"), "{lacks}");
+    has(&lacks, "no fleet `other` was diagnosed");
     let named = said("{fleet: other, stage: diagnose, by: causes, effects: [backlash]}");
-    assert!(named.contains("prior.effects"), "{named}");
+    has(&named, "prior.effects");
 }
 
 fn size(robot: usize) -> FleetCellRow {

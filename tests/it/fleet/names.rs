@@ -1,6 +1,7 @@
 //! Names of robots are data: never a path, never a command, never markup.
 
 use super::{copy, file, fleet, output, recordings, run};
+use crate::answer::{has, read};
 use std::path::Path;
 
 const NAMES: [&str; 10] = [
@@ -47,7 +48,7 @@ fn names_never_become_paths_commands_or_markup() {
     ]));
     assert!(result.status.success(), "{said}");
     let script = String::from_utf8(result.stdout).unwrap();
-    assert!(script.contains("#SBATCH --array=0-3\n"), "{script}");
+    has(&script, "#SBATCH --array=0-3\n");
     for part in ["pwned", "-rf", "blank", "onerror", "quoted"] {
         assert!(!script.contains(part), "{part}: {script}");
     }
@@ -70,7 +71,7 @@ fn names_never_become_paths_commands_or_markup() {
             .all(|c| c.is_ascii_alphanumeric() || "._-".contains(c))),
         "{files:?}"
     );
-    let page = std::fs::read_to_string(told["page"].as_str().unwrap()).unwrap();
+    let page = read(told["page"].as_str().unwrap());
     assert!(
         !page.contains("<img") && page.contains("&lt;img src=x"),
         "the name is markup"
@@ -82,7 +83,7 @@ fn names_never_become_paths_commands_or_markup() {
 
     let (result, said) = output(fleet("render", &file, &store).args(["--engine", "slurm"]));
     assert_eq!(result.status.code(), Some(2));
-    assert!(said.contains("every robot is recorded"), "{said}");
+    has(&said, "every robot is recorded");
 }
 
 #[test]
@@ -102,16 +103,10 @@ fn what_would_need_quoting_in_a_job_file_is_refused() {
         "main\n#SBATCH x",
     ]));
     assert_eq!(result.status.code(), Some(2));
-    assert!(
-        said.contains("--partition: ") && said.contains("--store: "),
-        "{said}"
-    );
+    has(&said, ["--partition: ", "--store: "]);
     let (result, said) =
         output(fleet("render", &file, &store).args(["--engine", "k8s", "--image", "calib:0.1"]));
     assert!(result.status.success(), "{said}");
     let text = String::from_utf8(result.stdout).unwrap();
-    assert!(
-        text.contains("completionMode: Indexed") && text.contains("completions: 1\n"),
-        "{text}"
-    );
+    has(&text, ["completionMode: Indexed", "completions: 1\n"]);
 }

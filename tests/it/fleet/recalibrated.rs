@@ -1,6 +1,7 @@
 //! A fleet measured again: what changed is flagged with its reason, what did not is left in peace.
 
 use super::{fleet, output, write};
+use crate::answer::{read, root};
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -44,7 +45,7 @@ fn list(folder: &Path, name: &str, campaign: usize, shift: impl Fn(usize, usize)
 }
 
 fn pipeline(folder: &Path) {
-    let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
+    let robot = root("pipelines/sr210d/robot.yaml");
     let text = format!(
         "calib: 1\nname: twins\nseed: 5\nstages:\n  - uses: robot\n    with: {{file: {}}}\n  - uses: simulate\n    with:\n      \
          truth: {{}}\n      tracker: {{position_mm: [4500, -1800, 900], roll_pitch_yaw_deg: [0.3, -0.2, 155]}}\n      \
@@ -115,7 +116,7 @@ fn a_robot_whose_diagnosis_changed_is_flagged_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     pipeline(folder);
-    let text = std::fs::read_to_string(folder.join("twins.yaml")).unwrap();
+    let text = read(folder.join("twins.yaml"));
     write(
         folder.join("twins.yaml"),
         &text.replace(
@@ -125,7 +126,7 @@ fn a_robot_whose_diagnosis_changed_is_flagged_with_the_reason() {
     );
     for name in ["spring", "autumn"] {
         list(folder, name, usize::from(name == "autumn"), |_, _| 0.0);
-        let rows = std::fs::read_to_string(folder.join(format!("{name}.csv"))).unwrap();
+        let rows = read(folder.join(format!("{name}.csv")));
         write(
             folder.join(format!("{name}.csv")),
             &rows

@@ -1,6 +1,7 @@
 //! Robots from a list, from one big table, and with settings of their own.
 
 use super::{file, recordings, run, write};
+use crate::answer::read;
 use std::path::Path;
 
 #[test]
@@ -51,7 +52,7 @@ fn a_list_names_robots_their_folders_groups_and_settings() {
         effects(1),
         serde_json::json!(["base_frame", "joint_offset"])
     );
-    let page = std::fs::read_to_string(told["page"].as_str().unwrap()).unwrap();
+    let page = read(told["page"].as_str().unwrap());
     for group in [
         "other, Linz, 2026-10-01",
         "c6, Graz, 2026-10-01",
@@ -78,8 +79,7 @@ fn together(cases: &Path, names: &[(&str, &str)]) -> String {
     let mut text = format!("cell,{},{}\n", CONTROLLER.join(","), TRACKER.join(","));
     for (case, robot) in names {
         let columns = |file: &str, wanted: &[&str]| -> Vec<String> {
-            let text =
-                std::fs::read_to_string(cases.join("recordings").join(case).join(file)).unwrap();
+            let text = read(cases.join("recordings").join(case).join(file));
             let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
             let places: Vec<usize> = wanted
                 .iter()
@@ -111,7 +111,7 @@ fn one_big_table_is_parted_by_robot_once() {
     recordings(&cases, 3);
     let names = [("c0001", "../a"), ("c0002", "b, c"), ("c0003", "d")];
     write(folder.path().join("all.csv"), &together(&cases, &names));
-    let text = std::fs::read_to_string(super::pipeline()).unwrap();
+    let text = read(super::pipeline());
     let start = text.find("        - file: ${case}/controller.csv").unwrap();
     let end = text.find("        - file: ${case}/tracker.csv").unwrap();
     let join = text.find("      join: {by: id}\n").unwrap();
@@ -132,9 +132,7 @@ fn one_big_table_is_parted_by_robot_once() {
     write(folder.path().join("one.yaml"), &text);
     let rest = "robots:\n  - {recording: all.csv, by: cell, variable: part}\n";
     let file = file(folder.path(), "line", rest);
-    let text = std::fs::read_to_string(&file)
-        .unwrap()
-        .replace(&super::pipeline().display().to_string(), "one.yaml");
+    let text = read(&file).replace(&super::pipeline().display().to_string(), "one.yaml");
     std::fs::write(&file, text).unwrap();
     let told = run(&file, &store, 0);
     let names: Vec<&str> = told["robots"]
@@ -151,7 +149,7 @@ fn one_big_table_is_parted_by_robot_once() {
     );
     assert_eq!(run(&file, &store, 0)["computed"].as_u64(), Some(0));
     // A row more of one robot is another recording of that one alone.
-    let mut all = std::fs::read_to_string(folder.path().join("all.csv")).unwrap();
+    let mut all = read(folder.path().join("all.csv"));
     let last = all
         .lines()
         .next_back()

@@ -2,12 +2,11 @@
 
 use super::laws::select;
 use super::{Cell, THREE};
-use crate::fixture;
+use crate::answer::has;
+use crate::fixture::{self, diagnosed};
 use crate::identify::normal;
-use calib::diagnose::{Diagnosis, Question, diagnose};
-use calib::estimate::gauge;
-use calib::robot::{Measurements, Named, RobotModel, Sequence};
-use std::collections::BTreeMap;
+use calib::diagnose::Diagnosis;
+use calib::robot::{Measurements, Named, Sequence};
 
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
@@ -40,32 +39,6 @@ fn lagging(poses: usize, rest: impl Fn(f64, f64) -> f64) -> (Cell, Measurements)
     (cell, data)
 }
 
-fn said(cell: &Cell, data: &Measurements) -> Diagnosis {
-    let all: Vec<usize> = (0..data.rows()).collect();
-    let (robot, _) = gauge(
-        RobotModel::new(cell.description.clone()),
-        data,
-        &all,
-        &BTreeMap::new(),
-    )
-    .expect("a robot");
-    let question = Question {
-        robot: &robot,
-        data,
-        fit: &all,
-        validate: &[],
-        set: &vec![0; all.len()],
-        prior_weight: 1.0,
-        open_world: 0.3,
-        without: &[],
-        own: &[],
-        beside_simulation: false,
-        known: &[],
-        seed: 1,
-    };
-    diagnose(&question, |_| ())
-}
-
 fn lag_alone(said: &Diagnosis, what: &str) -> (String, f64) {
     let named: Vec<&str> = said.findings.iter().map(|finding| finding.effect).collect();
     assert_eq!(
@@ -87,22 +60,19 @@ fn lag_alone(said: &Diagnosis, what: &str) -> (String, f64) {
 #[test]
 fn a_lag_of_the_last_move_is_found_with_three_targets_a_pose() {
     let (cell, data) = lagging(60, |moved, _| 0.002 * moved);
-    let (statement, share) = lag_alone(&said(&cell, &data), "in order");
+    let (statement, share) = lag_alone(&diagnosed(&cell.description, &data), "in order");
     assert!((share / 0.002 - 1.0).abs() < 0.05, "{statement}");
-    assert!(
-        statement.contains("of the last move was still to come"),
-        "{statement}"
-    );
+    has(&statement, "of the last move was still to come");
 }
 
 #[test]
 fn a_lag_of_a_synchronous_motion_is_shared_out_as_the_moves_are() {
     let (cell, data) = lagging(60, |moved, largest| 90.0 * ARCSEC * moved / largest);
-    let (statement, rest) = lag_alone(&said(&cell, &data), "in order");
+    let (statement, rest) = lag_alone(&diagnosed(&cell.description, &data), "in order");
     assert!((rest / 90.0 - 1.0).abs() < 0.05, "{statement}");
-    assert!(
-        statement.contains("the joint that moved most had 90 arcsec still to come"),
-        "{statement}"
+    has(
+        &statement,
+        "the joint that moved most had 90 arcsec still to come",
     );
 }
 
@@ -121,7 +91,7 @@ fn rows_in_another_order_than_their_times_lag_by_their_times() {
             .time
             .as_ref()
             .map(|time| order.iter().map(|row| time[*row]).collect());
-        let times = sorted.time.clone().expect("times");
+        let times = sorted.time.clone().unwrap();
         sorted.sequence = Sequence::by_time(&times, |a, b| sorted.near_pose(a, b));
         for (row, own) in order.iter().enumerate() {
             for joint in 0..data.joints {
@@ -137,7 +107,7 @@ fn rows_in_another_order_than_their_times_lag_by_their_times() {
                 );
             }
         }
-        let (statement, rest) = lag_alone(&said(&cell, &sorted), what);
+        let (statement, rest) = lag_alone(&diagnosed(&cell.description, &sorted), what);
         assert!((rest / 90.0 - 1.0).abs() < 0.05, "{what}: {statement}");
     }
 }

@@ -122,7 +122,7 @@ impl Truth {
                 .specs()
                 .iter()
                 .position(|spec| spec.name == format!("anchor.{axis}"))
-                .expect("an axis")
+                .unwrap()
         };
         let moved = Vector3::new(x[named("x")], x[named("y")], x[named("z")]);
         let anchor = self.model.robot.setup().anchors[0].place + moved;
@@ -197,7 +197,7 @@ fn residual(
         row,
         placed: &placed,
     };
-    kind.residual(at).expect("measured").0
+    kind.residual(at).unwrap().0
 }
 
 #[test]
@@ -266,7 +266,7 @@ fn the_rank_of_every_kind_is_that_of_theory() {
         let all = truth.rows(600);
         // A level is read where it is upright.
         let upright: Vec<usize> = (0..all.rows())
-            .filter(|row| all.reading("orientation", *row).expect("all").values[8] > 0.0)
+            .filter(|row| all.reading("orientation", *row).unwrap().values[8] > 0.0)
             .collect();
         let all = select(&all, &upright);
         for kind in read() {

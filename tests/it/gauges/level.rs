@@ -19,7 +19,7 @@ const SIGMA_TILT: f64 = 2e-5;
 
 /// Rows of a level that stands upright: it works up to where its z axis is level.
 fn upright(data: &Measurements) -> Vec<usize> {
-    let up = |row: &usize| data.reading("orientation", *row).expect("measured").values[8] > 0.3;
+    let up = |row: &usize| data.reading("orientation", *row).unwrap().values[8] > 0.3;
     (0..data.rows()).filter(up).collect()
 }
 
@@ -31,7 +31,7 @@ fn ingested(data: &Measurements, seed: usize) -> Recording {
     let mut text = format!("{joints}x,y,z,level_x,level_y\n");
     for row in 0..data.rows() {
         let noise = |k: usize| normal(1_000_003 * (seed + 1) + 8 * row + k);
-        let tilt = data.reading("inclination", row).expect("measured").values;
+        let tilt = data.reading("inclination", row).unwrap().values;
         let cells = data.q(row).iter().map(|q| q.to_degrees());
         let cells = cells.chain(
             (0..3).map(|axis| (data.points.position[row][axis] + SIGMA * noise(axis)) * 1e3),
@@ -51,7 +51,7 @@ fn ingested(data: &Measurements, seed: usize) -> Recording {
         "q": column("q{j}", "deg"), "x": column("x", "mm"), "y": column("y", "mm"), "z": column("z", "mm"),
         "tilt_x": column("level_x", "mrad"), "tilt_y": column("level_y", "mrad"), "sigma_tilt": {"value": 20.0e-3, "unit": "mrad"},
     }}]}))
-    .expect("settings");
+    .unwrap();
     let tables = Desk::default()
         .with("a.csv", text)
         .run(
@@ -60,7 +60,7 @@ fn ingested(data: &Measurements, seed: usize) -> Recording {
                 robot: robot(&"r".repeat(data.joints), 1.0),
             },
         )
-        .expect("ingest runs");
+        .unwrap();
     table::<Recording>(&tables).remove(0)
 }
 
@@ -79,7 +79,7 @@ fn errors(model: &Model, fitted: &Fitted, at: &Measurements) -> [f64; 2] {
         rms(fitted
             .covariance
             .as_ref()
-            .expect("not singular")
+            .unwrap()
             .of_predictions(model, at)),
         rms(off),
     ]

@@ -2,9 +2,10 @@
 
 use super::laws::select;
 use super::{Cell, SIGMA, THREE};
-use crate::fixture;
+use crate::answer::has;
+use crate::fixture::{self, all_rows, diagnosed, question};
 use crate::identify::{GEOMETRY, model, normal};
-use calib::diagnose::{Question, diagnose};
+use calib::diagnose::diagnose;
 use calib::estimate::{
     FitOptions, Poses, Session, SuspectKind, cross_validate, fit_screened, gauge,
 };
@@ -38,18 +39,14 @@ fn stops(poses: usize, visits: usize, joint_sigma: f64, jitter: f64) -> (Cell, M
     (cell, data)
 }
 
-fn rows(data: &Measurements) -> Vec<usize> {
-    (0..data.rows()).collect()
-}
-
 #[test]
 fn targets_of_one_pose_are_no_repeats_of_each_other() {
     let (_, data) = stops(40, 1, 0.0, 2e-6);
-    let poses = Poses::of(&data, &rows(&data));
+    let poses = Poses::of(&data, &all_rows(&data));
     assert_eq!((poses.all().len(), poses.repeated().count()), (40, 0));
     assert!(poses.all().iter().all(|rows| rows.len() == 3));
     let (_, twice) = stops(40, 2, 0.0, 2e-6);
-    let poses = Poses::of(&twice, &rows(&twice));
+    let poses = Poses::of(&twice, &all_rows(&twice));
     assert_eq!((poses.all().len(), poses.repeated().count()), (40, 120));
     let same = |rows: &Vec<usize>| {
         rows.iter()
@@ -61,40 +58,14 @@ fn targets_of_one_pose_are_no_repeats_of_each_other() {
 #[test]
 fn a_diagnosis_learns_the_repeatability_from_the_same_target_again() {
     let (cell, data) = stops(40, 2, 6.0 * ARCSEC, 0.0);
-    let all = rows(&data);
-    let (robot, _) = gauge(
-        RobotModel::new(cell.description.clone()),
-        &data,
-        &all,
-        &BTreeMap::new(),
-    )
-    .expect("a robot");
-    let question = Question {
-        robot: &robot,
-        data: &data,
-        fit: &all,
-        validate: &[],
-        set: &vec![0; all.len()],
-        prior_weight: 1.0,
-        open_world: 0.3,
-        without: &[],
-        own: &[],
-        beside_simulation: false,
-        known: &[],
-        seed: 1,
-    };
-    let found = diagnose(&question, |_| ());
+    let found = diagnosed(&cell.description, &data);
     assert_eq!(
         (found.repeatability.repeats, found.noise_basis),
         (120, NoiseBasis::Repeats)
     );
     let ratio = found.repeatability.sigma / (6.0 * ARCSEC);
     assert!((0.8..1.25).contains(&ratio), "{ratio} of the truth");
-    assert!(
-        found.statement.contains("the noise that 120 repeats show"),
-        "{}",
-        found.statement
-    );
+    has(&found.statement, "the noise that 120 repeats show");
 }
 
 #[test]
@@ -130,14 +101,14 @@ fn folds_never_part_the_targets_of_a_pose() {
     let folds = |jitter: f64| {
         let (cell, data) = stops(60, 1, 20.0 * ARCSEC, jitter);
         let (model, fitted) = cell.fit(&data, |_| BTreeMap::new());
-        let fit_rows = rows(&data);
+        let fit_rows = all_rows(&data);
         let session = Session {
             data: &data,
             rows: &fit_rows,
             model: &model,
             fitted: &fitted,
         };
-        let folds = cross_validate(&session, 5, 3).expect("enough poses");
+        let folds = cross_validate(&session, 5, 3).unwrap();
         let rms = |errors: &[f64]| {
             (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
         };
@@ -165,14 +136,14 @@ fn a_pose_with_wrong_joints_is_set_aside_with_all_its_targets_and_no_event() {
     for row in 3 * 40..3 * 44 {
         data.points.position[row] += Vector3::new(0.0, 3e-4, 1e-4);
     }
-    let all = rows(&data);
+    let all = all_rows(&data);
     let (robot, base) = gauge(
         RobotModel::new(cell.description.clone()),
         &data,
         &all,
         &BTreeMap::new(),
     )
-    .expect("a robot");
+    .unwrap();
     let model = model(&robot, base, &GEOMETRY);
     let candidates: Vec<usize> = (0..model.x.len()).collect();
     let options = FitOptions {
@@ -221,45 +192,26 @@ fn near_repeats_count_less_the_known_motion() {
     };
     // At half a metre 0.03 deg are 260 um, far more than 5 arcsec and the instrument make.
     let data = returns(5e-4, 5.0 * ARCSEC);
-    let poses = Poses::of(&data, &rows(&data));
+    let poses = Poses::of(&data, &all_rows(&data));
     assert_eq!((poses.all().len(), poses.repeated().count()), (60, 60));
     let (model, fitted) = cell.fit(&data, |_| BTreeMap::new());
-    let found = poses
-        .joint_repeatability(&model, &data)
-        .expect("it is there")
-        / (5.0 * ARCSEC);
+    let found = poses.joint_repeatability(&model, &data).unwrap() / (5.0 * ARCSEC);
     assert!((0.8..1.2).contains(&found), "{found} of the truth");
-    let repeated = fitted.repeated.expect("repeats");
+    let repeated = fitted.repeated.unwrap();
     assert_eq!(
         (repeated.poses, repeated.freedom, repeated.revisited),
         (60, 180, true)
     );
     let still = returns(5e-4, 0.0);
     let (model, fitted) = cell.fit(&still, |_| BTreeMap::new());
-    let noise = fitted.repeated.expect("repeats").noise;
+    let noise = fitted.repeated.unwrap().noise;
     assert!((noise / SIGMA - 1.0).abs() < 0.15, "{noise:e} m");
     assert_eq!(
-        Poses::of(&still, &rows(&still)).joint_repeatability(&model, &still),
+        Poses::of(&still, &all_rows(&still)).joint_repeatability(&model, &still),
         None
     );
-    let question_rows = rows(&data);
-    let robot = RobotModel::new(cell.description.clone());
-    let set = vec![0; data.rows()];
-    let question = Question {
-        robot: &robot,
-        data: &data,
-        fit: &question_rows,
-        validate: &[],
-        set: &set,
-        prior_weight: 1.0,
-        open_world: 0.3,
-        without: &[],
-        own: &[],
-        beside_simulation: false,
-        known: &[],
-        seed: 1,
-    };
-    let said = diagnose(&question, |_| ());
+    let (robot, fit) = (RobotModel::new(cell.description.clone()), all_rows(&data));
+    let said = diagnose(&question(&robot, &data, &fit), |_| ());
     assert!(
         said.repeatability.repeats >= 30 && said.noise_basis == NoiseBasis::Repeats,
         "{:?}",

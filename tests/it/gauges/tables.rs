@@ -1,7 +1,7 @@
 //! Targets, orientations and distances as tables: identified, stored and read back.
 
 use super::{Cell, THREE};
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, identify_reads, table};
 use crate::fixture;
 use calib::effect::Load;
 use calib::robot::{Measurements, Named, RobotModel};
@@ -53,18 +53,17 @@ fn tables(cell: &Cell, data: &Measurements) -> IdentifyReads {
             .collect(),
         ..Recording::default()
     };
-    let recording = Recording::from_frame(&recording.to_frame().expect("a sound table"))
-        .expect("the same table");
+    let recording = Recording::from_frame(&recording.to_frame().unwrap()).unwrap();
     let split = |row: usize| SplitRow {
         sequence: row as i64,
         point_id: format!("P{row}"),
         set: "fit".into(),
     };
-    IdentifyReads {
-        robot: Robot::from_description(&cell.description),
+    identify_reads(
+        Robot::from_description(&cell.description),
         recording,
-        split: Split((0..rows).map(split).collect()),
-    }
+        Split((0..rows).map(split).collect()),
+    )
 }
 
 /// What is beside points, by setting.
@@ -111,8 +110,8 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
     let desk = Desk::default();
     let stage: Identify =
         serde_json::from_value(json!({"targets": {"A": [119.0, 1.0, 30.0]}, "screen": false}))
-            .expect("settings");
-    let tables = desk.run(&stage, reads).expect("identify runs");
+            .unwrap();
+    let tables = desk.run(&stage, reads).unwrap();
     let parameters = table::<Parameters>(&tables).remove(0);
     let placed = |name: &str| {
         parameters
@@ -134,7 +133,7 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
     );
     let model = parameters
         .model(RobotModel::new(description), &[], Load::GravityTorque)
-        .expect("a model");
+        .unwrap();
     let own = recording.measurements();
     let errors = model.row_errors(&own);
     let prediction = table::<Prediction>(&tables).remove(0);
@@ -146,7 +145,7 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
             row.error_mm,
             error.length * 1e3
         );
-        assert!((row.turn_rad.expect("turned") - error.angle.expect("turned")).abs() < 1e-9);
+        assert!((row.turn_rad.unwrap() - error.angle.unwrap()).abs() < 1e-9);
         assert_eq!(
             row.measured.as_deref(),
             (row.sequence >= 90).then_some("rotation distance")
@@ -170,7 +169,7 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
 fn a_target_that_the_recording_does_not_have_is_named_with_those_it_has() {
     let cell = Cell::new(fixture::offset_wrist(), &THREE, 9);
     let stage: Identify =
-        serde_json::from_value(json!({"targets": {"D": [1.0, 2.0, 3.0]}})).expect("settings");
+        serde_json::from_value(json!({"targets": {"D": [1.0, 2.0, 3.0]}})).unwrap();
     let error = Desk::default()
         .run(&stage, tables(&cell, &cell.rows(20, 0)))
         .map(|_| ())

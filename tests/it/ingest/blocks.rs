@@ -1,6 +1,7 @@
 //! Files of many blocks: whatever is odd in them, and on whichever number of threads, each row is what it is in a short file.
 
-use super::{TWO, Taken, robot, take};
+use super::{TWO, Taken, rr, take};
+use crate::answer::has;
 use crate::desk::Desk;
 use rayon::ThreadPoolBuilder;
 
@@ -53,7 +54,7 @@ fn on(threads: usize, read: impl FnOnce() -> Taken + Send) -> Taken {
     ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
-        .expect("threads")
+        .unwrap()
         .install(read)
 }
 
@@ -66,7 +67,7 @@ fn oddities_at_any_place_of_a_long_file_are_those_of_a_short_one() {
     );
     for threads in [1, 2, 3] {
         let desk = Desk::default().with("a.csv", text.as_str());
-        let taken = on(threads, || take(&desk, &yaml, robot("rr", 1.0)).unwrap());
+        let taken = on(threads, || take(&desk, &yaml, rr()).unwrap());
         let used: Vec<(i64, &str)> = (1..)
             .zip(&rows)
             .filter(|(_, row)| row.2.is_none())
@@ -141,7 +142,7 @@ fn numbers_of_rows_ascend_over_the_borders_of_blocks() {
     let yaml = TWO.replace("      q:", "      sequence: {column: s}\n      q:");
     for threads in [1, 3] {
         let desk = Desk::default().with("a.csv", text.as_str());
-        let taken = on(threads, || take(&desk, &yaml, robot("rr", 1.0)).unwrap());
+        let taken = on(threads, || take(&desk, &yaml, rr()).unwrap());
         let refused: Vec<(i64, &str)> = taken
             .rejected
             .0
@@ -170,17 +171,11 @@ fn what_is_wrong_with_a_late_row_is_an_error_of_its_line() {
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
-            .expect("threads");
-        let said = pool.install(|| {
-            take(&desk, &yaml, robot("rr", 1.0))
-                .err()
-                .expect("a fault")
-                .to_string()
-        });
-        assert!(
-            said.contains(&format!("a.csv:{lines}"))
-                && said.contains("a quoted field is not closed"),
-            "{said}"
+            .unwrap();
+        let said = pool.install(|| take(&desk, &yaml, rr()).err().unwrap().to_string());
+        has(
+            &said,
+            [&*format!("a.csv:{lines}"), "a quoted field is not closed"],
         );
     }
 }

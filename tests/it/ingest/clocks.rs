@@ -1,6 +1,7 @@
 //! Times as clocks write them.
 
-use super::{refusal, robot, take};
+use super::{refusal, rr, take};
+use crate::answer::has;
 use crate::desk::Desk;
 
 const CLOCK: &str = r#"
@@ -27,7 +28,7 @@ fn rows(times: &[&str]) -> Desk {
 #[test]
 fn times_of_day_go_on_after_midnight_and_dates_are_seconds() {
     let times = |cells: &[&str]| {
-        take(&rows(cells), CLOCK, robot("rr", 1.0))
+        take(&rows(cells), CLOCK, rr())
             .unwrap()
             .recording
             .time
@@ -47,29 +48,19 @@ fn times_of_day_go_on_after_midnight_and_dates_are_seconds() {
 
 #[test]
 fn what_is_no_clock_time_is_a_rejected_row_and_a_clock_without_its_unit_says_how_to_read_it() {
-    let taken = take(
-        &rows(&["08:15:03", "8 o'clock", "08:15:05"]),
-        CLOCK,
-        robot("rr", 1.0),
-    )
-    .unwrap();
+    let taken = take(&rows(&["08:15:03", "8 o'clock", "08:15:05"]), CLOCK, rr()).unwrap();
     let [gone] = taken.rejected.0.as_slice() else {
         panic!("{:?}", taken.rejected)
     };
     assert_eq!((gone.line, gone.reason.as_str()), (3, "not_a_number"));
-    assert!(
-        gone.detail.contains("`8 o'clock` is no clock time") && gone.detail.contains("08:15:03.25"),
-        "{}",
-        gone.detail
+    has(
+        &gone.detail,
+        ["`8 o'clock` is no clock time", "08:15:03.25"],
     );
     let seconds = CLOCK.replace("unit: clock", "unit: s");
-    let said = refusal(
-        &rows(&["08:15:03", "08:15:04", "08:15:05"]),
-        &seconds,
-        robot("rr", 1.0),
-    );
-    assert!(
-        said.contains("`08:15:03` is a clock time, not a number; `unit: clock` reads such times"),
-        "{said}"
+    let said = refusal(&rows(&["08:15:03", "08:15:04", "08:15:05"]), &seconds, rr());
+    has(
+        &said,
+        "`08:15:03` is a clock time, not a number; `unit: clock` reads such times",
     );
 }

@@ -1,6 +1,7 @@
 //! Controllers that count joints in their own way: other signs, other zeros, and angles that hold a part of another one.
 
-use super::{TWO, refusal, robot, rows, settings, take};
+use super::{TWO, faults_of, refusal, rows, rr, settings, take};
+use crate::answer::has;
 use calib::stage::Stage;
 
 fn with(q: &str) -> String {
@@ -10,7 +11,7 @@ fn with(q: &str) -> String {
 #[test]
 fn joints_arrive_as_the_robot_file_counts_them() {
     let desk = rows("P1,30,-60,1000,200,3\nP2,100,20,4,5,6\n");
-    let taken = |q: &str| take(&desk, &with(q), robot("rr", 1.0)).unwrap().recording;
+    let taken = |q: &str| take(&desk, &with(q), rr()).unwrap().recording;
     let degrees = |q: &str| {
         taken(q)
             .q
@@ -55,29 +56,17 @@ fn ways_of_counting_that_no_robot_has_are_faults() {
         "      x:",
         "      current: {column: \"i{j}\", unit: A, zero: [1, 2]}\n      x:",
     );
-    let said = settings(&current)
-        .check()
-        .iter()
-        .map(ToString::to_string)
-        .collect::<Vec<_>>()
-        .join("\n");
+    let said = faults_of(&current).join("\n");
     assert_eq!(
         said,
         "files[0].columns.current: `zero` and `coupled` are for positions; say them at `q`"
     );
     let desk = rows("P1,30,-60,1000,200,3\n");
-    let said = refusal(&desk, &with("sign: [1, 1, -1]"), robot("rr", 1.0));
-    assert!(
-        said.contains("`q.sign` lists 3 numbers; the robot has 2 joints"),
-        "{said}"
-    );
-    let said = refusal(
-        &desk,
-        &with("coupled: [{joint: 3, by: 2, ratio: 1}]"),
-        robot("rr", 1.0),
-    );
-    assert!(
-        said.contains("`q.coupled` names a joint beyond the last; the robot has 2 joints"),
-        "{said}"
+    let said = refusal(&desk, &with("sign: [1, 1, -1]"), rr());
+    has(&said, "`q.sign` lists 3 numbers; the robot has 2 joints");
+    let said = refusal(&desk, &with("coupled: [{joint: 3, by: 2, ratio: 1}]"), rr());
+    has(
+        &said,
+        "`q.coupled` names a joint beyond the last; the robot has 2 joints",
     );
 }

@@ -1,12 +1,12 @@
 //! Feather files are read as text is: the same recording, the same diagnosis; what is damaged or compressed otherwise is refused.
 
+use crate::answer::{self, Answer, has, put, read};
 use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray};
 use arrow_ipc::CompressionType;
 use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
 use calib::table::{Recording, from_file};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
 use std::sync::Arc;
 
 /// A delimited file as columns of numbers, of texts where one of its cells is none, in batches of 50 rows.
@@ -45,13 +45,8 @@ fn feather(text: &str, compression: Option<CompressionType>) -> Vec<u8> {
     writer.into_inner().unwrap()
 }
 
-fn calib(here: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .args(["--store", "s", "--quiet"])
-        .current_dir(here)
-        .output()
-        .unwrap()
+fn calib(here: &Path, words: &str) -> Answer {
+    answer::calib(here, &format!("{words} --store s --quiet"))
 }
 
 /// The first example of cases, its files in another format.
@@ -60,13 +55,11 @@ fn case(here: &Path, written: impl Fn(&str) -> Vec<u8>) {
     let example = root.join("example/r01");
     std::fs::copy(example.join("robot.json"), here.join("robot.json")).unwrap();
     for name in ["controller", "tracker"] {
-        let text = std::fs::read_to_string(example.join(name).with_extension("csv")).unwrap();
+        let text = read(example.join(name).with_extension("csv"));
         std::fs::write(here.join(name).with_extension("feather"), written(&text)).unwrap();
     }
-    let pipeline = std::fs::read_to_string(root.join("pipeline.yaml"))
-        .unwrap()
-        .replace(".csv", ".feather");
-    std::fs::write(here.join("p.yaml"), pipeline.replace("example/r01", ".")).unwrap();
+    let pipeline = read(root.join("pipeline.yaml")).replace(".csv", ".feather");
+    put(here, "p.yaml", pipeline.replace("example/r01", "."));
 }
 
 #[test]
@@ -76,23 +69,13 @@ fn a_recording_in_feather_files_is_diagnosed_as_its_text_is() {
         case(folder.path(), |text| {
             compression.map_or_else(|| text.into(), |compression| feather(text, compression))
         });
-        let run = calib(folder.path(), &["run", "p.yaml", "--until", "split"]);
-        assert!(
-            run.status.success(),
-            "{}",
-            String::from_utf8_lossy(&run.stderr)
-        );
+        calib(folder.path(), "run p.yaml --until split").code(0);
         let recording =
             from_file::<Recording>(&folder.path().join("s/tables/case/ingest.recording.parquet"))
                 .unwrap()
                 .table;
-        let output = calib(folder.path(), &["diagnose", "p.yaml", "--json"]);
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        let mut said: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let output = calib(folder.path(), "diagnose p.yaml --json").code(0);
+        let mut said: Value = output.json();
         (recording, said["findings"].take())
     };
     let (text, plain) = (said(None), said(Some(None)));
@@ -111,20 +94,17 @@ fn a_feather_file_that_cannot_be_read_is_refused_with_a_reason() {
     let refused = |written: &dyn Fn(Vec<u8>) -> Vec<u8>| {
         let folder = tempfile::tempdir().unwrap();
         case(folder.path(), |text| written(feather(text, None)));
-        let output = calib(folder.path(), &["run", "p.yaml"]);
-        assert!(!output.status.success());
-        String::from_utf8(output.stderr).unwrap()
+        let output = calib(folder.path(), "run p.yaml");
+        assert_ne!(output.code, Some(0));
+        output.err
     };
     let said = refused(&|bytes| bytes[..bytes.len() / 2].to_vec());
-    assert!(
-        said.contains("controller.feather: is a Feather file that cannot be read: "),
-        "{said}"
+    has(
+        &said,
+        "controller.feather: is a Feather file that cannot be read: ",
     );
     let said = refused(&|bytes| [b"FEA1", &bytes[4..]].concat());
-    assert!(
-        said.contains("is a Feather file of version 1; allowed: version 2"),
-        "{said}"
-    );
+    has(&said, "is a Feather file of version 1; allowed: version 2");
 }
 
 /// An array of NumPy, version 1, as `numpy.save` writes it.

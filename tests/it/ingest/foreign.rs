@@ -1,6 +1,7 @@
 //! Files as other programs write them: differences from a target, headers inside comments, texts that are not UTF-8.
 
-use super::{TWO, refusal, robot, settings, take};
+use super::{TWO, refusal, rr, settings, take};
+use crate::answer::starts_with;
 use crate::desk::Desk;
 use calib::stage::Stage;
 
@@ -17,12 +18,7 @@ files:
 #[test]
 fn a_point_is_its_target_and_the_difference_from_it() {
     let text = "q1,q2,xt,yt,zt,xd,yd,zd\n1,2,1000,200,300,0.5,0.25,1500\n1,2,1000,200,300,,1,1\n1,2,1000,200,300,ten,1,1\n1,2,1000,200,300,4e5,1,1\n3,4,1,2,3,0,0,0\n5,6,1,2,3,0,0,0\n7,8,1,2,3,0,0,0\n";
-    let taken = take(
-        &Desk::default().with("a.csv", text),
-        DIFFERENCES,
-        robot("rr", 1.0),
-    )
-    .unwrap();
+    let taken = take(&Desk::default().with("a.csv", text), DIFFERENCES, rr()).unwrap();
     for (found, expected) in taken.recording.position[0]
         .iter()
         .zip([0.9995, 0.20025, 0.2985])
@@ -44,10 +40,10 @@ fn a_point_is_its_target_and_the_difference_from_it() {
         ]
     );
     let missing = Desk::default().with("a.csv", "q1,q2,xt,yt,zt,xdd,yd,zd\n");
-    let message = refusal(&missing, DIFFERENCES, robot("rr", 1.0));
-    assert!(
-        message.starts_with("a.csv:1: no column `xd`, mapped to `x`; did you mean `xdd`?"),
-        "{message}"
+    let message = refusal(&missing, DIFFERENCES, rr());
+    starts_with(
+        &message,
+        "a.csv:1: no column `xd`, mapped to `x`; did you mean `xdd`?",
     );
 }
 
@@ -100,19 +96,14 @@ fn a_header_inside_a_comment_names_the_columns() {
     );
     let text =
         "// made by a program\n// id q1 q2   x y z\nA 1 2 3 4 5\n// a comment\nB 2 3 4 5 6\n";
-    let taken = take(
-        &Desk::default().with("a.csv", text),
-        &yaml,
-        robot("rr", 1.0),
-    )
-    .unwrap();
+    let taken = take(&Desk::default().with("a.csv", text), &yaml, rr()).unwrap();
     assert_eq!(taken.recording.point_id, ["A", "B"]);
     assert!(taken.rejected.0.is_empty());
     let bare = Desk::default().with(
         "a.csv",
         "// made by a program\nid q1 q2 x y z\nA 1 2 3 4 5\n",
     );
-    let message = refusal(&bare, &yaml, robot("rr", 1.0));
+    let message = refusal(&bare, &yaml, rr());
     assert_eq!(
         message,
         "a.csv:2: the header does not begin with `//`; allowed: so, or `header_in_comment: false`"
@@ -130,20 +121,10 @@ fn texts_that_are_not_utf_8_are_windows_1252() {
         .replace("column: x,", "column: \"x [\u{b5}m]\",")
         .replace("column: id", "column: \"Pr\u{fc}fung\"");
     let mut file = b"Pr\xfcfung,q1,q2,x [\xb5m],y,z\nM\xfcller \x80,1,2,3,4,5\n".to_vec();
-    let taken = take(
-        &Desk::default().with("a.csv", file.clone()),
-        &yaml,
-        robot("rr", 1.0),
-    )
-    .unwrap();
+    let taken = take(&Desk::default().with("a.csv", file.clone()), &yaml, rr()).unwrap();
     assert_eq!(taken.recording.point_id, ["M\u{fc}ller \u{20ac}"]);
     file.extend(b"no\x81ne,1,2,3,4,5\n");
-    let taken = take(
-        &Desk::default().with("a.csv", file),
-        &yaml,
-        robot("rr", 1.0),
-    )
-    .unwrap();
+    let taken = take(&Desk::default().with("a.csv", file), &yaml, rr()).unwrap();
     let rejected = &taken.rejected.0[0];
     assert_eq!(
         (rejected.reason.as_str(), rejected.detail.as_str()),

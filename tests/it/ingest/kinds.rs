@@ -1,6 +1,7 @@
 //! Targets, orientations, some axes and distances arrive as the file has them; what is missing beside them is said.
 
-use super::{refusal, robot, settings, take};
+use super::{refusal, rr, settings, take};
+use crate::answer::{has, starts_with};
 use crate::desk::Desk;
 use calib::stage::Stage;
 use nalgebra::{Rotation3, Vector3};
@@ -27,7 +28,7 @@ fn targets_and_gaps_arrive_by_row() {
         "a.csv",
         "q1,q2,smr,x,y,z\n1,2,A,10,20,30\n1,2,B,,,35\n1,2,,1,2,3\n5,6,A,,,\n",
     );
-    let taken = take(&desk, &yaml, robot("rr", 1.0)).unwrap();
+    let taken = take(&desk, &yaml, rr()).unwrap();
     assert_eq!(
         taken.recording.target,
         Some(vec![Some("A".into()), Some("B".into()), None])
@@ -50,7 +51,7 @@ fn all_conventions_of_orientation_are_one_rotation() {
     let by = |orientation: &str, cells: &str| {
         let yaml = with(&format!("      orientation: {orientation}\n{lines}"));
         let desk = Desk::default().with("a.csv", format!("q1,q2,a,b,c,d\n1,2,{cells}\n"));
-        let taken = take(&desk, &yaml, robot("rr", 1.0)).unwrap();
+        let taken = take(&desk, &yaml, rr()).unwrap();
         assert!(
             (taken.recording.readings["sigma_orientation"][0] - 20.0 / 206_264.806).abs() < 1e-12
         );
@@ -92,7 +93,7 @@ fn images_of_a_camera_need_their_noise_and_no_unit() {
         )
     };
     let yaml = with(&format!("{lines}      sigma_image: {{value: 5.0e-6}}\n"));
-    let taken = take(&desk(), &yaml, robot("rr", 1.0)).unwrap();
+    let taken = take(&desk(), &yaml, rr()).unwrap();
     assert_eq!(taken.recording.readings["image_x"], [0.25, 0.0]);
     assert_eq!(taken.recording.readings["image_y"], [-0.125, 1e-3]);
     assert_eq!(taken.recording.readings["sigma_image"], [5e-6; 2]);
@@ -123,7 +124,7 @@ fn images_of_a_camera_need_their_noise_and_no_unit() {
 fn distances_need_no_point_and_half_an_orientation_is_refused() {
     let distance = "      distance: {column: l, unit: mm}\n      sigma_distance: {value: 0.05, unit: mm}\n      anchor: {column: box}\n";
     let desk = Desk::default().with("a.csv", "q1,q2,l,box\n1,2,1500,N\n3,4,1400.5,S\n");
-    let taken = take(&desk, &with(distance), robot("rr", 1.0)).unwrap();
+    let taken = take(&desk, &with(distance), rr()).unwrap();
     assert_eq!(taken.recording.readings["distance"], [1.5, 1.4005]);
     assert_eq!(
         taken.recording.names["anchor"],
@@ -139,11 +140,8 @@ fn distances_need_no_point_and_half_an_orientation_is_refused() {
     );
     let turn = "      orientation: {quaternion: [a, b, c, d], optional: true}\n      sigma_orientation: {value: 1, unit: mrad}\n";
     let desk = Desk::default().with("a.csv", "q1,q2,a,b,c,d\n1,2,1,0,0,\n3,4,1,0,0,0.2\n");
-    let message = refusal(&desk, &with(turn), robot("rr", 1.0));
-    assert!(
-        message.contains("the orientation is incomplete"),
-        "{message}"
-    );
+    let message = refusal(&desk, &with(turn), rr());
+    has(&message, "the orientation is incomplete");
 }
 
 #[test]
@@ -157,24 +155,21 @@ fn what_belongs_together_is_asked_for_together() {
             .join("\n")
     };
     let alone = faults("      distance: {column: l, unit: mm}\n");
-    assert!(
-        alone.contains("map `distance` and `sigma_distance` together"),
-        "{alone}"
-    );
+    has(&alone, "map `distance` and `sigma_distance` together");
     let two = faults(
         "      orientation: {rpy: [a, b, c], quaternion: [d, e, f, g], unit: deg}\n      sigma_orientation: {value: 1, unit: deg}\n",
     );
-    assert!(
-        two.contains("say `quaternion: [w, x, y, z]`, `rpy: [roll, pitch, yaw]`, `euler_xyz"),
-        "{two}"
+    has(
+        &two,
+        "say `quaternion: [w, x, y, z]`, `rpy: [roll, pitch, yaw]`, `euler_xyz",
     );
     let height = faults("      z: {column: z, unit: mm}\n");
-    assert!(height.contains("not mapped: x, y"), "{height}");
+    has(&height, "not mapped: x, y");
     assert_eq!(faults("      z: {column: z, unit: mm}\naxes: [z]\n"), "");
     let unread = faults(&format!("{POINT}axes: [z]\n"));
     let expected = "files[0].columns.x: `axes: [z]` says that x was not measured; take `x` out of `columns`, or add it to `axes`\n\
                     files[0].columns.y: `axes: [z]` says that y";
-    assert!(unread.starts_with(expected), "{unread}");
+    starts_with(&unread, expected);
     assert_eq!(
         faults("      z: {column: z, unit: mm}\naxes: [z, z]\n"),
         "axes[1]: `z` is named twice"
@@ -184,10 +179,7 @@ fn what_belongs_together_is_asked_for_together() {
             .starts_with("axes: no axis; name those that were measured")
     );
     let anchor = faults(&format!("{POINT}      anchor: {{column: box}}\n"));
-    assert!(
-        anchor.contains("an anchor is the end of a `distance`"),
-        "{anchor}"
-    );
+    has(&anchor, "an anchor is the end of a `distance`");
 }
 
 #[test]
@@ -197,7 +189,7 @@ fn both_angles_of_a_level_arrive_and_one_alone_is_refused() {
         "a.csv",
         "q1,q2,a,b\n1,2,-12.5,300\n3,4,7,\n5,6,0,1\n7,8,1,2\n",
     );
-    let taken = take(&desk, &with(columns), robot("rr", 1.0)).unwrap();
+    let taken = take(&desk, &with(columns), rr()).unwrap();
     assert_eq!(taken.recording.readings["tilt_x"], [-0.0125, 0.0, 0.001]);
     assert_eq!(taken.recording.readings["tilt_y"], [0.3, 0.001, 0.002]);
     assert_eq!(taken.rejected.0[0].detail, "the inclination is incomplete");
@@ -206,8 +198,5 @@ fn both_angles_of_a_level_arrive_and_one_alone_is_refused() {
         .iter()
         .map(ToString::to_string)
         .collect::<String>();
-    assert!(
-        alone.contains("map all of tilt_x, tilt_y, or none"),
-        "{alone}"
-    );
+    has(&alone, "map all of tilt_x, tilt_y, or none");
 }

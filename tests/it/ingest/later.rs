@@ -1,6 +1,7 @@
 //! Measurements of several days: each joined by itself, then appended.
 
-use super::{refusal, robot, settings, take};
+use super::{faults_of, refusal, rr, settings, take};
+use crate::answer::{has, starts_with};
 use crate::desk::Desk;
 use calib::stage::Stage;
 
@@ -39,15 +40,15 @@ fn a_later_measurement_is_joined_by_itself_and_follows() {
     let taken = take(
         &desk(),
         &format!("{DAYS}max_rejected_fraction: 0.6\n"),
-        robot("rr", 1.0),
+        rr(),
     )
-    .expect("a recording");
+    .unwrap();
     let recording = &taken.recording;
     assert_eq!(recording.point_id, ["P1", "P2", "P1", "P3"]);
     assert_eq!(recording.sequence, [1, 2, 3, 5]);
     // The clock starts again at 5 s: 500 s behind 30 s.
     assert_eq!(
-        recording.time.as_deref().expect("times"),
+        recording.time.as_deref().unwrap(),
         [0.0, 30.0, 530.0, 590.0]
     );
     let x: Vec<f64> = recording
@@ -90,9 +91,9 @@ fn a_clock_that_goes_on_is_left_alone() {
     let taken = take(
         &desk().with("joints2.csv", later),
         &format!("{DAYS}max_rejected_fraction: 0.6\n"),
-        robot("rr", 1.0),
+        rr(),
     );
-    let times = taken.expect("a recording").recording.time.expect("times");
+    let times = taken.unwrap().recording.time.unwrap();
     assert_eq!(times, [0.0, 30.0, 86400.0, 86430.0]);
 }
 
@@ -101,11 +102,7 @@ fn what_a_later_measurement_lacks_is_said_with_its_place() {
     let yaml = DAYS
         .replace("[joints2.csv, points2.csv]", "[joints2.csv]")
         .replace("500", "-1");
-    let faults: Vec<String> = settings(&yaml)
-        .check()
-        .iter()
-        .map(ToString::to_string)
-        .collect();
+    let faults: Vec<String> = faults_of(&yaml);
     assert_eq!(
         faults,
         [
@@ -114,11 +111,8 @@ fn what_a_later_measurement_lacks_is_said_with_its_place() {
         ]
     );
     let without = desk().with("points2.csv", "id,x,y\nP1,7,8\n");
-    let said = refusal(&without, DAYS, robot("rr", 1.0));
-    assert!(
-        said.contains("points2.csv") && said.contains("`z`"),
-        "{said}"
-    );
+    let said = refusal(&without, DAYS, rr());
+    has(&said, ["points2.csv", "`z`"]);
 }
 
 #[test]
@@ -151,10 +145,10 @@ fn the_files_of_an_earlier_measurement_again_are_a_fault_of_the_settings() {
 #[test]
 fn points_that_would_be_used_twice_are_refused_whatever_their_file_is_called() {
     let copied = desk().with("points2.csv", "id,x,y,z\r\nP2,4,5,6\r\nP1,1,2,3.0\r\n");
-    let said = refusal(&copied, DAYS, robot("rr", 1.0));
+    let said = refusal(&copied, DAYS, rr());
     let expected = "with.later[0].files[1]: `points2.csv` measured what `points1.csv` of `files[1].file` did, and 2 rows would be used \
                     twice";
-    assert!(said.starts_with(expected), "{said}");
+    starts_with(&said, expected);
 }
 
 #[test]
@@ -165,6 +159,6 @@ fn one_log_of_two_days_is_no_copy() {
         .with("joints2.csv", "id,t,q1,q2\nP3,5,12,22\n")
         .with("points1.csv", log);
     let yaml = DAYS.replace("points2.csv", "points1.csv") + "max_rejected_fraction: 0.7\n";
-    let taken = take(&days, &yaml, robot("rr", 1.0)).expect("a recording");
+    let taken = take(&days, &yaml, rr()).unwrap();
     assert_eq!(taken.recording.point_id, ["P1", "P2", "P3"]);
 }

@@ -1,6 +1,7 @@
 //! Arms that move while they are measured: velocities as the file has them, or by the joints over time, and two clocks in one recording.
 
-use super::{refusal, robot, settings, take};
+use super::{refusal, rr, settings, take};
+use crate::answer::has;
 use crate::desk::Desk;
 use calib::stage::Stage;
 use std::fmt::Write;
@@ -36,7 +37,7 @@ fn velocities_arrive_in_the_unit_that_the_settings_say() {
     let taken = take(
         &Desk::default().with("a.csv", controller(0.01, 50, |_| false)),
         &yaml,
-        robot("rr", 1.0),
+        rr(),
     )
     .unwrap();
     let velocity = taken.recording.velocity.unwrap();
@@ -61,7 +62,7 @@ fn velocities_follow_from_the_joints_over_time_but_never_across_gaps() {
     // Rows 20 to 39 are missing; row 45 stands alone between two gaps of ten steps.
     let left_out = |row: usize| (20..40).contains(&row) && row != 30;
     let desk = Desk::default().with("a.csv", controller(0.01, 80, left_out));
-    let taken = take(&desk, &yaml, robot("rr", 1.0)).unwrap();
+    let taken = take(&desk, &yaml, rr()).unwrap();
     let (time, velocity) = (
         taken.recording.time.unwrap(),
         taken.recording.velocity.unwrap(),
@@ -81,10 +82,12 @@ fn velocities_follow_from_the_joints_over_time_but_never_across_gaps() {
         }
     }
     let said = desk.notes.lock().unwrap().join("\n");
-    assert!(
-        said.contains("10.0 ms apart, never across gaps above 50 ms")
-            && said.contains("none for 1 row between gaps"),
-        "{said}"
+    has(
+        &said,
+        [
+            "10.0 ms apart, never across gaps above 50 ms",
+            "none for 1 row between gaps",
+        ],
     );
 }
 
@@ -92,11 +95,8 @@ fn velocities_follow_from_the_joints_over_time_but_never_across_gaps() {
 fn standing_points_are_refused_where_velocities_are_asked_for() {
     let yaml = one_file("motion: {}\n");
     let desk = Desk::default().with("a.csv", controller(1.6, 60, |_| false));
-    let text = refusal(&desk, &yaml, robot("rr", 1.0));
-    assert!(
-        text.contains("1600.0 ms apart, too far") && text.contains("leave `motion` out"),
-        "{text}"
-    );
+    let text = refusal(&desk, &yaml, rr());
+    has(&text, ["1600.0 ms apart, too far", "leave `motion` out"]);
     let faults = settings(&yaml.replace("      time: {column: t, unit: s}\n", "")).check();
     assert!(
         faults.iter().any(|fault| fault.place == "motion"),
@@ -108,18 +108,20 @@ fn standing_points_are_refused_where_velocities_are_asked_for() {
 fn velocities_in_another_unit_than_the_settings_say_are_refused() {
     let yaml = one_file("      velocity: {column: \"dq{j}\", unit: rad/s}\nmotion: {}\n");
     let desk = Desk::default().with("a.csv", controller(0.01, 50, |_| false));
-    let text = refusal(&desk, &yaml, robot("rr", 1.0));
-    assert!(
-        text.contains("the velocities of joint 1 are 57.")
-            && text.contains("state the unit and sign"),
-        "{text}"
+    let text = refusal(&desk, &yaml, rr());
+    has(
+        &text,
+        [
+            "the velocities of joint 1 are 57.",
+            "state the unit and sign",
+        ],
     );
     let yaml = yaml.replace("rad/s", "deg/s");
     assert!(
         take(
             &Desk::default().with("a.csv", controller(0.01, 50, |_| false)),
             &yaml,
-            robot("rr", 1.0)
+            rr()
         )
         .is_ok()
     );
@@ -162,7 +164,7 @@ fn two_clocks_become_one_recording_with_the_joints_at_the_moment_of_the_point() 
         let taken = take(
             &desk,
             &format!("{}{motion}", files(tracker_first, velocity)),
-            robot("rr", 1.0),
+            rr(),
         )
         .unwrap();
         assert_eq!(taken.recording.rows(), 100);
@@ -182,9 +184,9 @@ fn two_clocks_become_one_recording_with_the_joints_at_the_moment_of_the_point() 
             }
         }
         let said = desk.notes.lock().unwrap().join("\n");
-        assert!(
-            said.contains("extrapolated by their velocity to the time of their point"),
-            "{said}"
+        has(
+            &said,
+            "extrapolated by their velocity to the time of their point",
         );
     }
 }
@@ -195,7 +197,7 @@ fn points_that_are_known_to_be_late_take_their_joints_with_them() {
     let taken = take(
         &Desk::default().with("a.csv", controller(0.01, 50, |_| false)),
         &yaml,
-        robot("rr", 1.0),
+        rr(),
     )
     .unwrap();
     for row in 0..50 {

@@ -1,10 +1,9 @@
 //! The noise of a recording is its own: recorded, by uncertainty, by instrument, or said to be inferred.
 
-use super::{robot, settings, take};
+use super::{faults_of, rr, take};
 use crate::desk::Desk;
 use crate::workbook::workbook;
 use calib::robot::{INSTRUMENTS, NoiseBasis, SigmaSource};
-use calib::stage::Stage;
 use calib::table::{Recording, Table};
 
 /// Three rows at 5 m, and beside the point two columns more.
@@ -12,30 +11,21 @@ fn taken(more: &str, instrument: &str) -> (Recording, Vec<String>) {
     let text = "id,q1,q2,x,y,z,u,v\nP1,10,20,3000,4000,0,0.06,0.08\nP2,11,21,3000,0,4000,,\nP3,12,22,0,3000,4000,0,0\n";
     let desk = Desk::default().with("a.csv", text);
     let yaml = format!("{}      {more}\n{instrument}\n", super::TWO);
-    let recording = take(&desk, &yaml, robot("rr", 1.0))
-        .expect("rows")
-        .recording;
-    let notes = desk.notes.lock().expect("one thread").clone();
+    let recording = take(&desk, &yaml, rr()).unwrap().recording;
+    let notes = desk.notes.lock().unwrap().clone();
     (
-        Recording::from_frame(&recording.to_frame().expect("a table")).expect("the same"),
+        Recording::from_frame(&recording.to_frame().unwrap()).unwrap(),
         notes,
     )
 }
 
 fn faults(more: &str, instrument: &str) -> Vec<String> {
     let yaml = format!("{}      {more}\n{instrument}\n", super::TWO);
-    settings(&yaml)
-        .check()
-        .iter()
-        .map(ToString::to_string)
-        .collect()
+    faults_of(&yaml)
 }
 
 fn sigmas_um(recording: &Recording) -> Vec<[f64; 3]> {
-    let all = recording
-        .position_sigma
-        .as_ref()
-        .expect("standard deviations");
+    let all = recording.position_sigma.as_ref().unwrap();
     all.iter()
         .map(|row| row.map(|sigma| (sigma * 1e9).round() / 1e3))
         .collect()
@@ -215,11 +205,8 @@ fn a_coordinate_of_exactly_zero_keeps_its_stated_uncertainty() {
         ),
         (desk, format!("{apart}join: {{by: id}}\n")),
     ] {
-        let recording = take(&desk, &yaml, robot("rr", 1.0))
-            .expect("rows")
-            .recording;
-        let recording =
-            Recording::from_frame(&recording.to_frame().expect("a table")).expect("the same");
+        let recording = take(&desk, &yaml, rr()).unwrap().recording;
+        let recording = Recording::from_frame(&recording.to_frame().unwrap()).unwrap();
         is_near(&sigmas_um(&recording), &expected);
         assert_eq!(
             recording.sigma_source.as_deref(),

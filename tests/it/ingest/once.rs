@@ -1,6 +1,7 @@
 //! Files that fit into memory are read once, whatever becomes of their rows.
 
-use super::{HEAD, TWO, Taken, good, robot, settings, take, taken};
+use super::{HEAD, TWO, Taken, good, robot, rr, settings, take, taken};
+use crate::answer::starts_with;
 use crate::desk::Desk;
 use calib::stage::Writes;
 use calib::stage::ingest::{IngestReads, IngestWrites};
@@ -55,19 +56,13 @@ fn text_behind_a_closing_quote_refuses_its_row() {
         [("arm.csv", 3, "damaged"), ("arm.csv", 5, "damaged")]
     );
     let detail = &taken.rejected.0[0].detail;
-    assert!(
-        detail.starts_with("column 2: text behind the closing `\"` of a field; allowed:"),
-        "{detail}"
+    starts_with(
+        detail,
+        "column 2: text behind the closing `\"` of a field; allowed:",
     );
     let desk = Desk::default().with("a.csv", format!("\"id\"x,q1,q2,x,y,z\n{}", good(3)));
-    let header = take(&desk, TWO, robot("rr", 1.0))
-        .err()
-        .unwrap()
-        .to_string();
-    assert!(
-        header.starts_with("a.csv:1: column 1: text behind"),
-        "{header}"
-    );
+    let header = take(&desk, TWO, rr()).err().unwrap().to_string();
+    starts_with(&header, "a.csv:1: column 1: text behind");
 }
 
 #[test]
@@ -93,10 +88,7 @@ fn rows_that_are_used_as_they_come_are_read_once() {
         [("arm.csv", 3, "unmatched"), ("tracker.csv", 3, "blank")]
     );
     let desk = Desk::default().with("a.csv", format!("{HEAD}{}", good(3)));
-    assert_eq!(
-        take(&desk, TWO, robot("rr", 1.0)).unwrap().recording.rows(),
-        3
-    );
+    assert_eq!(take(&desk, TWO, rr()).unwrap().recording.rows(), 3);
     assert_eq!(*desk.opened.lock().unwrap(), ["a.csv"]);
 }
 

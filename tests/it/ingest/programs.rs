@@ -1,6 +1,7 @@
 //! Joint positions that a controller's program declares are the joint file of a recording.
 
 use super::{refusal, robot, settings, take};
+use crate::answer::{has, starts_with};
 use crate::desk::{Desk, table};
 use calib::stage::ingest::IngestReads;
 use calib::table::{Intake, Rejected, RejectedRow};
@@ -60,8 +61,7 @@ fn jointtargets_of_rapid_are_rows_in_the_order_of_the_file_and_robtargets_are_co
         &rapid,
         "more{2},1,2,3\nmore{1},4,5,6\np10,7,8,16\n",
     );
-    let taken =
-        take(&desk, &joined("cell.MOD", "rax_#"), robot("rrrrrr", 1.0)).expect("a recording");
+    let taken = take(&desk, &joined("cell.MOD", "rax_#"), robot("rrrrrr", 1.0)).unwrap();
     assert_eq!(taken.recording.point_id, ["p10", "more{1}", "more{2}"]);
     assert_eq!(
         degrees(taken.recording.q(0)),
@@ -71,7 +71,7 @@ fn jointtargets_of_rapid_are_rows_in_the_order_of_the_file_and_robtargets_are_co
     assert!(
         desk.notes
             .lock()
-            .expect("notes")
+            .unwrap()
             .iter()
             .any(|note| note == "cell.MOD: 1 pose without joints left out")
     );
@@ -92,7 +92,7 @@ fn positions_of_one_line_that_no_point_was_measured_at_are_rejected_together() {
                 robot: robot("rrrrrr", 1.0),
             },
         )
-        .expect("tables");
+        .unwrap();
     let rejected: Vec<RejectedRow> = table::<Rejected>(&tables)
         .into_iter()
         .flat_map(|chunk| chunk.0)
@@ -128,7 +128,7 @@ fn an_external_axis_at_9e9_is_none_and_a_connected_one_is_a_joint() {
         &track.replace("PROGRAM", "cell.prg"),
         robot("prrrrrr", 1.0),
     )
-    .expect("a recording");
+    .unwrap();
     assert_eq!(
         [taken.recording.q(0)[0], taken.recording.q(1)[0]],
         [1.5, 0.0005]
@@ -138,7 +138,7 @@ fn an_external_axis_at_9e9_is_none_and_a_connected_one_is_a_joint() {
         .0
         .iter()
         .find(|row| row.file == "cell.prg")
-        .expect("the point without its track");
+        .unwrap();
     assert_eq!(
         (rejected.line, rejected.detail.as_str()),
         (6, "eax_a is blank")
@@ -149,10 +149,7 @@ fn an_external_axis_at_9e9_is_none_and_a_connected_one_is_a_joint() {
         &track.replace("PROGRAM", "cell.prg"),
         robot("prrrrrr", 1.0),
     );
-    assert!(
-        message.contains("cell.prg:1: no column `eax_a`, mapped to `q`"),
-        "{message}"
-    );
+    has(&message, "cell.prg:1: no column `eax_a`, mapped to `q`");
 }
 
 #[test]
@@ -161,8 +158,7 @@ fn axes_that_krl_declares_are_rows_and_its_poses_are_counted() {
                 DECL E6AXIS XP1={A1 0.0,A2 -90.0,A3 90.5,A4 0.0,A5 1.0E1,A6 0.0,E1 0.0,E2 0.0,E3 0.0,E4 0.0,E5 0.0,E6 0.0}\n\
                 GLOBAL AXIS XP2={A1 5,A2 -80,A3 80,A4 1,A5 2,A6 3}\nDECL FDAT FP1={TOOL_NO 1,BASE_NO 0,IPO_FRAME #BASE}\nENDDAT\n";
     let desk = desk("measure.dat", text, "XP1,1,2,3\nXP2,4,5,6\n");
-    let taken =
-        take(&desk, &joined("measure.dat", "A#"), robot("rrrrrr", 1.0)).expect("a recording");
+    let taken = take(&desk, &joined("measure.dat", "A#"), robot("rrrrrr", 1.0)).unwrap();
     assert_eq!(taken.recording.point_id, ["XP1", "XP2"]);
     assert_eq!(
         degrees(taken.recording.q(0)),
@@ -171,7 +167,7 @@ fn axes_that_krl_declares_are_rows_and_its_poses_are_counted() {
     assert!(
         desk.notes
             .lock()
-            .expect("notes")
+            .unwrap()
             .iter()
             .any(|note| note == "measure.dat: 1 pose without joints left out")
     );
@@ -183,7 +179,7 @@ fn a_table_of_text_that_ends_as_a_program_does_is_a_table() {
     let desk = desk("joints.dat", text, "P1,1,2,3\n");
     assert_eq!(
         take(&desk, &joined("joints.dat", "A#"), robot("rrrrrr", 1.0))
-            .expect("a recording")
+            .unwrap()
             .recording
             .rows(),
         1
@@ -209,14 +205,12 @@ fn faults_of_a_program_have_their_places_and_a_program_without_joints_is_refused
     let message = refused(
         "MODULE a\n CONST robtarget h:=[[6,0,9],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nENDMODULE\n",
     );
-    assert!(
-        message.starts_with(
-            "cell.mod: declares no joint position (1 pose without joints); allowed: declarations such as `CONST jointtarget"
-        ),
-        "{message}"
+    starts_with(
+        &message,
+        "cell.mod: declares no joint position (1 pose without joints); allowed: declarations such as `CONST jointtarget",
     );
     let far = refused(&RAPID.replace("-12.5", "-12500"));
-    assert!(far.starts_with("cell.mod:4:"), "{far}");
+    starts_with(&far, "cell.mod:4:");
     let cut: String = RAPID.chars().take(330).collect();
     assert!(refused(&cut).starts_with("cell.mod:"));
 }

@@ -1,10 +1,11 @@
 //! Files and settings that are refused as a whole: the message names the place and what is allowed.
 
-use super::{HEAD, TWO, good, refusal, robot, rows, settings, take};
+use super::{HEAD, TWO, faults_of, good, refusal, robot, rows, rr, take};
+use crate::answer::{ends_with, has, starts_with};
 use crate::desk::Desk;
 
 fn with(file: &str, yaml: &str) -> String {
-    refusal(&Desk::default().with("a.csv", file), yaml, robot("rr", 1.0))
+    refusal(&Desk::default().with("a.csv", file), yaml, rr())
 }
 
 #[test]
@@ -15,7 +16,7 @@ fn a_missing_column_is_named_with_those_that_are_there() {
         .replace("column: z,", "column: height,");
     let expected = "a.csv:1: no column `y_mm`, mapped to `y`; did you mean `y_m`?\n\
                     a.csv:1: no column `height`, mapped to `z`; found: id, q1, q2, x, y_m, depth";
-    assert_eq!(refusal(&desk, &yaml, robot("rr", 1.0)), expected);
+    assert_eq!(refusal(&desk, &yaml, rr()), expected);
 }
 
 #[test]
@@ -64,12 +65,7 @@ fn a_file_whose_lines_end_in_cr_alone_says_how_to_convert_it() {
 
 #[test]
 fn a_column_of_two_measured_quantities_or_joints_is_a_fault() {
-    let faults = |yaml: &str| {
-        calib::stage::Stage::check(&settings(yaml))
-            .iter()
-            .map(ToString::to_string)
-            .collect::<Vec<_>>()
-    };
+    let faults = |yaml: &str| faults_of(yaml);
     let own = "allowed: a column for each";
     assert_eq!(
         faults(&TWO.replace("column: y", "column: \" x\"")),
@@ -102,44 +98,44 @@ fn a_column_of_two_measured_quantities_or_joints_is_a_fault() {
 #[test]
 fn a_header_of_another_shape_gets_a_hint() {
     let semicolons = with("id;q1;q2;x;y;z\n", TWO);
-    assert!(
-        semicolons.ends_with("found: id;q1;q2;x;y;z (one column; `delimiter: \";\"`?)"),
-        "{semicolons}"
+    ends_with(
+        &semicolons,
+        "found: id;q1;q2;x;y;z (one column; `delimiter: \";\"`?)",
     );
     assert!(with("1,2,3,4,5,6\n", TWO).ends_with("(all numbers; `header: false`?)"));
     let twice = with("id,q1,q2,x,y,z,x\n", TWO);
-    assert!(twice.starts_with("a.csv:1: column `x`, mapped to `x`, stands twice in the header (4 and 7); name it by number"));
+    starts_with(
+        &twice,
+        "a.csv:1: column `x`, mapped to `x`, stands twice in the header (4 and 7); name it by number",
+    );
 }
 
 #[test]
 fn another_number_of_joints_is_an_error_of_the_file() {
     let desk = || rows(&good(3));
     let more = refusal(&desk(), TWO, robot("rrr", 1.0));
-    assert!(
-        more.starts_with(
-            "a.csv:1: `q` has 2 of its columns; the robot has 3 joints\na.csv:1: no column `q3`"
-        ),
-        "{more}"
+    starts_with(
+        &more,
+        "a.csv:1: `q` has 2 of its columns; the robot has 3 joints\na.csv:1: no column `q3`",
     );
     let fewer = refusal(&desk(), TWO, robot("r", 1.0));
-    assert!(
-        fewer
-            .starts_with("a.csv:1: column `q2`, by the pattern of `q`: the robot has 1 joint only"),
-        "{fewer}"
+    starts_with(
+        &fewer,
+        "a.csv:1: column `q2`, by the pattern of `q`: the robot has 1 joint only",
     );
     let listed = refusal(
         &desk(),
         &TWO.replace("column: \"q{j}\"", "columns: [q1, q2]"),
         robot("rrr", 1.0),
     );
-    assert!(
-        listed.starts_with("a.csv:1: `q` lists 2 columns; the robot has 3 joints"),
-        "{listed}"
+    starts_with(
+        &listed,
+        "a.csv:1: `q` lists 2 columns; the robot has 3 joints",
     );
     let linear = refusal(&desk(), TWO, robot("pr", 1.0));
-    assert!(
-        linear.starts_with("a.csv:1: joint 1 is prismatic; say `linear_unit` for `q`"),
-        "{linear}"
+    starts_with(
+        &linear,
+        "a.csv:1: joint 1 is prismatic; say `linear_unit` for `q`",
     );
 }
 
@@ -155,10 +151,9 @@ fn an_unannounced_decimal_comma_is_an_error_that_says_so() {
     assert_eq!(with(file, &yaml), expected);
     let announced = yaml.replace("delimiter", "decimal: comma\n    delimiter");
     let points = with("id;q1;q2;x;y;z\nP1;0.365;1;2;3;4\n", &announced);
-    assert!(
-        points
-            .contains("q1: `0.365` has a decimal point; allowed: `decimal: point` in the settings"),
-        "{points}"
+    has(
+        &points,
+        "q1: `0.365` has a decimal point; allowed: `decimal: point` in the settings",
     );
 }
 
@@ -167,27 +162,25 @@ fn degrees_declared_as_rad_are_an_error_that_says_so() {
     let text: String = (1..=10)
         .map(|row| format!("P{row},{},20,1,2,3\n", 15 * row))
         .collect();
-    let message = refusal(&rows(&text), &TWO.replace("deg", "rad"), robot("rr", 1.0));
+    let message = refusal(&rows(&text), &TWO.replace("deg", "rad"), rr());
     let expected = "a.csv:2: `q` is declared in rad, but 10 of 10 rows hold a joint beyond one and a half turns, \
                     here joint 1 at 15.0000 rad; allowed: up to 9.42 rad; if the file holds degrees, say `unit: deg`";
     assert_eq!(message, expected);
     let small: String = (1..=10)
         .map(|row| format!("P{row},0.{row},5,1,2,3\n"))
         .collect();
-    let message = refusal(&rows(&small), &TWO.replace("deg", "rad"), robot("rr", 1.0));
-    assert!(
-        message.starts_with(
-            "a.csv:2: 10 of 10 rows are beyond the robot's joint limits, here joint 2 (`J2`) at 286.4789 deg, above"
-        ),
-        "{message}"
+    let message = refusal(&rows(&small), &TWO.replace("deg", "rad"), rr());
+    starts_with(
+        &message,
+        "a.csv:2: 10 of 10 rows are beyond the robot's joint limits, here joint 2 (`J2`) at 286.4789 deg, above",
     );
-    assert!(message.ends_with("say `unit: deg`"), "{message}");
+    ends_with(&message, "say `unit: deg`");
     let desk = rows(
         &(1..=10)
             .map(|row| format!("P{row},{row}e-1,1.5,1,2,3\n"))
             .collect::<String>(),
     );
-    take(&desk, TWO, robot("rr", 1.0)).unwrap();
+    take(&desk, TWO, rr()).unwrap();
     let warning = "a.csv: no joint is ever beyond 1.50 deg; if the file holds rad, say `unit: rad`";
     assert_eq!(desk.warnings.lock().unwrap().as_slice(), [warning]);
 }
@@ -200,11 +193,11 @@ fn too_few_usable_rows_are_an_error_with_the_reasons() {
     );
     let expected = "a.csv:5: 5 of 7 rows are rejected; allowed: up to 50 % (`max_rejected_fraction`); reasons: 2 blank (line 5: q1 is blank); \
                     2 duplicate_id (line 2: point ids that occur more than once); 1 short_row (line 7: 3 fields; allowed: 6)";
-    assert_eq!(refusal(&rows(&text), TWO, robot("rr", 1.0)), expected);
+    assert_eq!(refusal(&rows(&text), TWO, rr()), expected);
     take(
         &rows(&text),
         &format!("{TWO}max_rejected_fraction: 0.8\n"),
-        robot("rr", 1.0),
+        rr(),
     )
     .unwrap();
 }
@@ -224,10 +217,7 @@ files:
       z: {unit: mm}
       sigma_x: {column: 3}
 "#;
-    let found = calib::stage::Stage::check(&settings(yaml))
-        .iter()
-        .map(ToString::to_string)
-        .collect::<Vec<_>>();
+    let found = faults_of(yaml);
     assert_eq!(
         found,
         [
@@ -261,10 +251,7 @@ fn files_that_do_not_fit_together_are_faults_of_the_settings() {
                 file(second)
             }
         );
-        calib::stage::Stage::check(&settings(&yaml))
-            .iter()
-            .map(ToString::to_string)
-            .collect::<Vec<_>>()
+        faults_of(&yaml)
     };
     let without = "join: several files; say how they belong together: {by: id}, {by: time, tolerance_s: 0.5}, {by: order} or {by: append}";
     assert_eq!(faults(q, xyz, ""), [without]);

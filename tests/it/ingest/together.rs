@@ -1,22 +1,15 @@
 //! Duplicates, joins, shapes of files, and long files.
 
-use super::{HEAD, TWO, good, refusal, robot, rows, settings, take};
+use super::{HEAD, TWO, good, refusal, robot, rows, rr, settings, take};
+use crate::answer::{has, starts_with};
 use crate::desk::{Desk, table};
 use calib::stage::ingest::IngestReads;
 use calib::table::{Recording, Rejected};
 
-fn refused(rejected: &Rejected) -> Vec<(&str, i64, &str, &str)> {
-    rejected
-        .0
-        .iter()
-        .map(|row| {
-            (
-                row.file.as_str(),
-                row.line,
-                row.reason.as_str(),
-                row.detail.as_str(),
-            )
-        })
+/// `FILE:LINE REASON: DETAIL` of each.
+fn refused(rejected: &Rejected) -> Vec<String> {
+    let rows = rejected.0.iter();
+    rows.map(|row| format!("{}:{} {}: {}", row.file, row.line, row.reason, row.detail))
         .collect()
 }
 
@@ -24,27 +17,19 @@ fn refused(rejected: &Rejected) -> Vec<(&str, i64, &str, &str)> {
 fn joints_beyond_the_limits_are_counted_rejected_or_ignored() {
     let text = format!("{}B,190,20,1,2,3\n", good(3));
     let desk = rows(&text);
-    assert_eq!(
-        take(&desk, TWO, robot("rr", 1.0)).unwrap().recording.rows(),
-        4
-    );
+    assert_eq!(take(&desk, TWO, rr()).unwrap().recording.rows(), 4);
     let warning = "a.csv: 1 row with a joint beyond the robot's limits, used all the same; first line 5, joint 1 (`J1`) at \
                    190.0000 deg, above its upper limit of 180.0000 deg";
     assert_eq!(desk.warnings.lock().unwrap().as_slice(), [warning]);
-    let rejecting = take(
-        &rows(&text),
-        &format!("{TWO}limits: reject\n"),
-        robot("rr", 1.0),
-    )
-    .unwrap();
+    let rejecting = take(&rows(&text), &format!("{TWO}limits: reject\n"), rr()).unwrap();
     let detail = "joint 1 at 190.0000 deg; allowed: -180.0000 to 180.0000 deg";
     assert_eq!(
         refused(&rejecting.rejected),
-        [("a.csv", 5, "out_of_range", detail)]
+        [format!("a.csv:5 out_of_range: {detail}")]
     );
     let desk = rows(&text);
     assert_eq!(
-        take(&desk, &format!("{TWO}limits: ignore\n"), robot("rr", 1.0))
+        take(&desk, &format!("{TWO}limits: ignore\n"), rr())
             .unwrap()
             .recording
             .rows(),
@@ -86,23 +71,18 @@ fn ids_without_a_partner_are_shown_with_an_example_of_each_file() {
     };
     let other = said(["XP1", "XP2"]);
     let expected = "2 unmatched (no partner in run/b_tracker.csv, e.g. `P1` here and `XP1` there: ids must be the same in both files)";
-    assert!(other.contains(expected), "{other}");
+    has(&other, expected);
     let lower = said(["q7", "p2"]);
     let expected =
         "e.g. `P2` here and `p2` there: ids that differ in upper and lower case are different ids";
-    assert!(lower.contains(expected), "{lower}");
+    has(&lower, expected);
 }
 
 #[test]
 fn of_duplicated_ids_none_the_first_the_last_or_all_are_used() {
     let text = "A,1,2,3,4,1\nB,1,2,3,4,2\nA,1,2,,4,3\nA,1,2,3,4,4\nC,1,2,3,4,5\nD,1,2,3,4,6\n";
     let used = |word: &str| {
-        let taken = take(
-            &rows(text),
-            &format!("{TWO}duplicates: {word}\n"),
-            robot("rr", 1.0),
-        )
-        .unwrap();
+        let taken = take(&rows(text), &format!("{TWO}duplicates: {word}\n"), rr()).unwrap();
         let lines = taken
             .rejected
             .0
@@ -172,25 +152,10 @@ fn rows_join_by_id_in_the_order_of_the_first_file() {
     assert_eq!(
         refused(&taken.rejected),
         [
-            (
-                "b_tracker.csv",
-                5,
-                "unmatched",
-                "no usable row of z_arm.csv has the point id `A2`"
-            ),
-            (
-                "b_tracker.csv",
-                6,
-                "unmatched",
-                "no usable row of z_arm.csv has the point id `more`"
-            ),
-            (
-                "z_arm.csv",
-                4,
-                "unmatched",
-                "no usable row of b_tracker.csv has the point id `lost`"
-            ),
-            ("z_arm.csv", 5, "blank", "q1 is blank"),
+            "b_tracker.csv:5 unmatched: no usable row of z_arm.csv has the point id `A2`",
+            "b_tracker.csv:6 unmatched: no usable row of z_arm.csv has the point id `more`",
+            "z_arm.csv:4 unmatched: no usable row of b_tracker.csv has the point id `lost`",
+            "z_arm.csv:5 blank: q1 is blank"
         ]
     );
 }
@@ -231,30 +196,10 @@ fn a_simulation_joins_as_a_third_file_by_id_by_time_and_by_order() {
     assert_eq!(
         refused(&taken.rejected),
         [
-            (
-                "b_tracker.csv",
-                3,
-                "unmatched",
-                "no usable row of z_arm.csv (joined to all files) has the point id `B`"
-            ),
-            (
-                "model.csv",
-                4,
-                "unmatched",
-                "no usable row of z_arm.csv (joined to all files) has the point id `D`"
-            ),
-            (
-                "z_arm.csv",
-                4,
-                "unmatched",
-                "no usable row of model.csv has the point id `B`"
-            ),
-            (
-                "z_arm.csv",
-                5,
-                "unmatched",
-                "no usable row of b_tracker.csv has the point id `D`"
-            ),
+            "b_tracker.csv:3 unmatched: no usable row of z_arm.csv (joined to all files) has the point id `B`",
+            "model.csv:4 unmatched: no usable row of z_arm.csv (joined to all files) has the point id `D`",
+            "z_arm.csv:4 unmatched: no usable row of model.csv has the point id `B`",
+            "z_arm.csv:5 unmatched: no usable row of b_tracker.csv has the point id `D`"
         ]
     );
     let sound = |row: &calib::table::IntakeRow| row.read == row.accepted + row.rejected;
@@ -322,18 +267,8 @@ fn rows_join_by_time_within_the_tolerance_and_across_clocks() {
     assert_eq!(
         refused(&taken.rejected),
         [
-            (
-                "b_tracker.csv",
-                5,
-                "unmatched",
-                "z_arm.csv has no row within 0.2 s of 46 s"
-            ),
-            (
-                "z_arm.csv",
-                5,
-                "unmatched",
-                "b_tracker.csv has no row within 0.2 s of 40 s"
-            ),
+            "b_tracker.csv:5 unmatched: z_arm.csv has no row within 0.2 s of 46 s",
+            "z_arm.csv:5 unmatched: b_tracker.csv has no row within 0.2 s of 40 s"
         ]
     );
 }
@@ -356,14 +291,9 @@ fn rows_join_by_order_and_a_bad_row_takes_its_partner_along() {
     assert_eq!(
         refused(&taken.rejected),
         [
-            (
-                "b_tracker.csv",
-                3,
-                "unmatched",
-                "data row 2 of z_arm.csv is missing or rejected"
-            ),
-            ("b_tracker.csv", 6, "blank", "the whole row is blank"),
-            ("z_arm.csv", 3, "not_a_number", "q1: `bad` is not a number"),
+            "b_tracker.csv:3 unmatched: data row 2 of z_arm.csv is missing or rejected",
+            "b_tracker.csv:6 blank: the whole row is blank",
+            "z_arm.csv:3 not_a_number: q1: `bad` is not a number"
         ]
     );
 }
@@ -387,12 +317,7 @@ fn files_of_unequal_length_are_not_joined_by_order() {
 fn of_rows_that_are_copies_of_each_other_one_is_used() {
     let text = "A,1,2,3,4,1\nB,1,2,3,4,2\nA,1.0, 2,3,4,1\nC,1,2,3,4,5\nC,1,2,3,4,6\nC,1,2,3,4,5\nD,1,2,3,4,5\nE,1,2,3,4,5\nF,1,2,3,4,5\n";
     let used = |word: &str| {
-        let taken = take(
-            &rows(text),
-            &format!("{TWO}duplicates: {word}\n"),
-            robot("rr", 1.0),
-        )
-        .unwrap();
+        let taken = take(&rows(text), &format!("{TWO}duplicates: {word}\n"), rr()).unwrap();
         let lines = taken
             .rejected
             .0
@@ -472,23 +397,13 @@ fn files_that_continue_each_other_share_their_ids() {
             "b/a.csv",
             format!("{HEAD}N,1,2,3,4,5\ng2,1,2,3,4,5\nM,1,2,3,4,5\n"),
         );
-    let taken = take(&desk, &yaml, robot("rr", 1.0)).unwrap();
+    let taken = take(&desk, &yaml, rr()).unwrap();
     assert_eq!(taken.recording.sequence, [1, 3, 4, 6]);
     assert_eq!(
         refused(&taken.rejected),
         [
-            (
-                "a.csv",
-                3,
-                "duplicate_id",
-                "point id `g2` also stands on line 3 of a.csv (2)"
-            ),
-            (
-                "a.csv (2)",
-                3,
-                "duplicate_id",
-                "point id `g2` also stands on line 3 of a.csv"
-            ),
+            "a.csv:3 duplicate_id: point id `g2` also stands on line 3 of a.csv (2)",
+            "a.csv (2):3 duplicate_id: point id `g2` also stands on line 3 of a.csv"
         ]
     );
 }
@@ -528,7 +443,7 @@ files:
     assert!((temperature[0] - 27.0).abs() < 1e-12 && temperature[1].is_nan());
     assert_eq!(
         refused(&taken.rejected),
-        [("a.txt", 8, "out_of_order", "sequence 8 does not follow 9")]
+        ["a.txt:8 out_of_order: sequence 8 does not follow 9"]
     );
 }
 
@@ -548,7 +463,7 @@ fn a_file_without_header_is_read_by_numbers() {
     let taken = take(
         &Desk::default().with("a.csv", "  \"P 1\" 1 2  3 4 5\nP2 1 2 3\t4 5\n"),
         &yaml,
-        robot("rr", 1.0),
+        rr(),
     )
     .unwrap();
     assert_eq!(taken.recording.point_id, ["P 1", "P2"]);
@@ -579,35 +494,21 @@ fn a_parquet_file_gives_what_its_text_gives() {
     writer.write(&batch).unwrap();
     writer.close().unwrap();
     let yaml = TWO.to_string() + "max_rejected_fraction: 0.9\n";
-    let binary = take(
-        &Desk::default().with("a.csv", file.clone()),
-        &yaml,
-        robot("rr", 1.0),
-    )
-    .unwrap();
+    let binary = take(&Desk::default().with("a.csv", file.clone()), &yaml, rr()).unwrap();
     let text =
         "\"A, 1\",1,0.30000000000000004,1234.5678901234567,2,3\nB,2,-1e-7,,2,3\nC,3,12,NaN,2,3\n";
-    let text = take(&rows(text), &yaml, robot("rr", 1.0)).unwrap();
+    let text = take(&rows(text), &yaml, rr()).unwrap();
     assert_eq!(binary.recording, text.recording);
     assert_eq!(
         refused(&binary.rejected),
         [
-            ("a.csv", 2, "blank", "x is blank"),
-            (
-                "a.csv",
-                3,
-                "not_a_number",
-                "x: `NaN` is not a finite number"
-            )
+            "a.csv:2 blank: x is blank",
+            "a.csv:3 not_a_number: x: `NaN` is not a finite number"
         ]
     );
     assert_eq!(binary.rejected.0[0].text, "B,2,-1e-7,,2.0,3.0");
     let mapped = yaml.replace("column: z", "column: depth");
-    let message = super::refusal(
-        &Desk::default().with("a.csv", file),
-        &mapped,
-        robot("rr", 1.0),
-    );
+    let message = super::refusal(&Desk::default().with("a.csv", file), &mapped, rr());
     assert_eq!(
         message,
         "a.csv: no column `depth`, mapped to `z`; found: id, q1, q2, x, y, z"
@@ -615,12 +516,9 @@ fn a_parquet_file_gives_what_its_text_gives() {
     let message = super::refusal(
         &Desk::default().with("a.csv", "PAR1 and nothing else"),
         TWO,
-        robot("rr", 1.0),
+        rr(),
     );
-    assert!(
-        message.starts_with("a.csv: is a Parquet file that cannot be read: "),
-        "{message}"
-    );
+    starts_with(&message, "a.csv: is a Parquet file that cannot be read: ");
 }
 
 #[test]
@@ -719,9 +617,7 @@ fn a_long_file_streams_in_chunks_and_equal_content_gives_equal_tables() {
         let desk = Desk::default().with(&format!("{folder}/a.csv"), text.clone());
         desk.run(
             &settings(&TWO.replace("a.csv", &format!("{folder}/a.csv"))),
-            IngestReads {
-                robot: robot("rr", 1.0),
-            },
+            IngestReads { robot: rr() },
         )
         .unwrap()
     };

@@ -1,8 +1,8 @@
 //! Several targets side by side in a row become rows of their own.
 
-use super::{refusal, robot, settings, take};
+use super::{faults_of, refusal, rr, take};
+use crate::answer::starts_with;
 use crate::desk::Desk;
-use calib::stage::Stage;
 
 const WIDE: &str = r#"
 files:
@@ -23,10 +23,10 @@ P7,9e9,2,3,4,5,7,8,9,6,10,20
 ";
 
 fn seen(recording: &calib::table::Recording) -> Vec<(i64, &str, &str, [f64; 3])> {
-    let targets = recording.target.as_ref().expect("targets");
+    let targets = recording.target.as_ref().unwrap();
     let millimetres = |row: usize| recording.position[row].map(|value| (value * 1e6).round() / 1e3);
     let row = |row: usize| {
-        let target = targets[row].as_deref().expect("a target");
+        let target = targets[row].as_deref().unwrap();
         (
             recording.sequence[row],
             recording.point_id[row].as_str(),
@@ -53,12 +53,7 @@ fn a_wide_row_is_a_row_for_each_target_that_was_seen() {
         .replace("OWN", JOINTS)
         .replace("[7, 8, 9]", "[X3, 8, 9]")
         + "max_rejected_fraction: 0.6\n";
-    let taken = take(
-        &Desk::default().with("a.csv", ROWS),
-        &yaml,
-        robot("rr", 1.0),
-    )
-    .expect("a recording");
+    let taken = take(&Desk::default().with("a.csv", ROWS), &yaml, rr()).unwrap();
     assert_eq!(seen(&taken.recording), SEEN);
     assert_eq!(taken.recording.q(4), taken.recording.q(3), "P2 stands once");
     let refused: Vec<(i64, &str)> = taken
@@ -90,20 +85,12 @@ fn a_wide_file_of_points_is_joined_to_the_joints_by_its_rows() {
             .with("joints.csv", joints)
     };
     let first = format!("{of_points}{other}{JOINTS}join: {{by: id}}\nmax_rejected_fraction: 0.6\n");
-    let taken = take(
-        &desk(),
-        &first.replace("[7, 8, 9]", "[X3, 8, 9]"),
-        robot("rr", 1.0),
-    )
-    .expect("a recording");
+    let taken = take(&desk(), &first.replace("[7, 8, 9]", "[X3, 8, 9]"), rr()).unwrap();
     assert_eq!(seen(&taken.recording), SEEN);
-    let body = of_points
-        .trim_start()
-        .strip_prefix("files:\n")
-        .expect("files");
+    let body = of_points.trim_start().strip_prefix("files:\n").unwrap();
     let second =
         format!("files:\n{other}{JOINTS}{body}join: {{by: id}}\nmax_rejected_fraction: 0.6\n");
-    let taken = take(&desk(), &second, robot("rr", 1.0)).expect("a recording");
+    let taken = take(&desk(), &second, rr()).unwrap();
     let (ids, targets): (Vec<&str>, Vec<&str>) = seen(&taken.recording)
         .iter()
         .map(|row| (row.1, row.2))
@@ -122,13 +109,7 @@ fn a_wide_file_of_points_is_joined_to_the_joints_by_its_rows() {
 
 #[test]
 fn faults_of_targets_have_their_places() {
-    let faults = |yaml: &str| {
-        settings(yaml)
-            .check()
-            .iter()
-            .map(ToString::to_string)
-            .collect::<Vec<_>>()
-    };
+    let faults = |yaml: &str| faults_of(yaml);
     let whole = WIDE.replace("OWN", JOINTS);
     assert_eq!(faults(&whole), [""; 0]);
     assert_eq!(
@@ -149,10 +130,7 @@ fn faults_of_targets_have_their_places() {
     let missing = refusal(
         &Desk::default().with("a.csv", ROWS.replace("Y2", "YY2")),
         &whole,
-        robot("rr", 1.0),
+        rr(),
     );
-    assert!(
-        missing.starts_with("a.csv:1: no column `Y2`, mapped to `smr2`"),
-        "{missing}"
-    );
+    starts_with(&missing, "a.csv:1: no column `Y2`, mapped to `smr2`");
 }

@@ -1,6 +1,7 @@
 //! Sheets of workbooks are read as text tables are.
 
-use super::{TWO, refusal, robot, settings, take};
+use super::{TWO, refusal, rr, settings, take};
+use crate::answer::starts_with;
 use crate::desk::Desk;
 use crate::workbook::{archive, with_texts, workbook};
 use calib::stage::Stage;
@@ -21,9 +22,9 @@ fn a_sheet_is_read_below_its_title_with_its_units_and_blank_rows() {
     let taken = take(
         &book(&[("Notes", "by hand"), ("Data", DATA)]),
         &titled(),
-        robot("rr", 1.0),
+        rr(),
     )
-    .expect("a recording");
+    .unwrap();
     let recording = &taken.recording;
     assert_eq!(recording.point_id, ["P1", "P3"]);
     assert_eq!(
@@ -48,10 +49,10 @@ fn dates_and_times_of_day_in_cells_are_clock_times() {
         "      time: {column: at, unit: clock}\n      q:",
     );
     let data = DATA.replace("five", "5").replace(":0.25", "@45943.75");
-    let taken = take(&book(&[("Data", &data)]), &timed, robot("rr", 1.0)).expect("a recording");
+    let taken = take(&book(&[("Data", &data)]), &timed, rr()).unwrap();
     // 2025-10-13 is day 20,374 after 1970-01-01 (45943 less 25569, the number of 1970-01-01 in a workbook).
     let expected = [20374.541, 20374.5421, 20374.75].map(|days: f64| days * 86_400.0);
-    let times = taken.recording.time.expect("times");
+    let times = taken.recording.time.unwrap();
     for (time, expected) in times.iter().zip(expected) {
         assert!((time - expected).abs() < 1e-5, "{time} for {expected}");
     }
@@ -59,8 +60,8 @@ fn dates_and_times_of_day_in_cells_are_clock_times() {
         .replace("five", "5")
         .replace("@45943.5421", ":0.2")
         .replace("@45943.541", ":0.125");
-    let taken = take(&book(&[("Data", &of_day)]), &timed, robot("rr", 1.0)).expect("a recording");
-    let times = taken.recording.time.expect("times");
+    let taken = take(&book(&[("Data", &of_day)]), &timed, rr()).unwrap();
+    let times = taken.recording.time.unwrap();
     assert_eq!(times, [10_800.0, 17_280.0, 21_600.0]);
 }
 
@@ -71,36 +72,30 @@ fn of_several_sheets_with_numbers_one_is_named() {
         ("Two", &DATA.replace("five", "5")),
         ("_spare", DATA),
     ];
-    let message = refusal(&book(&sheets), &titled(), robot("rr", 1.0));
+    let message = refusal(&book(&sheets), &titled(), rr());
     assert_eq!(
         message,
         "a.csv: has numbers in several sheets; say which, `sheet: NAME`; allowed: `One`, `Two`"
     );
     let two = titled().replace("  - file: a.csv\n", "  - file: a.csv\n    sheet: Two\n");
     assert_eq!(
-        take(&book(&sheets), &two, robot("rr", 1.0))
-            .expect("a recording")
-            .recording
-            .rows(),
+        take(&book(&sheets), &two, rr()).unwrap().recording.rows(),
         3
     );
     let three = two.replace("Two", "Three");
-    let message = refusal(&book(&sheets), &three, robot("rr", 1.0));
+    let message = refusal(&book(&sheets), &three, rr());
     assert_eq!(
         message,
         "a.csv: has no sheet `Three`; allowed: `One`, `Two`, `_spare`"
     );
-    let none = refusal(&book(&[("Notes", "a|b|c\n1|2")]), TWO, robot("rr", 1.0));
+    let none = refusal(&book(&[("Notes", "a|b|c\n1|2")]), TWO, rr());
     assert_eq!(
         none,
         "a.csv: has no sheet with rows of numbers; its sheets: `Notes`"
     );
     let text = Desk::default().with("a.csv", "id,q1,q2,x,y,z\nP1,1,2,3,4,5\n");
-    let message = refusal(&text, &two, robot("rr", 1.0));
-    assert!(
-        message.starts_with("a.csv: is no workbook, and has no sheet `Two`"),
-        "{message}"
-    );
+    let message = refusal(&text, &two, rr());
+    starts_with(&message, "a.csv: is no workbook, and has no sheet `Two`");
     assert_eq!(settings(&two).check(), []);
 }
 
@@ -111,9 +106,9 @@ fn texts_in_cells_keep_quotes_and_lose_line_ends_and_numbers_have_the_stated_mar
     let taken = take(
         &book(&[("Data", &format!("{data}B|1|2|3|4|5\n"))]),
         &comma,
-        robot("rr", 1.0),
+        rr(),
     )
-    .expect("a recording");
+    .unwrap();
     assert_eq!(taken.recording.point_id[0], "the \"A\" of B");
     assert_eq!(
         taken.recording.q(0),
@@ -123,13 +118,7 @@ fn texts_in_cells_keep_quotes_and_lose_line_ends_and_numbers_have_the_stated_mar
 
 #[test]
 fn what_is_no_workbook_is_refused_in_words() {
-    let refused = |content: Vec<u8>| {
-        refusal(
-            &Desk::default().with("a.csv", content),
-            TWO,
-            robot("rr", 1.0),
-        )
-    };
+    let refused = |content: Vec<u8>| refusal(&Desk::default().with("a.csv", content), TWO, rr());
     let older = refused(
         [
             &[0xd0, 0xcf, 0x11, 0xe0, 0xa1, 0xb1, 0x1a, 0xe1][..],
@@ -157,23 +146,13 @@ fn what_is_no_workbook_is_refused_in_words() {
         let mut flipped = whole.clone();
         flipped[at] ^= 0x41;
         // Whatever a wrong byte makes of it: no panic, and no more than a refusal.
-        let _ = take(
-            &Desk::default().with("a.csv", flipped),
-            &titled(),
-            robot("rr", 1.0),
-        );
+        let _ = take(&Desk::default().with("a.csv", flipped), &titled(), rr());
     }
 }
 
 #[test]
 fn a_workbook_that_unpacks_to_too_much_is_refused_before_it_is_decoded() {
-    let refused = |content: Vec<u8>| {
-        refusal(
-            &Desk::default().with("a.csv", content),
-            TWO,
-            robot("rr", 1.0),
-        )
-    };
+    let refused = |content: Vec<u8>| refusal(&Desk::default().with("a.csv", content), TWO, rr());
     let body = "<worksheet><sheetData/></worksheet>".to_string();
     let long = format!("<sst>{}</sst>", " ".repeat(70 << 20));
     let message = refused(with_texts(
@@ -181,21 +160,18 @@ fn a_workbook_that_unpacks_to_too_much_is_refused_before_it_is_decoded() {
         std::slice::from_ref(&body),
         &long,
     ));
-    assert!(
-        message.starts_with(
-            "a.csv: is too large at `xl/sharedStrings.xml`; allowed: up to 512 MB unpacked"
-        ),
-        "{message}"
+    starts_with(
+        &message,
+        "a.csv: is too large at `xl/sharedStrings.xml`; allowed: up to 512 MB unpacked",
     );
     let message = refused(with_texts(
         &[("Data", "")],
         &[body],
         r#"<sst uniqueCount="900000000000"></sst>"#,
     ));
-    assert!(
-        message
-            .starts_with("a.csv: is damaged: `xl/sharedStrings.xml` says that it has more texts"),
-        "{message}"
+    starts_with(
+        &message,
+        "a.csv: is damaged: `xl/sharedStrings.xml` says that it has more texts",
     );
     let far = r#"<worksheet><sheetData><row r="1048577"><c r="A1048577"><v>1</v></c><c r="B1048577"><v>1</v></c><c r="C1048577"><v>1</v></c></row></sheetData></worksheet>"#;
     assert!(

@@ -1,6 +1,6 @@
 //! Headers as controllers, trackers and spreadsheets write them: `init` maps them right or asks, and what it wrote runs.
 
-use crate::compensate::calib;
+use crate::answer::{calib, has, put, read};
 use std::fmt::Write;
 use std::path::Path;
 use tempfile::TempDir;
@@ -30,7 +30,7 @@ pub(super) fn point(row: usize, delimiter: &str) -> String {
 /// A header and thirty rows.
 pub(super) fn table(header: &str, row: impl Fn(usize) -> String) -> String {
     let mut text = format!("{header}\n");
-    (0..30).for_each(|k| writeln!(text, "{}", row(k)).expect("text"));
+    (0..30).for_each(|k| writeln!(text, "{}", row(k)).unwrap());
     text
 }
 
@@ -41,7 +41,7 @@ fn comma(text: &str) -> String {
 /// Windows-1252 of what fits into Latin-1.
 fn latin(text: &str) -> Vec<u8> {
     text.chars()
-        .map(|letter| u8::try_from(u32::from(letter)).expect("a letter of Latin-1"))
+        .map(|letter| u8::try_from(u32::from(letter)).unwrap())
         .collect()
 }
 
@@ -53,29 +53,23 @@ pub(super) struct Made {
 }
 
 pub(super) fn made(files: &[(&str, Vec<u8>)]) -> Made {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     for (name, content) in files {
-        std::fs::write(folder.path().join(name), content).expect("a file");
+        put(folder.path(), name, content);
     }
     let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
     let output = calib(
         folder.path(),
         &[&["init", ".", "--data"], names.as_slice()].concat(),
-        "",
     );
     // 1 where nothing was understood: the files to fill in are written all the same.
-    assert!(
-        output.status.code().is_some_and(|code| code <= 1),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    let pipeline =
-        std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
+    assert!(output.code.is_some_and(|code| code <= 1), "{}", output.err);
+    let pipeline = read(folder.path().join("pipeline.yaml"));
     assert!(folder.path().join("robot.yaml").is_file());
     Made {
         folder,
         pipeline,
-        said: String::from_utf8_lossy(&output.stdout).into_owned(),
+        said: output.out.clone(),
     }
 }
 
@@ -124,38 +118,22 @@ impl Made {
     }
     /// `check` finds nothing wrong, and the recording has so many rows.
     pub fn runs(&self, rows: usize) -> &Self {
-        let check = calib(self.path(), &["check", "pipeline.yaml"], "");
-        let told = String::from_utf8_lossy(&check.stderr).into_owned();
-        assert!(check.status.success(), "{told}\n{}", self.pipeline);
+        let check = calib(self.path(), "check pipeline.yaml");
+        let told = check.err.clone();
+        assert!(check.code == Some(0), "{told}\n{}", self.pipeline);
         let run = calib(
             self.path(),
-            &[
-                "run",
-                "pipeline.yaml",
-                "--until",
-                "split",
-                "--json",
-                "--quiet",
-            ],
-            "",
-        );
-        assert!(
-            run.status.success(),
-            "{}\n{}",
-            String::from_utf8_lossy(&run.stderr),
-            self.pipeline
-        );
-        let run: serde_json::Value = serde_json::from_slice(&run.stdout).expect("JSON");
-        let stages = run["stages"].as_array().expect("stages");
-        let ingest = stages
-            .iter()
-            .find(|stage| stage["id"] == "ingest")
-            .expect("ingest");
-        let outputs = ingest["outputs"].as_array().expect("outputs");
+            "run pipeline.yaml --until split --json --quiet",
+        )
+        .code(0);
+        let run: serde_json::Value = run.json();
+        let stages = run["stages"].as_array().unwrap();
+        let ingest = stages.iter().find(|stage| stage["id"] == "ingest").unwrap();
+        let outputs = ingest["outputs"].as_array().unwrap();
         let recording = outputs
             .iter()
             .find(|output| output["port"] == "recording")
-            .expect("a recording");
+            .unwrap();
         assert_eq!(recording["rows"], rows, "{}", self.pipeline);
         self
     }
@@ -174,7 +152,7 @@ fn a_german_controller_in_latin_1_joins_a_spatial_analyzer_export_by_its_points(
     let mut tracker =
         "// SpatialAnalyzer, Einheit mm\n// Collection Group Target X Y Z\n".to_string();
     for k in (0..30).rev() {
-        writeln!(tracker, "A Main M\u{fc}-{k}   {}", point(k, "  ")).expect("text");
+        writeln!(tracker, "A Main M\u{fc}-{k}   {}", point(k, "  ")).unwrap();
         if k == 15 {
             tracker.push_str("// Group of the afternoon\n");
         }
@@ -214,17 +192,9 @@ fn a_spatial_analyzer_export_with_commas_is_understood_too() {
     made.lacks(&["// Collection"]).runs(30);
     let again = calib(
         made.path(),
-        &[
-            "run",
-            "pipeline.yaml",
-            "--until",
-            "split",
-            "--json",
-            "--quiet",
-        ],
-        "",
+        "run pipeline.yaml --until split --json --quiet",
     );
-    let again: serde_json::Value = serde_json::from_slice(&again.stdout).expect("JSON");
+    let again: serde_json::Value = again.json();
     assert_eq!(again["rejected_rows"], 0, "a line of remarks is no row");
 }
 
@@ -262,9 +232,7 @@ fn clock_times_are_times() {
 fn a_fast_log_beside_few_points_runs() {
     let controller = {
         let mut text = "time_s,A1,A2,A3,A4,A5,A6\n".to_string();
-        (0..2000).for_each(|k| {
-            writeln!(text, "{:.3},{}", 0.1 * k as f64, joints(k, ",")).expect("text")
-        });
+        (0..2000).for_each(|k| writeln!(text, "{:.3},{}", 0.1 * k as f64, joints(k, ",")).unwrap());
         text
     };
     let tracker = table("time_s,x,y,z", |k| {
@@ -332,17 +300,9 @@ fn rows_of_unequal_number_are_never_joined_by_order_in_silence() {
     let tracker = table("x,y,z", |k| point(k, ",")) + "1,2,3\n";
     let made = two(controller.clone(), tracker);
     made.says(&["join: {by: order}", "REPLACE", "30 and 31 rows"]);
-    let check = calib(
-        made.path(),
-        &["run", "pipeline.yaml", "--until", "split", "--quiet"],
-        "",
-    );
-    assert_eq!(check.status.code(), Some(10));
-    let told = String::from_utf8_lossy(&check.stderr).into_owned();
-    assert!(
-        told.contains("31 data rows, controller.csv has 30"),
-        "{told}"
-    );
+    let check = calib(made.path(), "run pipeline.yaml --until split --quiet").code(10);
+    let told = check.err.clone();
+    has(&told, "31 data rows, controller.csv has 30");
     let equal = two(controller, table("x,y,z", |k| point(k, ",")));
     equal.says(&["join: {by: order}", "CHECK"]).runs(30);
 }
@@ -474,7 +434,7 @@ fn a_file_without_a_header_gets_both_files_with_what_was_seen() {
     sheet.says(&["REPLACE", "saved as CSV"]);
     let prose = one("nothing\nto see\n");
     prose.says(&["REPLACE", "nothing", "to see"]);
-    assert!(prose.said.contains("no header found"), "{}", prose.said);
+    has(&prose.said, "no header found");
 }
 
 #[test]
@@ -557,9 +517,9 @@ fn the_controllers_own_point_is_not_taken_beside_the_trackers() {
         .filter(|line| line.trim_start().starts_with("x: {column"))
         .collect();
     assert_eq!(places.len(), 1, "{}", made.pipeline);
-    let joints = made.pipeline.find("q: {column").expect("joints");
+    let joints = made.pipeline.find("q: {column").unwrap();
     assert!(
-        made.pipeline.find(places[0]).expect("a point") > joints,
+        made.pipeline.find(places[0]).unwrap() > joints,
         "{}",
         made.pipeline
     );
@@ -577,16 +537,8 @@ fn the_identity_that_init_comments_out_is_nobodys() {
         made.pipeline
     );
     let identified = made.pipeline.replace("# identity:", "identity:");
-    std::fs::write(made.path().join("pipeline.yaml"), identified).expect("a file");
-    let check = calib(made.path(), &["check", "pipeline.yaml"], "");
-    assert!(
-        check.status.success(),
-        "{}",
-        String::from_utf8_lossy(&check.stderr)
-    );
-    let said = String::from_utf8_lossy(&check.stdout).into_owned();
-    assert!(
-        said.contains("replace   ") && said.contains("          pipeline.yaml:"),
-        "{said}"
-    );
+    put(made.path(), "pipeline.yaml", identified);
+    let check = calib(made.path(), "check pipeline.yaml").code(0);
+    let said = check.out.clone();
+    has(&said, ["replace   ", "          pipeline.yaml:"]);
 }

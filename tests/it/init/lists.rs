@@ -1,7 +1,7 @@
 //! Lists as they come off a tracker's own software: no header, other names than the controller's, UTF-16, marks of thousands, many columns.
 
 use super::layouts::{joints, made, point, table};
-use crate::compensate::calib;
+use crate::answer::{calib, has, put, starts_with};
 use std::fmt::Write;
 
 #[test]
@@ -10,7 +10,7 @@ fn a_list_of_points_without_a_header_joins_by_the_numbers_in_its_names() {
         format!("Pose {k};{}", joints(k, ";"))
     });
     let mut tracker = String::new();
-    (0..30).for_each(|k| writeln!(tracker, "pt_{k:03} {}", point(k, " ")).expect("text"));
+    (0..30).for_each(|k| writeln!(tracker, "pt_{k:03} {}", point(k, " ")).unwrap());
     let made = made(&[
         ("controller.csv", controller.into()),
         ("tracker.txt", tracker.into()),
@@ -57,34 +57,29 @@ fn a_text_in_utf_16_with_marks_of_thousands_is_read() {
 
 #[test]
 fn what_cannot_be_told_ends_with_code_1_and_a_sentence_and_too_many_files_with_2() {
-    let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(
-        folder.path().join("notes.csv"),
+    let folder = tempfile::tempdir().unwrap();
+    put(
+        folder.path(),
+        "notes.csv",
         "day,weather,mood\nmon,rain,good\ntue,sun,good\n",
-    )
-    .expect("a file");
-    let output = calib(folder.path(), &["init", ".", "--data", "notes.csv"], "");
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(
-        told.starts_with("error: neither joints nor a measured point were recognised in notes.csv"),
-        "{told}"
+    );
+    let output = calib(folder.path(), "init . --data notes.csv");
+    let told = output.err.clone();
+    assert_eq!(output.code, Some(1), "{told}");
+    starts_with(
+        &told,
+        "error: neither joints nor a measured point were recognised in notes.csv",
     );
     let output = calib(
         folder.path(),
-        &[
-            "init",
-            "more",
-            "--data",
-            "notes.csv",
-            "notes.csv",
-            "notes.csv",
-        ],
-        "",
+        "init more --data notes.csv notes.csv notes.csv",
     );
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{told}");
-    assert!(told.contains("--data: 3 files; allowed: one recording, the controller's and the tracker's, the controller's and a list of points in one layout for each of several reflectors, or recordings that have joints and points each"), "{told}");
+    let told = output.err.clone();
+    assert_eq!(output.code, Some(2), "{told}");
+    has(
+        &told,
+        "--data: 3 files; allowed: one recording, the controller's and the tracker's, the controller's and a list of points in one layout for each of several reflectors, or recordings that have joints and points each",
+    );
     assert!(!folder.path().join("more").exists());
 }
 
@@ -92,7 +87,7 @@ fn what_cannot_be_told_ends_with_code_1_and_a_sentence_and_too_many_files_with_2
 fn a_wide_file_takes_time_in_proportion_to_its_width() {
     let wide = |columns: usize| {
         let mut header = String::from("Punkt,A1,A2,A3,A4,A5,A6,X,Y,Z");
-        (0..columns).for_each(|k| write!(header, ",channel {k}").expect("text"));
+        (0..columns).for_each(|k| write!(header, ",channel {k}").unwrap());
         let blank = ",0.5".repeat(columns);
         let text = table(&header, |k| {
             format!("P{k},{},{}{blank}", joints(k, ","), point(k, ","))
@@ -160,52 +155,38 @@ const CELL: &str = r#"<robot name="cell"><link name="world"/><link name="carriag
 
 #[test]
 fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let data = table("Punkt,J1_mm,J2_deg,X,Y,Z", |k| {
         format!("P{k},{},{},{}", 40 * k, 3 * k, point(k, ","))
     });
-    std::fs::write(folder.path().join("data.csv"), data).expect("a file");
-    std::fs::write(folder.path().join("cell.urdf"), CELL).expect("a file");
-    let told = |arguments: &[&str]| {
-        let output = calib(folder.path(), arguments, "");
-        (
-            output.status.code(),
-            String::from_utf8_lossy(&output.stderr).into_owned(),
-        )
+    put(folder.path(), "data.csv", data);
+    put(folder.path(), "cell.urdf", CELL);
+    let told = |arguments: &str| {
+        let output = calib(folder.path(), arguments);
+        (output.code, output.err.clone())
     };
-    let start = [
-        "init",
-        ".",
-        "--data",
-        "data.csv",
-        "--urdf",
-        "cell.urdf",
-        "--tip",
-    ];
-    assert_eq!(
-        told(&[&start[..], &["holder"]].concat()),
-        (Some(0), String::new())
-    );
-    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("a file");
+    let start = "init . --data data.csv --urdf cell.urdf --tip";
+    assert_eq!(told(&format!("{start} holder")), (Some(0), String::new()));
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert!(
         read("robot.yaml").contains("urdf: {base: \"world\", tip: \"holder\"}"),
         "{}",
         read("robot.yaml")
     );
     let pipeline = read("pipeline.yaml");
-    assert!(
-        pipeline.contains("q: {columns: [\"J1_mm\", \"J2_deg\"], unit: deg, linear_unit: mm}"),
-        "{pipeline}"
+    has(
+        &pipeline,
+        "q: {columns: [\"J1_mm\", \"J2_deg\"], unit: deg, linear_unit: mm}",
     );
-    std::fs::remove_file(folder.path().join("robot.yaml")).expect("a file");
-    std::fs::remove_file(folder.path().join("pipeline.yaml")).expect("a file");
-    let (code, said) = told(&[&start[..], &["carriage"]].concat());
+    std::fs::remove_file(folder.path().join("robot.yaml")).unwrap();
+    std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
+    let (code, said) = told(&format!("{start} carriage"));
     assert_eq!(code, Some(2));
-    assert!(
-        said.contains("--tip: the chain from `world` to `carriage` has 1 joint, the recording 2"),
-        "{said}"
+    has(
+        &said,
+        "--tip: the chain from `world` to `carriage` has 1 joint, the recording 2",
     );
-    let (code, said) = told(&[&start[..], &["tool0"]].concat());
+    let (code, said) = told(&format!("{start} tool0"));
     assert!(
         code == Some(2)
             && said.contains("no link `tool0`")
@@ -236,7 +217,7 @@ fn quaternions_are_orientations_to_take_in_and_u95_is_two_standard_deviations() 
         .pipeline
         .replace("# orientation:", "orientation:")
         .replace("# sigma_orientation:", "sigma_orientation:");
-    std::fs::write(made.path().join("pipeline.yaml"), taken).expect("a file");
+    put(made.path(), "pipeline.yaml", taken);
     made.runs(30);
 }
 

@@ -1,7 +1,7 @@
 //! Recordings of torques, files of columns with lists, files that are known and not read, and folders that have their robot file.
 
 use super::layouts::{cells, joints, made, point, table};
-use crate::compensate::calib;
+use crate::answer::{calib, put};
 use arrow::array::{ArrayRef, FixedSizeListArray, Float64Array, ListArray, RecordBatch};
 use arrow::datatypes::{Field, Float32Type};
 use std::fmt::Write;
@@ -17,7 +17,7 @@ fn log(header: &str, count: usize, row: impl Fn(usize, usize) -> String) -> Stri
             0.008 * k as f64,
             cells(count, ",", |column| row(k, column))
         )
-        .expect("text");
+        .unwrap();
     }
     text
 }
@@ -66,13 +66,7 @@ fn torques_under_any_name_make_a_pipeline_that_reads_torques() {
             "time: {column: \"time_s\", unit: s}",
         ]);
         made.lacks(&["uses: ingest\n", "instrument", "split"]);
-        let check = calib(made.path(), &["check", "pipeline.yaml"], "");
-        assert!(
-            check.status.success(),
-            "{}\n{}",
-            String::from_utf8_lossy(&check.stderr),
-            made.pipeline
-        );
+        calib(made.path(), "check pipeline.yaml").code(0);
     }
 }
 
@@ -140,7 +134,7 @@ fn lists(count: usize) -> Vec<u8> {
     let state = |k: usize| {
         Some(
             (0..count)
-                .map(|j| Some(wave(k, j).parse::<f32>().expect("a number")))
+                .map(|j| Some(wave(k, j).parse::<f32>().unwrap()))
                 .collect::<Vec<_>>(),
         )
     };
@@ -150,7 +144,7 @@ fn lists(count: usize) -> Vec<u8> {
         .flat_map(|k| {
             point(k, ",")
                 .split(',')
-                .map(|x| x.parse().expect("a number"))
+                .map(|x| x.parse().unwrap())
                 .collect::<Vec<f64>>()
         })
         .collect();
@@ -166,12 +160,12 @@ fn lists(count: usize) -> Vec<u8> {
         ("observation.state", Arc::new(state)),
         ("point", Arc::new(points)),
     ];
-    let batch = RecordBatch::try_from_iter(columns).expect("columns");
+    let batch = RecordBatch::try_from_iter(columns).unwrap();
     let mut bytes = Vec::new();
     let mut writer =
-        parquet::arrow::ArrowWriter::try_new(&mut bytes, batch.schema(), None).expect("a writer");
-    writer.write(&batch).expect("rows");
-    writer.close().expect("a file");
+        parquet::arrow::ArrowWriter::try_new(&mut bytes, batch.schema(), None).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
     bytes
 }
 
@@ -195,7 +189,7 @@ fn lists_of_a_parquet_file_are_columns_of_which_the_first_are_the_joints() {
                 &format!("{axis}: {{column: \"point[{k}]\","),
             )
         });
-    std::fs::write(made.path().join("pipeline.yaml"), mapped).expect("a file");
+    put(made.path(), "pipeline.yaml", mapped);
     made.runs(30);
 }
 
@@ -225,10 +219,10 @@ fn programs_and_bags_are_named_as_what_they_are_by_init_and_by_check() {
     ] {
         let made = made(&[(name, content.to_vec())]);
         assert!(made.said.contains(said), "{name}: {}", made.said);
-        let check = calib(made.path(), &["check", "pipeline.yaml"], "");
-        let told = String::from_utf8_lossy(&check.stderr).into_owned();
+        let check = calib(made.path(), "check pipeline.yaml");
+        let told = check.err.clone();
         assert!(
-            check.status.code() == Some(10) && told.contains(said),
+            check.code == Some(10) && told.contains(said),
             "{name}: {told}"
         );
     }
@@ -236,37 +230,32 @@ fn programs_and_bags_are_named_as_what_they_are_by_init_and_by_check() {
 
 #[test]
 fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let told = |arguments: &[&str]| {
-        let output = calib(folder.path(), arguments, "");
-        (
-            output.status.code(),
-            [output.stdout, output.stderr]
-                .map(|text| String::from_utf8_lossy(&text).into_owned())
-                .concat(),
-        )
+    let folder = tempfile::tempdir().unwrap();
+    let told = |arguments: &str| {
+        let output = calib(folder.path(), arguments);
+        (output.code, output.both())
     };
-    std::fs::write(
-        folder.path().join("data.csv"),
+    put(
+        folder.path(),
+        "data.csv",
         table("A1,A2,A3,A4,A5,A6,X,Y,Z", |k| {
             format!("{},{}", joints(k, ","), point(k, ","))
         }),
-    )
-    .expect("a file");
-    let robot = told(&["robots", "lrmate_200id"]).1;
-    std::fs::write(folder.path().join("robot.yaml"), &robot).expect("a file");
-    let (code, said) = told(&["init", ".", "--data", "data.csv", "--robot", "ur10e"]);
+    );
+    let robot = told("robots lrmate_200id").1;
+    put(folder.path(), "robot.yaml", &robot);
+    let (code, said) = told("init . --data data.csv --robot ur10e");
     assert!(
         code == Some(2) && said.contains("robot.yaml: is already there and would be used"),
         "{said}"
     );
-    let (code, said) = told(&["init", ".", "--data", "data.csv"]);
+    let (code, said) = told("init . --data data.csv");
     assert!(
         code == Some(0)
             && said.contains("wrote ./pipeline.yaml beside ./robot.yaml, which is used as it is"),
         "{said}"
     );
-    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("a file");
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert_eq!(read("robot.yaml"), robot);
     // What its controller counts otherwise goes along.
     assert!(
@@ -274,14 +263,10 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
         "{}",
         read("pipeline.yaml")
     );
-    assert_eq!(told(&["check", "pipeline.yaml"]).0, Some(0));
-    std::fs::remove_file(folder.path().join("pipeline.yaml")).expect("a file");
-    std::fs::write(
-        folder.path().join("robot.yaml"),
-        told(&["robots", "panda"]).1,
-    )
-    .expect("a file");
-    let (code, said) = told(&["init", ".", "--data", "data.csv"]);
+    assert_eq!(told("check pipeline.yaml").0, Some(0));
+    std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
+    put(folder.path(), "robot.yaml", told("robots panda").1);
+    let (code, said) = told("init . --data data.csv");
     assert!(
         code == Some(2)
             && said.contains("has 7 joints, the recording 6; put the robot of the recording there"),

@@ -59,15 +59,14 @@ fn joints_and_poses_of_the_first_group_are_targets() {
             "25:28: CONFIG: calib assumed that N is a wrist with J5 below zero, and F one above; confirm it at one pose of the controller",
         ]
     );
-    let program =
-        Program::parse(LISTING.as_bytes(), Language::Fanuc, Partial::Refused).expect("accepted");
+    let program = Program::parse(LISTING.as_bytes(), Language::Fanuc, Partial::Refused).unwrap();
     let posture = PostureStatement::Config {
         flip: false,
         up: true,
         turns: [0, 0, -1],
     };
     assert_eq!(program.literals()[1].posture, posture);
-    let list = joint_list(LISTING.as_bytes(), Language::Fanuc).expect("a list");
+    let list = joint_list(LISTING.as_bytes(), Language::Fanuc).unwrap();
     assert_eq!(
         (
             list.rows.len(),
@@ -81,8 +80,7 @@ fn joints_and_poses_of_the_first_group_are_targets() {
 
 #[test]
 fn a_turn_that_changes_is_written_where_it_stands() {
-    let program =
-        Program::parse(LISTING.as_bytes(), Language::Fanuc, Partial::Refused).expect("accepted");
+    let program = Program::parse(LISTING.as_bytes(), Language::Fanuc, Partial::Refused).unwrap();
     let answer = |literal: &calib::program::Literal| calib::program::SolvedLiteral {
         values: literal.values.clone(),
         posture: match literal.posture {
@@ -103,7 +101,7 @@ fn a_turn_that_changes_is_written_where_it_stands() {
                 .map(|literal| Ok(answer(literal)))
                 .collect(),
         )
-        .expect("written");
+        .unwrap();
     assert_eq!(
         String::from_utf8_lossy(&out.bytes),
         LISTING.replace("'N U T, 0, 0, -1'", "'N U T, 0, 1, 0'")
@@ -191,17 +189,13 @@ fn what_is_not_understood_is_refused_with_its_line() {
 #[test]
 fn frames_and_displacements_that_a_listing_does_not_hold_are_said() {
     let frames = |text: &str| {
-        let program =
-            Program::parse(text.as_bytes(), Language::Fanuc, Partial::Refused).expect("accepted");
+        let program = Program::parse(text.as_bytes(), Language::Fanuc, Partial::Refused).unwrap();
         super::told(program.frames())
     };
     let posture = "CONFIG: calib assumed that N is a wrist with J5 below zero, and F one above; confirm it at one pose of the controller";
     let behind = |text: &str| {
         let mut all = frames(text);
-        let at = all
-            .iter()
-            .position(|note| note.ends_with(posture))
-            .expect("what the letters of CONFIG mean is assumed");
+        let at = all.iter().position(|note| note.ends_with(posture)).unwrap();
         all.remove(at);
         all
     };

@@ -196,8 +196,7 @@ fn points_of_inline_forms_are_followed_through_the_files_of_a_program() {
 fn routines_of_other_files_leave_frames_as_they_are_or_are_read() {
     let one = base(100.0);
     let text = format!("DEF MAIN()\n{one}\nGRIP(1)\nGRIP(2)\n{MOTION}\nEND\n");
-    let program =
-        Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
+    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).unwrap();
     let told: Vec<&str> = program
         .warnings()
         .iter()

@@ -133,7 +133,7 @@ fn partial_targets_are_listed_and_left_where_that_is_wished() {
     let refusal = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused)
         .expect_err("partial targets");
     assert_eq!((told(&refusal.faults), refusal.partial), (listed, 4));
-    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Left).expect("left");
+    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Left).unwrap();
     assert_eq!(program.literals().len(), 1);
     let mut warned: Vec<String> = places
         .iter()

@@ -66,7 +66,7 @@ impl Writer {
             self.text.push('+');
         }
         self.text.push_str(unsigned);
-        let value: f64 = unsigned.parse().expect("a number");
+        let value: f64 = unsigned.parse().unwrap();
         self.gap(false);
         if text.starts_with('-') { -value } else { value }
     }
@@ -309,7 +309,7 @@ fn check(language: Language, text: &[u8], program: &Program) {
     // A quaternion is one no longer when every part of it is moved far.
     let by = 1e-5;
     let out = moved(program, by);
-    let written = read(language, &out).expect("what is written");
+    let written = read(language, &out).unwrap();
     assert_eq!(written.len(), wanted.len());
     for ((kind, values), (_, given)) in written.iter().zip(&wanted) {
         for (k, (value, given)) in values.iter().zip(given).enumerate() {
@@ -325,7 +325,7 @@ fn check(language: Language, text: &[u8], program: &Program) {
             );
         }
     }
-    let again = Program::parse(&out, language, Partial::Refused).expect("what is written");
+    let again = Program::parse(&out, language, Partial::Refused).unwrap();
     assert_eq!(rest(&out, &again), rest(text, program), "{shown}");
 }
 

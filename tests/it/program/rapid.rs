@@ -159,7 +159,7 @@ fn a_part_of_a_target_is_listed_and_left_where_that_is_wished() {
         (told(&refusal.faults), refusal.partial),
         (vec![format!("3:1: {said}")], 1)
     );
-    let program = Program::parse(text.as_bytes(), Language::Rapid, Partial::Left).expect("left");
+    let program = Program::parse(text.as_bytes(), Language::Rapid, Partial::Left).unwrap();
     assert_eq!(
         told(program.warnings()),
         [

@@ -1,5 +1,6 @@
 //! Frames and loads that a program itself declares.
 
+use crate::answer::has;
 use calib::program::{Language, Partial, Program, TargetKind};
 use calib::robot::RobotModel;
 use calib::spatial::Pose;
@@ -15,7 +16,7 @@ type Surroundings = (Option<Pose>, Option<f64>);
 
 /// Those of every target; lines that name a frame which is not applied.
 fn read(language: Language, text: &str) -> (Vec<Surroundings>, Vec<String>) {
-    let program = Program::parse(text.as_bytes(), language, Partial::Refused).expect("accepted");
+    let program = Program::parse(text.as_bytes(), language, Partial::Refused).unwrap();
     let literals = program
         .literals()
         .iter()
@@ -126,16 +127,14 @@ fn a_work_object_that_moves_or_changes_is_not_applied() {
             .contains("work object `bench`")
     );
     let said = refused(OBJECT, &format!("{once}\nMoveL p,v1,z1,gun;"));
-    assert!(
-        said.contains(
-            "its work object differs between the ways to this target: work object `bench` and wobj0"
-        ),
-        "{said}"
+    has(
+        &said,
+        "its work object differs between the ways to this target: work object `bench` and wobj0",
     );
     let said = refused(OBJECT, "MoveL p,v1,z1,gun;\nMoveL p,v1,z1,bare;");
-    assert!(
-        said.contains("its tool differs between the ways to this target: `gun` and `bare`"),
-        "{said}"
+    has(
+        &said,
+        "its tool differs between the ways to this target: `gun` and `bare`",
     );
 }
 
@@ -175,8 +174,7 @@ fn a_base_and_a_load_that_a_file_sets_once_hold_for_its_targets() {
 fn joints_are_the_same_in_every_frame() {
     let text =
         "$BASE={X 100.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\n";
-    let program =
-        Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
+    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).unwrap();
     assert_eq!(
         (program.literals()[0].kind, program.literals()[0].frame),
         (TargetKind::Joints, None)
@@ -192,8 +190,8 @@ fn the_targets_of_a_file_are_reached_with_one_tool() {
         );
         let text = format!("{targets}MoveL p,v1,z1,gun;\nMoveL r,v1,z1,{tool};");
         let mut program =
-            Program::parse(text.as_bytes(), Language::Rapid, Partial::Refused).expect("accepted");
-        program.relate_tools(&robot, None).expect("related");
+            Program::parse(text.as_bytes(), Language::Rapid, Partial::Refused).unwrap();
+        program.relate_tools(&robot, None).unwrap();
         program
             .frames()
             .iter()
@@ -203,8 +201,8 @@ fn the_targets_of_a_file_are_reached_with_one_tool() {
     };
     assert_eq!(said("gun"), "");
     let two = said("bare");
-    assert!(
-        two.contains("is reached with the tool BARE, another target with GUN: --tool says which"),
-        "{two}"
+    has(
+        &two,
+        "is reached with the tool BARE, another target with GUN: --tool says which",
     );
 }

@@ -44,11 +44,10 @@ fn poses_and_joints_of_motions_are_targets_where_they_are_written() {
             "15:9: left as it is: `get_actual_tcp_pose()` computes the target"
         ]
     );
-    let program =
-        Program::parse(SCRIPT.as_bytes(), Language::UrScript, Partial::Refused).expect("accepted");
+    let program = Program::parse(SCRIPT.as_bytes(), Language::UrScript, Partial::Refused).unwrap();
     let near = [-1_600_000, -1_730_000, -2_200_000, -810_000, 1_600_000, 0];
     assert_eq!(program.literals()[0].posture, PostureStatement::Near(near));
-    let list = joint_list(SCRIPT.as_bytes(), Language::UrScript).expect("a list");
+    let list = joint_list(SCRIPT.as_bytes(), Language::UrScript).unwrap();
     let names: Vec<&str> = list.rows.iter().map(|row| row.name.as_str()).collect();
     assert_eq!((names, list.poses), (vec!["wp1_q", "limits", "home"], 1));
     assert!((list.rows[2].joints[4] - 1.57f64.to_degrees()).abs() < 1e-12);
@@ -116,7 +115,6 @@ fn what_may_or_may_not_be_a_target_is_refused_with_its_line() {
         "  movej(home)\n",
         "  set_tcp(p[0, 0, 0.2, 0, 0, 0])\n  movej(home)\n",
     );
-    let program =
-        Program::parse(frames.as_bytes(), Language::UrScript, Partial::Refused).expect("accepted");
+    let program = Program::parse(frames.as_bytes(), Language::UrScript, Partial::Refused).unwrap();
     assert!(super::told(program.frames())[0].contains("set_tcp sets several tools"));
 }

@@ -1,10 +1,11 @@
 //! Recordings that are not as they should be get an answer in plain words; derivatives of what is closed are those of differences.
 
 use super::{fixture, plane, socket, sphere, touched, truth};
-use crate::desk::{self, Desk};
+use crate::answer::has;
+use crate::desk::{self, Desk, identify_reads};
 use calib::description::RobotDescription;
 use calib::observation::{KINDS, RowView, Weight};
-use calib::stage::{Identify, IdentifyReads};
+use calib::stage::Identify;
 use calib::table::{Parameters, Recording, Robot, Split, SplitRow};
 use nalgebra::Vector3;
 
@@ -41,13 +42,13 @@ pub fn all(recording: &Recording) -> Split {
 fn said(robot: &RobotDescription, recording: Recording, settings: &str) -> (String, Parameters) {
     let split = all(&recording);
     let desk = Desk::default();
-    let stage: Identify = serde_saphyr::from_str(settings).expect("good settings");
-    let reads = IdentifyReads {
-        robot: Robot::from_description(robot),
-        recording,
-        split,
-    };
-    let tables = desk.run(&stage, reads).expect("identified");
+    let stage: Identify = serde_saphyr::from_str(settings).unwrap();
+    let tables = desk
+        .run(
+            &stage,
+            identify_reads(Robot::from_description(robot), recording, split),
+        )
+        .unwrap();
     let parameters = desk::table::<Parameters>(&tables).remove(0);
     let (warnings, notes) = (
         desk.warnings.into_inner().unwrap(),
@@ -60,21 +61,25 @@ fn said(robot: &RobotDescription, recording: Recording, settings: &str) -> (Stri
 fn rows_of_another_hole_are_named_with_the_hole() {
     let robot = fixture::seven();
     let mut recording = touched(&robot, &truth(&robot, 3), &cell(25), 3);
-    let names = recording.names.get_mut("socket").expect("sockets");
+    let names = recording.names.get_mut("socket").unwrap();
     for row in [30, 31] {
         names[row] = Some("b/0".into());
     }
     let (text, parameters) = said(&robot, recording, SETTINGS);
-    assert!(
-        text.contains("2 rows do not close within their noise")
-            && text.contains("a/1-0006 to a/1-0007 (2 rows)"),
-        "{text}"
+    has(
+        &text,
+        [
+            "2 rows do not close within their noise",
+            "a/1-0006 to a/1-0007 (2 rows)",
+        ],
     );
-    assert!(text.contains("where `a/1` is"), "{text}");
-    assert!(
-        text.contains("the scale of the arm is known to")
-            && text.contains("by the lengths that were given"),
-        "{text}"
+    has(&text, "where `a/1` is");
+    has(
+        &text,
+        [
+            "the scale of the arm is known to",
+            "by the lengths that were given",
+        ],
     );
     let told = parameters
         .0
@@ -95,7 +100,7 @@ fn a_ball_that_was_put_back_elsewhere_is_said_with_the_row() {
     let robot = fixture::seven();
     let before = truth(&robot, 4);
     let mut after = before.clone();
-    after.links.last_mut().expect("links").shift_mm[0] += 1.5;
+    after.links.last_mut().unwrap().shift_mm[0] += 1.5;
     let (first, second) = (
         touched(&robot, &before, &cell(20), 4),
         touched(&robot, &after, &cell(20), 5),
@@ -104,9 +109,9 @@ fn a_ball_that_was_put_back_elsewhere_is_said_with_the_row() {
     let half = 40 * first.joints;
     recording.q[half..].copy_from_slice(&second.q[half..]);
     let (text, _) = said(&robot, recording, SETTINGS);
-    assert!(
-        text.contains("on the ball sits elsewhere on the tool") && text.contains("from b/0-000"),
-        "{text}"
+    has(
+        &text,
+        ["on the ball sits elsewhere on the tool", "from b/0-000"],
     );
     let (clean, _) = said(&robot, first, SETTINGS);
     assert!(
@@ -126,10 +131,10 @@ fn five_rows_and_no_length_are_said_to_be_too_little() {
     );
     let bare = "{effects: [anchor, base_frame, tool_offset, joint_offset, link_geometry]}";
     let (text, _) = said(&robot, recording, bare);
-    assert!(text.contains("only 5 points for"), "{text}");
-    assert!(
-        text.contains("the scale of the arm is not observable: no length was given"),
-        "{text}"
+    has(&text, "only 5 points for");
+    has(
+        &text,
+        "the scale of the arm is not observable: no length was given",
     );
 }
 
@@ -153,17 +158,19 @@ fn names_that_the_recording_does_not_have_are_refused() {
             "no sphere `ball`; the recording has: a/0",
         ),
     ] {
-        let stage: Identify = serde_saphyr::from_str(more).expect("good settings");
-        let reads = IdentifyReads {
-            robot: Robot::from_description(&robot),
-            recording: recording.clone(),
-            split: split.clone(),
-        };
+        let stage: Identify = serde_saphyr::from_str(more).unwrap();
         let message = Desk::default()
-            .run(&stage, reads)
+            .run(
+                &stage,
+                identify_reads(
+                    Robot::from_description(&robot),
+                    recording.clone(),
+                    split.clone(),
+                ),
+            )
             .expect_err("refused")
             .to_string();
-        assert!(message.contains(expected), "{message}");
+        has(&message, expected);
     }
 }
 
@@ -215,7 +222,7 @@ fn derivatives_of_sockets_planes_and_spheres_are_central_differences() {
                         row,
                         placed: &placed,
                     };
-                    kind.residual(at).expect("measured").0
+                    kind.residual(at).unwrap().0
                 };
                 let central = (moved(-1e-6) - moved(1e-6)) / 2e-6;
                 let (name, off) = (&model.stack.specs()[k].name, (central - partial).norm());

@@ -1,5 +1,6 @@
 //! Files by a pattern, names by their paths, and what is refused with the place in the YAML.
 
+use crate::answer::has;
 use calib::pipeline::Plan;
 use calib::stage::STAGES;
 use std::path::Path;
@@ -45,7 +46,7 @@ fn plan(folder: &Path) -> Result<Plan, String> {
 }
 
 fn refused(columns: &str, file: &str) -> String {
-    plan(folder(columns, file).path()).err().expect("refused")
+    plan(folder(columns, file).path()).err().unwrap()
 }
 
 const NAMED: &str = "            socket: {path: \"{position}/hole_{n}.csv\"}\n            sigma_socket: {value: 0.1, unit: mm}\n";
@@ -53,7 +54,7 @@ const NAMED: &str = "            socket: {path: \"{position}/hole_{n}.csv\"}\n  
 #[test]
 fn a_pattern_stands_for_its_files_and_paths_name_the_sockets() {
     let folder = folder(NAMED, "data/*/hole_?.csv");
-    let plan = plan(folder.path()).expect("sound");
+    let plan = plan(folder.path()).unwrap();
     let ingest = &plan.stages[1];
     let named: Vec<String> = ingest
         .files
@@ -82,27 +83,15 @@ fn a_pattern_stands_for_its_files_and_paths_name_the_sockets() {
 #[test]
 fn what_does_not_fit_is_refused_with_its_place() {
     let none = refused(NAMED, "data/*/socket_?.csv");
-    assert!(
-        none.contains("stages[1].with.files[0].file") && none.contains("no file matches"),
-        "{none}"
-    );
+    has(&none, ["stages[1].with.files[0].file", "no file matches"]);
     let path = refused(
         &NAMED.replace("hole_{n}", "socket_{n}"),
         "data/*/hole_?.csv",
     );
-    assert!(
-        path.contains("files[0].columns.socket.path") && path.contains("does not end like"),
-        "{path}"
-    );
+    has(&path, ["files[0].columns.socket.path", "does not end like"]);
     let alone = refused("            socket: {value: a}\n", "data/back/hole_0.csv");
-    assert!(
-        alone.contains("map `socket` and `sigma_socket` together"),
-        "{alone}"
-    );
+    has(&alone, "map `socket` and `sigma_socket` together");
     let distance = "            distance: {value: 0, unit: mm}\n            sigma_distance: {value: 0.1, unit: mm}\n";
     let nought = refused(distance, "data/back/hole_0.csv");
-    assert!(
-        nought.contains("columns.distance") && nought.contains("`socket: {column: ...}`"),
-        "{nought}"
-    );
+    has(&nought, ["columns.distance", "`socket: {column: ...}`"]);
 }

@@ -1,10 +1,10 @@
 //! A model of sockets, planes and spheres is the same when it is read from its tables again.
 
 use super::{dirty, fixture, plane, socket, sphere, touched, truth};
-use crate::desk::{self, Desk};
+use crate::desk::{self, Desk, identify_reads};
 use calib::effect::Load;
 use calib::robot::{Anchor, RobotModel};
-use calib::stage::{Identify, IdentifyReads};
+use calib::stage::Identify;
 use calib::table::{Parameters, Prediction, Robot};
 use nalgebra::Vector3;
 
@@ -19,19 +19,19 @@ fn planes_and_spheres_stand_where_they_were_identified() {
     ];
     let robot = fixture::seven();
     let recording = touched(&robot, &truth(&robot, 12), &things, 12);
-    let stage: Identify = serde_saphyr::from_str(dirty::SETTINGS).expect("good settings");
+    let stage: Identify = serde_saphyr::from_str(dirty::SETTINGS).unwrap();
     let (data, split) = (recording.measurements(), dirty::all(&recording));
-    let reads = IdentifyReads {
-        robot: Robot::from_description(&robot),
-        recording,
-        split,
-    };
-    let tables = Desk::default().run(&stage, reads).expect("identified");
+    let tables = Desk::default()
+        .run(
+            &stage,
+            identify_reads(Robot::from_description(&robot), recording, split),
+        )
+        .unwrap();
     let parameters = desk::table::<Parameters>(&tables).remove(0);
     let prediction = desk::table::<Prediction>(&tables).remove(0);
     let model = parameters
         .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
-        .expect("read again");
+        .unwrap();
     for (error, row) in model.row_errors(&data).iter().zip(&prediction.0) {
         assert!(
             (1e3 * error.length - row.error_mm).abs() < 1e-6,
@@ -46,7 +46,7 @@ fn planes_and_spheres_stand_where_they_were_identified() {
             .0
             .iter()
             .find(|row| row.name == name)
-            .expect("a row")
+            .unwrap()
             .value
     };
     assert!(

@@ -2,16 +2,15 @@
 
 use super::dirty::{SETTINGS, cell};
 use super::{fixture, touched, truth};
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, identify_reads, table};
+use calib::stage::Identify;
 use calib::stage::split::{SplitBy, SplitReads};
-use calib::stage::{Identify, IdentifyReads};
 use calib::table::{Prediction, PredictionRow, Recording, Robot, Split};
 use calib::twin::touch::Fixture;
 
 fn split(yaml: &str, recording: &Recording) -> Result<Split, String> {
     let options = serde_saphyr::options! { strict_booleans: true };
-    let settings: SplitBy =
-        serde_saphyr::from_str_with_options(yaml, options).expect("good settings");
+    let settings: SplitBy = serde_saphyr::from_str_with_options(yaml, options).unwrap();
     let tables = Desk::default()
         .run(
             &settings,
@@ -27,14 +26,14 @@ fn split(yaml: &str, recording: &Recording) -> Result<Split, String> {
 fn a_place_that_no_row_was_fitted_to_closes_as_well_as_the_others() {
     let robot = fixture::seven();
     let recording = touched(&robot, &truth(&robot, 6), &cell(30), 6);
-    let split = split("{by: named, column: socket, names: [b/*]}", &recording).expect("dealt");
-    let stage: Identify = serde_saphyr::from_str(SETTINGS).expect("good settings");
-    let reads = IdentifyReads {
-        robot: Robot::from_description(&robot),
-        recording,
-        split,
-    };
-    let tables = Desk::default().run(&stage, reads).expect("identified");
+    let split = split("{by: named, column: socket, names: [b/*]}", &recording).unwrap();
+    let stage: Identify = serde_saphyr::from_str(SETTINGS).unwrap();
+    let tables = Desk::default()
+        .run(
+            &stage,
+            identify_reads(Robot::from_description(&robot), recording, split),
+        )
+        .unwrap();
     let rows = table::<Prediction>(&tables).remove(0).0;
     let mean = |rows: &[&PredictionRow], error: fn(&PredictionRow) -> Option<f64>| {
         let all: Vec<f64> = rows.iter().filter_map(|row| error(row)).collect();
@@ -60,16 +59,18 @@ fn a_place_that_no_row_was_fitted_to_closes_as_well_as_the_others() {
 fn blocks_of_a_cross_validation_are_whole_places() {
     let robot = fixture::seven();
     let recording = touched(&robot, &truth(&robot, 8), &cell(30), 8);
-    let all = split("{by: order, sets: [{set: fit}]}", &recording).expect("dealt");
-    let stage: Identify = serde_saphyr::from_str(SETTINGS).expect("good settings");
-    let reads = IdentifyReads {
-        robot: Robot::from_description(&robot),
-        recording,
-        split: all,
-    };
-    let rows = table::<Prediction>(&Desk::default().run(&stage, reads).expect("identified"))
-        .remove(0)
-        .0;
+    let all = split("{by: order, sets: [{set: fit}]}", &recording).unwrap();
+    let stage: Identify = serde_saphyr::from_str(SETTINGS).unwrap();
+    let rows = table::<Prediction>(
+        &Desk::default()
+            .run(
+                &stage,
+                identify_reads(Robot::from_description(&robot), recording, all),
+            )
+            .unwrap(),
+    )
+    .remove(0)
+    .0;
     let mean = |error: fn(&PredictionRow) -> Option<f64>| {
         rows.iter().filter_map(error).sum::<f64>() / rows.len() as f64
     };
@@ -97,7 +98,7 @@ fn rows_are_counted_anew_in_every_socket() {
         })
         .collect();
     let recording = touched(&robot, &truth(&robot, 6), &uneven, 6);
-    let dealt = split("{by: every, n: 4, within: socket}", &recording).expect("dealt");
+    let dealt = split("{by: every, n: 4, within: socket}", &recording).unwrap();
     let held: Vec<&str> = dealt
         .0
         .iter()

@@ -17,7 +17,7 @@ fn beside(points: Measurements, sockets: &Measurements) -> Measurements {
     let (rows, more) = (points.rows(), sockets.rows());
     let own = &sockets.readings[0];
     let names: Vec<&str> = std::iter::repeat_n("", rows)
-        .chain((0..more).map(|row| own.row(row).expect("a socket").anchor))
+        .chain((0..more).map(|row| own.row(row).unwrap().anchor))
         .collect();
     let readings = Readings {
         kind: own.kind,

@@ -12,7 +12,7 @@ fn site(robot: &calib::description::RobotDescription) -> Site {
         ranges: robot
             .joints
             .iter()
-            .map(|joint| joint.limits.expect("limits"))
+            .map(|joint| joint.limits.unwrap())
             .collect(),
         bounds: [[f64::NEG_INFINITY, f64::INFINITY]; 3],
         floor: 0.0,
@@ -42,7 +42,7 @@ fn the_ball_lies_in_a_socket_at_every_posture_and_limits_hold() {
         RobotModel::new(robot.clone()),
         [[0.4, 0.1, 0.05], [0.4, 0.15, 0.05]],
     );
-    let found = propose_contacts(&own, &site(&robot), &request(&sockets)).expect("in reach");
+    let found = propose_contacts(&own, &site(&robot), &request(&sockets)).unwrap();
     assert_eq!(found.poses.rows(), 40);
     for (row, socket) in found.socket.iter().enumerate() {
         let q = found.poses.q(row);
@@ -68,7 +68,7 @@ fn the_ball_lies_in_a_socket_at_every_posture_and_limits_hold() {
         .map(|(_, _, own, random)| (random / own).ln())
         .sum();
     assert!(gain > 0.0, "{gain}");
-    let again = propose_contacts(&own, &site(&robot), &request(&sockets)).expect("in reach");
+    let again = propose_contacts(&own, &site(&robot), &request(&sockets)).unwrap();
     assert_eq!(again.poses.q, found.poses.q);
 }
 
@@ -80,7 +80,7 @@ fn a_ball_on_the_last_axis_hides_two_directions_that_one_beside_it_shows() {
         &site(&robot),
         &request(&[[0.4, 0.1, 0.05]]),
     )
-    .expect("in reach");
+    .unwrap();
     let (on_axis, beside) = (found.offsets[0], found.offsets[found.offsets.len() - 1]);
     assert!(on_axis.off < 1e-9);
     assert_eq!(on_axis.directions, 4 * 7 - 4);
@@ -104,7 +104,7 @@ fn sockets_out_of_reach_and_other_texts_are_refused() {
     );
     assert!(far.err().is_some_and(|text| text.contains("out of reach")));
     assert_eq!(
-        places("[[0.4, 0.1, 0.0], [0.4,0.15,0.0]]").expect("two"),
+        places("[[0.4, 0.1, 0.0], [0.4,0.15,0.0]]").unwrap(),
         [[0.4, 0.1, 0.0], [0.4, 0.15, 0.0]]
     );
     for (text, expected) in [

@@ -101,7 +101,7 @@ fn stated_sigmas_of_distances_hold_and_the_rank_is_that_of_theory() {
             let weights =
                 DVector::from_iterator(parameters.len(), parameters.iter().map(|k| rates[*k]));
             let sigma = weights
-                .dot(&(covariance.block(parameters).expect("estimated") * &weights))
+                .dot(&(covariance.block(parameters).unwrap() * &weights))
                 .sqrt();
             scores.push(((points[a] - points[b]).norm() - (there(a) - there(b)).norm()) / sigma);
         }
@@ -154,12 +154,8 @@ fn the_scale_that_priors_tell_scatters_as_stated_where_links_err_on_their_own() 
             &[],
             priors,
         );
-        let stated = scale(&model, &data, &rows, fitted.covariance.as_ref())
-            .expect("brought to sockets alone");
-        let (together, apart) = (
-            stated.sigma.expect("two places"),
-            stated.independent.expect("two places"),
-        );
+        let stated = scale(&model, &data, &rows, fitted.covariance.as_ref()).unwrap();
+        let (together, apart) = (stated.sigma.unwrap(), stated.independent.unwrap());
         assert!(
             !stated.by_length && stated.by_priors && apart <= together,
             "{stated:?}"

@@ -2,47 +2,40 @@
 
 use super::results::{arm, calib};
 use super::write;
+use crate::answer::root;
 use calib::audit::QueryTables;
 use calib::pipeline::{Manifest, find_run};
 use calib::store::Store;
 use calib::table::{Table, TorqueChangeRow, TorqueChangeTable};
 use calib::twin::torque::{TorqueCase, TorqueDesign};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Both cases through the pipeline of pairs.
 fn compared(before: &TorqueCase, after: &TorqueCase) -> Vec<TorqueChangeRow> {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     write(&at("before"), &before.recording());
     write(&at("after"), &after.recording());
     let sets = ["before", "after"].map(|name| format!("{name}={}", at(name).display()));
-    changes_of(&["--set", &sets[0], "--set", &sets[1]])
+    changes_of(&format!("--set {} --set {}", sets[0], sets[1]))
 }
 
 /// What the pipeline of pairs says with some settings.
-fn changes_of(settings: &[&str]) -> Vec<TorqueChangeRow> {
-    let folder = tempfile::tempdir().expect("a folder");
+fn changes_of(settings: &str) -> Vec<TorqueChangeRow> {
+    let folder = tempfile::tempdir().unwrap();
     let pipeline = pair().join("pipeline.yaml").display().to_string();
-    let output = calib(
-        &[&["run", "--quiet", &pipeline], settings].concat(),
-        folder.path(),
-    );
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    let store = Store::open(folder.path()).expect("the store");
-    let run = find_run(&store, "HEAD").expect("a run");
-    let tables = QueryTables::of(&Manifest::of(&store, &run).expect("its record"));
+    calib(&format!("run --quiet {pipeline} {settings}"), folder.path()).code(0);
+    let store = Store::open(folder.path()).unwrap();
+    let run = find_run(&store, "HEAD").unwrap();
+    let tables = QueryTables::of(&Manifest::of(&store, &run).unwrap());
     let table = tables
         .find("compare_torques/changes")
-        .expect("a table")
+        .unwrap()
         .table
         .clone();
     let TorqueChangeTable(rows) =
-        TorqueChangeTable::from_frame(&store.load(&table).expect("columns")).expect("rows");
+        TorqueChangeTable::from_frame(&store.load(&table).unwrap()).unwrap();
     for row in rows.iter().filter(|row| row.rank.is_some()) {
         println!(
             "{}: {} +- {} {}, probability {}",
@@ -53,7 +46,7 @@ fn changes_of(settings: &[&str]) -> Vec<TorqueChangeRow> {
 }
 
 fn pair() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics_pair")
+    root("pipelines/dynamics_pair")
 }
 
 fn row<'a>(rows: &'a [TorqueChangeRow], name: &str) -> &'a TorqueChangeRow {
@@ -81,7 +74,7 @@ fn a_payload_between_two_recordings_is_found_within_two_per_cent_and_ten_millime
         .on_other_paths(5077, 48.0)
         .carrying(2.0, [0.0; 3]);
     // What was added: the payload now less the payload then.
-    let bodies = [&before, &after].map(|case| case.last_bodies().1.expect("a payload"));
+    let bodies = [&before, &after].map(|case| case.last_bodies().1.unwrap());
     let mass = bodies[1].mass - bodies[0].mass;
     let centre: [f64; 3] = std::array::from_fn(|axis| {
         (bodies[1].mass * bodies[1].centre[axis] - bodies[0].mass * bodies[0].centre[axis]) / mass
@@ -117,7 +110,7 @@ fn a_payload_between_two_recordings_is_found_within_two_per_cent_and_ten_millime
 #[test]
 fn friction_that_a_repair_changed_is_found_at_its_joint_and_nothing_else() {
     let before = arm();
-    let size = 0.6 * before.plain_friction()[2][1].expect("friction");
+    let size = 0.6 * before.plain_friction()[2][1].unwrap();
     let after = before.clone().on_other_paths(5078, 48.0).with_drag(2, size);
     let rows = compared(&before, &after);
     assert_eq!(changed(&rows), ["coulomb_friction"]);
@@ -159,22 +152,22 @@ fn the_example_of_a_pair_shows_the_tool_that_was_added() {
             rate: 50.0,
         };
         let before = TorqueCase::draw(&design, 0);
-        let declared = before.last_bodies().1.expect("a payload");
+        let declared = before.last_bodies().1.unwrap();
         let after = before.on_other_paths(12, 24.0).carrying(mass, shift);
         let centre: [f64; 3] = std::array::from_fn(|axis| {
             declared.centre[axis] + (declared.mass + mass) * shift[axis] / mass
         });
         let truth = json!({ "payload_kg": mass, "centre_m": centre });
-        let truth = serde_json::to_string_pretty(&truth).expect("JSON") + "\n";
+        let truth = serde_json::to_string_pretty(&truth).unwrap() + "\n";
         write(
             &example,
             &[after.recording()[1].clone(), ("truth.json", truth)],
         );
     }
     let truth = super::json(example.join("truth.json"));
-    let rows = changes_of(&[]);
+    let rows = changes_of("");
     let found = row(&rows, "payload.mass");
-    let mass = truth["payload_kg"].as_f64().expect("kg");
+    let mass = truth["payload_kg"].as_f64().unwrap();
     assert_eq!(found.rank, Some(1));
     assert!(
         (found.change - mass).abs() < 4.0 * found.sigma && found.sigma < 0.1 * mass,

@@ -1,41 +1,32 @@
 //! Recordings of the twin whose physics is concealed, diagnosed blind through the real command and marked.
 
+use crate::answer::{Answer, calib, has, read, root};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
 
-fn simulate(verb: &str, out: &Path, more: &[&str]) -> Output {
-    let pipeline = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/pipelines/dynamics/pipeline.yaml"
-    );
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    command
-        .args(["simulate", verb, "--dynamics", "--out"])
-        .arg(out)
-        .args(more);
-    if verb == "prove" {
-        command.args(["--pipeline", pipeline, "--quiet", "--json"]);
-    }
-    let done = command.output().expect("calib");
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
-    done
+fn simulate(verb: &str, out: &Path, more: &str) -> Answer {
+    let pipeline = match verb {
+        "prove" => format!(
+            "--pipeline {} --quiet --json",
+            root("pipelines/dynamics/pipeline.yaml").display()
+        ),
+        _ => String::new(),
+    };
+    let out = out.display();
+    let words = format!("simulate {verb} --dynamics --out {out} {more} {pipeline}");
+    calib(".", &words).code(0)
 }
 
 /// Half of the effects in forms that are not the estimator's. More of them: `calib simulate prove --dynamics --cases 300`.
 #[test]
 fn concealed_torques_are_found_and_nulls_stay_empty() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let done = simulate(
         "prove",
         &folder.path().join("set"),
-        &["--seed", "11", "--cases", "4", "--nulls", "0.25"],
+        "--seed 11 --cases 4 --nulls 0.25",
     );
-    let board: Value = serde_json::from_slice(&done.stdout).expect("JSON");
+    let board: Value = done.json();
     assert_eq!(
         (&board["recordings"], &board["without_verdict"]),
         (&4.into(), &serde_json::json!([]))
@@ -55,26 +46,15 @@ fn concealed_torques_are_found_and_nulls_stay_empty() {
 
 #[test]
 fn a_seed_gives_the_same_recordings_of_torques_on_one_and_two_threads() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let seals = ["1", "2"].map(|jobs| {
         let out = folder.path().join(jobs);
         simulate(
             "conceal",
             &out,
-            &[
-                "--cases",
-                "3",
-                "--seconds",
-                "16",
-                "--rate",
-                "20",
-                "--open",
-                "0.4",
-                "--jobs",
-                jobs,
-            ],
+            &format!("--cases 3 --seconds 16 --rate 20 --open 0.4 --jobs {jobs}"),
         );
-        std::fs::read_to_string(out.join("seal.json")).expect("a seal")
+        read(out.join("seal.json"))
     });
     // The hash of every file is in it.
     assert_eq!(seals[0], seals[1]);
@@ -83,22 +63,6 @@ fn a_seed_gives_the_same_recordings_of_torques_on_one_and_two_threads() {
 
 #[test]
 fn options_of_points_are_refused_of_torques() {
-    let done = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args([
-            "simulate",
-            "conceal",
-            "--dynamics",
-            "--out",
-            "never",
-            "--layout",
-            "path",
-        ])
-        .output()
-        .expect("calib");
-    assert_eq!(done.status.code(), Some(2));
-    assert!(
-        String::from_utf8_lossy(&done.stderr).contains("--layout"),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    let refused = calib(".", "simulate conceal --dynamics --out never --layout path").code(2);
+    has(&refused.err, "--layout");
 }

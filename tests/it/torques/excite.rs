@@ -1,6 +1,7 @@
 //! A motion proposed for a recording of torques: it holds its limits, and tells more than a random one.
 
 use super::write;
+use crate::answer::{calib, has, read};
 use calib::dynamics::{
     DynamicArm, InverseDynamics, MotionRow, TorqueModel, TorqueQuestion, TorqueRecording, diagnose,
 };
@@ -9,7 +10,6 @@ use calib::excitation::{MotionProposal, MotionRequest, exciting_motion};
 use calib::twin::torque::TorqueCase;
 use calib::twin::torque::rigid::JointState;
 use std::path::PathBuf;
-use std::process::Command;
 
 fn request(robot: PathBuf, generations: usize) -> MotionRequest {
     MotionRequest {
@@ -38,16 +38,16 @@ fn request(robot: PathBuf, generations: usize) -> MotionRequest {
 
 #[test]
 fn an_exciting_motion_holds_its_limits_and_tells_more_than_random_ones() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let case = super::results::arm();
     write(folder.path(), &case.recording());
     let asked = request(folder.path().join("robot.json"), 60);
-    let proposal = exciting_motion(&asked).expect("a motion");
+    let proposal = exciting_motion(&asked).unwrap();
     let motion = &proposal.motion;
     let n = 6;
     for row in 0..motion.time.len() {
         for joint in 0..n {
-            let [least, most] = asked.limits.as_ref().expect("limits")[joint].map(f64::to_radians);
+            let [least, most] = asked.limits.as_ref().unwrap()[joint].map(f64::to_radians);
             assert!(
                 (least..=most).contains(&motion.position[n * row + joint]),
                 "joint {} leaves its range",
@@ -71,7 +71,7 @@ fn an_exciting_motion_holds_its_limits_and_tells_more_than_random_ones() {
             .any(|line| line.contains("torque constants"))
     );
     // The same seed on one thread gives the same motion.
-    let again = exciting_motion(&MotionRequest { jobs: 1, ..asked }).expect("a motion");
+    let again = exciting_motion(&MotionRequest { jobs: 1, ..asked }).unwrap();
     assert_eq!(motion.position, again.motion.position);
 }
 
@@ -172,19 +172,18 @@ fn predicted_sigma(model: &TorqueModel, arm: &DynamicArm, case: &TorqueCase) -> 
 
 #[test]
 fn what_is_identified_from_an_exciting_motion_is_surer_than_from_random_ones() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let case = super::results::arm();
     write(folder.path(), &case.recording());
     let (mut arm, _) = super::declared(&case);
     arm.links = None;
     let sigma = |asked: &MotionRequest| {
-        let proposal = exciting_motion(asked).expect("a motion");
+        let proposal = exciting_motion(asked).unwrap();
         let question = TorqueQuestion {
             free_inertials: true,
             ..TorqueQuestion::default()
         };
-        let found = diagnose(&arm, &recorded(&case, &proposal), &question, &mut |_| ())
-            .expect("a diagnosis");
+        let found = diagnose(&arm, &recorded(&case, &proposal), &question, &mut |_| ()).unwrap();
         predicted_sigma(&found.model, &arm, &case)
     };
     let asked = request(folder.path().join("robot.json"), 60);
@@ -210,44 +209,23 @@ fn what_is_identified_from_an_exciting_motion_is_surer_than_from_random_ones() {
 
 #[test]
 fn the_file_of_a_motion_is_one_that_compensate_takes() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     write(folder.path(), &super::results::arm().recording());
     let (robot, file) = (
         folder.path().join("robot.json"),
         folder.path().join("motion.csv"),
     );
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    command
-        .arg("excite")
-        .arg(&robot)
-        .args([
-            "--seconds",
-            "8",
-            "--rate",
-            "50",
-            "--generations",
-            "2",
-            "--out",
-        ])
-        .arg(&file);
-    let output = command
-        .args(["--limits", "-90:90,-120:-40,-90:90,-90:90,-90:90,-90:90"])
-        .output()
-        .expect("calib");
-    let told = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
+    let limits = "-90:90,-120:-40,-90:90,-90:90,-90:90,-90:90";
+    let words = format!(
+        "excite {} --seconds 8 --rate 50 --generations 2 --out {} --limits {limits}",
+        robot.display(),
+        file.display()
     );
-    assert!(
-        told.contains("condition number") && told.contains("will not determine"),
-        "{told}"
-    );
-    let text = std::fs::read_to_string(&file).expect("a file");
-    let robot = calib::identified::robot_file(&robot, None).expect("a robot");
-    let trajectory =
-        calib::targets::Trajectory::read("motion.csv", &text, &robot, false).expect("a motion");
+    let told = calib(".", &words).ok();
+    has(&told, ["condition number", "will not determine"]);
+    let text = read(&file);
+    let robot = calib::identified::robot_file(&robot, None).unwrap();
+    let trajectory = calib::targets::Trajectory::read("motion.csv", &text, &robot, false).unwrap();
     assert_eq!(trajectory.motion.time.len(), 401);
     assert!(trajectory.motion.acceleration.is_some());
 }

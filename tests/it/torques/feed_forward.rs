@@ -1,33 +1,32 @@
 //! Torques that are fed forward say how certain they are, and what is not certain is refused: a wrong number moves a robot.
 
 use super::results::{Solved, arm, calib, column, motion, solve, solved};
+use crate::answer::{Answer, has, read};
 use crate::compensate::concealed::from_environment;
 use calib::twin::torque::TorqueCase;
 use std::path::Path;
-use std::process::Output;
 
-fn fed(solved: &Solved, file: &Path, more: &[&str]) -> Output {
+fn fed(solved: &Solved, file: &Path, more: &str) -> Answer {
     let file = file.display().to_string();
     calib(
-        &[&["compensate", "HEAD", &file, "--torque"], more].concat(),
+        &format!("compensate HEAD {file} --torque {more}"),
         &solved.path("store"),
     )
 }
 
-fn told(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+fn told(answer: &Answer) -> String {
+    answer.err.clone()
 }
 
-fn answer(output: &Output) -> String {
-    assert!(output.status.success(), "{}", told(output));
-    String::from_utf8(output.stdout.clone()).expect("UTF-8")
+fn answer(answer: &Answer) -> String {
+    answer.clone().ok()
 }
 
 /// A fresh motion of the solved case as a file.
 fn fresh(name: &str) -> std::path::PathBuf {
     let file = solved().path(name);
     let rows = solved().case.clone().on_other_paths(977, 40.0).true_rows();
-    std::fs::write(&file, motion(&rows, 1, true)).expect("a file");
+    std::fs::write(&file, motion(&rows, 1, true)).unwrap();
     file
 }
 
@@ -36,12 +35,12 @@ fn cells<'t>(text: &'t str, name: &str) -> Vec<&'t str> {
     let mut lines = text.lines();
     let place = lines
         .next()
-        .expect("a header")
+        .unwrap()
         .split(',')
         .position(|column| column == name)
-        .expect("the column");
+        .unwrap();
     lines
-        .map(|line| line.splitn(place + 2, ',').nth(place).expect("a cell"))
+        .map(|line| line.splitn(place + 2, ',').nth(place).unwrap())
         .collect()
 }
 
@@ -52,8 +51,8 @@ fn covered(solved: &Solved, seed: u64) -> Vec<f64> {
     let mut within = vec![(0usize, 0usize); n];
     for stretch in [1, 2] {
         let file = solved.path(&format!("fresh_{seed}_{stretch}.csv"));
-        std::fs::write(&file, motion(&rows, stretch, true)).expect("a file");
-        let text = answer(&fed(solved, &file, &["--quiet", "--force"]));
+        std::fs::write(&file, motion(&rows, stretch, true)).unwrap();
+        let text = answer(&fed(solved, &file, "--quiet --force"));
         let own: Vec<usize> = (0..rows.time.len())
             .filter(|row| rows.trajectory[*row] == stretch)
             .collect();
@@ -121,39 +120,22 @@ fn the_uncertainty_of_torques_covers_the_truth_of_several_arms() {
 #[test]
 fn torques_less_certain_than_allowed_are_refused_and_written_only_with_force() {
     let file = fresh("doubtful.csv");
-    let rows = std::fs::read_to_string(&file)
-        .expect("text")
-        .lines()
-        .count()
-        - 1;
-    let refused = fed(solved(), &file, &["--max-uncertainty", "1e-6"]);
-    assert_eq!(refused.status.code(), Some(10), "{}", told(&refused));
+    let rows = read(&file).lines().count() - 1;
+    let refused = fed(solved(), &file, "--max-uncertainty 1e-6").code(10);
     let said = told(&refused);
-    assert!(
-        said.contains("doubtful.csv:2: ") && said.contains("no torques are written"),
-        "{said}"
+    has(&said, ["doubtful.csv:2: ", "no torques are written"]);
+    has(
+        &said,
+        &format!("{rows} of {rows} rows are less certain than allowed"),
     );
-    assert!(
-        said.contains(&format!(
-            "{rows} of {rows} rows are less certain than allowed"
-        )),
-        "{said}"
-    );
-    let text = String::from_utf8(refused.stdout).expect("UTF-8");
+    let text = refused.out;
     assert!(
         cells(&text, "tau2_nm").iter().all(|cell| cell.is_empty())
             && cells(&text, "i2_a").iter().all(|cell| cell.is_empty())
     );
     assert!(column(&text, "u95_2_nm").iter().all(|u95| *u95 > 0.0));
-    assert!(
-        text.contains("refused: joint ") && text.contains("Nm allowed (--max-uncertainty)"),
-        "{text}"
-    );
-    let text = answer(&fed(
-        solved(),
-        &file,
-        &["--max-uncertainty", "1e-6", "--force"],
-    ));
+    has(&text, ["refused: joint ", "Nm allowed (--max-uncertainty)"]);
+    let text = answer(&fed(solved(), &file, "--max-uncertainty 1e-6 --force"));
     assert!(
         column(&text, "tau2_nm")
             .iter()
@@ -164,32 +146,30 @@ fn torques_less_certain_than_allowed_are_refused_and_written_only_with_force() {
         rows
     );
     // By default a motion like the recorded one is written whole.
-    let usual = fed(solved(), &file, &[]);
-    assert_eq!(usual.status.code(), Some(0), "{}", told(&usual));
-    let without = answer(&fed(solved(), &file, &["--no-sigma", "--quiet"]));
+    fed(solved(), &file, "").code(0);
+    let without = answer(&fed(solved(), &file, "--no-sigma --quiet"));
     assert!(!without.contains("u95_1_nm"));
 }
 
 #[test]
 fn torques_that_were_fed_forward_already_are_no_motion() {
     let file = fresh("once.csv");
-    let once = answer(&fed(solved(), &file, &["--quiet"]));
+    let once = answer(&fed(solved(), &file, "--quiet"));
     let twice = solved().path("twice.csv");
-    std::fs::write(&twice, &once).expect("a file");
-    let refused = fed(solved(), &twice, &[]);
-    assert_eq!(refused.status.code(), Some(10), "{}", told(&refused));
+    std::fs::write(&twice, &once).unwrap();
+    let refused = fed(solved(), &twice, "").code(10);
     assert!(
         told(&refused).contains("carries the torques that calib wrote already"),
         "{}",
         told(&refused)
     );
-    let again = answer(&fed(solved(), &twice, &["--quiet", "--force"]));
+    let again = answer(&fed(solved(), &twice, "--quiet --force"));
     assert_eq!(again, once);
 }
 
 #[test]
 fn a_motion_beyond_the_recording_is_remarked_row_by_row_with_what_it_exceeds() {
-    let slow = std::fs::read_to_string(fresh("slow.csv")).expect("text");
+    let slow = read(fresh("slow.csv"));
     // The same path in a third of the time.
     let path = |line: &str| {
         line.split(',')
@@ -201,17 +181,15 @@ fn a_motion_beyond_the_recording_is_remarked_row_by_row_with_what_it_exceeds() {
     let fast: String = slow
         .lines()
         .map(|line| match line.split_once(',') {
-            Some((time, _)) if time != "time_s" => format!(
-                "{:.5},{}\n",
-                time.parse::<f64>().expect("s") / 3.0,
-                path(line)
-            ),
+            Some((time, _)) if time != "time_s" => {
+                format!("{:.5},{}\n", time.parse::<f64>().unwrap() / 3.0, path(line))
+            }
             _ => format!("time_s,{}\n", path(line)),
         })
         .collect();
     let file = solved().path("fast.csv");
-    std::fs::write(&file, fast).expect("a file");
-    let output = fed(solved(), &file, &["--force"]);
+    std::fs::write(&file, fast).unwrap();
+    let output = fed(solved(), &file, "--force");
     assert!(
         told(&output).contains("beyond the motion that the model was seen in"),
         "{}",
@@ -226,7 +204,7 @@ fn a_motion_beyond_the_recording_is_remarked_row_by_row_with_what_it_exceeds() {
         assert!(fast.contains(what), "no `{what}`");
     }
     // Friction is less certain where nobody saw it.
-    let slow = answer(&fed(solved(), &solved().path("slow.csv"), &["--quiet"]));
+    let slow = answer(&fed(solved(), &solved().path("slow.csv"), "--quiet"));
     let most = |text: &str| column(text, "u95_2_nm").into_iter().fold(0.0, f64::max);
     assert!(
         most(&fast) > 2.0 * most(&slow),
@@ -251,13 +229,13 @@ fn an_arm_whose_recording_says_its_temperature_is_remarked_where_it_is_colder() 
         &file,
         motion(&case.on_other_paths(977, 40.0).true_rows(), 1, false),
     )
-    .expect("a file");
-    let cold = answer(&fed(&solved, &file, &["--temperature", "5"]));
+    .unwrap();
+    let cold = answer(&fed(&solved, &file, "--temperature 5"));
     assert!(
         cold.contains("colder than recorded: 5.0 C, the recording begins at 25.0 C"),
         "{}",
         &cold[..2000]
     );
-    let usual = answer(&fed(&solved, &file, &["--temperature", "26"]));
+    let usual = answer(&fed(&solved, &file, "--temperature 26"));
     assert!(!usual.contains("than recorded: "), "{}", &usual[..2000]);
 }

@@ -1,8 +1,8 @@
 //! Bad recordings of torques: each has a clear answer with file, line or place, and is not diagnosed.
 
 use super::{diagnose, nothing, write};
+use crate::answer::{calib, put, read, root};
 use calib::twin::torque::TorqueCase;
-use std::path::Path;
 
 struct Sheet {
     header: Vec<String>,
@@ -14,7 +14,7 @@ impl Sheet {
         let cells = |line: &str| line.split(',').map(String::from).collect::<Vec<String>>();
         let mut lines = text.lines();
         Self {
-            header: cells(lines.next().expect("a header")),
+            header: cells(lines.next().unwrap()),
             rows: lines.map(cells).collect(),
         }
     }
@@ -25,27 +25,60 @@ impl Sheet {
             .unwrap_or_else(|| panic!("no column {name}"))
     }
     fn number(&self, row: usize, column: usize) -> f64 {
-        self.rows[row][column].parse().expect("a number")
+        self.rows[row][column].parse().unwrap()
     }
-    fn change(&mut self, columns: &[String], of: impl Fn(f64) -> f64) {
-        for name in columns {
-            let column = self.column(name);
+    /// The numbers of a column of each joint, or of one.
+    fn change(&mut self, pattern: &str, of: impl Fn(f64) -> f64) {
+        for column in self.columns(pattern) {
             for row in 0..self.rows.len() {
                 self.rows[row][column] = format!("{:.6}", of(self.number(row, column)));
             }
         }
     }
+    fn columns(&self, pattern: &str) -> Vec<usize> {
+        let names = (0..10).map(|joint| pattern.replace("{j}", &joint.to_string()));
+        let is_one = |name: &String| names.clone().any(|one| one == *name);
+        let columns = self.header.iter().enumerate();
+        columns
+            .filter(|(_, name)| is_one(name))
+            .map(|(column, _)| column)
+            .collect()
+    }
     fn exchange(&mut self, one: &str, other: &str) {
         let (one, other) = (self.column(one), self.column(other));
         self.rows.iter_mut().for_each(|row| row.swap(one, other));
     }
-    fn without(&mut self, names: &[String]) {
-        for name in names {
-            let column = self.column(name);
+    fn without(&mut self, pattern: &str) {
+        for column in self.columns(pattern).into_iter().rev() {
             self.header.remove(column);
             self.rows
                 .iter_mut()
                 .for_each(|row| drop(row.remove(column)));
+        }
+    }
+    /// The clock from line 122 on is later.
+    fn later(&mut self, seconds: f64) {
+        let column = self.column("time_s");
+        for row in 120..self.rows.len() {
+            self.rows[row][column] = format!("{:.3}", self.number(row, column) + seconds);
+        }
+    }
+    fn cut(&mut self, name: &str, share: f64) {
+        let column = self.column(name);
+        let sizes = (0..self.rows.len()).map(|row| self.number(row, column).abs());
+        let most = share * sizes.fold(0.0, f64::max);
+        self.change(name, |value| value.clamp(-most, most));
+    }
+    fn lose(&mut self, every: usize) {
+        let column = self.column("q2_deg");
+        let rows = self.rows.iter_mut().step_by(every);
+        rows.for_each(|row| row[column] = "lost".into());
+    }
+    /// Every joint moves by a thousandth of what it did.
+    fn calm(&mut self) {
+        for column in self.columns("q{j}_deg") {
+            let (name, first) = (self.header[column].clone(), self.number(0, column));
+            self.change(&name, |q| first + 1e-3 * (q - first));
         }
     }
     fn text(&self) -> String {
@@ -61,155 +94,158 @@ fn case(robot: &str) -> (TorqueCase, Sheet) {
     let case = (0..20)
         .map(|number| TorqueCase::draw(&nothing(5), number))
         .find(|case| case.robot.name == robot)
-        .expect("one");
+        .unwrap();
     let sheet = Sheet::read(&case.recording()[1].1);
     (case, sheet)
 }
 
-fn columns(pattern: &str) -> Vec<String> {
-    (1..=6)
-        .map(|joint| pattern.replace("{j}", &joint.to_string()))
-        .collect()
-}
-
 /// What calib says of a changed recording; the exit code too.
-fn told(change: impl FnOnce(&mut Sheet), folder: &Path) -> (i32, String) {
-    told_of("compact6", change, folder)
-}
-
-fn told_of(robot: &str, change: impl FnOnce(&mut Sheet), folder: &Path) -> (i32, String) {
+fn told(robot: &str, change: impl FnOnce(&mut Sheet)) -> (i32, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
     let (case, mut sheet) = case(robot);
     change(&mut sheet);
     write(
         folder,
         &[case.recording()[0].clone(), ("recording.csv", sheet.text())],
     );
-    let output = diagnose(folder, &folder.join("store"), &[]);
+    let output = diagnose(folder, &folder.join("store"), "");
+    (output.code.unwrap(), output.err)
+}
+
+/// Whose recording, how it is spoiled, and what the answer says.
+type Spoiled = (&'static str, fn(&mut Sheet), &'static str);
+
+const SPOILED: [Spoiled; 22] = [
+    // Units.
     (
-        output.status.code().expect("a code"),
-        String::from_utf8_lossy(&output.stderr).into_owned(),
-    )
-}
+        "seven7r",
+        |s| s.change("tau{j}_nm", |x| 1e3 * x),
+        "torque|a unit|1,000",
+    ),
+    (
+        "seven7r",
+        |s| s.change("tau{j}_nm", |x| 1e-3 * x),
+        "torque|a unit|1,000",
+    ),
+    (
+        "compact6",
+        |s| s.change("i{j}_a", |x| 1e3 * x),
+        "torque|a unit|1,000",
+    ),
+    (
+        "seven7r",
+        |s| s.change("tau{j}_nm", |x| x / 12.0),
+        "torque|map them as `current`",
+    ),
+    (
+        "compact6",
+        |s| s.change("i{j}_a", |x| 12.0 * x),
+        "torque|map them as `torque`",
+    ),
+    (
+        "compact6",
+        |s| s.change("q{j}_deg", f64::to_radians),
+        "joint|radians",
+    ),
+    (
+        "compact6",
+        |s| s.change("q{j}_deg", f64::to_degrees),
+        "q2_deg|allowed: -1145.9",
+    ),
+    (
+        "compact6",
+        |s| s.change("time_s", |time| 1e3 * time),
+        "time|Hz",
+    ),
+    // Columns that are others'.
+    (
+        "compact6",
+        |s| s.exchange("i2_a", "i3_a"),
+        "joint 2 and joint 3 look exchanged",
+    ),
+    (
+        "compact6",
+        |s| s.exchange("q2_deg", "q3_deg"),
+        "the angles of joint 2 and joint 3 look exchanged",
+    ),
+    (
+        "compact6",
+        |s| {
+            s.exchange("q2_deg", "q3_deg");
+            s.exchange("i2_a", "i3_a");
+        },
+        "joint 2 and joint 3 look exchanged",
+    ),
+    (
+        "compact6",
+        |s| s.change("i2_a", |x| -x),
+        "joint 2|the other sign",
+    ),
+    // Clocks.
+    (
+        "compact6",
+        |s| s.later(5.0),
+        "recording.csv:122|the clock jumps by 5.0",
+    ),
+    (
+        "compact6",
+        |s| s.later(-1.0),
+        "recording.csv:122|the clock goes back",
+    ),
+    // What shows nothing.
+    (
+        "compact6",
+        |s| s.cut("i2_a", 0.5),
+        "joint 2|the current is cut off",
+    ),
+    (
+        "compact6",
+        |s| s.change("i3_a", |_| 0.25),
+        "current of joint 3|0.25 in each of",
+    ),
+    (
+        "compact6",
+        |s| s.change("q{j}_deg", |_| 12.0),
+        "hardly moves",
+    ),
+    ("compact6", Sheet::calm, "hardly moves"),
+    (
+        "compact6",
+        |s| s.lose(10),
+        "recording.csv:2|rows are rejected|`lost` is not a number",
+    ),
+    // What is not there.
+    (
+        "compact6",
+        |s| s.without("i{j}_a"),
+        "recording.csv|neither torques nor motor currents",
+    ),
+    ("compact6", |s| s.without("q3_deg"), "recording.csv|q3_deg"),
+    ("compact6", |s| s.without("time_s"), "recording.csv|time_s"),
+];
 
-fn refused(change: impl FnOnce(&mut Sheet), words: &[&str]) {
-    let folder = tempfile::tempdir().expect("a folder");
-    let (code, told) = told(change, folder.path());
-    assert!([2, 10].contains(&code), "exit code {code}: {told}");
-    for word in words {
-        assert!(told.contains(word), "no `{word}` in: {told}");
+#[test]
+fn spoiled_recordings_are_refused_with_a_code_and_a_sentence() {
+    let mut wrong = Vec::new();
+    for (robot, change, words) in SPOILED {
+        let (code, said) = told(robot, change);
+        if code != 10 || !words.split('|').all(|word| said.contains(word)) {
+            wrong.push(format!("code {code}, wanted {words}: {said}"));
+        }
     }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
-fn milliamperes_for_amperes_are_refused() {
-    refused(
-        |sheet| sheet.change(&columns("i{j}_a"), |current| 1e3 * current),
-        &["unit"],
-    );
-}
-
-#[test]
-fn radians_for_degrees_are_refused() {
-    refused(
-        |sheet| sheet.change(&columns("q{j}_deg"), f64::to_radians),
-        &["joint"],
-    );
-}
-
-#[test]
-fn exchanged_joints_are_refused() {
-    refused(
-        |sheet| sheet.exchange("i2_a", "i3_a"),
-        &["joint 2", "joint 3", "exchanged"],
-    );
-}
-
-#[test]
-fn a_clock_that_jumps_or_goes_back_is_refused_at_its_line() {
-    let later = |sheet: &mut Sheet, seconds: f64| {
-        let column = sheet.column("time_s");
-        for row in 120..sheet.rows.len() {
-            sheet.rows[row][column] = format!("{:.3}", sheet.number(row, column) + seconds);
-        }
-    };
-    refused(
-        |sheet| later(sheet, 5.0),
-        &["recording.csv:122", "the clock jumps by 5.0"],
-    );
-    refused(
-        |sheet| later(sheet, -1.0),
-        &["recording.csv:122", "the clock goes back"],
-    );
-}
-
-#[test]
-fn a_dead_channel_is_refused_with_its_joint() {
-    refused(
-        |sheet| sheet.change(&["i3_a".into()], |_| 0.25),
-        &["current of joint 3", "0.25 in each of"],
-    );
-}
-
-#[test]
-fn missing_columns_are_named() {
-    refused(
-        |sheet| sheet.without(&columns("i{j}_a")),
-        &["recording.csv", "neither torques nor motor currents"],
-    );
-    refused(
-        |sheet| sheet.without(&["q3_deg".into()]),
-        &["recording.csv", "q3_deg"],
-    );
-    refused(
-        |sheet| sheet.without(&["time_s".into()]),
-        &["recording.csv", "time_s"],
-    );
-}
-
-#[test]
-fn an_arm_that_hardly_moves_is_refused() {
-    let still = |sheet: &mut Sheet| {
-        let names = columns("q{j}_deg");
-        let first: Vec<f64> = names
-            .iter()
-            .map(|name| sheet.number(0, sheet.column(name)))
-            .collect();
-        names.iter().zip(first).for_each(|(name, first)| {
-            sheet.change(std::slice::from_ref(name), |q| first + 1e-3 * (q - first))
-        });
-    };
-    refused(still, &["hardly moves"]);
-}
-
-#[test]
-fn rows_that_cannot_be_read_are_counted_and_too_many_are_refused() {
-    let spoiled = |every: usize| {
-        move |sheet: &mut Sheet| {
-            let column = sheet.column("q2_deg");
-            sheet
-                .rows
-                .iter_mut()
-                .step_by(every)
-                .for_each(|row| row[column] = "lost".into());
-        }
-    };
-    refused(
-        spoiled(10),
-        &[
-            "recording.csv:2",
-            "rows are rejected",
-            "`lost` is not a number",
-        ],
-    );
-    let folder = tempfile::tempdir().expect("a folder");
-    let (code, said) = told(spoiled(400), folder.path());
+fn a_few_rows_that_cannot_be_read_are_left_out() {
+    let (code, said) = told("compact6", |s| s.lose(400));
     assert_eq!(code, 0, "{said}");
 }
 
 #[test]
 fn a_row_that_is_missing_at_a_low_rate_is_bridged_and_no_row_is_told_twice() {
     // At 25 Hz every row of the clock is judged, one that is made up too.
-    let folder = tempfile::tempdir().expect("a folder");
     let holed = |sheet: &mut Sheet| {
         let mut number = 0..;
         sheet.rows.retain(|_| {
@@ -218,13 +254,13 @@ fn a_row_that_is_missing_at_a_low_rate_is_bridged_and_no_row_is_told_twice() {
                 .is_some_and(|number: usize| number.is_multiple_of(2) && number != 196)
         });
     };
-    let (code, said) = told(holed, folder.path());
+    let (code, said) = told("compact6", holed);
     assert_eq!(code, 0, "{said}");
 }
 
 #[test]
 fn files_of_one_name_in_two_folders_are_told_apart() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let (case, sheet) = case("compact6");
     write(folder.path(), &[case.recording()[0].clone()]);
     let mut spoilt = Sheet {
@@ -239,184 +275,17 @@ fn files_of_one_name_in_two_folders_are_told_apart() {
             &[("recording.csv", sheet.text())],
         );
     }
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics/pipeline.yaml");
-    let text = std::fs::read_to_string(root).expect("a pipeline");
+    let text = read(root("pipelines/dynamics/pipeline.yaml"));
     let (before, block) = text
         .split_once("        - file: ${case}/recording.csv\n")
-        .expect("a file");
-    let (columns, after) = block.split_once("\n\n").expect("columns");
+        .unwrap();
+    let (columns, after) = block.split_once("\n\n").unwrap();
     let file = |name: &str| format!("        - file: {name}/recording.csv\n{columns}\n");
     let all = ["one", "two", "three"].map(file).concat();
-    std::fs::write(
-        folder.path().join("p.yaml"),
+    put(
+        folder.path(),
+        "p.yaml",
         format!("{}{all}\n{after}", before.replace("${case}/", "")),
-    )
-    .expect("a file");
-    let output = std::process::Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(["run", "p.yaml", "--until", "ingest_torques", "--quiet"])
-        .current_dir(folder.path())
-        .output()
-        .expect("calib");
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
     );
-}
-
-/// One way to spoil a recording: whose, how, the code, and words of the answer.
-type Spoiled = (
-    &'static str,
-    &'static str,
-    fn(&mut Sheet),
-    i32,
-    &'static [&'static str],
-);
-
-fn each(pattern: &str, joints: usize) -> Vec<String> {
-    (1..=joints)
-        .map(|joint| pattern.replace("{j}", &joint.to_string()))
-        .collect()
-}
-
-fn cut(sheet: &mut Sheet, name: &str, share: f64) {
-    let column = sheet.column(name);
-    let most = (0..sheet.rows.len())
-        .map(|row| sheet.number(row, column).abs())
-        .fold(0.0, f64::max);
-    sheet.change(&[name.into()], |value| {
-        value.clamp(-share * most, share * most)
-    });
-}
-
-const SPOILED: [Spoiled; 14] = [
-    (
-        "seven7r",
-        "Nmm for Nm",
-        |sheet| sheet.change(&each("tau{j}_nm", 7), |x| 1e3 * x),
-        10,
-        &["torque", "a unit", "1,000"],
-    ),
-    (
-        "seven7r",
-        "kNm for Nm",
-        |sheet| sheet.change(&each("tau{j}_nm", 7), |x| 1e-3 * x),
-        10,
-        &["torque", "a unit", "1,000"],
-    ),
-    (
-        "compact6",
-        "mA for A",
-        |sheet| sheet.change(&each("i{j}_a", 6), |x| 1e3 * x),
-        10,
-        &["torque", "a unit", "1,000"],
-    ),
-    (
-        "seven7r",
-        "A for Nm",
-        |sheet| sheet.change(&each("tau{j}_nm", 7), |x| x / 12.0),
-        10,
-        &["torque", "map them as `current`"],
-    ),
-    (
-        "compact6",
-        "Nm for A",
-        |sheet| sheet.change(&each("i{j}_a", 6), |x| 12.0 * x),
-        10,
-        &["torque", "map them as `torque`"],
-    ),
-    (
-        "compact6",
-        "currents exchanged",
-        |sheet| sheet.exchange("i2_a", "i3_a"),
-        10,
-        &["joint 2 and joint 3 look exchanged"],
-    ),
-    (
-        "compact6",
-        "angles exchanged",
-        |sheet| sheet.exchange("q2_deg", "q3_deg"),
-        10,
-        &["the angles of joint 2 and joint 3 look exchanged"],
-    ),
-    (
-        "compact6",
-        "joints exchanged",
-        |sheet| {
-            sheet.exchange("q2_deg", "q3_deg");
-            sheet.exchange("i2_a", "i3_a");
-        },
-        10,
-        &["joint 2 and joint 3 look exchanged"],
-    ),
-    (
-        "compact6",
-        "another sign",
-        |sheet| sheet.change(&["i2_a".into()], |x| -x),
-        10,
-        &["joint 2", "the other sign"],
-    ),
-    (
-        "compact6",
-        "radians declared as degrees",
-        |sheet| sheet.change(&each("q{j}_deg", 6), f64::to_radians),
-        10,
-        &["radians"],
-    ),
-    (
-        "compact6",
-        "degrees declared as radians",
-        |sheet| sheet.change(&each("q{j}_deg", 6), f64::to_degrees),
-        10,
-        &["q2_deg", "allowed: -1145.9"],
-    ),
-    (
-        "compact6",
-        "currents cut off",
-        |sheet| cut(sheet, "i2_a", 0.5),
-        10,
-        &["joint 2", "the current is cut off"],
-    ),
-    (
-        "compact6",
-        "a dead current",
-        |sheet| sheet.change(&["i5_a".into()], |_| 0.0),
-        10,
-        &["current of joint 5"],
-    ),
-    (
-        "compact6",
-        "dead angles",
-        |sheet| sheet.change(&each("q{j}_deg", 6), |_| 12.0),
-        10,
-        &["hardly moves"],
-    ),
-];
-
-#[test]
-fn spoiled_recordings_are_refused_with_a_code_and_a_sentence() {
-    let mut wrong = Vec::new();
-    for (robot, what, change, code, words) in SPOILED {
-        let folder = tempfile::tempdir().expect("a folder");
-        let (found, said) = told_of(robot, change, folder.path());
-        println!(
-            "{what}: code {found}: {}",
-            said.lines().next().unwrap_or_default()
-        );
-        if found != code || words.iter().any(|word| !said.contains(word)) {
-            wrong.push(format!(
-                "{what}: code {found}, wanted {code} and {words:?}: {said}"
-            ));
-        }
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-}
-
-#[test]
-fn a_clock_in_milliseconds_that_is_called_seconds_is_refused() {
-    refused(
-        |sheet| sheet.change(&["time_s".into()], |time| 1e3 * time),
-        &["time", "Hz"],
-    );
+    calib(folder.path(), "run p.yaml --until ingest_torques --quiet").ok();
 }

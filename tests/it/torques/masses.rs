@@ -57,38 +57,30 @@ stages:
 fn ratios(inertials: &str, share: f64) -> ([f64; 2], [f64; 2]) {
     let case = arm();
     let [(name, robot), recording] = case.recording();
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     write(&at("truth"), &[(name, robot.clone())]);
-    let mut file: Value = serde_json::from_str(&robot).expect("JSON");
-    for mass in file["mass"].as_array_mut().expect("masses") {
-        *mass = (share * mass.as_f64().expect("kg")).into();
+    let mut file: Value = serde_json::from_str(&robot).unwrap();
+    for mass in file["mass"].as_array_mut().unwrap() {
+        *mass = (share * mass.as_f64().unwrap()).into();
     }
     write(&at("believed"), &[(name, file.to_string()), recording]);
     let pipeline = at("pipeline.yaml");
-    std::fs::write(&pipeline, PIPELINE.replace("INERTIALS", inertials)).expect("a file");
-    let output = calib(
-        &["run", "--quiet", &pipeline.display().to_string()],
-        &at("store"),
-    );
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    std::fs::write(&pipeline, PIPELINE.replace("INERTIALS", inertials)).unwrap();
+    calib(&format!("run --quiet {}", pipeline.display()), &at("store")).code(0);
     let found = |stage: &str| compliances(&at("store"), stage);
     let of = |found: [f64; 2]| [found[0] / TRULY[0], found[1] / TRULY[1]];
     let masses: Robot = table(&at("store"), "masses/robot");
-    assert_eq!(masses.to_description().expect("a robot").joints.len(), 6);
+    assert_eq!(masses.to_description().unwrap().joints.len(), 6);
     (of(found("before")), of(found("after")))
 }
 
 pub(super) fn table<T: Table>(store: &Path, name: &str) -> T {
-    let store = Store::open(store).expect("the store");
-    let run = find_run(&store, "HEAD").expect("a run");
-    let tables = QueryTables::of(&Manifest::of(&store, &run).expect("its record"));
-    let table = tables.find(name).expect("a table").table.clone();
-    T::from_frame(&store.load(&table).expect("columns")).expect("rows")
+    let store = Store::open(store).unwrap();
+    let run = find_run(&store, "HEAD").unwrap();
+    let tables = QueryTables::of(&Manifest::of(&store, &run).unwrap());
+    let table = tables.find(name).unwrap().table.clone();
+    T::from_frame(&store.load(&table).unwrap()).unwrap()
 }
 
 fn compliances(store: &Path, stage: &str) -> [f64; 2] {

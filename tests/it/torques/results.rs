@@ -1,10 +1,10 @@
 //! What a diagnosis of torques is good for: files for simulators and torques that are fed forward, held against the twin's truth.
 
 use super::write;
+use crate::answer::{self, Answer, has, root};
 use calib::twin::torque::{TorqueCase, TorqueDesign, TorqueFile, TorqueRows};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 /// A diagnosed case.
@@ -24,7 +24,7 @@ pub(super) fn solved() -> &'static Solved {
     static SOLVED: OnceLock<Solved> = OnceLock::new();
     SOLVED.get_or_init(|| {
         let case = arm().carrying(1.5, [0.02, 0.0, 0.01]);
-        let size = 0.8 * case.plain_friction()[1][1].expect("friction");
+        let size = 0.8 * case.plain_friction()[1][1].unwrap();
         solve(case.with_stribeck(1, size, 0.08))
     })
 }
@@ -37,22 +37,17 @@ pub(super) fn solve(case: TorqueCase) -> Solved {
 
 /// Diagnoses files of a case.
 pub(super) fn solve_files(case: TorqueCase, files: &[TorqueFile]) -> Solved {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     write(&folder.path().join("case"), files);
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("pipelines/dynamics/pipeline.yaml")
+    let pipeline = root("pipelines/dynamics/pipeline.yaml")
         .display()
         .to_string();
     let set = format!("case={}", folder.path().join("case").display());
-    let output = calib(
-        &["run", "--quiet", "--set", &set, &pipeline],
+    calib(
+        &format!("run --quiet --set {set} {pipeline}"),
         &folder.path().join("store"),
-    );
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    )
+    .code(0);
     Solved { folder, case }
 }
 
@@ -79,10 +74,7 @@ pub(super) fn arm() -> TorqueCase {
                 .iter()
                 .all(|[v, c]| v.and(*c).is_some())
     };
-    cases(60)
-        .into_iter()
-        .find(fits)
-        .expect("an arm with friction at all joints")
+    cases(60).into_iter().find(fits).unwrap()
 }
 
 /// The first arm of six joints without any friction.
@@ -94,10 +86,7 @@ fn frictionless() -> TorqueCase {
                 .iter()
                 .all(|[v, c]| v.or(*c).is_none())
     };
-    cases(60)
-        .into_iter()
-        .find(bare)
-        .expect("an arm without friction")
+    cases(60).into_iter().find(bare).unwrap()
 }
 
 /// Arms of all kinds.
@@ -107,28 +96,17 @@ pub(super) fn cases(count: usize) -> Vec<TorqueCase> {
         .collect()
 }
 
-pub(super) fn calib(arguments: &[&str], store: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    command
-        .args(arguments)
-        .arg("--store")
-        .arg(store)
-        .output()
-        .expect("calib")
+pub(super) fn calib(words: &str, store: &Path) -> Answer {
+    answer::calib(".", &format!("{words} --store {}", store.display()))
 }
 
-fn text(output: Output) -> String {
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    String::from_utf8(output.stdout).expect("UTF-8")
+fn text(answer: Answer) -> String {
+    answer.ok()
 }
 
 fn exported(format: &str) -> String {
     text(calib(
-        &["export", "HEAD", "--quiet", "--format", format],
+        &format!("export HEAD --quiet --format {format}"),
         &solved().path("store"),
     ))
 }
@@ -138,7 +116,7 @@ fn number(element: &roxmltree::Node, name: &str) -> f64 {
         .attribute(name)
         .unwrap_or_else(|| panic!("no {name}"))
         .parse()
-        .expect("a number")
+        .unwrap()
 }
 
 /// How near friction is asked for: at joint 2 Stribeck friction, which no attribute holds, shares it with viscous and Coulomb friction; that of
@@ -172,7 +150,7 @@ fn true_last(case: &TorqueCase) -> (f64, [f64; 3]) {
 #[test]
 fn a_urdf_of_torques_holds_the_friction_and_the_masses_of_the_twin() {
     let text = exported("urdf");
-    let file = roxmltree::Document::parse(&text).expect("XML");
+    let file = roxmltree::Document::parse(&text).unwrap();
     let all: Vec<_> = file
         .descendants()
         .filter(|node| node.has_tag_name("dynamics"))
@@ -182,13 +160,13 @@ fn a_urdf_of_torques_holds_the_friction_and_the_masses_of_the_twin() {
     for (joint, (dynamics, [viscous, coulomb])) in all.iter().zip(truth).enumerate() {
         near(
             number(dynamics, "damping"),
-            viscous.expect("viscous"),
+            viscous.unwrap(),
             share(joint),
             &format!("viscous friction of joint {}", joint + 1),
         );
         near(
             number(dynamics, "friction"),
-            coulomb.expect("Coulomb"),
+            coulomb.unwrap(),
             share(joint),
             &format!("Coulomb friction of joint {}", joint + 1),
         );
@@ -196,11 +174,11 @@ fn a_urdf_of_torques_holds_the_friction_and_the_masses_of_the_twin() {
     let last = file
         .descendants()
         .find(|node| node.attribute("name") == Some("link_6"))
-        .expect("the last link");
+        .unwrap();
     let mass = last
         .descendants()
         .find(|node| node.has_tag_name("mass"))
-        .expect("its mass");
+        .unwrap();
     let (truth, _) = true_last(&solved().case);
     near(
         number(&mass, "value"),
@@ -213,7 +191,7 @@ fn a_urdf_of_torques_holds_the_friction_and_the_masses_of_the_twin() {
 #[test]
 fn an_mjcf_of_torques_holds_friction_and_drives() {
     let text = exported("mjcf");
-    let file = roxmltree::Document::parse(&text).expect("XML");
+    let file = roxmltree::Document::parse(&text).unwrap();
     let truth = solved().case.plain_friction();
     let joints: Vec<_> = file
         .descendants()
@@ -223,13 +201,13 @@ fn an_mjcf_of_torques_holds_friction_and_drives() {
     for (joint, (element, [viscous, coulomb])) in joints.iter().zip(truth).enumerate() {
         near(
             number(element, "damping"),
-            viscous.expect("viscous"),
+            viscous.unwrap(),
             share(joint),
             &format!("viscous friction of joint {}", joint + 1),
         );
         near(
             number(element, "frictionloss"),
-            coulomb.expect("Coulomb"),
+            coulomb.unwrap(),
             share(joint),
             &format!("Coulomb friction of joint {}", joint + 1),
         );
@@ -239,12 +217,12 @@ fn an_mjcf_of_torques_holds_friction_and_drives() {
         .filter(|node| node.has_tag_name("motor"))
         .map(|motor| number(&motor, "gear"))
         .collect();
-    let declared = solved().case.robot.joints.iter().map(|joint| {
-        joint
-            .reduction_ratio
-            .zip(joint.motor_constant)
-            .expect("a drive")
-    });
+    let declared = solved()
+        .case
+        .robot
+        .joints
+        .iter()
+        .map(|joint| joint.reduction_ratio.zip(joint.motor_constant).unwrap());
     for (gear, (ratio, constant)) in gears.iter().zip(declared) {
         near(*gear, ratio * constant, 1e-12, "Nm per ampere");
     }
@@ -255,36 +233,31 @@ fn an_mjcf_of_torques_holds_friction_and_drives() {
 fn files_say_nothing_of_friction_that_was_not_found() {
     // Friction at two joints alone: none at the others is found, and 0 would be a statement that nobody made.
     let plain = arm().plain_friction();
-    let [viscous, coulomb] = [1, 2].map(|joint| plain[joint].map(|size| size.expect("friction")));
+    let [viscous, coulomb] = [1, 2].map(|joint| plain[joint].map(|size| size.unwrap()));
     let case = frictionless()
         .with_drag(1, viscous[1])
         .with_drag(2, coulomb[1]);
     let solved = solve(case);
     let found: Value = serde_json::from_str(&text(calib(
-        &["export", "HEAD", "--quiet", "--format", "dynamics"],
+        "export HEAD --quiet --format dynamics",
         &solved.path("store"),
     )))
-    .expect("JSON");
+    .unwrap();
     for (format, element, names) in [
         ("urdf", "dynamics", ["damping", "friction"]),
         ("mjcf", "joint", ["damping", "frictionloss"]),
     ] {
         let text = text(calib(
-            &["export", "HEAD", "--quiet", "--format", format],
+            &format!("export HEAD --quiet --format {format}"),
             &solved.path("store"),
         ));
-        let file = roxmltree::Document::parse(&text).expect("XML");
-        for (index, joint) in found["joints"]
-            .as_array()
-            .expect("joints")
-            .iter()
-            .enumerate()
-        {
-            let name = joint["name"].as_str().expect("a name");
+        let file = roxmltree::Document::parse(&text).unwrap();
+        for (index, joint) in found["joints"].as_array().unwrap().iter().enumerate() {
+            let name = joint["name"].as_str().unwrap();
             let own = file
                 .descendants()
                 .find(|node| node.has_tag_name("joint") && node.attribute("name") == Some(name));
-            let own = own.expect("the joint");
+            let own = own.unwrap();
             let own = if element == "joint" {
                 Some(own)
             } else {
@@ -308,7 +281,7 @@ fn files_say_nothing_of_friction_that_was_not_found() {
         }
         let sliding = found["joints"]
             .as_array()
-            .expect("joints")
+            .unwrap()
             .iter()
             .filter(|joint| !joint["coulomb"].is_null())
             .count();
@@ -321,36 +294,22 @@ fn files_say_nothing_of_friction_that_was_not_found() {
 
 #[test]
 fn what_a_format_does_not_hold_of_torques_is_said_with_its_size() {
-    let all: Value = serde_json::from_str(&exported("dynamics")).expect("JSON");
-    let causes = all["causes"].as_array().expect("causes");
+    let all: Value = serde_json::from_str(&exported("dynamics")).unwrap();
+    let causes = all["causes"].as_array().unwrap();
     let stribeck = causes
         .iter()
         .find(|cause| cause["effect"] == "stribeck_friction")
-        .expect("the hidden Stribeck friction");
+        .unwrap();
     assert_eq!(stribeck["where"], "joint 2");
-    assert!(
-        stribeck["numbers"]["stribeck"]["sigma"]
-            .as_f64()
-            .expect("a sigma")
-            > 0.0
-    );
+    assert!(stribeck["numbers"]["stribeck"]["sigma"].as_f64().unwrap() > 0.0);
     for format in ["urdf", "mjcf"] {
         let text = exported(format);
-        assert!(
-            text.contains("not carried: stribeck_friction at joint 2, "),
-            "{text}"
-        );
+        has(&text, "not carried: stribeck_friction at joint 2, ");
     }
-    let refused = calib(
-        &["export", "HEAD", "--format", "dh"],
-        &solved().path("store"),
-    );
-    let told = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert_eq!(refused.status.code(), Some(2), "{told}");
-    assert!(
-        told.contains("allowed: urdf, json, mjcf, sdf, dynamics"),
-        "{told}"
-    );
+    let refused = calib("export HEAD --format dh", &solved().path("store"));
+    let told = refused.err.clone();
+    assert_eq!(refused.code, Some(2), "{told}");
+    has(&told, "allowed: urdf, json, mjcf, sdf, dynamics");
 }
 
 /// A motion as its user has it, of one stretch of rows.
@@ -390,18 +349,12 @@ pub(super) fn column(text: &str, name: &str) -> Vec<f64> {
     let mut lines = text.lines();
     let place = lines
         .next()
-        .expect("a header")
+        .unwrap()
         .split(',')
         .position(|column| column == name)
         .unwrap_or_else(|| panic!("no {name}"));
     lines
-        .map(|line| {
-            line.split(',')
-                .nth(place)
-                .expect("a cell")
-                .parse()
-                .expect("a number")
-        })
+        .map(|line| line.split(',').nth(place).unwrap().parse().unwrap())
         .collect()
 }
 
@@ -423,26 +376,19 @@ fn torques_fed_forward_are_those_of_the_twin_on_fresh_motions() {
     let n = fresh.robot.joints.len();
     for (stretch, derivatives) in [(1, false), (1, true), (2, true)] {
         let file = solved.path(&format!("motion_{stretch}_{derivatives}.csv"));
-        std::fs::write(&file, motion(&rows, stretch, derivatives)).expect("a file");
+        std::fs::write(&file, motion(&rows, stretch, derivatives)).unwrap();
         let told = text(calib(
-            &[
-                "compensate",
-                "HEAD",
-                &file.display().to_string(),
-                "--torque",
-                "--quiet",
-            ],
+            &format!("compensate HEAD {} --torque --quiet", file.display()),
             &solved.path("store"),
         ));
         let own: Vec<usize> = (0..rows.time.len())
             .filter(|row| rows.trajectory[*row] == stretch)
             .collect();
-        let drives = fresh.robot.joints.iter().map(|joint| {
-            joint
-                .reduction_ratio
-                .zip(joint.motor_constant)
-                .expect("a drive")
-        });
+        let drives = fresh
+            .robot
+            .joints
+            .iter()
+            .map(|joint| joint.reduction_ratio.zip(joint.motor_constant).unwrap());
         for (joint, (ratio, constant)) in drives.enumerate() {
             let found = column(&told, &format!("tau{}_nm", joint + 1));
             assert_eq!(found.len(), own.len());
@@ -492,21 +438,13 @@ fn a_motion_that_cannot_be_fed_forward_is_refused_at_its_line() {
     let changed = |change: &dyn Fn(&mut Vec<String>), words: &[&str]| {
         let mut lines: Vec<String> = whole.lines().map(String::from).collect();
         change(&mut lines);
-        std::fs::write(&file, lines.join("\n")).expect("a file");
+        std::fs::write(&file, lines.join("\n")).unwrap();
         let output = calib(
-            &[
-                "compensate",
-                "HEAD",
-                &file.display().to_string(),
-                "--torque",
-            ],
+            &format!("compensate HEAD {} --torque", file.display()),
             &solved.path("store"),
         );
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(
-            [Some(2), Some(10)].contains(&output.status.code()),
-            "{told}"
-        );
+        let told = output.err.clone();
+        assert!([Some(2), Some(10)].contains(&output.code), "{told}");
         words
             .iter()
             .for_each(|word| assert!(told.contains(word), "no `{word}` in: {told}"));
@@ -530,11 +468,8 @@ fn a_motion_that_cannot_be_fed_forward_is_refused_at_its_line() {
     changed(&|lines| lines.truncate(5), &["at least 10"]);
     // Without --torque there is nothing to correct.
     let output = calib(
-        &["compensate", "HEAD", &file.display().to_string()],
+        &format!("compensate HEAD {}", file.display()),
         &solved.path("store"),
     );
-    assert!(
-        String::from_utf8_lossy(&output.stderr).contains("--torque"),
-        "{output:?}"
-    );
+    assert!(output.err.contains("--torque"), "{output:?}");
 }

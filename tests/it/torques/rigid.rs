@@ -7,15 +7,15 @@ use calib::twin::torque::rigid::{Body, JointState, Machine};
 use serde_json::Value;
 
 fn numbers<const N: usize>(value: &Value) -> [f64; N] {
-    std::array::from_fn(|k| value[k].as_f64().expect("a number"))
+    std::array::from_fn(|k| value[k].as_f64().unwrap())
 }
 
 fn list(value: &Value) -> Vec<f64> {
     value
         .as_array()
-        .expect("a list")
+        .unwrap()
         .iter()
-        .map(|x| x.as_f64().expect("a number"))
+        .map(|x| x.as_f64().unwrap())
         .collect()
 }
 
@@ -57,14 +57,14 @@ fn bare(axes: &[[f64; 3]], points: &[[f64; 3]], gravity: [f64; 3]) -> DynamicArm
 
 #[test]
 fn columns_of_the_regressor_are_those_of_mujoco_and_pinocchio() {
-    let document: Value = serde_json::from_str(include_str!("rigid_arms.json")).expect("JSON");
+    let document: Value = serde_json::from_str(include_str!("rigid_arms.json")).unwrap();
     let mut compared = 0;
     let mut largest: [f64; 2] = [0.0; 2];
-    for told in document["arms"].as_array().expect("arms") {
+    for told in document["arms"].as_array().unwrap() {
         let of = |name: &str| -> Vec<[f64; 3]> {
             told["links"]
                 .as_array()
-                .expect("links")
+                .unwrap()
                 .iter()
                 .map(|link| numbers(&link[name]))
                 .collect()
@@ -73,9 +73,9 @@ fn columns_of_the_regressor_are_those_of_mujoco_and_pinocchio() {
         let mut dynamics = InverseDynamics::new(&arm);
         for (row, columns) in told["rows"]
             .as_array()
-            .expect("rows")
+            .unwrap()
             .iter()
-            .zip(told["columns"].as_array().expect("columns"))
+            .zip(told["columns"].as_array().unwrap())
         {
             let [q, v, a] = ["q", "v", "a"].map(|name| list(&row[name]));
             let motion = MotionRow {
@@ -86,9 +86,7 @@ fn columns_of_the_regressor_are_those_of_mujoco_and_pinocchio() {
             dynamics.regressor(motion, &arm.gravity, |joint, link, own| {
                 for (engine, off) in ["mujoco", "pinocchio"].into_iter().zip(&mut largest) {
                     for (number, value) in own.iter().enumerate() {
-                        let other = columns[engine][link][number][joint]
-                            .as_f64()
-                            .expect("a number");
+                        let other = columns[engine][link][number][joint].as_f64().unwrap();
                         *off = off.max((value - other).abs());
                         compared += 1;
                     }
@@ -108,16 +106,16 @@ fn columns_of_the_regressor_are_those_of_mujoco_and_pinocchio() {
 #[test]
 fn inverse_dynamics_of_estimator_and_twin_are_those_of_mujoco_and_pinocchio() {
     let text = include_str!("rigid_arms.json");
-    let document: Value = serde_json::from_str(text).expect("JSON");
-    let arms = document["arms"].as_array().expect("arms");
+    let document: Value = serde_json::from_str(text).unwrap();
+    let arms = document["arms"].as_array().unwrap();
     assert_eq!(arms.len(), 3);
     for told in arms {
-        let links = told["links"].as_array().expect("links");
+        let links = told["links"].as_array().unwrap();
         let gravity: [f64; 3] = numbers(&told["gravity"]);
         let axes: Vec<[f64; 3]> = links.iter().map(|link| numbers(&link["axis"])).collect();
         let points: Vec<[f64; 3]> = links.iter().map(|link| numbers(&link["point"])).collect();
         let body = |link: &Value| Body {
-            mass: link["mass"].as_f64().expect("kg"),
+            mass: link["mass"].as_f64().unwrap(),
             centre: numbers(&link["centre"]),
             inertia: numbers(&link["inertia"]),
         };
@@ -138,7 +136,7 @@ fn inverse_dynamics_of_estimator_and_twin_are_those_of_mujoco_and_pinocchio() {
             gravity,
         };
         let mut dynamics = InverseDynamics::new(&arm);
-        for row in told["rows"].as_array().expect("rows") {
+        for row in told["rows"].as_array().unwrap() {
             let [q, v, a, mujoco, pinocchio] =
                 ["q", "v", "a", "mujoco", "pinocchio"].map(|name| list(&row[name]));
             let mut estimator = vec![0.0; q.len()];
