@@ -1,5 +1,6 @@
 //! The page of a verification: errors before, predicted and achieved, and the poses that were repeated often enough for ISO 9283.
 
+use super::language::Locale;
 use super::number::{count, fixed, render};
 use super::workspace::{StepErrors, histogram};
 use crate::error::Result;
@@ -23,6 +24,7 @@ pub struct AchievedTables<'a> {
 
 /// The page as one file that needs no other.
 pub fn achieved_page(tables: &AchievedTables) -> Result<String> {
+    let locale = Locale::default();
     let mm = |length: f64| fixed(length, 4);
     let row = |(name, figures, what): &(&str, [f64; 3], String)| {
         let [mean, p95, max] = figures.map(mm);
@@ -62,8 +64,13 @@ pub fn achieved_page(tables: &AchievedTables) -> Result<String> {
         "points": count(tables.errors[1].len() as i64),
         "rows": tables.rows.iter().map(row).collect::<Vec<_>>(),
         "remarks": &tables.remarks,
-        "picture": histogram(&errors, "Histogram of the position error before and after correction"),
+        "picture": histogram(&locale, &errors, "Histogram of the position error before and after correction"),
         "poses": poses.collect::<Vec<_>>(),
     });
-    render("achieved.html", include_str!("achieved.html"), page)
+    render(
+        &locale,
+        "achieved.html",
+        include_str!("achieved.html"),
+        page,
+    )
 }

@@ -1,6 +1,7 @@
 //! The picture of the table of causes: findings and residual, by place and kind of variable.
 
-use super::number::{render, sentence_case, significant};
+use super::language::{Locale, sentence_case};
+use super::number::render;
 use crate::error::Result;
 use crate::table::{CauseGrid, CauseGridCell, Cells, Findings};
 use serde_json::{Value, json};
@@ -9,7 +10,7 @@ use serde_json::{Value, json};
 const DECADES: [f64; 6] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0];
 
 /// What the macro `causes` of the page draws; none where nothing was asked.
-pub(super) fn picture(cells: &Cells, findings: &Findings) -> Option<Value> {
+pub(super) fn picture(locale: &Locale, cells: &Cells, findings: &Findings) -> Option<Value> {
     let grid = CauseGrid::of(cells, findings);
     let drawn = |cell: &Option<CauseGridCell>, is_found: bool| {
         let Some(cell) = cell else {
@@ -31,7 +32,7 @@ pub(super) fn picture(cells: &Cells, findings: &Findings) -> Option<Value> {
         } else {
             String::new()
         };
-        json!({ "class": format!("size{step}{}", if is_found && !cell.is_named { " open" } else { "" }), "size": length(mm), "name": name })
+        json!({ "class": format!("size{step}{}", if is_found && !cell.is_named { " open" } else { "" }), "size": length(locale, mm), "name": name })
     };
     let rows = grid.rows.iter().map(|row| {
         let of = |cells: &[Option<CauseGridCell>], is_found| {
@@ -48,12 +49,12 @@ pub(super) fn picture(cells: &Cells, findings: &Findings) -> Option<Value> {
 }
 
 /// A size in the unit in which it is short.
-fn length(mm: f64) -> String {
+fn length(locale: &Locale, mm: f64) -> String {
     match mm {
-        _ if mm >= 1.0 => format!("{} mm", significant(mm, 2)),
+        _ if mm >= 1.0 => format!("{} mm", locale.significant(mm, 2)),
         _ => format!(
             "{} \u{b5}m",
-            significant(1e3 * mm, if mm >= 0.01 { 2 } else { 1 })
+            locale.significant(1e3 * mm, if mm >= 0.01 { 2 } else { 1 })
         ),
     }
 }
@@ -78,6 +79,7 @@ pub struct DiagnosedTables<'a> {
 
 /// A diagnosis as one file that needs no other.
 pub fn diagnosed_page(tables: &DiagnosedTables) -> Result<String> {
+    let locale = Locale::default();
     let findings = tables.findings.0.iter().map(|finding| {
         let chance = finding
             .probability
@@ -95,9 +97,14 @@ pub fn diagnosed_page(tables: &DiagnosedTables) -> Result<String> {
         "kind": if tables.verdict.0 { "better" } else { "open" },
         "sentence": sentence_case(&tables.verdict.1),
         "errors": tables.errors,
-        "causes_found": picture(tables.cells, tables.findings),
+        "causes_found": picture(&locale, tables.cells, tables.findings),
         "findings": findings.collect::<Vec<_>>(),
         "next": tables.next,
     });
-    render("diagnosed.html", include_str!("diagnosed.html"), page)
+    render(
+        &locale,
+        "diagnosed.html",
+        include_str!("diagnosed.html"),
+        page,
+    )
 }

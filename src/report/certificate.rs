@@ -4,9 +4,10 @@
 
 use super::Tables;
 use super::errors::{Steps, before};
-use super::findings::wrong_setup;
-use super::number::{count, fixed, mm};
-use crate::table::{AcceptanceRow, StatisticsRow, VerdictRow, VerdictTopic};
+use super::findings::{noise_basis, wrong_setup};
+use super::language::{Locale, say};
+use super::number::count;
+use crate::table::{AcceptanceRow, IntakeRow, StatisticsRow, VerdictRow, VerdictTopic};
 use crate::units::Unit;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -15,6 +16,7 @@ use std::collections::BTreeMap;
 const COVERAGE: f64 = 2.0;
 
 pub(super) fn certificate(
+    locale: &Locale,
     tables: &Tables,
     robot: &str,
     identity: &BTreeMap<String, String>,
@@ -24,109 +26,136 @@ pub(super) fn certificate(
     let after = judged(tables, set).filter(|_| wrong_setup(tables).is_none());
     let first = after.and_then(|after| before(&tables.statistics.0, after));
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back();
-    let (kind, verdict) = standing(tables, judgement, diagnosis, first.zip(after));
-    let subject = [("robot".to_string(), robot.to_string())];
+    let (kind, verdict) = standing(locale, judgement, diagnosis, first.zip(after));
+    let subject = [(say!(locale, "robot"), robot.to_string(), true)];
     let limit = |(row, found): (&AcceptanceRow, f64)| {
-        json!([row.figure, mm(found), mm(row.limit_mm), row.kept])
+        json!([
+            locale.stored(&row.figure),
+            locale.mm(found),
+            locale.mm(row.limit_mm),
+            row.kept
+        ])
     };
     let given = identity
         .iter()
-        .map(|(name, value)| (name.clone(), value.clone()));
+        .map(|(name, value)| (name.clone(), value.clone(), true));
     json!({
         // `better` (accepted and explained), `open` (not explained, or not asked), `worse` (not accepted), `unknown`: the class of its colour.
         "kind": kind,
         "verdict": verdict,
-        // What was calibrated, by whom, with what: name and value.
-        "subject": subject.into_iter().chain(given).chain(files(tables)).collect::<Vec<_>>(),
+        // What was calibrated, by whom, with what: name, value, and whether that is a name which no language changes.
+        "subject": subject.into_iter().chain(given).chain(files(locale, tables)).collect::<Vec<_>>(),
         // Model, points, mean, 95 %, largest.
         "figures": first
-            .map(|row| ("before", row))
+            .map(|row| figures(locale, false, row))
             .into_iter()
-            .chain(after.map(|row| ("after", row)))
-            .flat_map(figures)
+            .chain(after.map(|row| figures(locale, true, row)))
+            .flatten()
             .collect::<Vec<_>>(),
         // Figures that stand beside the table.
-        "uncertainty": after.map(uncertainty).unwrap_or_default(),
+        "uncertainty": after.map(|after| uncertainty(locale, after)).unwrap_or_default(),
         // Figure, found, allowed, whether it is kept.
         "limits": judgement.map(|judgement| judgement.found().map(limit).collect::<Vec<_>>()),
-        "conditions": conditions(tables),
+        "conditions": conditions(locale, tables),
         "not_observable": diagnosis.map(|row| tables.statements(&row.step, VerdictTopic::NotObservable)).unwrap_or_default(),
     })
 }
 
 /// Colour and sentence. Green is what is within the limits and explained; nothing else.
 fn standing(
-    tables: &Tables,
+    locale: &Locale,
     judgement: Option<&Judgement>,
     diagnosis: Option<&VerdictRow>,
     course: Option<(&StatisticsRow, &StatisticsRow)>,
 ) -> (&'static str, String) {
-    if wrong_setup(tables).is_some() {
-        return (
-            "worse",
-            judgement
-                .map(|judged| judged.sentence.clone())
-                .unwrap_or_default(),
-        );
-    }
-    if let Some(judged) = judgement.filter(|judged| !judged.kept) {
-        return ("worse", judged.sentence.clone());
+    if let Some(refused) = judgement.filter(|judged| !judged.kept) {
+        return ("worse", refused.sentence(locale));
     }
     if course.is_some_and(|(before, after)| after.mean_mm >= before.mean_mm) {
         return (
             "worse",
-            "The calibration did not make the robot more accurate.".into(),
+            say!(
+                locale,
+                "The calibration did not make the robot more accurate."
+            ),
         );
     }
-    let within = judgement.map(|judged| judged.sentence.trim_end_matches('.').to_string());
     let cause = match diagnosis.map(|row| row.verdict.as_str()) {
         Some("explained" | "nothing_missing") => None,
-        Some("unexplained") => Some("unexplained: a part of the error has no known cause"),
-        Some(_) => Some("too few points were fitted to say what the error consists of"),
-        None => Some("what the error consists of was not asked"),
+        Some("unexplained") => Some(say!(
+            locale,
+            "unexplained: a part of the error has no known cause"
+        )),
+        Some(_) => Some(say!(
+            locale,
+            "too few points were fitted to say what the error consists of"
+        )),
+        None => Some(say!(locale, "what the error consists of was not asked")),
     };
-    match (within, cause) {
-        (Some(within), None) => ("better", format!("{within}. The error is explained.")),
-        (Some(within), Some(cause)) => (
-            "open",
-            format!(
-                "{}, but {cause}.",
-                within.replacen("Accepted: within", "Within", 1)
-            ),
+    match (judgement, cause) {
+        (Some(within), None) => (
+            "better",
+            within.sentence(locale) + " " + &say!(locale, "The error is explained."),
         ),
+        (Some(within), Some(cause)) => ("open", within.but(locale, &cause)),
         (None, None) => (
             "unknown",
-            "Explained. No limits were stated, so that nothing is accepted or refused.".into(),
+            say!(
+                locale,
+                "Explained. No limits were stated, so that nothing is accepted or refused."
+            ),
         ),
         (None, Some(cause)) => (
             "open",
-            format!("Not judged, as no limits were stated; {cause}."),
+            say!(
+                locale,
+                "Not judged, as no limits were stated; {cause}.",
+                cause
+            ),
         ),
     }
 }
 
 /// Files that were read, and their rows.
-fn files(tables: &Tables) -> Option<(String, String)> {
-    let files: Vec<String> = tables
-        .intake
-        .iter()
-        .flat_map(|table| &table.0)
-        .map(|row| {
-            format!(
-                "{} ({} of {} rows used)",
-                row.file,
-                count(row.accepted),
-                count(row.read)
-            )
-        })
-        .collect();
-    (!files.is_empty()).then(|| ("recording".to_string(), files.join("; ")))
+fn files(locale: &Locale, tables: &Tables) -> Option<(String, String, bool)> {
+    let rows = tables.intake.iter().flat_map(|table| &table.0);
+    let file = |row: &IntakeRow| {
+        let (used, read) = (count(row.accepted), count(row.read));
+        say!(
+            locale,
+            "{file} ({used} of {read} rows used)",
+            file = row.file,
+            used,
+            read
+        )
+    };
+    let files: Vec<String> = rows.map(file).collect();
+    (!files.is_empty()).then(|| (say!(locale, "recording"), files.join("; "), false))
 }
 
 /// A row with all points, and one without suspects where there are any.
-fn figures((when, row): (&str, &StatisticsRow)) -> Vec<[String; 5]> {
+fn figures(locale: &Locale, is_after: bool, row: &StatisticsRow) -> Vec<[String; 5]> {
     let none = || "\u{2013}".to_string();
-    let name = format!("{when} ({})", row.step);
+    let (step, suspects) = (&row.step, row.suspects);
+    let [name, without] = match (is_after, suspects) {
+        (false, 1) => [
+            say!(locale, "before ({step})", step),
+            say!(locale, "before, without a suspect"),
+        ],
+        (true, 1) => [
+            say!(locale, "after ({step})", step),
+            say!(locale, "after, without a suspect"),
+        ],
+        (false, _) => [
+            say!(locale, "before ({step})", step),
+            say!(locale, "before, without {suspects} suspects", suspects),
+        ],
+        (true, _) => [
+            say!(locale, "after ({step})", step),
+            say!(locale, "after, without {suspects} suspects", suspects),
+        ],
+    };
+    let mm = |length| locale.mm(length);
     let mut rows = vec![[
         name,
         count(row.points),
@@ -135,17 +164,9 @@ fn figures((when, row): (&str, &StatisticsRow)) -> Vec<[String; 5]> {
         mm(row.max_mm),
     ]];
     if let Some(mean) = row.mean_without_mm {
-        let name = format!(
-            "{when}, without {}",
-            if row.suspects == 1 {
-                "a suspect".into()
-            } else {
-                format!("{} suspects", row.suspects)
-            }
-        );
         rows.push([
-            name,
-            count(row.points - row.suspects),
+            without,
+            count(row.points - suspects),
             mm(mean),
             none(),
             row.max_without_mm.map_or_else(none, mm),
@@ -154,84 +175,84 @@ fn figures((when, row): (&str, &StatisticsRow)) -> Vec<[String; 5]> {
     rows
 }
 
-fn uncertainty(after: &StatisticsRow) -> Vec<(&'static str, String)> {
+fn uncertainty(locale: &Locale, after: &StatisticsRow) -> Vec<(String, String)> {
     let axis = after.rms_x_mm.max(after.rms_y_mm).max(after.rms_z_mm);
-    let basis = match after.noise_basis.as_deref() {
-        _ if after.is_inferred() => " (assumed: none is recorded, no instrument is stated)".into(),
-        Some(basis) => format!(" (by {basis})"),
-        None => String::new(),
-    };
+    let noise = say!(locale, "{value} mm", value = locale.mm(after.noise_rms_mm));
+    let expanded = locale.mm(COVERAGE * axis);
     vec![
         (
-            "expanded uncertainty of the corrected robot in the measured region, along an axis (k = 2, from the held-out points)",
-            format!("\u{b1}\u{a0}{}\u{a0}mm", mm(COVERAGE * axis)),
+            say!(
+                locale,
+                "expanded uncertainty of the corrected robot in the measured region, along an axis (k = 2, from the held-out points)"
+            ),
+            format!("\u{b1}\u{a0}{expanded}\u{a0}mm"),
         ),
         (
-            "standard uncertainty of a measured point, rms length",
-            format!("{} mm{basis}", mm(after.noise_rms_mm)),
+            say!(
+                locale,
+                "standard uncertainty of a measured point, rms length"
+            ),
+            noise_basis(
+                locale,
+                noise,
+                after.noise_basis.as_deref(),
+                after.is_inferred(),
+            ),
         ),
     ]
 }
 
 /// Temperature, payload and region, as recorded.
-fn conditions(tables: &Tables) -> Vec<(&'static str, String)> {
+fn conditions(locale: &Locale, tables: &Tables) -> Vec<(String, String)> {
     let recording = &tables.recording;
-    let range = |values: &Option<Vec<f64>>, unit: &str, decimals: usize| {
-        let finite = values
+    let extent = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| {
+            (a.min(value), b.max(value))
+        })
+    };
+    let range = |values: &Option<Vec<f64>>, unit: &str| {
+        let mut finite = values
             .iter()
             .flatten()
             .copied()
             .filter(|value| value.is_finite());
-        let (lower, upper) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-            (a.min(x), b.max(x))
-        });
+        let (lower, upper) = extent(&mut finite);
+        let [from, to] = [lower, upper].map(|value| locale.fixed(value, 1));
         match (lower <= upper, lower == upper) {
-            (false, _) => "not recorded".into(),
-            (_, true) => format!("{} {unit}", fixed(lower, decimals)),
-            _ => format!(
-                "{} to {} {unit}",
-                fixed(lower, decimals),
-                fixed(upper, decimals)
-            ),
+            (false, _) => say!(locale, "not recorded"),
+            (_, true) => format!("{from} {unit}"),
+            _ => say!(locale, "{from} to {to} {unit}", from, to, unit),
         }
     };
     let joint = |k: usize| {
-        let values = (0..recording.rows()).map(|row| recording.q(row)[k]);
-        let (lower, upper) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| {
-            (a.min(q), b.max(q))
-        });
+        let (lower, upper) = extent(&mut (0..recording.rows()).map(|row| recording.q(row)[k]));
         let unit = if recording.prismatic.get(k).copied().unwrap_or(false) {
             Unit::Millimetre
         } else {
             Unit::Degree
         };
-        format!(
-            "J{} {} to {}",
-            k + 1,
-            fixed(unit.from_si(lower), 0),
-            fixed(unit.from_si(upper), 0)
-        )
+        let [from, to] = [lower, upper].map(|value| locale.fixed(unit.from_si(value), 0));
+        say!(locale, "J{joint} {from} to {to}", joint = k + 1, from, to)
     };
-    let region: Vec<String> = if recording.rows() == 0 {
-        Vec::new()
-    } else {
-        (0..recording.joints).map(joint).collect()
-    };
-    let sliding = recording.prismatic.iter().any(|prismatic| *prismatic);
-    let region = if region.is_empty() {
-        "no point was measured".into()
-    } else {
-        format!(
-            "{} {}",
-            region.join(", "),
-            if sliding { "deg, mm" } else { "deg" }
-        )
+    let joints = recording.joints.min(recording.rows() * recording.joints);
+    let region: Vec<String> = (0..joints).map(joint).collect();
+    let joined = region.join(", ");
+    let region = match recording.prismatic.contains(&true) {
+        _ if region.is_empty() => say!(locale, "no point was measured"),
+        true => say!(locale, "{region} deg, mm", region = joined),
+        false => say!(locale, "{region} deg", region = joined),
     };
     vec![
-        ("temperature", range(&recording.temperature, "\u{b0}C", 1)),
-        ("payload", range(&recording.payload, "kg", 1)),
-        ("region, by joints", region),
-        ("measured points", count(recording.rows() as i64)),
+        (
+            say!(locale, "temperature"),
+            range(&recording.temperature, "\u{b0}C"),
+        ),
+        (say!(locale, "payload"), range(&recording.payload, "kg")),
+        (say!(locale, "region, by joints"), region),
+        (
+            say!(locale, "measured points"),
+            count(recording.rows() as i64),
+        ),
     ]
 }
 
@@ -247,8 +268,11 @@ pub struct AcceptanceLimits {
 }
 
 #[derive(Debug)]
-pub(super) struct Judgement {
-    pub(crate) sentence: String,
+pub(super) struct Judgement<'a> {
+    /// What is wrong with the set-up, where something is.
+    wrong: Option<String>,
+    /// What is judged.
+    row: Option<&'a StatisticsRow>,
     /// Limits as they were set; none where a wrong set-up alone is not accepted.
     pub(crate) limits: Vec<AcceptanceRow>,
     pub(crate) kept: bool,
@@ -266,9 +290,9 @@ pub(super) fn judged<'a>(tables: &'a Tables, set: Option<&str>) -> Option<&'a St
     rows.max_by_key(|row| row.points)
 }
 
-impl Judgement {
+impl<'a> Judgement<'a> {
     /// None where there are no limits and the set-up is right.
-    pub fn new(tables: &Tables, limits: &AcceptanceLimits, set: Option<&str>) -> Option<Self> {
+    pub fn new(tables: &'a Tables, limits: &AcceptanceLimits, set: Option<&str>) -> Option<Self> {
         let figures = [
             ("mean", limits.mean_mm),
             ("95 % of the points", limits.p95_mm),
@@ -292,20 +316,11 @@ impl Judgement {
             && asked
                 .iter()
                 .all(|(_, found, limit)| is_within(*found, *limit));
-        let sentence = match (wrong, row) {
-            (Some(wrong), _) => format!("Not accepted: {wrong}."),
-            (None, None) => "The limits cannot be judged: no points were held out.".into(),
-            (None, Some(row)) => format!(
-                "{} the limits at {} held-out points of set {}, step {}.",
-                if kept {
-                    "Accepted: within"
-                } else {
-                    "Not accepted: beyond"
-                },
-                row.points,
-                row.set,
-                row.step
-            ),
+        let judgement = Self {
+            wrong,
+            row,
+            limits: Vec::new(),
+            kept,
         };
         let limit =
             |(order, (name, found_mm, limit_mm)): (i64, (&str, Option<f64>, f64))| AcceptanceRow {
@@ -315,14 +330,62 @@ impl Judgement {
                 limit_mm,
                 kept: is_within(found_mm, limit_mm),
                 accepted: kept,
-                sentence: sentence.clone(),
+                sentence: judgement.sentence(&Locale::default()),
             };
         let limits = (1..).zip(asked).map(limit).collect();
         Some(Self {
-            sentence,
             limits,
-            kept,
+            ..judgement
         })
+    }
+
+    /// The judgement in a sentence.
+    pub(crate) fn sentence(&self, locale: &Locale) -> String {
+        let Some(row) = self.row else {
+            return match &self.wrong {
+                Some(wrong) => say!(
+                    locale,
+                    "Not accepted: {wrong}.",
+                    wrong = locale.stored(wrong)
+                ),
+                None => say!(
+                    locale,
+                    "The limits cannot be judged: no points were held out."
+                ),
+            };
+        };
+        let (points, set, step) = (row.points, &row.set, &row.step);
+        match self.kept {
+            true => say!(
+                locale,
+                "Accepted: within the limits at {points} held-out points of set {set}, step {step}.",
+                points,
+                set,
+                step
+            ),
+            false => say!(
+                locale,
+                "Not accepted: beyond the limits at {points} held-out points of set {set}, step {step}.",
+                points,
+                set,
+                step
+            ),
+        }
+    }
+
+    /// The same of limits that are kept where the error is not explained.
+    fn but(&self, locale: &Locale, cause: &str) -> String {
+        let (points, set, step) = self
+            .row
+            .map_or((0, "", ""), |row| (row.points, &row.set, &row.step));
+        say!(
+            locale,
+            "Within the limits at {points} held-out points of set {set}, step {step}, but {cause}.",
+            points,
+            set,
+            step,
+            cause
+        )
     }
 
     /// Limits with what was found.

@@ -2,7 +2,8 @@
 
 use super::Tables;
 use super::findings::wrong_setup;
-use super::number::{count, mm};
+use super::language::{Locale, say};
+use super::number::count;
 use super::workspace::{Colours, StepErrors, VIEWS, cumulative, histogram, scatter};
 use crate::error::{Error, Result};
 use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED, Withdrawn};
@@ -74,19 +75,20 @@ impl Steps {
 }
 
 /// What is left out together, beside parts drawn at random.
-fn blocks(rows: &[StatisticsRow]) -> &'static str {
+fn blocks(locale: &Locale, rows: &[StatisticsRow]) -> String {
     let folded = || rows.iter().filter(|row| row.fold_rms_mm.is_some());
     match (
         folded().any(StatisticsRow::is_contact),
         folded().all(StatisticsRow::is_contact),
     ) {
-        (true, true) => "whole places",
-        (true, false) => "contiguous parts of the recording; whole places",
-        (false, _) => "contiguous parts of the recording",
+        (true, true) => say!(locale, "whole places"),
+        (true, false) => say!(locale, "contiguous parts of the recording; whole places"),
+        (false, _) => say!(locale, "contiguous parts of the recording"),
     }
 }
 
 pub(super) fn errors_section(
+    locale: &Locale,
     tables: &Tables,
     steps: &Steps,
     wished: Option<&str>,
@@ -113,7 +115,7 @@ pub(super) fn errors_section(
     let later = sets(rows, true)
         .into_iter()
         .filter(|set| !kept.contains(set));
-    let block = |set: &str, held_out: bool, note| {
+    let block = |set: &str, held_out: bool, note: Option<String>| {
         json!({
             "set": set,
             "note": note,
@@ -125,24 +127,24 @@ pub(super) fn errors_section(
         block(
             set,
             true,
-            Some("held out until a later step was fitted to it"),
+            Some(say!(locale, "held out until a later step was fitted to it")),
         )
     });
     Ok(json!({
         "verdict": match wrong_setup(tables) {
-            Some(_) => nothing_known("Nothing is calibrated before the set-up is right.".into()),
-            None => verdict(rows, &last, &tables.withdrawn),
+            Some(_) => nothing_known(say!(locale, "Nothing is calibrated before the set-up is right.")),
+            None => verdict(locale, rows, &last, &tables.withdrawn),
         },
         // Sets still held out after the step that stands, the verdict's first; then those that a later step was fitted to.
         "held_out": held_out.chain(used).collect::<Vec<_>>(),
         "training": sets(rows, false).into_iter().map(|set| block(set, false, None)).collect::<Vec<_>>(),
         "folds": rows.iter().filter(|row| row.fold_rms_mm.is_some()).map(|r| row(r, steps)).collect::<Vec<_>>(),
         // What the second kind of folds is.
-        "blocks": blocks(rows),
+        "blocks": blocks(locale, rows),
         // Steps whose cross-validation was dropped, and the number of poses.
         "unfolded": unfolded(tables),
         "references": rows.iter().filter(|row| row.reference.is_some()).collect::<Vec<_>>(),
-        "pictures": last.iter().map(|row| picture(tables, row, steps)).collect::<Vec<_>>(),
+        "pictures": last.iter().map(|row| picture(locale, tables, row, steps)).collect::<Vec<_>>(),
         "legend": steps.names.iter().map(|(order, step)| (steps.colour(*order), steps.called(step))).collect::<Vec<_>>(),
     }))
 }
@@ -187,79 +189,99 @@ pub(super) fn before<'a>(
         .min_by_key(|r| r.order)
 }
 
-fn points(number: i64) -> String {
-    if number == 1 {
-        "one point".into()
-    } else {
-        format!("{} points", count(number))
-    }
-}
-
 /// A sentence without figures.
 fn nothing_known(sentence: String) -> Value {
     json!({ "sentence": sentence, "others": [] })
 }
 
-fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdrawn]) -> Value {
+fn verdict(
+    locale: &Locale,
+    rows: &[StatisticsRow],
+    last: &[&StatisticsRow],
+    withdrawn: &[Withdrawn],
+) -> Value {
     let Some(after) = last.first() else {
-        let sentence = "No point was held out, so the accuracy on new poses is not known. The figures below are for points that \
-                        the model was fitted to, and flatter it.";
-        return nothing_known(sentence.into());
+        return nothing_known(say!(
+            locale,
+            "No point was held out, so the accuracy on new poses is not known. The figures below are for points that the model was fitted to, and flatter it."
+        ));
+    };
+    let set = &after.set;
+    let sample = match after.points {
+        1 => say!(
+            locale,
+            "one point of the set “{set}”, to which nothing was fitted",
+            set
+        ),
+        points => say!(
+            locale,
+            "{points} points of the set “{set}”, to which nothing was fitted",
+            points = count(points),
+            set
+        ),
     };
     let before_row = before(rows, after);
-    let sample = format!(
-        "{} of the set \u{201c}{}\u{201d}, to which nothing was fitted",
-        points(after.points),
-        after.set
-    );
-    let sentence = match before_row {
-        Some(before) if after.mean_mm < before.mean_mm => {
-            format!(
-                "The mean position error fell from {} mm to {} mm on {sample}.",
-                mm(before.mean_mm),
-                mm(after.mean_mm)
-            )
-        }
-        Some(before) => format!(
-            "The calibration did not help: the mean position error went from {} mm to {} mm on {sample}.",
-            mm(before.mean_mm),
-            mm(after.mean_mm)
+    let mean = locale.mm(after.mean_mm);
+    let earlier = before_row.map(|before| (before.mean_mm, locale.mm(before.mean_mm)));
+    let sentence = match earlier {
+        Some((before, earlier)) if after.mean_mm < before => say!(
+            locale,
+            "The mean position error fell from {earlier} mm to {mean} mm on {sample}.",
+            earlier,
+            mean,
+            sample
         ),
-        None => format!(
-            "The mean position error is {} mm on {sample}.",
-            mm(after.mean_mm)
+        Some((_, earlier)) => say!(
+            locale,
+            "The calibration did not help: the mean position error went from {earlier} mm to {mean} mm on {sample}.",
+            earlier,
+            mean,
+            sample
+        ),
+        None => say!(
+            locale,
+            "The mean position error is {mean} mm on {sample}.",
+            mean,
+            sample
         ),
     };
     let uneven = before_row
         .filter(|before| before.points != after.points)
         .map(|before| {
-            format!(
-                "Before, the set had {} held-out points; the two means are not of the same points.",
-                count(before.points)
-            )
+            say!(locale, "Before, the set had {points} held-out points; the two means are not of the same points.", points = count(before.points))
         });
     let other = |row: &&StatisticsRow| {
-        let from = before(rows, row).map_or_else(String::new, |before| {
-            format!("{} mm \u{2192} ", mm(before.mean_mm))
-        });
-        format!(
-            "Set \u{201c}{}\u{201d} ({} held-out points): mean {from}{} mm.",
-            row.set,
-            count(row.points),
-            mm(row.mean_mm)
-        )
+        let (set, points, mean) = (&row.set, count(row.points), locale.mm(row.mean_mm));
+        match before(rows, row).map(|before| locale.mm(before.mean_mm)) {
+            Some(earlier) => say!(
+                locale,
+                "Set “{set}” ({points} held-out points): mean {earlier} mm → {mean} mm.",
+                set,
+                points,
+                earlier,
+                mean
+            ),
+            None => say!(
+                locale,
+                "Set “{set}” ({points} held-out points): mean {mean} mm.",
+                set,
+                points,
+                mean
+            ),
+        }
     };
+    let stored = |line: String| locale.stored(&line) + ".";
     json!({
         "sentence": sentence,
-        "others": (withdrawn.iter().map(|gone| format!("{gone}.")))
+        "others": (withdrawn.iter().map(|gone| stored(gone.to_string())))
             .chain(uneven)
-            .chain(after.doubts().map(|line| format!("{line}.")))
+            .chain(after.doubts().map(stored))
             .chain(last.iter().skip(1).map(other))
             .collect::<Vec<_>>(),
     })
 }
 
-fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Value {
+fn picture(locale: &Locale, tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Value {
     let rows = tables
         .statistics
         .0
@@ -283,13 +305,14 @@ fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Value {
     json!({
         "set": set.set,
         "points": count(set.points),
-        "histogram": histogram(&errors, &format!("Histogram of the position error after each step, set {}", set.set)),
-        "cumulative": cumulative(&errors, &format!("Cumulative position error after each step, set {}", set.set)),
+        "histogram": histogram(locale, &errors, &say!(locale, "Histogram of the position error after each step, set {set}", set = set.set)),
+        "cumulative": cumulative(locale, &errors, &say!(locale, "Cumulative position error after each step, set {set}", set = set.set)),
     })
 }
 
 /// Nothing where nothing was predicted.
 pub(super) fn workspace_section(
+    locale: &Locale,
     prediction: &[Prediction],
     standing: Option<&str>,
 ) -> Option<Value> {
@@ -307,11 +330,17 @@ pub(super) fn workspace_section(
     for view in VIEWS {
         for table in std::iter::once(first).chain(last) {
             let step = table.0.first().map_or("", |row| &row.step);
-            let name = format!("{} after \u{201c}{step}\u{201d}", view.name);
-            let (svg, remark) =
-                scatter(view, table, [first, last.unwrap_or(first)], &colours, &name);
+            let name = say!(locale, "{view} after “{step}”", view = view.name, step);
+            let (svg, remark) = scatter(
+                locale,
+                view,
+                table,
+                [first, last.unwrap_or(first)],
+                &colours,
+                &name,
+            );
             panels.push(json!({ "name": name, "remark": remark, "svg": svg }));
         }
     }
-    Some(json!({ "legend": colours.legend(), "panels": panels }))
+    Some(json!({ "legend": colours.legend(locale), "panels": panels }))
 }

@@ -1,6 +1,7 @@
 //! `report.json`: what the report says, for other programs. Every figure is a column of a table.
 
 use super::certificate::Judgement;
+use super::language::Locale;
 use super::{ReportOptions, Tables};
 use crate::error::Result;
 use crate::table::{VerdictTopic, picked, picked_of};
@@ -10,7 +11,7 @@ use serde_json::json;
 pub(super) fn document(
     tables: &Tables,
     options: &ReportOptions,
-    title: &str,
+    (robot, title): (String, String),
     judgement: Option<&Judgement>,
 ) -> Result<String> {
     let findings = tables
@@ -47,7 +48,7 @@ pub(super) fn document(
     let limits = judgement.map(|judgement| {
         let figures = judgement.found().map(|(row, _)| row);
         json!({
-            "asked": !judgement.limits.is_empty(), "kept": judgement.kept, "sentence": judgement.sentence,
+            "asked": !judgement.limits.is_empty(), "kept": judgement.kept, "sentence": judgement.sentence(&Locale::default()),
             "figures": picked_of(figures, "figure found_mm limit_mm kept"),
         })
     });
@@ -58,7 +59,7 @@ pub(super) fn document(
     let document = json!({
         "calib_report": 1,
         "title": title,
-        "robot": super::data::robot_name(&tables.robot),
+        "robot": robot,
         "calib": env!("CARGO_PKG_VERSION"),
         "identity": options.identity,
         "standing": tables.standing,

@@ -1,6 +1,7 @@
 //! The page of a diagnosis of torques: what was found, and measured, simulated and corrected torque of each joint over time.
 
 use super::data;
+use super::language::Locale;
 use super::number::{self, count, fixed, significant};
 use super::svg::{Area, Scale, Svg, baseline, name_x, name_y};
 use crate::error::{Error, Result};
@@ -47,7 +48,8 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
     let verdict = tables.verdict.0.first();
     let verdict =
         verdict.ok_or_else(|| Error::Bug("a diagnosis of torques without a verdict".into()))?;
-    let robot = data::robot_name(&tables.robot);
+    let locale = Locale::default();
+    let robot = data::robot_name(&locale, &tables.robot);
     let said = |topic| tables.sentences.about(&verdict.step, topic);
     let page = json!({
         "title": title.map_or_else(|| format!("Torques of {robot}"), str::to_owned),
@@ -60,7 +62,7 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
         "findings": findings(tables),
         "withdrawn": said(VerdictTopic::Withdrawn),
         "errors": errors(&tables.joints),
-        "pictures": (0..tables.course.joints).map(|joint| pictures(tables, joint)).collect::<Vec<_>>(),
+        "pictures": (0..tables.course.joints).map(|joint| pictures(&locale, tables, joint)).collect::<Vec<_>>(),
         "contacts": contacts(&tables.contacts),
         "inertials": inertials(&tables.inertials),
         "bodies": bodies(&tables.consistency),
@@ -68,7 +70,7 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
         "remarks": said(VerdictTopic::Remark),
         "hashes": &tables.hashes,
     });
-    number::render("torques.html", include_str!("torques.html"), page)
+    number::render(&locale, "torques.html", include_str!("torques.html"), page)
 }
 
 fn facts(verdict: &TorqueVerdictRow) -> Vec<String> {
@@ -226,7 +228,7 @@ fn bodies(consistency: &BodyConsistencies) -> Vec<Vec<String>> {
     consistency.0.iter().map(row).collect()
 }
 
-fn pictures(tables: &TorqueTables, joint: usize) -> Value {
+fn pictures(locale: &Locale, tables: &TorqueTables, joint: usize) -> Value {
     let course = &tables.course;
     let of = |all: &[f64]| course.of_joint(all, joint).collect::<Vec<f64>>();
     let (measured, simulated, corrected) = (
@@ -255,9 +257,9 @@ fn pictures(tables: &TorqueTables, joint: usize) -> Value {
         .filter(|row| row.joint == joint as i64 + 1)
         .collect();
     json!({
-        "torque": over_time(course, &torque, &format!("torque of {name}: measured, simulated, corrected")),
-        "error": over_time(course, &[("s1", &before), ("s-last", &after)], &format!("error of {name} before and after")),
-        "friction": (!curve.is_empty()).then(|| friction(&curve, &format!("friction of {name}"))),
+        "torque": over_time(locale, course, &torque, &format!("torque of {name}: measured, simulated, corrected")),
+        "error": over_time(locale, course, &[("s1", &before), ("s-last", &after)], &format!("error of {name} before and after")),
+        "friction": (!curve.is_empty()).then(|| friction(locale, &curve, &format!("friction of {name}"))),
         "name": name,
     })
 }
@@ -269,7 +271,12 @@ const STEPS: usize = 300;
 const GAP: f64 = 8.0;
 
 /// Lines over time; what is held out is shaded.
-fn over_time(course: &TorqueCourse, lines: &[(&str, &[f64])], title: &str) -> String {
+fn over_time(
+    locale: &Locale,
+    course: &TorqueCourse,
+    lines: &[(&str, &[f64])],
+    title: &str,
+) -> String {
     let area = Area::new([52.0, 26.0, WIDTH - 14.0, 200.0]);
     let (first, last) = (
         course.time.first().copied().unwrap_or(0.0),
@@ -282,7 +289,7 @@ fn over_time(course: &TorqueCourse, lines: &[(&str, &[f64])], title: &str) -> St
     );
     let x = Scale::linear(first, last).over(area.left, area.right);
     let y = Scale::linear(low.min(0.0), high.max(0.0)).over(area.bottom, area.top);
-    let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
+    let mut svg = Svg::new(locale, WIDTH, area.bottom + 38.0);
     let stretches = stretches(&course.time);
     for rows in &stretches {
         let held = |row: &usize| course.held_out.get(*row).copied().unwrap_or(false);
@@ -340,7 +347,7 @@ fn stretches(time: &[f64]) -> Vec<std::ops::Range<usize>> {
 }
 
 /// Friction over velocity with a band of two standard deviations.
-fn friction(curve: &[&FrictionCurveRow], title: &str) -> String {
+fn friction(locale: &Locale, curve: &[&FrictionCurveRow], title: &str) -> String {
     let area = Area::new([52.0, 26.0, 406.0, 200.0]);
     let ends = |sign: f64| {
         curve
@@ -358,7 +365,7 @@ fn friction(curve: &[&FrictionCurveRow], title: &str) -> String {
     )
     .over(area.left, area.right);
     let y = Scale::linear(low, high).over(area.bottom, area.top);
-    let mut svg = Svg::new(420.0, area.bottom + 38.0);
+    let mut svg = Svg::new(locale, 420.0, area.bottom + 38.0);
     x.grid_x(&mut svg, area, 6);
     y.grid_y(&mut svg, area, 5);
     let point = |row: &&FrictionCurveRow, sigmas: f64| {

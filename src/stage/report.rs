@@ -192,6 +192,12 @@ impl Stage for Report {
             hashes,
         };
         let pages = pages(&tables, &options).map_err(|error| placed(error, context.id))?;
+        for text in &pages.missing {
+            let language = self.language.code();
+            context.warn(format!(
+                "the page says this in English, as `{language}` lacks it: {text}"
+            ));
+        }
         let document = |name: &str, media_type: &str, content| DocumentRow {
             name: name.into(),
             media_type: media_type.into(),
