@@ -185,8 +185,10 @@ pub(super) fn render(
     environment.add_filter("mm", move |value: Option<f64>| in_mm(value, MM));
     environment.add_filter("count", count);
     environment.add_filter("fixed", fixed);
-    environment.add_filter("significant", move |value: f64, digits: usize| {
-        of_significant.significant(value, digits)
+    environment.add_filter("significant", move |value: Option<f64>, digits: usize| {
+        value.map_or_else(String::new, |value| {
+            of_significant.significant(value, digits)
+        })
     });
     environment
         .add_template(name, &text)

@@ -2,14 +2,13 @@
 
 use super::data;
 use super::language::Locale;
-use super::number::{self, count, fixed, significant};
+use super::number::render;
 use super::svg::{Area, Scale, Svg, baseline, name_x, name_y};
 use crate::error::{Error, Result};
 use crate::table::{
-    BodyConsistencies, BodyConsistencyRow, ContactRow, Contacts, FrictionCurveRow, FrictionCurves,
-    InertialRow, Inertials, JointTorqueRow, JointTorques, Robot, TorqueCourse, TorqueFindingRow,
-    TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict, TorqueVerdictRow, VerdictSentences,
-    VerdictTopic,
+    BodyConsistencies, Contacts, FrictionCurveRow, FrictionCurves, Inertials, JointTorques, Robot,
+    TorqueCourse, TorqueFindingRow, TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict,
+    VerdictSentences, VerdictTopic,
 };
 use serde_json::{Value, json};
 
@@ -55,177 +54,37 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
         "title": title.map_or_else(|| format!("Torques of {robot}"), str::to_owned),
         "robot": robot,
         "joints": tables.course.joints,
-        "rows": count(verdict.rows),
-        "kind": if verdict.verdict == "unexplained" { "open" } else { "better" },
-        "sentence": format!("{}: {}", verdict.verdict.replace('_', " "), verdict.statement),
-        "facts": facts(verdict),
-        "findings": findings(tables),
+        "verdict": verdict,
+        "findings": tables.findings.0.iter().map(|row| finding(row, tables)).collect::<Vec<_>>(),
         "withdrawn": said(VerdictTopic::Withdrawn),
-        "errors": errors(&tables.joints),
+        "errors": &tables.joints.0,
         "pictures": (0..tables.course.joints).map(|joint| pictures(&locale, tables, joint)).collect::<Vec<_>>(),
-        "contacts": contacts(&tables.contacts),
-        "inertials": inertials(&tables.inertials),
-        "bodies": bodies(&tables.consistency),
+        "contacts": &tables.contacts.0,
+        "inertials": &tables.inertials.0,
+        "bodies": &tables.consistency.0,
         "not_observable": said(VerdictTopic::NotObservable),
         "remarks": said(VerdictTopic::Remark),
         "hashes": &tables.hashes,
     });
-    number::render(&locale, "torques.html", include_str!("torques.html"), page)
+    render(&locale, "torques.html", include_str!("torques.html"), page)
 }
 
-fn facts(verdict: &TorqueVerdictRow) -> Vec<String> {
-    let rows = if verdict.held_out {
-        "held-out rows"
-    } else {
-        "fitted rows (none are held out: flattered)"
-    };
-    let masses = match verdict.base_parameters {
-        Some(count) => format!(
-            "masses are identified freely, {count} numbers: their errors cannot be findings"
-        ),
-        None => "masses are free within their declared tolerance".into(),
-    };
-    vec![
-        format!(
-            "rms of measured minus simulated torque over that of measured torque about its mean, mean over joints, {rows}: {} before, \
-             {} with the findings",
-            fixed(verdict.before_nrmse, 3),
-            fixed(verdict.after_nrmse, 3)
-        ),
-        masses,
-        format!(
-            "recorded: {}; {} rows at {} Hz after a low-pass of {} Hz on both sides",
-            if verdict.signal == "current" {
-                "motor currents"
-            } else {
-                "joint torques"
-            },
-            count(verdict.rows),
-            fixed(verdict.rate_hz, 1),
-            fixed(verdict.cutoff_hz, 1)
-        ),
-    ]
-}
-
-fn findings(tables: &TorqueTables) -> Vec<Value> {
-    let view = |row: &TorqueFindingRow| {
-        let numbers = tables
-            .numbers
-            .0
-            .iter()
-            .filter(|number| number.rank == row.rank)
-            .map(|number| {
-                let sigma = number.sigma.map_or_else(String::new, |sigma| {
-                    format!(" \u{b1} {}", significant(sigma, 2))
-                });
-                format!(
-                    "{} {}{sigma} {}",
-                    number.name,
-                    significant(number.value, 4),
-                    number.unit
-                )
-            });
-        let rivals = tables
-            .rivals
-            .0
-            .iter()
-            .filter(|rival| rival.rank == row.rank);
-        let rivals = rivals.map(|rival| {
-            format!(
-                "{} at {} {}",
-                rival.effect,
-                rival.place,
-                fixed(rival.probability, 2)
-            )
-        });
-        json!({
-            "statement": row.statement,
-            "probability": format!(
-                "{} {}, at {} {}",
-                row.effect,
-                fixed(row.probability, 2),
-                row.place,
-                fixed(row.place_probability, 2)
-            ),
-            "numbers": numbers.collect::<Vec<_>>().join(", "),
-            "rivals": rivals.collect::<Vec<_>>().join(", "),
-        })
-    };
-    tables.findings.0.iter().map(view).collect()
-}
-
-fn errors(joints: &JointTorques) -> Vec<Vec<String>> {
-    let nm = |value: Option<f64>| value.map_or_else(String::new, |value| significant(value, 3));
-    let row = |row: &JointTorqueRow| {
-        vec![
-            format!("joint {}", row.joint),
-            nm(Some(row.before_rms_nm)),
-            nm(Some(row.after_rms_nm)),
-            nm(row.after_moving_rms_nm),
-            nm(row.after_rest_rms_nm),
-            nm(Some(row.noise_nm)),
-            fixed(row.autocorrelation, 1),
-            fixed(row.before_nrmse, 3),
-            fixed(row.after_nrmse, 3),
-            row.signature.clone().unwrap_or_default(),
-        ]
-    };
-    joints.0.iter().map(row).collect()
-}
-
-fn contacts(contacts: &Contacts) -> Vec<Vec<String>> {
-    let row = |row: &ContactRow| {
-        let force = [
-            (row.force_x_n, row.sigma_x_n),
-            (row.force_y_n, row.sigma_y_n),
-            (row.force_z_n, row.sigma_z_n),
-        ];
-        let force = force.map(|(force, sigma)| {
-            format!("{} \u{b1} {}", significant(force, 3), significant(sigma, 2))
-        });
-        vec![
-            row.event.to_string(),
-            fixed(row.start_s, 2),
-            fixed(row.end_s, 2),
-            row.joints.clone(),
-            force.join(", "),
-        ]
-    };
-    contacts.0.iter().map(row).collect()
-}
-
-fn inertials(inertials: &Inertials) -> Vec<Vec<String>> {
-    let row = |row: &InertialRow| {
-        vec![
-            format!("link {}", row.link),
-            row.quantity.clone(),
-            row.declared
-                .map_or_else(String::new, |value| significant(value, 4)),
-            significant(row.value, 4),
-            significant(row.sigma, 2),
-            row.unit.clone(),
-        ]
-    };
-    inertials.0.iter().map(row).collect()
-}
-
-fn bodies(consistency: &BodyConsistencies) -> Vec<Vec<String>> {
-    let row = |row: &BodyConsistencyRow| {
-        vec![
-            format!("link {}", row.link),
-            significant(row.mass_kg, 4),
-            significant(row.spread_kg_m2, 3),
-            row.sigma_kg_m2
-                .map_or_else(String::new, |sigma| significant(sigma, 2)),
-            match (row.enforced == Some(true), row.consistent) {
-                (true, _) => "no body had these numbers: moved to the nearest body",
-                (false, true) => "a body has these numbers",
-                (false, false) => "no body has these numbers",
-            }
-            .into(),
-        ]
-    };
-    consistency.0.iter().map(row).collect()
+/// A finding with its numbers and its rivals.
+fn finding(row: &TorqueFindingRow, tables: &TorqueTables) -> Value {
+    let numbers = tables
+        .numbers
+        .0
+        .iter()
+        .filter(|number| number.rank == row.rank);
+    let rivals = tables
+        .rivals
+        .0
+        .iter()
+        .filter(|rival| rival.rank == row.rank);
+    let mut finding = json!(row);
+    finding["numbers"] = numbers.map(|number| json!(number)).collect();
+    finding["rivals"] = rivals.map(|rival| json!(rival)).collect();
+    finding
 }
 
 fn pictures(locale: &Locale, tables: &TorqueTables, joint: usize) -> Value {
