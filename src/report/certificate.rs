@@ -4,13 +4,11 @@
 
 use super::Tables;
 use super::errors::{Steps, before};
-use super::findings::{noise_basis, wrong_setup};
+use super::findings::wrong_setup;
 use super::language::{Locale, say};
-use super::number::count;
-use crate::table::{AcceptanceRow, IntakeRow, StatisticsRow, VerdictRow, VerdictTopic};
+use crate::table::{AcceptanceRow, StatisticsRow, VerdictRow, VerdictTopic};
 use crate::units::Unit;
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 
 /// Standard deviations of an expanded uncertainty (VIM: coverage factor).
 const COVERAGE: f64 = 2.0;
@@ -18,8 +16,6 @@ const COVERAGE: f64 = 2.0;
 pub(super) fn certificate(
     locale: &Locale,
     tables: &Tables,
-    robot: &str,
-    identity: &BTreeMap<String, String>,
     judgement: Option<&Judgement>,
     set: Option<&str>,
 ) -> Value {
@@ -27,37 +23,39 @@ pub(super) fn certificate(
     let first = after.and_then(|after| before(&tables.statistics.0, after));
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back();
     let (kind, verdict) = standing(locale, judgement, diagnosis, first.zip(after));
-    let subject = [(say!(locale, "robot"), robot.to_string(), true)];
-    let limit = |(row, found): (&AcceptanceRow, f64)| {
-        json!([
-            locale.stored(&row.figure),
-            locale.mm(found),
-            locale.mm(row.limit_mm),
-            row.kept
-        ])
+    let recording = &tables.recording;
+    let region = |k: usize| {
+        let unit = if recording.prismatic.get(k) == Some(&true) {
+            Unit::Millimetre
+        } else {
+            Unit::Degree
+        };
+        extent((0..recording.rows()).map(|row| unit.from_si(recording.q(row)[k])))
     };
-    let given = identity
-        .iter()
-        .map(|(name, value)| (name.clone(), value.clone(), true));
     json!({
         // `better` (accepted and explained), `open` (not explained, or not asked), `worse` (not accepted), `unknown`: the class of its colour.
         "kind": kind,
         "verdict": verdict,
-        // What was calibrated, by whom, with what: name, value, and whether that is a name which no language changes.
-        "subject": subject.into_iter().chain(given).chain(files(locale, tables)).collect::<Vec<_>>(),
-        // Model, points, mean, 95 %, largest.
-        "figures": first
-            .map(|row| figures(locale, false, row))
-            .into_iter()
-            .chain(after.map(|row| figures(locale, true, row)))
-            .flatten()
-            .collect::<Vec<_>>(),
-        // Figures that stand beside the table.
-        "uncertainty": after.map(|after| uncertainty(locale, after)).unwrap_or_default(),
-        // Figure, found, allowed, whether it is kept.
-        "limits": judgement.map(|judgement| judgement.found().map(limit).collect::<Vec<_>>()),
-        "conditions": conditions(locale, tables),
+        "before": first,
+        "after": after,
+        "assumed": after.is_some_and(StatisticsRow::is_inferred),
+        "expanded_mm": after.map(|row| COVERAGE * row.rms_x_mm.max(row.rms_y_mm).max(row.rms_z_mm)),
+        "limits": judgement.map(|judgement| &judgement.limits),
+        "temperature": extent(recording.temperature.iter().flatten().copied()),
+        "payload": extent(recording.payload.iter().flatten().copied()),
+        // Smallest and largest position of each joint, deg or mm.
+        "region": (0..recording.joints).filter_map(region).collect::<Vec<_>>(),
+        "slides": recording.prismatic.contains(&true),
         "not_observable": diagnosis.map(|row| tables.statements(&row.step, VerdictTopic::NotObservable)).unwrap_or_default(),
+    })
+}
+
+/// The least and the largest; none where there is no number.
+fn extent(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let finite = values.filter(|value| value.is_finite());
+    finite.fold(None, |ends, value| {
+        let [lower, upper] = ends.unwrap_or([value; 2]);
+        Some([lower.min(value), upper.max(value)])
     })
 }
 
@@ -114,146 +112,6 @@ fn standing(
             ),
         ),
     }
-}
-
-/// Files that were read, and their rows.
-fn files(locale: &Locale, tables: &Tables) -> Option<(String, String, bool)> {
-    let rows = tables.intake.iter().flat_map(|table| &table.0);
-    let file = |row: &IntakeRow| {
-        let (used, read) = (count(row.accepted), count(row.read));
-        say!(
-            locale,
-            "{file} ({used} of {read} rows used)",
-            file = row.file,
-            used,
-            read
-        )
-    };
-    let files: Vec<String> = rows.map(file).collect();
-    (!files.is_empty()).then(|| (say!(locale, "recording"), files.join("; "), false))
-}
-
-/// A row with all points, and one without suspects where there are any.
-fn figures(locale: &Locale, is_after: bool, row: &StatisticsRow) -> Vec<[String; 5]> {
-    let none = || "\u{2013}".to_string();
-    let (step, suspects) = (&row.step, row.suspects);
-    let [name, without] = match (is_after, suspects) {
-        (false, 1) => [
-            say!(locale, "before ({step})", step),
-            say!(locale, "before, without a suspect"),
-        ],
-        (true, 1) => [
-            say!(locale, "after ({step})", step),
-            say!(locale, "after, without a suspect"),
-        ],
-        (false, _) => [
-            say!(locale, "before ({step})", step),
-            say!(locale, "before, without {suspects} suspects", suspects),
-        ],
-        (true, _) => [
-            say!(locale, "after ({step})", step),
-            say!(locale, "after, without {suspects} suspects", suspects),
-        ],
-    };
-    let mm = |length| locale.mm(length);
-    let mut rows = vec![[
-        name,
-        count(row.points),
-        mm(row.mean_mm),
-        mm(row.p95_mm),
-        mm(row.max_mm),
-    ]];
-    if let Some(mean) = row.mean_without_mm {
-        rows.push([
-            without,
-            count(row.points - suspects),
-            mm(mean),
-            none(),
-            row.max_without_mm.map_or_else(none, mm),
-        ]);
-    }
-    rows
-}
-
-fn uncertainty(locale: &Locale, after: &StatisticsRow) -> Vec<(String, String)> {
-    let axis = after.rms_x_mm.max(after.rms_y_mm).max(after.rms_z_mm);
-    let noise = say!(locale, "{value} mm", value = locale.mm(after.noise_rms_mm));
-    let expanded = locale.mm(COVERAGE * axis);
-    vec![
-        (
-            say!(
-                locale,
-                "expanded uncertainty of the corrected robot in the measured region, along an axis (k = 2, from the held-out points)"
-            ),
-            format!("\u{b1}\u{a0}{expanded}\u{a0}mm"),
-        ),
-        (
-            say!(
-                locale,
-                "standard uncertainty of a measured point, rms length"
-            ),
-            noise_basis(
-                locale,
-                noise,
-                after.noise_basis.as_deref(),
-                after.is_inferred(),
-            ),
-        ),
-    ]
-}
-
-/// Temperature, payload and region, as recorded.
-fn conditions(locale: &Locale, tables: &Tables) -> Vec<(String, String)> {
-    let recording = &tables.recording;
-    let extent = |values: &mut dyn Iterator<Item = f64>| {
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| {
-            (a.min(value), b.max(value))
-        })
-    };
-    let range = |values: &Option<Vec<f64>>, unit: &str| {
-        let mut finite = values
-            .iter()
-            .flatten()
-            .copied()
-            .filter(|value| value.is_finite());
-        let (lower, upper) = extent(&mut finite);
-        let [from, to] = [lower, upper].map(|value| locale.fixed(value, 1));
-        match (lower <= upper, lower == upper) {
-            (false, _) => say!(locale, "not recorded"),
-            (_, true) => format!("{from} {unit}"),
-            _ => say!(locale, "{from} to {to} {unit}", from, to, unit),
-        }
-    };
-    let joint = |k: usize| {
-        let (lower, upper) = extent(&mut (0..recording.rows()).map(|row| recording.q(row)[k]));
-        let unit = if recording.prismatic.get(k).copied().unwrap_or(false) {
-            Unit::Millimetre
-        } else {
-            Unit::Degree
-        };
-        let [from, to] = [lower, upper].map(|value| locale.fixed(unit.from_si(value), 0));
-        say!(locale, "J{joint} {from} to {to}", joint = k + 1, from, to)
-    };
-    let joints = recording.joints.min(recording.rows() * recording.joints);
-    let region: Vec<String> = (0..joints).map(joint).collect();
-    let joined = region.join(", ");
-    let region = match recording.prismatic.contains(&true) {
-        _ if region.is_empty() => say!(locale, "no point was measured"),
-        true => say!(locale, "{region} deg, mm", region = joined),
-        false => say!(locale, "{region} deg", region = joined),
-    };
-    vec![
-        (
-            say!(locale, "temperature"),
-            range(&recording.temperature, "\u{b0}C"),
-        ),
-        (say!(locale, "payload"), range(&recording.payload, "kg")),
-        (say!(locale, "region, by joints"), region),
-        (
-            say!(locale, "measured points"),
-            count(recording.rows() as i64),
-        ),
-    ]
 }
 
 /// What the user accepts, mm; of held-out points of the diagnosed model, without a diagnosis after the last step.

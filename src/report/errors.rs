@@ -131,10 +131,11 @@ pub(super) fn errors_section(
         )
     });
     Ok(json!({
-        "verdict": match wrong_setup(tables) {
-            Some(_) => nothing_known(say!(locale, "Nothing is calibrated before the set-up is right.")),
-            None => verdict(locale, rows, &last, &tables.withdrawn),
-        },
+        "wrong": wrong_setup(tables).is_some(),
+        // The sets still held out after the step that stands, before and after; the first is what the page speaks of.
+        "judged": last.iter().map(|after| json!({ "before": before(rows, after), "after": after })).collect::<Vec<_>>(),
+        "withdrawn": tables.withdrawn.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "doubts": last.first().and_then(|after| after.doubts()),
         // Sets still held out after the step that stands, the verdict's first; then those that a later step was fitted to.
         "held_out": held_out.chain(used).collect::<Vec<_>>(),
         "training": sets(rows, false).into_iter().map(|set| block(set, false, None)).collect::<Vec<_>>(),
@@ -187,98 +188,6 @@ pub(super) fn before<'a>(
     rows.iter()
         .filter(|r| r.held_out && r.set == after.set && r.order < after.order)
         .min_by_key(|r| r.order)
-}
-
-/// A sentence without figures.
-fn nothing_known(sentence: String) -> Value {
-    json!({ "sentence": sentence, "others": [] })
-}
-
-fn verdict(
-    locale: &Locale,
-    rows: &[StatisticsRow],
-    last: &[&StatisticsRow],
-    withdrawn: &[Withdrawn],
-) -> Value {
-    let Some(after) = last.first() else {
-        return nothing_known(say!(
-            locale,
-            "No point was held out, so the accuracy on new poses is not known. The figures below are for points that the model was fitted to, and flatter it."
-        ));
-    };
-    let set = &after.set;
-    let sample = match after.points {
-        1 => say!(
-            locale,
-            "one point of the set “{set}”, to which nothing was fitted",
-            set
-        ),
-        points => say!(
-            locale,
-            "{points} points of the set “{set}”, to which nothing was fitted",
-            points = count(points),
-            set
-        ),
-    };
-    let before_row = before(rows, after);
-    let mean = locale.mm(after.mean_mm);
-    let earlier = before_row.map(|before| (before.mean_mm, locale.mm(before.mean_mm)));
-    let sentence = match earlier {
-        Some((before, earlier)) if after.mean_mm < before => say!(
-            locale,
-            "The mean position error fell from {earlier} mm to {mean} mm on {sample}.",
-            earlier,
-            mean,
-            sample
-        ),
-        Some((_, earlier)) => say!(
-            locale,
-            "The calibration did not help: the mean position error went from {earlier} mm to {mean} mm on {sample}.",
-            earlier,
-            mean,
-            sample
-        ),
-        None => say!(
-            locale,
-            "The mean position error is {mean} mm on {sample}.",
-            mean,
-            sample
-        ),
-    };
-    let uneven = before_row
-        .filter(|before| before.points != after.points)
-        .map(|before| {
-            say!(locale, "Before, the set had {points} held-out points; the two means are not of the same points.", points = count(before.points))
-        });
-    let other = |row: &&StatisticsRow| {
-        let (set, points, mean) = (&row.set, count(row.points), locale.mm(row.mean_mm));
-        match before(rows, row).map(|before| locale.mm(before.mean_mm)) {
-            Some(earlier) => say!(
-                locale,
-                "Set “{set}” ({points} held-out points): mean {earlier} mm → {mean} mm.",
-                set,
-                points,
-                earlier,
-                mean
-            ),
-            None => say!(
-                locale,
-                "Set “{set}” ({points} held-out points): mean {mean} mm.",
-                set,
-                points,
-                mean
-            ),
-        }
-    };
-    let stored = |line: String| locale.stored(&line) + ".";
-    json!({
-        "sentence": sentence,
-        "others": (withdrawn.iter().map(|gone| stored(gone.to_string())))
-            .chain(uneven)
-            .chain(after.doubts().map(stored))
-            .chain(last.iter().skip(1).map(other))
-            .collect::<Vec<_>>(),
-    })
 }
 
 fn picture(locale: &Locale, tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Value {

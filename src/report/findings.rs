@@ -2,90 +2,25 @@
 
 use super::Tables;
 use super::language::{Locale, say};
-use super::number::count;
 use super::svg::{Area, Scale, Svg, baseline, label, name_x, name_y};
-use crate::table::{
-    CurveRow, FindingRow, FormRow, RivalRow, VerdictRow, VerdictTopic, formula_in_words,
-};
+use crate::table::{CurveRow, FindingRow, VerdictTopic, formula_in_words};
 use crate::units::Unit;
-use serde::Serialize;
 use serde_json::{Value, json};
 
 /// Points drawn in one picture: more would hide each other.
 const DRAWN: usize = 700;
 
-/// The figures that speak for a finding, with what each means.
-fn evidence(locale: &Locale) -> [[String; 2]; 8] {
-    [
-        [
-            say!(locale, "probability of the name"),
-            say!(
-                locale,
-                "that it is this effect at this place; the rest, up to 1, is listed below the finding"
-            ),
-        ],
-        [
-            say!(locale, "of the place"),
-            say!(locale, "that it acts at this place, whatever it is"),
-        ],
-        [
-            say!(locale, "of none"),
-            say!(
-                locale,
-                "that it is neither this effect nor any of its rivals"
-            ),
-        ],
-        [
-            "F".into(),
-            say!(
-                locale,
-                "gain per parameter over the residual variance; about 1 for noise"
-            ),
-        ],
-        [
-            "p".into(),
-            say!(
-                locale,
-                "chance that noise gives as much to this form alone; the search among many is in the probabilities"
-            ),
-        ],
-        [
-            say!(locale, "2 ln evidence"),
-            say!(
-                locale,
-                "twice the ln of the evidence for the finding beside all others; above 10 is strong"
-            ),
-        ],
-        [
-            say!(locale, "cross-validated gain"),
-            say!(
-                locale,
-                "cross-validated rms without the finding minus that with it"
-            ),
-        ],
-        [
-            say!(locale, "size"),
-            say!(locale, "rms of the whole effect at the tool"),
-        ],
-    ]
-}
-
-#[derive(Serialize)]
-struct FindingView {
-    rank: String,
-    effect: String,
-    place: String,
-    statement: String,
-    /// Name, value, sigma, unit.
-    numbers: Vec<[String; 4]>,
-    /// What, figure.
-    evidence: Vec<[String; 2]>,
-    rivals: Vec<String>,
-    /// Formulas that do what it does, with what they cost and bring.
-    formulas: Vec<String>,
-    valid: Option<String>,
-    pictures: Vec<(String, String)>,
-}
+/// The columns that speak for a finding.
+const EVIDENCE: [&str; 8] = [
+    "probability",
+    "place_probability",
+    "none_probability",
+    "f_statistic",
+    "p_value",
+    "delta_bic",
+    "heldout_gain_mm",
+    "effect_rms_mm",
+];
 
 /// None where the pipeline made no diagnosis.
 pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
@@ -94,65 +29,29 @@ pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
         .iter()
         .flat_map(|table| &table.0)
         .next_back()?;
-    let figure =
-        |value: Option<f64>| value.map_or_else(|| "\u{2013}".into(), |value| locale.mm(value));
-    let errors = |name: String, mean, rms, max| [name, figure(mean), figure(rms), figure(max)];
-    let suspects = tables
-        .suspects
+    let suspects = tables.suspects.iter().flat_map(|table| &table.0);
+    let findings = tables.findings.iter().flat_map(|table| &table.0);
+    let findings: Vec<Value> = findings.map(|row| finding(locale, row, tables)).collect();
+    let shown = |column: &&str| findings.iter().any(|finding| !finding[*column].is_null());
+    let arcsec = |rad: Option<f64>| rad.map(|rad| Unit::Arcsecond.from_si(rad));
+    let mut gone = tables
+        .withdrawn
         .iter()
-        .flat_map(|table| &table.0)
-        .filter(|row| row.step == verdict.step);
-    let wrong = wrong_setup(tables).is_some();
-    let (before, after) = match wrong {
-        true => (
-            say!(locale, "before: as set up"),
-            say!(locale, "after: set-up corrected"),
-        ),
-        false => (
-            say!(locale, "before: geometry, zeros and ratios identified"),
-            say!(locale, "after: with the findings"),
-        ),
-    };
-    let findings: Vec<FindingView> = tables
-        .findings
-        .iter()
-        .flat_map(|table| &table.0)
-        .map(|row| finding(locale, row, tables))
-        .collect();
-    let shown = |name: &str| {
-        findings
-            .iter()
-            .flat_map(|finding| &finding.evidence)
-            .any(|[shown, _]| shown == name)
-    };
-    let meanings: Vec<_> = evidence(locale)
-        .into_iter()
-        .filter(|[name, _]| shown(name))
-        .collect();
+        .filter(|gone| gone.step == verdict.step);
     Some(json!({
-        "kind": match verdict.verdict.as_str() {
-            "explained" | "nothing_missing" => "better",
-            _ => "unknown",
-        },
-        "sentence": sentence(locale, verdict, tables),
-        "heading": if wrong { say!(locale, "The set-up is wrong") } else { say!(locale, "What the simulation lacked") },
-        // What the errors are of.
-        "caption": if wrong { say!(locale, "Error of the nominal robot, base and tool fitted, mm") } else { say!(locale, "Error of held-out points, mm") },
-        // Name, mean, rms, max.
-        "errors": vec![
-            errors(before, verdict.before_mean_mm, verdict.before_rms_mm, verdict.before_max_mm),
-            errors(after, verdict.after_mean_mm, verdict.after_rms_mm, verdict.after_max_mm),
-        ],
+        "verdict": verdict,
+        "withdrawn": gone.next().map(ToString::to_string),
+        "assumed": verdict.is_noise_assumed(),
+        "inferred": verdict.is_noise_inferred() && !verdict.is_noise_assumed(),
+        "noise_arcsec": arcsec(verdict.noise_floor_rad),
+        "leftover_arcsec": arcsec(verdict.leftover_rms_rad),
+        "repeatability_arcsec": arcsec(Some(verdict.repeatability_rad)),
         "causes": tables.cells.last().zip(tables.findings.last()).and_then(|(cells, findings)| super::causes::picture(locale, cells, findings)),
-        "facts": facts(locale, verdict),
+        // Of which evidence the meaning is stated.
+        "meanings": EVIDENCE.iter().filter(|column| shown(column)).collect::<Vec<_>>(),
         "findings": findings,
-        // What each figure of the evidence means.
-        "meanings": meanings,
         "next": tables.statements(&verdict.step, VerdictTopic::NextMeasurement),
-        "signature": verdict.signature,
-        "suspects": suspects
-            .map(|row| [row.point_id.clone(), row.set.clone(), locale.stored(&row.kind), locale.mm(row.size_mm), locale.stored(&row.remark)])
-            .collect::<Vec<_>>(),
+        "suspects": suspects.filter(|row| row.step == verdict.step).collect::<Vec<_>>(),
     }))
 }
 
@@ -162,258 +61,33 @@ pub(super) fn wrong_setup(tables: &Tables) -> Option<String> {
     tables.verdict.last()?.wrong_setup(findings)
 }
 
-/// A noise with what it rests on.
-pub(super) fn noise_basis(
-    locale: &Locale,
-    noise: String,
-    basis: Option<&str>,
-    is_assumed: bool,
-) -> String {
-    match basis {
-        _ if is_assumed => say!(
-            locale,
-            "{noise} (assumed: none is recorded, no instrument is stated)",
-            noise
-        ),
-        Some(basis) => say!(
-            locale,
-            "{noise} (by {basis})",
-            noise,
-            basis = locale.stored(basis)
-        ),
-        None => noise,
-    }
-}
-
-fn facts(locale: &Locale, verdict: &VerdictRow) -> Vec<(String, String)> {
-    let arcsec = |rad: f64| {
-        let angle = locale.significant(Unit::Arcsecond.from_si(rad), 2);
-        say!(locale, "{angle} arcsec", angle)
-    };
-    let size = |length: Option<f64>, angle: Option<f64>| {
-        length
-            .map(|length| say!(locale, "{length} mm", length = locale.mm(length)))
-            .or_else(|| angle.map(arcsec))
-    };
-    let basis = |noise: String| match verdict.is_noise_inferred() && !verdict.is_noise_assumed() {
-        true => say!(locale, "{noise} (inferred from what is left)", noise),
-        false => {
-            let basis = verdict.noise_basis.as_deref();
-            noise_basis(locale, noise, basis, verdict.is_noise_assumed())
-        }
-    };
-    let probability = |p: Option<f64>| p.map(|p| locale.significant(p, 2));
-    let facts = [
-        (
-            say!(locale, "noise of one point, rms"),
-            size(verdict.noise_floor_mm, verdict.noise_floor_rad).map(basis),
-        ),
-        (
-            say!(locale, "left over at fitted rows, rms"),
-            size(verdict.leftover_rms_mm, verdict.leftover_rms_rad),
-        ),
-        (
-            say!(locale, "probability that no further cause is there"),
-            probability(verdict.p_after),
-        ),
-        (
-            say!(locale, "the same before any finding"),
-            probability(verdict.p_before),
-        ),
-        (
-            say!(locale, "repeatability of the joints"),
-            verdict.p_after.map(|_| arcsec(verdict.repeatability_rad)),
-        ),
-        (say!(locale, "rows fitted"), Some(count(verdict.points))),
-    ];
-    facts
-        .into_iter()
-        .filter_map(|(name, figure)| Some((name, figure?)))
-        .collect()
-}
-
-fn sentence(locale: &Locale, verdict: &VerdictRow, tables: &Tables) -> String {
-    let statement = match (&verdict.statement, verdict.verdict.as_str()) {
-        (Some(statement), _) => locale.sentence(statement),
-        (None, "explained") => say!(
-            locale,
-            "The findings bring the error of held-out points down to the noise."
-        ),
-        (None, "nothing_missing") => {
-            say!(locale, "These data show nothing that the simulation lacks.")
-        }
-        (None, "not_asked") => say!(
-            locale,
-            "Too few rows were fitted to determine what the simulation lacks."
-        ),
-        (None, _) => say!(locale, "The findings do not explain the whole error."),
-    };
-    let sentence = match wrong_setup(tables) {
-        Some(_) => statement,
-        None => {
-            statement
-                + " "
-                + &say!(
-                    locale,
-                    "The simulation is the nominal robot with geometry, zeros, ratios and declared couplings identified; everything else is a finding."
-                )
-        }
-    };
-    let mut gone = tables
-        .withdrawn
+/// A row with its numbers, rivals, formulas, range and curves.
+fn finding(locale: &Locale, row: &FindingRow, tables: &Tables) -> Value {
+    let numbers = tables.finding_numbers.iter().flat_map(|table| &table.0);
+    let numbers = numbers.filter(|number| number.rank == row.rank);
+    let rivals = tables.rivals.iter().flat_map(|table| &table.0);
+    let rivals = rivals.filter(|rival| rival.rank == row.rank && rival.is_inseparable());
+    let forms = tables
+        .forms
         .iter()
-        .filter(|gone| gone.step == verdict.step);
-    match gone.next() {
-        Some(gone) => {
-            let gone = locale.stored(&gone.to_string());
-            say!(
-                locale,
-                "This step is not the one that the run uses: {gone}. {sentence}",
-                gone,
-                sentence
-            )
-        }
-        None => sentence,
-    }
-}
-
-fn finding(locale: &Locale, row: &FindingRow, tables: &Tables) -> FindingView {
-    let numbers = tables
-        .finding_numbers
-        .iter()
-        .flat_map(|table| &table.0)
-        .filter(|number| number.rank == row.rank);
-    let rivals = tables
-        .rivals
-        .iter()
-        .flat_map(|table| &table.0)
-        .filter(|rival| rival.rank == row.rank && rival.is_inseparable());
-    let share = |p: Option<f64>| p.map(|p| locale.fixed(p, 2));
-    let millimetres = |length: Option<f64>| {
-        length.map(|length| say!(locale, "{length} mm", length = locale.mm(length)))
-    };
-    let three = |value: Option<f64>| value.map(|value| locale.significant(value, 3));
-    // What floating point no longer holds is not zero.
-    let chance = |p: f64| match p > 0.0 {
-        true => locale.significant(p, 2),
-        false => "< 1e-300".into(),
-    };
-    let figures = [
-        share(row.probability),
-        share(row.place_probability),
-        share(row.none_probability),
-        three(row.f_statistic),
-        row.p_value.map(chance),
-        three(row.delta_bic),
-        millimetres(row.heldout_gain_mm),
-        millimetres(row.effect_rms_mm),
-    ];
-    let valid = row.valid_range().map(|(joint, ends, unit)| {
-        let [from, to] = ends.map(|end| locale.fixed(end, 1));
-        let unit = locale.stored(unit);
-        say!(
-            locale,
-            "joint {joint} from {from} to {to} {unit}",
-            joint,
-            from,
-            to,
-            unit
-        )
-    });
-    let curve: Vec<&CurveRow> = tables
+        .flat_map(|table| table.of_finding(row.rank));
+    let curve = tables
         .curves
         .0
         .iter()
-        .filter(|point| point.rank == row.rank)
+        .filter(|point| point.rank == row.rank);
+    let mut shown = json!(row);
+    let is_missing = |column: &&&str| shown[**column].is_null();
+    shown["without"] = EVIDENCE.iter().filter(is_missing).copied().collect();
+    shown["numbers"] = json!(numbers.collect::<Vec<_>>());
+    shown["rivals"] = json!(rivals.collect::<Vec<_>>());
+    // Formulas that do what it does, with what they cost and bring.
+    shown["formulas"] = forms
+        .map(|rows| json!([formula_in_words(rows), rows[0]]))
         .collect();
-    FindingView {
-        rank: row.rank.to_string(),
-        effect: row.effect.clone(),
-        place: row.place.clone(),
-        statement: locale.sentence(&row.statement),
-        numbers: numbers
-            .map(|n| {
-                let sigma = n
-                    .sigma
-                    .map(|sigma| locale.significant(sigma, 2))
-                    .unwrap_or_default();
-                [
-                    n.name.clone(),
-                    locale.significant(n.value, 5),
-                    sigma,
-                    locale.stored(&n.unit),
-                ]
-            })
-            .collect(),
-        evidence: evidence(locale)
-            .into_iter()
-            .zip(figures)
-            .filter_map(|([name, _], figure)| Some([name, figure?]))
-            .collect(),
-        rivals: rivals.map(|row| rival(locale, row)).collect(),
-        formulas: tables
-            .forms
-            .iter()
-            .flat_map(|table| table.of_finding(row.rank))
-            .map(|rows| formula(locale, rows))
-            .collect(),
-        valid,
-        pictures: pictures(locale, row, &curve),
-    }
-}
-
-/// A formula with its numbers, its price and its errors on folds.
-fn formula(locale: &Locale, rows: &[FormRow]) -> String {
-    let formula = formula_in_words(rows);
-    let Some(row) = rows.first() else {
-        return formula;
-    };
-    let price = match row.proposed {
-        true => say!(locale, "{parts} parts, proposed", parts = row.price),
-        false => say!(locale, "{parts} parts", parts = row.price),
-    };
-    let [folds, curve] = [row.folds_rms_mm, row.curve_rms_mm].map(|rms| locale.mm(rms));
-    match row.without_rms_mm.map(|rms| locale.mm(rms)) {
-        Some(without) => say!(
-            locale,
-            "{formula} ({price}; {folds} mm cross-validated, {curve} mm with the curve, {without} mm without)",
-            formula,
-            price,
-            folds,
-            curve,
-            without
-        ),
-        None => say!(
-            locale,
-            "{formula} ({price}; {folds} mm cross-validated, {curve} mm with the curve)",
-            formula,
-            price,
-            folds,
-            curve
-        ),
-    }
-}
-
-fn rival(locale: &Locale, row: &RivalRow) -> String {
-    let (effect, place) = (&row.effect, locale.stored(&row.place));
-    let less = locale.significant(row.delta_bic, 2);
-    match row.probability.map(|p| locale.fixed(p, 2)) {
-        Some(p) => say!(
-            locale,
-            "{effect} at {place} (probability {p}, 2 ln evidence {less} less)",
-            effect,
-            place,
-            p,
-            less
-        ),
-        None => say!(
-            locale,
-            "{effect} at {place} (2 ln evidence {less} less)",
-            effect,
-            place,
-            less
-        ),
-    }
+    shown["valid"] = json!(row.valid_range());
+    shown["pictures"] = json!(pictures(locale, row, &curve.collect::<Vec<_>>()));
+    shown
 }
 
 /// Before with the fitted curve and its band, and after on the same scales.

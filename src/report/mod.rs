@@ -148,8 +148,8 @@ pub(crate) fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
     let choices = [("title", options.title), ("set", options.set)];
     let page = json!({
         "title": title,
-        "certificate": certificate::certificate(locale, tables, &robot, options.identity, judgement.as_ref(), options.set),
-        "has_identity": !options.identity.is_empty(),
+        "certificate": certificate::certificate(locale, tables, judgement.as_ref(), options.set),
+        "identity": options.identity,
         "hashes": &options.hashes,
         "diagnosis": findings::section(locale, tables),
         "errors": errors::errors_section(locale, tables, &steps, options.set)?,

@@ -148,9 +148,9 @@ impl Locale {
         }
     }
 
-    /// What templates say and read: `_("...", name=...)` as gettext has it, its arguments escaped and the message not, and the filter `stored`.
+    /// What templates say and read: `_("...", name=...)` as gettext has it, its arguments escaped and the message not, and the filters `stored` and `sentence`.
     pub(super) fn teach(&self, environment: &mut Environment) {
-        let (messages, tables) = (self.clone(), self.clone());
+        let (messages, tables, statements) = (self.clone(), self.clone(), self.clone());
         environment.add_function("_", move |id: &str, arguments: Kwargs| {
             let escaped = |value: Value| match value.is_safe() {
                 true => value.to_string(),
@@ -164,6 +164,9 @@ impl Locale {
             Ok(Value::from_safe_string(filled))
         });
         environment.add_filter("stored", move |english: &str| tables.stored(english));
+        environment.add_filter("sentence", move |english: &str| {
+            statements.sentence(english)
+        });
         environment.add_global("lang", self.language.code());
     }
 }
