@@ -1,9 +1,9 @@
 //! The picture of the table of causes: findings and residual, by place and kind of variable.
 
-use super::language::{Locale, sentence_case};
+use super::language::Locale;
 use super::number::render;
 use crate::error::Result;
-use crate::table::{CauseGrid, CauseGridCell, Cells, Findings};
+use crate::table::{CauseGrid, CauseGridCell, Cells, Findings, VerdictRow};
 use serde_json::{Value, json};
 
 /// Sizes (mm) from which a cell has the next colour.
@@ -59,47 +59,22 @@ fn length(locale: &Locale, mm: f64) -> String {
     }
 }
 
-/// What a page of one diagnosis is made of.
-pub struct DiagnosedTables<'a> {
-    /// Head of the page.
-    pub(crate) title: &'a str,
-    /// The run and the stage.
-    pub(crate) origin: [&'a str; 2],
-    /// Whether the error comes down to the noise, and the verdict in a sentence.
-    pub(crate) verdict: (bool, String),
-    /// Name, mean, rms and largest error, mm.
-    pub(crate) errors: Vec<[String; 4]>,
-    /// The table of causes.
-    pub(crate) cells: &'a Cells,
-    /// What was found.
-    pub(crate) findings: &'a Findings,
-    /// What to measure next, a sentence each.
-    pub(crate) next: Vec<String>,
-}
-
-/// A diagnosis as one file that needs no other.
-pub fn diagnosed_page(tables: &DiagnosedTables) -> Result<String> {
+/// A diagnosis as one file that needs no other; `origin` is the run, `next` what to measure next, a sentence each.
+pub fn diagnosed_page(
+    title: &str,
+    origin: &str,
+    verdict: &VerdictRow,
+    (cells, findings): (&Cells, &Findings),
+    next: &[String],
+) -> Result<String> {
     let locale = Locale::default();
-    let findings = tables.findings.0.iter().map(|finding| {
-        let chance = finding
-            .probability
-            .map(|probability| format!(", probability {probability:.2}"))
-            .unwrap_or_default();
-        [
-            finding.statement.clone(),
-            format!("{} at {}{chance}", finding.effect, finding.place),
-        ]
-    });
     let page = json!({
-        "title": tables.title,
-        "run": tables.origin[0],
-        "step_id": tables.origin[1],
-        "kind": if tables.verdict.0 { "better" } else { "open" },
-        "sentence": sentence_case(&tables.verdict.1),
-        "errors": tables.errors,
-        "causes_found": picture(&locale, tables.cells, tables.findings),
-        "findings": findings.collect::<Vec<_>>(),
-        "next": tables.next,
+        "title": title,
+        "run": origin,
+        "verdict": verdict,
+        "causes_found": picture(&locale, cells, findings),
+        "findings": &findings.0,
+        "next": next,
     });
     render(
         &locale,

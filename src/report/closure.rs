@@ -4,10 +4,12 @@ use super::Tables;
 use super::language::{Locale, say};
 use super::svg::{Area, Scale, Svg, baseline, name_x};
 use crate::table::{Prediction, PredictionRow};
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// What one fixture has, mm.
+/// What one fixture has: mean and largest distance, mm.
+#[derive(Serialize)]
 struct FixtureFigures {
     name: String,
     count: usize,
@@ -30,18 +32,11 @@ pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
             .and_then(|table| table.0.first())
             .map(|row| row.step.clone())
     };
-    let rows = all.iter().map(|own| {
-        let [before, after] =
-            [own.before, own.after].map(|pair| pair.map(|length| locale.mm(length)));
-        let [[a, b], [c, d]] = [before, after];
-        [own.name.clone(), own.count.to_string(), a, b, c, d]
-    });
     Some(json!({
         "before": name(tables.prediction.first())?,
         "after": name(standing(tables))?,
         "picture": picture(locale, &all[..all.len().min(MOST)]),
-        // Name, rows, mean and largest before, mean and largest after, mm.
-        "rows": rows.collect::<Vec<_>>(),
+        "rows": &all,
         // Fixtures beyond those of the picture.
         "more": all.len().saturating_sub(MOST),
     }))

@@ -1,11 +1,10 @@
 //! How the fits went: convergence, what the data could see, training.
 //!
-//! How the rivals of a learned correction did, and why one was kept or none.
+//! Rivals of learned corrections.
 
 use super::Tables;
 use super::errors::Steps;
 use super::language::{Locale, say};
-use super::number::count;
 use super::svg::{Line, course, spectrum};
 use crate::table::{CorrectionsRow, FitRow, ObservabilityRow, TrainingRow};
 use serde_json::{Value, json};
@@ -78,15 +77,7 @@ fn see(locale: &Locale, step: String, rows: &[&ObservabilityRow]) -> Value {
         "spectrum": (!values.is_empty()).then(|| spectrum(locale, &values, &say!(locale, "Singular values of the step {step}", step))),
         // What the singular values are of.
         "meaning": meaning,
-        // Quantity, value, meaning.
-        "quantities": others
-            .map(|row| {
-                let whole = row.value.fract() == 0.0 && row.value.abs() < 1e6;
-                let value = if whole { count(row.value as i64) } else { locale.significant(row.value, 4) };
-                let name = if row.index == 0 { row.quantity.clone() } else { format!("{} {}", row.quantity, row.index) };
-                (name, value, locale.stored(&row.meaning))
-            })
-            .collect::<Vec<_>>(),
+        "quantities": others.collect::<Vec<_>>(),
         "step": step,
     })
 }
@@ -107,111 +98,16 @@ fn training(locale: &Locale, step: String, phase: String, rows: &[&TrainingRow])
     .into_iter()
     .filter(|line| !line.points.is_empty())
     .collect();
-    let (to, evaluations) = (count(last.generation), count(last.evaluations));
-    let train = locale.mm(last.train_rms_mm);
-    let sentence = match last.check_rms_mm.map(|rms| locale.mm(rms)) {
-        Some(check) => say!(
-            locale,
-            "{step}, {phase}: to generation {to}, {evaluations} evaluations; at the end {train} mm rms on training rows, {check} mm on rows kept back.",
-            step,
-            phase,
-            to,
-            evaluations,
-            train,
-            check
-        ),
-        None => say!(
-            locale,
-            "{step}, {phase}: to generation {to}, {evaluations} evaluations; at the end {train} mm rms on training rows.",
-            step,
-            phase,
-            to,
-            evaluations,
-            train
-        ),
-    };
     let [x, y] = [
         say!(locale, "generation"),
         say!(locale, "rms of the position error, mm"),
     ];
     let title = say!(locale, "Training of {step}, {phase}", step, phase);
-    Some(json!({ "svg": course(locale, &lines, &x, &y, &title), "sentence": sentence }))
+    Some(json!({ "svg": course(locale, &lines, &x, &y, &title), "last": last }))
 }
 
 /// The comparisons in pipeline order; stages that had too few rows compared nothing.
-pub(super) fn comparisons(locale: &Locale, tables: &Tables) -> Vec<Value> {
-    tables
-        .corrections
-        .iter()
-        .filter_map(|table| comparison(locale, &table.0))
-        .collect()
-}
-
-fn comparison(locale: &Locale, rows: &[CorrectionsRow]) -> Option<Value> {
-    let first = rows.first()?;
-    let chosen = rows.iter().find(|row| row.chosen).unwrap_or(first);
-    let sentence = if chosen.rival == "none" {
-        let reason = locale.stored(&chosen.reason);
-        say!(locale, "no correction was kept: {reason}.", reason)
-    } else {
-        let rival = words(locale, &chosen.rival);
-        let before = locale.mm(chosen.before_mm);
-        let after = chosen
-            .mean_mm
-            .map_or_else(String::new, |mean| locale.mm(mean));
-        say!(
-            locale,
-            "kept is {rival}; the mean error falls from {before} to {after} mm on rows that it did not see.",
-            rival,
-            before,
-            after
-        )
-    };
-    let view = |row: &CorrectionsRow| {
-        let gain = row
-            .gain_mm
-            .zip(row.gain_sigma_mm)
-            .filter(|_| row.rival != "none");
-        let gain = gain
-            .map(|(gain, sigma)| format!("{} \u{b1} {}", locale.signed(gain, 3), locale.mm(sigma)));
-        let settings = row.hidden.zip(row.decay);
-        let settings = settings.map(|(hidden, decay)| {
-            let decay = locale.decimal(decay.to_string());
-            say!(locale, "{hidden} neurons, decay {decay}", hidden, decay)
-        });
-        let mut shown = json!(row);
-        shown["name"] = words(locale, &row.rival).into();
-        shown["gain"] = gain.unwrap_or_default().into();
-        shown["settings"] = settings.into();
-        shown
-    };
-    Some(
-        json!({ "step": first.step, "sentence": sentence, "rows": rows.iter().map(view).collect::<Vec<_>>() }),
-    )
-}
-
-/// A rival's name in words; names that are not known stay.
-fn words(locale: &Locale, rival: &str) -> String {
-    match rival {
-        "none" => say!(locale, "no correction"),
-        "ridge" => say!(locale, "ridge on harmonics"),
-        "gaussian_process" => say!(locale, "Gaussian process"),
-        "curves" => say!(locale, "joint curves"),
-        "mlp_random" => say!(locale, "network, started at random"),
-        _ => match (
-            rival.strip_prefix("mlp_joints_"),
-            rival.strip_prefix("mlp_").map(str::to_uppercase),
-        ) {
-            (Some("random"), _) => say!(locale, "joint network, started at random"),
-            (Some(start), _) => {
-                say!(
-                    locale,
-                    "joint network, started by {start}",
-                    start = start.to_uppercase()
-                )
-            }
-            (None, Some(start)) => say!(locale, "network, started by {start}", start),
-            (None, None) => rival.into(),
-        },
-    }
+pub(super) fn comparisons(tables: &Tables) -> Vec<&Vec<CorrectionsRow>> {
+    let rows = tables.corrections.iter().map(|table| &table.0);
+    rows.filter(|rows| !rows.is_empty()).collect()
 }

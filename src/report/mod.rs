@@ -21,7 +21,7 @@ mod torques;
 mod workspace;
 
 pub use achieved::{AchievedTables, achieved_page};
-pub use causes::{DiagnosedTables, diagnosed_page};
+pub use causes::diagnosed_page;
 pub use certificate::AcceptanceLimits;
 pub use language::PageLanguage;
 use language::{Locale, say};
@@ -157,7 +157,7 @@ pub(crate) fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
         "workspace": errors::workspace_section(locale, &tables.prediction, tables.standing.as_deref()),
         "parameters": parameters::section(locale, &tables.parameters, tables.counting.as_deref()),
         "fits": fits::section(locale, tables, &steps),
-        "comparisons": fits::comparisons(locale, tables),
+        "comparisons": fits::comparisons(tables),
         "data": data::section(locale, tables),
         "choices": choices.into_iter().filter(|(_, value)| value.is_some()).collect::<Vec<_>>(),
         "robot": robot,

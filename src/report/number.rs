@@ -84,9 +84,6 @@ impl Locale {
     pub(crate) fn mm(&self, value: f64) -> String {
         self.decimal(mm(value))
     }
-    pub(crate) fn signed(&self, value: f64, decimals: usize) -> String {
-        self.decimal(signed(value, decimals))
-    }
     pub(crate) fn significant(&self, value: f64, digits: usize) -> String {
         self.decimal(significant(value, digits))
     }
@@ -178,6 +175,7 @@ pub(super) fn render(
     locale.teach(&mut environment);
     // Figures of rows; of none an empty cell.
     let (of_fixed, of_significant) = (locale.clone(), locale.clone());
+    let (of_signed, of_decimal) = (locale.clone(), locale.clone());
     let fixed = move |value: Option<f64>, decimals: usize| {
         value.map_or_else(String::new, |value| of_fixed.fixed(value, decimals))
     };
@@ -185,6 +183,12 @@ pub(super) fn render(
     environment.add_filter("mm", move |value: Option<f64>| in_mm(value, MM));
     environment.add_filter("count", count);
     environment.add_filter("fixed", fixed);
+    environment.add_filter("decimal", move |value: f64| {
+        of_decimal.decimal(value.to_string())
+    });
+    environment.add_filter("signed", move |value: f64, decimals: usize| {
+        of_signed.decimal(signed(value, decimals))
+    });
     environment.add_filter("significant", move |value: Option<f64>, digits: usize| {
         value.map_or_else(String::new, |value| {
             of_significant.significant(value, digits)

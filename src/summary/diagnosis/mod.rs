@@ -10,7 +10,7 @@ use super::short_finding::{Found, ShortFinding, words};
 use crate::diagnose::VerdictKind;
 use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
-use crate::report::{DiagnosedTables, diagnosed_page};
+use crate::report::diagnosed_page;
 use crate::shell::typed;
 use crate::stage::{DeclaredStage, Diagnose, DiagnoseTorques};
 use crate::store::Store;
@@ -222,37 +222,10 @@ impl DiagnosisSummary {
                 "of torques the page is the pipeline's report: put `- uses: report` last",
             ));
         };
-        let v = &positions.verdict;
-        let mm =
-            |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
-        diagnosed_page(&DiagnosedTables {
-            title: self.robot.as_deref().unwrap_or("diagnosis"),
-            origin: [&self.run, &self.step],
-            verdict: (
-                v.verdict == VerdictKind::Explained.name(),
-                v.statement
-                    .clone()
-                    .unwrap_or_else(|| v.verdict.replace('_', " ")),
-            ),
-            errors: vec![
-                [
-                    "before".into(),
-                    mm(v.before_mean_mm),
-                    mm(v.before_rms_mm),
-                    mm(v.before_max_mm),
-                ],
-                [
-                    "after".into(),
-                    mm(v.after_mean_mm),
-                    mm(v.after_rms_mm),
-                    mm(v.after_max_mm),
-                ],
-                ["noise".into(), "-".into(), mm(v.noise_floor_mm), "-".into()],
-            ],
-            cells: &positions.cells,
-            findings: &positions.findings,
-            next: self.next(store).unwrap_or_default(),
-        })
+        let title = self.robot.as_deref().unwrap_or("diagnosis");
+        let causes = (&positions.cells, &positions.findings);
+        let next = self.next(store).unwrap_or_default();
+        diagnosed_page(title, &self.run, &positions.verdict, causes, &next)
     }
 
     /// All of the diagnosis, as `calib diagnose --details` prints it; `store` is the `--store` of the commands that it proposes.
