@@ -111,52 +111,45 @@ fn tool(locale: &Locale, robot: &Robot) -> Option<String> {
 }
 
 fn kinds(locale: &Locale, tables: &Tables) -> Vec<(&'static str, String)> {
-    let one = |rows: usize| vec![rows];
-    let kinds: [(&str, Vec<usize>); 15] = [
-        ("robot", one(tables.robot.0.len())),
-        ("recording", one(tables.recording.rows())),
-        ("intake", tables.intake.iter().map(|t| t.0.len()).collect()),
+    fn of<'a, T: 'a>(
+        tables: impl IntoIterator<Item = &'a T>,
+        rows: fn(&T) -> usize,
+    ) -> Vec<String> {
+        let tables = tables.into_iter();
+        tables.map(|table| count(rows(table) as i64)).collect()
+    }
+    let kinds = [
+        ("robot", of([&tables.robot], |table| table.0.len())),
+        ("recording", of([&tables.recording], |table| table.rows())),
+        ("intake", of(&tables.intake, |table| table.0.len())),
+        ("rejected", of(&tables.rejected, |table| table.0.len())),
+        ("split", of([&tables.split], |table| table.0.len())),
         (
-            "rejected",
-            tables.rejected.iter().map(|t| t.0.len()).collect(),
+            "parameters",
+            of([&tables.parameters], |table| table.0.len()),
         ),
-        ("split", one(tables.split.0.len())),
-        ("parameters", one(tables.parameters.0.len())),
-        ("fit", tables.fit.iter().map(|t| t.0.len()).collect()),
+        ("fit", of(&tables.fit, |table| table.0.len())),
         (
             "observability",
-            tables.observability.iter().map(|t| t.0.len()).collect(),
+            of(&tables.observability, |table| table.0.len()),
         ),
-        (
-            "training",
-            tables.training.iter().map(|t| t.0.len()).collect(),
-        ),
+        ("training", of(&tables.training, |table| table.0.len())),
         (
             "corrections",
-            tables.corrections.iter().map(|t| t.0.len()).collect(),
+            of(&tables.corrections, |table| table.0.len()),
         ),
+        ("prediction", of(&tables.prediction, |table| table.0.len())),
         (
-            "prediction",
-            tables.prediction.iter().map(|t| t.0.len()).collect(),
+            "statistics",
+            of([&tables.statistics], |table| table.0.len()),
         ),
-        ("statistics", one(tables.statistics.0.len())),
-        (
-            "suspects",
-            tables.suspects.iter().map(|t| t.0.len()).collect(),
-        ),
-        (
-            "findings",
-            tables.findings.iter().map(|t| t.0.len()).collect(),
-        ),
-        ("curves", one(tables.curves.0.len())),
+        ("suspects", of(&tables.suspects, |table| table.0.len())),
+        ("findings", of(&tables.findings, |table| table.0.len())),
+        ("curves", of([&tables.curves], |table| table.0.len())),
     ];
-    let of = |lengths: Vec<usize>| {
-        let texts: Vec<String> = lengths.into_iter().map(|n| count(n as i64)).collect();
-        if texts.is_empty() {
-            say!(locale, "not written")
-        } else {
-            say!(locale, "{rows} rows", rows = texts.join(" + "))
-        }
+    let words = |lengths: Vec<String>| match lengths.is_empty() {
+        true => say!(locale, "not written"),
+        false => say!(locale, "{rows} rows", rows = lengths.join(" + ")),
     };
-    kinds.map(|(kind, lengths)| (kind, of(lengths))).into()
+    kinds.map(|(kind, lengths)| (kind, words(lengths))).into()
 }

@@ -153,45 +153,50 @@ impl DiagnosisSummary {
         self.sentences.about(&self.step, topic)
     }
 
-    /// What to measure next, a sentence each, then what to type for poses that tell findings from their closest rivals.
-    fn next(&self, store: &str) -> Option<Vec<String>> {
-        let mut lines: Vec<String> = self
-            .statements(VerdictTopic::NextMeasurement)
-            .into_iter()
-            .map(String::from)
-            .collect();
-        if lines.is_empty() {
-            return None;
-        }
-        let step = if self.step == Diagnose::NAME {
-            String::new()
-        } else {
-            format!(" --step {}", typed(&self.step))
+    /// What to type for poses that tell findings from their closest rivals; `store` as in [`Self::document`].
+    fn poses(&self, store: &str) -> Vec<(&Found, &RivalRow, String)> {
+        let run = &self.run;
+        let step = match self.step == Diagnose::NAME {
+            true => String::new(),
+            false => format!(" --step {}", typed(&self.step)),
         };
-        for finding in self
-            .found
-            .iter()
-            .filter(|finding| is_separable_by_poses(&finding.effect))
-        {
-            let rivals = finding.rivals.iter();
-            let mut own: Vec<&RivalRow> = rivals
-                .filter(|rival| is_separable_by_poses(&rival.effect))
-                .collect();
-            own.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
-            for rival in own.iter().take(ASKED) {
-                let name = format!("{}@{}", rival.effect, rival.place);
-                lines.push(format!(
-                    "poses for finding {} or {} at {}: calib poses --run {}{step}{store} --separate {} {}",
-                    finding.rank,
-                    rival.effect,
-                    rival.place,
-                    self.run,
-                    finding.rank,
-                    typed(&name)
-                ));
-            }
+        if self.statements(VerdictTopic::NextMeasurement).is_empty() {
+            return Vec::new();
         }
-        Some(lines)
+        let findings = self.found.iter();
+        let findings = findings.filter(|finding| is_separable_by_poses(&finding.effect));
+        let rivals = findings.flat_map(|finding| {
+            let rivals = finding.rivals.iter();
+            let rivals = rivals.filter(|rival| is_separable_by_poses(&rival.effect));
+            let mut rivals: Vec<&RivalRow> = rivals.collect();
+            rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
+            rivals
+                .into_iter()
+                .take(ASKED)
+                .map(move |rival| (finding, rival))
+        });
+        let command = |finding: &Found, rival: &RivalRow| {
+            let name = typed(&format!("{}@{}", rival.effect, rival.place));
+            let rank = finding.rank;
+            format!("calib poses --run {run}{step}{store} --separate {rank} {name}")
+        };
+        rivals
+            .map(|(finding, rival)| (finding, rival, command(finding, rival)))
+            .collect()
+    }
+
+    /// What to measure next, a sentence each, then what to type for poses.
+    fn next(&self, store: &str) -> Option<Vec<String>> {
+        let sentences = self.statements(VerdictTopic::NextMeasurement);
+        let poses = self
+            .poses(store)
+            .into_iter()
+            .map(|(finding, rival, command)| {
+                let (rank, effect, place) = (finding.rank, &rival.effect, &rival.place);
+                format!("poses for finding {rank} or {effect} at {place}: {command}")
+            });
+        let lines = || sentences.iter().map(|line| line.to_string()).chain(poses);
+        (!sentences.is_empty()).then(|| lines().collect())
     }
 
     /// The diagnosis as one document; `store` is where the run is, as one types it.
@@ -376,26 +381,17 @@ impl DiagnosisSummary {
             .filter(|(short, _)| short.instead.is_some());
         let mut undecided: Vec<(&ShortFinding, &Found)> = undecided.collect();
         undecided.sort_by(|a, b| size(b.0).total_cmp(&size(a.0)));
-        let lines = self.next(store).unwrap_or_default();
-        let poses = undecided.into_iter().find_map(|(short, finding)| {
-            let start = format!("poses for finding {} or ", finding.rank);
-            let (rival, command) = lines
-                .iter()
-                .find_map(|line| line.strip_prefix(&start))?
-                .split_once(": ")?;
-            let (effect, place) = rival.split_once(" at ")?;
-            let what = format!(
-                "measure poses to decide: {}, or {}",
-                short.what,
-                words(effect, place)
-            );
-            Some(NextStep {
-                what,
-                command: Some(command.into()),
-            })
-        });
-        if poses.is_some() {
-            return poses;
+        let poses = self.poses(store);
+        for (short, finding) in undecided {
+            let of_finding =
+                |(asked, ..): &&(&Found, &RivalRow, String)| asked.rank == finding.rank;
+            if let Some((_, rival, command)) = poses.iter().find(of_finding) {
+                let rival = words(&rival.effect, &rival.place);
+                return Some(NextStep {
+                    what: format!("measure poses to decide: {}, or {rival}", short.what),
+                    command: Some(command.clone()),
+                });
+            }
         }
         if verdict.is_noise_inferred() {
             return Some(NextStep {

@@ -11,7 +11,8 @@ const MESSAGES: &str = include_str!("../../../src/report/language/de.po");
 const STORED: &str = include_str!("../../../src/report/language/de_stored.po");
 
 /// Sources whose sentences stand in tables that the page shows.
-const SOURCES: [&str; 15] = [
+const SOURCES: [&str; 16] = [
+    "numerics/compensate/remark",
     "numerics/diagnose/judge/withdraw",
     "numerics/diagnose/open_world/look",
     "numerics/diagnose/setup/",
