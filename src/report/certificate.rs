@@ -22,7 +22,6 @@ pub(super) fn certificate(
     let after = judged(tables, set).filter(|_| wrong_setup(tables).is_none());
     let first = after.and_then(|after| before(&tables.statistics.0, after));
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back();
-    let (kind, verdict) = standing(locale, judgement, diagnosis, first.zip(after));
     let recording = &tables.recording;
     let region = |k: usize| {
         let unit = if recording.prismatic.get(k) == Some(&true) {
@@ -33,9 +32,10 @@ pub(super) fn certificate(
         extent((0..recording.rows()).map(|row| unit.from_si(recording.q(row)[k])))
     };
     json!({
-        // `better` (accepted and explained), `open` (not explained, or not asked), `worse` (not accepted), `unknown`: the class of its colour.
-        "kind": kind,
-        "verdict": verdict,
+        // `better` (accepted and explained), `open` (not explained, or not asked), `refused`, `worse` (less accurate), `unknown` (no limits).
+        "kind": kind(judgement, diagnosis, first.zip(after)),
+        "judgement": judgement.map(|judgement| judgement.sentence(locale)),
+        "judged": judgement.and_then(|judgement| judgement.row),
         "before": first,
         "after": after,
         "assumed": after.is_some_and(StatisticsRow::is_inferred),
@@ -59,58 +59,20 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     })
 }
 
-/// Colour and sentence. Green is what is within the limits and explained; nothing else.
-fn standing(
-    locale: &Locale,
+/// The class of its colour. Green is what is within the limits and explained; nothing else.
+fn kind(
     judgement: Option<&Judgement>,
     diagnosis: Option<&VerdictRow>,
     course: Option<(&StatisticsRow, &StatisticsRow)>,
-) -> (&'static str, String) {
-    if let Some(refused) = judgement.filter(|judged| !judged.kept) {
-        return ("worse", refused.sentence(locale));
-    }
-    if course.is_some_and(|(before, after)| after.mean_mm >= before.mean_mm) {
-        return (
-            "worse",
-            say!(
-                locale,
-                "The calibration did not make the robot more accurate."
-            ),
-        );
-    }
-    let cause = match diagnosis.map(|row| row.verdict.as_str()) {
-        Some("explained" | "nothing_missing") => None,
-        Some("unexplained") => Some(say!(
-            locale,
-            "unexplained: a part of the error has no known cause"
-        )),
-        Some(_) => Some(say!(
-            locale,
-            "too few points were fitted to say what the error consists of"
-        )),
-        None => Some(say!(locale, "what the error consists of was not asked")),
-    };
-    match (judgement, cause) {
-        (Some(within), None) => (
-            "better",
-            within.sentence(locale) + " " + &say!(locale, "The error is explained."),
-        ),
-        (Some(within), Some(cause)) => ("open", within.but(locale, &cause)),
-        (None, None) => (
-            "unknown",
-            say!(
-                locale,
-                "Explained. No limits were stated, so that nothing is accepted or refused."
-            ),
-        ),
-        (None, Some(cause)) => (
-            "open",
-            say!(
-                locale,
-                "Not judged, as no limits were stated; {cause}.",
-                cause
-            ),
-        ),
+) -> &'static str {
+    let is_explained = diagnosis
+        .is_some_and(|row| ["explained", "nothing_missing"].contains(&row.verdict.as_str()));
+    match judgement {
+        Some(judged) if !judged.kept => "refused",
+        _ if course.is_some_and(|(before, after)| after.mean_mm >= before.mean_mm) => "worse",
+        Some(_) if is_explained => "better",
+        None if is_explained => "unknown",
+        _ => "open",
     }
 }
 
@@ -229,21 +191,6 @@ impl<'a> Judgement<'a> {
                 step
             ),
         }
-    }
-
-    /// The same of limits that are kept where the error is not explained.
-    fn but(&self, locale: &Locale, cause: &str) -> String {
-        let (points, set, step) = self
-            .row
-            .map_or((0, "", ""), |row| (row.points, &row.set, &row.step));
-        say!(
-            locale,
-            "Within the limits at {points} held-out points of set {set}, step {step}, but {cause}.",
-            points,
-            set,
-            step,
-            cause
-        )
     }
 
     /// Limits with what was found.

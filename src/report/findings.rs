@@ -63,10 +63,9 @@ pub(super) fn wrong_setup(tables: &Tables) -> Option<String> {
 
 /// A row with its numbers, rivals, formulas, range and curves.
 fn finding(locale: &Locale, row: &FindingRow, tables: &Tables) -> Value {
-    let numbers = tables.finding_numbers.iter().flat_map(|table| &table.0);
-    let numbers = numbers.filter(|number| number.rank == row.rank);
-    let rivals = tables.rivals.iter().flat_map(|table| &table.0);
-    let rivals = rivals.filter(|rival| rival.rank == row.rank && rival.is_inseparable());
+    let rivals = tables
+        .rivals(row.rank)
+        .filter(|rival| rival.is_inseparable());
     let forms = tables
         .forms
         .iter()
@@ -79,7 +78,7 @@ fn finding(locale: &Locale, row: &FindingRow, tables: &Tables) -> Value {
     let mut shown = json!(row);
     let is_missing = |column: &&&str| shown[**column].is_null();
     shown["without"] = EVIDENCE.iter().filter(is_missing).copied().collect();
-    shown["numbers"] = json!(numbers.collect::<Vec<_>>());
+    shown["numbers"] = json!(tables.numbers(row.rank).collect::<Vec<_>>());
     shown["rivals"] = json!(rivals.collect::<Vec<_>>());
     // Formulas that do what it does, with what they cost and bring.
     shown["formulas"] = forms

@@ -19,24 +19,20 @@ pub(super) fn document(
         .iter()
         .flat_map(|table| &table.0)
         .map(|row| {
-            let (numbers, rivals) = (tables.finding_numbers.iter(), tables.rivals.iter());
-            let numbers = numbers
-                .flat_map(|table| &table.0)
-                .filter(|number| number.rank == row.rank);
-            let rivals = rivals
-                .flat_map(|table| &table.0)
-                .filter(|rival| rival.rank == row.rank);
             let columns =
                 "rank effect where=place statement probability place_probability none_probability";
             let mut finding = picked(row, columns);
-            finding["numbers"] = picked_of(numbers, "name value unit sigma");
+            finding["numbers"] = picked_of(tables.numbers(row.rank), "name value unit sigma");
             finding["evidence"] = picked(row, "f_statistic p_value delta_bic heldout_gain_mm");
             finding["forms"] = tables
                 .forms
                 .iter()
                 .flat_map(|table| table.document(row.rank))
                 .collect();
-            finding["rivals"] = picked_of(rivals, "effect where=place delta_bic probability");
+            finding["rivals"] = picked_of(
+                tables.rivals(row.rank),
+                "effect where=place delta_bic probability",
+            );
             finding
         });
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back().map(|row| {

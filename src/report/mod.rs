@@ -29,9 +29,9 @@ pub use torques::{TorqueTables, torque_page};
 
 use crate::error::Result;
 use crate::table::{
-    Acceptance, Cells, Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake,
-    Observability, Parameters, Prediction, Recording, Rejected, Rivals, Robot, Split, Statistics,
-    Suspects, Training, Verdict, VerdictSentences, VerdictTopic, Withdrawn,
+    Acceptance, Cells, Corrections, Curves, FindingNumberRow, FindingNumbers, Findings, Fit, Forms,
+    Intake, Observability, Parameters, Prediction, Recording, Rejected, RivalRow, Rivals, Robot,
+    Split, Statistics, Suspects, Training, Verdict, VerdictSentences, VerdictTopic, Withdrawn,
 };
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -89,6 +89,18 @@ pub(crate) struct Tables {
 }
 
 impl Tables {
+    /// Numbers of a finding.
+    fn numbers(&self, rank: i64) -> impl Iterator<Item = &FindingNumberRow> {
+        let all = self.finding_numbers.iter().flat_map(|table| &table.0);
+        all.filter(move |number| number.rank == rank)
+    }
+
+    /// Rivals of a finding.
+    fn rivals(&self, rank: i64) -> impl Iterator<Item = &RivalRow> {
+        let all = self.rivals.iter().flat_map(|table| &table.0);
+        all.filter(move |rival| rival.rank == rank)
+    }
+
     /// What the diagnosis of a step says of a topic.
     fn statements(&self, step: &str, topic: VerdictTopic) -> Vec<&str> {
         self.sentences
