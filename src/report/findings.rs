@@ -46,7 +46,7 @@ pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
         "noise_arcsec": arcsec(verdict.noise_floor_rad),
         "leftover_arcsec": arcsec(verdict.leftover_rms_rad),
         "repeatability_arcsec": arcsec(Some(verdict.repeatability_rad)),
-        "causes": tables.cells.last().zip(tables.findings.last()).and_then(|(cells, findings)| super::causes::picture(locale, cells, findings)),
+        "causes": tables.cells.last().zip(tables.findings.last()).and_then(|(cells, findings)| super::causes::picture(cells, findings)),
         // Of which evidence the meaning is stated.
         "meanings": EVIDENCE.iter().filter(|column| shown(column)).collect::<Vec<_>>(),
         "findings": findings,
