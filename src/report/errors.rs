@@ -6,15 +6,14 @@ use super::language::{Locale, say};
 use super::number::count;
 use super::workspace::{Colours, StepErrors, VIEWS, cumulative, histogram, scatter};
 use crate::error::{Error, Result};
-use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED, Withdrawn};
+use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED};
 use serde_json::{Value, json};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// The steps in pipeline order, each with the colour it has in all pictures.
 pub(super) struct Steps {
     names: BTreeMap<i64, String>,
     standing: Option<i64>,
-    withdrawn: BTreeSet<String>,
 }
 
 impl Steps {
@@ -33,22 +32,6 @@ impl Steps {
         Self {
             standing: named.map(|(order, _)| *order),
             names,
-            withdrawn: BTreeSet::new(),
-        }
-    }
-    /// The same with steps that do not stand.
-    pub(crate) fn without(self, withdrawn: &[Withdrawn]) -> Self {
-        Self {
-            withdrawn: withdrawn.iter().map(|gone| gone.step.clone()).collect(),
-            ..self
-        }
-    }
-    /// How a step is called where its figures stand.
-    fn called(&self, step: &str) -> String {
-        if self.withdrawn.contains(step) {
-            format!("{step} (withdrawn)")
-        } else {
-            step.into()
         }
     }
     pub fn standing(&self) -> Option<i64> {
@@ -146,7 +129,7 @@ pub(super) fn errors_section(
         "unfolded": unfolded(tables),
         "references": rows.iter().filter(|row| row.reference.is_some()).collect::<Vec<_>>(),
         "pictures": last.iter().map(|row| picture(locale, tables, row, steps)).collect::<Vec<_>>(),
-        "legend": steps.names.iter().map(|(order, step)| (steps.colour(*order), steps.called(step))).collect::<Vec<_>>(),
+        "legend": steps.names.iter().map(|(order, step)| (steps.colour(*order), step)).collect::<Vec<_>>(),
     }))
 }
 
@@ -171,10 +154,9 @@ fn sets(rows: &[StatisticsRow], held_out: bool) -> Vec<&str> {
     names
 }
 
-/// A row with what its step is called, its colour, and whether it is the step that stands.
+/// A row with the colour of its step, and whether it is the step that stands.
 fn row(row: &StatisticsRow, steps: &Steps) -> Value {
     let mut shown = json!(row);
-    shown["called"] = steps.called(&row.step).into();
     shown["colour"] = steps.colour(row.order).into();
     shown["last"] = (Some(row.order) == steps.standing()).into();
     shown

@@ -140,8 +140,7 @@ pub(crate) struct Pages {
 
 /// The report; fails where `options.set` is no held-out set.
 pub(crate) fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
-    let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref())
-        .without(&tables.withdrawn);
+    let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref());
     let judgement = certificate::Judgement::new(tables, &options.limits, options.set);
     let head = |locale: &Locale| {
         let robot = data::robot_name(locale, &tables.robot);
@@ -173,6 +172,8 @@ pub(crate) fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
         "data": data::section(locale, tables),
         "choices": choices.into_iter().filter(|(_, value)| value.is_some()).collect::<Vec<_>>(),
         "robot": robot,
+        // Steps that do not stand.
+        "withdrawn": tables.withdrawn.iter().map(|gone| &gone.step).collect::<Vec<_>>(),
     });
     let html = number::render(locale, "report.html", include_str!("report.html"), page)?;
     let limits = judgement.map(|judgement| judgement.limits);
