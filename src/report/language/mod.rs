@@ -112,7 +112,7 @@ impl Locale {
 
     /// What [`say!`] calls.
     pub(super) fn say(&self, id: &str, arguments: &[(&str, String)]) -> String {
-        let of = |name: &str| arguments.iter().find(|(own, _)| *own == name);
+        let of = |name: &str| arguments.iter().find(|(known, _)| *known == name);
         let filled = self.message(id, |name| of(name).map(|(_, value)| value.clone()));
         filled.unwrap_or_else(|| id.into())
     }

@@ -181,8 +181,9 @@ fn a_template_says_nothing_but_messages() {
 #[test]
 fn no_stored_sentence_of_the_sources_lacks_its_german() {
     let known = STORED.to_lowercase();
-    let shown =
-        |file: &str| SOURCES.iter().any(|own| file.starts_with(own)) && !file.starts_with(WORDLESS);
+    let shown = |file: &str| {
+        SOURCES.iter().any(|source| file.starts_with(source)) && !file.starts_with(WORDLESS)
+    };
     let all: Vec<(String, String)> = sentences()
         .into_iter()
         .filter(|(file, _)| shown(file))
