@@ -83,6 +83,7 @@
 //! | table | `schemas/<kind>.json`, of which its rows are made; `src/table/<kind>.rs` for what fills them | one line in [`table::TABLES`] |
 //! | export format | `src/export/<name>.rs`, which declares an `export::Format` | its `mod`, and one line in `export::FORMATS` |
 //! | figure of a page | - | the template in `src/report`: it has the rows of tables with all their columns, and the filters `mm`, `count`, `fixed`, `significant` |
+//! | sentence of a page | - | `_("...", name=...)` in its template, or `say!` in `src/report`; its German in `src/report/language/de.po`, of sentences in tables in `de_stored.po` |
 //! | line of `calib show`, `explain`, `diagnose --details` | - | the template in `src/summary/text` |
 //! | figure of `--json` | - | the columns that `table::picked` is asked for where the document is made |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |

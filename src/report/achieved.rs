@@ -1,6 +1,7 @@
 //! The page of a verification: errors before, predicted and achieved, and the poses that were repeated often enough for ISO 9283.
 
-use super::number::{count, fixed, render};
+use super::language::Locale;
+use super::number::{count, render};
 use super::workspace::{StepErrors, histogram};
 use crate::error::Result;
 use serde_json::json;
@@ -23,11 +24,7 @@ pub struct AchievedTables<'a> {
 
 /// The page as one file that needs no other.
 pub fn achieved_page(tables: &AchievedTables) -> Result<String> {
-    let mm = |length: f64| fixed(length, 4);
-    let row = |(name, figures, what): &(&str, [f64; 3], String)| {
-        let [mean, p95, max] = figures.map(mm);
-        [format!("{name}: {what}"), mean, p95, max]
-    };
+    let locale = Locale::default();
     let errors = tables
         .errors
         .iter()
@@ -46,24 +43,19 @@ pub fn achieved_page(tables: &AchievedTables) -> Result<String> {
     let errors: Vec<StepErrors> = errors
         .filter(|errors| !errors.sorted_mm.is_empty())
         .collect();
-    let poses = (1..)
-        .zip(&tables.poses)
-        .map(|(k, (cycles, accuracy, repeatability)): (i64, _)| {
-            [
-                k.to_string(),
-                count(*cycles as i64),
-                mm(*accuracy),
-                mm(*repeatability),
-            ]
-        });
     let page = json!({
         "title": tables.title,
         "model": tables.model,
         "points": count(tables.errors[1].len() as i64),
-        "rows": tables.rows.iter().map(row).collect::<Vec<_>>(),
+        "rows": &tables.rows,
         "remarks": &tables.remarks,
-        "picture": histogram(&errors, "Histogram of the position error before and after correction"),
-        "poses": poses.collect::<Vec<_>>(),
+        "picture": histogram(&locale, &errors, "Histogram of the position error before and after correction"),
+        "poses": (1..).zip(&tables.poses).collect::<Vec<(i64, _)>>(),
     });
-    render("achieved.html", include_str!("achieved.html"), page)
+    render(
+        &locale,
+        "achieved.html",
+        include_str!("achieved.html"),
+        page,
+    )
 }

@@ -1,103 +1,37 @@
 //! The picture of the table of causes: findings and residual, by place and kind of variable.
 
-use super::number::{render, sentence_case, significant};
+use super::language::Locale;
+use super::number::render;
 use crate::error::Result;
-use crate::table::{CauseGrid, CauseGridCell, Cells, Findings};
-use serde_json::{Value, json};
-
-/// Sizes (mm) from which a cell has the next colour.
-const DECADES: [f64; 6] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0];
+use crate::table::{CauseGrid, Cells, Findings, VerdictRow};
+use serde_json::json;
 
 /// What the macro `causes` of the page draws; none where nothing was asked.
-pub(super) fn picture(cells: &Cells, findings: &Findings) -> Option<Value> {
-    let grid = CauseGrid::of(cells, findings);
-    let drawn = |cell: &Option<CauseGridCell>, is_found: bool| {
-        let Some(cell) = cell else {
-            return json!({ "class": "", "size": "", "name": "" });
-        };
-        let Some(mm) = cell
-            .mm
-            .or_else(|| (!cell.effects.is_empty()).then_some(0.0))
-        else {
-            return json!({ "class": "asked", "size": "\u{b7}", "name": "" });
-        };
-        let step = DECADES.iter().filter(|from| mm >= **from).count();
-        let name = if is_found {
-            cell.effects
-                .iter()
-                .map(|effect| effect.replace('_', " "))
-                .collect::<Vec<_>>()
-                .join(", ")
-        } else {
-            String::new()
-        };
-        json!({ "class": format!("size{step}{}", if is_found && !cell.is_named { " open" } else { "" }), "size": length(mm), "name": name })
-    };
-    let rows = grid.rows.iter().map(|row| {
-        let of = |cells: &[Option<CauseGridCell>], is_found| {
-            cells
-                .iter()
-                .map(|cell| drawn(cell, is_found))
-                .collect::<Vec<_>>()
-        };
-        json!({ "place": row.place, "found": of(&row.found, true), "left": of(&row.left, false) })
-    });
-    let rows: Vec<Value> = rows.collect();
-    (!rows.is_empty())
-        .then(|| json!({ "columns": grid.columns, "rows": rows, "others": grid.others }))
+pub(super) fn picture(cells: &Cells, findings: &Findings) -> Option<CauseGrid> {
+    Some(CauseGrid::of(cells, findings)).filter(|grid| !grid.rows.is_empty())
 }
 
-/// A size in the unit in which it is short.
-fn length(mm: f64) -> String {
-    match mm {
-        _ if mm >= 1.0 => format!("{} mm", significant(mm, 2)),
-        _ => format!(
-            "{} \u{b5}m",
-            significant(1e3 * mm, if mm >= 0.01 { 2 } else { 1 })
-        ),
-    }
-}
-
-/// What a page of one diagnosis is made of.
-pub struct DiagnosedTables<'a> {
-    /// Head of the page.
-    pub(crate) title: &'a str,
-    /// The run and the stage.
-    pub(crate) origin: [&'a str; 2],
-    /// Whether the error comes down to the noise, and the verdict in a sentence.
-    pub(crate) verdict: (bool, String),
-    /// Name, mean, rms and largest error, mm.
-    pub(crate) errors: Vec<[String; 4]>,
-    /// The table of causes.
-    pub(crate) cells: &'a Cells,
-    /// What was found.
-    pub(crate) findings: &'a Findings,
-    /// What to measure next, a sentence each.
-    pub(crate) next: Vec<String>,
-}
-
-/// A diagnosis as one file that needs no other.
-pub fn diagnosed_page(tables: &DiagnosedTables) -> Result<String> {
-    let findings = tables.findings.0.iter().map(|finding| {
-        let chance = finding
-            .probability
-            .map(|probability| format!(", probability {probability:.2}"))
-            .unwrap_or_default();
-        [
-            finding.statement.clone(),
-            format!("{} at {}{chance}", finding.effect, finding.place),
-        ]
-    });
+/// A diagnosis as one file that needs no other; `origin` is the run, `next` what to measure next, a sentence each.
+pub fn diagnosed_page(
+    title: &str,
+    origin: &str,
+    verdict: &VerdictRow,
+    (cells, findings): (&Cells, &Findings),
+    next: &[String],
+) -> Result<String> {
+    let locale = Locale::default();
     let page = json!({
-        "title": tables.title,
-        "run": tables.origin[0],
-        "step_id": tables.origin[1],
-        "kind": if tables.verdict.0 { "better" } else { "open" },
-        "sentence": sentence_case(&tables.verdict.1),
-        "errors": tables.errors,
-        "causes_found": picture(tables.cells, tables.findings),
-        "findings": findings.collect::<Vec<_>>(),
-        "next": tables.next,
+        "title": title,
+        "run": origin,
+        "verdict": verdict,
+        "causes_found": picture(cells, findings),
+        "findings": &findings.0,
+        "next": next,
     });
-    render("diagnosed.html", include_str!("diagnosed.html"), page)
+    render(
+        &locale,
+        "diagnosed.html",
+        include_str!("diagnosed.html"),
+        page,
+    )
 }

@@ -5,234 +5,75 @@
 use super::Tables;
 use super::errors::{Steps, before};
 use super::findings::wrong_setup;
-use super::number::{count, fixed, mm};
+use super::language::{Locale, say};
 use crate::table::{AcceptanceRow, StatisticsRow, VerdictRow, VerdictTopic};
 use crate::units::Unit;
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 
 /// Standard deviations of an expanded uncertainty (VIM: coverage factor).
 const COVERAGE: f64 = 2.0;
 
 pub(super) fn certificate(
+    locale: &Locale,
     tables: &Tables,
-    robot: &str,
-    identity: &BTreeMap<String, String>,
     judgement: Option<&Judgement>,
     set: Option<&str>,
 ) -> Value {
     let after = judged(tables, set).filter(|_| wrong_setup(tables).is_none());
     let first = after.and_then(|after| before(&tables.statistics.0, after));
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back();
-    let (kind, verdict) = standing(tables, judgement, diagnosis, first.zip(after));
-    let subject = [("robot".to_string(), robot.to_string())];
-    let limit = |(row, found): (&AcceptanceRow, f64)| {
-        json!([row.figure, mm(found), mm(row.limit_mm), row.kept])
-    };
-    let given = identity
-        .iter()
-        .map(|(name, value)| (name.clone(), value.clone()));
-    json!({
-        // `better` (accepted and explained), `open` (not explained, or not asked), `worse` (not accepted), `unknown`: the class of its colour.
-        "kind": kind,
-        "verdict": verdict,
-        // What was calibrated, by whom, with what: name and value.
-        "subject": subject.into_iter().chain(given).chain(files(tables)).collect::<Vec<_>>(),
-        // Model, points, mean, 95 %, largest.
-        "figures": first
-            .map(|row| ("before", row))
-            .into_iter()
-            .chain(after.map(|row| ("after", row)))
-            .flat_map(figures)
-            .collect::<Vec<_>>(),
-        // Figures that stand beside the table.
-        "uncertainty": after.map(uncertainty).unwrap_or_default(),
-        // Figure, found, allowed, whether it is kept.
-        "limits": judgement.map(|judgement| judgement.found().map(limit).collect::<Vec<_>>()),
-        "conditions": conditions(tables),
-        "not_observable": diagnosis.map(|row| tables.statements(&row.step, VerdictTopic::NotObservable)).unwrap_or_default(),
-    })
-}
-
-/// Colour and sentence. Green is what is within the limits and explained; nothing else.
-fn standing(
-    tables: &Tables,
-    judgement: Option<&Judgement>,
-    diagnosis: Option<&VerdictRow>,
-    course: Option<(&StatisticsRow, &StatisticsRow)>,
-) -> (&'static str, String) {
-    if wrong_setup(tables).is_some() {
-        return (
-            "worse",
-            judgement
-                .map(|judged| judged.sentence.clone())
-                .unwrap_or_default(),
-        );
-    }
-    if let Some(judged) = judgement.filter(|judged| !judged.kept) {
-        return ("worse", judged.sentence.clone());
-    }
-    if course.is_some_and(|(before, after)| after.mean_mm >= before.mean_mm) {
-        return (
-            "worse",
-            "The calibration did not make the robot more accurate.".into(),
-        );
-    }
-    let within = judgement.map(|judged| judged.sentence.trim_end_matches('.').to_string());
-    let cause = match diagnosis.map(|row| row.verdict.as_str()) {
-        Some("explained" | "nothing_missing") => None,
-        Some("unexplained") => Some("unexplained: a part of the error has no known cause"),
-        Some(_) => Some("too few points were fitted to say what the error consists of"),
-        None => Some("what the error consists of was not asked"),
-    };
-    match (within, cause) {
-        (Some(within), None) => ("better", format!("{within}. The error is explained.")),
-        (Some(within), Some(cause)) => (
-            "open",
-            format!(
-                "{}, but {cause}.",
-                within.replacen("Accepted: within", "Within", 1)
-            ),
-        ),
-        (None, None) => (
-            "unknown",
-            "Explained. No limits were stated, so that nothing is accepted or refused.".into(),
-        ),
-        (None, Some(cause)) => (
-            "open",
-            format!("Not judged, as no limits were stated; {cause}."),
-        ),
-    }
-}
-
-/// Files that were read, and their rows.
-fn files(tables: &Tables) -> Option<(String, String)> {
-    let files: Vec<String> = tables
-        .intake
-        .iter()
-        .flat_map(|table| &table.0)
-        .map(|row| {
-            format!(
-                "{} ({} of {} rows used)",
-                row.file,
-                count(row.accepted),
-                count(row.read)
-            )
-        })
-        .collect();
-    (!files.is_empty()).then(|| ("recording".to_string(), files.join("; ")))
-}
-
-/// A row with all points, and one without suspects where there are any.
-fn figures((when, row): (&str, &StatisticsRow)) -> Vec<[String; 5]> {
-    let none = || "\u{2013}".to_string();
-    let name = format!("{when} ({})", row.step);
-    let mut rows = vec![[
-        name,
-        count(row.points),
-        mm(row.mean_mm),
-        mm(row.p95_mm),
-        mm(row.max_mm),
-    ]];
-    if let Some(mean) = row.mean_without_mm {
-        let name = format!(
-            "{when}, without {}",
-            if row.suspects == 1 {
-                "a suspect".into()
-            } else {
-                format!("{} suspects", row.suspects)
-            }
-        );
-        rows.push([
-            name,
-            count(row.points - row.suspects),
-            mm(mean),
-            none(),
-            row.max_without_mm.map_or_else(none, mm),
-        ]);
-    }
-    rows
-}
-
-fn uncertainty(after: &StatisticsRow) -> Vec<(&'static str, String)> {
-    let axis = after.rms_x_mm.max(after.rms_y_mm).max(after.rms_z_mm);
-    let basis = match after.noise_basis.as_deref() {
-        _ if after.is_inferred() => " (assumed: none is recorded, no instrument is stated)".into(),
-        Some(basis) => format!(" (by {basis})"),
-        None => String::new(),
-    };
-    vec![
-        (
-            "expanded uncertainty of the corrected robot in the measured region, along an axis (k = 2, from the held-out points)",
-            format!("\u{b1}\u{a0}{}\u{a0}mm", mm(COVERAGE * axis)),
-        ),
-        (
-            "standard uncertainty of a measured point, rms length",
-            format!("{} mm{basis}", mm(after.noise_rms_mm)),
-        ),
-    ]
-}
-
-/// Temperature, payload and region, as recorded.
-fn conditions(tables: &Tables) -> Vec<(&'static str, String)> {
     let recording = &tables.recording;
-    let range = |values: &Option<Vec<f64>>, unit: &str, decimals: usize| {
-        let finite = values
-            .iter()
-            .flatten()
-            .copied()
-            .filter(|value| value.is_finite());
-        let (lower, upper) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-            (a.min(x), b.max(x))
-        });
-        match (lower <= upper, lower == upper) {
-            (false, _) => "not recorded".into(),
-            (_, true) => format!("{} {unit}", fixed(lower, decimals)),
-            _ => format!(
-                "{} to {} {unit}",
-                fixed(lower, decimals),
-                fixed(upper, decimals)
-            ),
-        }
-    };
-    let joint = |k: usize| {
-        let values = (0..recording.rows()).map(|row| recording.q(row)[k]);
-        let (lower, upper) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| {
-            (a.min(q), b.max(q))
-        });
-        let unit = if recording.prismatic.get(k).copied().unwrap_or(false) {
+    let region = |k: usize| {
+        let unit = if recording.prismatic.get(k) == Some(&true) {
             Unit::Millimetre
         } else {
             Unit::Degree
         };
-        format!(
-            "J{} {} to {}",
-            k + 1,
-            fixed(unit.from_si(lower), 0),
-            fixed(unit.from_si(upper), 0)
-        )
+        extent((0..recording.rows()).map(|row| unit.from_si(recording.q(row)[k])))
     };
-    let region: Vec<String> = if recording.rows() == 0 {
-        Vec::new()
-    } else {
-        (0..recording.joints).map(joint).collect()
-    };
-    let sliding = recording.prismatic.iter().any(|prismatic| *prismatic);
-    let region = if region.is_empty() {
-        "no point was measured".into()
-    } else {
-        format!(
-            "{} {}",
-            region.join(", "),
-            if sliding { "deg, mm" } else { "deg" }
-        )
-    };
-    vec![
-        ("temperature", range(&recording.temperature, "\u{b0}C", 1)),
-        ("payload", range(&recording.payload, "kg", 1)),
-        ("region, by joints", region),
-        ("measured points", count(recording.rows() as i64)),
-    ]
+    json!({
+        // `better` (accepted and explained), `open` (not explained, or not asked), `refused`, `worse` (less accurate), `unknown` (no limits).
+        "kind": kind(judgement, diagnosis, first.zip(after)),
+        "judgement": judgement.map(|judgement| judgement.sentence(locale)),
+        "judged": judgement.and_then(|judgement| judgement.row),
+        "before": first,
+        "after": after,
+        "assumed": after.is_some_and(StatisticsRow::is_inferred),
+        "expanded_mm": after.map(|row| COVERAGE * row.rms_x_mm.max(row.rms_y_mm).max(row.rms_z_mm)),
+        "limits": judgement.map(|judgement| &judgement.limits),
+        "temperature": extent(recording.temperature.iter().flatten().copied()),
+        "payload": extent(recording.payload.iter().flatten().copied()),
+        // Smallest and largest position of each joint, deg or mm.
+        "region": (0..recording.joints).filter_map(region).collect::<Vec<_>>(),
+        "slides": recording.prismatic.contains(&true),
+        "not_observable": diagnosis.map(|row| tables.statements(&row.step, VerdictTopic::NotObservable)).unwrap_or_default(),
+    })
+}
+
+/// The least and the largest; none where there is no number.
+fn extent(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let finite = values.filter(|value| value.is_finite());
+    finite.fold(None, |ends, value| {
+        let [lower, upper] = ends.unwrap_or([value; 2]);
+        Some([lower.min(value), upper.max(value)])
+    })
+}
+
+/// The class of its colour. Green is what is within the limits and explained; nothing else.
+fn kind(
+    judgement: Option<&Judgement>,
+    diagnosis: Option<&VerdictRow>,
+    course: Option<(&StatisticsRow, &StatisticsRow)>,
+) -> &'static str {
+    let is_explained = diagnosis
+        .is_some_and(|row| ["explained", "nothing_missing"].contains(&row.verdict.as_str()));
+    match judgement {
+        Some(judged) if !judged.kept => "refused",
+        _ if course.is_some_and(|(before, after)| after.mean_mm >= before.mean_mm) => "worse",
+        Some(_) if is_explained => "better",
+        None if is_explained => "unknown",
+        _ => "open",
+    }
 }
 
 /// What the user accepts, mm; of held-out points of the diagnosed model, without a diagnosis after the last step.
@@ -247,8 +88,11 @@ pub struct AcceptanceLimits {
 }
 
 #[derive(Debug)]
-pub(super) struct Judgement {
-    pub(crate) sentence: String,
+pub(super) struct Judgement<'a> {
+    /// What is wrong with the set-up, where something is.
+    wrong: Option<String>,
+    /// What is judged.
+    row: Option<&'a StatisticsRow>,
     /// Limits as they were set; none where a wrong set-up alone is not accepted.
     pub(crate) limits: Vec<AcceptanceRow>,
     pub(crate) kept: bool,
@@ -266,9 +110,9 @@ pub(super) fn judged<'a>(tables: &'a Tables, set: Option<&str>) -> Option<&'a St
     rows.max_by_key(|row| row.points)
 }
 
-impl Judgement {
+impl<'a> Judgement<'a> {
     /// None where there are no limits and the set-up is right.
-    pub fn new(tables: &Tables, limits: &AcceptanceLimits, set: Option<&str>) -> Option<Self> {
+    pub fn new(tables: &'a Tables, limits: &AcceptanceLimits, set: Option<&str>) -> Option<Self> {
         let figures = [
             ("mean", limits.mean_mm),
             ("95 % of the points", limits.p95_mm),
@@ -292,20 +136,11 @@ impl Judgement {
             && asked
                 .iter()
                 .all(|(_, found, limit)| is_within(*found, *limit));
-        let sentence = match (wrong, row) {
-            (Some(wrong), _) => format!("Not accepted: {wrong}."),
-            (None, None) => "The limits cannot be judged: no points were held out.".into(),
-            (None, Some(row)) => format!(
-                "{} the limits at {} held-out points of set {}, step {}.",
-                if kept {
-                    "Accepted: within"
-                } else {
-                    "Not accepted: beyond"
-                },
-                row.points,
-                row.set,
-                row.step
-            ),
+        let judgement = Self {
+            wrong,
+            row,
+            limits: Vec::new(),
+            kept,
         };
         let limit =
             |(order, (name, found_mm, limit_mm)): (i64, (&str, Option<f64>, f64))| AcceptanceRow {
@@ -315,14 +150,47 @@ impl Judgement {
                 limit_mm,
                 kept: is_within(found_mm, limit_mm),
                 accepted: kept,
-                sentence: sentence.clone(),
+                sentence: judgement.sentence(&Locale::default()),
             };
         let limits = (1..).zip(asked).map(limit).collect();
         Some(Self {
-            sentence,
             limits,
-            kept,
+            ..judgement
         })
+    }
+
+    /// The judgement in a sentence.
+    pub(crate) fn sentence(&self, locale: &Locale) -> String {
+        let Some(row) = self.row else {
+            return match &self.wrong {
+                Some(wrong) => say!(
+                    locale,
+                    "Not accepted: {wrong}.",
+                    wrong = locale.stored(wrong)
+                ),
+                None => say!(
+                    locale,
+                    "The limits cannot be judged: no points were held out."
+                ),
+            };
+        };
+        let (points, set, step) = (row.points, &row.set, &row.step);
+        match self.kept {
+            true => say!(
+                locale,
+                "Accepted: within the limits at {points} held-out points of set {set}, step {step}.",
+                points,
+                set,
+                step
+            ),
+            false => say!(
+                locale,
+                "Not accepted: beyond the limits at {points} held-out points of set {set}, step {step}.",
+                points,
+                set,
+                step
+            ),
+        }
     }
 
     /// Limits with what was found.

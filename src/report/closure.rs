@@ -1,13 +1,15 @@
 //! How well the ball comes back to every socket, plane and sphere, before and after: a picture and a table.
 
 use super::Tables;
-use super::number::mm;
+use super::language::{Locale, say};
 use super::svg::{Area, Scale, Svg, baseline, name_x};
 use crate::table::{Prediction, PredictionRow};
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// What one fixture has, mm.
+/// What one fixture has: mean and largest distance, mm.
+#[derive(Serialize)]
 struct FixtureFigures {
     name: String,
     count: usize,
@@ -23,24 +25,18 @@ const ROW: f64 = 20.0;
 const MOST: usize = 40;
 
 /// Nothing where no row is a contact, or nothing was predicted.
-pub(super) fn section(tables: &Tables) -> Option<Value> {
+pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
     let all = closings(tables)?;
     let name = |table: Option<&Prediction>| {
         table
             .and_then(|table| table.0.first())
             .map(|row| row.step.clone())
     };
-    let rows = all.iter().map(|own| {
-        let [before, after] = [own.before, own.after].map(|pair| pair.map(mm));
-        let [[a, b], [c, d]] = [before, after];
-        [own.name.clone(), own.count.to_string(), a, b, c, d]
-    });
     Some(json!({
         "before": name(tables.prediction.first())?,
         "after": name(standing(tables))?,
-        "picture": picture(&all[..all.len().min(MOST)]),
-        // Name, rows, mean and largest before, mean and largest after, mm.
-        "rows": rows.collect::<Vec<_>>(),
+        "picture": picture(locale, &all[..all.len().min(MOST)]),
+        "rows": &all,
         // Fixtures beyond those of the picture.
         "more": all.len().saturating_sub(MOST),
     }))
@@ -90,7 +86,7 @@ fn closings(tables: &Tables) -> Option<Vec<FixtureFigures>> {
     (!all.is_empty()).then_some(all)
 }
 
-fn picture(all: &[FixtureFigures]) -> String {
+fn picture(locale: &Locale, all: &[FixtureFigures]) -> String {
     let area = Area::new([LEFT, 8.0, WIDTH - 12.0, 8.0 + ROW * all.len() as f64]);
     let means = || {
         all.iter()
@@ -102,7 +98,7 @@ fn picture(all: &[FixtureFigures]) -> String {
         means().fold(0.0, f64::max),
     );
     let scale = Scale::positive(0.5 * lower.min(upper), upper).over(area.left, area.right);
-    let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
+    let mut svg = Svg::new(locale, WIDTH, area.bottom + 38.0);
     scale.grid_x(&mut svg, area, 7);
     for (k, own) in all.iter().enumerate() {
         let top = area.top + ROW * k as f64;
@@ -123,7 +119,7 @@ fn picture(all: &[FixtureFigures]) -> String {
     name_x(
         &mut svg,
         area,
-        "mean distance of the ball from where it lay, mm",
+        &say!(locale, "mean distance of the ball from where it lay, mm"),
     );
-    svg.finish("Closure by fixture, before and after")
+    svg.finish(&say!(locale, "Closure by fixture, before and after"))
 }

@@ -1,7 +1,8 @@
 //! The robot, the recording, and what was read, used and rejected.
 
 use super::Tables;
-use super::number::{count, fixed};
+use super::language::{Locale, say};
+use super::number::count;
 use crate::table::{RejectedRow, Robot, RobotRow};
 use crate::units::Unit;
 use serde_json::{Value, json};
@@ -11,24 +12,32 @@ use std::collections::{BTreeMap, BTreeSet};
 const LISTED: usize = 50;
 
 /// The base's name is the robot's.
-pub(super) fn robot_name(robot: &Robot) -> String {
+pub(super) fn robot_name(locale: &Locale, robot: &Robot) -> String {
     let base = robot.0.iter().find(|body| body.kind == "base");
-    base.map(|body| body.name.trim())
+    base.map(|body| body.name.trim().to_owned())
         .filter(|name| !name.is_empty())
-        .unwrap_or("a robot without a name")
-        .to_owned()
+        .unwrap_or_else(|| say!(locale, "a robot without a name"))
 }
 
-pub(super) fn section(tables: &Tables) -> Value {
+pub(super) fn section(locale: &Locale, tables: &Tables) -> Value {
     let recording = &tables.recording;
     let quantities = [
-        (recording.position_sigma.is_some(), "measurement sigma"),
-        (recording.time.is_some(), "time"),
-        (recording.payload.is_some(), "payload"),
-        (recording.temperature.is_some(), "temperature"),
-        (recording.current.is_some(), "motor current"),
-        (recording.direction.is_some(), "direction of approach"),
-        (recording.velocity.is_some(), "joint velocities"),
+        (
+            recording.position_sigma.is_some(),
+            say!(locale, "measurement sigma"),
+        ),
+        (recording.time.is_some(), say!(locale, "time")),
+        (recording.payload.is_some(), say!(locale, "payload")),
+        (recording.temperature.is_some(), say!(locale, "temperature")),
+        (recording.current.is_some(), say!(locale, "motor current")),
+        (
+            recording.direction.is_some(),
+            say!(locale, "direction of approach"),
+        ),
+        (
+            recording.velocity.is_some(),
+            say!(locale, "joint velocities"),
+        ),
     ];
     let mut sets: BTreeMap<&str, i64> = BTreeMap::new();
     for row in &tables.split.0 {
@@ -37,33 +46,43 @@ pub(super) fn section(tables: &Tables) -> Value {
     let rejected: Vec<&RejectedRow> = tables.rejected.iter().flat_map(|table| &table.0).collect();
     let reasons: BTreeSet<&String> = rejected.iter().map(|row| &row.reason).collect();
     json!({
-        "joints": joints(&tables.robot),
-        "tool": tool(&tables.robot),
+        "joints": joints(locale, &tables.robot),
+        "tool": tool(locale, &tables.robot),
         "points": count(recording.rows() as i64),
-        "quantities": quantities.into_iter().filter_map(|(there, name)| there.then_some(name)).collect::<Vec<_>>(),
+        "quantities": quantities.into_iter().filter_map(|(there, name)| there.then_some(name)).collect::<Vec<_>>().join(", "),
         // Set and its rows.
-        "sets": sets.into_iter().map(|(name, rows)| (name, count(rows))).collect::<Vec<_>>(),
+        "sets": sets.into_iter().map(|(name, rows)| format!("{name} {}", count(rows))).collect::<Vec<_>>().join(", "),
         "files": tables.intake.iter().flat_map(|table| &table.0).collect::<Vec<_>>(),
         "reasons": reasons.into_iter().cloned().collect::<Vec<_>>(),
         "rejected": rejected.iter().take(LISTED).collect::<Vec<_>>(),
         "rejected_count": count(rejected.len() as i64),
         "unlisted": rejected.len() > LISTED,
         // Table kind and its rows, as read by the report; a sum where several stages wrote one.
-        "tables": kinds(tables),
+        "tables": kinds(locale, tables),
     })
 }
 
-fn joints(robot: &Robot) -> Vec<Value> {
+fn joints(locale: &Locale, robot: &Robot) -> Vec<Value> {
     let is_joint = |body: &&RobotRow| body.kind == "revolute" || body.kind == "prismatic";
     let with_travel = |body: &RobotRow| {
         let mut joint = json!(body);
-        let degrees = |v| fixed(Unit::Degree.from_si(v), 1);
+        let degrees = |v| locale.fixed(Unit::Degree.from_si(v), 1);
         let travel = match (
             body.lower_rad.zip(body.upper_rad),
             body.lower_mm.zip(body.upper_mm),
         ) {
-            (Some((from, to)), _) => format!("{} to {} deg", degrees(from), degrees(to)),
-            (None, Some((from, to))) => format!("{} to {} mm", fixed(from, 1), fixed(to, 1)),
+            (Some((from, to)), _) => {
+                say!(
+                    locale,
+                    "{from} to {to} deg",
+                    from = degrees(from),
+                    to = degrees(to)
+                )
+            }
+            (None, Some((from, to))) => {
+                let [from, to] = [from, to].map(|v| locale.fixed(v, 1));
+                say!(locale, "{from} to {to} mm", from, to)
+            }
             (None, None) => String::new(),
         };
         joint["travel"] = travel.into();
@@ -72,67 +91,65 @@ fn joints(robot: &Robot) -> Vec<Value> {
     robot.0.iter().filter(is_joint).map(with_travel).collect()
 }
 
-fn tool(robot: &Robot) -> Option<String> {
+fn tool(locale: &Locale, robot: &Robot) -> Option<String> {
     let tool = robot.0.iter().find(|body| body.kind == "tool")?;
-    let mass = tool
-        .mass_kg
-        .filter(|kg| *kg > 0.0)
-        .map_or_else(String::new, |kg| {
-            format!(", rated payload {} kg", fixed(kg, 1))
-        });
-    let point = [tool.point_x_mm?, tool.point_y_mm?, tool.point_z_mm?]
-        .map(|v| fixed(v, 3))
-        .join(", ");
-    Some(format!("{point} mm{mass}"))
+    let [x, y, z] =
+        [tool.point_x_mm?, tool.point_y_mm?, tool.point_z_mm?].map(|v| locale.fixed(v, 3));
+    let point = say!(locale, "{x}, {y}, {z}", x, y, z);
+    Some(match tool.mass_kg.filter(|kg| *kg > 0.0) {
+        Some(kg) => {
+            let mass = locale.fixed(kg, 1);
+            say!(
+                locale,
+                "measured point {point} mm, rated payload {mass} kg",
+                point,
+                mass
+            )
+        }
+        None => say!(locale, "measured point {point} mm", point),
+    })
 }
 
-fn kinds(tables: &Tables) -> Vec<(&'static str, String)> {
-    let one = |rows: usize| vec![rows];
-    let kinds: [(&str, Vec<usize>); 15] = [
-        ("robot", one(tables.robot.0.len())),
-        ("recording", one(tables.recording.rows())),
-        ("intake", tables.intake.iter().map(|t| t.0.len()).collect()),
+fn kinds(locale: &Locale, tables: &Tables) -> Vec<(&'static str, String)> {
+    fn of<'a, T: 'a>(
+        tables: impl IntoIterator<Item = &'a T>,
+        rows: fn(&T) -> usize,
+    ) -> Vec<String> {
+        let tables = tables.into_iter();
+        tables.map(|table| count(rows(table) as i64)).collect()
+    }
+    let kinds = [
+        ("robot", of([&tables.robot], |table| table.0.len())),
+        ("recording", of([&tables.recording], |table| table.rows())),
+        ("intake", of(&tables.intake, |table| table.0.len())),
+        ("rejected", of(&tables.rejected, |table| table.0.len())),
+        ("split", of([&tables.split], |table| table.0.len())),
         (
-            "rejected",
-            tables.rejected.iter().map(|t| t.0.len()).collect(),
+            "parameters",
+            of([&tables.parameters], |table| table.0.len()),
         ),
-        ("split", one(tables.split.0.len())),
-        ("parameters", one(tables.parameters.0.len())),
-        ("fit", tables.fit.iter().map(|t| t.0.len()).collect()),
+        ("fit", of(&tables.fit, |table| table.0.len())),
         (
             "observability",
-            tables.observability.iter().map(|t| t.0.len()).collect(),
+            of(&tables.observability, |table| table.0.len()),
         ),
-        (
-            "training",
-            tables.training.iter().map(|t| t.0.len()).collect(),
-        ),
+        ("training", of(&tables.training, |table| table.0.len())),
         (
             "corrections",
-            tables.corrections.iter().map(|t| t.0.len()).collect(),
+            of(&tables.corrections, |table| table.0.len()),
         ),
+        ("prediction", of(&tables.prediction, |table| table.0.len())),
         (
-            "prediction",
-            tables.prediction.iter().map(|t| t.0.len()).collect(),
+            "statistics",
+            of([&tables.statistics], |table| table.0.len()),
         ),
-        ("statistics", one(tables.statistics.0.len())),
-        (
-            "suspects",
-            tables.suspects.iter().map(|t| t.0.len()).collect(),
-        ),
-        (
-            "findings",
-            tables.findings.iter().map(|t| t.0.len()).collect(),
-        ),
-        ("curves", one(tables.curves.0.len())),
+        ("suspects", of(&tables.suspects, |table| table.0.len())),
+        ("findings", of(&tables.findings, |table| table.0.len())),
+        ("curves", of([&tables.curves], |table| table.0.len())),
     ];
-    let of = |lengths: Vec<usize>| {
-        let texts: Vec<String> = lengths.into_iter().map(|n| count(n as i64)).collect();
-        if texts.is_empty() {
-            "not written".into()
-        } else {
-            format!("{} rows", texts.join(" + "))
-        }
+    let words = |lengths: Vec<String>| match lengths.is_empty() {
+        true => say!(locale, "not written"),
+        false => say!(locale, "{rows} rows", rows = lengths.join(" + ")),
     };
-    kinds.map(|(kind, lengths)| (kind, of(lengths))).into()
+    kinds.map(|(kind, lengths)| (kind, words(lengths))).into()
 }

@@ -2,18 +2,18 @@
 
 use super::Tables;
 use super::findings::wrong_setup;
-use super::number::{count, mm};
+use super::language::{Locale, say};
+use super::number::count;
 use super::workspace::{Colours, StepErrors, VIEWS, cumulative, histogram, scatter};
 use crate::error::{Error, Result};
-use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED, Withdrawn};
+use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED};
 use serde_json::{Value, json};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// The steps in pipeline order, each with the colour it has in all pictures.
 pub(super) struct Steps {
     names: BTreeMap<i64, String>,
     standing: Option<i64>,
-    withdrawn: BTreeSet<String>,
 }
 
 impl Steps {
@@ -32,22 +32,6 @@ impl Steps {
         Self {
             standing: named.map(|(order, _)| *order),
             names,
-            withdrawn: BTreeSet::new(),
-        }
-    }
-    /// The same with steps that do not stand.
-    pub(crate) fn without(self, withdrawn: &[Withdrawn]) -> Self {
-        Self {
-            withdrawn: withdrawn.iter().map(|gone| gone.step.clone()).collect(),
-            ..self
-        }
-    }
-    /// How a step is called where its figures stand.
-    fn called(&self, step: &str) -> String {
-        if self.withdrawn.contains(step) {
-            format!("{step} (withdrawn)")
-        } else {
-            step.into()
         }
     }
     pub fn standing(&self) -> Option<i64> {
@@ -74,19 +58,20 @@ impl Steps {
 }
 
 /// What is left out together, beside parts drawn at random.
-fn blocks(rows: &[StatisticsRow]) -> &'static str {
+fn blocks(locale: &Locale, rows: &[StatisticsRow]) -> String {
     let folded = || rows.iter().filter(|row| row.fold_rms_mm.is_some());
     match (
         folded().any(StatisticsRow::is_contact),
         folded().all(StatisticsRow::is_contact),
     ) {
-        (true, true) => "whole places",
-        (true, false) => "contiguous parts of the recording; whole places",
-        (false, _) => "contiguous parts of the recording",
+        (true, true) => say!(locale, "whole places"),
+        (true, false) => say!(locale, "contiguous parts of the recording; whole places"),
+        (false, _) => say!(locale, "contiguous parts of the recording"),
     }
 }
 
 pub(super) fn errors_section(
+    locale: &Locale,
     tables: &Tables,
     steps: &Steps,
     wished: Option<&str>,
@@ -113,7 +98,7 @@ pub(super) fn errors_section(
     let later = sets(rows, true)
         .into_iter()
         .filter(|set| !kept.contains(set));
-    let block = |set: &str, held_out: bool, note| {
+    let block = |set: &str, held_out: bool, note: Option<String>| {
         json!({
             "set": set,
             "note": note,
@@ -125,25 +110,26 @@ pub(super) fn errors_section(
         block(
             set,
             true,
-            Some("held out until a later step was fitted to it"),
+            Some(say!(locale, "held out until a later step was fitted to it")),
         )
     });
     Ok(json!({
-        "verdict": match wrong_setup(tables) {
-            Some(_) => nothing_known("Nothing is calibrated before the set-up is right.".into()),
-            None => verdict(rows, &last, &tables.withdrawn),
-        },
+        "wrong": wrong_setup(tables).is_some(),
+        // The sets still held out after the step that stands, before and after; the first is what the page speaks of.
+        "judged": last.iter().map(|after| json!({ "before": before(rows, after), "after": after })).collect::<Vec<_>>(),
+        "withdrawn": tables.withdrawn.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "doubts": last.first().and_then(|after| after.doubts()),
         // Sets still held out after the step that stands, the verdict's first; then those that a later step was fitted to.
         "held_out": held_out.chain(used).collect::<Vec<_>>(),
         "training": sets(rows, false).into_iter().map(|set| block(set, false, None)).collect::<Vec<_>>(),
         "folds": rows.iter().filter(|row| row.fold_rms_mm.is_some()).map(|r| row(r, steps)).collect::<Vec<_>>(),
         // What the second kind of folds is.
-        "blocks": blocks(rows),
+        "blocks": blocks(locale, rows),
         // Steps whose cross-validation was dropped, and the number of poses.
         "unfolded": unfolded(tables),
         "references": rows.iter().filter(|row| row.reference.is_some()).collect::<Vec<_>>(),
-        "pictures": last.iter().map(|row| picture(tables, row, steps)).collect::<Vec<_>>(),
-        "legend": steps.names.iter().map(|(order, step)| (steps.colour(*order), steps.called(step))).collect::<Vec<_>>(),
+        "pictures": last.iter().map(|row| picture(locale, tables, row, steps)).collect::<Vec<_>>(),
+        "legend": steps.names.iter().map(|(order, step)| (steps.colour(*order), step)).collect::<Vec<_>>(),
     }))
 }
 
@@ -168,10 +154,9 @@ fn sets(rows: &[StatisticsRow], held_out: bool) -> Vec<&str> {
     names
 }
 
-/// A row with what its step is called, its colour, and whether it is the step that stands.
+/// A row with the colour of its step, and whether it is the step that stands.
 fn row(row: &StatisticsRow, steps: &Steps) -> Value {
     let mut shown = json!(row);
-    shown["called"] = steps.called(&row.step).into();
     shown["colour"] = steps.colour(row.order).into();
     shown["last"] = (Some(row.order) == steps.standing()).into();
     shown
@@ -187,79 +172,7 @@ pub(super) fn before<'a>(
         .min_by_key(|r| r.order)
 }
 
-fn points(number: i64) -> String {
-    if number == 1 {
-        "one point".into()
-    } else {
-        format!("{} points", count(number))
-    }
-}
-
-/// A sentence without figures.
-fn nothing_known(sentence: String) -> Value {
-    json!({ "sentence": sentence, "others": [] })
-}
-
-fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdrawn]) -> Value {
-    let Some(after) = last.first() else {
-        let sentence = "No point was held out, so the accuracy on new poses is not known. The figures below are for points that \
-                        the model was fitted to, and flatter it.";
-        return nothing_known(sentence.into());
-    };
-    let before_row = before(rows, after);
-    let sample = format!(
-        "{} of the set \u{201c}{}\u{201d}, to which nothing was fitted",
-        points(after.points),
-        after.set
-    );
-    let sentence = match before_row {
-        Some(before) if after.mean_mm < before.mean_mm => {
-            format!(
-                "The mean position error fell from {} mm to {} mm on {sample}.",
-                mm(before.mean_mm),
-                mm(after.mean_mm)
-            )
-        }
-        Some(before) => format!(
-            "The calibration did not help: the mean position error went from {} mm to {} mm on {sample}.",
-            mm(before.mean_mm),
-            mm(after.mean_mm)
-        ),
-        None => format!(
-            "The mean position error is {} mm on {sample}.",
-            mm(after.mean_mm)
-        ),
-    };
-    let uneven = before_row
-        .filter(|before| before.points != after.points)
-        .map(|before| {
-            format!(
-                "Before, the set had {} held-out points; the two means are not of the same points.",
-                count(before.points)
-            )
-        });
-    let other = |row: &&StatisticsRow| {
-        let from = before(rows, row).map_or_else(String::new, |before| {
-            format!("{} mm \u{2192} ", mm(before.mean_mm))
-        });
-        format!(
-            "Set \u{201c}{}\u{201d} ({} held-out points): mean {from}{} mm.",
-            row.set,
-            count(row.points),
-            mm(row.mean_mm)
-        )
-    };
-    json!({
-        "sentence": sentence,
-        "others": (withdrawn.iter().map(|gone| format!("{gone}.")))
-            .chain(uneven)
-            .chain(after.doubts().map(|line| format!("{line}.")))
-            .chain(last.iter().skip(1).map(other))
-            .collect::<Vec<_>>(),
-    })
-}
-
-fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Value {
+fn picture(locale: &Locale, tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Value {
     let rows = tables
         .statistics
         .0
@@ -283,13 +196,14 @@ fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Value {
     json!({
         "set": set.set,
         "points": count(set.points),
-        "histogram": histogram(&errors, &format!("Histogram of the position error after each step, set {}", set.set)),
-        "cumulative": cumulative(&errors, &format!("Cumulative position error after each step, set {}", set.set)),
+        "histogram": histogram(locale, &errors, &say!(locale, "Histogram of the position error after each step, set {set}", set = set.set)),
+        "cumulative": cumulative(locale, &errors, &say!(locale, "Cumulative position error after each step, set {set}", set = set.set)),
     })
 }
 
 /// Nothing where nothing was predicted.
 pub(super) fn workspace_section(
+    locale: &Locale,
     prediction: &[Prediction],
     standing: Option<&str>,
 ) -> Option<Value> {
@@ -307,11 +221,17 @@ pub(super) fn workspace_section(
     for view in VIEWS {
         for table in std::iter::once(first).chain(last) {
             let step = table.0.first().map_or("", |row| &row.step);
-            let name = format!("{} after \u{201c}{step}\u{201d}", view.name);
-            let (svg, remark) =
-                scatter(view, table, [first, last.unwrap_or(first)], &colours, &name);
+            let name = say!(locale, "{view} after “{step}”", view = view.name, step);
+            let (svg, remark) = scatter(
+                locale,
+                view,
+                table,
+                [first, last.unwrap_or(first)],
+                &colours,
+                &name,
+            );
             panels.push(json!({ "name": name, "remark": remark, "svg": svg }));
         }
     }
-    Some(json!({ "legend": colours.legend(), "panels": panels }))
+    Some(json!({ "legend": colours.legend(locale), "panels": panels }))
 }

@@ -1,5 +1,6 @@
 //! A fleet as one self-contained page: every robot a row, sorted and filtered in the browser without a request.
 
+use super::language::Locale;
 use super::number::render;
 use super::svg::Svg;
 use crate::error::{Result, visible};
@@ -44,7 +45,12 @@ pub fn html(
         "compared": fleet.0.iter().any(|row| row.changes.is_some()),
         "grouped": fleet.0.iter().any(|row| row.model.is_some() || row.plant.is_some() || row.campaign.is_some()),
     });
-    render("fleet.html", include_str!("fleet.html"), page)
+    render(
+        &Locale::default(),
+        "fleet.html",
+        include_str!("fleet.html"),
+        page,
+    )
 }
 
 /// Robots that are named above the table, at most.
@@ -145,7 +151,8 @@ fn spark(course: &str, floor: Option<f64>) -> Option<String> {
         .enumerate()
         .map(|(i, value)| [2.0 + step * i as f64, height(*value)])
         .collect();
-    let mut svg = Svg::new(SIZE[0], SIZE[1]);
+    let locale = Locale::default();
+    let mut svg = Svg::new(&locale, SIZE[0], SIZE[1]);
     if let Some(floor) = floor {
         svg.line("floor", [0.0, height(floor)], [SIZE[0], height(floor)]);
     }

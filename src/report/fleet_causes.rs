@@ -1,5 +1,6 @@
 //! What the robots of a fleet have in common, as one self-contained page: the table of causes, every robot's size, who needs a technician.
 
+use super::language::Locale;
 use super::number::render;
 use super::svg::Svg;
 use crate::error::{Result, counted, visible};
@@ -66,7 +67,12 @@ pub fn html(
         "heads": shared.iter().map(|row| words(&row.effect, &row.place)).collect::<Vec<_>>(),
         "robots": robots(&shared, cells),
     });
-    render("fleet_causes.html", include_str!("fleet_causes.html"), page)
+    render(
+        &Locale::default(),
+        "fleet_causes.html",
+        include_str!("fleet_causes.html"),
+        page,
+    )
 }
 
 fn words(effect: &str, place: &str) -> String {
@@ -183,7 +189,8 @@ fn strip(robots: &[&FleetCellRow], usual: f64) -> String {
         .map(|lane| high(lane.len()) + 8.0)
         .sum::<f64>()
         + 22.0;
-    let mut svg = Svg::new(WIDTH[0], height);
+    let locale = Locale::default();
+    let mut svg = Svg::new(&locale, WIDTH[0], height);
     let mut top = 2.0;
     for (name, mut lane) in lanes {
         lane.sort_by(|a, b| a.size_mm.total_cmp(&b.size_mm));

@@ -1,6 +1,7 @@
 //! `report.json`: what the report says, for other programs. Every figure is a column of a table.
 
 use super::certificate::Judgement;
+use super::language::Locale;
 use super::{ReportOptions, Tables};
 use crate::error::Result;
 use crate::table::{VerdictTopic, picked, picked_of};
@@ -10,7 +11,7 @@ use serde_json::json;
 pub(super) fn document(
     tables: &Tables,
     options: &ReportOptions,
-    title: &str,
+    (robot, title): (String, String),
     judgement: Option<&Judgement>,
 ) -> Result<String> {
     let findings = tables
@@ -18,24 +19,20 @@ pub(super) fn document(
         .iter()
         .flat_map(|table| &table.0)
         .map(|row| {
-            let (numbers, rivals) = (tables.finding_numbers.iter(), tables.rivals.iter());
-            let numbers = numbers
-                .flat_map(|table| &table.0)
-                .filter(|number| number.rank == row.rank);
-            let rivals = rivals
-                .flat_map(|table| &table.0)
-                .filter(|rival| rival.rank == row.rank);
             let columns =
                 "rank effect where=place statement probability place_probability none_probability";
             let mut finding = picked(row, columns);
-            finding["numbers"] = picked_of(numbers, "name value unit sigma");
+            finding["numbers"] = picked_of(tables.numbers(row.rank), "name value unit sigma");
             finding["evidence"] = picked(row, "f_statistic p_value delta_bic heldout_gain_mm");
             finding["forms"] = tables
                 .forms
                 .iter()
                 .flat_map(|table| table.document(row.rank))
                 .collect();
-            finding["rivals"] = picked_of(rivals, "effect where=place delta_bic probability");
+            finding["rivals"] = picked_of(
+                tables.rivals(row.rank),
+                "effect where=place delta_bic probability",
+            );
             finding
         });
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back().map(|row| {
@@ -47,7 +44,7 @@ pub(super) fn document(
     let limits = judgement.map(|judgement| {
         let figures = judgement.found().map(|(row, _)| row);
         json!({
-            "asked": !judgement.limits.is_empty(), "kept": judgement.kept, "sentence": judgement.sentence,
+            "asked": !judgement.limits.is_empty(), "kept": judgement.kept, "sentence": judgement.sentence(&Locale::default()),
             "figures": picked_of(figures, "figure found_mm limit_mm kept"),
         })
     });
@@ -58,7 +55,7 @@ pub(super) fn document(
     let document = json!({
         "calib_report": 1,
         "title": title,
-        "robot": super::data::robot_name(&tables.robot),
+        "robot": robot,
         "calib": env!("CARGO_PKG_VERSION"),
         "identity": options.identity,
         "standing": tables.standing,

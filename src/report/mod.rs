@@ -21,16 +21,17 @@ mod torques;
 mod workspace;
 
 pub use achieved::{AchievedTables, achieved_page};
-pub use causes::{DiagnosedTables, diagnosed_page};
+pub use causes::diagnosed_page;
 pub use certificate::AcceptanceLimits;
-pub use language::{PageLanguage, Translation};
+pub use language::PageLanguage;
+use language::{Locale, say};
 pub use torques::{TorqueTables, torque_page};
 
 use crate::error::Result;
 use crate::table::{
-    Acceptance, Cells, Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake,
-    Observability, Parameters, Prediction, Recording, Rejected, Rivals, Robot, Split, Statistics,
-    Suspects, Training, Verdict, VerdictSentences, VerdictTopic, Withdrawn,
+    Acceptance, Cells, Corrections, Curves, FindingNumberRow, FindingNumbers, Findings, Fit, Forms,
+    Intake, Observability, Parameters, Prediction, Recording, Rejected, RivalRow, Rivals, Robot,
+    Split, Statistics, Suspects, Training, Verdict, VerdictSentences, VerdictTopic, Withdrawn,
 };
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -88,6 +89,18 @@ pub(crate) struct Tables {
 }
 
 impl Tables {
+    /// Numbers of a finding.
+    fn numbers(&self, rank: i64) -> impl Iterator<Item = &FindingNumberRow> {
+        let all = self.finding_numbers.iter().flat_map(|table| &table.0);
+        all.filter(move |number| number.rank == rank)
+    }
+
+    /// Rivals of a finding.
+    fn rivals(&self, rank: i64) -> impl Iterator<Item = &RivalRow> {
+        let all = self.rivals.iter().flat_map(|table| &table.0);
+        all.filter(move |rival| rival.rank == rank)
+    }
+
     /// What the diagnosis of a step says of a topic.
     fn statements(&self, step: &str, topic: VerdictTopic) -> Vec<&str> {
         self.sentences
@@ -121,44 +134,53 @@ pub(crate) struct Pages {
     pub(crate) json: String,
     /// The user's limits and what was found.
     pub(crate) acceptance: Acceptance,
+    /// What the page says in English since its language lacks it.
+    pub(crate) missing: Vec<String>,
 }
 
 /// The report; fails where `options.set` is no held-out set.
 pub(crate) fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
-    let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref())
-        .without(&tables.withdrawn);
-    let robot = data::robot_name(&tables.robot);
+    let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref());
     let judgement = certificate::Judgement::new(tables, &options.limits, options.set);
-    let title = options
-        .title
-        .map_or_else(|| format!("Calibration of {robot}"), str::to_owned);
-    let json = json::document(tables, options, &title, judgement.as_ref())?;
+    let head = |locale: &Locale| {
+        let robot = data::robot_name(locale, &tables.robot);
+        let title = options.title.map(str::to_owned);
+        let title = title.unwrap_or_else(|| say!(locale, "Calibration of {robot}", robot));
+        (robot, title)
+    };
+    let json = json::document(
+        tables,
+        options,
+        head(&Locale::default()),
+        judgement.as_ref(),
+    )?;
+    let locale = &Locale::new(options.language);
+    let (robot, title) = head(locale);
     let choices = [("title", options.title), ("set", options.set)];
     let page = json!({
         "title": title,
-        "certificate": certificate::certificate(tables, &robot, options.identity, judgement.as_ref(), options.set),
-        "has_identity": !options.identity.is_empty(),
+        "certificate": certificate::certificate(locale, tables, judgement.as_ref(), options.set),
+        "identity": options.identity,
         "hashes": &options.hashes,
-        "diagnosis": findings::section(tables),
-        "errors": errors::errors_section(tables, &steps, options.set)?,
-        "closure": closure::section(tables),
-        "workspace": errors::workspace_section(&tables.prediction, tables.standing.as_deref()),
-        "parameters": parameters::section(&tables.parameters, tables.counting.as_deref()),
-        "fits": fits::section(tables, &steps),
+        "diagnosis": findings::section(locale, tables),
+        "errors": errors::errors_section(locale, tables, &steps, options.set)?,
+        "closure": closure::section(locale, tables),
+        "workspace": errors::workspace_section(locale, &tables.prediction, tables.standing.as_deref()),
+        "parameters": parameters::section(locale, &tables.parameters, tables.counting.as_deref()),
+        "fits": fits::section(locale, tables, &steps),
         "comparisons": fits::comparisons(tables),
-        "data": data::section(tables),
+        "data": data::section(locale, tables),
         "choices": choices.into_iter().filter(|(_, value)| value.is_some()).collect::<Vec<_>>(),
         "robot": robot,
+        // Steps that do not stand.
+        "withdrawn": tables.withdrawn.iter().map(|gone| &gone.step).collect::<Vec<_>>(),
     });
-    let html = number::render("report.html", include_str!("report.html"), page)?;
-    let acceptance = Acceptance(
-        judgement
-            .map(|judgement| judgement.limits)
-            .unwrap_or_default(),
-    );
+    let html = number::render(locale, "report.html", include_str!("report.html"), page)?;
+    let limits = judgement.map(|judgement| judgement.limits);
     Ok(Pages {
-        html: options.language.page(html).html,
+        html,
         json,
-        acceptance,
+        acceptance: Acceptance(limits.unwrap_or_default()),
+        missing: locale.missing(),
     })
 }

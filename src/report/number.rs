@@ -2,6 +2,7 @@
 //!
 //! Templates to HTML: one head for every page, and no name that does not exist.
 
+use super::language::Locale;
 use crate::error::{Error, Result};
 use crate::units::{Quantity, Unit};
 use minijinja::value::Serde;
@@ -75,6 +76,19 @@ pub(super) fn count(value: i64) -> String {
     if value < 0 { format!("-{out}") } else { out }
 }
 
+/// The same in the language of a page.
+impl Locale {
+    pub(crate) fn fixed(&self, value: f64, decimals: usize) -> String {
+        self.decimal(fixed(value, decimals))
+    }
+    pub(crate) fn mm(&self, value: f64) -> String {
+        self.decimal(mm(value))
+    }
+    pub(crate) fn significant(&self, value: f64, digits: usize) -> String {
+        self.decimal(significant(value, digits))
+    }
+}
+
 /// How a person reads a unit of the tables: a factor, a symbol and the usual decimals.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct UnitFormat {
@@ -138,7 +152,12 @@ impl UnitFormat {
 
 /// The page of a template, behind the head, for which it has `title`, and where they are not those of the report `style` and `policy` (what
 /// the page may load and run). Fails where the template asks for what the page does not have.
-pub(super) fn render(name: &str, template: &str, mut page: Value) -> Result<String> {
+pub(super) fn render(
+    locale: &Locale,
+    name: &str,
+    template: &str,
+    mut page: Value,
+) -> Result<String> {
     let usual = [
         ("version", env!("CARGO_PKG_VERSION")),
         ("policy", ""),
@@ -153,28 +172,32 @@ pub(super) fn render(name: &str, template: &str, mut page: Value) -> Result<Stri
     let mut environment = Environment::new();
     // A name in the template that does not exist is a bug, not an empty cell.
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
+    locale.teach(&mut environment);
     // Figures of rows; of none an empty cell.
-    let filled = |value: Option<String>| value.unwrap_or_default();
-    environment.add_filter("mm", move |value: Option<f64>| filled(value.map(mm)));
+    let (of_fixed, of_significant) = (locale.clone(), locale.clone());
+    let (of_signed, of_decimal) = (locale.clone(), locale.clone());
+    let fixed = move |value: Option<f64>, decimals: usize| {
+        value.map_or_else(String::new, |value| of_fixed.fixed(value, decimals))
+    };
+    let in_mm = fixed.clone();
+    environment.add_filter("mm", move |value: Option<f64>| in_mm(value, MM));
     environment.add_filter("count", count);
-    environment.add_filter("fixed", move |value: Option<f64>, decimals: usize| {
-        filled(value.map(|value| fixed(value, decimals)))
+    environment.add_filter("fixed", fixed);
+    environment.add_filter("decimal", move |value: f64| {
+        of_decimal.decimal(value.to_string())
     });
-    environment.add_filter("significant", significant);
+    environment.add_filter("signed", move |value: f64, decimals: usize| {
+        of_signed.decimal(signed(value, decimals))
+    });
+    environment.add_filter("significant", move |value: Option<f64>, digits: usize| {
+        value.map_or_else(String::new, |value| {
+            of_significant.significant(value, digits)
+        })
+    });
     environment
         .add_template(name, &text)
         .and_then(|()| environment.get_template(name)?.render(Serde(&page)))
         .map_err(|error| Error::Bug(format!("template {name}: {error:#}")))
-}
-
-/// A statement as a sentence.
-pub(super) fn sentence_case(statement: &str) -> String {
-    let mut letters = statement.chars();
-    let first = letters
-        .next()
-        .map(|letter| letter.to_uppercase().to_string())
-        .unwrap_or_default();
-    format!("{first}{}.", letters.as_str())
 }
 
 #[cfg(test)]

@@ -1,10 +1,11 @@
 //! The identified parameters in people's units, and what the data could not tell.
 
-use super::number::{UnitFormat, exact, readings, significant};
+use super::language::{Locale, say};
+use super::number::{UnitFormat, exact, readings};
 use crate::table::{ParameterRow, Parameters};
 use serde_json::{Value, json};
 
-pub(super) fn section(parameters: &Parameters, counting: Option<&str>) -> Value {
+pub(super) fn section(locale: &Locale, parameters: &Parameters, counting: Option<&str>) -> Value {
     let registered = parameters.effects();
     let place = |row: &ParameterRow| {
         registered
@@ -27,17 +28,14 @@ pub(super) fn section(parameters: &Parameters, counting: Option<&str>) -> Value 
     let groups = effects.into_iter().map(|(effect, rows)| {
         json!({
             "effect": effect,
-            "rows": rows.iter().map(|parameter| row(parameter, &rows)).collect::<Vec<_>>(),
+            "rows": rows.iter().map(|parameter| row(locale, parameter, &rows)).collect::<Vec<_>>(),
         })
     });
     let remarked = sorted
         .iter()
         .filter(|p| p.remark.is_some() || p.status == "redundant" || p.status == "unseen");
     let counting = counting.map(|difference| {
-        format!(
-            "Zeros, ratios and couplings of joints stand in the robot file's counting; the controller counts otherwise ({difference}), \
-             and \u{201c}calib export --format controller\u{201d} writes them as it does."
-        )
+        say!(locale, "Zeros, ratios and couplings of joints stand in the robot file's counting; the controller counts otherwise ({difference}), and “calib export --format controller” writes them as it does.", difference)
     });
     json!({
         "groups": groups.collect::<Vec<_>>(),
@@ -78,16 +76,17 @@ fn along_the_chain(name: &str) -> Vec<(bool, String, u64)> {
 }
 
 /// A parameter among those of its effect, with which it shares its decimals.
-fn row(p: &ParameterRow, group: &[&ParameterRow]) -> Value {
+fn row(locale: &Locale, p: &ParameterRow, group: &[&ParameterRow]) -> Value {
     let (nominal, value, unit, change, sigma, fine_unit) = match readings(&p.unit) {
-        Some((coarse, fine)) => read(p, group, coarse, fine),
+        Some((coarse, fine)) => read(locale, p, group, coarse, fine),
         // A unit that calib does not know is shown as it is stored.
         None => (
-            significant(p.nominal, 6),
-            significant(p.value, 6),
+            locale.significant(p.nominal, 6),
+            locale.significant(p.value, 6),
             p.unit.clone(),
-            significant(p.change, 4),
-            p.sigma.map_or_else(String::new, |s| significant(s, 2)),
+            locale.significant(p.change, 4),
+            p.sigma
+                .map_or_else(String::new, |s| locale.significant(s, 2)),
             p.unit.clone(),
         ),
     };
@@ -109,6 +108,7 @@ fn row(p: &ParameterRow, group: &[&ParameterRow]) -> Value {
 }
 
 fn read(
+    locale: &Locale,
     p: &ParameterRow,
     group: &[&ParameterRow],
     coarse: UnitFormat,
@@ -122,13 +122,14 @@ fn read(
             .unwrap_or_default()
     };
     (
-        coarse.show(p.nominal, decimals(coarse)),
-        coarse.show(p.value, decimals(coarse)),
-        coarse.symbol.into(),
-        fine.show_signed(p.change, decimals(fine)),
-        p.sigma
-            .map_or_else(String::new, |s| fine.show(s, decimals(fine))),
-        fine.symbol.into(),
+        locale.decimal(coarse.show(p.nominal, decimals(coarse))),
+        locale.decimal(coarse.show(p.value, decimals(coarse))),
+        locale.stored(coarse.symbol),
+        locale.decimal(fine.show_signed(p.change, decimals(fine))),
+        p.sigma.map_or_else(String::new, |s| {
+            locale.decimal(fine.show(s, decimals(fine)))
+        }),
+        locale.stored(fine.symbol),
     )
 }
 

@@ -2,21 +2,24 @@
 //!
 //! Axes: data to user units, round ticks (1-2-5), grid and labels.
 
+use super::language::{Locale, say};
 use super::number::fixed;
 use std::fmt::Write as _;
 
 pub(super) type SvgPoint = [f64; 2];
 
 /// A picture under construction, in user units (about a CSS pixel on a wide screen).
-pub(super) struct Svg {
+pub(super) struct Svg<'a> {
+    locale: &'a Locale,
     width: f64,
     height: f64,
     body: String,
 }
 
-impl Svg {
-    pub fn new(width: f64, height: f64) -> Self {
+impl<'a> Svg<'a> {
+    pub fn new(locale: &'a Locale, width: f64, height: f64) -> Self {
         Self {
+            locale,
             width,
             height,
             body: String::new(),
@@ -218,14 +221,22 @@ impl Scale {
         for tick in self.ticks(wanted) {
             let x = self.at(tick);
             svg.line("grid", [x, area.top], [x, area.bottom]);
-            svg.text("tick mid", [x, area.bottom + 14.0], &label(tick));
+            svg.text(
+                "tick mid",
+                [x, area.bottom + 14.0],
+                &svg.locale.decimal(label(tick)),
+            );
         }
     }
     pub(crate) fn grid_y(&self, svg: &mut Svg, area: Area, wanted: usize) {
         for tick in self.ticks(wanted) {
             let y = self.at(tick);
             svg.line("grid", [area.left, y], [area.right, y]);
-            svg.text("tick end", [area.left - 6.0, y + 3.5], &label(tick));
+            svg.text(
+                "tick end",
+                [area.left - 6.0, y + 3.5],
+                &svg.locale.decimal(label(tick)),
+            );
         }
     }
 }
@@ -300,7 +311,13 @@ const WIDTH: f64 = 420.0;
 const DRAWN: usize = 300;
 
 /// Positive values over a count (iterations, generations).
-pub(super) fn course(lines: &[Line], x_name: &str, y_name: &str, title: &str) -> String {
+pub(super) fn course(
+    locale: &Locale,
+    lines: &[Line],
+    x_name: &str,
+    y_name: &str,
+    title: &str,
+) -> String {
     let area = Area::new([52.0, 26.0, WIDTH - 14.0, 220.0]);
     let all = || lines.iter().flat_map(|line| &line.points);
     let last = all().map(|p| p[0]).fold(1.0, f64::max);
@@ -308,7 +325,7 @@ pub(super) fn course(lines: &[Line], x_name: &str, y_name: &str, title: &str) ->
     let lower = all().map(|p| p[1]).fold(upper, f64::min);
     let x = Scale::linear(0.0, last).over(area.left, area.right);
     let y = Scale::positive(lower, upper).over(area.bottom, area.top);
-    let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
+    let mut svg = Svg::new(locale, WIDTH, area.bottom + 38.0);
     x.grid_x(&mut svg, area, 6);
     y.grid_y(&mut svg, area, 6);
     for line in lines {
@@ -334,7 +351,7 @@ pub(super) fn course(lines: &[Line], x_name: &str, y_name: &str, title: &str) ->
 }
 
 /// Singular values as (number, value), on a logarithmic axis.
-pub(super) fn spectrum(values: &[(i64, f64)], title: &str) -> String {
+pub(super) fn spectrum(locale: &Locale, values: &[(i64, f64)], title: &str) -> String {
     let area = Area::new([52.0, 26.0, WIDTH - 14.0, 220.0]);
     let upper = values.iter().map(|v| v.1).fold(0.0, f64::max);
     let lower = values
@@ -346,7 +363,7 @@ pub(super) fn spectrum(values: &[(i64, f64)], title: &str) -> String {
     let x = Scale::linear(0.5, count as f64 + 0.5).over(area.left, area.right);
     // Below 1e-16 of the largest there is only rounding.
     let y = Scale::log(lower.max(upper * 1e-16), upper).over(area.bottom, area.top);
-    let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
+    let mut svg = Svg::new(locale, WIDTH, area.bottom + 38.0);
     y.grid_y(&mut svg, area, 6);
     for tick in x
         .ticks(8)
@@ -365,8 +382,12 @@ pub(super) fn spectrum(values: &[(i64, f64)], title: &str) -> String {
         svg.circle("mark seen", top, 2.4);
     }
     baseline(&mut svg, area);
-    name_x(&mut svg, area, "number of the singular value");
-    name_y(&mut svg, area, "singular value");
+    name_x(
+        &mut svg,
+        area,
+        &say!(locale, "number of the singular value"),
+    );
+    name_y(&mut svg, area, &say!(locale, "singular value"));
     svg.finish(title)
 }
 

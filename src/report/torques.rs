@@ -1,14 +1,14 @@
 //! The page of a diagnosis of torques: what was found, and measured, simulated and corrected torque of each joint over time.
 
 use super::data;
-use super::number::{self, count, fixed, significant};
+use super::language::Locale;
+use super::number::render;
 use super::svg::{Area, Scale, Svg, baseline, name_x, name_y};
 use crate::error::{Error, Result};
 use crate::table::{
-    BodyConsistencies, BodyConsistencyRow, ContactRow, Contacts, FrictionCurveRow, FrictionCurves,
-    InertialRow, Inertials, JointTorqueRow, JointTorques, Robot, TorqueCourse, TorqueFindingRow,
-    TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict, TorqueVerdictRow, VerdictSentences,
-    VerdictTopic,
+    BodyConsistencies, Contacts, FrictionCurveRow, FrictionCurves, Inertials, JointTorques, Robot,
+    TorqueCourse, TorqueFindingRow, TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict,
+    VerdictSentences, VerdictTopic,
 };
 use serde_json::{Value, json};
 
@@ -47,186 +47,47 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
     let verdict = tables.verdict.0.first();
     let verdict =
         verdict.ok_or_else(|| Error::Bug("a diagnosis of torques without a verdict".into()))?;
-    let robot = data::robot_name(&tables.robot);
+    let locale = Locale::default();
+    let robot = data::robot_name(&locale, &tables.robot);
     let said = |topic| tables.sentences.about(&verdict.step, topic);
     let page = json!({
         "title": title.map_or_else(|| format!("Torques of {robot}"), str::to_owned),
         "robot": robot,
         "joints": tables.course.joints,
-        "rows": count(verdict.rows),
-        "kind": if verdict.verdict == "unexplained" { "open" } else { "better" },
-        "sentence": format!("{}: {}", verdict.verdict.replace('_', " "), verdict.statement),
-        "facts": facts(verdict),
-        "findings": findings(tables),
+        "verdict": verdict,
+        "findings": tables.findings.0.iter().map(|row| finding(row, tables)).collect::<Vec<_>>(),
         "withdrawn": said(VerdictTopic::Withdrawn),
-        "errors": errors(&tables.joints),
-        "pictures": (0..tables.course.joints).map(|joint| pictures(tables, joint)).collect::<Vec<_>>(),
-        "contacts": contacts(&tables.contacts),
-        "inertials": inertials(&tables.inertials),
-        "bodies": bodies(&tables.consistency),
+        "errors": &tables.joints.0,
+        "pictures": (0..tables.course.joints).map(|joint| pictures(&locale, tables, joint)).collect::<Vec<_>>(),
+        "contacts": &tables.contacts.0,
+        "inertials": &tables.inertials.0,
+        "bodies": &tables.consistency.0,
         "not_observable": said(VerdictTopic::NotObservable),
         "remarks": said(VerdictTopic::Remark),
         "hashes": &tables.hashes,
     });
-    number::render("torques.html", include_str!("torques.html"), page)
+    render(&locale, "torques.html", include_str!("torques.html"), page)
 }
 
-fn facts(verdict: &TorqueVerdictRow) -> Vec<String> {
-    let rows = if verdict.held_out {
-        "held-out rows"
-    } else {
-        "fitted rows (none are held out: flattered)"
-    };
-    let masses = match verdict.base_parameters {
-        Some(count) => format!(
-            "masses are identified freely, {count} numbers: their errors cannot be findings"
-        ),
-        None => "masses are free within their declared tolerance".into(),
-    };
-    vec![
-        format!(
-            "rms of measured minus simulated torque over that of measured torque about its mean, mean over joints, {rows}: {} before, \
-             {} with the findings",
-            fixed(verdict.before_nrmse, 3),
-            fixed(verdict.after_nrmse, 3)
-        ),
-        masses,
-        format!(
-            "recorded: {}; {} rows at {} Hz after a low-pass of {} Hz on both sides",
-            if verdict.signal == "current" {
-                "motor currents"
-            } else {
-                "joint torques"
-            },
-            count(verdict.rows),
-            fixed(verdict.rate_hz, 1),
-            fixed(verdict.cutoff_hz, 1)
-        ),
-    ]
+/// A finding with its numbers and its rivals.
+fn finding(row: &TorqueFindingRow, tables: &TorqueTables) -> Value {
+    let numbers = tables
+        .numbers
+        .0
+        .iter()
+        .filter(|number| number.rank == row.rank);
+    let rivals = tables
+        .rivals
+        .0
+        .iter()
+        .filter(|rival| rival.rank == row.rank);
+    let mut finding = json!(row);
+    finding["numbers"] = numbers.map(|number| json!(number)).collect();
+    finding["rivals"] = rivals.map(|rival| json!(rival)).collect();
+    finding
 }
 
-fn findings(tables: &TorqueTables) -> Vec<Value> {
-    let view = |row: &TorqueFindingRow| {
-        let numbers = tables
-            .numbers
-            .0
-            .iter()
-            .filter(|number| number.rank == row.rank)
-            .map(|number| {
-                let sigma = number.sigma.map_or_else(String::new, |sigma| {
-                    format!(" \u{b1} {}", significant(sigma, 2))
-                });
-                format!(
-                    "{} {}{sigma} {}",
-                    number.name,
-                    significant(number.value, 4),
-                    number.unit
-                )
-            });
-        let rivals = tables
-            .rivals
-            .0
-            .iter()
-            .filter(|rival| rival.rank == row.rank);
-        let rivals = rivals.map(|rival| {
-            format!(
-                "{} at {} {}",
-                rival.effect,
-                rival.place,
-                fixed(rival.probability, 2)
-            )
-        });
-        json!({
-            "statement": row.statement,
-            "probability": format!(
-                "{} {}, at {} {}",
-                row.effect,
-                fixed(row.probability, 2),
-                row.place,
-                fixed(row.place_probability, 2)
-            ),
-            "numbers": numbers.collect::<Vec<_>>().join(", "),
-            "rivals": rivals.collect::<Vec<_>>().join(", "),
-        })
-    };
-    tables.findings.0.iter().map(view).collect()
-}
-
-fn errors(joints: &JointTorques) -> Vec<Vec<String>> {
-    let nm = |value: Option<f64>| value.map_or_else(String::new, |value| significant(value, 3));
-    let row = |row: &JointTorqueRow| {
-        vec![
-            format!("joint {}", row.joint),
-            nm(Some(row.before_rms_nm)),
-            nm(Some(row.after_rms_nm)),
-            nm(row.after_moving_rms_nm),
-            nm(row.after_rest_rms_nm),
-            nm(Some(row.noise_nm)),
-            fixed(row.autocorrelation, 1),
-            fixed(row.before_nrmse, 3),
-            fixed(row.after_nrmse, 3),
-            row.signature.clone().unwrap_or_default(),
-        ]
-    };
-    joints.0.iter().map(row).collect()
-}
-
-fn contacts(contacts: &Contacts) -> Vec<Vec<String>> {
-    let row = |row: &ContactRow| {
-        let force = [
-            (row.force_x_n, row.sigma_x_n),
-            (row.force_y_n, row.sigma_y_n),
-            (row.force_z_n, row.sigma_z_n),
-        ];
-        let force = force.map(|(force, sigma)| {
-            format!("{} \u{b1} {}", significant(force, 3), significant(sigma, 2))
-        });
-        vec![
-            row.event.to_string(),
-            fixed(row.start_s, 2),
-            fixed(row.end_s, 2),
-            row.joints.clone(),
-            force.join(", "),
-        ]
-    };
-    contacts.0.iter().map(row).collect()
-}
-
-fn inertials(inertials: &Inertials) -> Vec<Vec<String>> {
-    let row = |row: &InertialRow| {
-        vec![
-            format!("link {}", row.link),
-            row.quantity.clone(),
-            row.declared
-                .map_or_else(String::new, |value| significant(value, 4)),
-            significant(row.value, 4),
-            significant(row.sigma, 2),
-            row.unit.clone(),
-        ]
-    };
-    inertials.0.iter().map(row).collect()
-}
-
-fn bodies(consistency: &BodyConsistencies) -> Vec<Vec<String>> {
-    let row = |row: &BodyConsistencyRow| {
-        vec![
-            format!("link {}", row.link),
-            significant(row.mass_kg, 4),
-            significant(row.spread_kg_m2, 3),
-            row.sigma_kg_m2
-                .map_or_else(String::new, |sigma| significant(sigma, 2)),
-            match (row.enforced == Some(true), row.consistent) {
-                (true, _) => "no body had these numbers: moved to the nearest body",
-                (false, true) => "a body has these numbers",
-                (false, false) => "no body has these numbers",
-            }
-            .into(),
-        ]
-    };
-    consistency.0.iter().map(row).collect()
-}
-
-fn pictures(tables: &TorqueTables, joint: usize) -> Value {
+fn pictures(locale: &Locale, tables: &TorqueTables, joint: usize) -> Value {
     let course = &tables.course;
     let of = |all: &[f64]| course.of_joint(all, joint).collect::<Vec<f64>>();
     let (measured, simulated, corrected) = (
@@ -255,9 +116,9 @@ fn pictures(tables: &TorqueTables, joint: usize) -> Value {
         .filter(|row| row.joint == joint as i64 + 1)
         .collect();
     json!({
-        "torque": over_time(course, &torque, &format!("torque of {name}: measured, simulated, corrected")),
-        "error": over_time(course, &[("s1", &before), ("s-last", &after)], &format!("error of {name} before and after")),
-        "friction": (!curve.is_empty()).then(|| friction(&curve, &format!("friction of {name}"))),
+        "torque": over_time(locale, course, &torque, &format!("torque of {name}: measured, simulated, corrected")),
+        "error": over_time(locale, course, &[("s1", &before), ("s-last", &after)], &format!("error of {name} before and after")),
+        "friction": (!curve.is_empty()).then(|| friction(locale, &curve, &format!("friction of {name}"))),
         "name": name,
     })
 }
@@ -269,7 +130,12 @@ const STEPS: usize = 300;
 const GAP: f64 = 8.0;
 
 /// Lines over time; what is held out is shaded.
-fn over_time(course: &TorqueCourse, lines: &[(&str, &[f64])], title: &str) -> String {
+fn over_time(
+    locale: &Locale,
+    course: &TorqueCourse,
+    lines: &[(&str, &[f64])],
+    title: &str,
+) -> String {
     let area = Area::new([52.0, 26.0, WIDTH - 14.0, 200.0]);
     let (first, last) = (
         course.time.first().copied().unwrap_or(0.0),
@@ -282,7 +148,7 @@ fn over_time(course: &TorqueCourse, lines: &[(&str, &[f64])], title: &str) -> St
     );
     let x = Scale::linear(first, last).over(area.left, area.right);
     let y = Scale::linear(low.min(0.0), high.max(0.0)).over(area.bottom, area.top);
-    let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
+    let mut svg = Svg::new(locale, WIDTH, area.bottom + 38.0);
     let stretches = stretches(&course.time);
     for rows in &stretches {
         let held = |row: &usize| course.held_out.get(*row).copied().unwrap_or(false);
@@ -340,7 +206,7 @@ fn stretches(time: &[f64]) -> Vec<std::ops::Range<usize>> {
 }
 
 /// Friction over velocity with a band of two standard deviations.
-fn friction(curve: &[&FrictionCurveRow], title: &str) -> String {
+fn friction(locale: &Locale, curve: &[&FrictionCurveRow], title: &str) -> String {
     let area = Area::new([52.0, 26.0, 406.0, 200.0]);
     let ends = |sign: f64| {
         curve
@@ -358,7 +224,7 @@ fn friction(curve: &[&FrictionCurveRow], title: &str) -> String {
     )
     .over(area.left, area.right);
     let y = Scale::linear(low, high).over(area.bottom, area.top);
-    let mut svg = Svg::new(420.0, area.bottom + 38.0);
+    let mut svg = Svg::new(locale, 420.0, area.bottom + 38.0);
     x.grid_x(&mut svg, area, 6);
     y.grid_y(&mut svg, area, 5);
     let point = |row: &&FrictionCurveRow, sigmas: f64| {

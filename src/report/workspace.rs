@@ -2,7 +2,7 @@
 //!
 //! How the error is distributed after each step: histograms above each other on one axis, and cumulative curves.
 
-use super::number::mm;
+use super::language::{Locale, say};
 use super::svg::{Area, Scale, Svg, baseline, label, name_x, name_y, round_down};
 use crate::table::{Prediction, PredictionRow};
 
@@ -68,7 +68,8 @@ impl Colours {
         self.edges.iter().take_while(|edge| error > **edge).count()
     }
     /// What each class means, e.g. `0.1 - 0.2`.
-    pub(crate) fn legend(&self) -> Vec<(String, String)> {
+    pub(crate) fn legend(&self, locale: &Locale) -> Vec<(String, String)> {
+        let label = |edge: f64| locale.decimal(label(edge));
         let text = |k: usize| match (
             k.checked_sub(1).and_then(|k| self.edges.get(k)),
             self.edges.get(k),
@@ -76,7 +77,7 @@ impl Colours {
             (None, Some(upper)) => format!("\u{2264} {}", label(*upper)),
             (Some(lower), Some(upper)) => format!("{}\u{2013}{}", label(*lower), label(*upper)),
             (Some(lower), None) => format!("> {}", label(*lower)),
-            (None, None) => "all".into(),
+            (None, None) => say!(locale, "all"),
         };
         (0..=self.edges.len())
             .map(|k| (format!("e{k}"), text(k)))
@@ -102,6 +103,7 @@ fn descending(upper: f64, digits: &[f64], count: usize) -> Vec<f64> {
 
 /// One view: the points of one step, framed by all points of both steps, and how much its vectors are magnified.
 pub(super) fn scatter(
+    locale: &Locale,
     view: WorkspaceView,
     rows: &Prediction,
     frame: [&Prediction; 2],
@@ -150,7 +152,7 @@ pub(super) fn scatter(
         1.0
     };
 
-    let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
+    let mut svg = Svg::new(locale, WIDTH, area.bottom + 38.0);
     x.grid_x(&mut svg, area, 5);
     y.grid_y(&mut svg, area, 5);
     let every = rows.0.len().div_ceil(DRAWN).max(1);
@@ -175,15 +177,17 @@ pub(super) fn scatter(
     baseline(&mut svg, area);
     name_x(&mut svg, area, &format!("{}, mm", view.axes[0].0));
     name_y(&mut svg, area, &format!("{}, mm", view.axes[1].0));
-    let thinned = if every > 1 {
-        format!(", one point in {every}")
-    } else {
-        String::new()
+    let factor = locale.decimal(label(magnified));
+    let remark = match every {
+        1 => say!(locale, "vectors ×{factor}", factor),
+        _ => say!(
+            locale,
+            "vectors ×{factor}, one point in {every}",
+            factor,
+            every
+        ),
     };
-    (
-        svg.finish(title),
-        format!("vectors \u{d7}{}{thinned}", label(magnified)),
-    )
+    (svg.finish(title), remark)
 }
 
 /// The errors of one set of points after one step.
@@ -222,7 +226,7 @@ fn scale(all: &[StepErrors]) -> Scale {
 }
 
 /// Points per equal bin (equal on the axis as drawn), a row per step, one height scale for all.
-pub(super) fn histogram(all: &[StepErrors], title: &str) -> String {
+pub(super) fn histogram(locale: &Locale, all: &[StepErrors], title: &str) -> String {
     let area = Area::new([16.0, TOP, WIDTH - 12.0, TOP + ROW * all.len() as f64]);
     let scale = scale(all).over(area.left, area.right);
     let counts: Vec<[usize; BINS]> = all
@@ -230,7 +234,7 @@ pub(super) fn histogram(all: &[StepErrors], title: &str) -> String {
         .map(|errors| bins(&errors.sorted_mm, scale, area))
         .collect();
     let highest = counts.iter().flatten().copied().max().unwrap_or(1).max(1) as f64;
-    let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
+    let mut svg = Svg::new(locale, WIDTH, area.bottom + 38.0);
     scale.grid_x(&mut svg, area, 7);
     for (i, (errors, counts)) in all.iter().zip(&counts).enumerate() {
         let foot = area.top + ROW * (i + 1) as f64;
@@ -263,10 +267,10 @@ pub(super) fn histogram(all: &[StepErrors], title: &str) -> String {
         svg.text(
             class,
             [x, foot - ROW + 18.0],
-            &format!("mean {}", mm(errors.mean_mm)),
+            &say!(locale, "mean {length}", length = locale.mm(errors.mean_mm)),
         );
     }
-    name_x(&mut svg, area, "position error, mm");
+    name_x(&mut svg, area, &say!(locale, "position error, mm"));
     svg.finish(title)
 }
 
@@ -280,7 +284,7 @@ fn bins(errors: &[f64], scale: Scale, area: Area) -> [usize; BINS] {
 }
 
 /// Share of the points whose error is at most so large, a curve per step.
-pub(super) fn cumulative(all: &[StepErrors], title: &str) -> String {
+pub(super) fn cumulative(locale: &Locale, all: &[StepErrors], title: &str) -> String {
     let area = Area::new([
         44.0,
         26.0,
@@ -289,7 +293,7 @@ pub(super) fn cumulative(all: &[StepErrors], title: &str) -> String {
     ]);
     let scale = scale(all).over(area.left, area.right);
     let share = Scale::linear(0.0, 100.0).over(area.bottom, area.top);
-    let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
+    let mut svg = Svg::new(locale, WIDTH, area.bottom + 38.0);
     scale.grid_x(&mut svg, area, 7);
     share.grid_y(&mut svg, area, 5);
     let p95 = share.at(95.0);
@@ -321,7 +325,7 @@ pub(super) fn cumulative(all: &[StepErrors], title: &str) -> String {
         );
     }
     baseline(&mut svg, area);
-    name_x(&mut svg, area, "position error, mm");
-    name_y(&mut svg, area, "% of the points at or below");
+    name_x(&mut svg, area, &say!(locale, "position error, mm"));
+    name_y(&mut svg, area, &say!(locale, "% of the points at or below"));
     svg.finish(title)
 }

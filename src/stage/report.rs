@@ -49,7 +49,7 @@ pub struct Accepted {
 }
 
 crate::stage::stage! {
-    Report, "report", 22, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
+    Report, "report", 23, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
         ReportReads {
             statistics: Statistics,
             prediction: Vec<Labelled<Prediction>>,
@@ -192,6 +192,12 @@ impl Stage for Report {
             hashes,
         };
         let pages = pages(&tables, &options).map_err(|error| placed(error, context.id))?;
+        for text in &pages.missing {
+            let language = self.language.code();
+            context.warn(format!(
+                "the page says this in English, as `{language}` lacks it: {text}"
+            ));
+        }
         let document = |name: &str, media_type: &str, content| DocumentRow {
             name: name.into(),
             media_type: media_type.into(),

@@ -13,6 +13,8 @@ use crate::table::{
     StatisticsRow, Table, Withdrawn,
 };
 use screen::NextStep;
+use serde::Serialize;
+use serde_json::{Value, json};
 
 /// How a result is printed.
 #[derive(Debug, Clone, Copy, Default)]
@@ -277,30 +279,8 @@ pub fn statistics(
 }
 
 fn errors(title: &str, rows: &[&StatisticsRow]) -> String {
-    let heads = [
-        "<step",
-        "<set",
-        ">6points",
-        ">8mean",
-        ">8std",
-        ">8p95",
-        ">8max",
-        ">8rms",
-        ">8expected",
-    ];
-    let cells = rows.iter().map(|row| {
-        let of_row = [row.step.clone(), row.set.clone(), row.points.to_string()];
-        let figures = [row.mean_mm, row.std_mm, row.p95_mm, row.max_mm, row.rms_mm].map(Some);
-        let figures = figures.into_iter().chain([row.expected_rms_mm]);
-        of_row
-            .into_iter()
-            .chain(figures.map(|mm| figure(mm, "")))
-            .collect()
-    });
-    format!(
-        "{title}, error in mm\n{}\n",
-        aligned(&heads, cells.collect())
-    )
+    let columns = "<step=step <set=set >6points=points >8mean=mean_mm >8std=std_mm >8p95=p95_mm >8max=max_mm >8rms=rms_mm >8expected=expected_rms_mm";
+    format!("{title}, error in mm\n{}\n", listed(rows, columns, ""))
 }
 
 /// Training points under fits without them; nothing where no step made folds.
@@ -314,36 +294,10 @@ fn folds(rows: &[StatisticsRow]) -> String {
         some if some == rows.len() => "whole places",
         _ => "contiguous folds, whole places",
     };
-    let heads = [
-        "<step",
-        "<set",
-        ">8mean",
-        ">8max",
-        ">8rms",
-        ">8expected",
-        ">8|mean",
-        ">8max",
-        ">8rms",
-    ];
-    let cells = rows.iter().map(|row| {
-        let figures = [
-            row.fold_mean_mm,
-            row.fold_max_mm,
-            row.fold_rms_mm,
-            row.fold_expected_mm,
-            row.block_mean_mm,
-            row.block_max_mm,
-            row.block_rms_mm,
-        ];
-        let of_row = [row.step.clone(), row.set.clone()];
-        of_row
-            .into_iter()
-            .chain(figures.map(|mm| figure(mm, "")))
-            .collect()
-    });
+    let columns = "<step=step <set=set >8mean=fold_mean_mm >8max=fold_max_mm >8rms=fold_rms_mm >8expected=fold_expected_mm >8|mean=block_mean_mm >8max=block_max_mm >8rms=block_rms_mm";
     format!(
         "training points, each under a fit without it (cross-validated), error in mm: random folds | {blocks}\n{}\n",
-        aligned(&heads, cells.collect())
+        listed(&rows, columns, "")
     )
 }
 
@@ -377,34 +331,21 @@ pub fn corrections(outcome: &CompletedRun, store: &Store) -> Result<String> {
     if rows.is_empty() {
         return Ok(String::new());
     }
-    let heads = [
-        "<  step",
-        "<16rival",
-        ">8mean",
-        ">8rms",
-        ">8max",
-        ">7numbers",
-        ">11evaluations",
-        "<why",
-    ];
-    let cells = rows.iter().map(|row| {
-        let settings = row.hidden.zip(row.decay);
-        let settings =
-            settings.map(|(hidden, decay)| format!(" ({hidden} neurons, decay {decay})"));
-        vec![
-            format!("{} {}", if row.chosen { ">" } else { " " }, row.step),
-            row.rival.clone(),
-            figure(row.mean_mm, "-"),
-            figure(row.rms_mm, "-"),
-            figure(row.max_mm, "-"),
-            row.numbers.to_string(),
-            row.evaluations.to_string(),
-            format!("{}{}", row.reason, settings.unwrap_or_default()),
-        ]
+    let shown = rows.iter().map(|row| {
+        let mut shown = json!(row);
+        let mark = if row.chosen { ">" } else { " " };
+        shown["step"] = format!("{mark} {}", row.step).into();
+        if let Some((hidden, decay)) = row.hidden.zip(row.decay) {
+            let reason = format!("{} ({hidden} neurons, decay {decay})", row.reason);
+            shown["reason"] = reason.into();
+        }
+        shown
     });
+    let shown: Vec<Value> = shown.collect();
+    let columns = "<\u{a0}\u{a0}step=step <16rival=rival >8mean=mean_mm >8rms=rms_mm >8max=max_mm >7numbers=numbers >11evaluations=evaluations <why=reason";
     Ok(format!(
         "learned corrections, cross-validated on their own training rows (> kept), error in mm\n{}\n",
-        aligned(&heads, cells.collect())
+        listed(&shown, columns, "-").replacen('\u{a0}', " ", 2)
     ))
 }
 
@@ -458,6 +399,25 @@ pub fn searches(outcome: &CompletedRun, store: &Store) -> Result<String> {
 
 fn figure(mm: Option<f64>, none: &str) -> String {
     mm.map_or_else(|| none.into(), |mm| format!("{mm:.4}"))
+}
+
+/// Rows below their heads: each column is a head as in [`aligned`] and the name of what it shows, lengths with four decimals.
+fn listed(rows: &[impl Serialize], columns: &str, none: &str) -> String {
+    let columns = columns
+        .split(' ')
+        .filter_map(|column| column.split_once('='));
+    let (heads, names): (Vec<&str>, Vec<&str>) = columns.unzip();
+    let cell = |value: &Value| match value {
+        Value::Null => none.into(),
+        Value::String(text) => text.clone(),
+        number if number.is_f64() => figure(number.as_f64(), none),
+        other => other.to_string(),
+    };
+    let cells = rows.iter().map(|row| {
+        let row = json!(row);
+        names.iter().map(|name| cell(&row[*name])).collect()
+    });
+    aligned(&heads, cells.collect())
 }
 
 /// Rows below their heads. A head says how a column is aligned (`<`, `>`), how wide it is at least, and with `|` that a line stands before it.

@@ -1,12 +1,12 @@
 //! What the reports of a run say of the limits that the user set: a line each, and whether all are kept.
 
 use super::labelled;
-use crate::error::{Error, Result};
+use crate::error::Error;
 use crate::pipeline::{CompletedRun, Manifest};
 use crate::stage::{DeclaredStage, Report};
 use crate::store::Store;
-use crate::table::{Acceptance, AcceptanceRow, Table};
-use serde::Serialize;
+use crate::table::{Acceptance, AcceptanceRow, Table, picked_of};
+use serde::{Serialize, Serializer};
 
 /// The judgements of a run's reports, those alone that have limits.
 #[derive(Serialize)]
@@ -18,25 +18,23 @@ struct Judged {
     stage: String,
     kept: bool,
     sentence: String,
-    figures: Vec<Figure>,
+    /// Those for which something was found.
+    #[serde(serialize_with = "figures")]
+    figures: Vec<AcceptanceRow>,
 }
 
-#[derive(Serialize)]
-struct Figure {
-    figure: String,
-    found_mm: f64,
-    limit_mm: f64,
-    kept: bool,
+fn figures<S: Serializer>(rows: &[AcceptanceRow], serializer: S) -> Result<S::Ok, S::Error> {
+    picked_of(rows, "figure found_mm limit_mm kept").serialize(serializer)
 }
 
 impl LimitsSummary {
     /// The judgements of all reports of a run. Fails where a table has left the store, or a report is older than the table.
-    pub fn read(outcome: &CompletedRun, store: &Store) -> Result<Self> {
+    pub fn read(outcome: &CompletedRun, store: &Store) -> crate::error::Result<Self> {
         Self::of(&outcome.manifest, store)
     }
 
     /// The judgements of all reports of the record of a run.
-    pub fn of(manifest: &Manifest, store: &Store) -> Result<Self> {
+    pub fn of(manifest: &Manifest, store: &Store) -> crate::error::Result<Self> {
         let mut all = Vec::new();
         for stage in manifest
             .stages
@@ -85,26 +83,14 @@ impl LimitsSummary {
 /// What a report says of its limits; none where it has none.
 fn judged(stage: &str, Acceptance(rows): Acceptance) -> Option<Judged> {
     let first = rows.first()?;
-    let (kept, sentence) = (first.accepted, first.sentence.clone());
-    let figure = |row: AcceptanceRow| {
-        let AcceptanceRow {
-            figure,
-            limit_mm,
-            kept,
-            ..
-        } = row;
-        Some(Figure {
-            figure,
-            found_mm: row.found_mm?,
-            limit_mm,
-            kept,
-        })
-    };
     Some(Judged {
         stage: stage.into(),
-        kept,
-        sentence,
-        figures: rows.into_iter().filter_map(figure).collect(),
+        kept: first.accepted,
+        sentence: first.sentence.clone(),
+        figures: rows
+            .into_iter()
+            .filter(|row| row.found_mm.is_some())
+            .collect(),
     })
 }
 
@@ -115,11 +101,11 @@ impl Judged {
             .figures
             .iter()
             .filter(|figure| figure.kept == self.kept);
-        let limits = limits.map(|one| {
-            format!(
-                "{} {:.4} mm, at most {} mm allowed",
-                one.figure, one.found_mm, one.limit_mm
-            )
+        let limits = limits.filter_map(|one| {
+            let (figure, found, limit) = (&one.figure, one.found_mm?, one.limit_mm);
+            Some(format!(
+                "{figure} {found:.4} mm, at most {limit} mm allowed"
+            ))
         });
         let limits: Vec<String> = limits.collect();
         let mut letters = self.sentence.trim_end_matches('.').chars();

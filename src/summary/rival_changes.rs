@@ -1,11 +1,14 @@
 //! What two runs say about the rivals of their findings: which of them later measurements decided, and how.
 
+use super::run::filled;
 use crate::audit::{RunAddress, RunDiff};
 use crate::error::Result;
 use crate::pipeline::{Manifest, StageReport};
 use crate::stage::{DeclaredStage, Diagnose};
 use crate::store::Store;
 use crate::table::{FindingRow, Findings, Rivals, Table};
+use minijinja::context;
+use minijinja::value::Serde;
 use serde::Serialize;
 
 /// Less probable than this, a rival is excluded.
@@ -52,12 +55,6 @@ pub(crate) enum RivalOutcome {
     Neither,
     /// A finding of run B has a rival that run A excluded.
     New,
-}
-
-impl std::fmt::Display for CauseAtPlace {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} at {}", self.effect, self.place)
-    }
 }
 
 /// The findings of a diagnosis, and the rivals of each with their probabilities.
@@ -220,45 +217,8 @@ pub fn rival_changes(
 
 /// A line each.
 pub(crate) fn rival_words(changes: &[RivalChange]) -> String {
-    let number = |value: Option<f64>| {
-        value.map_or_else(|| "not listed".into(), |value| format!("{value:.2}"))
-    };
-    let line = |change: &RivalChange| {
-        let RivalChange {
-            stage,
-            finding,
-            rival,
-            outcome,
-            before,
-            now,
-        } = change;
-        let (was, is) = (number(*before), number(*now));
-        match outcome {
-            RivalOutcome::Confirmed => format!(
-                "{stage}: decided: {finding}, not {rival} (its probability {was} -> {is})\n"
-            ),
-            RivalOutcome::Reversed => {
-                format!(
-                    "{stage}: decided: {rival}, not {finding} as in A (the rival's probability was {was} there)\n"
-                )
-            }
-            RivalOutcome::Open => {
-                format!(
-                    "{stage}: still open: {finding} or {rival} (probability of the less probable one {was} -> {is})\n"
-                )
-            }
-            RivalOutcome::Both => {
-                format!("{stage}: {finding} and {rival} are both findings in B\n")
-            }
-            RivalOutcome::Neither => {
-                format!("{stage}: neither {finding} nor its rival {rival} is a finding in B\n")
-            }
-            RivalOutcome::New => {
-                format!("{stage}: new rival: {finding} or {rival} (probability {was} -> {is})\n")
-            }
-        }
-    };
-    changes.iter().map(line).collect()
+    let about = context! { changes => Serde(changes) };
+    filled(include_str!("text/rivals.txt"), about)
 }
 
 #[cfg(test)]

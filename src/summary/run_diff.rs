@@ -1,9 +1,12 @@
 //! The difference of two runs as a short text: what was put in differently, and what came out of it, table by table.
 
 use super::rival_changes::{RivalChange, rival_words};
+use super::run::filled;
 use crate::audit::{RunDiff, TableChange};
 use crate::diff::{ColumnDiff, TableDiff, headline, short};
 use crate::error::counted;
+use minijinja::context;
+use minijinja::value::Serde;
 
 /// Tables that are told one by one.
 const TABLES: usize = 6;
@@ -12,57 +15,28 @@ const CAUSES: usize = 5;
 
 /// Two runs compared, as text, with the rivals that are gone or new; with `stat` every table of which rows differ.
 pub fn run_diff(diff: &RunDiff, rivals: &[RivalChange], stat: bool) -> String {
-    let line = |letter: char, run: &crate::audit::RunSummary| {
-        format!(
-            "{letter}  {}  {}  {:.16}\n",
-            run.run, run.pipeline, run.started
-        )
+    let most = |shown: usize| if stat { usize::MAX } else { shown };
+    let value = |value: &str| match value.len() > 40 {
+        true => format!("{}…", value.chars().take(12).collect::<String>()),
+        false => value.to_string(),
     };
-    let mut text = line('A', &diff.a) + &line('B', &diff.b);
-    let shown = if stat { diff.causes.len() } else { CAUSES };
-    for cause in diff.causes.iter().take(shown) {
+    let causes = diff.causes.iter().take(most(CAUSES)).map(|cause| {
         let change = &cause.change;
-        let value = |value: &str| {
-            if value.len() > 40 {
-                format!("{}…", value.chars().take(12).collect::<String>())
-            } else {
-                value.to_string()
-            }
-        };
         let place = if change.name.is_empty() {
-            cause.stage.clone()
+            &cause.stage
         } else {
-            change.name.clone()
+            &change.name
         };
-        text.push_str(&format!(
-            "{} {place}: {} -> {}\n",
-            change.what,
+        (
+            &change.what,
+            place,
             value(&change.before),
-            value(&change.now)
-        ));
-    }
-    if diff.causes.len() > shown {
-        text.push_str(&format!(
-            "and {} of settings and files\n",
-            counted(diff.causes.len() - shown, "more change")
-        ));
-    }
-    if diff.causes.is_empty() {
-        text.push_str("settings, files and seeds are the same\n");
-    }
-    let same = diff
-        .tables
-        .iter()
-        .filter(|table| table.status == "same")
-        .count();
-    let mut differing: Vec<&TableChange> = diff
-        .tables
-        .iter()
-        .filter(|table| table.status != "same")
-        .collect();
-    if differing.is_empty() {
-        return text + &format!("same: {}\n", counted(same, "table"));
-    }
+            value(&change.now),
+        )
+    });
+    let causes: Vec<_> = causes.collect();
+    let is_same = |table: &&TableChange| table.status == "same";
+    let (same, mut differing): (Vec<_>, Vec<&TableChange>) = diff.tables.iter().partition(is_same);
     // The largest change of a length first; of tables without one what people ask for, in the order of the pipeline.
     let rank = |table: &TableChange| {
         ["parameters", "statistics", "prediction"]
@@ -75,32 +49,16 @@ pub fn run_diff(diff: &RunDiff, rivals: &[RivalChange], stat: bool) -> String {
             .total_cmp(&largest_mm(a))
             .then(rank(a).cmp(&rank(b)))
     });
-    let (shown, rest) = differing.split_at(if stat {
-        differing.len()
-    } else {
-        differing.len().min(TABLES)
-    });
-    text.push_str(&rival_words(rivals));
-    text.push('\n');
-    let width = shown
-        .iter()
-        .map(|table| table.name.len())
-        .max()
-        .unwrap_or(0);
-    for table in shown {
-        text.push_str(&format!("{:width$}  {}\n", table.name, summary(table)));
-    }
-    let rest: Vec<&str> = rest.iter().map(|table| table.name.as_str()).collect();
-    if !rest.is_empty() {
-        text.push_str(&format!(
-            "also changed: {} (--stat lists each)\n",
-            list(&rest)
-        ));
-    }
-    if same > 0 {
-        text.push_str(&format!("same: {}\n", counted(same, "table")));
-    }
-    text
+    let (shown, others) = differing.split_at(differing.len().min(most(TABLES)));
+    let tables = shown.iter().map(|table| (&table.name, summary(table)));
+    let others = others.iter().map(|table| &table.name);
+    let about = context! {
+        runs => Serde([&diff.a, &diff.b]), more_causes => diff.causes.len() - causes.len(), causes => Serde(causes),
+        rivals => rival_words(rivals), tables => Serde(tables.collect::<Vec<_>>()),
+        width => shown.iter().map(|table| table.name.len()).max(),
+        others => Serde(others.collect::<Vec<_>>()), same => same.len(),
+    };
+    filled(include_str!("text/run_diff.txt"), about)
 }
 
 /// The largest change of a column in mm, 0 where none changed.
@@ -114,19 +72,6 @@ fn largest_mm(table: &TableChange) -> f64 {
         .filter_map(|column| column.statistics)
         .map(|found| found.max)
         .fold(0.0, f64::max)
-}
-
-fn list(names: &[&str]) -> String {
-    const SHOWN: usize = 4; // a line's worth
-    if names.len() <= SHOWN {
-        names.join(", ")
-    } else {
-        format!(
-            "{} and {} more",
-            names[..SHOWN].join(", "),
-            names.len() - SHOWN
-        )
-    }
 }
 
 fn summary(table: &TableChange) -> String {

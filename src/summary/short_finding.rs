@@ -2,8 +2,9 @@
 
 use super::estimate::estimate;
 use crate::effect::{figure, names};
-use crate::table::{FindingNumberRow, RivalRow, picked_of};
-use serde_json::Value;
+use crate::table::{FindingNumberRow, FindingNumbers, RivalRow, Rivals, picked, picked_of};
+use serde::Serialize;
+use serde_json::{Value, json};
 
 /// From this probability on a name stands without its rivals.
 const CERTAIN: f64 = 0.9;
@@ -34,6 +35,36 @@ pub(super) struct Found {
 }
 
 impl Found {
+    /// A row of findings on positions or torques with what both have; `evidence` are the columns that speak for it.
+    pub(crate) fn of(
+        row: &impl Serialize,
+        evidence: &str,
+        numbers: &FindingNumbers,
+        rivals: &Rivals,
+    ) -> Self {
+        let columns = "effect where=place statement probability place_probability none_probability";
+        let mut document = picked(row, columns);
+        document["evidence"] = picked(row, evidence);
+        document["valid_range"] = json!({});
+        let row = json!(row);
+        let text = |column: &str| row[column].as_str().unwrap_or_default().to_string();
+        let rank = row["rank"].as_i64().unwrap_or_default();
+        let probabilities = ["probability", "place_probability", "none_probability"];
+        Self {
+            rank,
+            effect: text("effect"),
+            place: text("place"),
+            statement: text("statement"),
+            forms: Value::Null,
+            numbers: numbers.of_finding(rank),
+            probabilities: probabilities.map(|column| row[column].as_f64()),
+            is_compared: !row["delta_bic"].is_null(),
+            rivals: rivals.of_finding(rank),
+            size: None,
+            document,
+        }
+    }
+
     /// All of it for other programs.
     pub fn document(&self) -> Value {
         let mut document = self.document.clone();
@@ -100,117 +131,22 @@ enum NumberShown {
 
 use NumberShown::{Amplitude, Called, Largest, No, Size, Twice};
 
-/// An effect, what it does at a place `{}`, and the number that is shown of it.
-const PHRASES: &[(&str, &str, NumberShown)] = &[
-    ("joint_compliance", "{} yields under load", Largest),
-    ("joint_hardening", "{} yields nonlinearly", No),
-    ("link_compliance", "{} bends under load", Largest),
-    ("base_compliance", "{} tilts under load", Largest),
-    ("gear_cyclic", "{} errs with its angle", Amplitude),
-    ("gear_motor_cyclic", "{} errs with its motor", Amplitude),
-    ("gear_flank", "{} errs with angle and side", Amplitude),
-    ("gear_load", "{} errs with angle and load", Amplitude),
-    ("joint_table", "{} errs irregularly", No),
-    ("backlash", "{} has backlash", Twice),
-    ("presliding", "{} has gradual backlash", Twice),
-    ("thermal_growth", "{} grows with temperature", Largest),
-    ("joint_warming", "{} changes with temperature", Largest),
-    ("counterbalance", "balancer at {} is missing", No),
-    ("cable_drag", "hose or cable pulls on {}", No),
-    ("link_mass", "mass of {} differs", Called("mass")),
-    ("payload_error", "payload differs", Called("mass")),
-    ("axis_wobble", "axis of {} wobbles", No),
-    ("viscous_windup", "{} trails with its speed", Largest),
-    ("zero_shift", "zero of {} steps", Size),
-    ("tool_shift", "target on the tool moves", No),
-    ("base_shift", "base or tracker moves", No),
-    ("tracker_drift", "tracker drifts", No),
-    ("tracker_scale", "tracker scale differs", Largest),
-    (
-        "tracker_circle",
-        "tracker azimuth errs periodically",
-        Amplitude,
-    ),
-    (
-        "tracker_elevation",
-        "tracker errs with elevation",
-        Amplitude,
-    ),
-    ("tracker_offset", "tracker ranges are offset", Largest),
-    (
-        "tracker_refraction",
-        "tracker ranges change with the air",
-        Largest,
-    ),
-    ("joint_log_lag", "joint log lags or leads", Largest),
-    ("coupling_ratio", "{} cross-coupling", Largest),
-    ("coulomb_friction", "{} Coulomb friction", Called("coulomb")),
-    ("viscous_friction", "{} viscous friction", Called("viscous")),
-    (
-        "stribeck_friction",
-        "{} Stribeck friction",
-        Called("stribeck"),
-    ),
-    (
-        "asymmetric_friction",
-        "{} friction differs by side",
-        Called("asymmetry"),
-    ),
-    (
-        "presliding_friction",
-        "{} presliding friction",
-        Called("kept"),
-    ),
-    (
-        "load_friction",
-        "{} friction grows with load",
-        Called("share"),
-    ),
-    (
-        "warmup_friction",
-        "{} friction falls with warmth",
-        Called("coulomb_cold"),
-    ),
-    (
-        "wrist_coupling",
-        "{} friction by another joint",
-        Called("coulomb"),
-    ),
-    (
-        "backlash_spikes",
-        "{} knocks at reversals",
-        Called("height"),
-    ),
-    ("torque_ripple", "{} torque ripple", Called("amplitude")),
-    ("joint_elasticity", "{} oscillates", Called("resonance")),
-    (
-        "torque_constant",
-        "{} torque constant differs",
-        Called("relative"),
-    ),
-    ("rotor_inertia", "{} rotor inertia", Called("inertia")),
-    ("current_offset", "{} torque offset", Called("offset")),
-    (
-        "current_latency",
-        "torques lag behind positions",
-        Called("latency"),
-    ),
-    ("spring_balance", "balancing spring at {}", No),
-    (
-        "cable_stiffness",
-        "cable or hose at {}",
-        Called("stiffness"),
-    ),
-    ("link_com", "centre of mass of {} differs", Largest),
-    ("link_inertia", "inertia of {} differs", Largest),
-    ("gravity_direction", "base is tilted", Called("tilt")),
-];
+/// An effect, what it does at a place `{}`, and the number that is shown of it: a kind of [`NumberShown`], or a name.
+const PHRASES: &str = include_str!("text/phrases.txt");
 
 fn phrase(effect: &str) -> Option<(&'static str, NumberShown)> {
-    PHRASES
-        .iter()
-        .find(|(name, ..)| *name == effect)
-        .map(|(_, words, number)| (*words, *number))
+    let mut lines = PHRASES.lines().filter_map(|line| line.split_once(": "));
+    let (_, phrase) = lines.find(|(name, _)| *name == effect)?;
+    let (words, number) = phrase.split_once(": ")?;
+    let shown = match number {
+        "No" => No,
+        "Largest" => Largest,
+        "Size" => Size,
+        "Twice" => Twice,
+        "Amplitude" => Amplitude,
+        name => Called(name),
+    };
+    Some((words, shown))
 }
 
 /// What a cause does at a place, whatever its size; one that a user declares by its name.
@@ -399,7 +335,6 @@ fn amplitude(all: &[FindingNumberRow]) -> Option<String> {
 mod tests {
     use super::*;
     use crate::effect::CAUSES;
-    use serde_json::json;
 
     fn rival(effect: &str, probability: f64) -> RivalRow {
         RivalRow {
@@ -562,7 +497,9 @@ mod tests {
             .filter(|name| !base.contains(name) && !of_rows.contains(name))
             .collect();
         assert!(missing.is_empty(), "{missing:?}");
-        for (_, words, _) in PHRASES {
+        for line in PHRASES.lines() {
+            let (name, _) = line.split_once(": ").expect("name and phrase");
+            let (words, _) = phrase(name).expect("words and number");
             assert!(words.replace("{}", "joint 3").len() <= 35, "{words}");
         }
     }

@@ -12,6 +12,11 @@ use calib::stage::{
 use calib::table::*;
 use tables::{point, tables};
 
+thread_local! {
+    /// What stages of this test warned of.
+    static WARNED: std::cell::RefCell<Vec<String>> = const { std::cell::RefCell::new(Vec::new()) };
+}
+
 struct Silent;
 impl Services for Silent {
     fn open(&self, _: &calib::stage::RawFile) -> calib::error::Result<OpenedInput> {
@@ -23,7 +28,9 @@ impl Services for Silent {
     fn begin(&self, _: &str, _: Option<u64>, _: &str) {}
     fn advance(&self, _: u64, _: &str) {}
     fn note(&self, _: String) {}
-    fn warn(&self, _: String) {}
+    fn warn(&self, text: String) {
+        WARNED.with_borrow_mut(|all| all.push(text));
+    }
 }
 
 fn context() -> Context<'static> {

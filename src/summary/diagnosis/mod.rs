@@ -10,7 +10,7 @@ use super::short_finding::{Found, ShortFinding, words};
 use crate::diagnose::VerdictKind;
 use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
-use crate::report::{DiagnosedTables, diagnosed_page};
+use crate::report::diagnosed_page;
 use crate::shell::typed;
 use crate::stage::{DeclaredStage, Diagnose, DiagnoseTorques};
 use crate::store::Store;
@@ -153,45 +153,50 @@ impl DiagnosisSummary {
         self.sentences.about(&self.step, topic)
     }
 
-    /// What to measure next, a sentence each, then what to type for poses that tell findings from their closest rivals.
-    fn next(&self, store: &str) -> Option<Vec<String>> {
-        let mut lines: Vec<String> = self
-            .statements(VerdictTopic::NextMeasurement)
-            .into_iter()
-            .map(String::from)
-            .collect();
-        if lines.is_empty() {
-            return None;
-        }
-        let step = if self.step == Diagnose::NAME {
-            String::new()
-        } else {
-            format!(" --step {}", typed(&self.step))
+    /// What to type for poses that tell findings from their closest rivals; `store` as in [`Self::document`].
+    fn poses(&self, store: &str) -> Vec<(&Found, &RivalRow, String)> {
+        let run = &self.run;
+        let step = match self.step == Diagnose::NAME {
+            true => String::new(),
+            false => format!(" --step {}", typed(&self.step)),
         };
-        for finding in self
-            .found
-            .iter()
-            .filter(|finding| is_separable_by_poses(&finding.effect))
-        {
-            let rivals = finding.rivals.iter();
-            let mut own: Vec<&RivalRow> = rivals
-                .filter(|rival| is_separable_by_poses(&rival.effect))
-                .collect();
-            own.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
-            for rival in own.iter().take(ASKED) {
-                let name = format!("{}@{}", rival.effect, rival.place);
-                lines.push(format!(
-                    "poses for finding {} or {} at {}: calib poses --run {}{step}{store} --separate {} {}",
-                    finding.rank,
-                    rival.effect,
-                    rival.place,
-                    self.run,
-                    finding.rank,
-                    typed(&name)
-                ));
-            }
+        if self.statements(VerdictTopic::NextMeasurement).is_empty() {
+            return Vec::new();
         }
-        Some(lines)
+        let findings = self.found.iter();
+        let findings = findings.filter(|finding| is_separable_by_poses(&finding.effect));
+        let rivals = findings.flat_map(|finding| {
+            let rivals = finding.rivals.iter();
+            let rivals = rivals.filter(|rival| is_separable_by_poses(&rival.effect));
+            let mut rivals: Vec<&RivalRow> = rivals.collect();
+            rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
+            rivals
+                .into_iter()
+                .take(ASKED)
+                .map(move |rival| (finding, rival))
+        });
+        let command = |finding: &Found, rival: &RivalRow| {
+            let name = typed(&format!("{}@{}", rival.effect, rival.place));
+            let rank = finding.rank;
+            format!("calib poses --run {run}{step}{store} --separate {rank} {name}")
+        };
+        rivals
+            .map(|(finding, rival)| (finding, rival, command(finding, rival)))
+            .collect()
+    }
+
+    /// What to measure next, a sentence each, then what to type for poses.
+    fn next(&self, store: &str) -> Option<Vec<String>> {
+        let sentences = self.statements(VerdictTopic::NextMeasurement);
+        let poses = self
+            .poses(store)
+            .into_iter()
+            .map(|(finding, rival, command)| {
+                let (rank, effect, place) = (finding.rank, &rival.effect, &rival.place);
+                format!("poses for finding {rank} or {effect} at {place}: {command}")
+            });
+        let lines = || sentences.iter().map(|line| line.to_string()).chain(poses);
+        (!sentences.is_empty()).then(|| lines().collect())
     }
 
     /// The diagnosis as one document; `store` is where the run is, as one types it.
@@ -222,37 +227,10 @@ impl DiagnosisSummary {
                 "of torques the page is the pipeline's report: put `- uses: report` last",
             ));
         };
-        let v = &positions.verdict;
-        let mm =
-            |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
-        diagnosed_page(&DiagnosedTables {
-            title: self.robot.as_deref().unwrap_or("diagnosis"),
-            origin: [&self.run, &self.step],
-            verdict: (
-                v.verdict == VerdictKind::Explained.name(),
-                v.statement
-                    .clone()
-                    .unwrap_or_else(|| v.verdict.replace('_', " ")),
-            ),
-            errors: vec![
-                [
-                    "before".into(),
-                    mm(v.before_mean_mm),
-                    mm(v.before_rms_mm),
-                    mm(v.before_max_mm),
-                ],
-                [
-                    "after".into(),
-                    mm(v.after_mean_mm),
-                    mm(v.after_rms_mm),
-                    mm(v.after_max_mm),
-                ],
-                ["noise".into(), "-".into(), mm(v.noise_floor_mm), "-".into()],
-            ],
-            cells: &positions.cells,
-            findings: &positions.findings,
-            next: self.next(store).unwrap_or_default(),
-        })
+        let title = self.robot.as_deref().unwrap_or("diagnosis");
+        let causes = (&positions.cells, &positions.findings);
+        let next = self.next(store).unwrap_or_default();
+        diagnosed_page(title, &self.run, &positions.verdict, causes, &next)
     }
 
     /// All of the diagnosis, as `calib diagnose --details` prints it; `store` is the `--store` of the commands that it proposes.
@@ -403,26 +381,17 @@ impl DiagnosisSummary {
             .filter(|(short, _)| short.instead.is_some());
         let mut undecided: Vec<(&ShortFinding, &Found)> = undecided.collect();
         undecided.sort_by(|a, b| size(b.0).total_cmp(&size(a.0)));
-        let lines = self.next(store).unwrap_or_default();
-        let poses = undecided.into_iter().find_map(|(short, finding)| {
-            let start = format!("poses for finding {} or ", finding.rank);
-            let (rival, command) = lines
-                .iter()
-                .find_map(|line| line.strip_prefix(&start))?
-                .split_once(": ")?;
-            let (effect, place) = rival.split_once(" at ")?;
-            let what = format!(
-                "measure poses to decide: {}, or {}",
-                short.what,
-                words(effect, place)
-            );
-            Some(NextStep {
-                what,
-                command: Some(command.into()),
-            })
-        });
-        if poses.is_some() {
-            return poses;
+        let poses = self.poses(store);
+        for (short, finding) in undecided {
+            let of_finding =
+                |(asked, ..): &&(&Found, &RivalRow, String)| asked.rank == finding.rank;
+            if let Some((_, rival, command)) = poses.iter().find(of_finding) {
+                let rival = words(&rival.effect, &rival.place);
+                return Some(NextStep {
+                    what: format!("measure poses to decide: {}, or {rival}", short.what),
+                    command: Some(command.clone()),
+                });
+            }
         }
         if verdict.is_noise_inferred() {
             return Some(NextStep {

@@ -49,30 +49,16 @@ impl Positions {
 
     pub(crate) fn found(&self, numbers: &FindingNumbers, rivals: &Rivals) -> Vec<Found> {
         let one = |row: &FindingRow| {
-            let columns =
-                "effect where=place statement probability place_probability none_probability";
-            let mut document = picked(row, columns);
-            let columns = "f_statistic p_value delta_bic heldout_gain_mm effect_rms_mm";
-            document["evidence"] = picked(row, columns);
-            document["forms"] = json!(self.forms.document(row.rank));
-            document["valid_range"] = match row.valid_range() {
-                Some((joint, range, unit)) => json!({ format!("q{joint}_{unit}"): range }),
-                None => json!({}),
-            };
-            let by_length = row.effect_rms_mm.map(|mm| (mm, length(mm)));
-            Found {
-                rank: row.rank,
-                effect: row.effect.clone(),
-                place: row.place.clone(),
-                statement: row.statement.clone(),
-                forms: serde_json::from_str(&row.forms).unwrap_or_default(),
-                numbers: numbers.of_finding(row.rank),
-                probabilities: [row.probability, row.place_probability, row.none_probability],
-                is_compared: row.delta_bic.is_some(),
-                rivals: rivals.of_finding(row.rank),
-                size: by_length.or_else(|| row.effect_rms_rad.map(|rad| (rad, angle(rad)))),
-                document,
+            let evidence = "f_statistic p_value delta_bic heldout_gain_mm effect_rms_mm";
+            let mut found = Found::of(row, evidence, numbers, rivals);
+            found.document["forms"] = json!(self.forms.document(row.rank));
+            if let Some((joint, range, unit)) = row.valid_range() {
+                found.document["valid_range"] = json!({ format!("q{joint}_{unit}"): range });
             }
+            found.forms = serde_json::from_str(&row.forms).unwrap_or_default();
+            let by_length = row.effect_rms_mm.map(|mm| (mm, length(mm)));
+            found.size = by_length.or_else(|| row.effect_rms_rad.map(|rad| (rad, angle(rad))));
+            found
         };
         self.findings.0.iter().map(one).collect()
     }

@@ -7,14 +7,13 @@ use crate::summary::run::filled;
 use crate::summary::short_finding::Found;
 use crate::summary::{labelled, screen};
 use crate::table::{
-    ContactRow, Contacts, FindingNumberRow, FindingNumbers, JointTorqueRow, JointTorques, Rivals,
-    TablesByKind, TorqueFindingRow, TorqueFindings, TorqueVerdict, TorqueVerdictRow, of_kind,
-    picked, picked_of,
+    ContactRow, Contacts, FindingNumberRow, FindingNumbers, JointTorqueRow, JointTorques, RivalRow,
+    Rivals, TablesByKind, TorqueFindingRow, TorqueFindings, TorqueVerdict, TorqueVerdictRow,
+    of_kind, picked, picked_of,
 };
 use minijinja::context;
 use minijinja::value::Serde;
 use serde_json::{Value, json};
-use std::cmp::Ordering;
 
 /// Tables of a diagnosis of torques but findings and sentences.
 pub(super) struct Torques {
@@ -39,33 +38,14 @@ impl Torques {
 
     pub(crate) fn found(&self, numbers: &FindingNumbers, rivals: &Rivals) -> Vec<Found> {
         let one = |row: &TorqueFindingRow| {
-            let columns =
-                "effect where=place statement probability place_probability none_probability";
-            let mut document = picked(row, columns);
-            let columns = "gain f_statistic p_value delta_bic heldout_gain_nm effect_rms_nm";
-            document["evidence"] = picked(row, columns);
-            document["valid_range"] = json!({});
-            let mut rivals = rivals.of_finding(row.rank);
-            rivals.sort_by(|a, b| {
-                b.probability
-                    .partial_cmp(&a.probability)
-                    .unwrap_or(Ordering::Equal)
-            });
+            let evidence = "gain f_statistic p_value delta_bic heldout_gain_nm effect_rms_nm";
+            let mut found = Found::of(row, evidence, numbers, rivals);
+            let chance = |rival: &RivalRow| rival.probability.unwrap_or_default();
+            let by_chance = |a: &RivalRow, b: &RivalRow| chance(b).total_cmp(&chance(a));
+            found.rivals.sort_by(by_chance);
             let size = Some(row.effect_rms_nm).filter(|nm| *nm > 0.0);
-            Found {
-                rank: row.rank,
-                effect: row.effect.clone(),
-                place: row.place.clone(),
-                statement: row.statement.clone(),
-                forms: Value::Null,
-                numbers: numbers.of_finding(row.rank),
-                probabilities: [row.probability, row.place_probability, row.none_probability]
-                    .map(Some),
-                is_compared: true,
-                rivals,
-                size: size.map(|nm| (nm, format!("{} Nm", figure(nm, 1)))),
-                document,
-            }
+            found.size = size.map(|nm| (nm, format!("{} Nm", figure(nm, 1))));
+            found
         };
         self.findings.0.iter().map(one).collect()
     }
