@@ -87,7 +87,11 @@ fn no_file_uses_what_uses_it() {
         faults.push(format!("a circle of {} files:", circle.len()));
         for file in circle {
             for (to, one) in arrows[file].iter().filter(|(to, _)| circle.contains(to)) {
-                faults.push(format!("  src/{file} uses {to} by {}", one.path.join("::")));
+                faults.push(format!(
+                    "  src/{file}:{} uses {to} by {}",
+                    one.line,
+                    one.path.join("::")
+                ));
             }
         }
     }

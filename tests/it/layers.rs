@@ -1,9 +1,8 @@
 //! The map in `src/lib.rs` is true: every layer uses what its row of the table allows, and nothing else.
 
-use crate::answer::{read, root};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::source::{Source, sources, uses};
 
@@ -21,12 +20,12 @@ const NUMERICS: [&str; 8] = [
 ];
 
 fn source() -> PathBuf {
-    root("src")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
 
 /// Layer -> what it may use, from the rows ``| [`layer`] | holds | may use |``, a private one without brackets. A use is a module or `module::file`.
 fn table() -> BTreeMap<String, BTreeSet<String>> {
-    let text = read(source().join("lib.rs"));
+    let text = fs::read_to_string(source().join("lib.rs")).unwrap();
     let rows = text
         .lines()
         .filter_map(|line| line.strip_prefix("//! | "))
@@ -61,7 +60,7 @@ fn table() -> BTreeMap<String, BTreeSet<String>> {
 #[test]
 fn every_layer_is_a_row_of_the_map_and_every_row_a_layer() {
     let text = ["lib.rs", "foundation/lib.rs", "numerics/lib.rs"]
-        .map(|file| read(source().join(file)))
+        .map(|file| fs::read_to_string(source().join(file)).unwrap())
         .concat();
     let declared: BTreeSet<String> = text
         .lines()
@@ -103,7 +102,7 @@ fn breaches(sources: &[Source], table: &BTreeMap<String, BTreeSet<String>>) -> V
                     .iter()
                     .any(|name| allowed.contains(*name))
             {
-                faults.push(format!("{}: {layer} uses {item}", source.file));
+                faults.push(format!("{}:{}: {layer} uses {item}", source.file, one.line));
             }
         }
     }
@@ -133,10 +132,10 @@ fn a_breach_is_found_in_a_group_behind_unit_tests_and_inside_an_expression() {
     assert_eq!(
         breaches(&[source], &table()),
         [
-            "store/key.rs: store uses cli::",
-            "store/key.rs: store uses cli::run",
-            "store/key.rs: store uses pipeline::run",
-            "store/key.rs: store uses stage::Plan",
+            "store/key.rs:3: store uses cli::",
+            "store/key.rs:3: store uses cli::run",
+            "store/key.rs:4: store uses pipeline::run",
+            "store/key.rs:4: store uses stage::Plan",
         ]
     );
 }
@@ -147,7 +146,9 @@ fn stages_do_not_use_each_other() {
         .unwrap()
         .map(|entry| entry.unwrap().path())
         // What several stages share is no stage.
-        .filter(|path| path.is_file() && read(path).contains("impl Stage for"))
+        .filter(|path| {
+            path.is_file() && fs::read_to_string(path).unwrap().contains("impl Stage for")
+        })
         .map(|path| path.file_stem().unwrap().to_string_lossy().into_owned())
         .collect();
     let mut faults = Vec::new();
@@ -160,7 +161,7 @@ fn stages_do_not_use_each_other() {
             let (module, item) = leads_to(&one.path);
             let other = item.trim_start_matches("stage::");
             if module == "stage" && other != own && names.iter().any(|name| name == other) {
-                faults.push(format!("{}: uses {item}", source.file));
+                faults.push(format!("{}:{}: uses {item}", source.file, one.line));
             }
         }
     }

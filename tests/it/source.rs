@@ -1,7 +1,6 @@
 //! The sources as the compiler sees them: which module a file is, and what it names of other modules. Unit tests, comments and texts
 //! are left out; groups (`use crate::{a, b::{c, d}}`), `self`, `super` and paths inside expressions are not.
 
-use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,6 +8,7 @@ use std::path::{Path, PathBuf};
 /// A path that a file names, from the root of the crate: `["store", "key", "StageKey"]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Use {
+    pub line: usize,
     pub path: Vec<String>,
     /// What an import calls it here; none for a path inside an expression.
     pub name: Option<String>,
@@ -87,9 +87,10 @@ fn module_of(file: &str) -> Vec<String> {
 pub fn uses(text: &str, module: &[String], modules: &[Vec<String>]) -> Vec<Use> {
     let tokens = without_tests(&tokens(text));
     let mut found = Vec::new();
-    let mut add = |path: Vec<String>, name: Option<String>, handed_on: bool| {
+    let mut add = |line: usize, path: Vec<String>, name: Option<String>, handed_on: bool| {
         if let Some(path) = absolute(&path, module, modules) {
             found.push(Use {
+                line,
                 path,
                 name,
                 handed_on,
@@ -98,25 +99,26 @@ pub fn uses(text: &str, module: &[String], modules: &[Vec<String>]) -> Vec<Use> 
     };
     let mut at = 0;
     while at < tokens.len() {
-        let before = at.checked_sub(1).map(|before| tokens[before].as_str());
-        if tokens[at] == "use" {
+        let before = at.checked_sub(1).map(|before| tokens[before].text.as_str());
+        if tokens[at].text == "use" {
             let handed_on = matches!(before, Some("pub" | ")"));
             let mut leaves = Vec::new();
             at = tree(&tokens, at + 1, &mut Vec::new(), &mut leaves);
-            for (path, name) in leaves {
-                add(path, Some(name), handed_on);
+            for (line, path, name) in leaves {
+                add(line, path, Some(name), handed_on);
             }
-        } else if is_word(&tokens[at]) && before != Some("::") {
-            let mut path = vec![tokens[at].clone()];
-            while tokens.get(at + 1).is_some_and(|token| token == "::")
-                && tokens.get(at + 2).is_some_and(|token| is_word(token))
+        } else if tokens[at].is_word() && before != Some("::") {
+            let line = tokens[at].line;
+            let mut path = vec![tokens[at].text.clone()];
+            while tokens.get(at + 1).is_some_and(|token| token.text == "::")
+                && tokens.get(at + 2).is_some_and(Token::is_word)
             {
-                path.push(tokens[at + 2].clone());
+                path.push(tokens[at + 2].text.clone());
                 at += 2;
             }
             at += 1;
             if path.len() > 1 {
-                add(path, None, false);
+                add(line, path, None, false);
             }
         } else {
             at += 1;
@@ -125,24 +127,25 @@ pub fn uses(text: &str, module: &[String], modules: &[Vec<String>]) -> Vec<Use> 
     found
 }
 
-/// The leaves of an import's tree that begins at a token: path, name. Gives the token after it.
+/// The leaves of an import's tree that begins at a token: line, path, name. Gives the token after it.
 fn tree(
-    tokens: &[String],
+    tokens: &[Token],
     mut at: usize,
     path: &mut Vec<String>,
-    leaves: &mut Vec<(Vec<String>, String)>,
+    leaves: &mut Vec<(usize, Vec<String>, String)>,
 ) -> usize {
     let depth = path.len();
     let mut name = None;
+    let line = tokens[at].line;
     let mut group = false;
     while let Some(token) = tokens.get(at) {
-        match token.as_str() {
+        match token.text.as_str() {
             "::" => at += 1,
             "{" => {
                 group = true;
                 at += 1;
-                while tokens[at] != "}" {
-                    at = if tokens[at] == "," {
+                while tokens[at].text != "}" {
+                    at = if tokens[at].text == "," {
                         at + 1
                     } else {
                         tree(tokens, at, path, leaves)
@@ -151,12 +154,12 @@ fn tree(
                 at += 1;
             }
             "as" => {
-                name = Some(tokens[at + 1].clone());
+                name = Some(tokens[at + 1].text.clone());
                 at += 2;
             }
             "self" if path.len() > depth || depth > 0 => at += 1,
-            _ if is_word(token) || token == "*" => {
-                path.push(token.clone());
+            _ if token.is_word() || token.text == "*" => {
+                path.push(token.text.clone());
                 at += 1;
             }
             _ => break,
@@ -164,7 +167,7 @@ fn tree(
     }
     if !group {
         let last = path.last().cloned().unwrap_or_default();
-        leaves.push((path.clone(), name.unwrap_or(last)));
+        leaves.push((line, path.clone(), name.unwrap_or(last)));
     }
     path.truncate(depth);
     at
@@ -236,54 +239,140 @@ pub fn home<'a>(
     }
 }
 
-/// Words, `::` and other single characters of a text; literals and comments are none.
-fn tokens(text: &str) -> Vec<String> {
-    let mut found = Vec::new();
-    flatten(text.parse().unwrap(), &mut found);
-    found
+/// A word, a number, `::` or another single character; a text or a comment is none.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Token {
+    line: usize,
+    text: String,
 }
 
-fn flatten(stream: TokenStream, found: &mut Vec<String>) {
-    let mut colon = false;
-    for tree in stream {
-        let after_colon = std::mem::take(&mut colon);
-        match tree {
-            TokenTree::Punct(mark) if mark.as_char() == ':' && after_colon => {
-                found.push("::".into())
-            }
-            TokenTree::Punct(mark) if mark.as_char() == ':' => {
-                colon = mark.spacing() == Spacing::Joint
-            }
-            TokenTree::Group(group) => {
-                let [open, close] = match group.delimiter() {
-                    Delimiter::Parenthesis => ["(", ")"],
-                    Delimiter::Brace => ["{", "}"],
-                    Delimiter::Bracket => ["[", "]"],
-                    Delimiter::None => ["", ""],
-                };
-                found.push(open.into());
-                flatten(group.stream(), found);
-                found.push(close.into());
-            }
-            TokenTree::Literal(_) => {}
-            word => found.push(word.to_string()),
-        }
+impl Token {
+    fn is_word(&self) -> bool {
+        self.text
+            .starts_with(|c: char| c.is_alphabetic() || c == '_')
     }
 }
 
-fn is_word(token: &str) -> bool {
-    token.starts_with(|c: char| c.is_alphabetic() || c == '_')
+fn tokens(text: &str) -> Vec<Token> {
+    let chars: Vec<char> = text.chars().collect();
+    let (mut found, mut at, mut line) = (Vec::new(), 0, 1);
+    while at < chars.len() {
+        let next = chars.get(at + 1).copied();
+        let end = match chars[at] {
+            '/' if next == Some('/') => to(&chars, at, |c| c == '\n'),
+            '/' if next == Some('*') => after_comment(&chars, at),
+            '"' => after_text(&chars, at + 1),
+            'r' | 'b' if raw(&chars, at).is_some() => raw(&chars, at).unwrap_or(at),
+            '\'' => after_tick(&chars, at),
+            ':' if next == Some(':') => {
+                found.push(Token {
+                    line,
+                    text: "::".into(),
+                });
+                at + 2
+            }
+            c if c.is_alphanumeric() || c == '_' => {
+                let end = to(&chars, at, |c| !(c.is_alphanumeric() || c == '_'));
+                found.push(Token {
+                    line,
+                    text: chars[at..end].iter().collect(),
+                });
+                end
+            }
+            c => {
+                if !c.is_whitespace() {
+                    found.push(Token {
+                        line,
+                        text: c.to_string(),
+                    });
+                }
+                at + 1
+            }
+        };
+        line += chars[at..end.min(chars.len())]
+            .iter()
+            .filter(|c| **c == '\n')
+            .count();
+        at = end;
+    }
+    found
+}
+
+fn to(chars: &[char], from: usize, stop: impl Fn(char) -> bool) -> usize {
+    (from..chars.len())
+        .find(|at| stop(chars[*at]))
+        .unwrap_or(chars.len())
+}
+
+fn after_comment(chars: &[char], from: usize) -> usize {
+    let (mut at, mut depth) = (from, 0);
+    while at + 1 < chars.len() {
+        match (chars[at], chars[at + 1]) {
+            ('/', '*') => (at, depth) = (at + 2, depth + 1),
+            ('*', '/') => (at, depth) = (at + 2, depth - 1),
+            _ => at += 1,
+        }
+        if depth == 0 {
+            return at;
+        }
+    }
+    chars.len()
+}
+
+fn after_text(chars: &[char], from: usize) -> usize {
+    let mut at = from;
+    while at < chars.len() && chars[at] != '"' {
+        at += if chars[at] == '\\' { 2 } else { 1 };
+    }
+    at + 1
+}
+
+/// The end of `r"..."`, `r#"..."#`, `b"..."`, `br"..."` that begins here.
+fn raw(chars: &[char], from: usize) -> Option<usize> {
+    if from > 0 && (chars[from - 1].is_alphanumeric() || chars[from - 1] == '_') {
+        return None;
+    }
+    let quote = to(chars, from, |c| !"rb#".contains(c));
+    let prefix: String = chars[from..quote].iter().collect();
+    let marks = prefix.chars().filter(|c| *c == '#').count();
+    if chars.get(quote) != Some(&'"') {
+        return None;
+    }
+    if !prefix.contains('r') {
+        return Some(after_text(chars, quote + 1));
+    }
+    let closes = |at: &usize| {
+        chars[*at] == '"'
+            && chars[at + 1..]
+                .iter()
+                .take(marks)
+                .filter(|c| **c == '#')
+                .count()
+                == marks
+    };
+    (quote + 1..chars.len())
+        .find(closes)
+        .map(|at| at + 1 + marks)
+}
+
+/// After a character, or after the tick of a lifetime.
+fn after_tick(chars: &[char], from: usize) -> usize {
+    match (chars.get(from + 1), chars.get(from + 2)) {
+        (Some('\\'), _) => to(chars, from + 3, |c| c == '\'') + 1,
+        (_, Some('\'')) => from + 3,
+        _ => from + 1,
+    }
 }
 
 /// Without items behind `#[cfg(test)]`, each up to its `;` or the end of its block.
-fn without_tests(tokens: &[String]) -> Vec<String> {
+fn without_tests(tokens: &[Token]) -> Vec<Token> {
     let mut kept = Vec::new();
     let mut at = 0;
     while at < tokens.len() {
         let here: Vec<&str> = tokens[at..]
             .iter()
             .take(7)
-            .map(|token| token.as_str())
+            .map(|token| token.text.as_str())
             .collect();
         if here != ["#", "[", "cfg", "(", "test", ")", "]"] {
             kept.push(tokens[at].clone());
@@ -293,7 +382,7 @@ fn without_tests(tokens: &[String]) -> Vec<String> {
         at += 7;
         let mut depth = 0;
         while at < tokens.len() {
-            let text = tokens[at].as_str();
+            let text = tokens[at].text.as_str();
             depth += match text {
                 "{" | "(" | "[" => 1,
                 "}" | ")" | "]" => -1,
@@ -332,25 +421,25 @@ fn k() { std::mem::swap(); child::call(self::own::Six); vec![super::super::top::
     .collect();
     assert_eq!(named, [words("twin::arm::Arm"), words("units::Unit")]);
     let modules = [words("room::here"), words("room::here::child")];
-    let found: Vec<(String, bool)> = uses(text, &words("room::here"), &modules)
+    let found: Vec<(usize, String, bool)> = uses(text, &words("room::here"), &modules)
         .into_iter()
-        .map(|one| (one.path.join("::"), one.handed_on))
+        .map(|one| (one.line, one.path.join("::"), one.handed_on))
         .collect();
     let wanted = [
-        ("alpha", false),
-        ("alpha::One", false),
-        ("beta::Two", false),
-        ("gamma", false),
-        ("room::delta::Three", false),
-        ("room::delta::four::*", false),
-        ("room::here::child::Five", true),
-        ("epsilon::h", false),
-        ("room::here::child::call", false),
-        ("room::here::own::Six", false),
-        ("top::Seven", false),
+        (3, "alpha", false),
+        (3, "alpha::One", false),
+        (3, "beta::Two", false),
+        (3, "gamma", false),
+        (6, "room::delta::Three", false),
+        (6, "room::delta::four::*", false),
+        (7, "room::here::child::Five", true),
+        (8, "epsilon::h", false),
+        (10, "room::here::child::call", false),
+        (10, "room::here::own::Six", false),
+        (10, "top::Seven", false),
     ];
     assert_eq!(
         found,
-        wanted.map(|(path, handed_on)| (path.to_string(), handed_on))
+        wanted.map(|(line, path, handed_on)| (line, path.to_string(), handed_on))
     );
 }

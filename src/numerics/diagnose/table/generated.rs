@@ -39,9 +39,9 @@ const CURVE: Over = Over::Curve {
     lengths: 3,
 };
 const SLOW: Over = Over::Curve {
-    count: 12,
+    count: 8,
     first: 4,
-    lengths: 3,
+    lengths: 2,
 };
 
 /// Variables of one kind, which share its prior odds.
