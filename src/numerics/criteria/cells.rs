@@ -84,6 +84,14 @@ criteria! {
     ROUGHLY: usize = 4, "functions", "judgement: bounds time", "";
     /// Functions of each of two variables in a product, of motions in one direction, in two, in three.
     EACH: [usize; 3] = [6, 5, 4], "functions", "judgement: bounds time", "";
+    /// Products of a scan that are looked at as one curve times another.
+    SEPARATED: usize = 3, "cells", "judgement: bounds time", "";
+    /// Turns of estimating one of the two curves of a product given the other, at most.
+    TURNS: usize = 8, "turns", "judgement: bounds time", "";
+    /// Gain of a turn, ln of the evidence, below which it is the last.
+    TURNED: f64 = 0.1, "ln of evidence", "judgement: no odds that matter change by it", "";
+    /// Functions of the curve of a product that stays free in the end.
+    JUMPING: usize = 40, "functions", "count: a jump within a fortieth of the range", "";
     /// Cosines of what is not straight in a law that is nearly a line.
     BENDING: usize = 12, "cosines", "count: bends over a twelfth of the range", "";
     /// Steps in time of a motion without a name that are asked at first.

@@ -110,3 +110,28 @@ fn what_is_in_no_list_is_diagnosed_and_counted() {
     assert_eq!(silent + placed + misplaced, count);
     assert!(harmed <= worse && wrong <= placed + misplaced);
 }
+
+#[test]
+fn a_product_of_which_neither_variable_is_of_its_joint_or_shows_by_itself_is_found() {
+    let design = Design {
+        seed: 1_795_788_582,
+        cases: 60,
+        foreign: 1.0,
+        faulty: 0.0,
+        ..Design::default()
+    };
+    let case = Case::make(&design, 47, Content::Foreign).unwrap();
+    let cause = &case.concealed[0].cause;
+    // Joint 3 turns by jumps over the angle of joint 1, to one side without the payload and to the other with it.
+    assert_eq!((&*case.name, &*cause.place), ("c0048", "joint 3"));
+    let said = said(&case, &[]);
+    let largest = said.found.iter().max_by(|a, b| a.3.total_cmp(&b.3));
+    let largest = largest.map(|(name, place, ..)| (&**name, &**place));
+    assert_eq!(largest, Some(("unknown", "joint 3")), "{:?}", said.found);
+    assert!(
+        said.after < 0.5 * said.before,
+        "{} -> {}",
+        said.before,
+        said.after
+    );
+}

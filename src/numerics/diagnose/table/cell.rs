@@ -471,13 +471,18 @@ pub(super) fn fields(motion: Motion) -> usize {
     }
 }
 
+/// Whether the directions of a motion alternate in its coefficients, as the axes of a frame do; else all functions of one follow each other.
+pub(super) fn alternates(motion: Motion) -> bool {
+    matches!(
+        motion,
+        Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }
+    )
+}
+
 /// Shares of functions, for every direction of a motion alike, in the order of its coefficients.
 pub(super) fn over_fields(shares: Vec<f64>, motion: Motion, fields: usize) -> Vec<f64> {
     let scaled = |share: &f64| share / fields as f64;
-    if matches!(
-        motion,
-        Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }
-    ) {
+    if alternates(motion) {
         shares
             .iter()
             .flat_map(|share| std::iter::repeat_n(scaled(share), fields))

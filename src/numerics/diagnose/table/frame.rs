@@ -1,6 +1,7 @@
 //! The rows as they stand around the present model: what is left without any cell, and the columns of whatever moves it; both weighed, with
 //! geometry projected off.
 
+use super::cell::alternates;
 use super::evidence::EvidenceRows;
 use crate::criteria::cells::{EVEN, FAR, UNEVEN};
 use crate::diagnose::linear::{dot, orthonormal, project};
@@ -303,11 +304,8 @@ impl<'a> SearchRows<'a> {
             .map(|function| function.iter().map(|value| value * value).collect())
             .collect();
         let count = directions.len() * functions.len();
-        // In the order of the term's coefficients: a frame's axes alternate.
-        let alternate = matches!(
-            term.motion(),
-            Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }
-        );
+        // In the order of the term's coefficients.
+        let alternate = alternates(term.motion());
         let pair = |k: usize| {
             if alternate {
                 (k % directions.len(), k / directions.len())

@@ -30,7 +30,7 @@ pub use state::KnownState;
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::Located;
 use crate::criteria::cells::{IDLE, OPEN, ROUNDS, UNEXPLAINED};
-use crate::effect::{Basis, Form, Law, Motion, Place, Survey, names};
+use crate::effect::{Basis, Form, Law, Place, Survey, names};
 use crate::estimate::Prior;
 use crate::observation::only_contacts;
 use cause_table::CauseTable;
@@ -283,10 +283,7 @@ fn without_idle_waves(
         return (form.clone(), all);
     };
     let fields = count / waves.max(1);
-    let alternates = matches!(
-        term.motion(),
-        Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }
-    );
+    let alternates = cell::alternates(term.motion());
     let column = |wave: usize, field: usize| {
         if alternates {
             wave * fields + field

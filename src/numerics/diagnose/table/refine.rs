@@ -4,16 +4,13 @@ use super::cause_table::CauseTable;
 use super::cell::{FreeShape, Over, ShapeGroup, Shapes, fields};
 use super::scan::{CellEvidence, CellScan, Refined};
 use super::state::{Component, KnownState};
-use crate::criteria::cells::{BENDS, LEVELS, STICKS};
+use crate::criteria::cells::{BENDS, LEVELS, SEPARATED, STICKS};
 use crate::effect::{Basis, Form, Variable};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// ln of the evidence of a shape, and its amplitude.
 type Worth = (f64, f64);
-
-/// Products of a scan that are looked at as one curve times another.
-const SEPARATED: usize = 3;
 
 /// A shape with other numbers, and its forms.
 type Variant<T> = (T, Vec<Form>);
@@ -76,7 +73,7 @@ impl CauseTable<'_, '_> {
                 .total_cmp(&scan.log_odds[*a])
                 .then(a.cmp(b))
         });
-        products.truncate(SEPARATED);
+        products.truncate(*SEPARATED);
         let separated: Vec<(usize, Refined)> = products
             .into_par_iter()
             .filter_map(|cell| {

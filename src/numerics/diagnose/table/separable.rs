@@ -3,28 +3,17 @@
 
 use super::cause_table::CauseTable;
 use super::cell::{
-    CellShape, FreeShape, Over, ShapeGroup, Shapes, cornered, density, fields, over_fields, support,
+    CellShape, FreeShape, Over, ShapeGroup, Shapes, alternates, cornered, density, fields,
+    over_fields, support,
 };
 use super::scan::{CellEvidence, Refined};
 use super::state::{CellColumns, Component, KnownState};
-use crate::criteria::cells::{LENGTHS, NU};
+use crate::criteria::cells::{JUMPING, LENGTHS, NU, TURNED, TURNS};
 use crate::effect::{Basis, Form, Law, Motion};
 use nalgebra::DMatrix;
 use std::collections::BTreeSet;
 
-/// Functions of each variable while both are estimated.
-const COUNT: usize = Basis::CURVE;
-/// Functions of the one that stays free in the end: what jumps needs many.
-const FINELY: usize = 40;
-/// Turns of estimating one curve given the other.
-const TURNS: usize = 8;
-/// Gain of ln of the evidence below which no further turn is made.
-const ENOUGH: f64 = 0.1;
-
-/// Spectra of a curve: smooth ones of some correlation lengths, and one with corners.
-const SPECTRA: usize = 6;
-
-type Weights = [f64; COUNT];
+type Weights = [f64; Basis::CURVE];
 
 /// One of the curves given the other.
 struct Half {
@@ -66,11 +55,11 @@ impl CauseTable<'_, '_> {
         let mut curves = [(self.first_curve(free, supports, state, others)?, 0.0); 2];
         let mut best: Option<Refined> = None;
         let mut last = f64::NEG_INFINITY;
-        for turn in 0..TURNS {
+        for turn in 0..*TURNS {
             let given = turn % 2;
             let half = self.half(
                 free,
-                (supports, COUNT),
+                (supports, Basis::CURVE),
                 (given, curves[given]),
                 state,
                 others,
@@ -83,19 +72,13 @@ impl CauseTable<'_, '_> {
             if best.as_ref().is_none_or(|best| log > best.log) {
                 best = Some(half.refined);
             }
-            if log < last + ENOUGH {
+            if log < last + *TURNED {
                 break;
             }
             last = log;
         }
-        for given in 0..2 {
-            let half = self.half(
-                free,
-                (supports, FINELY),
-                (given, curves[given]),
-                state,
-                others,
-            );
+        for (given, curve) in curves.into_iter().enumerate() {
+            let half = self.half(free, (supports, *JUMPING), (given, curve), state, others);
             let half = half.map(|half| half.refined);
             best = best
                 .into_iter()
@@ -138,7 +121,7 @@ impl CauseTable<'_, '_> {
             coefficients[at(i, k / fields, k % fields)]
         });
         let leading = leading(&unfolded)?;
-        let mut weights = [0.0; COUNT];
+        let mut weights = [0.0; Basis::CURVE];
         match law.first.basis {
             // Of two or three values: a line is a cosine.
             Basis::Straight { zero, per } => {
@@ -146,7 +129,7 @@ impl CauseTable<'_, '_> {
                 weights[0] = leading[0];
                 weights[1] = -leading[1] / end;
             }
-            _ => (0..rows.min(COUNT)).for_each(|k| weights[k] = leading[k]),
+            _ => (0..rows.min(Basis::CURVE)).for_each(|k| weights[k] = leading[k]),
         }
         Some(weights)
     }
@@ -180,7 +163,7 @@ impl CauseTable<'_, '_> {
         let fields = fields(free.motion);
         let smooth = LENGTHS.iter().map(|length| density(functions - 1, *length));
         let spectra: Vec<Vec<f64>> = smooth.chain([cornered(functions - 1)]).collect();
-        let log_weight = cost - (SPECTRA as f64).ln();
+        let log_weight = cost - (spectra.len() as f64).ln();
         let shape = |curve: Vec<f64>| {
             let curve = curve.into_iter().map(|share| 0.5 * share);
             let shares = std::iter::once(0.5).chain(curve).collect();
@@ -213,8 +196,8 @@ impl CauseTable<'_, '_> {
         let whole = *NU + state.rows.square;
         let gain = -0.5 * (state.rows.freedom + *NU) * (1.0 - evidence.fit / whole).max(1e-9).ln();
         let leading = leading(&unfolded)?;
-        let mut weights = [0.0; COUNT];
-        weights.copy_from_slice(&leading[..COUNT]);
+        let mut weights = [0.0; Basis::CURVE];
+        weights.copy_from_slice(&leading[..Basis::CURVE]);
         Some(Half {
             refined: Refined {
                 forms: vec![form],
@@ -230,10 +213,7 @@ impl CauseTable<'_, '_> {
 
 /// Where the coefficient of a function in a direction stands among those of a motion.
 fn place(motion: Motion, fields: usize, functions: usize, function: usize, field: usize) -> usize {
-    if matches!(
-        motion,
-        Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }
-    ) {
+    if alternates(motion) {
         function * fields + field
     } else {
         field * functions + function
