@@ -606,17 +606,21 @@ impl KnownState {
             .cholesky()?
             .solve(&roots.component_mul(&gradient))
             .component_mul(&roots);
-        let scale = |k: usize| {
-            let square = block.columns.square[group.range.start + k];
-            if square > 0.0 {
+        let squares = &block.columns.square[group.range.clone()];
+        // A function that is zero at all values that there are, as a cosine may be at two, is rounding.
+        let least = 1e-9 * squares.iter().copied().fold(0.0, f64::max);
+        let scale = |square: f64| {
+            if square > least {
                 square.sqrt().recip()
             } else {
                 0.0
             }
         };
-        Some(DVector::from_fn(weights.len(), |k, _| {
-            weights[k] * scale(k)
-        }))
+        let scaled = weights.iter().zip(squares);
+        Some(DVector::from_iterator(
+            weights.len(),
+            scaled.map(|(weight, square)| weight * scale(*square)),
+        ))
     }
 
     /// Standard error of each coefficient (SI) of a block of one group given the components.
