@@ -404,6 +404,11 @@ fn the_place_counts_apart_from_the_name_and_unknown_is_no_wrong_name() {
 fn one_changed_byte_breaks_the_seal() {
     let root = tempfile::tempdir().unwrap();
     let (set, verdicts) = judged(root.path(), wanted);
+    let reveal = format!(
+        "simulate reveal {} --verdicts {}",
+        set.display(),
+        verdicts.display()
+    );
     for name in ["sealed/c0003.json", "recordings/c0002/tracker.csv"] {
         let path = set.join(name);
         let before = std::fs::read(&path).unwrap();
@@ -411,14 +416,7 @@ fn one_changed_byte_breaks_the_seal() {
         let last = after.iter().rposition(u8::is_ascii_digit).unwrap();
         after[last] = if after[last] == b'1' { b'2' } else { b'1' };
         std::fs::write(&path, after).unwrap();
-        let done = calib(
-            ".",
-            &format!(
-                "simulate reveal {} --verdicts {}",
-                set.display(),
-                verdicts.display()
-            ),
-        );
+        let done = calib(".", &reveal);
         let said = done.err.clone();
         assert_eq!(done.code, Some(10), "{said}");
         assert!(
@@ -429,14 +427,7 @@ fn one_changed_byte_breaks_the_seal() {
         std::fs::write(&path, before).unwrap();
     }
     std::fs::remove_file(set.join("recordings/c0001/robot.json")).unwrap();
-    let done = calib(
-        ".",
-        &format!(
-            "simulate reveal {} --verdicts {}",
-            set.display(),
-            verdicts.display()
-        ),
-    );
+    let done = calib(".", &reveal);
     assert!(
         done.err
             .contains("recordings/c0001/robot.json: was sealed, but cannot be read")

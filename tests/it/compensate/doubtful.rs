@@ -11,6 +11,7 @@ use crate::desk::{Desk, diagnose_reads, table};
 use calib::compensate::{Chain, Circumstance, IdentifiedArm, Nominal};
 use calib::robot::{Posture, RobotModel};
 use calib::stage::{Diagnose, Labelled, Validate, ValidateReads};
+use calib::store::frame::Frame;
 use calib::table::{Parameters, Prediction, Robot, Statistics, StatisticsRow, Verdict};
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::points::FIT;
@@ -21,18 +22,20 @@ use calib::twin::effect::{JointCompliance, JointHardening, Physical};
 use calib::twin::noise::{Noise, Purpose};
 use calib::twin::recorder::Shot;
 use serde_json::json;
+use std::collections::BTreeMap;
 
-/// What a diagnosis and its validation say of a recording.
-fn judged(case: &Case) -> (Verdict, Prediction, StatisticsRow) {
+/// The tables of a diagnosis of a recording.
+fn diagnosed(case: &Case) -> BTreeMap<&'static str, Vec<Frame>> {
     let recording = recording(case);
     let split = split(case, &recording);
     let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
-    let tables = Desk::default()
-        .run(
-            &stage,
-            diagnose_reads(Robot::from_description(&case.robot), recording, split),
-        )
-        .unwrap();
+    let reads = diagnose_reads(Robot::from_description(&case.robot), recording, split);
+    Desk::default().run(&stage, reads).unwrap()
+}
+
+/// What a diagnosis and its validation say of a recording.
+fn judged(case: &Case) -> (Verdict, Prediction, StatisticsRow) {
+    let tables = diagnosed(case);
     let prediction = table::<Prediction>(&tables).remove(0);
     let labelled = Labelled {
         stage: "diagnose".into(),
@@ -190,14 +193,7 @@ fn asked_beyond_small_loads(
     let case = again(case, effects, seed, pose);
     let recording = recording(&case);
     let data = recording.measurements();
-    let split = split(&case, &recording);
-    let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
-    let tables = Desk::default()
-        .run(
-            &stage,
-            diagnose_reads(Robot::from_description(&case.robot), recording, split),
-        )
-        .unwrap();
+    let tables = diagnosed(&case);
     let arm = IdentifiedArm::new(
         model(&case.robot, &table::<Parameters>(&tables).remove(0)),
         None,

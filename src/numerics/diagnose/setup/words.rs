@@ -330,7 +330,7 @@ fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
             if quarters != 0 && rest.abs() < *QUARTERLY && joints <= MOST {
                 let SetupWords { what, mend, .. } =
                     of_counting(Counting::of_a_zero(joint, quarters), joints);
-                let what = format!("{what}, and is {} deg off besides", figure(rest, 2));
+                let what = format!("{what}, and is also {} deg off", figure(rest, 2));
                 return SetupWords::of(what, mend);
             }
             (

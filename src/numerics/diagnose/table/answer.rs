@@ -2,10 +2,11 @@
 //! the residual sits before and after.
 
 use super::cause_table::CauseTable;
+use super::component::{CellColumns, Component};
 use super::evidence::log_sum;
 use super::scan::CellScan;
 use super::search::without;
-use super::state::{CellColumns, Component, KnownState};
+use super::state::KnownState;
 use crate::criteria::cells::{BENDS, MISLED, RIVAL};
 use crate::diagnose::types::{
     ExplainedCell, ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine,

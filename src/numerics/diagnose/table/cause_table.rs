@@ -1,8 +1,9 @@
 //! All cells of a recording with their columns, and the products of these with components of a model.
 
 use super::cell::{CauseCell, FreeShape, Over, Shapes};
+use super::component::{CellColumns, ColumnProducts, Component, PartProducts};
 use super::frame::SearchRows;
-use super::state::{CellColumns, ColumnProducts, Component, KnownState, PartProducts};
+use super::state::KnownState;
 use super::{generated, listed};
 use crate::criteria::cells::{ALIKE, COMPONENTS, USUAL_MOST};
 use crate::diagnose::types::{KnownCell, Question};

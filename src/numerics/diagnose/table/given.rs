@@ -2,10 +2,11 @@
 
 use super::cause_table::CauseTable;
 use super::cell::CauseCell;
+use super::component::{CellColumns, Component, SeenGroup, shape_keys};
 use super::evidence::log_sum;
 use super::frame::{NoiseShape, SearchRows, product, view as matrix};
 use super::search::without;
-use super::state::{CellColumns, Component, KnownState, SeenGroup, shape_keys};
+use super::state::KnownState;
 use super::{by_currents, estimated, is_kept};
 use crate::criteria::cells::{CLOSELY, OPEN, SMALLEST};
 use crate::criteria::fleet::WRITTEN;

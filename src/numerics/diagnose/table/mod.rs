@@ -7,6 +7,7 @@
 mod answer;
 mod cause_table;
 mod cell;
+mod component;
 mod evidence;
 mod forms;
 mod frame;
@@ -35,8 +36,8 @@ use crate::estimate::Prior;
 use crate::observation::only_contacts;
 use cause_table::CauseTable;
 use cell::FreeShape;
+use component::Component;
 use frame::{NoiseShape, SearchRows};
-use state::Component;
 
 /// What rounds of searching around better and better models keep.
 #[derive(Default)]

@@ -2,12 +2,12 @@
 
 use super::cause_table::CauseTable;
 use super::cell::{FreeShape, Over, ShapeGroup, Shapes, fields};
+use super::component::{Component, form_keys};
 use super::scan::{CellEvidence, CellScan, Refined};
-use super::state::{Component, KnownState};
+use super::state::KnownState;
 use crate::criteria::cells::{BENDS, LEVELS, SEPARATED, STICKS};
 use crate::effect::{Basis, Form, Variable};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 
 /// ln of the evidence of a shape, and its amplitude.
 type Worth = (f64, f64);
@@ -100,11 +100,7 @@ impl CauseTable<'_, '_> {
         others: &[&Component],
     ) -> Option<Refined> {
         let best = self.as_found(cell, found);
-        let keys: BTreeSet<String> = others
-            .iter()
-            .flat_map(|component| &component.forms)
-            .map(Form::key)
-            .collect();
+        let keys = form_keys(others);
         let value = |forms: &[Form]| {
             let other = self.with_forms(&best, forms.to_vec());
             // With other numbers a variable may have so few values that its curve has fewer columns.

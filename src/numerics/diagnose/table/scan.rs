@@ -2,13 +2,14 @@
 
 use super::cause_table::CauseTable;
 use super::cell::{CellShape, FreeShape, Over, ShapeGroup, Shapes};
+use super::component::{CellColumns, Component, form_keys, shape_keys};
 use super::evidence::log_sum;
 use super::frame::UnitColumns;
-use super::state::{CellColumns, Component, KnownState, shape_keys};
+use super::state::KnownState;
 use crate::criteria::cells::{BENDS, FAR_BELOW, JOINS, PAIR, PAIRS, UNLIKELY};
 use crate::effect::{Form, Variable};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// What a cell says given a state, with its likeliest shape.
@@ -78,12 +79,7 @@ impl CauseTable<'_, '_> {
         let block = self.fine(cell);
         let across = self.across_block(block, state, components);
         let mut all: Vec<(f64, usize, usize, f64)> = Vec::new();
-        // A model holds every number once, by its name.
-        let keys: BTreeSet<String> = components
-            .iter()
-            .flat_map(|component| &component.forms)
-            .map(Form::key)
-            .collect();
+        let keys = form_keys(components);
         let is_there = |group: usize| {
             block.groups[group]
                 .group

@@ -2,8 +2,9 @@
 
 use super::cause_table::CauseTable;
 use super::cell::{FreeShape, Over, Shapes};
+use super::component::Component;
 use super::evidence::AMPLITUDES;
-use super::state::{Component, KnownState};
+use super::state::KnownState;
 use crate::criteria::cells::{
     BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER, SWAPS,
     TRACE, WAVES,

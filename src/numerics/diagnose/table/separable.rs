@@ -6,12 +6,12 @@ use super::cell::{
     CellShape, FreeShape, Over, ShapeGroup, Shapes, alternates, cornered, density, fields,
     over_fields, support,
 };
+use super::component::{CellColumns, Component, form_keys};
 use super::scan::{CellEvidence, Refined};
-use super::state::{CellColumns, Component, KnownState};
+use super::state::KnownState;
 use crate::criteria::cells::{JUMPING, LENGTHS, NU, TURNED, TURNS};
-use crate::effect::{Basis, Form, Law, Motion};
+use crate::effect::{Basis, Law, Motion};
 use nalgebra::DMatrix;
-use std::collections::BTreeSet;
 
 type Weights = [f64; Basis::CURVE];
 
@@ -85,11 +85,7 @@ impl CauseTable<'_, '_> {
                 .chain(half)
                 .max_by(|a, b| a.log.total_cmp(&b.log));
         }
-        let keys: BTreeSet<String> = others
-            .iter()
-            .flat_map(|component| &component.forms)
-            .map(Form::key)
-            .collect();
+        let keys = form_keys(others);
         best.filter(|best| best.forms.iter().all(|form| !keys.contains(&form.key())))
     }
 

@@ -69,7 +69,7 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
             "anything below the repeatability of closing, {}: nothing but joints was recorded",
             small(closing(survey.data, &rows), Dimension::Length)
         ));
-        out.push("place of the base: it moves with all that the target was brought to; measure three points of the cell".into());
+        out.push("place of the base: it moves with all places that were touched; measure three points of the cell".into());
         out.push("scale of the arm: arm, target and fixtures may all be larger together; state `distances` in `identify`".into());
     } else {
         out.push("tracker_scale: link lengths absorb it; measure a scale bar".into());

@@ -1,0 +1,407 @@
+//! Columns of cells, and cells of the model as components: their columns in one shape at an amplitude, and the products of these with each other,
+//! each computed once.
+
+use super::cell::{CellShape, ShapeGroup};
+use super::frame::{SearchRows, UnitColumns, product, view};
+use crate::effect::Form;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, Par};
+use nalgebra::{Cholesky, DMatrix, DVector};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::sync::{Arc, RwLock, Weak};
+
+/// A group of shapes with its columns.
+pub(super) struct SeenGroup {
+    pub(crate) group: ShapeGroup,
+    /// Its columns among those of its block.
+    pub(crate) range: Range<usize>,
+    /// Columns of each form.
+    pub(crate) counts: Vec<usize>,
+    pub(super) gram: DMatrix<f64>,
+    pub(super) gradient: DVector<f64>,
+}
+
+/// Keys of the shapes of a cell: their forms, numbered where several have the same.
+pub(super) fn shape_keys(groups: &[SeenGroup]) -> Vec<String> {
+    let mut times: BTreeMap<String, usize> = BTreeMap::new();
+    let key = |seen: &SeenGroup| {
+        let keys: Vec<String> = seen.group.forms.iter().map(Form::key).collect();
+        let key = keys.join("+");
+        let before = times.entry(key.clone()).or_default();
+        *before += 1;
+        match *before {
+            1 => key,
+            count => format!("{key}~{count}"),
+        }
+    };
+    groups.iter().map(key).collect()
+}
+
+/// All shapes of a cell with their columns.
+pub(super) struct CellColumns {
+    pub(crate) groups: Vec<SeenGroup>,
+    pub(crate) columns: UnitColumns,
+    /// Its possible amplitudes, m.
+    pub(crate) between: [f64; 2],
+}
+
+impl CellColumns {
+    pub(crate) fn of(groups: Vec<ShapeGroup>, frame: &SearchRows) -> Self {
+        let forms: Vec<Form> = groups
+            .iter()
+            .flat_map(|group| group.forms.iter().cloned())
+            .collect();
+        let (columns, counts) = frame.columns(&forms);
+        let (mut first, mut counts) = (0, counts.into_iter());
+        let seen = |mut group: ShapeGroup| {
+            let counts: Vec<usize> = counts.by_ref().take(group.forms.len()).collect();
+            let count: usize = counts.iter().sum();
+            let range = first..first + count;
+            first += count;
+            for shape in group
+                .shapes
+                .iter_mut()
+                .filter(|shape| shape.shares.is_empty())
+            {
+                shape.shares = vec![1.0 / count.max(1) as f64; count];
+            }
+            let values = columns.values.columns(range.start, count).into_owned();
+            let (gram, gradient) = (product(view(&values), view(&values)), frame.along(&values));
+            SeenGroup {
+                group,
+                range,
+                counts,
+                gram,
+                gradient,
+            }
+        };
+        Self {
+            groups: groups.into_iter().map(seen).collect(),
+            columns,
+            between: [0.0, f64::INFINITY],
+        }
+    }
+}
+
+impl CellColumns {
+    /// The shape of a component alone.
+    pub(crate) fn of_component(component: &Component, frame: &SearchRows) -> Self {
+        let values = component.values.clone();
+        let (gram, gradient) = (product(view(&values), view(&values)), frame.along(&values));
+        let range = 0..values.ncols();
+        let group = SeenGroup {
+            group: (*component.group).clone(),
+            range,
+            counts: component.counts.clone(),
+            gram,
+            gradient,
+        };
+        Self {
+            groups: vec![group],
+            columns: UnitColumns {
+                values,
+                square: (*component.square).clone(),
+            },
+            between: [0.0, f64::INFINITY],
+        }
+    }
+
+    /// With the possible amplitudes that other robots show.
+    pub(crate) fn between(self, between: Option<[f64; 2]>) -> Self {
+        Self {
+            between: between.unwrap_or([0.0, f64::INFINITY]),
+            ..self
+        }
+    }
+
+    /// The largest share of a motion that the columns of a group can make, by their products with it; of unit length.
+    pub(crate) fn overlap(&self, along: &[f64]) -> f64 {
+        let mut most = 0.0;
+        for group in &self.groups {
+            let along = DVector::from_column_slice(&along[group.range.clone()]);
+            let share = match along.len() {
+                1 => along[0] * along[0] / group.gram[(0, 0)].max(f64::MIN_POSITIVE),
+                count => {
+                    let least = 1e-6 * group.gram.trace().max(f64::MIN_POSITIVE);
+                    let factor =
+                        Cholesky::new(&group.gram + DMatrix::identity(count, count) * least);
+                    factor.map_or(0.0, |factor| along.dot(&factor.solve(&along)))
+                }
+            };
+            most = f64::max(most, share);
+        }
+        most
+    }
+}
+
+/// Keys of the forms of some components: a model holds every number once, by its name.
+pub(super) fn form_keys(components: &[&Component]) -> BTreeSet<String> {
+    let forms = components.iter().flat_map(|component| &component.forms);
+    forms.map(Form::key).collect()
+}
+
+/// A cell of the model: its forms in one shape, at an amplitude.
+#[derive(Clone)]
+pub(super) struct Component {
+    /// Components of the same number have the same part in the covariance.
+    pub(crate) id: u64,
+    pub(crate) cell: usize,
+    pub(crate) forms: Vec<Form>,
+    pub(crate) counts: Vec<usize>,
+    pub(crate) shape: CellShape,
+    /// Whether, and up to which size, its coefficients are positive.
+    pub(crate) group: Arc<ShapeGroup>,
+    pub(crate) values: Arc<DMatrix<f64>>,
+    pub(crate) square: Arc<Vec<f64>>,
+    /// Rms motion at the tool, m.
+    pub(crate) amplitude: f64,
+    /// Columns whose products with themselves are its part in the covariance: the directions that the rows could show.
+    pub(crate) part: Arc<DMatrix<f64>>,
+    /// What makes these of its columns.
+    pub(crate) mix: Arc<DMatrix<f64>>,
+}
+
+/// Prior variance of a direction, in that of the noise, below which no row shows it.
+const UNSEEN: f64 = 0.01;
+
+impl Component {
+    /// Roots of the prior variances of its columns.
+    pub(super) fn roots(&self) -> impl Iterator<Item = f64> + '_ {
+        self.shape
+            .shares
+            .iter()
+            .map(|share| self.amplitude * share.sqrt())
+    }
+
+    /// Prior standard deviations of its coefficients, SI.
+    pub(crate) fn sigmas(&self) -> Vec<f64> {
+        let scale = |square: &f64| {
+            if *square > 0.0 {
+                square.sqrt().recip()
+            } else {
+                0.0
+            }
+        };
+        self.roots()
+            .zip(self.square.iter())
+            .map(|(root, square)| root * scale(square))
+            .collect()
+    }
+
+    /// With its part in the covariance.
+    pub(crate) fn with_part(self, id: u64) -> Self {
+        let roots: Vec<f64> = self.roots().collect();
+        let mut mix = DMatrix::from_diagonal(&DVector::from_column_slice(&roots));
+        if roots.len() > 2 {
+            let mut gram = product(view(&self.values), view(&self.values));
+            for (j, mut column) in gram.column_iter_mut().enumerate() {
+                column
+                    .iter_mut()
+                    .zip(&roots)
+                    .for_each(|(entry, root)| *entry *= root * roots[j]);
+            }
+            let eigen = gram.symmetric_eigen();
+            let seen: Vec<usize> = (0..eigen.eigenvalues.len())
+                .filter(|k| eigen.eigenvalues[*k] > UNSEEN)
+                .collect();
+            let kept = if seen.is_empty() {
+                vec![eigen.eigenvalues.imax()]
+            } else {
+                seen
+            };
+            mix *= eigen.eigenvectors.select_columns(kept.iter());
+        }
+        let mut part = DMatrix::zeros(self.values.nrows(), mix.ncols());
+        let out = MatMut::from_column_major_slice_mut(
+            part.as_mut_slice(),
+            self.values.nrows(),
+            mix.ncols(),
+        );
+        matmul(
+            out,
+            Accum::Replace,
+            view(&self.values),
+            view(&mix),
+            1.0,
+            Par::Seq,
+        );
+        Self {
+            id,
+            part: Arc::new(part),
+            mix: Arc::new(mix),
+            ..self
+        }
+    }
+
+    /// One that has no part in the covariance yet.
+    pub(crate) fn apart(
+        cell: usize,
+        forms: Vec<Form>,
+        counts: Vec<usize>,
+        group: ShapeGroup,
+        columns: UnitColumns,
+        amplitude: f64,
+    ) -> Self {
+        let shape = group.shapes[0].clone();
+        let UnitColumns { values, square } = columns;
+        Self {
+            id: 0,
+            cell,
+            forms,
+            counts,
+            shape,
+            group: Arc::new(group),
+            values,
+            square: Arc::new(square),
+            amplitude,
+            part: Arc::default(),
+            mix: Arc::default(),
+        }
+    }
+
+    /// Products of its part with other columns, by those of its columns with them.
+    pub(crate) fn by_part(&self, of_columns: &DMatrix<f64>) -> DMatrix<f64> {
+        product(view(&self.mix), view(of_columns))
+    }
+}
+
+/// Products of the columns of components with those of cells, each computed once: most states differ in amplitudes alone.
+#[derive(Default)]
+pub(super) struct ColumnProducts(RwLock<ProductCache>);
+
+#[derive(Default)]
+struct ProductCache {
+    known: BTreeMap<(usize, usize), KnownProduct>,
+    /// Numbers in all of them.
+    size: usize,
+}
+
+struct KnownProduct {
+    /// What it is of: as long as it is known, nothing else comes to lie there.
+    _of: [Weak<DMatrix<f64>>; 2],
+    product: Arc<DMatrix<f64>>,
+}
+
+impl ColumnProducts {
+    /// The transpose of `a` times `b`.
+    pub(crate) fn of(&self, a: &Arc<DMatrix<f64>>, b: &Arc<DMatrix<f64>>) -> Arc<DMatrix<f64>> {
+        let key = (Arc::as_ptr(a) as usize, Arc::as_ptr(b) as usize);
+        if let Ok(cache) = self.0.read()
+            && let Some(known) = cache.known.get(&key)
+        {
+            return known.product.clone();
+        }
+        let product = Arc::new(product(view(a), view(b)));
+        if let Ok(mut cache) = self.0.write() {
+            // 128 MB.
+            if cache.size > 1 << 24 {
+                *cache = ProductCache::default();
+            }
+            cache.size += product.len();
+            cache.known.insert(
+                key,
+                KnownProduct {
+                    _of: [Arc::downgrade(a), Arc::downgrade(b)],
+                    product: product.clone(),
+                },
+            );
+        }
+        product
+    }
+}
+
+/// Products of the parts of components with each other and with the residual, each computed once.
+#[derive(Default)]
+pub(super) struct PartProducts(RwLock<PartCache>);
+
+#[derive(Default)]
+struct PartCache {
+    pairs: BTreeMap<(u64, u64), Arc<DMatrix<f64>>>,
+    along: BTreeMap<u64, Arc<DVector<f64>>>,
+}
+
+impl PartProducts {
+    /// Computes what is missing for some components, and forgets what is too much.
+    pub(crate) fn know(&self, components: &[&Component], frame: &SearchRows) {
+        let Ok(mut cache) = self.0.write() else {
+            return;
+        };
+        if cache.pairs.len() > 20_000 {
+            *cache = PartCache::default();
+        }
+        for (i, component) in components.iter().enumerate() {
+            cache
+                .along
+                .entry(component.id)
+                .or_insert_with(|| Arc::new(frame.along(&component.part)));
+            for other in &components[..=i] {
+                let key = (component.id.max(other.id), component.id.min(other.id));
+                let [later, earlier] = if component.id >= other.id {
+                    [component, other]
+                } else {
+                    [other, component]
+                };
+                cache
+                    .pairs
+                    .entry(key)
+                    .or_insert_with(|| Arc::new(product(view(&later.part), view(&earlier.part))));
+            }
+        }
+    }
+
+    /// The Gram matrix of components, and their products with the residual.
+    pub(super) fn of(&self, components: &[&Component]) -> (DMatrix<f64>, DVector<f64>) {
+        let count: usize = components
+            .iter()
+            .map(|component| component.part.ncols())
+            .sum();
+        let (mut gram, mut along) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let Ok(cache) = self.0.read() else {
+            return (gram, along);
+        };
+        let mut down = 0;
+        for (i, component) in components.iter().enumerate() {
+            let rows = component.part.ncols();
+            if let Some(known) = cache.along.get(&component.id) {
+                along.rows_mut(down, rows).copy_from(known);
+            }
+            let mut across = 0;
+            for other in &components[..=i] {
+                let columns = other.part.ncols();
+                let key = (component.id.max(other.id), component.id.min(other.id));
+                if let Some(known) = cache.pairs.get(&key) {
+                    let block = if component.id >= other.id {
+                        (**known).clone()
+                    } else {
+                        known.transpose()
+                    };
+                    gram.view_mut((across, down), (columns, rows))
+                        .copy_from(&block.transpose());
+                    gram.view_mut((down, across), (rows, columns))
+                        .copy_from(&block);
+                }
+                across += columns;
+            }
+            down += rows;
+        }
+        (gram, along)
+    }
+
+    /// How much two components do the same, 0 to 1.
+    pub(crate) fn overlap(&self, a: &Component, b: &Component) -> f64 {
+        let Ok(cache) = self.0.read() else { return 1.0 };
+        let square = |a: u64, b: u64| {
+            cache
+                .pairs
+                .get(&(a.max(b), a.min(b)))
+                .map(|known| known.norm_squared())
+        };
+        match (square(a.id, b.id), square(a.id, a.id), square(b.id, b.id)) {
+            (Some(both), Some(first), Some(second)) => {
+                both / (first * second).sqrt().max(f64::MIN_POSITIVE)
+            }
+            _ => 1.0,
+        }
+    }
+}
