@@ -7,7 +7,7 @@ use super::state::KnownState;
 use super::{generated, listed};
 use crate::criteria::cells::{ALIKE, COMPONENTS, USUAL_MOST};
 use crate::diagnose::types::{KnownCell, Question};
-use crate::effect::{Place, Survey, Variable, cause, names};
+use crate::effect::{Survey, Variable, cause, names};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -48,7 +48,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         frame: &'f mut SearchRows<'a>,
         survey: &'f Survey<'f>,
         question: &Question,
-        (shown, pairs): (&[FreeShape], &[FreeShape]),
+        (shown, pairs): (&[FreeShape], Vec<CauseCell>),
         is_open: bool,
         keeps: impl Fn(&CauseCell) -> bool,
     ) -> Self {
@@ -56,7 +56,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         cells.extend(generated::products(shown, survey, frame));
         let mut known: BTreeSet<String> = cells.iter().map(|cell| cell.key.clone()).collect();
         cells.extend(
-            generated::pair_cells(pairs)
+            pairs
                 .into_iter()
                 .filter(|cell| known.insert(cell.key.clone())),
         );
@@ -93,38 +93,21 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             );
         }
         frame.prepare(&motions, &variables);
-        let frame = &*frame;
-        let values = |of: Variable| frame.values(of);
-        let coarse: Vec<CellColumns> = named
-            .par_iter()
-            .map(|cell| {
-                let block = CellColumns::of(cell.groups(survey, &values, false), frame);
-                block.between(cell.between)
-            })
-            .collect();
-        let fine = named.iter().map(|_| OnceLock::new()).collect();
-        let mut columns = 0;
-        let mut first = Vec::with_capacity(coarse.len());
-        for block in &coarse {
-            first.push(columns);
-            columns += block.columns.values.ncols();
-        }
-        let products = BTreeMap::new();
         let is_declared = |cell: &CauseCell| cell.is_named() && cause(cell.name).is_none();
         let declared = (0..named.len())
             .filter(|cell| is_declared(&named[*cell]))
             .collect();
-        Self {
+        let mut table = Self {
             frame,
             survey,
-            cells: named,
-            coarse,
-            fine,
-            products,
+            cells: Vec::new(),
+            coarse: Vec::new(),
+            fine: Vec::new(),
+            products: BTreeMap::new(),
             parts: PartProducts::default(),
             known: ColumnProducts::default(),
-            first,
-            columns,
+            first: Vec::new(),
+            columns: 0,
             next: 0,
             numbers: Vec::new(),
             likely: Vec::new(),
@@ -140,6 +123,69 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             } else {
                 names::JOINT_HARDENING
             },
+        };
+        table.extend(named);
+        table
+    }
+
+    /// Adds cells.
+    fn extend(&mut self, cells: Vec<CauseCell>) {
+        let values = |of: Variable| self.frame.values(of);
+        let coarse: Vec<CellColumns> = cells
+            .par_iter()
+            .map(|cell| {
+                let block = CellColumns::of(cell.groups(self.survey, &values, false), self.frame);
+                block.between(cell.between)
+            })
+            .collect();
+        for block in &coarse {
+            self.first.push(self.columns);
+            self.columns += block.columns.values.ncols();
+        }
+        self.fine.extend(cells.iter().map(|_| OnceLock::new()));
+        self.coarse.extend(coarse);
+        self.cells.extend(cells);
+        self.products.clear();
+    }
+
+    /// A component's product with the numbers that its variables have; none of what is no product.
+    pub(crate) fn product(&self, component: &Component) -> Option<FreeShape> {
+        let Shapes::Free(free) = &self.cells[component.cell].shapes else {
+            return None;
+        };
+        let law = component.forms.first()?.term()?.law();
+        let (Over::Product(_), Some(times)) = (free.over, law.times) else {
+            return None;
+        };
+        Some(FreeShape {
+            of: law.first.of,
+            over: Over::Product(times.of),
+            ..*free
+        })
+    }
+
+    /// Adds cells that may do what products among the components do, each as probable beforehand as that.
+    pub(crate) fn add_siblings(&mut self, components: &[Component]) {
+        let mut fresh: Vec<CauseCell> = Vec::new();
+        for component in components {
+            let Some(free) = self.product(component) else {
+                continue;
+            };
+            let log_prior = self.cells[component.cell].log_prior;
+            let siblings = generated::siblings(&free, self.survey)
+                .into_iter()
+                .map(|free| generated::cell(free, log_prior));
+            let values = |of: Variable| self.frame.values(of);
+            for cell in siblings {
+                let is_known = self.cells.iter().chain(&fresh).any(|k| k.key == cell.key);
+                if !is_known && !cell.groups(self.survey, &values, false).is_empty() {
+                    fresh.push(cell);
+                }
+            }
+        }
+        if !fresh.is_empty() {
+            self.extend(fresh);
+            self.know(components);
         }
     }
 
@@ -282,22 +328,13 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                     .map(|term| term.law().first.of)
             }
         };
-        let joints = self.survey.joints();
-        let along = |place: Place| match place {
-            Place::Base => Some(0),
-            Place::Joint(joint) => Some(2 * joint + 1),
-            Place::Links(first, last) if first == last => Some(2 * first + 2),
-            Place::Tool => Some(2 * joints),
-            _ => None,
-        };
         let cell = &self.cells[component.cell];
         let free = matches!(cell.shapes, Shapes::Free(_));
         let variable = of(cell).filter(|_| free);
-        let near = |other: &CauseCell| match (along(cell.place), along(other.place)) {
-            (Some(place), Some(at)) => {
-                variable.is_some() && of(other) == variable && place.abs_diff(at) <= 2
-            }
-            _ => false,
+        let near = |other: &CauseCell| {
+            variable.is_some()
+                && of(other) == variable
+                && generated::are_near(cell.place, other.place, 2, self.survey)
         };
         let named_here = |other: &CauseCell| other.is_named() && other.place == cell.place;
         (0..self.cells.len())

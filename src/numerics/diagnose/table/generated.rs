@@ -171,13 +171,52 @@ pub(super) fn pair_cells(seen: &[FreeShape]) -> Vec<CauseCell> {
     seen.iter().map(|free| cell(*free, PAIR.ln())).collect()
 }
 
+/// Products that may do what one does: of the same variables at the places near it, where a motion that an axis does not turn is the same one,
+/// and of other variables that change slowly, as time, temperature and payload may do together.
+pub(super) fn siblings(free: &FreeShape, survey: &Survey) -> Vec<FreeShape> {
+    let Over::Product(other) = free.over else {
+        return Vec::new();
+    };
+    let motions = places(survey)
+        .into_iter()
+        .filter(|place| are_near(*place, free.motion.place(), 3, survey))
+        .flat_map(|place| families(place, survey))
+        .flatten()
+        .map(|motion| FreeShape { motion, ..*free });
+    let slow = [Variable::Time, Variable::Temperature, Variable::Payload];
+    let like = |of: Variable| slow.into_iter().filter(move |_| slow.contains(&of));
+    let first = like(free.of).map(|of| FreeShape { of, ..*free });
+    let second = like(other).map(|other| FreeShape {
+        over: Over::Product(other),
+        ..*free
+    });
+    motions
+        .chain(first)
+        .chain(second)
+        .filter(|one| one != free && one.over != Over::Product(one.of))
+        .collect()
+}
+
+/// Whether two places are so many steps from each other at most, along the chain of base, joints, links and tool.
+pub(super) fn are_near(a: Place, b: Place, steps: usize, survey: &Survey) -> bool {
+    let along = |place: Place| match place {
+        Place::Base => Some(0),
+        Place::Joint(joint) => Some(2 * joint + 1),
+        Place::Links(first, last) if first == last => Some(2 * first + 2),
+        Place::Tool => Some(2 * survey.joints()),
+        _ => None,
+    };
+    let both = along(a).zip(along(b));
+    both.is_some_and(|(a, b)| a.abs_diff(b) <= steps)
+}
+
 /// Whether a product of both is one of a variable with itself: two directions in space are two variables.
 fn is_square(a: Variable, b: Variable) -> bool {
     let space = matches!(a, Variable::Position { .. } | Variable::Sighted { .. });
     a == b || !space && a.is_alike(b)
 }
 
-fn cell(free: FreeShape, log_prior: f64) -> CauseCell {
+pub(super) fn cell(free: FreeShape, log_prior: f64) -> CauseCell {
     let times = if let Over::Product(other) = free.over {
         format!(" times {other:?}")
     } else {

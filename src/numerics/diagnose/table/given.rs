@@ -75,7 +75,14 @@ fn with_table<T>(
     let is_open = survey.rows.len() >= *OPEN;
     let kept = |cell: &CauseCell| keeps(cell) && is_kept(cell, view, &survey, fitter);
     let question = fitter.question;
-    let mut table = CauseTable::new(&mut frame, &survey, question, (&[], &[]), is_open, kept);
+    let mut table = CauseTable::new(
+        &mut frame,
+        &survey,
+        question,
+        (&[], Vec::new()),
+        is_open,
+        kept,
+    );
     ask(&mut table)
 }
 

@@ -45,6 +45,8 @@ pub(crate) struct Rounds {
     /// Components with the keys of their cells.
     components: Vec<(String, Component)>,
     shown: Vec<FreeShape>,
+    /// Products among the components, with ln of their prior odds.
+    products: Vec<(FreeShape, f64)>,
     /// Whether cells without a name are asked of few rows, too.
     is_open: bool,
     /// Products of two variables that show together; none before they were looked for.
@@ -96,7 +98,13 @@ impl Rounds {
         } else {
             Vec::new()
         };
-        let products = (&self.shown[..], self.pairs.as_deref().unwrap_or_default());
+        let known = self.products.drain(..);
+        let known = known.map(|(free, log_prior)| generated::cell(free, log_prior));
+        let mut products: Vec<_> = known.collect();
+        products.extend(generated::pair_cells(
+            self.pairs.as_deref().unwrap_or_default(),
+        ));
+        let products = (&self.shown[..], products);
         let is_open = self.is_open || survey.rows.len() >= *OPEN;
         let mut table = CauseTable::new(&mut frame, &survey, question, products, is_open, keeps);
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
@@ -125,6 +133,7 @@ impl Rounds {
             components = table.prune(components);
         }
         if !waits && !components.is_empty() {
+            table.add_siblings(&components);
             components = table.swap(components);
             components = table.grow(components);
             if std::mem::take(&mut self.has_new_pairs) {
@@ -182,6 +191,12 @@ impl Rounds {
         let mut causes = estimated(&table, &components);
         by_currents(&mut causes, view);
         let cells = table.cells.len();
+        let product = |component: &Component| match table.cells[component.cell].shapes {
+            cell::Shapes::Free(free) => matches!(free.over, cell::Over::Product(_))
+                .then_some((free, table.cells[component.cell].log_prior)),
+            cell::Shapes::Listed(_) => None,
+        };
+        self.products = components.iter().filter_map(product).collect();
         self.components = keys.into_iter().zip(components).collect();
         self.shown = shown;
         Round {
