@@ -175,10 +175,13 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             let siblings = generated::siblings(&free, self.survey)
                 .into_iter()
                 .map(|free| generated::cell(free, log_prior));
-            let values = |of: Variable| self.frame.values(of);
+            let frame = self.frame;
+            let values = |of: Variable| frame.values(of);
             for cell in siblings {
-                let is_known = self.cells.iter().chain(&fresh).any(|k| k.key == cell.key);
-                if !is_known && !cell.groups(self.survey, &values, false).is_empty() {
+                let mut known = self.cells.iter_mut().chain(&mut fresh);
+                if let Some(known) = known.find(|known| known.key == cell.key) {
+                    known.log_prior = known.log_prior.max(log_prior);
+                } else if !cell.groups(self.survey, &values, false).is_empty() {
                     fresh.push(cell);
                 }
             }

@@ -252,7 +252,7 @@ pub(super) fn places(survey: &Survey) -> Vec<Place> {
 /// The motions of a place, by family.
 pub(super) fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
     match place {
-        // What carries the first joint is the base.
+        // What carries the first joint is the base, and leans with it.
         Place::Joint(joint) if joint > 0 && survey.robot.is_revolute(joint) => vec![
             vec![Motion::Joint { joint }],
             vec![false, true]
@@ -269,6 +269,10 @@ pub(super) fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
                 joint,
                 along: false,
             }],
+        ],
+        Place::Joint(joint) if survey.robot.is_revolute(joint) => vec![
+            vec![Motion::Joint { joint }],
+            vec![Motion::Slide { joint, along: true }],
         ],
         Place::Joint(joint) => vec![vec![Motion::Joint { joint }]],
         Place::Links(link, _) => vec![
