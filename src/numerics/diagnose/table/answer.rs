@@ -142,7 +142,7 @@ impl CauseTable<'_, '_> {
             known.push(&components[i]);
         }
         let also: Vec<usize> = std::iter::once(cell)
-            .chain(self.over_its_variable(&components[main]))
+            .chain(self.over_its_variable(&components[main], &state, &rest))
             .collect();
         let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &also);
         // Others are asked what the strongest does: further ones of its cell add to any of them.

@@ -5,7 +5,7 @@ use super::component::{CellColumns, ColumnProducts, Component, PartProducts};
 use super::frame::SearchRows;
 use super::state::KnownState;
 use super::{generated, listed};
-use crate::criteria::cells::{ALIKE, COMPONENTS, USUAL_MOST};
+use crate::criteria::cells::{ALIKE, CLOSELY, COMPONENTS, USUAL_MOST};
 use crate::diagnose::types::{KnownCell, Question};
 use crate::effect::{Survey, Variable, cause, names};
 use nalgebra::DMatrix;
@@ -345,8 +345,14 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             .collect()
     }
 
-    /// Other motions over a variable with numbers that a component follows: coarsely asked they have other numbers.
-    pub(crate) fn over_its_variable(&self, component: &Component) -> Vec<usize> {
+    /// Other motions over a variable with numbers that a component follows: coarsely asked they have other numbers; the most promising of them
+    /// given a state of others.
+    pub(crate) fn over_its_variable(
+        &self,
+        component: &Component,
+        state: &KnownState,
+        others: &[&Component],
+    ) -> Vec<usize> {
         let Shapes::Free(free) = &self.cells[component.cell].shapes else {
             return Vec::new();
         };
@@ -358,9 +364,12 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         if !is_curve(free.over) || free.near(0).is_empty() {
             return Vec::new();
         }
-        (0..self.cells.len())
+        let all: Vec<usize> = (0..self.cells.len())
             .filter(|cell| same(&self.cells[*cell]))
-            .collect()
+            .collect();
+        let mut promising = self.promising(&all, state, others);
+        promising.truncate(2 * *CLOSELY);
+        promising
     }
 
     /// The same of a block's columns, from the components that the state has.

@@ -8,6 +8,7 @@ use super::frame::UnitColumns;
 use super::state::KnownState;
 use crate::criteria::cells::{BENDS, FAR_BELOW, JOINS, PAIR, PAIRS, UNLIKELY};
 use crate::effect::{Form, Variable};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -173,6 +174,38 @@ impl CauseTable<'_, '_> {
         self.scan_some(&self.alike(component, 60), state, others, most, also)
     }
 
+    /// Some cells, the most promising first.
+    pub(crate) fn promising(
+        &self,
+        cells: &[usize],
+        state: &KnownState,
+        components: &[&Component],
+    ) -> Vec<usize> {
+        let across = self.across_cells(cells, state);
+        let (_, order) = self.by_bound(cells, state, components, &across);
+        order.into_iter().map(|k| cells[k]).collect()
+    }
+
+    /// ln of the largest odds that the coarse columns of cells could have given a state, by their places among these, and these places by that,
+    /// the most promising first.
+    fn by_bound(
+        &self,
+        cells: &[usize],
+        state: &KnownState,
+        components: &[&Component],
+        (across, first): &(DMatrix<f64>, Vec<usize>),
+    ) -> (Vec<f64>, Vec<usize>) {
+        let bound = |k: usize| {
+            let there = components.iter().map(|component| component.cell);
+            let block = &self.coarse[cells[k]];
+            self.log_prior(cells[k], there) + state.bound(block, across, first[k])
+        };
+        let bounds: Vec<f64> = (0..cells.len()).into_par_iter().map(bound).collect();
+        let mut order: Vec<usize> = (0..cells.len()).collect();
+        order.sort_by(|a, b| bounds[*b].total_cmp(&bounds[*a]).then(a.cmp(b)));
+        (bounds, order)
+    }
+
     /// The same of some cells.
     pub(crate) fn scan_some(
         &self,
@@ -186,10 +219,9 @@ impl CauseTable<'_, '_> {
             let there = components.iter().map(|component| component.cell);
             self.log_prior(cell, there)
         };
-        let (across, first) = self.across_cells(cells, state);
-        let bound =
-            |k: usize| prior(cells[k]) + state.bound(&self.coarse[cells[k]], &across, first[k]);
-        let bounds: Vec<f64> = (0..cells.len()).into_par_iter().map(bound).collect();
+        let across = self.across_cells(cells, state);
+        let (bounds, promising) = self.by_bound(cells, state, components, &across);
+        let (across, first) = across;
         let coarse = |k: usize| {
             let mut logs = Vec::new();
             state.shapes(&self.coarse[cells[k]], &across, first[k], |_, _, found| {
@@ -197,8 +229,6 @@ impl CauseTable<'_, '_> {
             });
             prior(cells[k]) + log_sum(&logs)
         };
-        let mut promising: Vec<usize> = (0..cells.len()).collect();
-        promising.sort_by(|a, b| bounds[*b].total_cmp(&bounds[*a]).then(a.cmp(b)));
         let mut log_odds = vec![f64::NEG_INFINITY; self.cells.len()];
         // In turns, until no other cell could come near the best.
         for some in promising.chunks(2 * most) {

@@ -284,7 +284,7 @@ impl CauseTable<'_, '_> {
                 let alike = self.alike(&components[i], 24);
                 let near: Vec<usize> = std::iter::once(cell)
                     .chain(self.near(&components[i]))
-                    .chain(self.over_its_variable(&components[i]))
+                    .chain(self.over_its_variable(&components[i], &state, &rest))
                     .collect();
                 let mut scan = self.scan_some(&alike, &state, &rest, 5, &near);
                 if scan.best().is_some_and(|best| best != cell) {
@@ -373,12 +373,15 @@ impl CauseTable<'_, '_> {
                 .kappa;
             let before = self.total(&components, kappa);
             let mut next = without(&components, &[at]);
-            for _ in 0..*WAVES {
+            for further in (0..*WAVES).rev() {
                 self.know(&next);
                 let rest: Vec<&Component> = next.iter().collect();
+                let missing = before - self.total(&next, kappa);
                 let state = self.state(&rest, Some(kappa));
                 let scan = self.scan_some(&named, &state, &rest, 4, &[]);
-                let Some(best) = scan.best().filter(|best| scan.log_odds[*best] > 0.0) else {
+                // Those that come later say less, as a rule.
+                let least = (missing / (further + 1) as f64).max(0.0);
+                let Some(best) = scan.best().filter(|best| scan.log_odds[*best] > least) else {
                     break;
                 };
                 let found = scan.closely[&best].clone();
