@@ -145,6 +145,10 @@ impl CauseTable<'_, '_> {
             .chain(self.over_its_variable(&components[main], &state, &rest))
             .collect();
         let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &also);
+        // What was found may be one curve times another: so may its rivals.
+        if self.product(&components[main]).is_some() {
+            self.separate(&mut scan, &state, &rest);
+        }
         // Others are asked what the strongest does: further ones of its cell add to any of them.
         scan.log_odds[cell] = self.cells[cell].log_prior + log_main;
         let (effect, place) = (self.name_of(&components[main]), self.cells[cell].place);

@@ -287,7 +287,8 @@ impl CauseTable<'_, '_> {
                     .chain(self.over_its_variable(&components[i], &state, &rest))
                     .collect();
                 let mut scan = self.scan_some(&alike, &state, &rest, 5, &near);
-                if scan.best().is_some_and(|best| best != cell) {
+                let is_product = self.product(&components[i]).is_some();
+                if is_product || scan.best().is_some_and(|best| best != cell) {
                     self.separate(&mut scan, &state, &rest);
                 }
                 let Some(best) = scan.best() else { continue };
