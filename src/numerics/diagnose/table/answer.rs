@@ -7,7 +7,7 @@ use super::evidence::log_sum;
 use super::scan::CellScan;
 use super::search::without;
 use super::state::KnownState;
-use crate::criteria::cells::{BENDS, MISLED, RIVAL};
+use crate::criteria::cells::{BENDS, MISLED, RIVAL, SEPARATED};
 use crate::diagnose::types::{
     ExplainedCell, ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine,
 };
@@ -141,12 +141,16 @@ impl CauseTable<'_, '_> {
             log += log_of(i, &given, &known).max(0.0);
             known.push(&components[i]);
         }
-        let also: Vec<usize> = std::iter::once(cell)
+        let mut also: Vec<usize> = std::iter::once(cell)
             .chain(self.over_its_variable(&components[main], &state, &rest))
             .collect();
-        let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &also);
         // What was found may be one curve times another: so may its rivals.
-        if self.product(&components[main]).is_some() {
+        let is_product = self.product(&components[main]).is_some();
+        if is_product {
+            also.extend(self.alike(&components[main], *SEPARATED));
+        }
+        let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &also);
+        if is_product {
             self.separate(&mut scan, &state, &rest);
         }
         // Others are asked what the strongest does: further ones of its cell add to any of them.

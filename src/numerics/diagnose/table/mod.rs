@@ -186,8 +186,10 @@ impl Rounds {
                 self.pairs = Some(seen);
             }
         }
-        let answer =
-            is_last.then(|| table.answer(&components, self.first.clone().unwrap_or_default()));
+        let answer = is_last.then(|| {
+            table.add_siblings(&components);
+            table.answer(&components, self.first.clone().unwrap_or_default())
+        });
         let mut causes = estimated(&table, &components);
         by_currents(&mut causes, view);
         let cells = table.cells.len();

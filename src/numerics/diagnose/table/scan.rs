@@ -10,7 +10,7 @@ use crate::criteria::cells::{BENDS, FAR_BELOW, JOINS, PAIR, PAIRS, UNLIKELY};
 use crate::effect::{Form, Variable};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// What a cell says given a state, with its likeliest shape.
@@ -247,12 +247,13 @@ impl CauseTable<'_, '_> {
             .collect();
         order.sort_by(|a, b| log_odds[*b].total_cmp(&log_odds[*a]).then(a.cmp(b)));
         order.truncate(most);
-        let also = also
+        let also: BTreeSet<usize> = also
             .iter()
             .chain(&self.declared)
             .copied()
-            .filter(|cell| !order.contains(cell));
-        order.extend(also.collect::<Vec<_>>());
+            .filter(|cell| !order.contains(cell))
+            .collect();
+        order.extend(also);
         let closely: BTreeMap<usize, CellEvidence> = order
             .into_par_iter()
             .filter_map(|cell| Some((cell, self.closely(cell, state, components)?)))
