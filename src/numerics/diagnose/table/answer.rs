@@ -7,7 +7,7 @@ use super::evidence::log_sum;
 use super::scan::CellScan;
 use super::search::without;
 use super::state::KnownState;
-use crate::criteria::cells::{BENDS, MISLED, RIVAL, SEPARATED};
+use crate::criteria::cells::{BENDS, MISLED, RIVAL};
 use crate::diagnose::types::{
     ExplainedCell, ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine,
 };
@@ -145,10 +145,9 @@ impl CauseTable<'_, '_> {
             .chain(self.over_its_variable(&components[main], &state, &rest))
             .collect();
         // What was found may be one curve times another: so may its rivals.
-        let is_product = self.product(&components[main]).is_some();
-        if is_product {
-            also.extend(self.alike(&components[main], *SEPARATED));
-        }
+        let siblings = self.siblings(&components[main], &state, &rest);
+        let is_product = !siblings.is_empty();
+        also.extend(siblings);
         let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &also);
         if is_product {
             self.separate(&mut scan, &state, &rest);

@@ -5,7 +5,7 @@ use super::component::{CellColumns, ColumnProducts, Component, PartProducts};
 use super::frame::SearchRows;
 use super::state::KnownState;
 use super::{generated, listed};
-use crate::criteria::cells::{ALIKE, CLOSELY, COMPONENTS, USUAL_MOST};
+use crate::criteria::cells::{ALIKE, CLOSELY, COMPONENTS, SEPARATED, USUAL_MOST};
 use crate::diagnose::types::{KnownCell, Question};
 use crate::effect::{Survey, Variable, cause, names};
 use nalgebra::DMatrix;
@@ -162,6 +162,26 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             over: Over::Product(times.of),
             ..*free
         })
+    }
+
+    /// The most promising cells, given a state of others, that may do what a product does; none of what is no product.
+    pub(crate) fn siblings(
+        &self,
+        component: &Component,
+        state: &KnownState,
+        others: &[&Component],
+    ) -> Vec<usize> {
+        let Some(free) = self.product(component) else {
+            return Vec::new();
+        };
+        let siblings = generated::siblings(&free, self.survey);
+        let cells: Vec<usize> = siblings
+            .into_iter()
+            .filter_map(|free| self.cell(&generated::cell(free, 0.0).key))
+            .collect();
+        let mut promising = self.promising(&cells, state, others);
+        promising.truncate(*SEPARATED);
+        promising
     }
 
     /// Adds cells that may do what products among the components do, each as probable beforehand as that.

@@ -6,8 +6,8 @@ use super::component::Component;
 use super::evidence::AMPLITUDES;
 use super::state::KnownState;
 use crate::criteria::cells::{
-    BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER,
-    SEPARATED, SWAPS, TRACE, WAVES,
+    BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER, SWAPS,
+    TRACE, WAVES,
 };
 use crate::effect::{Form, Variable, names};
 use std::collections::BTreeSet;
@@ -282,15 +282,12 @@ impl CauseTable<'_, '_> {
                 let rest: Vec<&Component> = others.iter().collect();
                 let state = self.state(&rest, Some(kappa));
                 let alike = self.alike(&components[i], 24);
-                let is_product = self.product(&components[i]).is_some();
-                let same = alike
-                    .iter()
-                    .copied()
-                    .take(if is_product { *SEPARATED } else { 0 });
+                let siblings = self.siblings(&components[i], &state, &rest);
+                let is_product = !siblings.is_empty();
                 let near: Vec<usize> = std::iter::once(cell)
                     .chain(self.near(&components[i]))
                     .chain(self.over_its_variable(&components[i], &state, &rest))
-                    .chain(same)
+                    .chain(siblings)
                     .collect();
                 let mut scan = self.scan_some(&alike, &state, &rest, 5, &near);
                 if is_product || scan.best().is_some_and(|best| best != cell) {
