@@ -105,7 +105,11 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             rounds.again();
             continue;
         }
-        let (next, answer) = without_empty(fitter.held_to_a_common_size(next), answer, &fitter);
+        // The search saw a linear picture of each: what comes to nothing in the whole model is not asked again.
+        let next = fitter.held_to_a_common_size(next);
+        if rounds.again_without(&empty(&next, &answer)) {
+            continue;
+        }
         tell(words::of_the_conclusions(&next));
         let survey = view.survey();
         let last = LastRound {
@@ -149,31 +153,12 @@ pub fn cell_evidence(question: &Question, given: &[GivenCell]) -> Result<Vec<Cel
     Ok(answers(&view, &now, &fitter, given))
 }
 
-/// The model without findings that are smaller than their own uncertainty in the whole model: the search saw a linear picture of each.
-fn without_empty(state: FitState, mut answer: Answer, fitter: &Fitter) -> (FitState, Answer) {
-    let is_empty = |found: &FoundCell| {
-        state
-            .square_size(&found.members)
-            .is_some_and(|size| size < 1.0)
+/// Causes of findings that are smaller than their own uncertainty in the whole model.
+fn empty(state: &FitState, answer: &Answer) -> Vec<usize> {
+    let is_empty = |found: &&FoundCell| {
+        let size = state.square_size(&found.members);
+        state.screening.apart.is_none() && size.is_some_and(|size| size < 1.0)
     };
-    let gone: Vec<usize> = answer
-        .found
-        .iter()
-        .filter(|found| is_empty(found))
-        .flat_map(|found| found.members.clone())
-        .collect();
-    if gone.is_empty() || state.screening.apart.is_some() {
-        return (state, answer);
-    }
-    let kept: Vec<usize> = (0..state.causes.len())
-        .filter(|i| !gone.contains(i))
-        .collect();
-    let causes = kept.iter().map(|i| state.causes[*i].clone()).collect();
-    answer
-        .found
-        .retain(|found| !found.members.iter().any(|i| gone.contains(i)));
-    for member in answer.found.iter_mut().flat_map(|found| &mut found.members) {
-        *member = kept.iter().position(|i| i == member).unwrap_or(*member);
-    }
-    (fitter.fit(&state.model, causes), answer)
+    let empty = answer.found.iter().filter(is_empty);
+    empty.flat_map(|found| found.members.clone()).collect()
 }

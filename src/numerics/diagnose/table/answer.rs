@@ -141,17 +141,11 @@ impl CauseTable<'_, '_> {
             log += log_of(i, &given, &known).max(0.0);
             known.push(&components[i]);
         }
-        let mut also: Vec<usize> = std::iter::once(cell)
+        let also: Vec<usize> = std::iter::once(cell)
             .chain(self.over_its_variable(&components[main], &state, &rest))
             .collect();
-        // What was found may be one curve times another: so may its rivals.
-        let siblings = self.siblings(&components[main], &state, &rest);
-        let is_product = !siblings.is_empty();
-        also.extend(siblings);
-        let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &also);
-        if is_product {
-            self.separate(&mut scan, &state, &rest);
-        }
+        let alike = self.alike(&components[main], 60);
+        let mut scan = self.scan_instead(&components[main], &alike, &state, &rest, 8, &also);
         // Others are asked what the strongest does: further ones of its cell add to any of them.
         scan.log_odds[cell] = self.cells[cell].log_prior + log_main;
         let (effect, place) = (self.name_of(&components[main]), self.cells[cell].place);

@@ -5,7 +5,7 @@ use super::component::{CellColumns, ColumnProducts, Component, PartProducts};
 use super::frame::SearchRows;
 use super::state::KnownState;
 use super::{generated, listed};
-use crate::criteria::cells::{ALIKE, CLOSELY, COMPONENTS, SEPARATED, USUAL_MOST};
+use crate::criteria::cells::{ALIKE, CLOSELY, COMPONENTS, USUAL_MOST};
 use crate::diagnose::types::{KnownCell, Question};
 use crate::effect::{Survey, Variable, cause, names};
 use nalgebra::DMatrix;
@@ -164,28 +164,16 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         })
     }
 
-    /// The most promising cells, given a state of others, that may do what a product does; none of what is no product.
-    pub(crate) fn siblings(
-        &self,
-        component: &Component,
-        state: &KnownState,
-        others: &[&Component],
-    ) -> Vec<usize> {
-        let Some(free) = self.product(component) else {
-            return Vec::new();
-        };
-        let siblings = generated::siblings(&free, self.survey);
-        let cells: Vec<usize> = siblings
-            .into_iter()
-            .filter_map(|free| self.cell(&generated::cell(free, 0.0).key))
-            .collect();
-        let mut promising = self.promising(&cells, state, others);
-        promising.truncate(*SEPARATED);
-        promising
+    /// Cells that may do what a product does; none of what is no product.
+    pub(crate) fn siblings(&self, component: &Component) -> Vec<usize> {
+        let product = self.product(component);
+        let siblings = product.map(|free| generated::siblings(&free, self.survey));
+        let known = |free| self.cell(&generated::cell(free, 0.0).key);
+        siblings.into_iter().flatten().filter_map(known).collect()
     }
 
-    /// Adds cells that may do what products among the components do, each as probable beforehand as that.
-    pub(crate) fn add_siblings(&mut self, components: &[Component]) {
+    /// Adds cells that may do what products among the components do, each as probable beforehand as that, less some.
+    pub(crate) fn add_siblings(&mut self, components: &[Component], without: &BTreeSet<String>) {
         let mut fresh: Vec<CauseCell> = Vec::new();
         for component in components {
             let Some(free) = self.product(component) else {
@@ -194,7 +182,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             let log_prior = self.cells[component.cell].log_prior;
             let siblings = generated::siblings(&free, self.survey)
                 .into_iter()
-                .map(|free| generated::cell(free, log_prior));
+                .map(|free| generated::cell(free, log_prior))
+                .filter(|cell| !without.contains(&cell.key));
             let frame = self.frame;
             let values = |of: Variable| frame.values(of);
             for cell in siblings {

@@ -38,6 +38,7 @@ use cause_table::CauseTable;
 use cell::FreeShape;
 use component::Component;
 use frame::{NoiseShape, SearchRows};
+use std::collections::BTreeSet;
 
 /// What rounds of searching around better and better models keep.
 #[derive(Default)]
@@ -55,6 +56,8 @@ pub(crate) struct Rounds {
     has_new_pairs: bool,
     first: Option<(Located, f64)>,
     round: usize,
+    /// Keys of cells that are not asked again: in the whole model they came to nothing.
+    empty: BTreeSet<String>,
 }
 
 /// What a round found.
@@ -76,8 +79,25 @@ impl Rounds {
     pub(crate) fn again(&mut self) {
         *self = Self {
             first: self.first.take(),
+            empty: std::mem::take(&mut self.empty),
             ..Self::default()
         };
+    }
+
+    /// From the beginning without the cells of some causes of the last model; false if they are none.
+    pub(crate) fn again_without(&mut self, causes: &[usize]) -> bool {
+        let mut at = 0;
+        for (key, component) in &self.components {
+            let range = at..at + component.forms.len();
+            at = range.end;
+            if causes.iter().any(|cause| range.contains(cause)) {
+                self.empty.insert(key.clone());
+            }
+        }
+        if !causes.is_empty() {
+            self.again();
+        }
+        !causes.is_empty()
     }
 
     /// Searches around a fitted model.
@@ -92,7 +112,10 @@ impl Rounds {
         let mut frame = SearchRows::of(view, now, fitter, noise);
         let question = fitter.question;
         let contacts_only = only_contacts(&fitter.data, question.fit);
-        let keeps = |cell: &cell::CauseCell| is_kept(cell, view, &survey, fitter);
+        let empty = self.empty.clone();
+        let keeps = |cell: &cell::CauseCell| {
+            !empty.contains(&cell.key) && is_kept(cell, view, &survey, fitter)
+        };
         let all_pairs = if self.pairs.is_none() {
             generated::pairs(&survey, &mut frame)
         } else {
@@ -133,7 +156,7 @@ impl Rounds {
             components = table.prune(components);
         }
         if !waits && !components.is_empty() {
-            table.add_siblings(&components);
+            table.add_siblings(&components, &self.empty);
             components = table.swap(components);
             components = table.grow(components);
             if std::mem::take(&mut self.has_new_pairs) {
@@ -187,7 +210,7 @@ impl Rounds {
             }
         }
         let answer = is_last.then(|| {
-            table.add_siblings(&components);
+            table.add_siblings(&components, &self.empty);
             table.answer(&components, self.first.clone().unwrap_or_default())
         });
         let mut causes = estimated(&table, &components);

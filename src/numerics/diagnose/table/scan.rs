@@ -6,7 +6,7 @@ use super::component::{CellColumns, Component, form_keys, shape_keys};
 use super::evidence::log_sum;
 use super::frame::UnitColumns;
 use super::state::KnownState;
-use crate::criteria::cells::{BENDS, FAR_BELOW, JOINS, PAIR, PAIRS, UNLIKELY};
+use crate::criteria::cells::{BENDS, FAR_BELOW, JOINS, PAIR, PAIRS, SEPARATED, UNLIKELY};
 use crate::effect::{Form, Variable};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -55,6 +55,14 @@ impl CellScan {
             .keys()
             .copied()
             .max_by(|a, b| self.log_odds[*a].total_cmp(&self.log_odds[*b]))
+    }
+
+    /// With the cells that another scan of the same state asked closely.
+    fn join(&mut self, other: CellScan) {
+        for (cell, found) in other.closely {
+            self.log_odds[cell] = other.log_odds[cell];
+            self.closely.insert(cell, found);
+        }
     }
 }
 
@@ -162,18 +170,6 @@ impl CauseTable<'_, '_> {
         self.scan_some(&all, state, components, most, also)
     }
 
-    /// The odds of cells that do much of what a component does, given a state without it.
-    pub(crate) fn scan_alike(
-        &self,
-        component: &Component,
-        state: &KnownState,
-        others: &[&Component],
-        most: usize,
-        also: &[usize],
-    ) -> CellScan {
-        self.scan_some(&self.alike(component, 60), state, others, most, also)
-    }
-
     /// Some cells, the most promising first.
     pub(crate) fn promising(
         &self,
@@ -268,6 +264,28 @@ impl CauseTable<'_, '_> {
             order,
         };
         self.refine(&mut scan, state, components, &prior);
+        scan
+    }
+
+    /// Some cells that may stand for a component, given a state without it, some closely in any case; of a product also those that may do the
+    /// same, each as one curve times another where that says more.
+    pub(crate) fn scan_instead(
+        &self,
+        component: &Component,
+        cells: &[usize],
+        state: &KnownState,
+        others: &[&Component],
+        most: usize,
+        also: &[usize],
+    ) -> CellScan {
+        let mut scan = self.scan_some(cells, state, others, most, also);
+        let siblings = self.siblings(component);
+        if !siblings.is_empty() {
+            scan.join(self.scan_some(&siblings, state, others, *SEPARATED, &[]));
+        }
+        if !siblings.is_empty() || scan.best().is_some_and(|best| best != component.cell) {
+            self.separate(&mut scan, state, others);
+        }
         scan
     }
 

@@ -282,17 +282,11 @@ impl CauseTable<'_, '_> {
                 let rest: Vec<&Component> = others.iter().collect();
                 let state = self.state(&rest, Some(kappa));
                 let alike = self.alike(&components[i], 24);
-                let siblings = self.siblings(&components[i], &state, &rest);
-                let is_product = !siblings.is_empty();
                 let near: Vec<usize> = std::iter::once(cell)
                     .chain(self.near(&components[i]))
                     .chain(self.over_its_variable(&components[i], &state, &rest))
-                    .chain(siblings)
                     .collect();
-                let mut scan = self.scan_some(&alike, &state, &rest, 5, &near);
-                if is_product || scan.best().is_some_and(|best| best != cell) {
-                    self.separate(&mut scan, &state, &rest);
-                }
+                let scan = self.scan_instead(&components[i], &alike, &state, &rest, 5, &near);
                 let Some(best) = scan.best() else { continue };
                 let prior = self.log_prior(cell, rest.iter().map(|other| other.cell));
                 let stays = prior + self.log_evidence(&components[i], &state, &rest);
