@@ -85,8 +85,7 @@ impl CauseTable<'_, '_> {
         for (cell, separated) in separated {
             if let Some(found) = scan.closely.get_mut(&cell) {
                 scan.log_odds[cell] += separated.log - found.log;
-                found.log = separated.log;
-                found.refined = Some(separated);
+                found.improve(separated);
             }
         }
     }

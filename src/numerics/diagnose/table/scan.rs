@@ -27,6 +27,16 @@ pub(super) struct CellEvidence {
     pub(crate) refined: Option<Refined>,
 }
 
+impl CellEvidence {
+    /// With a shape in the place of its likeliest one where the rows say more of it.
+    pub(crate) fn improve(&mut self, refined: Refined) {
+        if refined.log > self.log {
+            self.log = refined.log;
+            self.refined = Some(refined);
+        }
+    }
+}
+
 /// A shape with the numbers of which the rows say most.
 #[derive(Clone)]
 pub(super) struct Refined {
@@ -268,7 +278,7 @@ impl CauseTable<'_, '_> {
     }
 
     /// Some cells that may stand for a component, given a state without it, some closely in any case; of a product also those that may do the
-    /// same, each as one curve times another where that says more.
+    /// same.
     pub(crate) fn scan_instead(
         &self,
         component: &Component,
@@ -283,10 +293,49 @@ impl CauseTable<'_, '_> {
         if !siblings.is_empty() {
             scan.join(self.scan_some(&siblings, state, others, *SEPARATED, &[]));
         }
-        if !siblings.is_empty() || scan.best().is_some_and(|best| best != component.cell) {
+        if scan.best().is_some_and(|best| best != component.cell) {
             self.separate(&mut scan, state, others);
         }
+        for cell in siblings {
+            if let Some(found) = scan.closely.get_mut(&cell)
+                && let Some(moved) = self.moved(component, cell, state, others)
+            {
+                scan.log_odds[cell] += (moved.log - found.log).max(0.0);
+                found.improve(moved);
+            }
+        }
         scan
+    }
+
+    /// A component's laws in its shape for the motion of another cell; none where that has other directions.
+    fn moved(
+        &self,
+        component: &Component,
+        cell: usize,
+        state: &KnownState,
+        others: &[&Component],
+    ) -> Option<Refined> {
+        let Shapes::Free(free) = &self.cells[cell].shapes else {
+            return None;
+        };
+        let product = self.product(component)?;
+        if free.of != product.of || free.over != product.over {
+            return None;
+        }
+        let moved = |form: &Form| Some(free.term(*form.term()?.law()));
+        let forms: Vec<Form> = component.forms.iter().map(moved).collect::<Option<_>>()?;
+        let keys = form_keys(others);
+        let moved = self.with_forms(component, forms);
+        let is_other = moved.values.ncols() != component.values.ncols()
+            || moved.forms.iter().any(|form| keys.contains(&form.key()));
+        let evidence = (!is_other).then(|| self.of_component(&moved, state, others));
+        let (log, amplitude) = evidence.flatten()?;
+        Some(Refined {
+            forms: moved.forms,
+            shape: Some(component.shape.clone()),
+            log,
+            amplitude,
+        })
     }
 
     /// Those of some products that a state shows, the most probable first.
