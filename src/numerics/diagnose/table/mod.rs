@@ -195,7 +195,7 @@ impl Rounds {
                     seen = table.seen_pairs(&all_pairs, &state, &all);
                 }
                 // What several components without a name explain may be one product.
-                if named.len() < all.len() {
+                if named.len() + 1 < all.len() {
                     let state = table.state(&named, None);
                     let more = table.seen_pairs(&all_pairs, &state, &named);
                     seen.extend(
