@@ -228,10 +228,10 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                     component.by_part(&self.known.of(&component.values, &block.columns.values))
                 };
                 let all: Vec<DMatrix<f64>> = self.coarse.par_iter().map(with).collect();
-                let values: Vec<f64> = all
-                    .iter()
-                    .flat_map(|products| products.iter().copied())
-                    .collect();
+                let mut values = Vec::with_capacity(component.part.ncols() * self.columns);
+                for products in &all {
+                    values.extend_from_slice(products.as_slice());
+                }
                 self.products.insert(
                     component.id,
                     DMatrix::from_vec(component.part.ncols(), self.columns, values),
@@ -284,10 +284,10 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 state.solved(DMatrix::from_vec(rows, some.len(), values))
             })
             .collect();
-        let values = solved
-            .iter()
-            .flat_map(|part| part.iter().copied())
-            .collect();
+        let mut values = Vec::with_capacity(rows * columns.len());
+        for part in &solved {
+            values.extend_from_slice(part.as_slice());
+        }
         (DMatrix::from_vec(rows, columns.len(), values), first)
     }
 
@@ -399,7 +399,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let mut values = Vec::with_capacity(rows * columns);
         for column in 0..columns {
             for part in &parts {
-                values.extend(part.column(column).iter().copied());
+                let rows = part.nrows();
+                values.extend_from_slice(&part.as_slice()[column * rows..(column + 1) * rows]);
             }
         }
         state.solved(DMatrix::from_vec(rows, columns, values))

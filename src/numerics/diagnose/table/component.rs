@@ -66,8 +66,8 @@ impl CellColumns {
             {
                 shape.shares = vec![1.0 / count.max(1) as f64; count];
             }
-            let values = columns.values.columns(range.start, count).into_owned();
-            let (gram, gradient) = (product(view(&values), view(&values)), frame.along(&values));
+            let values = view(&columns.values).subcols(range.start, count);
+            let (gram, gradient) = (product(values, values), frame.along(values));
             SeenGroup {
                 group,
                 range,
@@ -88,7 +88,8 @@ impl CellColumns {
     /// The shape of a component alone.
     pub(crate) fn of_component(component: &Component, frame: &SearchRows) -> Self {
         let values = component.values.clone();
-        let (gram, gradient) = (product(view(&values), view(&values)), frame.along(&values));
+        let gram = product(view(&values), view(&values));
+        let gradient = frame.along(view(&values));
         let range = 0..values.ncols();
         let group = SeenGroup {
             group: (*component.group).clone(),
@@ -334,7 +335,7 @@ impl PartProducts {
             cache
                 .along
                 .entry(component.id)
-                .or_insert_with(|| Arc::new(frame.along(&component.part)));
+                .or_insert_with(|| Arc::new(frame.along(view(&component.part))));
             for other in &components[..=i] {
                 let key = (component.id.max(other.id), component.id.min(other.id));
                 let [later, earlier] = if component.id >= other.id {

@@ -126,9 +126,9 @@ impl<'a> SearchRows<'a> {
     }
 
     /// Products of some columns with the residual.
-    pub(crate) fn along(&self, columns: &DMatrix<f64>) -> DVector<f64> {
+    pub(crate) fn along(&self, columns: MatRef<'_, f64>) -> DVector<f64> {
         let residual = MatRef::from_column_major_slice(&self.residual, self.residual.len(), 1);
-        product(view(columns), residual).column(0).into_owned()
+        DVector::from_vec(product(columns, residual).data.into())
     }
 
     /// A variable at every row; none where some row does not tell it.

@@ -299,7 +299,7 @@ impl CauseTable<'_, '_> {
         let block = CellColumns::of_component(own, self.frame);
         let across = self.across_block(&block, state, others);
         let whole = product(matrix(&own.values), matrix(&own.values));
-        let along = self.frame.along(&own.values);
+        let along = self.frame.along(matrix(&own.values));
         let (gram, gradient) = state.see((&whole, &along), &across, 0);
         let prior: Vec<f64> = own
             .shape
