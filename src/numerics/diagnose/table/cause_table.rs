@@ -1,13 +1,13 @@
 //! All cells of a recording with their columns, and the products of these with components of a model.
 
-use super::cell::{CauseCell, FreeShape, Over, Shapes};
+use super::cell::{CauseCell, FreeShape, Over, ShapeGroup, Shapes};
 use super::component::{CellColumns, ColumnProducts, Component, PartProducts};
 use super::frame::SearchRows;
 use super::state::KnownState;
 use super::{generated, listed};
 use crate::criteria::cells::{ALIKE, COMPONENTS, USUAL_MOST};
 use crate::diagnose::types::{KnownCell, Question};
-use crate::effect::{Place, Survey, Variable, cause, names};
+use crate::effect::{Place, Survey, Term, Variable, cause, names};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -73,41 +73,37 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 cell.between = Some(known.between);
             }
         }
+        let groups: Vec<Vec<ShapeGroup>> = named
+            .iter()
+            .map(|cell| cell.groups(survey, &values, false))
+            .collect();
+        let forms = groups.iter().flatten().flat_map(|group| &group.forms);
+        let terms: Vec<&Term> = forms.filter_map(|form| form.term()).collect();
         let mut motions = Vec::new();
         let mut variables = Vec::new();
-        for form in named
-            .iter()
-            .flat_map(|cell| cell.groups(survey, &values, false))
-            .flat_map(|group| group.forms)
-        {
-            let Some(term) = form.term() else { continue };
+        for term in &terms {
             if !motions.contains(&term.motion()) {
                 motions.push(term.motion());
             }
-            variables.extend(
-                term.law()
-                    .variables()
-                    .into_iter()
-                    .filter(|of| of.is_single() && !variables.contains(of))
-                    .collect::<Vec<_>>(),
-            );
+            for of in term.law().factors().map(|factor| factor.of) {
+                if of.is_single() && !variables.contains(&of) {
+                    variables.push(of);
+                }
+            }
         }
         frame.prepare(&motions, &variables);
+        frame.tabulate(terms.iter().map(|term| term.law()));
         let frame = &*frame;
-        let values = |of: Variable| frame.values(of);
-        let coarse: Vec<CellColumns> = named
-            .par_iter()
-            .map(|cell| {
-                let block = CellColumns::of(cell.groups(survey, &values, false), frame);
-                block.between(cell.between)
-            })
-            .collect();
+        let block = |(cell, groups): (&CauseCell, Vec<ShapeGroup>)| {
+            CellColumns::of(groups, frame).between(cell.between)
+        };
+        let coarse: Vec<CellColumns> = named.par_iter().zip(groups).map(block).collect();
         let fine = named.iter().map(|_| OnceLock::new()).collect();
         let mut columns = 0;
         let mut first = Vec::with_capacity(coarse.len());
         for block in &coarse {
             first.push(columns);
-            columns += block.columns.values.ncols();
+            columns += block.count();
         }
         let products = BTreeMap::new();
         let is_declared = |cell: &CauseCell| cell.is_named() && cause(cell.name).is_none();
@@ -167,7 +163,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         for component in components {
             if !self.products.contains_key(&component.id) {
                 let with = |block: &CellColumns| {
-                    component.by_part(&self.known.of(&component.values, &block.columns.values))
+                    component.by_part(&self.known.of(component, block, self.frame))
                 };
                 let all: Vec<DMatrix<f64>> = self.coarse.par_iter().map(with).collect();
                 let values: Vec<f64> = all
@@ -208,7 +204,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let mut columns = Vec::new();
         for cell in cells {
             first.push(columns.len());
-            let count = self.coarse[*cell].columns.values.ncols();
+            let count = self.coarse[*cell].count();
             columns.extend(self.first[*cell]..self.first[*cell] + count);
         }
         let solved: Vec<DMatrix<f64>> = columns
@@ -252,8 +248,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             .map(|value| value / length)
             .collect();
         let overlap = |cell: usize| {
-            let range =
-                self.first[cell]..self.first[cell] + self.coarse[cell].columns.values.ncols();
+            let range = self.first[cell]..self.first[cell] + self.coarse[cell].count();
             (self.coarse[cell].overlap(&along[range]), cell)
         };
         let mut all: Vec<(f64, usize)> = (0..self.cells.len())
@@ -332,12 +327,10 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     ) -> DMatrix<f64> {
         let parts: Vec<DMatrix<f64>> = components
             .iter()
-            .map(|component| {
-                component.by_part(&self.known.of(&component.values, &block.columns.values))
-            })
+            .map(|component| component.by_part(&self.known.of(component, block, self.frame)))
             .collect();
         let rows = parts.iter().map(DMatrix::nrows).sum();
-        let columns = block.columns.values.ncols();
+        let columns = block.count();
         let mut values = Vec::with_capacity(rows * columns);
         for column in 0..columns {
             for part in &parts {

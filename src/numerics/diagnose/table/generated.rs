@@ -70,7 +70,7 @@ pub(super) fn cells(
         for motions in families {
             let kinds: Vec<Kind> = kinds(place, motions[0], survey);
             let variables: Vec<Variable> = kinds.iter().flatten().map(|(of, _)| *of).collect();
-            frame.prepare(&motions, &variables);
+            frame.prepare(&[], &variables);
             for kind in kinds {
                 let kind = kind.into_iter().filter(|(of, _)| varies(frame, *of));
                 let all: Vec<_> = kind
@@ -110,7 +110,7 @@ pub(super) fn products(
             .map(|(other, _)| other)
             .filter(|other| other != of)
             .collect();
-        frame.prepare(&[*motion], &others);
+        frame.prepare(&[], &others);
         let mut seen: Vec<Variable> = Vec::new();
         for other in others {
             if seen.contains(&other) || is_square(*of, other) {

@@ -9,11 +9,13 @@ mod cause_table;
 mod cell;
 mod component;
 mod evidence;
+mod factored;
 mod forms;
 mod frame;
 mod generated;
 mod given;
 mod listed;
+mod noise_shape;
 mod refine;
 mod scan;
 mod search;
@@ -37,7 +39,8 @@ use crate::observation::only_contacts;
 use cause_table::CauseTable;
 use cell::FreeShape;
 use component::Component;
-use frame::{NoiseShape, SearchRows};
+use frame::SearchRows;
+use noise_shape::NoiseShape;
 
 /// What rounds of searching around better and better models keep.
 #[derive(Default)]
