@@ -9,6 +9,9 @@ use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
+/// Share of a column's square that rounding may leave where the base has all of it.
+const ROUNDING: f64 = 1e-12;
+
 /// A direction in which a motion moves the rows.
 pub(super) struct WeighedDirection {
     /// By a unit, weighed, residual rows of readings.
@@ -137,7 +140,7 @@ impl MotionRows {
         let base = shares.len() / columns.len().max(1);
         let share = |k: usize| &shares[base * k..base * (k + 1)];
         let mut gram = DMatrix::zeros(columns.len(), columns.len());
-        let mut weighed = Vec::new();
+        let (mut weighed, mut before) = (Vec::new(), vec![0.0; columns.len()]);
         for (j, (of, function, scale)) in columns.iter().enumerate() {
             let mut by = usize::MAX;
             for (i, (other, also, also_scale)) in columns[..=j].iter().enumerate() {
@@ -150,7 +153,17 @@ impl MotionRows {
                 let whole = dot(also, &weighed) * scale * also_scale;
                 gram[(i, j)] = whole - dot(share(i), share(j));
                 gram[(j, i)] = gram[(i, j)];
+                before[j] = whole;
             }
+        }
+        // What the base has all of is rounding.
+        for j in 0..columns.len() {
+            if gram[(j, j)] >= ROUNDING * before[j] {
+                continue;
+            }
+            gram.row_mut(j).fill(0.0);
+            gram.column_mut(j).fill(0.0);
+            gram[(j, j)] = f64::EPSILON * f64::EPSILON * before[j];
         }
         let along = columns.iter().map(|(direction, function, scale)| {
             scale * dot(function, &self.by_residual[*direction])
