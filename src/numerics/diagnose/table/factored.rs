@@ -163,7 +163,7 @@ impl MotionRows {
             }
             gram.row_mut(j).fill(0.0);
             gram.column_mut(j).fill(0.0);
-            gram[(j, j)] = f64::EPSILON * f64::EPSILON * before[j];
+            gram[(j, j)] = ROUNDING * ROUNDING * before[j];
         }
         let along = columns.iter().map(|(direction, function, scale)| {
             scale * dot(function, &self.by_residual[*direction])
