@@ -56,7 +56,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         cells.extend(generated::products(shown, survey, frame));
         let mut known: BTreeSet<String> = cells.iter().map(|cell| cell.key.clone()).collect();
         cells.extend(
-            generated::pair_cells(pairs)
+            generated::pair_cells(pairs, survey)
                 .into_iter()
                 .filter(|cell| known.insert(cell.key.clone())),
         );

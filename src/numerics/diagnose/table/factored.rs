@@ -9,9 +9,6 @@ use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
-/// Share of a column's square that rounding may leave where the base has all of it.
-const ROUNDING: f64 = 1e-12;
-
 /// A direction in which a motion moves the rows.
 pub(super) struct WeighedDirection {
     /// By a unit, weighed, residual rows of readings.
@@ -156,14 +153,15 @@ impl MotionRows {
                 before[j] = whole;
             }
         }
-        // What the base has all of is rounding.
+        // What the base has all of cannot be told from rounding.
+        let rounding = 1e-12;
         for j in 0..columns.len() {
-            if gram[(j, j)] >= ROUNDING * before[j] {
+            if gram[(j, j)] >= rounding * before[j] {
                 continue;
             }
             gram.row_mut(j).fill(0.0);
             gram.column_mut(j).fill(0.0);
-            gram[(j, j)] = ROUNDING * ROUNDING * before[j];
+            gram[(j, j)] = rounding * rounding * before[j];
         }
         let along = columns.iter().map(|(direction, function, scale)| {
             scale * dot(function, &self.by_residual[*direction])

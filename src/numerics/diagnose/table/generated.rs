@@ -86,9 +86,9 @@ pub(super) fn cells(
         for group in groups {
             let log_prior = (unnamed / count / group.len() as f64).ln();
             out.extend(
-                group
-                    .into_iter()
-                    .map(|(motion, of, over)| cell(FreeShape { motion, of, over }, log_prior)),
+                group.into_iter().map(|(motion, of, over)| {
+                    cell(FreeShape { motion, of, over }, log_prior, survey)
+                }),
             );
         }
     }
@@ -122,7 +122,7 @@ pub(super) fn products(
                 of: *of,
                 over: Over::Product(other),
             };
-            let cell = cell(free, PRODUCT.ln());
+            let cell = cell(free, PRODUCT.ln(), survey);
             if !out.iter().any(|known| known.key == cell.key) {
                 out.push(cell);
             }
@@ -167,8 +167,9 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
 }
 
 /// Cells of products that were seen among all pairs.
-pub(super) fn pair_cells(seen: &[FreeShape]) -> Vec<CauseCell> {
-    seen.iter().map(|free| cell(*free, PAIR.ln())).collect()
+pub(super) fn pair_cells(seen: &[FreeShape], survey: &Survey) -> Vec<CauseCell> {
+    let of = |free: &FreeShape| cell(*free, PAIR.ln(), survey);
+    seen.iter().map(of).collect()
 }
 
 /// Whether a product of both is one of a variable with itself: two directions in space are two variables.
@@ -177,9 +178,17 @@ fn is_square(a: Variable, b: Variable) -> bool {
     a == b || !space && a.is_alike(b)
 }
 
-fn cell(free: FreeShape, log_prior: f64) -> CauseCell {
+fn cell(free: FreeShape, log_prior: f64, survey: &Survey) -> CauseCell {
+    // Recordings of robots of one model travel differently far, and their cells are the same.
+    let named = |of: Variable| match of {
+        Variable::Stretch { joint, limit } => {
+            let share = limit / survey.travel(joint);
+            format!("Stretch {{ joint: {joint}, share: {share:.4} }}")
+        }
+        of => format!("{of:?}"),
+    };
     let times = if let Over::Product(other) = free.over {
-        format!(" times {other:?}")
+        format!(" times {}", named(other))
     } else {
         String::new()
     };
@@ -187,7 +196,7 @@ fn cell(free: FreeShape, log_prior: f64) -> CauseCell {
     CauseCell {
         name: names::UNKNOWN,
         place: free.motion.place(),
-        key: format!("{:?} by {:?}{times}{step}", free.motion, free.of),
+        key: format!("{:?} by {}{times}{step}", free.motion, named(free.of)),
         log_prior,
         shapes: Shapes::Free(free),
         between: None,
