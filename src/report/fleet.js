@@ -4,7 +4,8 @@ const value = (row, column) => {
   const cell = row.cells[column], given = cell.dataset.v;
   return given === undefined ? cell.textContent.trim() : given === "" ? null : Number(given);
 };
-const order = (a, b) => typeof a === "number" && typeof b === "number" ? a - b : String(a).localeCompare(String(b), undefined, { numeric: true });
+const words = new Intl.Collator(undefined, { numeric: true });
+const order = (a, b) => typeof a === "number" && typeof b === "number" ? a - b : words.compare(a, b);
 for (const head of table.tHead.rows[0].cells) {
   const button = head.querySelector("button");
   if (!button) continue;
@@ -23,11 +24,11 @@ for (const head of table.tHead.rows[0].cells) {
 }
 const search = document.getElementById("search"), shown = document.getElementById("shown");
 search.addEventListener("input", () => {
-  const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+  const wanted = search.value.toLowerCase().split(/\s+/).filter(Boolean);
   let count = 0;
   for (const row of rows) {
     const text = row.textContent.toLowerCase();
-    row.hidden = !words.every((word) => text.includes(word));
+    row.hidden = !wanted.every((word) => text.includes(word));
     count += row.hidden ? 0 : 1;
   }
   shown.textContent = count + " of " + rows.length;

@@ -33,7 +33,7 @@ pub struct Given {
 }
 
 crate::stage::stage! {
-    CellEvidence, "cell_evidence", 3, "says what every possible cause explains of one robot, for the sum over a fleet",
+    CellEvidence, "cell_evidence", 4, "says what every possible cause explains of one robot, for the sum over a fleet",
         DiagnoseReads -> CellEvidenceWrites {
             cell_evidence: CellEvidenceTable,
         }

@@ -1,21 +1,27 @@
 #!/usr/bin/env python3
-"""Proof of `calib fleet diagnose`: fleets of twins with a cause that each recording alone hardly shows.
+"""Proof of `calib fleet diagnose`: fleets of arms with a cause that each recording alone hardly shows.
 
     python3 tests/reference/fleet_causes.py OUT --calib target/debug/calib [--fleets 10] [--robots 20] [--points 100] [--nulls 10] [--seed N]
+    ... --mujoco medium6      arms of mujoco_maker.py instead of twins (needs mujoco and numpy)
+    ... --short 30            of each fleet 20 further robots with so few points, diagnosed with and without what the fleet says
+    ... --size 2000           one fleet of so many robots: CPU time and memory, killed and resumed
 
 Every robot of a fleet has rigid errors, a tracker's place, poses and noise of its own, and the fleet's cause with a size that scatters by
 10 % (and a phase of its own); one robot lacks it. A first fleet of a few robots scales the cause so that ln of the evidence of its cell in
 one robot is about 5 (--evidence). Counted: the cause named at its place, findings that are this one or a rival, wrong names (of decided
 findings, and of others whose rival is wrong as well), the robot that lacks it listed, others listed; in how many single robots the cell's
-odds alone would have been enough; null fleets with any name.
+odds alone would have been enough; null fleets with any name. Needs pyarrow.
 """
 
 import argparse
 import json
 import math
 import os
+import pathlib
 import random
+import resource
 import shutil
+import signal
 import subprocess
 import time
 
@@ -30,44 +36,79 @@ CAUSES = [
 ]
 
 
-def pipeline(folder, args):
-    robot = args.robot_file or os.path.join(ROOT, "pipelines/sr210d/robot.yaml")
-    text = f"""calib: 1
-name: twins
-seed: 5
-stages:
-  - uses: robot
+class Twins:
+    """Robots that the pipeline simulates."""
+
+    causes = CAUSES
+
+    def __init__(self, args):
+        robot = args.robot_file or os.path.join(ROOT, "pipelines/sr210d/robot.yaml")
+        self.stages = f"""  - uses: robot
     with: {{file: {robot}}}
   - uses: simulate
     with:
       truth: {{}}
       tracker: {{position_mm: [4500, -1800, 900], roll_pitch_yaw_deg: [0.3, -0.2, 155]}}
-      blocks: [{{usage: fit, points: {args.points}}}]
+      blocks: [{{usage: fit, points: POINTS}}]
   - uses: split
     with: {{by: usage}}
-  - uses: diagnose
 """
-    with open(os.path.join(folder, "twins.yaml"), "w") as file:
-        file.write(text)
+        self.header = "set.simulate.seed,set.simulate.truth.offset_deg,set.simulate.truth.links,set.simulate.tracker.position_mm,set.simulate.effects"
 
-
-def fleet(folder, name, effects, r):
-    """A fleet whose robot k has effects[k]."""
-    os.makedirs(folder, exist_ok=True)
-    lines = ["robot,model,plant,set.simulate.seed,set.simulate.truth.offset_deg,set.simulate.truth.links,set.simulate.tracker.position_mm,set.simulate.effects"]
-    for k, own in enumerate(effects):
+    def robot(self, folder, name, points, own, r):
         offsets = [round(r.gauss(0, 0.05), 6) for _ in range(6)]
         links = [f"{{link: {l}, shift_mm: [{r.gauss(0, .3):.5f}, {r.gauss(0, .3):.5f}, {r.gauss(0, .3):.5f}], "
                  f"tilt_arcsec: [{r.gauss(0, 20):.3f}, {r.gauss(0, 20):.3f}, {r.gauss(0, 20):.3f}]}}" for l in range(1, 6)]
         place = [4500 + r.randrange(-900, 900), -1800 + r.randrange(-900, 900), 900 + r.randrange(-300, 300)]
-        cells = [json.dumps(offsets), "[" + ", ".join(links) + "]", json.dumps(place), json.dumps(own)]
-        quoted = ",".join('"' + cell.replace('"', '""') + '"' for cell in cells)
-        lines.append(f"r{k:03},sr210d,{'north' if k % 2 else 'south'},{r.randrange(1 << 30)},{quoted}")
+        return [str(r.randrange(1 << 30)), json.dumps(offsets), "[" + ", ".join(links) + "]", json.dumps(place), json.dumps(own)]
+
+
+class Arms:
+    """Robots that MuJoCo makes: rigid bodies in static equilibrium, in which effects emerge."""
+
+    causes = [
+        ("backlash", "joint", lambda j, a, r: dict(kind="gap", joint=j - 1, size=a, friction=1e9, follow=1), 3e-5),
+        ("gear_cyclic", "joint", lambda j, a, r: dict(kind="cyclic", joint=j - 1, waves=[(2 + j % 3, 1.0, r.uniform(0, 6.28))], size=a), 2e-5),
+        ("axis_wobble", "joint", lambda j, a, r: dict(kind="wobble", joint=j - 1, side="", order=2, ellipse=1.0, phase=r.uniform(0, 6.28), size=a), 2e-5),
+        ("joint_compliance", "joint", lambda j, a, r: dict(kind="compliance", joint=j - 1, size=a), 1e-7),
+    ]
+
+    def __init__(self, args):
+        import mujoco_maker
+        self.maker, self.arm = mujoco_maker, mujoco_maker.ROBOTS[args.mujoco]
+        text = open(os.path.join(ROOT, "pipelines/case/pipeline.yaml")).read()
+        before, after = text.index("stages:\n") + len("stages:\n"), text.index("  - id: nominal")
+        self.stages, self.header = text[before:after], "set.case"
+
+    def robot(self, folder, name, points, own, r):
+        def conceal(rng, robot, arm, rows, *_):
+            arm.build(own)
+            return [], [dict(e, want=("hidden", "arm")) for e in own], [0.0] * len(own), []
+
+        self.maker.conceal = conceal
+        options = argparse.Namespace(points=3 * points // 2, jitter=3.0, hide=["temp"], scatter="gaussian", outliers=0, exchanged=0, visible=0)
+        case = pathlib.Path(folder, "cases", name)
+        shutil.rmtree(case, ignore_errors=True)
+        self.maker.make(case, r.randrange(1 << 30), self.arm, "shared", options)
+        return [str(case.resolve())]
+
+
+def fleet(folder, name, effects, world, r, points, prior=""):
+    """A fleet whose robot k has effects[k]."""
+    os.makedirs(folder, exist_ok=True)
+    variables = "variables: {case: none}\n" if world.header == "set.case" else ""
+    with open(os.path.join(folder, f"{name}.pipeline.yaml"), "w") as file:
+        file.write(f"calib: 1\nname: {name}\nseed: 5\n{variables}stages:\n{world.stages.replace('POINTS', str(points))}  - uses: diagnose\n")
+    lines = ["robot,model,plant," + world.header.replace("set.case", "folder")]
+    for k, own in enumerate(effects):
+        quoted = ",".join('"' + cell.replace('"', '""') + '"' for cell in world.robot(folder, f"{name}-{k:05}", points, own, r))
+        lines.append(f"r{k:03},arm,{'north' if k % 2 else 'south'},{quoted}")
     with open(os.path.join(folder, f"{name}.csv"), "w") as file:
         file.write("\n".join(lines) + "\n")
     path = os.path.join(folder, f"{name}.yaml")
+    variable = ", variable: case" if world.header == "set.case" else ""
     with open(path, "w") as file:
-        file.write(f"calib: 1\nname: {name}\npipeline: twins.yaml\nrobots:\n  - list: {name}.csv\n")
+        file.write(f"calib: 1\nname: {name}\npipeline: {name}.pipeline.yaml\n{prior}robots:\n  - {{list: {name}.csv{variable}}}\n")
     return path
 
 
@@ -112,8 +153,70 @@ def logs(store, name, effect, place):
     return out
 
 
-def place_of(kind, j):
-    return f"{kind} {j}"
+def scaled(out, world, cause, j, args, r):
+    """The strength of a cause at a joint at which one robot says about as much of it as is wanted."""
+    effect, kind, make, strength = cause
+    store = os.path.join(out, "store")
+    for turn in range(7):
+        name = f"scale{turn}"
+        diagnose(fleet(out, name, [[make(j, strength, r)] for _ in range(6)], world, r, args.points), store, args)
+        seen = [log for log, _ in logs(store, name, effect, f"{kind} {j}")]
+        mean = sum(seen) / len(seen)
+        shutil.rmtree(store)
+        if abs(mean - args.evidence) < 1:
+            break
+        strength *= math.sqrt((args.evidence + 4) / max(mean + 4, 1.2)) if mean > 0 else 2.5
+    return strength
+
+
+def short(f, cause, j, strength, world, args, r):
+    """Exact diagnoses and wrong names of robots with few points, by themselves and with what the fleet says."""
+    import pyarrow.parquet as parquet
+    effect, kind, make, _ = cause
+    store, state = os.path.join(args.out, "store"), r.getstate()
+    score = []
+    for name, prior in (("alone", ""), ("expected", f"prior: {{fleet: fleet{f}, stage: diagnose, by: causes}}\n")):
+        r.setstate(state)
+        effects = [[make(j, strength * r.gauss(1, 0.1), r)] for _ in range(20)]
+        path = fleet(args.out, f"{name}{f}", effects, world, r, args.short, prior)
+        subprocess.run([args.calib, "fleet", "run", path, "--store", store, "--quiet", "-j", str(args.jobs)], capture_output=True, check=True)
+        exact = wrong = 0
+        for table in pathlib.Path(store, "tables").glob(f"{name}{f}.*/diagnose.findings.parquet"):
+            found = {(row["effect"], row["place"]) for row in parquet.read_table(table).to_pylist()}
+            exact += found == {(effect, f"{kind} {j}")}
+            wrong += bool(found - {(effect, f"{kind} {j}")})
+        score += [exact, wrong]
+    return score
+
+
+def size(world, args, r):
+    """One large fleet: CPU time and memory, and what a kill costs."""
+    effect, kind, make, strength = world.causes[0]
+    strength = args.strength or scaled(args.out, world, world.causes[0], 3, args, r)
+    effects = [[] if r.random() < 0.05 else [make(3, strength * r.gauss(1, 0.1), r)] for _ in range(args.size)]
+    path, store = fleet(args.out, "large", effects, world, r, args.points), os.path.join(args.out, "large.store")
+    command = [args.calib, "fleet", "diagnose", path, "--store", store, "--json", "--quiet", "-j", str(args.jobs)]
+    records = lambda: sum(len(files) for _, _, files in os.walk(os.path.join(store, "fleets", "large", "records")))
+    begun = time.time()
+    killed = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    while records() < args.size // 4 and killed.poll() is None:
+        time.sleep(1)
+    killed.send_signal(signal.SIGKILL)
+    killed.wait()
+    kept, first = records(), resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    answer, both = json.loads(done.stdout), resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = both.ru_utime + both.ru_stime
+    print(f"killed with {kept} records; resumed: {answer['computed']} of {answer['computed'] + kept} visits computed then, {answer['rounds']} rounds, "
+          f"{cpu:.0f} s CPU = {cpu / (answer['computed'] + kept):.3f} s a robot and round, {time.time() - begun:.0f} s in all, "
+          f"peak {both.ru_maxrss / 1024:.0f} MB (first {first.ru_maxrss / 1024:.0f})")
+    for row in answer["findings"]:
+        if not row["robot"]:
+            print(row["statement"], f"(probability {row['probability']:.2f})")
+    lacking = {f"r{k:03}" for k, own in enumerate(effects) if not own}
+    listed = {row["robot"] for row in answer["outliers"] if row["kind"] == "lacks"}
+    print(f"{len(lacking)} lack it, {len(lacking & listed)} of them listed, {len(listed - lacking)} others; "
+          f"{sum(bool(row['robot']) for row in answer['findings'])} causes of single robots; page {answer['page']}")
 
 
 def main():
@@ -128,31 +231,33 @@ def main():
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--robot-file", default=None)
+    parser.add_argument("--mujoco", default=None)
+    parser.add_argument("--short", type=int, default=0)
+    parser.add_argument("--size", type=int, default=0)
+    parser.add_argument("--strength", type=float, default=None, help="of the cause of a large fleet, without a search for it")
     args = parser.parse_args()
     args.calib = os.path.abspath(args.calib)
     seed = args.seed if args.seed is not None else random.SystemRandom().randrange(1 << 31)
-    print(f"seed {seed}")
+    print(f"seed {seed}", flush=True)
     r = random.Random(seed)
     os.makedirs(args.out, exist_ok=True)
-    pipeline(args.out, args)
+    world = Arms(args) if args.mujoco else Twins(args)
+    if args.size:
+        return size(world, args, r)
     score = {"named": 0, "one of two": 0, "other": 0, "lacking listed": 0, "others listed": 0, "single": 0, "robots": 0}
+    few = [0] * 4
     for f in range(args.fleets):
-        effect, kind, make, strength = CAUSES[f % len(CAUSES)]
-        j = r.choice([2, 3, 4])
-        place = place_of(kind, j)
+        cause = world.causes[f % len(world.causes)]
+        effect, kind, make, _ = cause
+        # Of the last of these an in-line wrist carries hardly anything.
+        j = r.choice([2, 3] if effect == "joint_compliance" and args.mujoco else [2, 3, 4])
+        place = f"{kind} {j}"
         store = os.path.join(args.out, "store")
-        for turn in range(7):
-            path = fleet(args.out, f"scale{f}-{turn}", [[make(j, strength, r)] for _ in range(6)], r)
-            diagnose(path, store, args)
-            seen = [log for log, _ in logs(store, f"scale{f}-{turn}", effect, place)]
-            mean = sum(seen) / len(seen)
-            if abs(mean - args.evidence) < 1:
-                break
-            strength *= math.sqrt((args.evidence + 4) / max(mean + 4, 1.2)) if mean > 0 else 2.5
+        strength = scaled(args.out, world, cause, j, args, r)
         lacking = r.randrange(args.robots)
         effects = [[] if k == lacking else [make(j, strength * r.gauss(1, 0.1), r)] for k in range(args.robots)]
         begun = time.time()
-        answer = diagnose(fleet(args.out, f"fleet{f}", effects, r), store, args)
+        answer = diagnose(fleet(args.out, f"fleet{f}", effects, world, r, args.points), store, args)
         seconds = time.time() - begun
         single = logs(store, f"fleet{f}", effect, place)
         shared = [row for row in answer["findings"] if not row["robot"]]
@@ -175,18 +280,23 @@ def main():
         print(f"fleet {f}: {effect} at {place}, strength {strength:.3g}, ln E {mean:.1f} a robot: named {named}, one of two {open_}, others {others}, "
               f"r{lacking:03} listed {f'r{lacking:03}' in listed}, also listed {sorted((listed | alone) - {f'r{lacking:03}'})}; "
               f"{answer['rounds']} rounds, {seconds:.0f} s", flush=True)
+        if args.short:
+            now = short(f, cause, j, strength, world, args, r)
+            few = [a + b for a, b in zip(few, now)]
+            print(f"    {args.short} points: exact {now[0]} and wrong {now[1]} of 20 alone, {now[2]} and {now[3]} with the fleet's prior", flush=True)
         shutil.rmtree(store)
     null = alone = 0
     for f in range(args.nulls):
         store = os.path.join(args.out, "store")
-        answer = diagnose(fleet(args.out, f"null{f}", [[] for _ in range(args.robots)], r), store, args)
+        answer = diagnose(fleet(args.out, f"null{f}", [[] for _ in range(args.robots)], world, r, args.points), store, args)
         shared = [row["statement"] for row in answer["findings"] if not row["robot"]]
         single = [row["statement"] for row in answer["findings"] if row["robot"]]
         null += bool(shared)
         alone += len(single)
         print(f"null {f}: {shared or 'nothing'}; single {single}", flush=True)
         shutil.rmtree(store)
-    print(json.dumps({**score, "fleets": args.fleets, "null fleets": args.nulls, "null named": null, "null single": alone}))
+    print(json.dumps({**score, "fleets": args.fleets, "null fleets": args.nulls, "null named": null, "null single": alone,
+                      **({"short: exact, wrong; with prior exact, wrong": few} if args.short else {})}))
 
 
 if __name__ == "__main__":

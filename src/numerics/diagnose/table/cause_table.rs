@@ -1,13 +1,13 @@
 //! All cells of a recording with their columns, and the products of these with components of a model.
 
-use super::cell::{CauseCell, FreeShape, Over, Shapes};
+use super::cell::{CauseCell, FreeShape, Over, ShapeGroup, Shapes};
 use super::component::{CellColumns, ColumnProducts, Component, PartProducts};
 use super::frame::SearchRows;
 use super::state::KnownState;
 use super::{generated, listed};
 use crate::criteria::cells::{ALIKE, CLOSELY, COMPONENTS, USUAL_MOST};
 use crate::diagnose::types::{KnownCell, Question};
-use crate::effect::{Survey, Variable, cause, names};
+use crate::effect::{Survey, Term, Variable, cause, names};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -73,26 +73,26 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 cell.between = Some(known.between);
             }
         }
+        let groups: Vec<Vec<ShapeGroup>> = named
+            .iter()
+            .map(|cell| cell.groups(survey, &values, false))
+            .collect();
+        let forms = groups.iter().flatten().flat_map(|group| &group.forms);
+        let terms: Vec<&Term> = forms.filter_map(|form| form.term()).collect();
         let mut motions = Vec::new();
         let mut variables = Vec::new();
-        for form in named
-            .iter()
-            .flat_map(|cell| cell.groups(survey, &values, false))
-            .flat_map(|group| group.forms)
-        {
-            let Some(term) = form.term() else { continue };
+        for term in &terms {
             if !motions.contains(&term.motion()) {
                 motions.push(term.motion());
             }
-            variables.extend(
-                term.law()
-                    .variables()
-                    .into_iter()
-                    .filter(|of| of.is_single() && !variables.contains(of))
-                    .collect::<Vec<_>>(),
-            );
+            for of in term.law().factors().map(|factor| factor.of) {
+                if of.is_single() && !variables.contains(&of) {
+                    variables.push(of);
+                }
+            }
         }
         frame.prepare(&motions, &variables);
+        frame.tabulate(terms.iter().map(|term| term.law()));
         let is_declared = |cell: &CauseCell| cell.is_named() && cause(cell.name).is_none();
         let declared = (0..named.len())
             .filter(|cell| is_declared(&named[*cell]))
@@ -124,27 +124,24 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 names::JOINT_HARDENING
             },
         };
-        table.extend(named);
+        table.extend(named.into_iter().zip(groups).collect());
         table
     }
 
-    /// Adds cells.
-    fn extend(&mut self, cells: Vec<CauseCell>) {
-        let values = |of: Variable| self.frame.values(of);
-        let coarse: Vec<CellColumns> = cells
-            .par_iter()
-            .map(|cell| {
-                let block = CellColumns::of(cell.groups(self.survey, &values, false), self.frame);
-                block.between(cell.between)
-            })
-            .collect();
-        for block in &coarse {
+    /// Adds cells with their groups of shapes.
+    fn extend(&mut self, cells: Vec<(CauseCell, Vec<ShapeGroup>)>) {
+        let block = |(cell, groups): (CauseCell, Vec<ShapeGroup>)| {
+            let block = CellColumns::of(groups, self.frame).between(cell.between);
+            (cell, block)
+        };
+        let blocks: Vec<(CauseCell, CellColumns)> = cells.into_par_iter().map(block).collect();
+        for (cell, block) in blocks {
             self.first.push(self.columns);
-            self.columns += block.columns.values.ncols();
+            self.columns += block.count();
+            self.fine.push(OnceLock::new());
+            self.coarse.push(block);
+            self.cells.push(cell);
         }
-        self.fine.extend(cells.iter().map(|_| OnceLock::new()));
-        self.coarse.extend(coarse);
-        self.cells.extend(cells);
         self.products.clear();
     }
 
@@ -168,13 +165,13 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     pub(crate) fn siblings(&self, component: &Component) -> Vec<usize> {
         let product = self.product(component);
         let siblings = product.map(|free| generated::siblings(&free, self.survey));
-        let known = |free| self.cell(&generated::cell(free, 0.0).key);
+        let known = |free| self.cell(&generated::cell(free, 0.0, self.survey).key);
         siblings.into_iter().flatten().filter_map(known).collect()
     }
 
     /// Adds cells that may do what products among the components do, each as probable beforehand as that, less some.
     pub(crate) fn add_siblings(&mut self, components: &[Component], without: &BTreeSet<String>) {
-        let mut fresh: Vec<CauseCell> = Vec::new();
+        let mut fresh: Vec<(CauseCell, Vec<ShapeGroup>)> = Vec::new();
         for component in components {
             let Some(free) = self.product(component) else {
                 continue;
@@ -182,16 +179,20 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             let log_prior = self.cells[component.cell].log_prior;
             let siblings = generated::siblings(&free, self.survey)
                 .into_iter()
-                .map(|free| generated::cell(free, log_prior))
+                .map(|free| generated::cell(free, log_prior, self.survey))
                 .filter(|cell| !without.contains(&cell.key));
             let frame = self.frame;
             let values = |of: Variable| frame.values(of);
             for cell in siblings {
-                let mut known = self.cells.iter_mut().chain(&mut fresh);
+                let known = self.cells.iter_mut();
+                let mut known = known.chain(fresh.iter_mut().map(|(cell, _)| cell));
                 if let Some(known) = known.find(|known| known.key == cell.key) {
                     known.log_prior = known.log_prior.max(log_prior);
-                } else if !cell.groups(self.survey, &values, false).is_empty() {
-                    fresh.push(cell);
+                    continue;
+                }
+                let groups = cell.groups(self.survey, &values, false);
+                if !groups.is_empty() {
+                    fresh.push((cell, groups));
                 }
             }
         }
@@ -225,7 +226,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         for component in components {
             if !self.products.contains_key(&component.id) {
                 let with = |block: &CellColumns| {
-                    component.by_part(&self.known.of(&component.values, &block.columns.values))
+                    component.by_part(&self.known.of(component, block, self.frame))
                 };
                 let all: Vec<DMatrix<f64>> = self.coarse.par_iter().map(with).collect();
                 let mut values = Vec::with_capacity(component.part.ncols() * self.columns);
@@ -266,7 +267,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let mut columns = Vec::new();
         for cell in cells {
             first.push(columns.len());
-            let count = self.coarse[*cell].columns.values.ncols();
+            let count = self.coarse[*cell].count();
             columns.extend(self.first[*cell]..self.first[*cell] + count);
         }
         let solved: Vec<DMatrix<f64>> = columns
@@ -310,8 +311,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             .map(|value| value / length)
             .collect();
         let overlap = |cell: usize| {
-            let range =
-                self.first[cell]..self.first[cell] + self.coarse[cell].columns.values.ncols();
+            let range = self.first[cell]..self.first[cell] + self.coarse[cell].count();
             (self.coarse[cell].overlap(&along[range]), cell)
         };
         let mut all: Vec<(f64, usize)> = (0..self.cells.len())
@@ -390,12 +390,10 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     ) -> DMatrix<f64> {
         let parts: Vec<DMatrix<f64>> = components
             .iter()
-            .map(|component| {
-                component.by_part(&self.known.of(&component.values, &block.columns.values))
-            })
+            .map(|component| component.by_part(&self.known.of(component, block, self.frame)))
             .collect();
         let rows = parts.iter().map(DMatrix::nrows).sum();
-        let columns = block.columns.values.ncols();
+        let columns = block.count();
         let mut values = Vec::with_capacity(rows * columns);
         for column in 0..columns {
             for part in &parts {

@@ -2,6 +2,7 @@
 //! each computed once.
 
 use super::cell::{CellShape, ShapeGroup};
+use super::factored::FactoredColumns;
 use super::frame::{SearchRows, UnitColumns, product, view};
 use crate::effect::Form;
 use faer::linalg::matmul::matmul;
@@ -9,7 +10,7 @@ use faer::{Accum, MatMut, Par};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::sync::{Arc, RwLock, Weak};
+use std::sync::{Arc, OnceLock, RwLock, Weak};
 
 /// A group of shapes with its columns.
 pub(super) struct SeenGroup {
@@ -41,24 +42,43 @@ pub(super) fn shape_keys(groups: &[SeenGroup]) -> Vec<String> {
 /// All shapes of a cell with their columns.
 pub(super) struct CellColumns {
     pub(crate) groups: Vec<SeenGroup>,
-    pub(crate) columns: UnitColumns,
+    /// Mean squared motion (m2 or rad2) by a unit of each coefficient.
+    pub(crate) square: Arc<Vec<f64>>,
+    /// Where all of them are directions times functions.
+    factored: Option<Vec<FactoredColumns>>,
+    /// Residual rows x columns, once somebody wants them.
+    values: OnceLock<Arc<DMatrix<f64>>>,
     /// Its possible amplitudes, m.
     pub(crate) between: [f64; 2],
 }
 
 impl CellColumns {
     pub(crate) fn of(groups: Vec<ShapeGroup>, frame: &SearchRows) -> Self {
-        let forms: Vec<Form> = groups
-            .iter()
-            .flat_map(|group| group.forms.iter().cloned())
-            .collect();
-        let (columns, counts) = frame.columns(&forms);
-        let (mut first, mut counts) = (0, counts.into_iter());
+        let forms = groups.iter().flat_map(|group| &group.forms);
+        let factored: Option<Vec<_>> = forms.clone().map(|form| frame.factored(form)).collect();
+        let values = OnceLock::new();
+        let (square, counts) = match &factored {
+            Some(factored) => (
+                factored
+                    .iter()
+                    .flat_map(|form| form.square())
+                    .copied()
+                    .collect(),
+                factored.iter().map(|form| form.square().len()).collect(),
+            ),
+            None => {
+                let (columns, counts) = frame.columns(&forms.cloned().collect::<Vec<_>>());
+                let _ = values.set(columns.values);
+                (columns.square, counts)
+            }
+        };
+        let (mut first, mut first_form) = (0, 0);
         let seen = |mut group: ShapeGroup| {
-            let counts: Vec<usize> = counts.by_ref().take(group.forms.len()).collect();
+            let of_group = first_form..first_form + group.forms.len();
+            let counts: Vec<usize> = counts[of_group.clone()].to_vec();
             let count: usize = counts.iter().sum();
             let range = first..first + count;
-            first += count;
+            (first, first_form) = (range.end, of_group.end);
             for shape in group
                 .shapes
                 .iter_mut()
@@ -66,8 +86,13 @@ impl CellColumns {
             {
                 shape.shares = vec![1.0 / count.max(1) as f64; count];
             }
-            let values = view(&columns.values).subcols(range.start, count);
-            let (gram, gradient) = (product(values, values), frame.along(values));
+            let by_factors = factored
+                .as_ref()
+                .and_then(|factored| frame.factored_products(&factored[of_group]));
+            let (gram, gradient) = by_factors.unwrap_or_else(|| match values.get() {
+                Some(values) => frame.products(view(values).subcols(range.start, count)),
+                None => frame.products(view(&frame.columns(&group.forms).0.values)),
+            });
             SeenGroup {
                 group,
                 range,
@@ -78,33 +103,50 @@ impl CellColumns {
         };
         Self {
             groups: groups.into_iter().map(seen).collect(),
-            columns,
+            square: Arc::new(square),
+            factored,
+            values,
             between: [0.0, f64::INFINITY],
         }
     }
-}
 
-impl CellColumns {
     /// The shape of a component alone.
     pub(crate) fn of_component(component: &Component, frame: &SearchRows) -> Self {
-        let values = component.values.clone();
-        let gram = product(view(&values), view(&values));
-        let gradient = frame.along(view(&values));
-        let range = 0..values.ncols();
+        let (gram, gradient) = frame.products(view(&component.values));
         let group = SeenGroup {
             group: (*component.group).clone(),
-            range,
+            range: 0..component.values.ncols(),
             counts: component.counts.clone(),
             gram,
             gradient,
         };
         Self {
             groups: vec![group],
-            columns: UnitColumns {
-                values,
-                square: (*component.square).clone(),
-            },
+            square: component.square.clone(),
+            factored: None,
+            values: OnceLock::from(component.values.clone()),
             between: [0.0, f64::INFINITY],
+        }
+    }
+
+    /// How many columns it has.
+    pub(crate) fn count(&self) -> usize {
+        self.square.len()
+    }
+
+    /// Residual rows x columns.
+    pub(crate) fn values(&self, frame: &SearchRows) -> &Arc<DMatrix<f64>> {
+        self.values.get_or_init(|| {
+            let forms = self.groups.iter().flat_map(|seen| &seen.group.forms);
+            frame.columns(&forms.cloned().collect::<Vec<_>>()).0.values
+        })
+    }
+
+    /// The transpose of columns of which the base is projected off times these.
+    fn products(&self, with: &DMatrix<f64>, frame: &SearchRows) -> DMatrix<f64> {
+        match &self.factored {
+            Some(factored) => frame.with_factored(with, factored),
+            None => product(view(with), view(self.values(frame))),
         }
     }
 
@@ -280,20 +322,26 @@ struct ProductCache {
 
 struct KnownProduct {
     /// What it is of: as long as it is known, nothing else comes to lie there.
-    _of: [Weak<DMatrix<f64>>; 2],
+    _of: (Weak<DMatrix<f64>>, Weak<Vec<f64>>),
     product: Arc<DMatrix<f64>>,
 }
 
 impl ColumnProducts {
-    /// The transpose of `a` times `b`.
-    pub(crate) fn of(&self, a: &Arc<DMatrix<f64>>, b: &Arc<DMatrix<f64>>) -> Arc<DMatrix<f64>> {
+    /// The transpose of a component's columns times those of a block.
+    pub(crate) fn of(
+        &self,
+        component: &Component,
+        block: &CellColumns,
+        frame: &SearchRows,
+    ) -> Arc<DMatrix<f64>> {
+        let (a, b) = (&component.values, &block.square);
         let key = (Arc::as_ptr(a) as usize, Arc::as_ptr(b) as usize);
         if let Ok(cache) = self.0.read()
             && let Some(known) = cache.known.get(&key)
         {
             return known.product.clone();
         }
-        let product = Arc::new(product(view(a), view(b)));
+        let product = Arc::new(block.products(a, frame));
         if let Ok(mut cache) = self.0.write() {
             // 128 MB.
             if cache.size > 1 << 24 {
@@ -303,7 +351,7 @@ impl ColumnProducts {
             cache.known.insert(
                 key,
                 KnownProduct {
-                    _of: [Arc::downgrade(a), Arc::downgrade(b)],
+                    _of: (Arc::downgrade(a), Arc::downgrade(b)),
                     product: product.clone(),
                 },
             );

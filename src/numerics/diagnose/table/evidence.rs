@@ -8,6 +8,7 @@
 use crate::criteria::cells::{EXACT, LARGEST, NU, SMALLEST};
 use crate::diagnose::linear::dot;
 use nalgebra::{DMatrix, DVector};
+use std::sync::LazyLock;
 
 /// Amplitudes of the grid.
 pub const AMPLITUDES: usize = 28;
@@ -61,46 +62,44 @@ pub(crate) fn evidence_between(
     [low, high]: [f64; 2],
 ) -> GroupEvidence {
     let kept: Vec<usize> = (0..shares.len()).filter(|k| shares[*k] > 0.0).collect();
-    let scaled;
-    let (diagonal, off_diagonal, along) = if let [k] = kept[..] {
-        scaled = (
-            vec![shares[k] * gram[(k, k)]],
-            Vec::new(),
-            vec![shares[k].sqrt() * gradient[k]],
-        );
-        (&scaled.0, &scaled.1, &scaled.2)
-    } else {
-        let roots: Vec<f64> = kept.iter().map(|k| shares[*k].sqrt()).collect();
-        let matrix = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
-            roots[i] * gram[(kept[i], kept[j])] * roots[j]
-        });
-        let mut along: Vec<f64> = kept
-            .iter()
-            .zip(&roots)
-            .map(|(k, root)| root * gradient[*k])
-            .collect();
-        let (diagonal, off_diagonal) = tridiagonal(matrix, &mut along);
-        scaled = (diagonal, off_diagonal, along);
-        (&scaled.0, &scaled.1, &scaled.2)
-    };
+    if let [k] = kept[..] {
+        let (diagonal, along) = ([shares[k] * gram[(k, k)]], [shares[k].sqrt() * gradient[k]]);
+        return over_amplitudes((&diagonal, &[], &along), rows, [low, high]);
+    }
+    let roots: Vec<f64> = kept.iter().map(|k| shares[*k].sqrt()).collect();
+    let matrix = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
+        roots[i] * gram[(kept[i], kept[j])] * roots[j]
+    });
+    let mut along: Vec<f64> = kept
+        .iter()
+        .zip(&roots)
+        .map(|(k, root)| root * gradient[*k])
+        .collect();
+    let (diagonal, off_diagonal) = tridiagonal(matrix, &mut along);
+    over_amplitudes((&diagonal, &off_diagonal, &along), rows, [low, high])
+}
+
+/// The evidence of a Gram matrix in tridiagonal form over all amplitudes.
+fn over_amplitudes(
+    (diagonal, off_diagonal, along): (&[f64], &[f64], &[f64]),
+    rows: EvidenceRows,
+    [low, high]: [f64; 2],
+) -> GroupEvidence {
     let trace: f64 = diagonal.iter().sum();
     if trace.is_nan() || trace <= 0.0 {
         return GroupEvidence::NONE;
     }
     let (whole, half) = (*NU + rows.square, 0.5 * (rows.freedom + *NU));
-    let (mut logs, mut fits) = ([0.0; AMPLITUDES], [0.0; AMPLITUDES]);
-    for ((log, fit_there), amplitude) in logs.iter_mut().zip(&mut fits).zip(amplitudes()) {
-        let square = amplitude * amplitude;
-        let (fit, determinant) = at_amplitude(square, diagonal, off_diagonal, along);
-        *fit_there = fit;
+    let squares = GRID.map(|amplitude| amplitude * amplitude);
+    let (fits, determinants) = at_amplitudes(&squares, diagonal, off_diagonal, along);
+    let mut logs = [f64::NEG_INFINITY; AMPLITUDES];
+    let is_possible = |k: usize| GRID[k] >= low && GRID[k] <= high;
+    for k in (0..AMPLITUDES).filter(|k| is_possible(*k)) {
         // Noise is always left: what leaves none is rounding.
-        let left = 1.0 - fit / whole;
-        let sound = left > 1e-9 && square * trace < *EXACT && amplitude >= low && amplitude <= high;
-        *log = if sound {
-            -0.5 * determinant - half * left.ln()
-        } else {
-            f64::NEG_INFINITY
-        };
+        let left = 1.0 - fits[k] / whole;
+        if left > 1e-9 && squares[k] * trace < *EXACT {
+            logs[k] = -0.5 * determinants[k] - half * left.ln();
+        }
     }
     if logs.iter().all(|log| *log == f64::NEG_INFINITY) {
         return GroupEvidence::NONE;
@@ -108,10 +107,10 @@ pub(crate) fn evidence_between(
     let best = (0..AMPLITUDES)
         .max_by(|a, b| logs[*a].total_cmp(&logs[*b]))
         .unwrap_or(0);
-    let possible = amplitudes().filter(|amplitude| *amplitude >= low && *amplitude <= high);
+    let possible = (0..AMPLITUDES).filter(|k| is_possible(*k)).count();
     GroupEvidence {
-        log: log_sum(&logs) - (possible.count().max(1) as f64).ln(),
-        amplitude: amplitudes().nth(best).unwrap_or(*SMALLEST),
+        log: log_sum(&logs) - (possible.max(1) as f64).ln(),
+        amplitude: GRID[best],
         fit: fits[best],
     }
 }
@@ -160,29 +159,52 @@ fn tridiagonal(mut matrix: DMatrix<f64>, along: &mut [f64]) -> (Vec<f64>, Vec<f6
     (diagonal, off)
 }
 
-/// At a squared amplitude, of a Gram matrix T in tridiagonal form: a^2 g' (1 + a^2 T)^-1 g, and ln det (1 + a^2 T).
-fn at_amplitude(square: f64, diagonal: &[f64], off: &[f64], along: &[f64]) -> (f64, f64) {
-    let (mut pivot, mut value, mut fit, mut log, mut product) = (1.0, 0.0, 0.0, 0.0, 1.0);
+/// At each squared amplitude, of a Gram matrix T in tridiagonal form: a^2 g' (1 + a^2 T)^-1 g, and ln det (1 + a^2 T).
+fn at_amplitudes(
+    squares: &[f64; AMPLITUDES],
+    diagonal: &[f64],
+    off: &[f64],
+    along: &[f64],
+) -> ([f64; AMPLITUDES], [f64; AMPLITUDES]) {
+    let (mut pivots, mut products) = ([1.0; AMPLITUDES], [1.0; AMPLITUDES]);
+    let (mut values, mut fits) = ([0.0; AMPLITUDES], [0.0; AMPLITUDES]);
+    let mut logs = [0.0; AMPLITUDES];
     for (k, entry) in diagonal.iter().enumerate() {
-        let (last, below) = (pivot, if k > 0 { square * off[k - 1] } else { 0.0 });
-        // Rounding makes a pivot no smaller than one.
-        pivot = f64::max(1.0 + square * entry - below * below / last, 1.0);
-        value = along[k] - below / last * value;
-        fit += value * value / pivot;
-        product *= pivot;
-        // Logarithms cost more than products, which must not overflow.
-        if product > 1e200 {
-            log += product.ln();
-            product = 1.0;
+        let next = if k > 0 { off[k - 1] } else { 0.0 };
+        // All amplitudes in step: each waits for its own pivot before.
+        for a in 0..AMPLITUDES {
+            let (last, below) = (pivots[a], squares[a] * next);
+            let share = below / last;
+            // Rounding makes a pivot no smaller than one.
+            pivots[a] = f64::max(1.0 + squares[a] * entry - below * share, 1.0);
+            values[a] = along[k] - share * values[a];
+            fits[a] += values[a] * values[a] / pivots[a];
+            products[a] *= pivots[a];
+        }
+        // Logarithms cost more than products, which must not overflow; the largest amplitude has the largest.
+        if products[AMPLITUDES - 1] > 1e200 {
+            for (log, product) in logs.iter_mut().zip(&mut products) {
+                *log += std::mem::replace(product, 1.0).ln();
+            }
         }
     }
-    (square * fit, log + product.ln())
+    for a in 0..AMPLITUDES {
+        fits[a] *= squares[a];
+        logs[a] += products[a].ln();
+    }
+    (fits, logs)
 }
 
-fn amplitudes() -> impl Iterator<Item = f64> {
+/// The amplitudes of the grid, m.
+static GRID: LazyLock<[f64; AMPLITUDES]> = LazyLock::new(|| {
     let step = libm::pow(*LARGEST / *SMALLEST, 1.0 / (AMPLITUDES - 1) as f64);
-    std::iter::successors(Some(*SMALLEST), move |amplitude| Some(amplitude * step)).take(AMPLITUDES)
-}
+    let mut next = *SMALLEST;
+    std::array::from_fn(|_| {
+        let amplitude = next;
+        next *= step;
+        amplitude
+    })
+});
 
 /// ln of a sum of exponentials; minus infinity of none.
 pub fn log_sum(logs: &[f64]) -> f64 {
@@ -222,7 +244,7 @@ mod tests {
             let fit = 40.0 * 40.0 / 4e6 * s / (1.0 + s);
             -0.5 * (1.0 + s).ln() - 0.5 * (300.0 + *NU) * (1.0 - fit / (*NU + 320.0)).ln()
         };
-        let logs: Vec<f64> = amplitudes().map(one).collect();
+        let logs: Vec<f64> = GRID.iter().copied().map(one).collect();
         assert!(
             (found.log - log_mean(&logs)).abs() < 1e-12,
             "{} {}",
@@ -262,7 +284,7 @@ mod tests {
                 .map(|square| 0.5 * (9.0 + *NU) * (*NU + square).ln());
             without - with - 0.5 * covariance.determinant().ln()
         };
-        let logs: Vec<f64> = amplitudes().map(at).collect();
+        let logs: Vec<f64> = GRID.iter().copied().map(at).collect();
         assert!(
             (found.log - log_mean(&logs)).abs() < 1e-6,
             "{} {}",

@@ -1,29 +1,20 @@
 //! The rows as they stand around the present model: what is left without any cell, and the columns of whatever moves it; both weighed, with
 //! geometry projected off.
 
-use super::cell::alternates;
 use super::evidence::EvidenceRows;
-use crate::criteria::cells::{EVEN, FAR, UNEVEN};
+use super::factored::{
+    FactoredColumns, Functions, MotionRows, WeighedDirection, column, pairs, unit,
+};
+use super::noise_shape::NoiseShape;
 use crate::diagnose::linear::{dot, orthonormal, project};
 use crate::diagnose::round::{FitState, Fitter, RoundView};
-use crate::effect::{Form, Law, Motion, Variable};
+use crate::effect::{Basis, Factor, Form, Law, Motion, Variable};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::Arc;
-
-/// How the noise of the rows differs from what they state: weights of rows that are far off, and the shape of the others'.
-#[derive(Clone, Default)]
-pub(super) struct NoiseShape {
-    /// Square root of the weight of each row of the recording; empty where all count fully.
-    weights: Vec<f64>,
-    /// What makes the three numbers of a point white, in the axes of the recording.
-    whitening: Option<Matrix3<f64>>,
-    /// By what motor currents are multiplied, so that they leave as much as points do.
-    currents: Option<f64>,
-}
 
 /// Columns of unit rms motion at the tool.
 pub(super) struct UnitColumns {
@@ -33,12 +24,11 @@ pub(super) struct UnitColumns {
     pub(crate) square: Vec<f64>,
 }
 
-/// A direction in which a motion moves the rows.
-struct WeighedDirection {
-    /// By a unit, weighed, residual rows of readings.
-    weighed: Vec<f64>,
-    /// Squared motion of each row by a unit, its share in the mean over the rows.
-    square: Vec<f64>,
+/// A variable at every row, none where some row does not tell it; and functions of it.
+struct VariableRows {
+    of: Variable,
+    values: Option<Vec<f64>>,
+    functions: Vec<(Basis, Arc<Functions>)>,
 }
 
 /// Columns one after another, of so many rows, weighed and of unit rms motion, with the mean squared motion by a unit of each.
@@ -52,12 +42,14 @@ struct Weighed {
 pub(super) struct SearchRows<'a> {
     pub(crate) view: &'a RoundView<'a>,
     base: Mat<f64>,
+    /// Columns of the base x residual rows.
+    base_by_line: DMatrix<f64>,
     residual: Vec<f64>,
     /// Variance of one number of a row, m2 or rad2, by which columns become sizes.
     variance: Vec<f64>,
     noise: NoiseShape,
-    directions: Vec<(Motion, Vec<WeighedDirection>)>,
-    values: Vec<(Variable, Option<Vec<f64>>)>,
+    motions: Vec<MotionRows>,
+    variables: Vec<VariableRows>,
 }
 
 impl<'a> SearchRows<'a> {
@@ -87,17 +79,20 @@ impl<'a> SearchRows<'a> {
         let mut out = Self {
             view,
             base: Mat::new(),
+            base_by_line: DMatrix::zeros(0, 0),
             residual: Vec::new(),
             variance,
             noise,
-            directions: Vec::new(),
-            values: Vec::new(),
+            motions: Vec::new(),
+            variables: Vec::new(),
         };
         let mut jacobian = problem.jacobian(&fitter.seen());
         (0..jacobian.ncols()).for_each(|j| out.weigh(jacobian.col_as_slice_mut(j)));
         out.weigh(&mut residual);
         out.base = orthonormal(&jacobian);
         project(out.base.as_ref(), &mut residual);
+        let base = &out.base;
+        out.base_by_line = DMatrix::from_fn(base.ncols(), base.nrows(), |j, line| base[(line, j)]);
         out.residual = residual;
         out
     }
@@ -131,47 +126,118 @@ impl<'a> SearchRows<'a> {
         DVector::from_vec(product(columns, residual).data.into())
     }
 
+    /// Products of some columns with each other and with the residual.
+    pub(crate) fn products(&self, columns: MatRef<'_, f64>) -> (DMatrix<f64>, DVector<f64>) {
+        (product(columns, columns), self.along(columns))
+    }
+
     /// A variable at every row; none where some row does not tell it.
     pub(crate) fn values(&self, of: Variable) -> Option<Vec<f64>> {
-        match self.values.iter().find(|(other, _)| *other == of) {
-            Some((_, values)) => values.clone(),
+        match self.variables.iter().find(|known| known.of == of) {
+            Some(known) => known.values.clone(),
             None => self.view.problem.values(of),
         }
     }
 
     /// Computes once what the columns of many forms are made of.
     pub(crate) fn prepare(&mut self, motions: &[Motion], variables: &[Variable]) {
-        let problem = &self.view.problem;
-        let fresh: Vec<Motion> = motions
-            .iter()
-            .filter(|motion| !self.directions.iter().any(|(other, _)| other == *motion))
-            .copied()
-            .collect();
-        let directions = |motion| {
-            problem
-                .directions(motion)
-                .into_iter()
-                .map(|raw| self.direction(raw))
-                .collect()
-        };
-        let fresh: Vec<(Motion, Vec<WeighedDirection>)> = fresh
+        let is_fresh = |motion: &&Motion| self.motions.iter().all(|known| known.motion != **motion);
+        let fresh: Vec<&Motion> = motions.iter().filter(is_fresh).collect();
+        let fresh: Vec<MotionRows> = fresh
             .into_par_iter()
-            .map(|motion| (motion, directions(motion)))
+            .map(|motion| self.motion(*motion))
             .collect();
-        self.directions.extend(fresh);
-        let fresh: Vec<Variable> = variables
-            .iter()
-            .filter(|of| !self.values.iter().any(|(other, _)| other == *of))
-            .copied()
-            .collect();
-        self.values
-            .par_extend(fresh.into_par_iter().map(|of| (of, problem.values(of))));
+        self.motions.extend(fresh);
+        let is_fresh = |of: &&Variable| self.variables.iter().all(|known| known.of != **of);
+        let fresh: Vec<&Variable> = variables.iter().filter(is_fresh).collect();
+        let problem = &self.view.problem;
+        self.variables
+            .par_extend(fresh.into_par_iter().map(|of| VariableRows {
+                of: *of,
+                values: problem.values(*of),
+                functions: Vec::new(),
+            }));
+    }
+
+    /// Computes once the functions of one variable that forms have.
+    pub(crate) fn tabulate<'l>(&mut self, laws: impl Iterator<Item = &'l Law>) {
+        for factor in laws.flat_map(Law::factors) {
+            let known = self
+                .variables
+                .iter()
+                .position(|known| known.of == factor.of);
+            let Some(known) = known else { continue };
+            let functions = &self.variables[known].functions;
+            if functions.iter().all(|(basis, _)| *basis != factor.basis)
+                && let Some(fresh) = self.factor(factor)
+            {
+                let fresh = Arc::new(Functions::of(fresh));
+                self.variables[known].functions.push((factor.basis, fresh));
+            }
+        }
+    }
+
+    /// Columns of a form as directions times functions; none where it is no such product, or where rows have a part in each other.
+    pub(crate) fn factored(&self, form: &Form) -> Option<FactoredColumns> {
+        let term = form.term().filter(|_| self.is_by_row())?;
+        let mut motions = self.motions.iter();
+        let motion = motions.position(|known| known.motion == term.motion())?;
+        let functions = self.functions(term.law())?;
+        Some(FactoredColumns::of(
+            motion,
+            &self.motions[motion],
+            functions,
+        ))
+    }
+
+    /// Whether rows are weighed each by itself, and all of them are readings.
+    fn is_by_row(&self) -> bool {
+        !self.view.problem.is_correlated()
+            && self.view.problem.of_readings().len() == self.residual.len()
+    }
+
+    /// What a motion's columns are made of.
+    fn motion(&self, motion: Motion) -> MotionRows {
+        let raw = self.view.problem.directions(motion);
+        let directions = raw.into_iter().map(|raw| self.direction(raw)).collect();
+        let out = MotionRows::of(motion, directions);
+        if !self.is_by_row() {
+            return out;
+        }
+        let row_of = self.view.problem.rows_of_readings();
+        out.by_row(&self.base_by_line, &self.residual, row_of)
+    }
+
+    /// The transpose of some columns, of which the base is projected off, times factored ones.
+    pub(crate) fn with_factored(
+        &self,
+        columns: &DMatrix<f64>,
+        factored: &[FactoredColumns],
+    ) -> DMatrix<f64> {
+        let (by_line, row_of) = (columns.transpose(), self.view.problem.rows_of_readings());
+        let mut out = Vec::new();
+        for form in factored {
+            let by_row = self.motions[form.motion].with(&by_line, row_of);
+            form.sums(&by_row, &mut out);
+        }
+        let count = out.len() / columns.ncols().max(1);
+        DMatrix::from_vec(columns.ncols(), count, out)
+    }
+
+    /// Products of factored columns with each other and with the residual, the base projected off; none of several motions.
+    pub(crate) fn factored_products(
+        &self,
+        factored: &[FactoredColumns],
+    ) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let first = factored.first()?.motion;
+        let is_one = factored.iter().all(|form| form.motion == first);
+        is_one.then(|| self.motions[first].products(factored))
     }
 
     /// Columns of some forms, one form after another, and how many each has. They end before the rows of motor currents where no form says
     /// anything of these.
     pub(crate) fn columns(&self, forms: &[Form]) -> (UnitColumns, Vec<usize>) {
-        let each: Vec<Weighed> = forms
+        let mut each: Vec<Weighed> = forms
             .iter()
             .map(|form| self.of_term(form).unwrap_or_else(|| self.of_form(form)))
             .collect();
@@ -180,8 +246,11 @@ impl<'a> SearchRows<'a> {
             .map(|block| block.rows)
             .max()
             .unwrap_or(self.residual.len());
-        let mut values =
-            Vec::with_capacity(rows * each.iter().map(|block| block.square.len()).sum::<usize>());
+        let counts: Vec<usize> = each.iter().map(|block| block.square.len()).collect();
+        let mut values = match &mut each[..] {
+            [block] => std::mem::take(&mut block.columns),
+            _ => Vec::with_capacity(rows * counts.iter().sum::<usize>()),
+        };
         for block in &each {
             for column in block.columns.chunks(block.rows.max(1)) {
                 values.extend_from_slice(column);
@@ -189,7 +258,6 @@ impl<'a> SearchRows<'a> {
             }
         }
         project(self.base.as_ref().subrows(0, rows), &mut values);
-        let counts = each.iter().map(|block| block.square.len()).collect();
         let square: Vec<f64> = each.into_iter().flat_map(|block| block.square).collect();
         (
             UnitColumns {
@@ -238,13 +306,11 @@ impl<'a> SearchRows<'a> {
     /// How much of the squared length of `left` the columns of a law at a place explain if they are orthogonal; nothing of what needs more.
     pub(crate) fn roughly(&self, form: &Form, left: &[f64]) -> Option<f64> {
         let term = form.term().filter(|_| !self.view.problem.is_correlated())?;
-        let (_, directions) = self
-            .directions
-            .iter()
-            .find(|(motion, _)| *motion == term.motion())?;
+        let of_motion = |known: &&MotionRows| known.motion == term.motion();
+        let motion = self.motions.iter().find(of_motion)?;
         let functions = self.functions(term.law())?;
         let mut fit = 0.0;
-        for WeighedDirection { weighed, .. } in directions {
+        for WeighedDirection { weighed, .. } in &motion.directions {
             let of_row = |i: usize| {
                 let lines = self.view.problem.readings_of(i);
                 let sums =
@@ -254,7 +320,7 @@ impl<'a> SearchRows<'a> {
                 })
             };
             let rows: Vec<[f64; 2]> = (0..self.variance.len()).map(of_row).collect();
-            for function in &functions {
+            for function in functions.values.column_iter() {
                 let sums = function
                     .iter()
                     .zip(&rows)
@@ -293,39 +359,26 @@ impl<'a> SearchRows<'a> {
     /// The columns of a law at a place from the motion's directions and the law's functions.
     fn of_term(&self, form: &Form) -> Option<Weighed> {
         let term = form.term()?;
-        let (_, directions) = self
-            .directions
-            .iter()
-            .find(|(motion, _)| *motion == term.motion())?;
+        let of_motion = |known: &&MotionRows| known.motion == term.motion();
+        let MotionRows { directions, .. } = self.motions.iter().find(of_motion)?;
         let functions = self.functions(term.law())?;
-        let (problem, rows) = (&self.view.problem, self.view.problem.of_readings().len());
-        let squared: Vec<Vec<f64>> = functions
-            .iter()
-            .map(|function| function.iter().map(|value| value * value).collect())
-            .collect();
-        let count = directions.len() * functions.len();
-        // In the order of the term's coefficients.
-        let alternate = alternates(term.motion());
-        let pair = |k: usize| {
-            if alternate {
-                (k % directions.len(), k / directions.len())
-            } else {
-                (k / functions.len(), k % functions.len())
-            }
-        };
-        let (mut columns, mut square) = (vec![0.0; rows * count], Vec::with_capacity(count));
-        for (k, column) in columns.chunks_mut(rows.max(1)).enumerate().take(count) {
-            let (direction, function) = pair(k);
-            let length = dot(&squared[function], &directions[direction].square);
+        let (problem, row_of) = (&self.view.problem, self.view.problem.rows_of_readings());
+        let (rows, mut columns, mut square) = (row_of.len(), Vec::new(), Vec::new());
+        for (direction, function) in pairs(term.motion(), directions.len(), functions.count()) {
+            let direction = &directions[direction];
+            let length = dot(column(&functions.squares, function), &direction.square);
             let scale = unit(length);
             square.push(length);
-            for (i, value) in functions[function].iter().enumerate() {
-                let by = value * scale;
-                for line in problem.readings_of(i) {
-                    column[line] = directions[direction].weighed[line] * by;
-                }
-            }
+            let by: Vec<f64> = functions
+                .at(function)
+                .iter()
+                .map(|value| value * scale)
+                .collect();
+            let first = columns.len();
+            let lines = direction.weighed.iter().zip(row_of);
+            columns.extend(lines.map(|(weighed, row)| weighed * by[*row]));
             if problem.is_correlated() {
+                let column = &mut columns[first..];
                 problem.innovate(column);
                 self.weigh(column);
             }
@@ -338,29 +391,48 @@ impl<'a> SearchRows<'a> {
     }
 
     /// The functions of a law at every row; none of a variable of several numbers, or that some row does not tell.
-    fn functions(&self, law: &Law) -> Option<Vec<Vec<f64>>> {
-        let mut out: Vec<Vec<f64>> = vec![vec![1.0; self.view.problem.rows.len()]];
-        for factor in law.factors() {
-            if !factor.of.is_single() {
-                return None;
-            }
-            let values = match self.values.iter().find(|(other, _)| *other == factor.of) {
-                Some((_, values)) => Cow::Borrowed(values.as_deref()?),
-                None => Cow::Owned(self.view.problem.values(factor.of)?),
-            };
-            let mut functions = vec![vec![0.0; values.len()]; factor.basis.count()];
-            for (row, u) in values.iter().enumerate() {
-                factor
-                    .basis
-                    .at(*u, &mut |k, value| functions[k][row] = value);
-            }
-            let times = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(x, y)| x * y).collect();
-            out = out
-                .iter()
-                .flat_map(|a| functions.iter().map(move |b| times(a, b)))
-                .collect();
+    fn functions(&self, law: &Law) -> Option<Arc<Functions>> {
+        let of = |factor: &Factor| {
+            let known = self.variables.iter().find(|known| known.of == factor.of)?;
+            let mut functions = known.functions.iter();
+            let known = functions.find(|(basis, _)| *basis == factor.basis)?;
+            Some(&known.1)
+        };
+        if let (Some(functions), None) = (of(&law.first), law.times) {
+            return Some(functions.clone());
         }
-        Some(out)
+        let factor = |factor: &Factor| match of(factor) {
+            Some(functions) => Some(Cow::Borrowed(&functions.values)),
+            None => Some(Cow::Owned(self.factor(factor)?)),
+        };
+        let first = factor(&law.first)?;
+        let Some(times) = law.times.as_ref() else {
+            return Some(Arc::new(Functions::of(first.into_owned())));
+        };
+        let second = factor(times)?;
+        let products: Vec<DVector<f64>> = first
+            .column_iter()
+            .flat_map(|a| second.column_iter().map(move |b| a.component_mul(&b)))
+            .collect();
+        Some(Arc::new(Functions::of(DMatrix::from_columns(&products))))
+    }
+
+    /// The functions of one variable at every row, rows x functions.
+    fn factor(&self, factor: &Factor) -> Option<DMatrix<f64>> {
+        if !factor.of.is_single() {
+            return None;
+        }
+        let values = match self.variables.iter().find(|known| known.of == factor.of) {
+            Some(known) => Cow::Borrowed(known.values.as_deref()?),
+            None => Cow::Owned(self.view.problem.values(factor.of)?),
+        };
+        let mut functions = DMatrix::zeros(values.len(), factor.basis.count());
+        for (row, u) in values.iter().enumerate() {
+            factor
+                .basis
+                .at(*u, &mut |k, value| functions[(row, k)] = value);
+        }
+        Some(functions)
     }
 
     /// Rms motion at the tool of what makes the squared residual smaller by so much.
@@ -396,141 +468,6 @@ impl<'a> SearchRows<'a> {
                 .iter_mut()
                 .for_each(|value| *value *= factor);
         }
-    }
-}
-
-impl NoiseShape {
-    /// Before anything was found: rows that measured one pose count as far as they say something of their own.
-    pub(crate) fn at_first(view: &RoundView, rows: usize) -> Self {
-        let mut weights = vec![1.0; rows];
-        share_among_repeats(view, &mut weights);
-        Self {
-            weights,
-            ..Self::default()
-        }
-    }
-
-    /// By what a fitted model leaves of the rows: those that are far off count less, and a noise that is stronger in some direction is made
-    /// even.
-    pub(crate) fn of(view: &RoundView, rows: usize) -> Self {
-        let problem = &view.problem;
-        let residual = problem.of_readings();
-        let square = |lines: std::ops::Range<usize>| {
-            let count = lines.len().max(1) as f64;
-            residual[lines]
-                .iter()
-                .map(|value| value * value)
-                .sum::<f64>()
-                / count
-        };
-        let mut sizes: Vec<f64> = (0..problem.rows.len())
-            .map(|i| square(problem.readings_of(i)).sqrt())
-            .collect();
-        let by_row = sizes.clone();
-        if sizes.is_empty() {
-            return Self::default();
-        }
-        let middle = sizes.len() / 2;
-        // The median of a mean of three squares is 0.79 of their expectation.
-        let scale = (*sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.89).max(0.3);
-        let mut weights = vec![1.0; rows];
-        for (size, row) in by_row.iter().zip(&problem.rows) {
-            weights[*row] = (*FAR * scale / size.max(f64::MIN_POSITIVE)).min(1.0);
-        }
-        let points = (0..problem.rows.len())
-            .filter(|i| weights[problem.rows[*i]] == 1.0 && problem.readings_of(*i).len() == 3);
-        let (mut sum, mut count) = (Matrix3::zeros(), 0.0);
-        for i in points {
-            let left = Vector3::from_column_slice(&residual[problem.readings_of(i)]);
-            sum += left * left.transpose();
-            count += 1.0;
-        }
-        share_among_repeats(view, &mut weights);
-        let mean = |values: &[f64]| {
-            values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64
-        };
-        let currents = &problem.residual[residual.len()..];
-        let currents = (!currents.is_empty()).then(|| {
-            (mean(residual) / mean(currents).max(1e-12))
-                .sqrt()
-                .clamp(0.2, 5.0)
-        });
-        Self {
-            weights,
-            whitening: evened(sum, count),
-            currents,
-        }
-    }
-}
-
-/// Rows that measured one pose one after another count as one where they differ less among each other than from the model: what they leave is
-/// then the pose's, not the instrument's.
-fn share_among_repeats(view: &RoundView, weights: &mut [f64]) {
-    let (problem, residual) = (&view.problem, view.problem.of_readings());
-    let width = problem.width().unwrap_or(0);
-    let mut poses: Vec<Vec<usize>> = Vec::new();
-    for (i, row) in problem.rows.iter().enumerate() {
-        match poses
-            .last_mut()
-            .filter(|pose| problem.data.same_pose(problem.rows[pose[0]], *row))
-        {
-            Some(pose) => pose.push(i),
-            None => poses.push(vec![i]),
-        }
-    }
-    let (mut within, mut freedom) = (0.0, 0.0);
-    for pose in poses.iter().filter(|pose| pose.len() > 1) {
-        for k in 0..width {
-            let values: Vec<f64> = pose
-                .iter()
-                .map(|i| residual[problem.readings_of(*i).start + k])
-                .collect();
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
-            within += values
-                .iter()
-                .map(|value| (value - mean).powi(2))
-                .sum::<f64>();
-            freedom += values.len() as f64 - 1.0;
-        }
-    }
-    if freedom < *EVEN {
-        return;
-    }
-    let within = within / freedom;
-    let whole =
-        residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64;
-    let between = (whole - within).max(0.0);
-    for pose in poses.iter().filter(|pose| pose.len() > 1) {
-        let count = pose.len() as f64;
-        let share = ((between + within) / (count * between + within).max(f64::MIN_POSITIVE))
-            .sqrt()
-            .min(1.0);
-        pose.iter().for_each(|i| weights[problem.rows[*i]] *= share);
-    }
-}
-
-/// What makes a noise of this summed covariance even and leaves its strength; none where it is nearly even.
-fn evened(sum: Matrix3<f64>, count: f64) -> Option<Matrix3<f64>> {
-    if count < *EVEN {
-        return None;
-    }
-    let even = sum.trace() / (3.0 * count);
-    let covariance = (sum + Matrix3::identity() * (*EVEN * even)) / (count + *EVEN);
-    let parts = covariance.symmetric_eigen();
-    let (least, most) = (parts.eigenvalues.min(), parts.eigenvalues.max());
-    if least <= 0.0 || most / least < *UNEVEN {
-        return None;
-    }
-    let roots = Matrix3::from_diagonal(&parts.eigenvalues.map(|variance| (even / variance).sqrt()));
-    Some(parts.eigenvectors * roots * parts.eigenvectors.transpose())
-}
-
-/// What makes a motion of this mean square one of unit size; 0 of none.
-fn unit(square: f64) -> f64 {
-    if square > 0.0 {
-        square.sqrt().recip()
-    } else {
-        0.0
     }
 }
 

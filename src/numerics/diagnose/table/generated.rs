@@ -70,7 +70,7 @@ pub(super) fn cells(
         for motions in families {
             let kinds: Vec<Kind> = kinds(place, motions[0], survey);
             let variables: Vec<Variable> = kinds.iter().flatten().map(|(of, _)| *of).collect();
-            frame.prepare(&motions, &variables);
+            frame.prepare(&[], &variables);
             for kind in kinds {
                 let kind = kind.into_iter().filter(|(of, _)| varies(frame, *of));
                 let all: Vec<_> = kind
@@ -86,9 +86,9 @@ pub(super) fn cells(
         for group in groups {
             let log_prior = (unnamed / count / group.len() as f64).ln();
             out.extend(
-                group
-                    .into_iter()
-                    .map(|(motion, of, over)| cell(FreeShape { motion, of, over }, log_prior)),
+                group.into_iter().map(|(motion, of, over)| {
+                    cell(FreeShape { motion, of, over }, log_prior, survey)
+                }),
             );
         }
     }
@@ -110,7 +110,7 @@ pub(super) fn products(
             .map(|(other, _)| other)
             .filter(|other| other != of)
             .collect();
-        frame.prepare(&[*motion], &others);
+        frame.prepare(&[], &others);
         let mut seen: Vec<Variable> = Vec::new();
         for other in others {
             if seen.contains(&other) || is_square(*of, other) {
@@ -122,7 +122,7 @@ pub(super) fn products(
                 of: *of,
                 over: Over::Product(other),
             };
-            let cell = cell(free, PRODUCT.ln());
+            let cell = cell(free, PRODUCT.ln(), survey);
             if !out.iter().any(|known| known.key == cell.key) {
                 out.push(cell);
             }
@@ -167,8 +167,9 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
 }
 
 /// Cells of products that were seen among all pairs.
-pub(super) fn pair_cells(seen: &[FreeShape]) -> Vec<CauseCell> {
-    seen.iter().map(|free| cell(*free, PAIR.ln())).collect()
+pub(super) fn pair_cells(seen: &[FreeShape], survey: &Survey) -> Vec<CauseCell> {
+    let of = |free: &FreeShape| cell(*free, PAIR.ln(), survey);
+    seen.iter().map(of).collect()
 }
 
 /// Products that may do what one does: of the same variables at the places near it, where a motion that an axis does not turn is the same one,
@@ -216,9 +217,17 @@ fn is_square(a: Variable, b: Variable) -> bool {
     a == b || !space && a.is_alike(b)
 }
 
-pub(super) fn cell(free: FreeShape, log_prior: f64) -> CauseCell {
+pub(super) fn cell(free: FreeShape, log_prior: f64, survey: &Survey) -> CauseCell {
+    // Recordings of robots of one model travel differently far, and their cells are the same.
+    let named = |of: Variable| match of {
+        Variable::Stretch { joint, limit } => {
+            let share = limit / survey.travel(joint);
+            format!("Stretch {{ joint: {joint}, share: {share:.4} }}")
+        }
+        of => format!("{of:?}"),
+    };
     let times = if let Over::Product(other) = free.over {
-        format!(" times {other:?}")
+        format!(" times {}", named(other))
     } else {
         String::new()
     };
@@ -226,7 +235,7 @@ pub(super) fn cell(free: FreeShape, log_prior: f64) -> CauseCell {
     CauseCell {
         name: names::UNKNOWN,
         place: free.motion.place(),
-        key: format!("{:?} by {:?}{times}{step}", free.motion, free.of),
+        key: format!("{:?} by {}{times}{step}", free.motion, named(free.of)),
         log_prior,
         shapes: Shapes::Free(free),
         between: None,

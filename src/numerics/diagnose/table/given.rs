@@ -4,7 +4,8 @@ use super::cause_table::CauseTable;
 use super::cell::CauseCell;
 use super::component::{CellColumns, Component, SeenGroup, shape_keys};
 use super::evidence::log_sum;
-use super::frame::{NoiseShape, SearchRows, product, view as matrix};
+use super::frame::{SearchRows, product, view as matrix};
+use super::noise_shape::NoiseShape;
 use super::search::without;
 use super::state::KnownState;
 use super::{by_currents, estimated, is_kept};
@@ -223,14 +224,15 @@ impl CauseTable<'_, '_> {
             };
             let steps =
                 |form: &Form| matches!(form.term().map(Term::basis), Some(Basis::After { .. }));
-            let shapes = block
-                .groups
-                .iter()
-                .zip(&logs)
-                .zip(shape_keys(&block.groups));
-            let shapes = shapes.filter(|((seen, log), _)| {
-                shared && log.is_finite() && !seen.group.forms.iter().any(steps)
-            });
+            // Keys are long to make.
+            let keys = if shared && logs.iter().any(|log| log.is_finite()) {
+                shape_keys(&block.groups)
+            } else {
+                Vec::new()
+            };
+            let shapes = block.groups.iter().zip(&logs).zip(keys);
+            let shapes = shapes
+                .filter(|((seen, log), _)| log.is_finite() && !seen.group.forms.iter().any(steps));
             let shapes: Vec<CellAnswer> = shapes.map(shape).collect();
             (whole, shapes)
         };

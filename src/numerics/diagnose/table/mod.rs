@@ -9,11 +9,13 @@ mod cause_table;
 mod cell;
 mod component;
 mod evidence;
+mod factored;
 mod forms;
 mod frame;
 mod generated;
 mod given;
 mod listed;
+mod noise_shape;
 mod refine;
 mod scan;
 mod search;
@@ -37,7 +39,8 @@ use crate::observation::only_contacts;
 use cause_table::CauseTable;
 use cell::FreeShape;
 use component::Component;
-use frame::{NoiseShape, SearchRows};
+use frame::SearchRows;
+use noise_shape::NoiseShape;
 use std::collections::BTreeSet;
 
 /// What rounds of searching around better and better models keep.
@@ -122,11 +125,10 @@ impl Rounds {
             Vec::new()
         };
         let known = self.products.drain(..);
-        let known = known.map(|(free, log_prior)| generated::cell(free, log_prior));
+        let known = known.map(|(free, log_prior)| generated::cell(free, log_prior, &survey));
         let mut products: Vec<_> = known.collect();
-        products.extend(generated::pair_cells(
-            self.pairs.as_deref().unwrap_or_default(),
-        ));
+        let pairs = self.pairs.as_deref().unwrap_or_default();
+        products.extend(generated::pair_cells(pairs, &survey));
         let products = (&self.shown[..], products);
         let is_open = self.is_open || survey.rows.len() >= *OPEN;
         let mut table = CauseTable::new(&mut frame, &survey, question, products, is_open, keeps);

@@ -423,7 +423,7 @@ impl CauseTable<'_, '_> {
                 kept.extend(columns);
             }
         }
-        let values = block.columns.values.select_columns(
+        let values = block.values(self.frame).select_columns(
             kept.iter()
                 .map(|k| seen.range.start + k)
                 .collect::<Vec<_>>()
@@ -431,7 +431,7 @@ impl CauseTable<'_, '_> {
         );
         let square = kept
             .iter()
-            .map(|k| block.columns.square[seen.range.start + k])
+            .map(|k| block.square[seen.range.start + k])
             .collect();
         let shares = kept.iter().map(|k| shape.shares[*k]).collect();
         let shape = CellShape { shares, ..shape };

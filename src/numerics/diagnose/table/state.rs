@@ -212,7 +212,7 @@ impl KnownState {
             .cholesky()?
             .solve(&roots.component_mul(&gradient))
             .component_mul(&roots);
-        let squares = &block.columns.square[group.range.clone()];
+        let squares = &block.square[group.range.clone()];
         // A function that is zero at all values that there are, as a cosine may be at two, is rounding.
         let least = 1e-9 * squares.iter().copied().fold(0.0, f64::max);
         let scale = |square: f64| {
@@ -240,7 +240,7 @@ impl KnownState {
             let variance = inverse
                 .as_ref()
                 .map_or(f64::INFINITY, |inverse| inverse[(k, k)]);
-            let square = block.columns.square[group.range.start + k];
+            let square = block.square[group.range.start + k];
             if variance > 0.0 && square > 0.0 {
                 (variance / square).sqrt()
             } else {
@@ -295,7 +295,7 @@ impl KnownState {
             if single {
                 let coefficient = gradient[0]
                     / gram[(0, 0)].max(f64::MIN_POSITIVE)
-                    / block.columns.square[group.range.start].sqrt();
+                    / block.square[group.range.start].sqrt();
                 let wrong = group.group.positive && coefficient < 0.0;
                 if wrong || coefficient.abs() > 1.5 * group.group.largest {
                     continue;

@@ -175,6 +175,11 @@ impl<'a> WhitenedProblem<'a> {
         self.residual.len()
     }
 
+    /// The places in `rows` of residual rows of readings.
+    pub(crate) fn rows_of_readings(&self) -> &[usize] {
+        &self.readings.row_of
+    }
+
     /// The place in `rows` of a residual row.
     pub(crate) fn row_of(&self, residual_row: usize) -> usize {
         match &self.currents {

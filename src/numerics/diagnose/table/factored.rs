@@ -1,0 +1,245 @@
+//! Columns as directions of a motion times functions of a row: their products with each other, with the base and with the residual are had
+//! row by row, without writing the columns down.
+
+use super::cell::alternates;
+use crate::diagnose::linear::dot;
+use crate::effect::Motion;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par};
+use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
+
+/// A direction in which a motion moves the rows.
+pub(super) struct WeighedDirection {
+    /// By a unit, weighed, residual rows of readings.
+    pub(super) weighed: Vec<f64>,
+    /// Squared motion of each row by a unit, its share in the mean over the rows.
+    pub(super) square: Vec<f64>,
+}
+
+/// A motion with its directions, and what products of its columns are made of.
+pub(super) struct MotionRows {
+    pub(super) motion: Motion,
+    pub(super) directions: Vec<WeighedDirection>,
+    /// Of each direction, row by row: its products with the base's columns.
+    by_base: Vec<DMatrix<f64>>,
+    /// Of each direction, row by row: its product with the residual.
+    by_residual: Vec<Vec<f64>>,
+    /// Of each two directions, row by row: their product.
+    by_each_other: Vec<Vec<f64>>,
+}
+
+/// Functions at every row, rows x functions, and their squares.
+pub(super) struct Functions {
+    pub(super) values: DMatrix<f64>,
+    pub(super) squares: DMatrix<f64>,
+}
+
+impl Functions {
+    pub(super) fn of(values: DMatrix<f64>) -> Self {
+        let squares = values.map(|value| value * value);
+        Self { values, squares }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.values.ncols()
+    }
+
+    /// A function at every row.
+    pub(super) fn at(&self, function: usize) -> &[f64] {
+        column(&self.values, function)
+    }
+}
+
+/// A column of a matrix.
+pub(super) fn column(of: &DMatrix<f64>, k: usize) -> &[f64] {
+    &of.as_slice()[k * of.nrows()..(k + 1) * of.nrows()]
+}
+
+/// Columns as directions of a motion times functions of a row: what is asked of them is had without writing them down.
+pub(super) struct FactoredColumns {
+    /// Position among the motions of the frame.
+    pub(super) motion: usize,
+    functions: Arc<Functions>,
+    /// Of each column: direction, function, and what makes it one of unit motion.
+    columns: Vec<(usize, usize, f64)>,
+    pub(super) square: Vec<f64>,
+}
+
+impl MotionRows {
+    /// Directions alone.
+    pub(super) fn of(motion: Motion, directions: Vec<WeighedDirection>) -> Self {
+        Self {
+            motion,
+            directions,
+            by_base: Vec::new(),
+            by_residual: Vec::new(),
+            by_each_other: Vec::new(),
+        }
+    }
+
+    /// With what products of its columns are made of: `base` is columns x residual rows, `row_of` the row of each of these.
+    pub(super) fn by_row(self, base: &DMatrix<f64>, residual: &[f64], row_of: &[usize]) -> Self {
+        let along = |weighed: &[f64], with: &[f64]| {
+            let rows = self.directions.first().map_or(0, |one| one.square.len());
+            let mut sums = vec![0.0; rows];
+            for ((a, b), row) in weighed.iter().zip(with).zip(row_of) {
+                sums[*row] += a * b;
+            }
+            sums
+        };
+        let all = || {
+            self.directions
+                .iter()
+                .map(|direction| &direction.weighed[..])
+        };
+        let with_each = |weighed: &'_ [f64]| -> Vec<Vec<f64>> {
+            all().map(move |other| along(weighed, other)).collect()
+        };
+        Self {
+            by_base: self.with(base, row_of),
+            by_residual: all().map(|weighed| along(weighed, residual)).collect(),
+            by_each_other: all().flat_map(with_each).collect(),
+            ..self
+        }
+    }
+
+    /// Products of each direction with columns (columns x residual rows) row by row, columns x rows.
+    pub(super) fn with(&self, columns: &DMatrix<f64>, row_of: &[usize]) -> Vec<DMatrix<f64>> {
+        let count = columns.nrows();
+        let of = |direction: &WeighedDirection| {
+            let mut out = DMatrix::zeros(count, direction.square.len());
+            for ((line, row), by) in row_of.iter().enumerate().zip(&direction.weighed) {
+                let sums = &mut out.as_mut_slice()[row * count..(row + 1) * count];
+                let each = sums.iter_mut().zip(column(columns, line));
+                each.for_each(|(sum, value)| *sum += by * value);
+            }
+            out
+        };
+        self.directions.iter().map(of).collect()
+    }
+
+    /// Products of factored columns of this motion with each other and with the residual, the base projected off.
+    pub(super) fn products(&self, factored: &[FactoredColumns]) -> (DMatrix<f64>, DVector<f64>) {
+        let columns: Vec<(usize, &[f64], f64)> = factored
+            .iter()
+            .flat_map(|form| {
+                let column = |(direction, function, scale): &(usize, usize, f64)| {
+                    (*direction, form.functions.at(*function), *scale)
+                };
+                form.columns.iter().map(column)
+            })
+            .collect();
+        let mut shares = Vec::new();
+        for form in factored {
+            form.sums(&self.by_base, &mut shares);
+        }
+        let base = shares.len() / columns.len().max(1);
+        let share = |k: usize| &shares[base * k..base * (k + 1)];
+        let mut gram = DMatrix::zeros(columns.len(), columns.len());
+        let (mut weighed, mut before) = (Vec::new(), vec![0.0; columns.len()]);
+        for (j, (of, function, scale)) in columns.iter().enumerate() {
+            let mut by = usize::MAX;
+            for (i, (other, also, also_scale)) in columns[..=j].iter().enumerate() {
+                if *other != by {
+                    by = *other;
+                    let products = &self.by_each_other[other * self.directions.len() + of];
+                    weighed.clear();
+                    weighed.extend(function.iter().zip(products).map(|(a, b)| a * b));
+                }
+                let whole = dot(also, &weighed) * scale * also_scale;
+                gram[(i, j)] = whole - dot(share(i), share(j));
+                gram[(j, i)] = gram[(i, j)];
+                before[j] = whole;
+            }
+        }
+        // What the base has all of cannot be told from rounding.
+        let rounding = 1e-12;
+        for j in 0..columns.len() {
+            if gram[(j, j)] >= rounding * before[j] {
+                continue;
+            }
+            gram.row_mut(j).fill(0.0);
+            gram.column_mut(j).fill(0.0);
+            gram[(j, j)] = rounding * rounding * before[j];
+        }
+        let along = columns.iter().map(|(direction, function, scale)| {
+            scale * dot(function, &self.by_residual[*direction])
+        });
+        let along = DVector::from_iterator(columns.len(), along);
+        (gram, along)
+    }
+}
+
+impl FactoredColumns {
+    /// A law's functions along the directions of a motion, which has this position in the frame.
+    pub(super) fn of(motion: usize, rows: &MotionRows, functions: Arc<Functions>) -> Self {
+        let (mut columns, mut square) = (Vec::new(), Vec::new());
+        for (direction, function) in pairs(rows.motion, rows.directions.len(), functions.count()) {
+            let square_of = column(&functions.squares, function);
+            let length = dot(square_of, &rows.directions[direction].square);
+            columns.push((direction, function, unit(length)));
+            square.push(length);
+        }
+        Self {
+            motion,
+            functions,
+            columns,
+            square,
+        }
+    }
+
+    /// Mean squared motion by a unit of each coefficient.
+    pub(crate) fn square(&self) -> &[f64] {
+        &self.square
+    }
+
+    /// Appends the products of its columns with others by those of each direction with these, row by row.
+    pub(super) fn sums(&self, by_row: &[DMatrix<f64>], out: &mut Vec<f64>) {
+        let count = by_row.first().map_or(0, DMatrix::nrows);
+        let functions = self.functions.count();
+        let sums: Vec<Mat<f64>> = by_row
+            .iter()
+            .map(|by_row| {
+                let mut sums = Mat::zeros(count, functions);
+                let of = columns_of(by_row);
+                let functions = columns_of(&self.functions.values);
+                matmul(sums.as_mut(), Accum::Replace, of, functions, 1.0, Par::Seq);
+                sums
+            })
+            .collect();
+        for (direction, function, scale) in &self.columns {
+            let sums = sums[*direction].col_as_slice(*function);
+            out.extend(sums.iter().map(|sum| sum * scale));
+        }
+    }
+}
+
+/// Direction and function of each column, in the order of a term's coefficients.
+pub(super) fn pairs(
+    motion: Motion,
+    directions: usize,
+    functions: usize,
+) -> impl Iterator<Item = (usize, usize)> {
+    let alternate = alternates(motion);
+    (0..directions * functions).map(move |k| {
+        if alternate {
+            (k % directions, k / directions)
+        } else {
+            (k / functions, k % functions)
+        }
+    })
+}
+
+/// What makes a motion of this mean square one of unit size; 0 of none.
+pub(super) fn unit(square: f64) -> f64 {
+    if square > 0.0 {
+        square.sqrt().recip()
+    } else {
+        0.0
+    }
+}
+
+fn columns_of(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
+    MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
+}

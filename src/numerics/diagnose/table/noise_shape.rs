@@ -1,0 +1,142 @@
+//! How the noise of the rows differs from what they state, by what a model leaves of them.
+
+use crate::criteria::cells::{EVEN, FAR, UNEVEN};
+use crate::diagnose::round::RoundView;
+use nalgebra::{Matrix3, Vector3};
+
+/// How the noise of the rows differs from what they state: weights of rows that are far off, and the shape of the others'.
+#[derive(Clone, Default)]
+pub(super) struct NoiseShape {
+    /// Square root of the weight of each row of the recording; empty where all count fully.
+    pub(super) weights: Vec<f64>,
+    /// What makes the three numbers of a point white, in the axes of the recording.
+    pub(super) whitening: Option<Matrix3<f64>>,
+    /// By what motor currents are multiplied, so that they leave as much as points do.
+    pub(super) currents: Option<f64>,
+}
+
+impl NoiseShape {
+    /// Before anything was found: rows that measured one pose count as far as they say something of their own.
+    pub(crate) fn at_first(view: &RoundView, rows: usize) -> Self {
+        let mut weights = vec![1.0; rows];
+        share_among_repeats(view, &mut weights);
+        Self {
+            weights,
+            ..Self::default()
+        }
+    }
+
+    /// By what a fitted model leaves of the rows: those that are far off count less, and a noise that is stronger in some direction is made
+    /// even.
+    pub(crate) fn of(view: &RoundView, rows: usize) -> Self {
+        let problem = &view.problem;
+        let residual = problem.of_readings();
+        let square = |lines: std::ops::Range<usize>| {
+            let count = lines.len().max(1) as f64;
+            residual[lines]
+                .iter()
+                .map(|value| value * value)
+                .sum::<f64>()
+                / count
+        };
+        let mut sizes: Vec<f64> = (0..problem.rows.len())
+            .map(|i| square(problem.readings_of(i)).sqrt())
+            .collect();
+        let by_row = sizes.clone();
+        if sizes.is_empty() {
+            return Self::default();
+        }
+        let middle = sizes.len() / 2;
+        // The median of a mean of three squares is 0.79 of their expectation.
+        let scale = (*sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.89).max(0.3);
+        let mut weights = vec![1.0; rows];
+        for (size, row) in by_row.iter().zip(&problem.rows) {
+            weights[*row] = (*FAR * scale / size.max(f64::MIN_POSITIVE)).min(1.0);
+        }
+        let points = (0..problem.rows.len())
+            .filter(|i| weights[problem.rows[*i]] == 1.0 && problem.readings_of(*i).len() == 3);
+        let (mut sum, mut count) = (Matrix3::zeros(), 0.0);
+        for i in points {
+            let left = Vector3::from_column_slice(&residual[problem.readings_of(i)]);
+            sum += left * left.transpose();
+            count += 1.0;
+        }
+        share_among_repeats(view, &mut weights);
+        let mean = |values: &[f64]| {
+            values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64
+        };
+        let currents = &problem.residual[residual.len()..];
+        let currents = (!currents.is_empty()).then(|| {
+            (mean(residual) / mean(currents).max(1e-12))
+                .sqrt()
+                .clamp(0.2, 5.0)
+        });
+        Self {
+            weights,
+            whitening: evened(sum, count),
+            currents,
+        }
+    }
+}
+
+/// Rows that measured one pose one after another count as one where they differ less among each other than from the model: what they leave is
+/// then the pose's, not the instrument's.
+fn share_among_repeats(view: &RoundView, weights: &mut [f64]) {
+    let (problem, residual) = (&view.problem, view.problem.of_readings());
+    let width = problem.width().unwrap_or(0);
+    let mut poses: Vec<Vec<usize>> = Vec::new();
+    for (i, row) in problem.rows.iter().enumerate() {
+        match poses
+            .last_mut()
+            .filter(|pose| problem.data.same_pose(problem.rows[pose[0]], *row))
+        {
+            Some(pose) => pose.push(i),
+            None => poses.push(vec![i]),
+        }
+    }
+    let (mut within, mut freedom) = (0.0, 0.0);
+    for pose in poses.iter().filter(|pose| pose.len() > 1) {
+        for k in 0..width {
+            let values: Vec<f64> = pose
+                .iter()
+                .map(|i| residual[problem.readings_of(*i).start + k])
+                .collect();
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            within += values
+                .iter()
+                .map(|value| (value - mean).powi(2))
+                .sum::<f64>();
+            freedom += values.len() as f64 - 1.0;
+        }
+    }
+    if freedom < *EVEN {
+        return;
+    }
+    let within = within / freedom;
+    let whole =
+        residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64;
+    let between = (whole - within).max(0.0);
+    for pose in poses.iter().filter(|pose| pose.len() > 1) {
+        let count = pose.len() as f64;
+        let share = ((between + within) / (count * between + within).max(f64::MIN_POSITIVE))
+            .sqrt()
+            .min(1.0);
+        pose.iter().for_each(|i| weights[problem.rows[*i]] *= share);
+    }
+}
+
+/// What makes a noise of this summed covariance even and leaves its strength; none where it is nearly even.
+fn evened(sum: Matrix3<f64>, count: f64) -> Option<Matrix3<f64>> {
+    if count < *EVEN {
+        return None;
+    }
+    let even = sum.trace() / (3.0 * count);
+    let covariance = (sum + Matrix3::identity() * (*EVEN * even)) / (count + *EVEN);
+    let parts = covariance.symmetric_eigen();
+    let (least, most) = (parts.eigenvalues.min(), parts.eigenvalues.max());
+    if least <= 0.0 || most / least < *UNEVEN {
+        return None;
+    }
+    let roots = Matrix3::from_diagonal(&parts.eigenvalues.map(|variance| (even / variance).sqrt()));
+    Some(parts.eigenvectors * roots * parts.eigenvectors.transpose())
+}
