@@ -292,8 +292,14 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         (DMatrix::from_vec(rows, columns.len(), values), first)
     }
 
-    /// Cells that do much of what a component does.
+    /// Cells that do most of what a component does, so many of them at most.
     pub(crate) fn alike(&self, component: &Component, most: usize) -> Vec<usize> {
+        let all = self.overlaps(component).into_iter();
+        all.take(most).map(|(_, cell)| cell).collect()
+    }
+
+    /// Cells that do much of what a component does with their shares of its squared motion, those that do most first.
+    pub(crate) fn overlaps(&self, component: &Component) -> Vec<(f64, usize)> {
         // Its likeliest motion, of unit length, in the directions of its part.
         self.parts.know(&[component], self.frame);
         let state = KnownState::of(&[component], &self.parts, self.frame, None);
@@ -320,7 +326,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             .filter(|(share, _)| *share > *ALIKE)
             .collect();
         all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        all.into_iter().take(most).map(|(_, cell)| cell).collect()
+        all
     }
 
     /// Cells with a name at the place of a component, and of a curve those over its variable there or next to it: columns that are looked at

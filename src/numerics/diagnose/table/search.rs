@@ -6,8 +6,8 @@ use super::component::Component;
 use super::evidence::AMPLITUDES;
 use super::state::KnownState;
 use crate::criteria::cells::{
-    BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER, SWAPS,
-    TRACE, WAVES,
+    ALIKE, BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER,
+    SWAPS, TRACE, WAVES,
 };
 use crate::effect::{Form, Variable, names};
 use std::collections::BTreeSet;
@@ -357,28 +357,28 @@ impl CauseTable<'_, '_> {
                 continue;
             };
             self.know(&components);
-            let mut named = self.alike(&components[at], 40);
-            named.extend(
-                self.near(&components[at])
-                    .into_iter()
-                    .filter(|cell| !named.contains(cell))
-                    .collect::<Vec<_>>(),
-            );
-            named.retain(|cell| self.cells[*cell].is_named());
+            let mut named = self.overlaps(&components[at]);
+            named.retain(|(_, cell)| self.cells[*cell].is_named());
+            // What several do together is not much more than what each of them does.
+            let most = named.iter().take(*WAVES).map(|(share, _)| share);
+            if most.sum::<f64>() < 1.0 - *ALIKE {
+                continue;
+            }
+            let mut named: Vec<usize> = named.into_iter().take(40).map(|(_, cell)| cell).collect();
+            let near = self.near(&components[at]).into_iter();
+            let near = near.filter(|cell| self.cells[*cell].is_named() && !named.contains(cell));
+            named.extend(near.collect::<Vec<_>>());
             let kappa = self
                 .state(&components.iter().collect::<Vec<_>>(), None)
                 .kappa;
             let before = self.total(&components, kappa);
             let mut next = without(&components, &[at]);
-            for further in (0..*WAVES).rev() {
+            for _ in 0..*WAVES {
                 self.know(&next);
                 let rest: Vec<&Component> = next.iter().collect();
-                let missing = before - self.total(&next, kappa);
                 let state = self.state(&rest, Some(kappa));
                 let scan = self.scan_some(&named, &state, &rest, 4, &[]);
-                // Those that come later say less, as a rule.
-                let least = (missing / (further + 1) as f64).max(0.0);
-                let Some(best) = scan.best().filter(|best| scan.log_odds[*best] > least) else {
+                let Some(best) = scan.best().filter(|best| scan.log_odds[*best] > 0.0) else {
                     break;
                 };
                 let found = scan.closely[&best].clone();
