@@ -37,7 +37,7 @@ pub(crate) struct FoundCell {
 impl FoundCell {
     /// That it is no cause at all with a probability, names and places as probable among the rest as before.
     pub(crate) fn or_nothing(&mut self, probability: f64) {
-        let rest = 1.0 - probability;
+        let rest = (1.0 - probability).max(0.0);
         self.probabilities = Probabilities {
             name: rest * self.probabilities.name,
             place: rest * self.probabilities.place,
@@ -89,7 +89,13 @@ impl CauseTable<'_, '_> {
         let mut groups: BTreeMap<(&'static str, Place), Vec<usize>> = BTreeMap::new();
         for (i, component) in components.iter().enumerate() {
             let cell = &self.cells[component.cell];
-            groups.entry((cell.name, cell.place)).or_default().push(i);
+            let is_of_a_curve = self.is_constant_of_a_curve(component, components);
+            let name = if is_of_a_curve {
+                names::UNKNOWN
+            } else {
+                cell.name
+            };
+            groups.entry((name, cell.place)).or_default().push(i);
         }
         let found = groups.into_values().map(|members| {
             let mut found = self.found(components, &members, state.kappa);
@@ -116,6 +122,22 @@ impl CauseTable<'_, '_> {
         }
     }
 
+    /// Whether a component is the constant of a motion that follows something in a way without a name: a curve has no constant itself.
+    fn is_constant_of_a_curve(&self, component: &Component, all: &[Component]) -> bool {
+        let [form] = &component.forms[..] else {
+            return false;
+        };
+        let constant = form.term().filter(|term| term.law().is_constant());
+        let follows = |other: &Component| {
+            let motion = other
+                .forms
+                .first()
+                .and_then(|form| Some(form.term()?.motion()));
+            !self.cells[other.cell].is_named() && motion == constant.map(|term| term.motion())
+        };
+        constant.is_some() && self.cells[component.cell].is_named() && all.iter().any(follows)
+    }
+
     /// The finding of some components: names and places given all others, at a noise.
     fn found(&self, components: &[Component], members: &[usize], kappa: f64) -> FoundCell {
         let others = without(components, members);
@@ -129,6 +151,7 @@ impl CauseTable<'_, '_> {
         let strongest = members
             .iter()
             .copied()
+            .filter(|i| !self.is_constant_of_a_curve(&components[*i], components))
             .max_by(|a, b| log_of(*a, &state, &rest).total_cmp(&log_of(*b, &state, &rest)));
         let main = strongest.unwrap_or(members[0]);
         let cell = components[main].cell;
