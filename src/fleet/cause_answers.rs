@@ -5,7 +5,7 @@ use super::ledger::{Ending, RobotRecord};
 use super::round::Round;
 use super::{Fleet, Ledger};
 use crate::criteria::cells::{MISLED, RIVAL};
-use crate::criteria::fleet::{APART, CHANCE, DECIDED, LEAST_SPREAD, SIBLINGS, USUALLY};
+use crate::criteria::fleet::{APART, CHANCE, DECIDED, LACKS, LEAST_SPREAD, SIBLINGS, USUALLY};
 use crate::error::{Result, counted};
 use crate::estimate::tail;
 use crate::statistics::{nearest, normal_quantile};
@@ -168,7 +168,8 @@ pub(super) fn of(
             robot.deviation = Some(deviation);
             let kind = match () {
                 () if have < *SIBLINGS => None,
-                () if !has(&robot) => (decided && is_usual).then_some("lacks"),
+                () if 1.0 - robot.probability > *LACKS && decided && is_usual => Some("lacks"),
+                () if !has(&robot) => None,
                 () if deviation > limit && ratio > *APART => Some("larger"),
                 () if -deviation > limit && ratio < 1.0 / *APART => Some("smaller"),
                 () => None,
@@ -177,8 +178,10 @@ pub(super) fn of(
                 let size = length(&robot);
                 let statement = match kind {
                     "lacks" => format!(
-                        "{}: no {words} ({size} mm), which {have} of {} have",
-                        robot.robot, sums.robots
+                        "{}: {}no {words} ({size} mm), which {have} of {} have",
+                        robot.robot,
+                        if has(&robot) { "perhaps " } else { "" },
+                        sums.robots
                     ),
                     _ => format!(
                         "{}: {words} moves the tool by {size} mm, {ratio:.1} times that of its siblings",

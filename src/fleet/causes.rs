@@ -262,7 +262,7 @@ pub fn publish(
         key_format: KEY_FORMAT,
         id: STAGE.into(),
         stage: STAGE.into(),
-        implementation: 2,
+        implementation: 3,
         settings: json!({ "robots": robots.collect::<Vec<_>>(), "round": search.round() }),
         reads: BTreeMap::new(),
         files: BTreeMap::new(),

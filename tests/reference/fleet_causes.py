@@ -159,7 +159,7 @@ def scaled(out, world, cause, j, args, r):
     store = os.path.join(out, "store")
     for turn in range(7):
         name = f"scale{turn}"
-        diagnose(fleet(out, name, [[make(j, strength, r)] for _ in range(6)], world, r, args.points), store, args)
+        diagnose(fleet(out, name, [[make(j, strength, r)] for _ in range(10)], world, r, args.points), store, args)
         seen = [log for log, _ in logs(store, name, effect, f"{kind} {j}")]
         mean = sum(seen) / len(seen)
         shutil.rmtree(store)
