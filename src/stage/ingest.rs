@@ -39,6 +39,7 @@ pub use mapped::{
 };
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
+pub(crate) use reading::FileKind;
 pub use reading::{TableLayout, records};
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 

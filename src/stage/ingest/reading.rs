@@ -8,7 +8,7 @@ use super::listing::ListedRows;
 use super::refusal::RowRefusal;
 use super::row::{RecordedRow, RowReader};
 use crate::error::{Error, Result, counted};
-use crate::program::listing as language;
+use crate::program::{Language, listing as language};
 use crate::raw::{
     self, BagRows, ColumnRows, Delimiter, InputSource, Record, RecordReader, TextLayout, TextRows,
     Workbook, failed, has_columns, is_bag, is_workbook, not_read,
@@ -36,7 +36,37 @@ pub struct TableLayout<'l> {
     pub(crate) decimal: Decimal,
 }
 
-/// Opens a table of any kind: the first that a file is, text at last.
+/// What a file is.
+#[derive(Clone, Copy)]
+pub(crate) enum FileKind {
+    Workbook,
+    Bag,
+    /// A controller's, which declares joints.
+    Program(Language),
+    Columns,
+    /// What is known and not read, and why.
+    NotRead(&'static str),
+    Text,
+}
+
+impl FileKind {
+    /// By its name and how it begins.
+    pub(crate) fn of(name: &str, head: &[u8]) -> Self {
+        if is_workbook(head) {
+            Self::Workbook
+        } else if is_bag(head) {
+            Self::Bag
+        } else if let Some(language) = language(&raw::ending(Path::new(name)), head) {
+            Self::Program(language)
+        } else if has_columns(head) {
+            Self::Columns
+        } else {
+            not_read(head).map_or(Self::Text, Self::NotRead)
+        }
+    }
+}
+
+/// Opens a table of any kind.
 pub fn records(
     source: Box<dyn InputSource>,
     label: &str,
@@ -44,45 +74,44 @@ pub fn records(
 ) -> Result<Box<dyn RecordReader>> {
     let mut reader = BufReader::with_capacity(BUFFER, source);
     let head = reader.fill_buf().map_err(|error| failed(label, &error))?;
-    let (is_book, is_bag) = (is_workbook(head), is_bag(head));
+    let kind = FileKind::of(label, head);
     let data = |message: String| Error::data(label, message);
-    if let Some(sheet) = layout.sheet.filter(|_| !is_book) {
+    if let Some(sheet) = layout.sheet.filter(|_| !matches!(kind, FileKind::Workbook)) {
         return Err(data(format!(
             "is no workbook, and has no sheet `{sheet}`; allowed: a file .xlsx or .xlsm, or no `sheet`"
         )));
     }
-    if let Some(topic) = layout.topic.filter(|_| !is_bag) {
+    if let Some(topic) = layout.topic.filter(|_| !matches!(kind, FileKind::Bag)) {
         return Err(data(format!(
             "is no recording of ROS 2, and has no topic `{topic}`; allowed: a file .mcap or .db3, or no `topic`"
         )));
     }
-    Ok(if is_book {
-        let mut book = Workbook::read(reader).map_err(data)?;
-        let name = book.sheet(layout.sheet).map_err(data)?;
-        let mark = if layout.decimal == Decimal::Comma {
-            ','
-        } else {
-            '.'
-        };
-        let lines = book.lines(&name, mark).map_err(data)?;
-        let text = TextLayout {
-            delimiter: Delimiter::Byte(b'\t'),
-            ..layout.text
-        };
-        let label = format!("{label} sheet `{name}`");
-        Box::new(TextRows::open(Cursor::new(lines), &label, text)?)
-    } else if is_bag {
-        Box::new(BagRows::open(reader.into_inner(), label, layout.topic)?)
-    } else if let Some(language) = language(&raw::ending(Path::new(label)), head) {
-        Box::new(ListedRows::open(reader, label, language)?)
-    } else if has_columns(head) {
-        Box::new(ColumnRows::open(reader, label)?)
-    } else if let Some(what) = not_read(head) {
-        return Err(Error::data(label, what));
-    } else {
-        let reader = raw::without_utf16(reader).map_err(|error| failed(label, &error))?;
-        let reader = BufReader::with_capacity(BUFFER, reader);
-        Box::new(TextRows::open(reader, label, layout.text)?)
+    Ok(match kind {
+        FileKind::Workbook => {
+            let mut book = Workbook::read(reader).map_err(data)?;
+            let name = book.sheet(layout.sheet).map_err(data)?;
+            let mark = if layout.decimal == Decimal::Comma {
+                ','
+            } else {
+                '.'
+            };
+            let lines = book.lines(&name, mark).map_err(data)?;
+            let text = TextLayout {
+                delimiter: Delimiter::Byte(b'\t'),
+                ..layout.text
+            };
+            let label = format!("{label} sheet `{name}`");
+            Box::new(TextRows::open(Cursor::new(lines), &label, text)?)
+        }
+        FileKind::Bag => Box::new(BagRows::open(reader.into_inner(), label, layout.topic)?),
+        FileKind::Program(language) => Box::new(ListedRows::open(reader, label, language)?),
+        FileKind::Columns => Box::new(ColumnRows::open(reader, label)?),
+        FileKind::NotRead(what) => return Err(data(what.into())),
+        FileKind::Text => {
+            let reader = raw::without_utf16(reader).map_err(|error| failed(label, &error))?;
+            let reader = BufReader::with_capacity(BUFFER, reader);
+            Box::new(TextRows::open(reader, label, layout.text)?)
+        }
     })
 }
 
