@@ -7,7 +7,7 @@ use std::fmt;
 
 /// What stands in every export.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ExportMark {
+pub(crate) struct ExportMark {
     /// Of the file.
     pub(crate) format: String,
     /// Of the robot, where the pipeline's report states it.

@@ -170,7 +170,7 @@ impl Plan {
     }
 
     /// The place of a stage, or what is allowed.
-    pub fn find(&self, id: &str, option: &str) -> Result<usize> {
+    pub(crate) fn find(&self, id: &str, option: &str) -> Result<usize> {
         self.stages
             .iter()
             .position(|stage| stage.id == id)

@@ -9,7 +9,7 @@ use crate::yaml::Trouble;
 
 /// An output port of an earlier stage, both counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Origin {
+pub(crate) struct Origin {
     /// Position in the plan.
     pub(crate) stage: usize,
     /// Position among its outputs.

@@ -9,17 +9,17 @@ use serde_json::json;
 /// What the page shows; lengths in mm.
 pub struct AchievedTables<'a> {
     /// Heading.
-    pub title: &'a str,
+    pub(crate) title: &'a str,
     /// Where the model is from.
-    pub model: &'a str,
+    pub(crate) model: &'a str,
     /// Name, mean, 95th percentile, largest, and what they are of.
-    pub rows: Vec<(&'static str, [f64; 3], String)>,
+    pub(crate) rows: Vec<(&'static str, [f64; 3], String)>,
     /// Errors of the uncorrected targets, by the model, and of the measured points.
-    pub errors: [Vec<f64>; 2],
+    pub(crate) errors: [Vec<f64>; 2],
     /// Cycles, accuracy and repeatability.
-    pub poses: Vec<(usize, f64, f64)>,
+    pub(crate) poses: Vec<(usize, f64, f64)>,
     /// What to know of the figures, a sentence each.
-    pub remarks: Vec<String>,
+    pub(crate) remarks: Vec<String>,
 }
 
 /// The page as one file that needs no other.

@@ -112,7 +112,11 @@ pub(super) fn judged<'a>(tables: &'a Tables, set: Option<&str>) -> Option<&'a St
 
 impl<'a> Judgement<'a> {
     /// None where there are no limits and the set-up is right.
-    pub fn new(tables: &'a Tables, limits: &AcceptanceLimits, set: Option<&str>) -> Option<Self> {
+    pub(crate) fn new(
+        tables: &'a Tables,
+        limits: &AcceptanceLimits,
+        set: Option<&str>,
+    ) -> Option<Self> {
         let figures = [
             ("mean", limits.mean_mm),
             ("95 % of the points", limits.p95_mm),

@@ -61,7 +61,7 @@ impl PublishedTable {
     }
 
     /// How many rows.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.table.rows as usize
     }
 
@@ -282,7 +282,7 @@ impl Decoded {
         self.said.get(key).map(String::as_str)
     }
 
-    pub fn rows(&self) -> u64 {
+    pub(crate) fn rows(&self) -> u64 {
         self.batch.num_rows() as u64
     }
 

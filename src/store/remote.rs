@@ -67,7 +67,7 @@ impl Store {
 
     /// Opens `s3://BUCKET/PREFIX` with a folder below `cache` before it. `settings` are the environment's `AWS_...`.
     #[cfg(feature = "s3")]
-    pub fn open_s3(
+    pub(crate) fn open_s3(
         url: &str,
         settings: &std::collections::BTreeMap<String, String>,
         cache: &Path,

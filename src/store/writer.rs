@@ -123,11 +123,6 @@ impl TableWriter {
         Ok(WriterState::Aside(aside))
     }
 
-    /// Taken so far.
-    pub fn rows(&self) -> u64 {
-        self.rows
-    }
-
     /// Closes the file.
     pub fn finish(self) -> Result<FinishedFile> {
         let open = match self.state {

@@ -110,7 +110,7 @@ impl fmt::Display for Contradicted {
 
 impl Standing {
     /// What a person must know of the choice, a sentence each.
-    pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
+    pub(crate) fn warnings(&self) -> impl Iterator<Item = String> + '_ {
         self.withdrawn
             .iter()
             .map(ToString::to_string)

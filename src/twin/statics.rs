@@ -12,7 +12,7 @@ pub(crate) struct Loads {
 
 impl Loads {
     /// The links and the declared payload (kg) of an arm in `posture`.
-    pub fn new(arm: &Arm, posture: &Posture, payload: f64) -> Loads {
+    pub(crate) fn new(arm: &Arm, posture: &Posture, payload: f64) -> Loads {
         let mut bodies: Vec<(usize, f64, Vector)> =
             (arm.links.iter().zip(&posture.frames).enumerate())
                 .map(|(index, (link, frame))| (index, link.mass, matrix::place(frame, link.centre)))

@@ -44,7 +44,7 @@ pub(super) struct Solution {
 
 impl<'p, 'a> FormRegression<'p, 'a> {
     /// `jacobian` is that of the model, which has `forms` besides; `residual` is what it leaves without these.
-    pub fn new(
+    pub(crate) fn new(
         problem: &'p WhitenedProblem<'a>,
         jacobian: &Mat<f64>,
         forms: &[&Form],

@@ -339,7 +339,7 @@ pub(super) struct TorqueExtremes {
 
 impl TorqueExtremes {
     /// The extremes of no rows of n joints.
-    pub fn new(joints: usize) -> Self {
+    pub(crate) fn new(joints: usize) -> Self {
         Self {
             rows: 0,
             joints: vec![[(f64::INFINITY, 0), (f64::NEG_INFINITY, 0)]; joints],

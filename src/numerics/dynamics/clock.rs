@@ -180,7 +180,7 @@ impl JointPace {
 
 impl MotionPace {
     /// The sums of no rows of n joints.
-    pub fn new(joints: usize) -> Self {
+    pub(crate) fn new(joints: usize) -> Self {
         Self {
             joints: vec![JointPace::default(); joints],
         }

@@ -45,7 +45,7 @@ impl TorqueColumns {
     }
 
     /// The base, and all forms of all causes but `without`; `torque` is half the range of each joint's torque, Nm.
-    pub fn new(
+    pub(crate) fn new(
         scene: &DynamicScene,
         reduction: &Reduction,
         regressor: &ReducedRegressor,

@@ -22,7 +22,7 @@ pub(super) struct ZeroPhase {
 
 impl ZeroPhase {
     /// The filter for a rate and a cut-off, Hz; above 0.45 times the rate it changes nothing.
-    pub fn new(rate: f64, cutoff: f64) -> Self {
+    pub(crate) fn new(rate: f64, cutoff: f64) -> Self {
         if cutoff >= IDLE * rate {
             return Self {
                 sections: None,

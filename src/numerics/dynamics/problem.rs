@@ -51,7 +51,7 @@ pub(super) struct TorqueProblem<'a> {
 
 impl<'a> TorqueProblem<'a> {
     /// The problem of a checked recording.
-    pub fn new(
+    pub(crate) fn new(
         arm: &'a DynamicArm,
         recording: TorqueRecording,
         question: &TorqueQuestion,
@@ -223,7 +223,7 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Number of joints.
-    pub fn joints(&self) -> usize {
+    pub(crate) fn joints(&self) -> usize {
         self.measured.len()
     }
 

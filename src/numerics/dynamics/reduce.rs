@@ -36,7 +36,7 @@ pub(super) struct Reduction {
 
 impl Reduction {
     /// The reduction by a clock and a cut-off (Hz).
-    pub fn new(clock: &RecordingClock, cutoff: f64) -> Self {
+    pub(crate) fn new(clock: &RecordingClock, cutoff: f64) -> Self {
         let recorded: usize = clock.stretches.iter().map(Range::len).sum();
         let every = ((clock.rate / (RATE_OVER_CUTOFF * cutoff)).round() as usize)
             .max(recorded.div_ceil(MOST))
@@ -177,7 +177,7 @@ impl ReducedRegressor {
     }
 
     /// Number of joints.
-    pub fn joints(&self) -> usize {
+    pub(crate) fn joints(&self) -> usize {
         self.0.len()
     }
 
@@ -206,7 +206,7 @@ impl ReducedRegressor {
     }
 
     /// Torque of 10 n numbers at a joint.
-    pub fn torque(&self, joint: usize, theta: &[f64]) -> Vec<f64> {
+    pub(crate) fn torque(&self, joint: usize, theta: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; self.0[joint].last().map_or(0, Vec::len)];
         for (course, share) in self.0[joint]
             .iter()

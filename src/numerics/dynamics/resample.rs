@@ -23,7 +23,7 @@ pub(super) struct Resampler {
 
 impl Resampler {
     /// For rows that have the columns of others; `by_stamps` tells whether they are interpolated by their stamps.
-    pub fn new([period, pause]: [f64; 2], by_stamps: bool, like: &TorqueRecording) -> Self {
+    pub(crate) fn new([period, pause]: [f64; 2], by_stamps: bool, like: &TorqueRecording) -> Self {
         let nothing = || TorqueRecording::like(like);
         Self {
             period,

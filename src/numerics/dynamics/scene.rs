@@ -47,7 +47,7 @@ pub(super) struct DynamicScene<'a> {
 
 impl<'a> DynamicScene<'a> {
     /// The scene of a checked recording; the final low-pass will be at `cutoff` (Hz).
-    pub fn new(
+    pub(crate) fn new(
         arm: &'a DynamicArm,
         recording: &TorqueRecording,
         clock: &RecordingClock,
@@ -109,7 +109,7 @@ impl<'a> DynamicScene<'a> {
     }
 
     /// Number of joints.
-    pub fn joints(&self) -> usize {
+    pub(crate) fn joints(&self) -> usize {
         self.position.len()
     }
 

@@ -70,7 +70,7 @@ struct JointFit {
 
 impl FrictionFit {
     /// The fit to the rows that count, by the torques as they are at present.
-    pub fn new(problem: &TorqueProblem) -> Self {
+    pub(crate) fn new(problem: &TorqueProblem) -> Self {
         let rows: Vec<usize> = problem.runs(false).iter().flat_map(Clone::clone).collect();
         let velocities = problem.reduction.reduce(problem.scene.velocity.clone());
         let of = |(joint, inertial): (usize, Vec<Vec<f64>>)| {

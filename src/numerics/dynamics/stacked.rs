@@ -30,7 +30,7 @@ pub(super) struct StackedColumns {
 
 impl StackedColumns {
     /// Of two problems whose columns are alike; both have the first `shared` forms.
-    pub fn new(problems: &[TorqueProblem; 2], shared: usize) -> Self {
+    pub(crate) fn new(problems: &[TorqueProblem; 2], shared: usize) -> Self {
         let n = problems[0].joints();
         let runs = problems.each_ref().map(|problem| problem.runs(false));
         let weighings = [0, 1].map(|which| problems[which].weighing(&runs[which]));

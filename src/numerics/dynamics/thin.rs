@@ -38,7 +38,7 @@ pub(super) struct ThinningPlan {
 
 impl ThinningPlan {
     /// For at most `most` rows (and some more where rows were lost), with a cut-off that will be at `cutoff` Hz.
-    pub fn new(rows: usize, rate: f64, cutoff: f64, most: usize) -> Self {
+    pub(crate) fn new(rows: usize, rate: f64, cutoff: f64, most: usize) -> Self {
         let every = rows
             .div_ceil(most)
             .min((rate / (RATE_OVER_CUTOFF * cutoff)) as usize)

@@ -62,7 +62,7 @@ pub(super) struct WeightedColumns {
 
 impl WeightedColumns {
     /// Products of the columns whose numbers are `chosen`, ascending.
-    pub fn new(
+    pub(crate) fn new(
         columns: &TorqueColumns,
         measured: &[Vec<f64>],
         weighing: Weighing,

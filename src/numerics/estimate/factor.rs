@@ -25,7 +25,7 @@ pub(crate) struct StackedRows {
 
 impl StackedRows {
     /// Room for chunks of `chunk` rows with `columns` = p + 1 columns.
-    pub fn new(columns: usize, chunk: usize) -> Self {
+    pub(crate) fn new(columns: usize, chunk: usize) -> Self {
         let height = columns + chunk;
         let block = recommended_block_size::<f64>(height, columns);
         let memory = MemBuffer::new(qr_in_place_scratch::<f64>(
@@ -186,7 +186,7 @@ impl TriangularFactor {
         self.r.at(i, j)
     }
 
-    pub fn parameters(&self) -> usize {
+    pub(crate) fn parameters(&self) -> usize {
         self.r.size() - 1
     }
 
@@ -207,7 +207,7 @@ impl TriangularFactor {
     }
 
     /// J^T r.
-    pub fn gradient(&self) -> Vec<f64> {
+    pub(crate) fn gradient(&self) -> Vec<f64> {
         (0..self.parameters())
             .map(|j| dot(self.r.column(j), self.right()))
             .collect()

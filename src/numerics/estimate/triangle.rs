@@ -30,7 +30,7 @@ impl Triangle {
         &self.values[first..=first + j]
     }
 
-    pub fn at(&self, i: usize, j: usize) -> f64 {
+    pub(crate) fn at(&self, i: usize, j: usize) -> f64 {
         if i <= j {
             self.values[j * (j + 1) / 2 + i]
         } else {

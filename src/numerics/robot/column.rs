@@ -95,7 +95,7 @@ pub enum Part {
 
 impl DeclaredColumn {
     /// A column with one number a row, stored by one name.
-    pub const fn number(
+    pub(crate) const fn number(
         setting: &'static str,
         stored: &'static [&'static str],
         quantity: Quantity,

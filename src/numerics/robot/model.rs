@@ -208,7 +208,7 @@ impl Travel {
     }
 
     /// rad or m.
-    pub fn value(&self) -> f64 {
+    pub(crate) fn value(&self) -> f64 {
         self.value
     }
 

@@ -151,7 +151,7 @@ pub(crate) struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     /// Weighs the arm in every point to fit.
-    pub fn new(
+    pub(crate) fn new(
         robot: &'a RobotDescription,
         ranges_deg: &'a [[f64; 2]],
         points: &[Point],

@@ -39,7 +39,7 @@ macro_rules! laws {
             } )+
 
             /// Its canonical name.
-            pub fn name(&self) -> &'static str {
+            pub(crate) fn name(&self) -> &'static str {
                 match self { $( Self::$name { .. } => $effect, )+ }
             }
 

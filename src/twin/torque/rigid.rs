@@ -142,7 +142,7 @@ impl Machine {
     }
 
     /// Nm at each joint that hold against a force at the tool (N, base frame).
-    pub fn against(&self, q: &[f64], force: Vector) -> Vec<f64> {
+    pub(crate) fn against(&self, q: &[f64], force: Vector) -> Vec<f64> {
         let pose = self.pose(q);
         let tool = pose
             .frames

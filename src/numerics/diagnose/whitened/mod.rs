@@ -47,7 +47,7 @@ pub(crate) struct WhitenedProblem<'a> {
 
 impl<'a> WhitenedProblem<'a> {
     /// The problem of what rows measured, without the motor currents.
-    pub fn new(model: &'a Model, data: &'a Measurements, rows: Vec<usize>) -> Self {
+    pub(crate) fn new(model: &'a Model, data: &'a Measurements, rows: Vec<usize>) -> Self {
         let kinds = kinds(data);
         let turns = kinds.iter().any(|kind| kind.about().rank.rotations);
         let look = |scratch: &mut PlacementBuffers, row: &usize| {

@@ -396,7 +396,7 @@ impl TorqueForm {
     }
 
     /// Shape numbers that are found from the data, each once.
-    pub fn shape_numbers(&self) -> Vec<ShapeSpan> {
+    pub(crate) fn shape_numbers(&self) -> Vec<ShapeSpan> {
         let mut numbers: Vec<ShapeSpan> = Vec::new();
         for span in (self.cause.spans)(self) {
             let is_found = span.usual != Some(self.shape[span.index]);

@@ -31,7 +31,7 @@ pub(super) struct Criterion {
 
 impl DesignTerm {
     /// `None` where the candidates do not tell the parameters.
-    pub fn new(
+    pub(crate) fn new(
         weight: f64,
         jacobian: PointJacobian,
         model: &Model,

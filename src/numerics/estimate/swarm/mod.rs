@@ -50,7 +50,7 @@ pub struct SearchBox {
 
 impl SearchBox {
     /// The box between two corners. Panics where they differ in length, are not finite or are in the wrong order.
-    pub fn new(lower: Vec<f64>, upper: Vec<f64>) -> Self {
+    pub(crate) fn new(lower: Vec<f64>, upper: Vec<f64>) -> Self {
         assert_eq!(lower.len(), upper.len(), "corners of one box");
         assert!(
             lower
