@@ -3,7 +3,6 @@
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
 
 mod achieved;
-mod causes;
 mod certificate;
 mod closure;
 mod data;
@@ -21,8 +20,8 @@ mod torques;
 mod workspace;
 
 pub use achieved::{AchievedTables, achieved_page};
-pub use causes::diagnosed_page;
 pub use certificate::AcceptanceLimits;
+pub use findings::diagnosed_page;
 pub use language::PageLanguage;
 use language::{Locale, say};
 pub use torques::{TorqueTables, torque_page};

@@ -10,7 +10,6 @@ mod in_short;
 mod limits;
 mod rival_changes;
 mod run;
-mod run_diff;
 mod screen;
 mod short_finding;
 
@@ -27,8 +26,8 @@ pub use in_short::{
 };
 pub use limits::LimitsSummary;
 pub use rival_changes::{RivalChange, rival_changes};
+pub use run::run_diff;
 pub use run::{explanation, graph, run, stage, status};
-pub use run_diff::run_diff;
 pub use screen::{LABEL, folded, labelled};
 
 use crate::error::Result;

@@ -3,8 +3,8 @@
 use super::arm::{Arm, Posture};
 use super::effect::{Physical, State};
 use super::matrix::{self, Matrix, Vector};
-use super::motion::Motion;
-use super::statics::{Loads, Row};
+use crate::arm::Motion;
+use crate::arm::{Loads, Row};
 
 /// The arm at rest under its loads.
 #[derive(Debug, Clone)]

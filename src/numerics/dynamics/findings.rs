@@ -6,7 +6,6 @@ use super::cells::{CellOdds, TorqueTable};
 use super::choice::CauseChoice;
 use super::naming::{JudgedSet, fitted};
 use super::problem::TorqueProblem;
-use super::sets::OtherInertials;
 use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueFinding};
@@ -15,6 +14,7 @@ use crate::diagnose::table::log_sum;
 use crate::diagnose::{Evidence, Probabilities, RivalCause};
 use crate::effect::Place;
 use crate::estimate::tail;
+use crate::judge::OtherInertials;
 
 /// Residual rows of a test, at most: beyond it the tail does not change.
 const FREEDOM: f64 = 1e4;

@@ -50,7 +50,6 @@ mod refine;
 mod resample;
 mod rich;
 mod scene;
-mod sets;
 mod shape_slopes;
 mod sign_width;
 mod solve;

@@ -15,12 +15,12 @@ use super::recording::TorqueRecording;
 use super::refine::polish;
 use super::refine::{one_power_of_speed, power_for_curve, refine};
 use super::rich::{basic_forms, noise_apart, noise_left, noise_of_fit, rich_forms};
-use super::sets::{OtherInertials, faint, from_common, search, settle, settle_with_priors};
 use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::WeightedColumns;
+use crate::judge::{OtherInertials, faint, from_common, search, settle, settle_with_priors};
 
 /// Rounds in which others are looked for in place of forms with a number at an end of its search, at most.
 const END_ROUNDS: usize = 3;

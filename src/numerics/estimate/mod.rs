@@ -1,6 +1,5 @@
 //! Estimation: robust least squares on streamed QR factors, what the data can see, and the model that comes of it.
 
-mod align;
 mod change;
 pub mod choose;
 mod cluster;
@@ -29,7 +28,6 @@ pub mod swarm;
 pub mod threads;
 mod triangle;
 
-pub use align::{align, align_points};
 pub use change::{ParameterChange, changes};
 pub use contacts::{Reseat, placed_by_left_out, reseated};
 pub use covariance::Covariance;
@@ -39,6 +37,7 @@ pub use fit::{CLEARLY, FitOptions, Fitted, ParameterStatus, Session, fit, seen};
 pub use fold_factors::NearbyFits;
 pub use folds::{FoldKind, Folds, cross_validate, dealt, fold_poses, gather, leave_one_out};
 pub use gauge::gauge;
+pub use gauge::{align, align_points};
 pub use levenberg::{Iteration, Stop};
 pub use model::{Bounds, CONFLICT, Known, KnownLength, Model, Prior, PriorCheck, RowError};
 pub use observe::Visibility;

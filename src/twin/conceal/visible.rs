@@ -2,13 +2,13 @@
 //! true numbers, orthogonalised (modified Gram-Schmidt, twice), and the effect's displacement less its shadow on them.
 
 use crate::arm::Arm;
+use crate::arm::Motion;
+use crate::arm::Row;
 use crate::effect::{self, Physical};
 use crate::equilibrium::{Equilibrium, settle, sighted};
 use crate::matrix;
 use crate::memory;
-use crate::motion::Motion;
 use crate::plan::Point;
-use crate::statics::Row;
 use crate::tracker::Tracker;
 use crate::truth::TrueRobot;
 use calib_foundation::description::RobotDescription;

@@ -4,7 +4,6 @@
 //! a case of a seed, `family` an effect, `again` takes it on other paths, `record` measures it, `visible` says how much of each effect data can
 //! show, `folder` writes the files.
 
-mod again;
 mod draw;
 mod family;
 mod folder;

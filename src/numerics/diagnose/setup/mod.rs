@@ -6,14 +6,11 @@
 
 mod compare;
 mod counting;
-mod manufacture;
 mod mixture;
 mod number;
-mod order;
 mod outcome;
 mod pairs;
 mod placement;
-mod sign_group;
 mod words;
 mod wrong;
 
@@ -82,7 +79,7 @@ pub(crate) fn wrong_when_identified(question: &Question, now: &FitState) -> Opti
     let points = WholePoints::of(question);
     let question = &points.question(question)?;
     let stated = AsStated::of(question);
-    let beyond = manufacture::beyond(now, question.robot, stated.reach);
+    let beyond = compare::beyond(now, question.robot, stated.reach);
     if beyond.is_empty() {
         return None;
     }

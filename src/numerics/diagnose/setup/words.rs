@@ -2,12 +2,12 @@
 
 use super::counting::{CountedJoint, Counting, MOST};
 use super::number::FreeNumber;
-use super::order::RowOrder;
 use super::wrong::{LENGTHS, WrongSetup};
 use crate::criteria::setup::{ARMS, QUARTERLY, SMALL};
 use crate::effect::figure;
 use crate::error::counted;
 use crate::robot::{RobotModel, numbered};
+use crate::setup::wrong::RowOrder;
 
 /// What is wrong, and what to change in which file.
 pub(super) struct SetupWords {

@@ -4,9 +4,9 @@
 use super::cell::alternates;
 use super::evidence::EvidenceRows;
 use crate::criteria::cells::{EVEN, FAR, UNEVEN};
-use crate::diagnose::linear::{dot, orthonormal, project};
 use crate::diagnose::round::{FitState, Fitter, RoundView};
 use crate::effect::{Form, Law, Motion, Variable};
+use crate::regression::{dot, orthonormal, project};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};

@@ -5,8 +5,6 @@ mod faults;
 mod findings;
 mod last_round;
 mod not_observable;
-mod rivals;
-mod unseen;
 
 pub(crate) use conclude::conclude;
 pub(crate) use last_round::LastRound;
