@@ -2,7 +2,6 @@
 //!
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
 
-mod achieved;
 mod certificate;
 mod closure;
 mod data;
@@ -19,8 +18,8 @@ mod svg;
 mod torques;
 mod workspace;
 
-pub use achieved::{AchievedTables, achieved_page};
 pub use certificate::AcceptanceLimits;
+pub use certificate::{AchievedTables, achieved_page};
 pub use findings::diagnosed_page;
 pub use language::PageLanguage;
 use language::{Locale, say};

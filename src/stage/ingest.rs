@@ -6,7 +6,6 @@
 
 mod arm;
 mod bind;
-mod channel;
 mod check;
 mod clock;
 mod columns;
@@ -15,13 +14,11 @@ mod held;
 mod joined;
 mod later;
 mod layout;
-mod listing;
 mod mapped;
 mod motion;
 mod noise;
 mod pair;
 mod reading;
-mod refusal;
 mod row;
 mod scan;
 mod stretch;

@@ -2,7 +2,6 @@
 
 mod columns;
 mod diagnosis;
-mod estimate;
 mod first_look;
 #[cfg(feature = "query")]
 mod grid;

@@ -9,7 +9,6 @@
 pub mod arm;
 pub mod conceal;
 pub mod effect;
-pub mod equilibrium;
 pub mod folder;
 pub mod matrix;
 pub mod memory;

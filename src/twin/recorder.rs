@@ -3,7 +3,6 @@
 
 use super::arm::Arm;
 use super::effect::{self, JointCompliance, Physical};
-use super::equilibrium::{Equilibrium, settle, sighted};
 use super::matrix::{Matrix, Vector};
 use super::memory;
 use super::noise::{Noise, Purpose};
@@ -13,6 +12,7 @@ use super::truth::{ARCSEC, TrueRobot};
 use super::way::{Path, Way};
 use crate::arm::Motion;
 use crate::arm::Row;
+use crate::touch::{Equilibrium, settle, sighted};
 use calib_foundation::description::RobotDescription;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

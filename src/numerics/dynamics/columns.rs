@@ -1,12 +1,12 @@
 //! Judged rows of the base and of every form, filtered and decimated alike.
 
 use super::arm::INERTIAL_NUMBERS;
-use super::base_parameters::base_parameters;
 use super::cause::{TORQUE_CAUSES, TorqueForm};
 use super::reduce::Reduction;
 use super::reduce::{ReducedRegressor, TorqueColumn};
 use super::scene::{DynamicScene, largest};
 use crate::criteria::torque::FRICTION;
+use crate::reduce::base_parameters;
 
 /// Base columns, then those of all forms, form after form.
 pub(super) struct TorqueColumns {

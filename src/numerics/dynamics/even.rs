@@ -6,9 +6,9 @@
 use super::check::row_faults;
 use super::recording::TorqueRecording;
 use super::recording::TorqueSource;
-use super::resample::Resampler;
 use crate::criteria::torque::{PAUSE, UNEVEN, UNEVEN_ROWS};
 use crate::error::Result;
+use crate::filter::Resampler;
 use crate::statistics::nearest;
 
 /// Steps that tell what is usual, at most.

@@ -3,7 +3,7 @@
 use super::factor::TriangularFactor;
 use super::model::Model;
 use super::problem::{Evaluation, Problem};
-use super::triangle::{axpy, dot};
+use crate::estimate::factor::{axpy, dot};
 
 /// Why the iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

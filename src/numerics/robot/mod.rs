@@ -1,7 +1,5 @@
 //! The robot as data, its import, its screws and its gravity torques.
 
-mod bound;
-mod circumstances;
 mod column;
 pub mod import;
 mod instrument;
@@ -13,12 +11,10 @@ mod model;
 pub mod pose_groups;
 mod posture;
 mod readings;
-mod rows;
 mod setup;
 mod visited;
 
-pub use bound::{Bound, ONE_AND_A_HALF_TURNS, too_far};
-pub use circumstances::{CIRCUMSTANCES, CircumstanceName, law_columns};
+pub use column::{CIRCUMSTANCES, CircumstanceName, law_columns};
 pub use column::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
 pub use instrument::{
     INSTRUMENTS, Instrument, NoiseBasis, PublishedInstrument, START, SigmaSource,
@@ -27,11 +23,12 @@ pub use joint_convention::{CountedCoupling, JointConvention};
 pub use library::{LIBRARY, LibraryArm};
 pub use measurements::{Measurements, Memories, RowTime};
 pub use memory::Memory;
+pub use model::{Bound, ONE_AND_A_HALF_TURNS, too_far};
 pub use model::{RobotModel, Travel};
 pub use pose_groups::Sequence;
 pub use posture::{Carried, LoadCorrection, Posture};
+pub use readings::{DhRow, DhTable};
 pub use readings::{Named, PointReadings, Reading, Readings};
-pub use rows::{DhRow, DhTable};
 pub use setup::{Anchor, MeasurementSetup, Shape, Target};
 pub use visited::{Unmeasured, Visited, numbered};
 

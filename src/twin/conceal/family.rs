@@ -8,15 +8,14 @@ mod gears;
 mod instruments;
 mod interactions;
 mod loads;
-mod memories;
 
 use super::robots::{ALL_KINDS, KINDS, Kind};
 use crate::arm::Arm;
 use crate::effect::Physical;
-use crate::equilibrium::settle;
 use crate::matrix::{self, Vector};
 use crate::noise::Noise;
 use crate::plan::Point;
+use crate::touch::settle;
 use crate::truth::ARCSEC;
 use calib_foundation::description::RobotDescription;
 
@@ -320,10 +319,10 @@ pub const BEYOND: &[Family] = &[
     alone("tracker_refraction", instruments::refraction),
     alone("unknown", instruments::swing),
     alone("base_shift", instruments::knock),
-    alone("presliding", memories::presliding),
-    alone("joint_warming", memories::own_heat),
-    alone("joint_warming", memories::late_heat),
-    alone("thermal_growth", memories::lagging_link),
+    alone("presliding", interactions::presliding),
+    alone("joint_warming", interactions::own_heat),
+    alone("joint_warming", interactions::late_heat),
+    alone("thermal_growth", interactions::lagging_link),
     alone("gear_load", interactions::gear_load),
     alone("gear_flank", interactions::gear_flank),
     alone("joint_warming", interactions::warm_ratio),

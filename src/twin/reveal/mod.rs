@@ -1,6 +1,5 @@
-//! Verdicts held against sealed truths: [`paper`] reads both, [`mark`] marks one case, and says
-//! whether the place was right, [`left_out`] marks a diagnosis without the causes of its recording, and mixes these with the others,
-//! [`board`] counts, `text` prints the board.
+//! Verdicts held against sealed truths: [`paper`] reads both, [`mark`] marks one case and whether the place was right, [`left_out`] marks a
+//! diagnosis without the causes of its recording and mixes these with the others, [`board`] counts, `text` prints the board.
 //!
 //! Nothing of the diagnosis is used: what it said is read as any reader of its JSON would.
 

@@ -5,10 +5,10 @@
 use crate::folder::robot_json;
 use crate::noise::{Noise, Purpose};
 use crate::torque::draw::{TorqueCase, paths};
+use crate::torque::law::{Body, JointState};
 use crate::torque::law::{Fall, Law};
-use crate::torque::path::Path;
+use crate::torque::record::Path;
 use crate::torque::record::TorqueRows;
-use crate::torque::rigid::{Body, JointState};
 use serde_json::{Value, json};
 use std::fmt::Write;
 

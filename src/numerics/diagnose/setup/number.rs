@@ -1,7 +1,7 @@
 //! One number of the robot file that may be wrong: a length between two axes, the place of one axis, or the zero of a joint.
 
-use super::pairs::bodies;
 use crate::robot::RobotModel;
+use crate::setup::placement::bodies;
 use crate::spatial::Pose;
 use nalgebra::{Matrix3, Vector3};
 

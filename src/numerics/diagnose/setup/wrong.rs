@@ -11,7 +11,7 @@ use crate::criteria::setup::{FARTHEST, LONG, SHIFTS, SORTED};
 use crate::robot::RobotModel;
 use crate::setup::counting::Counting;
 use crate::setup::number::FreeNumber;
-use crate::setup::pairs::{PointPairs, median};
+use crate::setup::placement::{PointPairs, median};
 use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -1,6 +1,8 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
 //!
 //! Causes that no data could tell from a finding.
+//!
+//! What the last round looked at, and what it found.
 
 use crate::criteria::cells::{DETAIL, FAINT, IDENTITY, SMALLEST, TRACE};
 use crate::criteria::words::FIRM;
@@ -8,12 +10,12 @@ use crate::effect::{
     Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Survey, Variable,
     moved_with_the_payload, names, people, turned_holder,
 };
-use crate::estimate::{Model, ParameterStatus, tail};
+use crate::estimate::{ErrorScale, Model, ParameterStatus, tail};
 use crate::observation::Dimension;
-use crate::table::FoundCell;
+use crate::round::{FitState, RoundView};
+use crate::table::{Answer, FoundCell};
 use crate::types::{Evidence, Finding, RivalCause};
-use crate::verdict::faults::{faults, rows_apart};
-use crate::verdict::last_round::LastRound;
+use crate::verdict::not_observable::{faults, rows_apart};
 use crate::words::{left_out, not_so, sentence, small, with_size};
 
 /// The causes of the last round as findings, strongest first; whether they leave more than noise `at_fitted_rows` or anywhere.
@@ -332,4 +334,24 @@ pub(super) fn share_with_identities(
     }
     rivals.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     left
+}
+
+/// The last round.
+pub(crate) struct LastRound<'a, 'b> {
+    pub(crate) view: &'b RoundView<'a>,
+    pub(crate) survey: &'b Survey<'a>,
+    /// The whole model with all causes.
+    pub(crate) state: FitState,
+    pub(crate) answer: Answer,
+    /// What errors of rows are compared and told in.
+    pub(crate) scale: ErrorScale,
+    /// Names of causes that are not to be given.
+    pub(crate) without: &'b [String],
+}
+
+impl LastRound<'_, '_> {
+    /// Whether a name is not to be given.
+    pub(crate) fn excludes(&self, effect: &str) -> bool {
+        self.without.iter().any(|name| name == effect)
+    }
 }

@@ -8,8 +8,6 @@ mod drive;
 mod friction;
 mod masses;
 mod memory;
-mod shared_friction;
-mod unnamed_friction;
 
 use super::arm::DeclaredInertials;
 use super::arm::INERTIAL_NUMBERS;
@@ -52,7 +50,7 @@ pub(super) static TORQUE_CAUSES: [&TorqueCause; 27] = [
     &angle::RIPPLE,
     &memory::ELASTICITY,
     &memory::SPIKES,
-    &shared_friction::WRIST_COUPLING,
+    &friction::WRIST_COUPLING,
     &masses::PAYLOAD,
     &masses::LINK_MASS,
     &masses::LINK_CENTRE,
@@ -60,8 +58,8 @@ pub(super) static TORQUE_CAUSES: [&TorqueCause; 27] = [
     &masses::GRAVITY_DIRECTION,
     &angle::TWO_ANGLES,
     &angle::ONE_ANGLE,
-    &unnamed_friction::BY_SPEED,
-    &unnamed_friction::BY_ANGLE,
+    &friction::BY_SPEED,
+    &friction::BY_ANGLE,
     &memory::HYSTERESIS,
 ];
 

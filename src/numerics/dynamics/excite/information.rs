@@ -2,7 +2,6 @@
 
 use super::super::arm::DynamicArm;
 use super::super::arm::INERTIAL_NUMBERS;
-use super::super::base_parameters::base_parameters;
 use super::super::clock::RecordingClock;
 use super::super::newton_euler::InverseDynamics;
 use super::super::recording::TorqueRecording;
@@ -10,6 +9,7 @@ use super::super::reduce::ReducedRegressor;
 use super::super::reduce::Reduction;
 use super::super::scene::{DynamicScene, split};
 use super::series::{JointSeries, SeriesBasis};
+use crate::reduce::base_parameters;
 use nalgebra::{DMatrix, DVector};
 
 /// rad/s over which the sign of a velocity turns.
