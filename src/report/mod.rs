@@ -18,8 +18,7 @@ mod svg;
 mod torques;
 mod workspace;
 
-pub use certificate::AcceptanceLimits;
-pub use certificate::{AchievedTables, achieved_page};
+pub use certificate::{AcceptanceLimits, AchievedTables, achieved_page};
 pub use findings::diagnosed_page;
 pub use language::PageLanguage;
 use language::{Locale, say};

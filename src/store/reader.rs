@@ -5,8 +5,7 @@
 use super::content::{TableHash, hash_of_columns};
 use super::disk::refused;
 use super::frame::{Frame, FrameBuilder};
-use super::key::FileHash;
-use super::key::TableRef;
+use super::key::{FileHash, TableRef};
 use super::schema::{self, Version};
 use super::writer::{CONTENT_HASH, SCHEMA, UNITS};
 use crate::error::{Error, Fault, Result};

@@ -25,8 +25,7 @@ pub use in_short::{
 };
 pub use limits::LimitsSummary;
 pub use rival_changes::{RivalChange, rival_changes};
-pub use run::run_diff;
-pub use run::{explanation, graph, run, stage, status};
+pub use run::{explanation, graph, run, run_diff, stage, status};
 pub use screen::{LABEL, folded, labelled};
 
 use crate::error::Result;

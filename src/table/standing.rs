@@ -6,8 +6,7 @@
 
 use super::{Frame, Prediction};
 use crate::error::Result;
-use crate::estimate::autocorrelation_time;
-use crate::estimate::tail;
+use crate::estimate::{autocorrelation_time, tail};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;

@@ -26,5 +26,4 @@ pub use sides::{ArmSides, SideShares, StatedSides};
 pub use solve::{
     Chain, CommandSolution, Nominal, SETTLED, ToolGoal, inverse, least_change, one_step,
 };
-pub use uncertainty::CorrectionUncertainty;
-pub use uncertainty::{PositionUncertainty, Scatter, Uncertainty};
+pub use uncertainty::{CorrectionUncertainty, PositionUncertainty, Scatter, Uncertainty};

@@ -1,8 +1,7 @@
 //! One arm in two recordings: what of its torques changed, with payload, temperature, wear or repair. Both are fitted at once; masses and
 //! friction are common but for what the second recording shows to be another.
 
-use super::arm::DynamicArm;
-use super::arm::INERTIAL_NUMBERS;
+use super::arm::{DynamicArm, INERTIAL_NUMBERS};
 use super::cause::{COULOMB, OFFSET, TORQUE_CAUSES, TorqueForm, VISCOUS};
 use super::model::TorqueModel;
 use super::noise::NoiseMemory;

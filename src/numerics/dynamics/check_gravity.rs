@@ -1,8 +1,7 @@
 //! A recording against the gravity of the declared arm: torques in a wrong unit, with another sign or of another joint, and angles in a wrong
 //! unit or of another joint.
 
-use super::arm::DeclaredInertials;
-use super::arm::DynamicArm;
+use super::arm::{DeclaredInertials, DynamicArm};
 use super::newton_euler::{InverseDynamics, MotionRow};
 use super::recording::TorqueRecording;
 use crate::criteria::torque::{UNIT, WEIGHS, WEIGHTY};

@@ -2,8 +2,7 @@
 
 use super::arm::INERTIAL_NUMBERS;
 use super::cause::{TORQUE_CAUSES, TorqueForm};
-use super::reduce::Reduction;
-use super::reduce::{ReducedRegressor, TorqueColumn};
+use super::reduce::{ReducedRegressor, Reduction, TorqueColumn};
 use super::scene::{DynamicScene, largest};
 use crate::criteria::torque::FRICTION;
 use crate::reduce::base_parameters;

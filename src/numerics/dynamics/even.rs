@@ -4,8 +4,7 @@
 //! row as by an even clock, it is the stamps that err, and rows get even ones. A pause ends a stretch either way.
 
 use super::check::row_faults;
-use super::recording::TorqueRecording;
-use super::recording::TorqueSource;
+use super::recording::{TorqueRecording, TorqueSource};
 use crate::criteria::torque::{PAUSE, UNEVEN, UNEVEN_ROWS};
 use crate::error::Result;
 use crate::filter::Resampler;

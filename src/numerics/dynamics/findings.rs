@@ -1,7 +1,6 @@
 //! What was found in words and numbers: sizes, evidence, rivals, probabilities.
 
-use super::cause::TorqueParameter;
-use super::cause::{COULOMB, TorqueForm, VISCOUS};
+use super::cause::{COULOMB, TorqueForm, TorqueParameter, VISCOUS};
 use super::cells::{CellOdds, TorqueTable};
 use super::choice::CauseChoice;
 use super::naming::{JudgedSet, fitted};

@@ -55,21 +55,15 @@ mod types;
 mod used;
 mod weighted;
 
-pub use arm::INERTIAL_NAMES;
-pub use arm::INERTIAL_NUMBERS;
-pub use arm::{DynamicArm, Inertial, InertialTolerance};
-pub use cause::TorqueParameter;
-pub use cause::{COULOMB, FittedNumber};
+pub use arm::{DynamicArm, INERTIAL_NAMES, INERTIAL_NUMBERS, Inertial, InertialTolerance};
+pub use cause::{COULOMB, FittedNumber, TorqueParameter};
 pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
 pub use excite::{ExciteRequest, ExcitingMotion, ExpectedSigma, excite};
-pub use feed_forward::{JudgedRow, TorqueGate, TorqueRemark};
-pub use feed_forward::{NeededTorques, PlannedMotion};
-pub use masses::LinkFromTorques;
-pub use masses::{BodyConsistency, inertial_numbers};
+pub use feed_forward::{JudgedRow, NeededTorques, PlannedMotion, TorqueGate, TorqueRemark};
+pub use masses::{BodyConsistency, LinkFromTorques, inertial_numbers};
 pub use model::{JointRange, TorqueModel, TorqueTerm};
 pub use newton_euler::{InverseDynamics, MotionRow};
-pub use recording::TorqueRecording;
-pub use recording::TorqueSource;
+pub use recording::{TorqueRecording, TorqueSource};
 pub use types::{
     ContactEvent, EnforcedBodies, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses,
     TorqueDiagnosis, TorqueErrors, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueQuestion,

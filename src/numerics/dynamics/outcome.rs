@@ -1,7 +1,6 @@
 //! The answer to a diagnosis of torques, from what was solved.
 
-use super::arm::INERTIAL_NUMBERS;
-use super::arm::{INERTIAL_NAMES, inertial_unit};
+use super::arm::{INERTIAL_NAMES, INERTIAL_NUMBERS, inertial_unit};
 use super::cause::TorqueParameter;
 use super::choice::CauseChoice;
 use super::enforce::with_bodies;

@@ -1,15 +1,12 @@
 //! A recording prepared for least squares: measured and rigid torque, base and forms in judged rows, and which of these count.
 
-use super::arm::DynamicArm;
-use super::arm::INERTIAL_NUMBERS;
+use super::arm::{DynamicArm, INERTIAL_NUMBERS};
 use super::cause::{TorqueForm, friction_of};
-use super::clock::RecordingClock;
-use super::clock::column;
+use super::clock::{RecordingClock, column};
 use super::columns::TorqueColumns;
 use super::noise::JointNoise;
 use super::recording::TorqueRecording;
-use super::reduce::ReducedRegressor;
-use super::reduce::Reduction;
+use super::reduce::{ReducedRegressor, Reduction};
 use super::scene::{DynamicScene, ends};
 use super::sweep::value_of;
 use super::types::{ContactEvent, TorqueQuestion};

@@ -1,10 +1,8 @@
 //! The recording as causes see it: motion, rigid torque and clock at the recording's own rate, joint after joint.
 
-use super::arm::DeclaredInertials;
-use super::arm::DynamicArm;
+use super::arm::{DeclaredInertials, DynamicArm};
 use super::clock::{RecordingClock, column};
-use super::filter::ZeroPhase;
-use super::filter::derivatives;
+use super::filter::{ZeroPhase, derivatives};
 use super::newton_euler::{InverseDynamics, MotionRow, turn};
 use super::recording::TorqueRecording;
 use nalgebra::{Matrix3, Vector3};

@@ -5,11 +5,8 @@
 //! matter where they end.
 
 use super::bridge::Bridged;
-use super::check::TorqueExtremes;
-use super::check::row_faults;
-use super::clock::MotionPace;
-use super::clock::column;
-use super::clock::{ClockPace, RecordingClock};
+use super::check::{TorqueExtremes, row_faults};
+use super::clock::{ClockPace, MotionPace, RecordingClock, column};
 use super::filter::ZeroPhase;
 use super::recording::{TorqueRecording, TorqueSource};
 use crate::error::{Error, Result};

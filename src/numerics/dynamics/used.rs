@@ -5,10 +5,8 @@ use super::bridge::{self, Bridged};
 use super::check;
 use super::clock::RecordingClock;
 use super::even::EvenSource;
-use super::recording::TorqueRecording;
-use super::recording::TorqueSource;
-use super::thin::RecordingSurvey;
-use super::thin::{ThinnedRecording, ThinningPlan};
+use super::recording::{TorqueRecording, TorqueSource};
+use super::thin::{RecordingSurvey, ThinnedRecording, ThinningPlan};
 use crate::error::Result;
 
 /// Rows that are used as they were recorded; of longer recordings about so many are kept, however long they are.

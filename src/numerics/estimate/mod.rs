@@ -25,18 +25,15 @@ pub mod threads;
 
 pub use change::{ParameterChange, changes};
 pub use contacts::{Reseat, placed_by_left_out, reseated};
-pub use covariance::Covariance;
-pub use covariance::tail;
+pub use covariance::{Covariance, tail};
 pub use fit::{CLEARLY, FitOptions, Fitted, ParameterStatus, Session, fit, seen};
-pub use folds::NearbyFits;
-pub use folds::{FoldKind, Folds, cross_validate, dealt, fold_poses, gather, leave_one_out};
-pub use gauge::gauge;
-pub use gauge::{align, align_points};
+pub use folds::{
+    FoldKind, Folds, NearbyFits, cross_validate, dealt, fold_poses, gather, leave_one_out,
+};
+pub use gauge::{align, align_points, gauge};
 pub use levenberg::{Iteration, Stop};
 pub use model::{Bounds, CONFLICT, Known, KnownLength, Model, Prior, PriorCheck, RowError};
-pub use remedy::Visibility;
-pub use remedy::{Remedy, remedies};
+pub use remedy::{Remedy, Visibility, remedies};
 pub use repeats::{Poses, Repeated, autocorrelation_time, spread};
-pub use scale::{ArmScale, known_places, scale};
-pub use scale::{ErrorScale, noise};
+pub use scale::{ArmScale, ErrorScale, known_places, noise, scale};
 pub use screen::{Screening, Suspect, SuspectKind, fit_screened};

@@ -14,8 +14,10 @@ mod readings;
 mod setup;
 mod visited;
 
-pub use column::{CIRCUMSTANCES, CircumstanceName, law_columns};
-pub use column::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
+pub use column::{
+    CIRCUMSTANCES, CircumstanceName, ColumnShape, Convention, Conventions, DeclaredColumn, Part,
+    law_columns,
+};
 pub use instrument::{
     INSTRUMENTS, Instrument, NoiseBasis, PublishedInstrument, START, SigmaSource,
 };
@@ -23,12 +25,10 @@ pub use joint_convention::{CountedCoupling, JointConvention};
 pub use library::{LIBRARY, LibraryArm};
 pub use measurements::{Measurements, Memories, RowTime};
 pub use memory::Memory;
-pub use model::{Bound, ONE_AND_A_HALF_TURNS, too_far};
-pub use model::{RobotModel, Travel};
+pub use model::{Bound, ONE_AND_A_HALF_TURNS, RobotModel, Travel, too_far};
 pub use pose_groups::Sequence;
 pub use posture::{Carried, LoadCorrection, Posture};
-pub use readings::{DhRow, DhTable};
-pub use readings::{Named, PointReadings, Reading, Readings};
+pub use readings::{DhRow, DhTable, Named, PointReadings, Reading, Readings};
 pub use setup::{Anchor, MeasurementSetup, Shape, Target};
 pub use visited::{Unmeasured, Visited, numbered};
 

@@ -1,8 +1,7 @@
 //! What moves or changes bodies: links that bend and grow, masses that are not as described, the base, the tool.
 
 use super::{Motion, State, by_axis, effect};
-use crate::arm::Arm;
-use crate::arm::step;
+use crate::arm::{Arm, step};
 use crate::matrix::{self, Vector};
 use crate::memory::{self, Moment};
 

@@ -17,8 +17,7 @@ use super::arm::{Arm, Posture};
 use super::matrix::Vector;
 use super::memory::Moment;
 use super::true_value::{TrueValue, true_value};
-use crate::arm::Motion;
-use crate::arm::{Loads, Row};
+use crate::arm::{Loads, Motion, Row};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

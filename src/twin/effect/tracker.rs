@@ -1,8 +1,7 @@
 //! What is wrong with the instrument: its circles, its ranges, its air, its stand.
 
 use super::{Motion, State, by_axis, effect, sine_and_cosine};
-use crate::arm::Row;
-use crate::arm::step;
+use crate::arm::{Row, step};
 use crate::matrix::{self, Vector};
 use crate::memory::{self, Moment};
 use crate::polar::Polar;

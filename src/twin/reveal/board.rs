@@ -3,8 +3,7 @@
 use super::left_out::LeftOut;
 use super::mark::{Case, DUE, HeldOut, Marked, Outcome};
 use super::reliability::{Reliability, Subject, reliability};
-use crate::reveal::mark::Places;
-use crate::reveal::mark::Share;
+use crate::reveal::mark::{Places, Share};
 use serde::{Serialize, Serializer};
 use serde_json::json;
 use std::collections::BTreeMap;

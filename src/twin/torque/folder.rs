@@ -5,10 +5,8 @@
 use crate::folder::robot_json;
 use crate::noise::{Noise, Purpose};
 use crate::torque::draw::{TorqueCase, paths};
-use crate::torque::law::{Body, JointState};
-use crate::torque::law::{Fall, Law};
-use crate::torque::record::Path;
-use crate::torque::record::TorqueRows;
+use crate::torque::law::{Body, Fall, JointState, Law};
+use crate::torque::record::{Path, TorqueRows};
 use serde_json::{Value, json};
 use std::fmt::Write;
 

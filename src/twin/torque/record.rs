@@ -4,8 +4,7 @@
 
 use crate::noise::{Noise, Purpose};
 use crate::torque::draw::TorqueCase;
-use crate::torque::law::{JointState, Machine};
-use crate::torque::law::{Law, Moment};
+use crate::torque::law::{JointState, Law, Machine, Moment};
 
 /// Hz of the simulation, at least.
 const FINE: f64 = 500.0;

@@ -14,10 +14,8 @@ use crate::observation::Dimension;
 use crate::robot::NoiseBasis;
 use crate::round::{FitState, Fitter};
 use crate::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
-use crate::verdict::findings::LastRound;
-use crate::verdict::findings::findings;
-use crate::verdict::not_observable::stand_out_in_number;
-use crate::verdict::not_observable::{next, not_observable, not_tried};
+use crate::verdict::findings::{LastRound, findings};
+use crate::verdict::not_observable::{next, not_observable, not_tried, stand_out_in_number};
 use crate::words::{Ground, hidden, slower_than_noise, statement};
 use std::collections::BTreeMap;
 

@@ -9,8 +9,7 @@ mod friction;
 mod masses;
 mod memory;
 
-use super::arm::DeclaredInertials;
-use super::arm::INERTIAL_NUMBERS;
+use super::arm::{DeclaredInertials, INERTIAL_NUMBERS};
 use super::scene::DynamicScene;
 use crate::criteria::torque::AT_END;
 use crate::effect::Place;

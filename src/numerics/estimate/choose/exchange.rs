@@ -6,8 +6,7 @@
 use super::point_jacobian::{PointJacobian, factor, product};
 use super::subset;
 use crate::criteria::choose::{PASSES, RIDGE, STEPS, WORTH};
-use crate::estimate::factor::TriangularFactor;
-use crate::estimate::factor::axpy;
+use crate::estimate::factor::{TriangularFactor, axpy};
 use crate::estimate::model::Model;
 use crate::robot::Measurements;
 use faer::linalg::matmul::matmul;
