@@ -10,7 +10,6 @@ mod findings;
 mod fits;
 pub mod fleet;
 pub mod fleet_causes;
-mod json;
 mod language;
 mod number;
 mod parameters;
@@ -145,7 +144,7 @@ pub(crate) fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
         let title = title.unwrap_or_else(|| say!(locale, "Calibration of {robot}", robot));
         (robot, title)
     };
-    let json = json::document(
+    let json = data::document(
         tables,
         options,
         head(&Locale::default()),

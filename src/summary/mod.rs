@@ -2,7 +2,6 @@
 
 mod columns;
 mod diagnosis;
-mod first_look;
 #[cfg(feature = "query")]
 mod grid;
 mod in_short;
@@ -14,7 +13,6 @@ mod short_finding;
 
 pub use columns::{columns, columns_json, effects_json};
 pub use diagnosis::DiagnosisSummary;
-pub use first_look::first_look;
 #[cfg(feature = "query")]
 pub use grid::grid;
 #[cfg(feature = "query")]
@@ -25,7 +23,7 @@ pub use in_short::{
 };
 pub use limits::LimitsSummary;
 pub use rival_changes::{RivalChange, rival_changes};
-pub use run::{explanation, graph, run, run_diff, stage, status};
+pub use run::{explanation, first_look, graph, run, run_diff, stage, status};
 pub use screen::{LABEL, folded, labelled};
 
 use crate::error::Result;

@@ -14,7 +14,6 @@ pub mod matrix;
 pub mod memory;
 pub mod noise;
 pub mod plan;
-pub(crate) mod polar;
 pub mod recorder;
 pub mod reveal;
 pub mod torque;

@@ -3,10 +3,10 @@
 use super::arm::DynamicArm;
 use super::check_gravity::gravity_faults;
 use super::clock::RecordingClock;
-use super::recording::TorqueRecording;
 use super::scene::ends;
 use crate::error::{Error, Fault, Result, counted};
 use crate::statistics::nearest;
+use crate::types::TorqueRecording;
 
 /// Rows, at least.
 const FEWEST: usize = 200;

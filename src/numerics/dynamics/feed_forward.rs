@@ -10,9 +10,9 @@ use crate::effect::Place;
 use crate::error::{Error, Result};
 use crate::model::{COVERAGE, JointRange, TorqueModel};
 use crate::newton_euler::InverseDynamics;
-use crate::recording::TorqueRecording;
 use crate::scene::{DynamicScene, split};
 use crate::shape_slopes::planned_slopes;
+use crate::types::TorqueRecording;
 use std::fmt;
 
 /// A motion of n joints at an even clock; lists are row-major (rows x n).

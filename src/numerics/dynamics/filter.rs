@@ -3,7 +3,7 @@
 //! Even rows of uneven ones, as these come: interpolated by their stamps, or with even stamps.
 
 use crate::error::Result;
-use crate::recording::TorqueRecording;
+use crate::types::TorqueRecording;
 use std::f64::consts::PI;
 
 /// Above this share of the rate the low-pass would do nothing.

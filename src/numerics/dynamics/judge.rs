@@ -9,7 +9,7 @@ use crate::choice::CauseChoice;
 use crate::criteria::torque::{APART, BLOCKS, CONFIRMED, NAMED};
 use crate::diagnose::table::ComponentSearch;
 use crate::effect::Place;
-use crate::naming::JudgedSet;
+use crate::findings::JudgedSet;
 use crate::problem::TorqueProblem;
 use crate::sweep::SweptColumns;
 use crate::weighted::WeightedColumns;

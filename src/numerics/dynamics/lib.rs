@@ -35,20 +35,15 @@ mod judge;
 mod latency;
 mod masses;
 mod model;
-mod naming;
 mod newton_euler;
-mod noise;
 mod outcome;
 mod problem;
-mod recording;
 mod reduce;
 mod refine;
 mod rich;
 mod scene;
 mod shape_slopes;
-mod sign_width;
 mod solve;
-mod stacked;
 mod sweep;
 mod thin;
 mod types;
@@ -63,10 +58,10 @@ pub use feed_forward::{JudgedRow, NeededTorques, PlannedMotion, TorqueGate, Torq
 pub use masses::{BodyConsistency, LinkFromTorques, inertial_numbers};
 pub use model::{JointRange, TorqueModel, TorqueTerm};
 pub use newton_euler::{InverseDynamics, MotionRow};
-pub use recording::{TorqueRecording, TorqueSource};
 pub use types::{
     ContactEvent, EnforcedBodies, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses,
     TorqueDiagnosis, TorqueErrors, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueQuestion,
+    TorqueRecording, TorqueSource,
 };
 
 use crate::error::{Error, Result};

@@ -376,8 +376,8 @@ mod tests {
     use super::super::cause::TORQUE_CAUSES;
     use super::*;
     use crate::dynamics::clock::RecordingClock;
-    use crate::dynamics::recording::TorqueRecording;
     use crate::dynamics::scene::DynamicScene;
+    use crate::types::TorqueRecording;
 
     #[test]
     fn every_form_is_read_back_as_one_of_its_own_cause_and_names_its_coefficients() {

@@ -6,7 +6,6 @@ use super::choice::CauseChoice;
 use super::enforce::with_bodies;
 use super::findings::{contact, findings, plain_finding};
 use super::model::TorqueModel;
-use super::noise::{JointNoise, NoiseMemory};
 use super::problem::TorqueProblem;
 use super::scene::{ends, largest};
 use super::solve::SolvedTorques;
@@ -18,6 +17,7 @@ use super::types::{
 use crate::diagnose::VerdictKind;
 use crate::effect::Place;
 use crate::error::counted;
+use crate::weighted::{JointNoise, NoiseMemory};
 
 /// Times the noise beyond which held-out rows are not explained.
 const UNEXPLAINED: f64 = 1.5;

@@ -4,14 +4,14 @@ use super::arm::{DynamicArm, INERTIAL_NUMBERS};
 use super::cause::{TorqueForm, friction_of};
 use super::clock::{RecordingClock, column};
 use super::columns::TorqueColumns;
-use super::noise::JointNoise;
-use super::recording::TorqueRecording;
 use super::reduce::{ReducedRegressor, Reduction};
 use super::scene::{DynamicScene, ends};
 use super::sweep::value_of;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{Weighing, WeightedColumns};
 use crate::effect::Place;
+use crate::types::TorqueRecording;
+use crate::weighted::JointNoise;
 use std::ops::Range;
 
 /// s around an event whose rows do not count either.

@@ -285,10 +285,10 @@ pub(super) fn base_parameters(regressor: &ReducedRegressor) -> Vec<usize> {
 mod tests {
     use super::super::arm::{DynamicArm, InertialTolerance};
     use super::super::clock::RecordingClock;
-    use super::super::recording::TorqueRecording;
     use super::super::reduce::Reduction;
     use super::super::scene::DynamicScene;
     use super::*;
+    use crate::types::TorqueRecording;
     use nalgebra::{Point3, Vector3};
 
     /// Base parameters of six turning joints that have nothing in common, the first one along `first`.

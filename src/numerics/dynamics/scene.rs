@@ -4,7 +4,7 @@ use super::arm::{DeclaredInertials, DynamicArm};
 use super::clock::{RecordingClock, column};
 use super::filter::{ZeroPhase, derivatives};
 use super::newton_euler::{InverseDynamics, MotionRow, turn};
-use super::recording::TorqueRecording;
+use crate::types::TorqueRecording;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
 

@@ -8,9 +8,9 @@ use super::bridge::Bridged;
 use super::check::{TorqueExtremes, row_faults};
 use super::clock::{ClockPace, MotionPace, RecordingClock, column};
 use super::filter::ZeroPhase;
-use super::recording::{TorqueRecording, TorqueSource};
 use crate::error::{Error, Result};
 use crate::statistics::nearest;
+use crate::types::{TorqueRecording, TorqueSource};
 use std::ops::Range;
 
 /// The rate of kept rows over the cut-off, at least: far from both, friction that turns with the direction is still sampled well.

@@ -3,7 +3,6 @@
 mod change;
 pub mod choose;
 mod cluster;
-mod constrained;
 mod contacts;
 mod covariance;
 mod factor;
@@ -19,7 +18,6 @@ mod remedy;
 mod repeats;
 mod scale;
 mod screen;
-mod standing;
 pub mod swarm;
 pub mod threads;
 

@@ -12,7 +12,6 @@ pub mod pose_groups;
 mod posture;
 mod readings;
 mod setup;
-mod visited;
 
 pub use column::{
     CIRCUMSTANCES, CircumstanceName, ColumnShape, Convention, Conventions, DeclaredColumn, Part,
@@ -24,13 +23,12 @@ pub use instrument::{
 pub use joint_convention::{CountedCoupling, JointConvention};
 pub use library::{LIBRARY, LibraryArm};
 pub use measurements::{Measurements, Memories, RowTime};
-pub use memory::Memory;
+pub use memory::{Memory, Unmeasured, Visited, numbered};
 pub use model::{Bound, ONE_AND_A_HALF_TURNS, RobotModel, Travel, too_far};
 pub use pose_groups::Sequence;
 pub use posture::{Carried, LoadCorrection, Posture};
 pub use readings::{DhRow, DhTable, Named, PointReadings, Reading, Readings};
 pub use setup::{Anchor, MeasurementSetup, Shape, Target};
-pub use visited::{Unmeasured, Visited, numbered};
 
 #[cfg(test)]
 pub(crate) use tests::small_arm;

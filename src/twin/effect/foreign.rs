@@ -4,7 +4,7 @@ use super::{Act, Motion, State, Stated, TrueValue, true_value};
 use crate::arm::Row;
 use crate::matrix::{self, Matrix, Vector};
 use crate::memory::Moment;
-use crate::polar::Polar;
+use crate::tracker::Polar;
 use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

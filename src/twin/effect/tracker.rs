@@ -4,7 +4,7 @@ use super::{Motion, State, by_axis, effect, sine_and_cosine};
 use crate::arm::{Row, step};
 use crate::matrix::{self, Vector};
 use crate::memory::{self, Moment};
-use crate::polar::Polar;
+use crate::tracker::Polar;
 use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -7,7 +7,6 @@
 mod compare;
 mod counting;
 mod mixture;
-mod number;
 mod placement;
 mod words;
 mod wrong;

@@ -10,8 +10,7 @@
 use crate::criteria::setup::{FARTHEST, LONG, SHIFTS, SORTED};
 use crate::robot::RobotModel;
 use crate::setup::counting::Counting;
-use crate::setup::number::FreeNumber;
-use crate::setup::placement::{PointPairs, median};
+use crate::setup::placement::{FreeNumber, PointPairs, median};
 use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -3,11 +3,11 @@
 use super::super::arm::{DynamicArm, INERTIAL_NUMBERS};
 use super::super::clock::RecordingClock;
 use super::super::newton_euler::InverseDynamics;
-use super::super::recording::TorqueRecording;
 use super::super::reduce::{ReducedRegressor, Reduction};
 use super::super::scene::{DynamicScene, split};
 use super::series::{JointSeries, SeriesBasis};
 use crate::reduce::base_parameters;
+use crate::types::TorqueRecording;
 use nalgebra::{DMatrix, DVector};
 
 /// rad/s over which the sign of a velocity turns.
