@@ -19,6 +19,7 @@ mod motion;
 mod noise;
 mod pair;
 mod reading;
+mod refusal;
 mod row;
 mod scan;
 mod stretch;

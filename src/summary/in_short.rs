@@ -2,12 +2,12 @@
 //!
 //! Tables of a run as text and as rows: errors step by step, rivals of learned corrections, optimisers compared, rejected rows.
 
+use super::estimate::length;
 use super::{DiagnosisSummary, labelled, screen, tables};
 use crate::error::{Result, counted};
 use crate::pipeline::{CompletedRun, Manifest};
 use crate::stage::{DIAGNOSES, DeclaredStage, Transfer};
 use crate::store::Store;
-use crate::summary::screen::length;
 use crate::table::{
     Contradicted, Corrections, CorrectionsRow, Robot, Searches, SearchesRow, Standing, Statistics,
     StatisticsRow, Table, Withdrawn,

@@ -2,12 +2,14 @@
 
 mod columns;
 mod diagnosis;
+mod estimate;
 #[cfg(feature = "query")]
 mod grid;
 mod in_short;
 mod limits;
 mod rival_changes;
 mod run;
+mod run_diff;
 mod screen;
 mod short_finding;
 
@@ -23,7 +25,8 @@ pub use in_short::{
 };
 pub use limits::LimitsSummary;
 pub use rival_changes::{RivalChange, rival_changes};
-pub use run::{explanation, first_look, graph, run, run_diff, stage, status};
+pub use run::{explanation, first_look, graph, run, stage, status};
+pub use run_diff::run_diff;
 pub use screen::{LABEL, folded, labelled};
 
 use crate::error::Result;

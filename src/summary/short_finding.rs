@@ -1,7 +1,7 @@
 //! A finding in a few words: what it is, its number, its size, and what it might be instead.
 
+use super::estimate::estimate;
 use crate::effect::{figure, names};
-use crate::summary::screen::estimate;
 use crate::table::{FindingNumberRow, FindingNumbers, RivalRow, Rivals, picked, picked_of};
 use serde::Serialize;
 use serde_json::{Value, json};

@@ -9,6 +9,7 @@
 pub mod arm;
 pub mod conceal;
 pub mod effect;
+pub mod equilibrium;
 pub mod folder;
 pub mod matrix;
 pub mod memory;

@@ -3,6 +3,7 @@
 
 use super::arm::Arm;
 use super::effect::{self, JointCompliance, Physical};
+use super::equilibrium::{Equilibrium, settle, sighted};
 use super::matrix::{Matrix, Vector};
 use super::memory;
 use super::noise::{Noise, Purpose};
@@ -11,7 +12,6 @@ use super::tracker::{Beam, Tracker};
 use super::truth::{ARCSEC, TrueRobot};
 use super::way::{Path, Way};
 use crate::arm::{Motion, Row};
-use crate::touch::{Equilibrium, settle, sighted};
 use calib_foundation::description::RobotDescription;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -11,10 +11,10 @@ use calib::twin::effect::{
     Circle, GearLoad, Heat, JointWarming, Physical, Presliding, TrackerCircle, TrackerElevation,
     TrackerOffset, TrackerRefraction, recall,
 };
+use calib::twin::equilibrium::{Equilibrium, settle, sighted};
 use calib::twin::matrix::IDENTITY;
 use calib::twin::memory::{Moment, past};
 use calib::twin::plan::Point;
-use calib::twin::touch::{Equilibrium, settle, sighted};
 use calib::twin::truth::TrueRobot;
 use std::f64::consts::PI;
 

@@ -15,7 +15,7 @@ use calib::twin::arm::Row;
 use calib::twin::effect::{
     Backlash, BaseCompliance, GearCyclic, JointCompliance, LinkCompliance, Physical,
 };
-use calib::twin::touch::{Equilibrium, settle};
+use calib::twin::equilibrium::{Equilibrium, settle};
 use calib::twin::tracker::{Beam, Scatter, Tracker};
 use calib::twin::truth::{CouplingError, LinkError, TrueRobot};
 use std::f64::consts::{FRAC_PI_2, PI};

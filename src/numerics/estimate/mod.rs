@@ -13,6 +13,7 @@ mod length;
 mod levenberg;
 mod model;
 pub mod network;
+mod observe;
 mod problem;
 mod remedy;
 mod repeats;
@@ -31,7 +32,8 @@ pub use folds::{
 pub use gauge::{align, align_points, gauge};
 pub use levenberg::{Iteration, Stop};
 pub use model::{Bounds, CONFLICT, Known, KnownLength, Model, Prior, PriorCheck, RowError};
-pub use remedy::{Remedy, Visibility, remedies};
+pub use observe::Visibility;
+pub use remedy::{Remedy, remedies};
 pub use repeats::{Poses, Repeated, autocorrelation_time, spread};
 pub use scale::{ArmScale, ErrorScale, known_places, noise, scale};
 pub use screen::{Screening, Suspect, SuspectKind, fit_screened};

@@ -11,6 +11,7 @@ mod model;
 pub mod pose_groups;
 mod posture;
 mod readings;
+mod rows;
 mod setup;
 
 pub use column::{
@@ -27,7 +28,8 @@ pub use memory::{Memory, Unmeasured, Visited, numbered};
 pub use model::{Bound, ONE_AND_A_HALF_TURNS, RobotModel, Travel, too_far};
 pub use pose_groups::Sequence;
 pub use posture::{Carried, LoadCorrection, Posture};
-pub use readings::{DhRow, DhTable, Named, PointReadings, Reading, Readings};
+pub use readings::{Named, PointReadings, Reading, Readings};
+pub use rows::{DhRow, DhTable};
 pub use setup::{Anchor, MeasurementSetup, Shape, Target};
 
 #[cfg(test)]

@@ -4,9 +4,9 @@
 
 use super::bind::Binding;
 use super::reading::OpenedFile;
+use super::refusal::RowRefusal;
 use super::row::RecordedRow;
 use crate::error::{Error, Result};
-use crate::stage::ingest::verdict::RowRefusal;
 use std::collections::BTreeMap;
 use twox_hash::XxHash3_128;
 

@@ -5,10 +5,10 @@ use super::arm::RobotJoints;
 use super::held::HeldRows;
 use super::layout::Join;
 use super::pair::{FileDecision, NONE};
+use super::refusal::{Reason, RowRefusal};
 use super::row::RecordedRow;
 use super::scan::Scan;
 use crate::observation::{KINDS, Part};
-use crate::stage::ingest::verdict::{Reason, RowRefusal};
 
 /// What all files give and decide together.
 pub(super) struct JoinDecisions<'a> {

@@ -4,9 +4,9 @@ use super::arm::{KindSlots, RobotJoints};
 use super::bind::{Binding, NumberBinding, TextBinding};
 use super::clock::{ALLOWED, CLOCK, ClockColumn, ClockTime};
 use super::layout::{Decimal, LimitPolicy};
+use super::refusal::{Reason, RowRefusal, refuse};
 use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
 use crate::robot::ONE_AND_A_HALF_TURNS;
-use crate::stage::ingest::verdict::{Reason, RowRefusal, refuse};
 use crate::table::RejectedRow;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.

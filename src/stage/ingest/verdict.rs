@@ -1,18 +1,15 @@
 //! What is wrong with a file as a whole, or with several files as copies of each other: errors for the owner of the measurements, before any table is written.
-//!
-//! Why a row is not used, and the table of such rows, written in chunks where files are read in the order of their names.
 
+use super::Ingest;
+use super::arm::RobotJoints;
+use super::columns::Columns;
+use super::layout::{Join, LimitPolicy};
+use super::pair::FileDecision;
+use super::refusal::Reason;
+use super::scan::{RefusalCount, Scan};
 use crate::error::{Error, Fault, Result, counted};
-use crate::raw::RecordFault;
 use crate::robot::too_far;
-use crate::stage::ingest::Ingest;
-use crate::stage::ingest::arm::RobotJoints;
-use crate::stage::ingest::columns::Columns;
-use crate::stage::ingest::layout::{Join, LimitPolicy};
-use crate::stage::ingest::pair::FileDecision;
-use crate::stage::ingest::scan::{RefusalCount, Scan};
-use crate::stage::{Context, Sink, StreamedTable};
-use crate::table::{Rejected, RejectedRow, Table};
+use crate::stage::Context;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Beyond this largest angle, deg, a file in degrees is believed to be one.
@@ -383,116 +380,4 @@ fn shared(one: &ReadFile, other: &ReadFile) -> Option<u64> {
     }
     let both = |number: &usize| one.decision.is_whole(*number) && other.decision.is_whole(*number);
     Some((1..=one.scan.read as usize).filter(both).count() as u64)
-}
-
-/// Why a row is not used; the stable word in the table `rejected`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Reason {
-    Blank,
-    NotANumber,
-    NotText,
-    ShortRow,
-    LongRow,
-    LostBeam,
-    OutOfRange,
-    OutOfOrder,
-    DuplicateId,
-    DuplicateRow,
-    DoubledStamp,
-    Foreign,
-    Damaged,
-    Unmatched,
-}
-
-impl Reason {
-    pub(super) fn word(self) -> &'static str {
-        match self {
-            Self::Blank => "blank",
-            Self::NotANumber => "not_a_number",
-            Self::NotText => "not_text",
-            Self::ShortRow => "short_row",
-            Self::LongRow => "long_row",
-            Self::LostBeam => "lost_beam",
-            Self::OutOfRange => "out_of_range",
-            Self::OutOfOrder => "out_of_order",
-            Self::DuplicateId => "duplicate_id",
-            Self::DuplicateRow => "duplicate_row",
-            Self::DoubledStamp => "doubled_stamp",
-            Self::Foreign => "foreign",
-            Self::Damaged => "damaged",
-            Self::Unmatched => "unmatched",
-        }
-    }
-}
-
-impl From<RecordFault> for Reason {
-    fn from(fault: RecordFault) -> Self {
-        match fault {
-            RecordFault::Damaged => Self::Damaged,
-            RecordFault::Foreign => Self::Foreign,
-            RecordFault::DoubledStamp => Self::DoubledStamp,
-        }
-    }
-}
-
-/// A row that is not used.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct RowRefusal {
-    pub(crate) reason: Reason,
-    pub(crate) detail: String,
-}
-
-pub(super) fn refuse<T>(reason: Reason, detail: String) -> Result<T, RowRefusal> {
-    Err(RowRefusal { reason, detail })
-}
-
-/// Rejected rows in memory at once, where they come in order.
-const REJECTED_CHUNK: usize = 1 << 12;
-
-/// The rejected rows, in the order of the table's key.
-pub(super) struct Rejections<'a> {
-    sink: Box<dyn Sink + 'a>,
-    rows: Vec<RejectedRow>,
-    /// The files are read in the order of their names.
-    ordered: bool,
-}
-
-impl<'a> Rejections<'a> {
-    pub(super) fn new(names: &[String], context: &Context<'a>) -> Result<Self> {
-        Ok(Self {
-            sink: context.services.sink(Rejected::KIND)?,
-            rows: Vec::new(),
-            ordered: names.is_sorted(),
-        })
-    }
-    pub(super) fn push(&mut self, row: RejectedRow) -> Result<()> {
-        let goes_on = self
-            .rows
-            .last()
-            .is_some_and(|last| (&last.file, last.line) == (&row.file, row.line));
-        if self.ordered && self.rows.len() >= REJECTED_CHUNK && !goes_on {
-            self.flush()?;
-        }
-        self.rows.push(row);
-        Ok(())
-    }
-    fn flush(&mut self) -> Result<()> {
-        self.rows
-            .sort_by(|a, b| (&a.file, a.line).cmp(&(&b.file, b.line)));
-        // A program may declare several positions in one line.
-        self.rows.dedup_by(|next, kept| {
-            let same = (&next.file, next.line) == (&kept.file, kept.line);
-            if same {
-                kept.detail.push_str(&format!("; {}", next.detail));
-            }
-            same
-        });
-        self.sink
-            .push(Rejected(std::mem::take(&mut self.rows)).to_frame()?)
-    }
-    pub(super) fn finish(mut self) -> Result<StreamedTable<Rejected>> {
-        // Also where nothing was rejected: a table without rows has its columns.
-        self.flush()?;
-        Ok(StreamedTable::new(self.sink.finish()?))
-    }
 }

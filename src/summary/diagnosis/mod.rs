@@ -13,7 +13,7 @@ use crate::report::diagnosed_page;
 use crate::shell::typed;
 use crate::stage::{DeclaredStage, Diagnose, DiagnoseTorques};
 use crate::store::Store;
-use crate::summary::screen::length;
+use crate::summary::estimate::length;
 use crate::table::{
     FindingNumbers, RivalRow, Rivals, Table, TablesByKind, TorqueNumbers, TorqueRivals, VerdictRow,
     VerdictSentences, VerdictTopic, is_separable_by_poses, of_kind,

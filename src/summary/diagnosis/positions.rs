@@ -3,8 +3,8 @@
 use crate::diagnose::VerdictKind;
 use crate::effect::names;
 use crate::error::{Error, Result, counted};
+use crate::summary::estimate::{angle, length};
 use crate::summary::run::filled;
-use crate::summary::screen::{angle, length};
 use crate::summary::short_finding::Found;
 use crate::summary::{labelled, screen};
 use crate::table::{

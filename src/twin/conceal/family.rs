@@ -12,10 +12,10 @@ mod loads;
 use super::robots::{ALL_KINDS, KINDS, Kind};
 use crate::arm::Arm;
 use crate::effect::Physical;
+use crate::equilibrium::settle;
 use crate::matrix::{self, Vector};
 use crate::noise::Noise;
 use crate::plan::Point;
-use crate::touch::settle;
 use crate::truth::ARCSEC;
 use calib_foundation::description::RobotDescription;
 

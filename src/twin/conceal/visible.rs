@@ -3,8 +3,8 @@
 
 use crate::arm::{Arm, Motion, Row};
 use crate::effect::{self, Physical};
+use crate::equilibrium::{Equilibrium, settle, sighted};
 use crate::plan::Point;
-use crate::touch::{Equilibrium, settle, sighted};
 use crate::tracker::Tracker;
 use crate::truth::TrueRobot;
 use crate::{matrix, memory};

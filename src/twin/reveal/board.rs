@@ -3,7 +3,8 @@
 use super::left_out::LeftOut;
 use super::mark::{Case, DUE, HeldOut, Marked, Outcome};
 use super::reliability::{Reliability, Subject, reliability};
-use crate::reveal::mark::{Places, Share};
+use super::share::Share;
+use crate::reveal::mark::Places;
 use serde::{Serialize, Serializer};
 use serde_json::json;
 use std::collections::BTreeMap;

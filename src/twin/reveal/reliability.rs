@@ -1,7 +1,7 @@
 //! Stated probabilities against what was true: how often what is said with a probability is right, and the mean squared error of it.
 
 use super::paper::{Atoms, Finding};
-use crate::reveal::mark::Share;
+use super::share::Share;
 use serde::Serialize;
 use std::collections::BTreeSet;
 

@@ -1,11 +1,12 @@
 //! The scoreboard for people and for programs.
 
 use super::board::{BINS, Board, Company, Counts, NEAR_BOUND};
+use super::both_worlds::{MixedBin, UNLISTED};
 use super::left_out::LeftOutShares;
 use super::mark::{Case, DUE};
 use super::reliability::{Reliability, Subject};
-use crate::reveal::left_out::{MixedBin, UNLISTED};
-use crate::reveal::mark::{GIVEN, Share};
+use super::share::Share;
+use crate::reveal::mark::GIVEN;
 use calib_foundation::statistics::quantile;
 use serde_json::{Value, json};
 use std::fmt::Write;

@@ -2,11 +2,11 @@
 
 use super::family::{FAMILIES, OPEN, Pool};
 use super::law::Law;
+use super::path::Path;
 use crate::conceal::robots::Kind;
 use crate::matrix::{self, Vector};
 use crate::noise::{Noise, Purpose};
 use crate::torque::law::{Body, Machine};
-use crate::torque::record::Path;
 use calib_foundation::description::{
     DeclaredInertias, InertiaMoments, MassTolerance, RobotDescription,
 };

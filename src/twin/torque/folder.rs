@@ -6,7 +6,8 @@ use crate::folder::robot_json;
 use crate::noise::{Noise, Purpose};
 use crate::torque::draw::{TorqueCase, paths};
 use crate::torque::law::{Body, Fall, JointState, Law};
-use crate::torque::record::{Path, TorqueRows};
+use crate::torque::path::Path;
+use crate::torque::record::TorqueRows;
 use serde_json::{Value, json};
 use std::fmt::Write;
 

@@ -6,6 +6,7 @@
 
 use crate::criteria::cells::{DETAIL, FAINT, IDENTITY, SMALLEST, TRACE};
 use crate::criteria::words::FIRM;
+use crate::diagnose::table::{Answer, FoundCell};
 use crate::effect::{
     Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Survey, Variable,
     moved_with_the_payload, names, people, turned_holder,
@@ -13,7 +14,6 @@ use crate::effect::{
 use crate::estimate::{ErrorScale, Model, ParameterStatus, tail};
 use crate::observation::Dimension;
 use crate::round::{FitState, RoundView};
-use crate::table::{Answer, FoundCell};
 use crate::types::{Evidence, Finding, RivalCause};
 use crate::verdict::not_observable::{faults, rows_apart};
 use crate::words::{left_out, not_so, sentence, small, with_size};

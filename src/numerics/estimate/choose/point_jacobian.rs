@@ -2,8 +2,8 @@
 
 use crate::estimate::factor::{StackedRows, TriangularFactor};
 use crate::estimate::model::Model;
+use crate::estimate::observe::{Visibility, visibility};
 use crate::estimate::problem::Problem;
-use crate::estimate::remedy::{Visibility, visibility};
 use crate::observation::{ExcessSigma, MeasurementKind, SocketKind};
 use crate::robot::Measurements;
 use crate::statistics::nearest;
