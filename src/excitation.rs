@@ -218,7 +218,7 @@ impl MotionProposal {
     }
 
     /// The same as one JSON document, with the motion.
-    pub fn document(&self) -> Value {
+    pub(crate) fn document(&self) -> Value {
         let motion = &self.motion;
         let parameters = motion.parameters.iter().map(|one| {
             json!({ "name": one.name, "unit": one.unit, "sigma": one.sigma, "random_sigma": one.random, "inflation": one.inflation })

@@ -73,15 +73,15 @@
 //! # Adding things
 //! | add | new | touch |
 //! |---|---|---|
-//! | effect | a row of [`effect::CAUSES`] in `src/numerics/effect/table.rs` | - |
+//! | effect | a row of [`effect::CAUSES`] in `src/numerics/effect/table.rs` | the German of its sentence in `src/report/language/de_stored.po` |
 //! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose` |
 //! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; with `.in_laws()` declared effects read it by its name |
-//! | kind of raw file | `src/raw/<name>.rs`, which hands out records | its `mod`, and one line in `records` of `src/stage/ingest/reading.rs` |
+//! | kind of raw file | `src/raw/<name>.rs`, which hands out records | its `mod`, and a line each in `FileKind` and `records` of `src/stage/ingest/reading.rs`; `init` follows |
 //! | number that decides | a row of `src/numerics/criteria/<class>.rs` | the code that says `*NAME` |
 //! | stage | `src/stage/<name>.rs`, declared with its ports by `stage!` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, of which its rows are made; `src/table/<kind>.rs` for what fills them | one line in [`table::TABLES`] |
-//! | export format | `src/export/<name>.rs`, which declares an `export::Format` | its `mod`, and one line in `export::FORMATS` |
+//! | export format | `src/export/<name>.rs`, which declares an `export::Format` and how its comments begin | its `mod`, and one line in `export::FORMATS` |
 //! | figure of a page | - | the template in `src/report`: it has the rows of tables with all their columns, and the filters `mm`, `count`, `fixed`, `significant` |
 //! | sentence of a page | - | `_("...", name=...)` in its template, or `say!` in `src/report`; its German in `src/report/language/de.po`, of sentences in tables in `de_stored.po` |
 //! | line of `calib show`, `explain`, `diagnose --details` | - | the template in `src/summary/text` |

@@ -53,7 +53,7 @@ struct State {
 
 impl Progress {
     /// Progress on stderr; `width` is that of the longest stage id.
-    pub fn new(verbosity: Verbosity, width: usize) -> Self {
+    pub(crate) fn new(verbosity: Verbosity, width: usize) -> Self {
         let terminal = matches!(verbosity, Verbosity::Detailed | Verbosity::Normal)
             && std::io::stderr().is_terminal();
         let bar = terminal
@@ -82,7 +82,7 @@ impl Progress {
     }
 
     /// Takes the bar away.
-    pub fn finish(&self) {
+    pub(crate) fn finish(&self) {
         if let Some(bar) = &self.state().bar {
             bar.finish_and_clear();
         }

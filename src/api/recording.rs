@@ -68,7 +68,7 @@ fn as_read(mm: f64) -> f64 {
 
 impl Poses {
     /// How many. Fails where the numbers are no rows of this robot, or degrees.
-    pub fn rows(&self, robot: &Robot) -> Result<usize> {
+    pub(crate) fn rows(&self, robot: &Robot) -> Result<usize> {
         let (joints, found) = (robot.joints(), self.joints_rad.len());
         let rows = found / joints;
         if rows == 0 || found % joints != 0 {

@@ -252,7 +252,11 @@ impl ModelArguments {
     }
 
     /// Loads the model and says what is to be known of it; runs the pipeline's stages that are not done.
-    pub fn load(&self, purpose: Purpose, command_line: &[OsString]) -> Result<IdentifiedModel> {
+    pub(crate) fn load(
+        &self,
+        purpose: Purpose,
+        command_line: &[OsString],
+    ) -> Result<IdentifiedModel> {
         let wrong = [
             ("--max-shift", self.max_shift),
             ("--max-tilt", self.max_tilt),

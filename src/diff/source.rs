@@ -55,7 +55,7 @@ pub(super) struct TableFile {
 }
 
 impl TableFile {
-    pub fn open(path: &Path) -> Result<Self> {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
         let unreadable =
             |e: ParquetError| Error::spec(&place, format!("not a readable Parquet file: {e}"));

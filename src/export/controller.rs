@@ -15,16 +15,13 @@ use std::collections::BTreeSet;
 pub(super) const CONTROLLER: Format = Format {
     name: "controller",
     help: "Joint zeros, ratios, couplings and tool, as a list, as the controller counts its joints",
+    comment: "#",
     carries: CarriedTorques::Nothing,
     text,
 };
 
 fn text(export: &Export) -> Result<String> {
-    let mut text: String = export
-        .remarks_in(&CONTROLLER)
-        .iter()
-        .map(|line| format!("# {line}\n"))
-        .collect();
+    let mut text: String = export.head(&CONTROLLER);
     text.push_str(
         "# true position = factor * commanded + zero (+ coupling * the other joint); sigma is one standard deviation\n",
     );

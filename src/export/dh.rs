@@ -21,6 +21,7 @@ const POSES: usize = 500;
 pub(super) const DH: Format = Format {
     name: "dh",
     help: "calib's robot file with a Denavit-Hartenberg table",
+    comment: "#",
     carries: CarriedTorques::Nothing,
     text: |export| text(export, false),
 };
@@ -59,11 +60,7 @@ fn text(export: &Export, modified: bool) -> Result<String> {
         (now.forward(poses.q(row)).translation - then.forward(poses.q(row)).translation).norm()
     });
     let most = apart.fold(0.0, f64::max) * 1e3;
-    let mut out: String = export
-        .remarks_in(format)
-        .iter()
-        .map(|line| format!("# {line}\n"))
-        .collect();
+    let mut out: String = export.head(format);
     out.push_str(&format!(
         "# conversion to this table: {most:.1e} mm at most over {} poses\n",
         poses.rows()

@@ -12,6 +12,7 @@ use serde_json::{Map, Value, json};
 pub(super) const DYNAMICS: Format = Format {
     name: "dynamics",
     help: "Friction, inertials and all other causes of the torques with sigma, as plain JSON",
+    comment: "\"origin\"",
     carries: CarriedTorques::All,
     text,
 };

@@ -8,6 +8,7 @@ use serde_json::json;
 pub(super) const JSON: Format = Format {
     name: "json",
     help: "Everything: description, parameters with sigma, remarks",
+    comment: "\"origin\"",
     carries: CarriedTorques::All,
     text,
 };

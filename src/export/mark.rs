@@ -1,13 +1,13 @@
 //! Whose an export is: format, serial number and hash of the model, in a line of every file; and whether a file belongs to a model.
 
-use super::{Export, FORMATS};
+use super::{Export, FORMATS, Format};
 use crate::error::{Error, Result, one_line};
 use crate::table::{Robot, Table};
 use std::fmt;
 
 /// What stands in every export.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ExportMark {
+pub(crate) struct ExportMark {
     /// Of the file.
     pub(crate) format: String,
     /// Of the robot, where the pipeline's report states it.
@@ -119,7 +119,7 @@ impl Export {
             return Ok(Belonging::Other(found, own));
         }
         let written = (format.text)(self)?;
-        let (theirs, ours) = (content(text), content(&written));
+        let (theirs, ours) = (content(text, format), content(&written, format));
         let differs = (0..theirs.len().max(ours.len()))
             .find(|k| theirs.get(*k).map(|line| line.1) != ours.get(*k).map(|line| line.1));
         Ok(match differs {
@@ -134,13 +134,9 @@ impl Export {
     }
 }
 
-/// The lines that are no comments, with their numbers; of JSON without the one that names the run.
-fn content(text: &str) -> Vec<(usize, &str)> {
-    let is_comment = |line: &str| {
-        ["#", "<!--", "\"origin\""]
-            .iter()
-            .any(|mark| line.trim_start().starts_with(mark))
-    };
+/// The lines that are no comments, with their numbers.
+fn content<'t>(text: &'t str, format: &Format) -> Vec<(usize, &'t str)> {
+    let is_comment = |line: &str| line.trim_start().starts_with(format.comment);
     (1..)
         .zip(text.lines())
         .filter(|(_, line)| !is_comment(line) && !line.trim().is_empty())

@@ -15,6 +15,7 @@ const LEAST: [(&str, &str); 2] = [("boundmass", "0.001"), ("boundinertia", "1e-6
 pub(super) const MJCF: Format = Format {
     name: "mjcf",
     help: "MuJoCo model: bodies and joints at the corrected axes, the tool as a site",
+    comment: "<!--",
     carries: CarriedTorques::Causes(&[DAMPING, FRICTION, ARMATURE, DRIVE, SPRINGS[0], SPRINGS[1]]),
     text,
 };

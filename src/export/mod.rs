@@ -25,6 +25,8 @@ pub(crate) struct Format {
     pub(crate) name: &'static str,
     /// What it is, in one line.
     pub(crate) help: &'static str,
+    /// How lines begin that say whence it is, and may differ between exports of one model: comments, where it has some.
+    pub(crate) comment: &'static str,
     /// What it holds of identified torques.
     pub(crate) carries: CarriedTorques,
     /// The whole file. Fails where the format cannot hold this arm at all.

@@ -13,6 +13,7 @@ use std::io;
 pub(super) const SDF: Format = Format {
     name: "sdf",
     help: "Gazebo's and Drake's model: joints at the corrected axes, the tool as a frame",
+    comment: "<!--",
     carries: CarriedTorques::Causes(&[DAMPING, FRICTION]),
     text,
 };

@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, Vector3};
 pub(super) const UR_KINEMATICS: Format = Format {
     name: "ur_kinematics",
     help: "Universal Robots' kinematics_params_file, for their ROS drivers and ur_description",
+    comment: "#",
     carries: CarriedTorques::Nothing,
     text,
 };
@@ -76,11 +77,7 @@ fn text(export: &Export) -> Result<String> {
                        base_link); allowed for other arms: --format urdf, xacro";
         Error::data(&robot.name, message)
     })?;
-    let mut out: String = export
-        .remarks_in(&UR_KINEMATICS)
-        .iter()
-        .map(|line| format!("# {line}\n"))
-        .collect();
+    let mut out: String = export.head(&UR_KINEMATICS);
     let (mut before, mut links) = (base, String::new());
     for (index, (link, frame)) in LINKS.iter().zip(&nominal).enumerate() {
         let own = moved(

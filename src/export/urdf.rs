@@ -11,6 +11,7 @@ use std::io;
 pub(super) const URDF: Format = Format {
     name: "urdf",
     help: "Unified robot description: joints at the corrected axes",
+    comment: "<!--",
     carries: CarriedTorques::Causes(&[DAMPING, FRICTION]),
     text,
 };

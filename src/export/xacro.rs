@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 pub(super) const XACRO: Format = Format {
     name: "xacro",
     help: "An include with the corrected origins of the joints of the arm's own URDF",
+    comment: "<!--",
     carries: CarriedTorques::Nothing,
     text,
 };

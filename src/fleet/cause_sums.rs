@@ -169,7 +169,7 @@ impl GroupSums {
     }
 
     /// All cells in the place of a given one; of none: next to all.
-    pub fn cells<'a>(&'a self, given: &'a str) -> impl Iterator<Item = CellTotal<'a>> {
+    pub(crate) fn cells<'a>(&'a self, given: &'a str) -> impl Iterator<Item = CellTotal<'a>> {
         let mut shared: BTreeMap<&str, (f64, f64, f64, &str, &Sum)> = BTreeMap::new();
         let here = move || self.sums.iter().filter(move |(key, _)| key.0 == given);
         for ((_, cell, shape), sum) in here().filter(|(key, _)| !key.2.is_empty()) {

@@ -47,7 +47,7 @@ pub(crate) struct CauseSearch {
 
 impl CauseSearch {
     /// Nothing is given yet.
-    pub fn new(by: GroupColumn) -> Self {
+    pub(crate) fn new(by: GroupColumn) -> Self {
         Self {
             round: Round::first(by),
             groups: BTreeMap::new(),
@@ -235,7 +235,7 @@ pub struct Published {
 }
 
 /// Makes the tables and the page from the last round's records and publishes them.
-pub fn publish(
+pub(crate) fn publish(
     fleet: &Fleet,
     ledger: &Ledger,
     search: &CauseSearch,

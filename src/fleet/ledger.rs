@@ -183,7 +183,7 @@ impl Drop for Claim {
 
 impl<'a> Ledger<'a> {
     /// The records of a fleet in a store.
-    pub fn new(store: &'a Store, fleet: &str) -> Self {
+    pub(crate) fn new(store: &'a Store, fleet: &str) -> Self {
         Self {
             store,
             fleet: fleet.into(),
@@ -203,7 +203,7 @@ impl<'a> Ledger<'a> {
     }
 
     /// The record of a key; one that is torn, or whose tables are gone, is none.
-    pub fn find(&self, key: &str) -> Result<Option<RobotRecord>> {
+    pub(crate) fn find(&self, key: &str) -> Result<Option<RobotRecord>> {
         let note = self
             .store
             .note(&self.records(key), &format!("{key}.json"))?;

@@ -45,7 +45,7 @@ pub(crate) struct Fleet {
 
 impl Fleet {
     /// Reads FLEET.yaml and finds its robots; fails with every fault at once. A large recording table is parted into the store.
-    pub fn load(path: &Path, store: &Store) -> Result<Self> {
+    pub(crate) fn load(path: &Path, store: &Store) -> Result<Self> {
         let (file, tree) = FleetFile::load(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let pipeline = folder.join(&file.pipeline);

@@ -55,7 +55,7 @@ pub(super) struct Earlier {
 
 impl Earlier {
     /// The latest run of the fleet that the file names as `previous`, if it names one; fails where that fleet has none.
-    pub fn find(fleet: &Fleet, ledger: &Ledger) -> Result<Option<Self>> {
+    pub(crate) fn find(fleet: &Fleet, ledger: &Ledger) -> Result<Option<Self>> {
         fleet
             .file
             .previous

@@ -29,7 +29,7 @@ pub(crate) struct FleetSummary {
 }
 
 /// Makes the tables and the page from the records (in the order of the roster; none: missing) and publishes them.
-pub fn publish(
+pub(crate) fn publish(
     fleet: &Fleet,
     ledger: &Ledger,
     records: &[Option<RobotRecord>],

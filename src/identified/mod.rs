@@ -1,12 +1,13 @@
 //! The identified model of a run, or of tables that were taken out of a store: what commands are corrected with and what is exported.
 
-mod achieved;
 mod standing;
 mod torques;
 
-pub use achieved::{Achieved, RepeatedPose, achieved};
 use standing::unexplained_of;
-pub use standing::{convention_of, counted_otherwise, robot_file, standing_of, wrong_setup_of};
+pub use standing::{
+    Achieved, RepeatedPose, achieved, convention_of, counted_otherwise, robot_file, standing_of,
+    wrong_setup_of,
+};
 pub use torques::IdentifiedTorques;
 
 use crate::compensate::{

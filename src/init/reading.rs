@@ -2,12 +2,10 @@
 
 use super::sheet::Sheet;
 use crate::error::{Error, Result};
-use crate::program::listing;
 use crate::raw::{
-    self, BagTopic, InputSource, Record, Workbook, bag_content, failed, has_columns, is_bag,
-    is_utf16, is_workbook, not_read, shown,
+    self, BagTopic, InputSource, Record, Workbook, bag_content, failed, is_utf16, shown,
 };
-use crate::stage::ingest::{TableLayout, records};
+use crate::stage::ingest::{FileKind, TableLayout, records};
 use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
@@ -26,32 +24,29 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
     let understood = |sheets: Result<Vec<Sheet>, String>| {
         Ok(sheets.unwrap_or_else(|trouble| vec![Sheet::not_understood(trouble)]))
     };
-    let language = listing(&raw::ending(path), head);
-    if is_workbook(head) {
-        return understood(sheets(reader, places));
-    }
-    if is_bag(head) {
-        return understood(topics(path, &place).map_err(|error| error.to_string()));
-    }
-    if language.is_some() || has_columns(head) {
-        let mut file = reader.into_inner();
-        file.rewind().map_err(failed)?;
-        let sheet = first_rows(file, &place, None).map(|(names, rows)| {
-            // A name, then six joints.
-            let unit = |column| language.and((1..=6).contains(&column).then_some("deg"));
-            Sheet {
-                units: (0..names.len()).map(unit).collect(),
-                ..Sheet::of_columns(names, rows)
-            }
-        });
-        return understood(
-            sheet
-                .map(|one| vec![one])
-                .map_err(|error| error.to_string()),
-        );
-    }
-    if let Some(what) = not_read(head) {
-        return understood(Err(what.into()));
+    match FileKind::of(&place, head) {
+        FileKind::Workbook => return understood(sheets(reader, places)),
+        FileKind::Bag => {
+            return understood(topics(path, &place).map_err(|error| error.to_string()));
+        }
+        FileKind::NotRead(what) => return understood(Err(what.into())),
+        FileKind::Text => {}
+        // What says itself what its columns are.
+        kind => {
+            let mut file = reader.into_inner();
+            file.rewind().map_err(failed)?;
+            let sheet = first_rows(file, &place, None).map(|(names, rows)| {
+                // A name, then six joints.
+                let degrees =
+                    |column| matches!(kind, FileKind::Program(_)) && (1..=6).contains(&column);
+                let unit = |column| degrees(column).then_some("deg");
+                vec![Sheet {
+                    units: (0..names.len()).map(unit).collect(),
+                    ..Sheet::of_columns(names, rows)
+                }]
+            });
+            return understood(sheet.map_err(|error| error.to_string()));
+        }
     }
     if !is_utf16(head) && head.contains(&0) {
         return understood(Err("no text".into()));

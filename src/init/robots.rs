@@ -29,7 +29,7 @@ pub const KINDS: [RobotFileKind; 4] = [
 
 impl RobotFileKind {
     /// The typical arm or the arm of the library that is called so.
-    pub fn find(name: &str) -> Option<Self> {
+    pub(crate) fn find(name: &str) -> Option<Self> {
         let typical = KINDS.into_iter().find(|kind| kind.name() == name);
         typical.or_else(|| LibraryArm::find(name).map(Self::Arm))
     }
@@ -59,7 +59,7 @@ impl RobotFileKind {
     }
 
     /// How many. Fails with the faults of a file of the library, which would be a fault of calib.
-    pub fn joints(self) -> Result<usize> {
+    pub(crate) fn joints(self) -> Result<usize> {
         match self {
             Self::Arm(arm) => Ok(arm.read()?.robot.joints.len()),
             Self::Seven => Ok(7),

@@ -80,10 +80,6 @@ impl Place<'_> {
         let message = format!("expected a whole number from {least} to {most}, not {value}");
         self.must(allowed.contains(&value), message);
     }
-    /// How many faults were found.
-    pub fn count(&self) -> usize {
-        self.faults.len()
-    }
 }
 
 /// Everything that can go wrong, by who can mend it.

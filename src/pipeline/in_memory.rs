@@ -31,7 +31,7 @@ pub struct StageTables {
 
 impl StageTables {
     /// The table of a kind, if there is one.
-    pub fn kind(&self, kind: &str) -> Option<&Frame> {
+    pub(crate) fn kind(&self, kind: &str) -> Option<&Frame> {
         let mut frames = self.tables.iter().map(|(_, frame)| frame);
         frames.find(|frame| frame.kind() == kind)
     }

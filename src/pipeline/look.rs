@@ -4,8 +4,7 @@
 
 use super::plan::{InputFile, PlannedStage, Selection};
 use super::run_state::{KeyState, RunState};
-use super::spec;
-use super::{Override, Plan, reason, services};
+use super::{Override, Plan, reason, services, spec};
 use crate::error::{Error, Fault, Result};
 use crate::raw;
 use crate::stage::{

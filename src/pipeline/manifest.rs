@@ -255,7 +255,7 @@ impl Manifest {
     }
 
     /// The tables of a kind, in pipeline order.
-    pub fn tables<'o>(&'o self, kind: &'o str) -> impl Iterator<Item = &'o OutputRecord> {
+    pub(crate) fn tables<'o>(&'o self, kind: &'o str) -> impl Iterator<Item = &'o OutputRecord> {
         self.stages
             .iter()
             .flat_map(|stage| &stage.outputs)

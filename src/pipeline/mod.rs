@@ -15,7 +15,6 @@ mod spec;
 
 #[cfg(test)]
 mod tests;
-mod wiring;
 
 pub use in_memory::{StageCall, StageTables, run_in_memory};
 pub use look::{Forecast, Prospect, checked_plan, look, preview};

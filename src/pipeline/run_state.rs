@@ -58,7 +58,7 @@ pub(super) enum KeyState {
 }
 
 impl<'a> RunState<'a> {
-    pub fn new(plan: &'a Plan) -> Self {
+    pub(crate) fn new(plan: &'a Plan) -> Self {
         Self {
             plan,
             tables: vec![None; plan.stages.len()],

@@ -48,7 +48,7 @@ pub(super) struct StageMessages {
 }
 
 impl<'a> StageServices<'a> {
-    pub fn new(
+    pub(crate) fn new(
         id: &'a str,
         store: Option<&'a Store>,
         files: &'a [super::plan::InputFile],

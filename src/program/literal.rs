@@ -175,7 +175,7 @@ pub(super) enum Setting<T> {
 #[derive(Debug, Clone)]
 pub(super) struct ToolInForce {
     pub(crate) name: String,
-    pub frame: Option<Pose>,
+    pub(crate) frame: Option<Pose>,
 }
 
 /// At a motion.
@@ -247,7 +247,7 @@ impl InForce {
     };
 
     /// Where nothing is known, for one reason.
-    pub fn open(why: &str) -> Self {
+    pub(crate) fn open(why: &str) -> Self {
         let why = || why.to_string();
         Self {
             base: Setting::Open(why()),

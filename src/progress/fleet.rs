@@ -33,7 +33,7 @@ struct State {
 
 impl FleetProgress {
     /// One bar for `total` robots and a line for each worker.
-    pub fn new(verbosity: Verbosity, workers: usize, total: usize) -> Self {
+    pub(crate) fn new(verbosity: Verbosity, workers: usize, total: usize) -> Self {
         let terminal = verbosity == Verbosity::Normal && std::io::stderr().is_terminal();
         let bars = terminal.then(|| {
             let all = MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(8));
@@ -77,7 +77,7 @@ impl FleetProgress {
     }
 
     /// Takes the bars away.
-    pub fn finish(&self) {
+    pub(crate) fn finish(&self) {
         if let Some(bars) = &self.bars {
             bars.workers.iter().for_each(ProgressBar::finish_and_clear);
             bars.total.finish_and_clear();

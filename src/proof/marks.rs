@@ -6,9 +6,8 @@ use crate::raw;
 use crate::table::{Scoreboard, ScoreboardRow, Table};
 use crate::twin::reveal::board::Board;
 use crate::twin::reveal::left_out::left_out;
-use crate::twin::reveal::mark::{Case, mark};
+use crate::twin::reveal::mark::{Case, NAMELESS, mark};
 use crate::twin::reveal::paper::{Answer, Truth};
-use crate::twin::reveal::place::NAMELESS;
 use parquet::arrow::ArrowWriter;
 use std::path::Path;
 

@@ -25,6 +25,8 @@ const LONGEST: usize = 256;
 /// How Parquet begins, and Feather of version 1 and of version 2.
 const PARQUET: &[u8] = b"PAR1";
 const FEATHER: [&[u8]; 2] = [b"FEA1", b"ARROW1"];
+/// Bytes that a column of one batch unpacks to, at most.
+const MOST_UNPACKED: i64 = 1 << 30;
 /// How a stream of Arrow begins: a message of some length follows.
 const STREAM: &[u8] = b"\xff\xff\xff\xff";
 
@@ -90,10 +92,12 @@ impl ColumnRows {
             });
             ("an archive of NumPy arrays", table)
         } else if content.starts_with(STREAM) {
-            let file = decoded(|| StreamReader::try_new(Cursor::new(content), None));
+            let file = bounded(&content)
+                .and_then(|()| decoded(|| StreamReader::try_new(Cursor::new(content), None)));
             ("a stream of Arrow", file.and_then(batches_of))
         } else {
-            let file = decoded(|| FileReader::try_new(Cursor::new(content), None));
+            let file = bounded(&content)
+                .and_then(|()| decoded(|| FileReader::try_new(Cursor::new(content), None)));
             ("a Feather file", file.and_then(batches_of))
         };
         let (schema, all, batches) = opened.map_err(|error| broken(label, what, error))?;
@@ -184,6 +188,46 @@ impl RecordReader for ColumnRows {
 /// The fault of a file whose decoder gives up.
 fn broken(label: &str, what: &str, error: impl Display) -> Error {
     Error::data(label, format!("is {what} that cannot be read: {error}"))
+}
+
+/// Refuses messages of Arrow whose columns unpack to more than may be: the decoder asks for that memory unseen, and ends the program where it
+/// is not granted. What else is wrong is the decoder's to say.
+fn bounded(content: &[u8]) -> std::result::Result<(), String> {
+    let first = content.chunks(8).position(|at| at.starts_with(STREAM));
+    let mut at = 8 * first.unwrap_or(content.len());
+    while let Some((message, body)) = message(content, at) {
+        let beyond = |by: i64| body.saturating_add(usize::try_from(by).unwrap_or(usize::MAX));
+        let batch = message.header_as_record_batch().or_else(|| {
+            let dictionary = message.header_as_dictionary_batch();
+            dictionary.and_then(|dictionary| dictionary.data())
+        });
+        let packed = batch.filter(|batch| batch.compression().is_some());
+        for buffer in packed.iter().filter_map(|batch| batch.buffers()).flatten() {
+            let stated = content.get(beyond(buffer.offset())..);
+            let stated = stated
+                .and_then(<[u8]>::first_chunk)
+                .filter(|_| buffer.length() > 0);
+            let bytes = stated.map_or(0, |bytes| i64::from_le_bytes(*bytes));
+            // -1: it is not packed.
+            if !(-1..=MOST_UNPACKED).contains(&bytes) {
+                return Err(format!(
+                    "a column unpacks to {bytes} bytes; allowed: {} GB a batch",
+                    MOST_UNPACKED >> 30
+                ));
+            }
+        }
+        at = beyond(message.bodyLength());
+    }
+    Ok(())
+}
+
+/// The message of Arrow that begins at a place, and where its columns begin.
+fn message(content: &[u8], at: usize) -> Option<(arrow_ipc::Message<'_>, usize)> {
+    let length = content.get(at..)?.strip_prefix(STREAM)?.first_chunk()?;
+    let head = at + 2 * STREAM.len();
+    let body = head.checked_add(u32::from_le_bytes(*length) as usize)?;
+    let message = arrow_ipc::root_as_message(content.get(head..body)?).ok()?;
+    Some((message, body))
 }
 
 /// Columns of Arrow as they stand in memory, in a Feather file, as pandas, polars and R write them, or in a stream; uncompressed or by zstd.

@@ -223,7 +223,7 @@ pub struct TextRows<R> {
 
 impl<R: BufRead> TextRows<R> {
     /// Opens a text without a byte-order mark and skips what stands above header and data.
-    pub fn open(mut reader: R, label: &str, layout: TextLayout) -> Result<Self> {
+    pub(crate) fn open(mut reader: R, label: &str, layout: TextLayout) -> Result<Self> {
         let head = reader.fill_buf().map_err(|error| failed(label, &error))?;
         // Old Macintosh; one at the end may be a CRLF that was cut.
         let lone = head

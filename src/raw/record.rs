@@ -46,7 +46,7 @@ impl Record {
         self.fault = None;
     }
     /// Adds a field.
-    pub fn push(&mut self, field: &[u8]) {
+    pub(crate) fn push(&mut self, field: &[u8]) {
         if !self.fields.is_empty() {
             self.text.push(b',');
         }

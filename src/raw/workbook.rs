@@ -94,7 +94,7 @@ impl Workbook {
     }
 
     /// The visible sheets with rows of numbers.
-    pub fn tables(&mut self) -> Result<Vec<String>, String> {
+    pub(crate) fn tables(&mut self) -> Result<Vec<String>, String> {
         let visible = self
             .book
             .sheets_metadata()

@@ -1,11 +1,16 @@
 //! The first page: what was calibrated with what, how accurate it is, whether that is accepted, under which conditions, and what was not seen.
 //!
 //! The verdict against the user's limits: figures of the held-out points of the model that stands, each next to its limit.
+//!
+//! The page of a verification: errors before, predicted and achieved, and the poses that were repeated often enough for ISO 9283.
 
-use super::Tables;
-use super::errors::{Steps, before};
-use super::findings::wrong_setup;
-use super::language::{Locale, say};
+use crate::error::Result;
+use crate::report::Tables;
+use crate::report::errors::{Steps, before};
+use crate::report::findings::wrong_setup;
+use crate::report::language::{Locale, say};
+use crate::report::number::{count, render};
+use crate::report::workspace::{StepErrors, histogram};
 use crate::table::{AcceptanceRow, StatisticsRow, VerdictRow, VerdictTopic};
 use crate::units::Unit;
 use serde_json::{Value, json};
@@ -112,7 +117,11 @@ pub(super) fn judged<'a>(tables: &'a Tables, set: Option<&str>) -> Option<&'a St
 
 impl<'a> Judgement<'a> {
     /// None where there are no limits and the set-up is right.
-    pub fn new(tables: &'a Tables, limits: &AcceptanceLimits, set: Option<&str>) -> Option<Self> {
+    pub(crate) fn new(
+        tables: &'a Tables,
+        limits: &AcceptanceLimits,
+        set: Option<&str>,
+    ) -> Option<Self> {
         let figures = [
             ("mean", limits.mean_mm),
             ("95 % of the points", limits.p95_mm),
@@ -199,4 +208,58 @@ impl<'a> Judgement<'a> {
             .iter()
             .filter_map(|row| Some((row, row.found_mm?)))
     }
+}
+
+/// What the page shows; lengths in mm.
+pub struct AchievedTables<'a> {
+    /// Heading.
+    pub(crate) title: &'a str,
+    /// Where the model is from.
+    pub(crate) model: &'a str,
+    /// Name, mean, 95th percentile, largest, and what they are of.
+    pub(crate) rows: Vec<(&'static str, [f64; 3], String)>,
+    /// Errors of the uncorrected targets, by the model, and of the measured points.
+    pub(crate) errors: [Vec<f64>; 2],
+    /// Cycles, accuracy and repeatability.
+    pub(crate) poses: Vec<(usize, f64, f64)>,
+    /// What to know of the figures, a sentence each.
+    pub(crate) remarks: Vec<String>,
+}
+
+/// The page as one file that needs no other.
+pub fn achieved_page(tables: &AchievedTables) -> Result<String> {
+    let locale = Locale::default();
+    let errors = tables
+        .errors
+        .iter()
+        .zip([("before", "s0"), ("achieved", "s-last")])
+        .map(|(lengths, (step, colour))| {
+            let mut sorted_mm = lengths.clone();
+            sorted_mm.sort_by(f64::total_cmp);
+            let mean_mm = sorted_mm.iter().sum::<f64>() / sorted_mm.len().max(1) as f64;
+            StepErrors {
+                step: step.into(),
+                colour: colour.into(),
+                sorted_mm,
+                mean_mm,
+            }
+        });
+    let errors: Vec<StepErrors> = errors
+        .filter(|errors| !errors.sorted_mm.is_empty())
+        .collect();
+    let page = json!({
+        "title": tables.title,
+        "model": tables.model,
+        "points": count(tables.errors[1].len() as i64),
+        "rows": &tables.rows,
+        "remarks": &tables.remarks,
+        "picture": histogram(&locale, &errors, "Histogram of the position error before and after correction"),
+        "poses": (1..).zip(&tables.poses).collect::<Vec<(i64, _)>>(),
+    });
+    render(
+        &locale,
+        "achieved.html",
+        include_str!("achieved.html"),
+        page,
+    )
 }

@@ -18,7 +18,7 @@ pub(super) struct Steps {
 
 impl Steps {
     /// `standing` is the step that the report speaks of; without one, the last.
-    pub fn new(statistics: &Statistics, standing: Option<&str>) -> Self {
+    pub(crate) fn new(statistics: &Statistics, standing: Option<&str>) -> Self {
         let names: BTreeMap<i64, String> = statistics
             .0
             .iter()

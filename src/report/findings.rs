@@ -1,9 +1,15 @@
 //! What was left out of the simulation: the diagnosis' verdict, its findings with their curves, what it could not see.
+//!
+//! The picture of the table of causes: findings and residual, by place and kind of variable.
 
-use super::Tables;
-use super::language::{Locale, say};
-use super::svg::{Area, Scale, Svg, baseline, label, name_x, name_y};
-use crate::table::{CurveRow, FindingRow, VerdictTopic, formula_in_words};
+use crate::error::Result;
+use crate::report::Tables;
+use crate::report::language::{Locale, say};
+use crate::report::number::render;
+use crate::report::svg::{Area, Scale, Svg, baseline, label, name_x, name_y};
+use crate::table::{
+    CauseGrid, Cells, CurveRow, FindingRow, Findings, VerdictRow, VerdictTopic, formula_in_words,
+};
 use crate::units::Unit;
 use serde_json::{Value, json};
 
@@ -46,7 +52,7 @@ pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
         "noise_arcsec": arcsec(verdict.noise_floor_rad),
         "leftover_arcsec": arcsec(verdict.leftover_rms_rad),
         "repeatability_arcsec": arcsec(Some(verdict.repeatability_rad)),
-        "causes": tables.cells.last().zip(tables.findings.last()).and_then(|(cells, findings)| super::causes::picture(cells, findings)),
+        "causes": tables.cells.last().zip(tables.findings.last()).and_then(|(cells, findings)| picture(cells, findings)),
         // Of which evidence the meaning is stated.
         "meanings": EVIDENCE.iter().filter(|column| shown(column)).collect::<Vec<_>>(),
         "findings": findings,
@@ -214,4 +220,34 @@ fn pictures(locale: &Locale, finding: &FindingRow, curve: &[&CurveRow]) -> Vec<(
             ),
         ),
     ]
+}
+
+/// What the macro `causes` of the page draws; none where nothing was asked.
+pub(super) fn picture(cells: &Cells, findings: &Findings) -> Option<CauseGrid> {
+    Some(CauseGrid::of(cells, findings)).filter(|grid| !grid.rows.is_empty())
+}
+
+/// A diagnosis as one file that needs no other; `origin` is the run, `next` what to measure next, a sentence each.
+pub fn diagnosed_page(
+    title: &str,
+    origin: &str,
+    verdict: &VerdictRow,
+    (cells, findings): (&Cells, &Findings),
+    next: &[String],
+) -> Result<String> {
+    let locale = Locale::default();
+    let page = json!({
+        "title": title,
+        "run": origin,
+        "verdict": verdict,
+        "causes_found": picture(cells, findings),
+        "findings": &findings.0,
+        "next": next,
+    });
+    render(
+        &locale,
+        "diagnosed.html",
+        include_str!("diagnosed.html"),
+        page,
+    )
 }

@@ -2,8 +2,6 @@
 //!
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
 
-mod achieved;
-mod causes;
 mod certificate;
 mod closure;
 mod data;
@@ -12,7 +10,6 @@ mod findings;
 mod fits;
 pub mod fleet;
 pub mod fleet_causes;
-mod json;
 mod language;
 mod number;
 mod parameters;
@@ -20,9 +17,8 @@ mod svg;
 mod torques;
 mod workspace;
 
-pub use achieved::{AchievedTables, achieved_page};
-pub use causes::diagnosed_page;
-pub use certificate::AcceptanceLimits;
+pub use certificate::{AcceptanceLimits, AchievedTables, achieved_page};
+pub use findings::diagnosed_page;
 pub use language::PageLanguage;
 use language::{Locale, say};
 pub use torques::{TorqueTables, torque_page};
@@ -148,7 +144,7 @@ pub(crate) fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
         let title = title.unwrap_or_else(|| say!(locale, "Calibration of {robot}", robot));
         (robot, title)
     };
-    let json = json::document(
+    let json = data::document(
         tables,
         options,
         head(&Locale::default()),

@@ -17,7 +17,7 @@ pub(super) struct Svg<'a> {
 }
 
 impl<'a> Svg<'a> {
-    pub fn new(locale: &'a Locale, width: f64, height: f64) -> Self {
+    pub(crate) fn new(locale: &'a Locale, width: f64, height: f64) -> Self {
         Self {
             locale,
             width,
@@ -78,7 +78,7 @@ impl<'a> Svg<'a> {
         );
     }
     /// The `svg` element; `title` is what a screen reader says.
-    pub fn finish(self, title: &str) -> String {
+    pub(crate) fn finish(self, title: &str) -> String {
         format!(
             "<svg class=\"chart\" viewBox=\"0 0 {} {}\" role=\"img\">\n<title>{}</title>\n{}</svg>",
             tenth(self.width),
@@ -118,7 +118,7 @@ pub(super) struct Area {
 
 impl Area {
     /// Left, top, right, bottom.
-    pub fn new([left, top, right, bottom]: [f64; 4]) -> Self {
+    pub(crate) fn new([left, top, right, bottom]: [f64; 4]) -> Self {
         Self {
             left,
             top,

@@ -41,7 +41,7 @@ pub(super) struct Colours {
 
 impl Colours {
     /// Round edges from below the median error of `after` to within the largest errors of `before`.
-    pub fn new(before: &Prediction, after: &Prediction) -> Self {
+    pub(crate) fn new(before: &Prediction, after: &Prediction) -> Self {
         let quantile = |table: &Prediction, share: f64| {
             let mut errors: Vec<f64> = table.0.iter().map(|row| row.error_mm).collect();
             errors.sort_by(f64::total_cmp);

@@ -36,7 +36,7 @@ impl KnownModel<'_> {
 }
 
 /// How many held-out points have a remark, of how many, in a sentence; none where none has.
-pub fn sentence(prediction: &Prediction) -> Option<String> {
+pub(crate) fn sentence(prediction: &Prediction) -> Option<String> {
     let held_out = || prediction.0.iter().filter(|row| row.held_out);
     let remarked: Vec<&PredictionRow> = held_out().filter(|row| row.remark.is_some()).collect();
     (!remarked.is_empty()).then(|| {

@@ -6,7 +6,6 @@
 
 mod arm;
 mod bind;
-mod channel;
 mod check;
 mod clock;
 mod columns;
@@ -15,7 +14,6 @@ mod held;
 mod joined;
 mod later;
 mod layout;
-mod listing;
 mod mapped;
 mod motion;
 mod noise;
@@ -39,6 +37,7 @@ pub use mapped::{
 };
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
+pub(crate) use reading::FileKind;
 pub use reading::{TableLayout, records};
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 

@@ -202,7 +202,7 @@ pub struct StreamedTable<T>(Streamed, PhantomData<fn() -> T>);
 
 impl<T: Table> StreamedTable<T> {
     /// A finished table of this kind; panics where it is another.
-    pub fn new(streamed: Streamed) -> Self {
+    pub(crate) fn new(streamed: Streamed) -> Self {
         assert_eq!(streamed.kind, T::KIND, "a sink of another kind");
         Self(streamed, PhantomData)
     }
@@ -253,7 +253,7 @@ pub struct Chunks<T>(InputTable, PhantomData<fn() -> T>);
 
 impl<T: Table> Chunks<T> {
     /// How many rows.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.0.rows()
     }
 

@@ -11,10 +11,10 @@ crate::stage::identified::identification! {
     /// Settings of `stiffness`.
     pub struct Stiffness {
         /// Sets of the split to fit: loaded poses.
-        pub on: Vec<String>,
+        pub(crate) on: Vec<String>,
         /// Joints to estimate, from 1; all that the data see if empty.
         #[serde(default)]
-        pub joints: Vec<usize>,
+        pub(crate) joints: Vec<usize>,
     }
 }
 

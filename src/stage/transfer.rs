@@ -20,7 +20,7 @@ crate::stage::identified::identification! {
     pub struct Transfer {
         /// Sets of the split by which the base is found.
         #[serde(default = "fit_set")]
-        pub on: Vec<String>,
+        pub(crate) on: Vec<String>,
     }
 }
 

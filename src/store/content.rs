@@ -16,7 +16,7 @@ pub struct TableHash(String);
 
 impl TableHash {
     /// Hexadecimal.
-    pub fn as_str(&self) -> &str {
+    pub(crate) fn as_str(&self) -> &str {
         &self.0
     }
 }

@@ -216,7 +216,7 @@ pub struct TextCells(StringBuilder);
 
 impl TextCells {
     /// Adds a cell; none is null.
-    pub fn push(&mut self, text: Option<&str>) {
+    pub(crate) fn push(&mut self, text: Option<&str>) {
         self.0.append_option(text);
     }
     /// The column so far; what follows begins another.

@@ -109,7 +109,7 @@ impl FileHash {
         }
     }
     /// Hexadecimal.
-    pub fn as_str(&self) -> &str {
+    pub(crate) fn as_str(&self) -> &str {
         &self.0
     }
 }

@@ -17,7 +17,6 @@ pub(crate) mod runs;
 #[cfg(feature = "s3")]
 mod s3;
 pub mod schema;
-mod sweep;
 mod verify;
 pub(crate) mod writer;
 
@@ -27,8 +26,7 @@ pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableR
 pub(crate) use reader::table_of_bytes;
 pub use reader::{Loose, PublishedTable, read_table};
 pub use runs::{Link, Run, Sealed};
-pub use sweep::Sweep;
-pub use verify::Verification;
+pub use verify::{Sweep, Verification};
 pub use writer::{FinishedFile, TableWriter};
 
 use crate::error::{Error, Result};

@@ -5,8 +5,7 @@
 use super::content::{TableHash, hash_of_columns};
 use super::disk::refused;
 use super::frame::{Frame, FrameBuilder};
-use super::key::FileHash;
-use super::key::TableRef;
+use super::key::{FileHash, TableRef};
 use super::schema::{self, Version};
 use super::writer::{CONTENT_HASH, SCHEMA, UNITS};
 use crate::error::{Error, Fault, Result};
@@ -61,7 +60,7 @@ impl PublishedTable {
     }
 
     /// How many rows.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.table.rows as usize
     }
 
@@ -282,7 +281,7 @@ impl Decoded {
         self.said.get(key).map(String::as_str)
     }
 
-    pub fn rows(&self) -> u64 {
+    pub(crate) fn rows(&self) -> u64 {
         self.batch.num_rows() as u64
     }
 

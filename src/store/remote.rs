@@ -5,12 +5,11 @@
 //! store is opened, records when they are looked up, tables when they are needed; what does not have the hash of its name is not taken.
 //! What is for people (`tables/`, `documents/`) lies in the folder alone, where every run puts it.
 
-use super::Bucket;
-use super::Store;
 use super::disk::{
     component, make_dir, make_read_only, place, put_if_absent, refused, together, write,
 };
 use super::key::{TableRef, same_bytes};
+use super::{Bucket, Store};
 use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::fmt::Debug;
@@ -67,7 +66,7 @@ impl Store {
 
     /// Opens `s3://BUCKET/PREFIX` with a folder below `cache` before it. `settings` are the environment's `AWS_...`.
     #[cfg(feature = "s3")]
-    pub fn open_s3(
+    pub(crate) fn open_s3(
         url: &str,
         settings: &std::collections::BTreeMap<String, String>,
         cache: &Path,

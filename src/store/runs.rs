@@ -18,7 +18,6 @@ use std::path::{Path, PathBuf};
 /// A run in flight.
 #[derive(Debug)]
 pub struct Run {
-    id: String,
     dir: PathBuf,
     events: File,
     chain: blake3::Hasher,
@@ -46,10 +45,6 @@ pub struct Sealed {
 const EVENT_DIGITS: usize = 16;
 
 impl Run {
-    /// ULID: ids sort by time.
-    pub fn id(&self) -> &str {
-        &self.id
-    }
     /// Its folder.
     pub fn dir(&self) -> &PathBuf {
         &self.dir
@@ -159,7 +154,6 @@ impl Store {
                 .map_err(|e| refused(&path, "write", &e))?;
             self.owe_folder(&self.root().join("runs"));
             Ok(Run {
-                id: id.into(),
                 dir: dir.clone(),
                 events,
                 chain: blake3::Hasher::new(),

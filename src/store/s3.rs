@@ -42,7 +42,7 @@ pub(super) struct S3 {
 
 impl S3 {
     /// Nothing is asked yet.
-    pub fn open(url: &str, settings: &BTreeMap<String, String>) -> Result<Self> {
+    pub(crate) fn open(url: &str, settings: &BTreeMap<String, String>) -> Result<Self> {
         let shape = || Error::spec(url, "expected s3://BUCKET/PREFIX");
         let rest = url
             .strip_prefix("s3://")

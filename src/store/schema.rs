@@ -201,7 +201,7 @@ impl TableSchema {
     }
 
     /// `recording/1.0.0`.
-    pub fn id(&self) -> String {
+    pub(crate) fn id(&self) -> String {
         format!("{}/{}", self.name, self.version)
     }
 

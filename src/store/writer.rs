@@ -4,8 +4,7 @@ use super::check;
 use super::content::ContentHasher;
 use super::disk::{Workspace, refused};
 use super::frame::Frame;
-use super::key::FileHash;
-use super::key::TableRef;
+use super::key::{FileHash, TableRef};
 use super::schema::TableSchema;
 use crate::error::{Error, Result};
 use arrow::array::{Array, ArrayRef, AsArray, RecordBatch};
@@ -121,11 +120,6 @@ impl TableWriter {
         let mut aside = EncodingThread::new(*open);
         aside.push(chunk.batch())?;
         Ok(WriterState::Aside(aside))
-    }
-
-    /// Taken so far.
-    pub fn rows(&self) -> u64 {
-        self.rows
     }
 
     /// Closes the file.

@@ -3,7 +3,6 @@
 mod columns;
 mod diagnosis;
 mod estimate;
-mod first_look;
 #[cfg(feature = "query")]
 mod grid;
 mod in_short;
@@ -16,7 +15,6 @@ mod short_finding;
 
 pub use columns::{columns, columns_json, effects_json};
 pub use diagnosis::DiagnosisSummary;
-pub use first_look::first_look;
 #[cfg(feature = "query")]
 pub use grid::grid;
 #[cfg(feature = "query")]
@@ -27,7 +25,7 @@ pub use in_short::{
 };
 pub use limits::LimitsSummary;
 pub use rival_changes::{RivalChange, rival_changes};
-pub use run::{explanation, graph, run, stage, status};
+pub use run::{explanation, first_look, graph, run, stage, status};
 pub use run_diff::run_diff;
 pub use screen::{LABEL, folded, labelled};
 

@@ -66,7 +66,7 @@ impl Found {
     }
 
     /// All of it for other programs.
-    pub fn document(&self) -> Value {
+    pub(crate) fn document(&self) -> Value {
         let mut document = self.document.clone();
         document["parameters"] = picked_of(&self.numbers, "name value unit sigma");
         document["rivals"] = picked_of(&self.rivals, "effect where=place delta_bic probability");

@@ -303,7 +303,7 @@ impl Forms {
 
 impl Forms {
     /// The formulas of a finding as JSON.
-    pub fn document(&self, rank: i64) -> Vec<Value> {
+    pub(crate) fn document(&self, rank: i64) -> Vec<Value> {
         let one = |rows: &[FormRow]| {
             let columns = "formula price proposed folds_rms_mm curve_rms_mm without_rms_mm";
             let mut form = picked(&rows[0], columns);

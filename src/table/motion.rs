@@ -114,7 +114,7 @@ impl PerJoint {
 
 impl ArmMotion {
     /// How many rows.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.sequence.len()
     }
 }

@@ -341,7 +341,7 @@ fn interleave(columns: &[Vec<f64>]) -> Vec<f64> {
 
 impl Split {
     /// Rows of the recording in any of `sets`. A set without rows, or a split of another recording, is an error.
-    pub fn rows(&self, recording: &Recording, sets: &[String]) -> Result<Vec<usize>> {
+    pub(crate) fn rows(&self, recording: &Recording, sets: &[String]) -> Result<Vec<usize>> {
         let same = self.0.len() == recording.rows()
             && self
                 .0

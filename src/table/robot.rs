@@ -483,7 +483,7 @@ macro_rules! of_one_robot {
     ($table:ident, $kind:literal) => {
         impl $table {
             /// The same as the model of this robot.
-            pub fn of_robot(mut self, robot: &RobotDescription) -> Self {
+            pub(crate) fn of_robot(mut self, robot: &RobotDescription) -> Self {
                 let RobotIdentity { name, kinematics } = RobotIdentity::of(robot);
                 for row in &mut self.0 {
                     (row.robot, row.kinematics) = (Some(name.clone()), Some(kinematics.clone()));
@@ -492,14 +492,14 @@ macro_rules! of_one_robot {
             }
 
             /// Whether the table says of which robot it is.
-            pub fn says_its_robot(&self) -> bool {
+            pub(crate) fn says_its_robot(&self) -> bool {
                 self.0
                     .iter()
                     .all(|row| row.robot.is_some() && row.kinematics.is_some())
             }
 
             /// Fails where the table says that it is the model of another robot.
-            pub fn must_be_of(&self, robot: &RobotDescription) -> Result<()> {
+            pub(crate) fn must_be_of(&self, robot: &RobotDescription) -> Result<()> {
                 let other = RobotIdentity::of(robot);
                 let mut stated = self
                     .0

@@ -6,8 +6,7 @@
 
 use super::{Frame, Prediction};
 use crate::error::Result;
-use crate::estimate::autocorrelation_time;
-use crate::estimate::fisher::tail;
+use crate::estimate::{autocorrelation_time, tail};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -110,7 +109,7 @@ impl fmt::Display for Contradicted {
 
 impl Standing {
     /// What a person must know of the choice, a sentence each.
-    pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
+    pub(crate) fn warnings(&self) -> impl Iterator<Item = String> + '_ {
         self.withdrawn
             .iter()
             .map(ToString::to_string)

@@ -364,7 +364,7 @@ impl TorqueCovariance {
     }
 
     /// Covariance of a model's numbers in the order of its names, row-major. Fails where a pair is missing or a term has no cause.
-    pub fn of_model(&self, model: &TorqueModel) -> Result<Vec<f64>> {
+    pub(crate) fn of_model(&self, model: &TorqueModel) -> Result<Vec<f64>> {
         let names = model.names()?;
         let width = names.len();
         let places: BTreeMap<&str, usize> = names

@@ -2,10 +2,14 @@
 //!
 //! Frame j sits on body j with its origin on the axis of joint j; at the zero pose of the nominal arm it is parallel to the base.
 //! `T_j = T_(j-1) * (span and elastic motion of link j-1) * (motion of joint j)`.
+//!
+//! What effects add to the arm in one row.
+//!
+//! Statics: forces and moments summed over bodies.
 
-use super::matrix::{self, Matrix, Vector};
-use super::motion::Motion;
-use super::truth::TrueRobot;
+use crate::matrix;
+use crate::matrix::{IDENTITY, Matrix, Vector};
+use crate::truth::{ARCSEC, TrueRobot};
 use calib_foundation::description::{JointKind, RobotDescription};
 
 /// A joint with the link that it moves, in the frame of that link.
@@ -117,4 +121,178 @@ impl Arm {
             axes,
         }
     }
+}
+
+/// A share of a rigid step: a shift (um) after a rotation vector (arcsec).
+pub(crate) fn step(shift_um: Vector, turn_arcsec: Vector, share: f64) -> Matrix {
+    let moved = matrix::shift(matrix::scale(shift_um, 1e-6 * share));
+    matrix::times(
+        &moved,
+        &matrix::turn_by(matrix::scale(turn_arcsec, ARCSEC * share)),
+    )
+}
+
+/// What effects do to the arm.
+#[derive(Debug, Clone)]
+pub struct Motion {
+    /// Motion of the tracker's frame.
+    pub(crate) tracker: Matrix,
+    /// Motion of the base, base frame.
+    pub(crate) base: Matrix,
+    /// Added to each joint, rad or m.
+    pub joint: Vec<f64>,
+    /// Motion of each link's far end, in the frame of the link, about that end.
+    pub(crate) link_end: Vec<Matrix>,
+    /// Shift of the measured point, last link's frame, m.
+    pub(crate) tool: Vector,
+    /// What turns each joint besides gravity, Nm: springs and hoses. The gear carries it too.
+    pub(crate) load: Vec<f64>,
+    /// What each motor carries besides gravity, Nm at the joint.
+    pub(crate) motor_torque: Vec<f64>,
+}
+
+impl Motion {
+    /// No motion of an arm with so many joints.
+    pub fn none(joints: usize) -> Motion {
+        Motion {
+            tracker: IDENTITY,
+            base: IDENTITY,
+            joint: vec![0.0; joints],
+            link_end: vec![IDENTITY; joints],
+            tool: [0.0; 3],
+            load: vec![0.0; joints],
+            motor_torque: vec![0.0; joints],
+        }
+    }
+
+    /// Moves the base about a point of it, m.
+    pub(crate) fn move_base(&mut self, pivot: Vector, by: &Matrix) {
+        let about = matrix::times(by, &matrix::shift(matrix::scale(pivot, -1.0)));
+        self.base = matrix::times(&self.base, &matrix::times(&matrix::shift(pivot), &about));
+    }
+
+    /// Moves the far end of a link (from 0), in its frame.
+    pub(crate) fn move_end(&mut self, link: usize, by: &Matrix) {
+        self.link_end[link] = matrix::times(&self.link_end[link], by);
+    }
+
+    /// Moves the axis of a joint (from 0), seen from the body that carries it; the first stands on the base, at its foot.
+    pub(crate) fn move_axis(&mut self, foot: Vector, joint: usize, by: &Matrix) {
+        match joint.checked_sub(1) {
+            Some(link) => self.move_end(link, by),
+            None => self.move_base(foot, by),
+        }
+    }
+
+    /// The largest difference of any number, rad, m or Nm; the motors' torque does not move the arm.
+    pub(crate) fn distance(&self, other: &Motion) -> f64 {
+        let apart = |a: &Matrix, b: &Matrix| {
+            a.as_flattened()
+                .iter()
+                .zip(b.as_flattened())
+                .map(|(x, y)| (x - y).abs())
+                .fold(0.0, f64::max)
+        };
+        let joints = self
+            .joint
+            .iter()
+            .zip(&other.joint)
+            .map(|(a, b)| (a - b).abs());
+        let links = self
+            .link_end
+            .iter()
+            .zip(&other.link_end)
+            .map(|(a, b)| apart(a, b));
+        let loads = self
+            .load
+            .iter()
+            .zip(&other.load)
+            .map(|(a, b)| (a - b).abs());
+        let frames = [
+            apart(&self.base, &other.base),
+            apart(&self.tracker, &other.tracker),
+        ];
+        joints
+            .chain(links)
+            .chain(loads)
+            .chain(frames)
+            .fold(matrix::norm(matrix::minus(self.tool, other.tool)), f64::max)
+    }
+}
+
+/// Bodies with weight, in the base frame: the link that carries it (the payload: one past the last), mass in kg, centre.
+#[derive(Debug, Clone)]
+pub(crate) struct Loads {
+    bodies: Vec<(usize, f64, Vector)>,
+    gravity: Vector,
+}
+
+impl Loads {
+    /// The links and the declared payload (kg) of an arm in `posture`.
+    pub(crate) fn new(arm: &Arm, posture: &Posture, payload: f64) -> Loads {
+        let mut bodies: Vec<(usize, f64, Vector)> =
+            (arm.links.iter().zip(&posture.frames).enumerate())
+                .map(|(index, (link, frame))| (index, link.mass, matrix::place(frame, link.centre)))
+                .collect();
+        if let Some(hand) = posture.frames.last() {
+            // Beyond the last link: it bends that link too.
+            bodies.push((
+                arm.links.len(),
+                payload * arm.payload_share,
+                matrix::place(hand, arm.payload_centre),
+            ));
+        }
+        Loads {
+            bodies,
+            gravity: arm.gravity,
+        }
+    }
+
+    /// Force (N) and moment about `point` (Nm) of the weight of everything from link `from` (from 0) on, base frame.
+    pub(crate) fn wrench(&self, from: usize, point: Vector) -> (Vector, Vector) {
+        let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
+        for (_, mass, centre) in self.bodies.iter().filter(|(link, _, _)| *link >= from) {
+            let weight = matrix::scale(self.gravity, *mass);
+            force = matrix::add(force, weight);
+            moment = matrix::add(moment, matrix::cross(matrix::minus(*centre, point), weight));
+        }
+        (force, moment)
+    }
+
+    /// What gravity does to each joint along its axis, Nm (N for a prismatic joint).
+    pub(crate) fn torques(&self, arm: &Arm, posture: &Posture) -> Vec<f64> {
+        let joints = arm
+            .links
+            .iter()
+            .zip(&posture.frames)
+            .zip(&posture.axes)
+            .enumerate();
+        joints
+            .map(|(index, ((link, frame), axis))| {
+                let (force, moment) = self.wrench(index, matrix::origin(frame));
+                matrix::dot(*axis, if link.revolute { moment } else { force })
+            })
+            .collect()
+    }
+}
+
+/// What holds in one row besides the loads.
+#[derive(Debug, Clone)]
+pub struct Row {
+    /// Joint positions that the controller reports, rad or m.
+    pub command: Vec<f64>,
+    /// Joint positions at the gears' outputs without load, rad or m.
+    pub drive: Vec<f64>,
+    /// +1, -1 or 0: last move of each joint.
+    pub direction: Vec<f64>,
+    /// s.
+    pub time_s: f64,
+    /// C.
+    pub temperature_c: f64,
+    /// Declared, kg.
+    pub payload_kg: f64,
+    /// Velocity of each joint, rad/s or m/s; empty where the arm stands.
+    pub velocity: Vec<f64>,
+    /// What each effect that acts makes of the rows before, in the order of the effects; empty: they make nothing of them.
+    pub memory: Vec<f64>,
 }

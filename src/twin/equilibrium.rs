@@ -3,8 +3,7 @@
 use super::arm::{Arm, Posture};
 use super::effect::{Physical, State};
 use super::matrix::{self, Matrix, Vector};
-use super::motion::Motion;
-use super::statics::{Loads, Row};
+use crate::arm::{Loads, Motion, Row};
 
 /// The arm at rest under its loads.
 #[derive(Debug, Clone)]

@@ -10,7 +10,7 @@ use super::matrix::{self, Vector};
 use super::noise::{Noise, Purpose};
 use super::plan::{self, Climate, Poses};
 use super::recorder::Experiment;
-use super::statics::Row;
+use crate::arm::Row;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -266,7 +266,7 @@ impl Experiment<'_> {
 
     /// Joints up to the second stand on the base, which may reach to the floor; the ball may lie below it.
     fn is_above_floor(&self, arm: &Arm, q: &[f64]) -> bool {
-        let posture = arm.posture(q, &super::motion::Motion::none(arm.links.len()));
+        let posture = arm.posture(q, &crate::arm::Motion::none(arm.links.len()));
         posture
             .frames
             .iter()

@@ -1,8 +1,11 @@
 //! The laser tracker: a pose in the room and a noise that grows with range.
+//!
+//! A point as a tracker measures it: range, azimuth about its standing axis z from x, elevation above its horizon.
 
-use super::matrix::{self, Matrix, Vector};
-use super::noise::{Noise, Purpose};
-use super::true_value::{TrueValue, true_value};
+use crate::matrix;
+use crate::matrix::{Matrix, Vector};
+use crate::noise::{Noise, Purpose};
+use crate::true_value::{TrueValue, true_value};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -171,5 +174,41 @@ impl Tracker {
                 })
             }
         }
+    }
+}
+
+/// m and rad, in the tracker's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Polar {
+    /// m.
+    pub(crate) range: f64,
+    /// rad.
+    pub(crate) azimuth: f64,
+    /// rad.
+    pub(crate) elevation: f64,
+}
+
+impl Polar {
+    /// The range and the angles of a point as the instrument sees it, m.
+    pub(crate) fn of(point: Vector) -> Polar {
+        let level = point[0].hypot(point[1]);
+        Polar {
+            range: matrix::norm(point),
+            azimuth: point[1].atan2(point[0]),
+            elevation: point[2].atan2(level),
+        }
+    }
+
+    /// The point, m.
+    pub(crate) fn point(self) -> Vector {
+        let (level, height) = (
+            self.range * self.elevation.cos(),
+            self.range * self.elevation.sin(),
+        );
+        [
+            level * self.azimuth.cos(),
+            level * self.azimuth.sin(),
+            height,
+        ]
     }
 }

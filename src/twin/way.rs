@@ -77,7 +77,7 @@ const SHORTEST_S: f64 = 0.3;
 
 impl Path {
     /// A way of so many seconds; fails where no pose is allowed.
-    pub fn draw(
+    pub(crate) fn draw(
         way: &Way,
         robot: &RobotDescription,
         arm: &Arm,

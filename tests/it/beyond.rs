@@ -2,6 +2,7 @@
 //! and the library's set, which stays as it was.
 
 use calib::twin::arm::Arm;
+use calib::twin::arm::Row;
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
 use calib::twin::conceal::family::{BEYOND, Collection};
@@ -14,7 +15,6 @@ use calib::twin::equilibrium::{Equilibrium, settle, sighted};
 use calib::twin::matrix::IDENTITY;
 use calib::twin::memory::{Moment, past};
 use calib::twin::plan::Point;
-use calib::twin::statics::Row;
 use calib::twin::truth::TrueRobot;
 use std::f64::consts::PI;
 

@@ -486,15 +486,14 @@ fn every_sentence_is_as_it_was_read() {
         }
     });
     let said: String = said.into_iter().map(|line| line + "\n").collect();
-    let read = include_str!("forms/sentences.txt");
-    if said != read {
-        let path = std::env::temp_dir().join("sentences.txt");
-        std::fs::write(&path, &said).unwrap();
-        panic!(
-            "read {} and put it in place of tests/it/forms/sentences.txt if it reads well",
-            path.display()
-        );
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/forms/sentences.txt");
+    if std::env::var_os("CALIB_UPDATE").is_some() {
+        std::fs::write(path, &said).unwrap();
     }
+    assert!(
+        said == std::fs::read_to_string(path).unwrap(),
+        "CALIB_UPDATE=1 cargo test --test it forms writes {path}; read what is new there"
+    );
 }
 
 #[test]
@@ -549,7 +548,6 @@ fn every_cause_is_listed_once_and_described() {
             assert_eq!(effect.name(), about.name);
         }
     }
-    assert_eq!(seen.len(), 39);
 }
 
 #[test]

@@ -10,12 +10,12 @@ use calib::stage::{
 };
 use calib::table::Robot;
 use calib::twin::arm::Arm;
+use calib::twin::arm::Motion;
+use calib::twin::arm::Row;
 use calib::twin::effect::{
     Backlash, BaseCompliance, GearCyclic, JointCompliance, LinkCompliance, Physical,
 };
 use calib::twin::equilibrium::{Equilibrium, settle};
-use calib::twin::motion::Motion;
-use calib::twin::statics::Row;
 use calib::twin::tracker::{Beam, Scatter, Tracker};
 use calib::twin::truth::{CouplingError, LinkError, TrueRobot};
 use std::f64::consts::{FRAC_PI_2, PI};

@@ -2,22 +2,27 @@
 //!
 //! Tables go by `stage_port`, `stage.port` or, where one stage alone writes such a table, by their kind. Rows come in the order of
 //! their tables unless `ORDER BY` says otherwise.
+//!
+//! The order of a table's rows kept through a query: groups in the order of their first rows, pairs in that of the left table.
+//!
+//! Left to itself, polars gives groups and pairs in whatever order its threads finish.
+//!
+//! What a query gave: columns of values.
 
-mod answer;
-mod order;
-mod statement;
-
-pub use answer::{QueryResult, QueryValue};
-
-use polars::prelude::{DataFrame, LazyFrame, PlRefPath, PolarsResult, ScanArgsParquet};
-use polars::sql::SQLContext;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
-use super::tables::{QueryTable, QueryTables};
-use crate::error::{Error, Result};
+use crate::audit::query::statement::Statement;
+use crate::audit::tables::{QueryTable, QueryTables};
+use crate::error::{Error, Result, suggestion};
 use crate::store::Store;
-use answer::fault_of;
-use statement::Statement;
+use polars::prelude::{
+    AnyValue, Column, DataFrame, DslPlan, JoinType, LazyFrame, MaintainOrderJoin, PlRefPath,
+    PolarsError, PolarsResult, ScanArgsParquet, UniqueKeepStrategy,
+};
+use polars::sql::SQLContext;
+use std::borrow::Cow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+mod statement;
 
 /// Answers one SELECT over the tables of a run; whatever is wrong with it is the asker's to mend.
 pub fn query(store: &Store, tables: &QueryTables, sql: &str) -> Result<QueryResult> {
@@ -43,7 +48,7 @@ pub fn query(store: &Store, tables: &QueryTables, sql: &str) -> Result<QueryResu
 
 fn collect(mut context: SQLContext, sql: &str) -> PolarsResult<DataFrame> {
     let frame = context.execute(sql)?;
-    LazyFrame::from(order::kept(frame.logical_plan)).collect()
+    LazyFrame::from(kept(frame.logical_plan)).collect()
 }
 
 /// A table of the store, not yet read; of a store in a bucket its file is fetched first.
@@ -65,4 +70,264 @@ fn names(frame: &mut LazyFrame) -> PolarsResult<Vec<String>> {
         .iter_names()
         .map(ToString::to_string)
         .collect())
+}
+
+/// The same plan, with every step that may lose the order told to keep it.
+pub(crate) fn kept(plan: DslPlan) -> DslPlan {
+    match plan {
+        // What polars noted about a plan while it read the SQL; it does so again.
+        DslPlan::IR { dsl, .. } => kept(Arc::unwrap_or_clone(dsl)),
+        DslPlan::GroupBy {
+            input,
+            keys,
+            predicates,
+            aggs,
+            maintain_order: _,
+            options,
+            apply,
+        } => DslPlan::GroupBy {
+            input: below(input),
+            keys,
+            predicates,
+            aggs,
+            maintain_order: true,
+            options,
+            apply,
+        },
+        DslPlan::Join {
+            input_left,
+            input_right,
+            left_on,
+            right_on,
+            predicates,
+            mut options,
+        } => {
+            let order = match options.args.how {
+                JoinType::Inner | JoinType::Left | JoinType::Full => {
+                    Some(MaintainOrderJoin::LeftRight)
+                }
+                JoinType::Right => Some(MaintainOrderJoin::RightLeft),
+                JoinType::Semi | JoinType::Anti => Some(MaintainOrderJoin::Left),
+                // Every row with every row: in order by themselves.
+                _ => None,
+            };
+            if let Some(order) = order {
+                Arc::make_mut(&mut options).args.maintain_order = order;
+            }
+            let (input_left, input_right) = (below(input_left), below(input_right));
+            DslPlan::Join {
+                input_left,
+                input_right,
+                left_on,
+                right_on,
+                predicates,
+                options,
+            }
+        }
+        DslPlan::Distinct { input, mut options } => {
+            options.maintain_order = true;
+            if matches!(options.keep_strategy, UniqueKeepStrategy::Any) {
+                options.keep_strategy = UniqueKeepStrategy::First;
+            }
+            DslPlan::Distinct {
+                input: below(input),
+                options,
+            }
+        }
+        DslPlan::Sort {
+            input,
+            by_column,
+            slice,
+            mut sort_options,
+        } => {
+            sort_options.maintain_order = true;
+            DslPlan::Sort {
+                input: below(input),
+                by_column,
+                slice,
+                sort_options,
+            }
+        }
+        DslPlan::Union { inputs, mut args } => {
+            args.maintain_order = true;
+            DslPlan::Union {
+                inputs: inputs.into_iter().map(kept).collect(),
+                args,
+            }
+        }
+        DslPlan::Filter { input, predicate } => DslPlan::Filter {
+            input: below(input),
+            predicate,
+        },
+        DslPlan::Select {
+            expr,
+            input,
+            options,
+        } => DslPlan::Select {
+            expr,
+            input: below(input),
+            options,
+        },
+        DslPlan::HStack {
+            input,
+            exprs,
+            options,
+        } => DslPlan::HStack {
+            input: below(input),
+            exprs,
+            options,
+        },
+        DslPlan::Slice { input, offset, len } => DslPlan::Slice {
+            input: below(input),
+            offset,
+            len,
+        },
+        DslPlan::MapFunction { input, function } => DslPlan::MapFunction {
+            input: below(input),
+            function,
+        },
+        DslPlan::Cache { input, id } => DslPlan::Cache {
+            input: below(input),
+            id,
+        },
+        other => other,
+    }
+}
+
+fn below(input: Arc<DslPlan>) -> Arc<DslPlan> {
+    Arc::new(kept(Arc::unwrap_or_clone(input)))
+}
+
+/// The rows that a query gave.
+#[derive(Debug)]
+pub struct QueryResult(DataFrame);
+
+/// One value of an answer.
+#[derive(Debug, Clone, PartialEq)]
+pub enum QueryValue<'a> {
+    /// Missing.
+    Null,
+    /// True or false.
+    Boolean(bool),
+    /// A whole number.
+    Integer(i128),
+    /// A number.
+    Number(f64),
+    /// Text.
+    Text(Cow<'a, str>),
+}
+
+impl QueryResult {
+    pub(crate) fn new(frame: DataFrame) -> Self {
+        Self(frame)
+    }
+
+    /// How many.
+    pub fn rows(&self) -> usize {
+        self.0.height()
+    }
+
+    /// Names of the columns, in order.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.0.columns().iter().map(|column| column.name().as_str())
+    }
+
+    /// The values of a row, counted from 0, in the order of the names.
+    pub(crate) fn row(&self, row: usize) -> impl Iterator<Item = QueryValue<'_>> {
+        self.0
+            .columns()
+            .iter()
+            .map(move |column| value(column, row))
+    }
+
+    /// The first `rows` values of every column.
+    pub fn columns(&self, rows: usize) -> impl Iterator<Item = Vec<QueryValue<'_>>> {
+        let rows = rows.min(self.rows());
+        self.0
+            .columns()
+            .iter()
+            .map(move |column| (0..rows).map(|row| value(column, row)).collect())
+    }
+}
+
+fn value(column: &Column, row: usize) -> QueryValue<'_> {
+    let Ok(value) = column.get(row) else {
+        return QueryValue::Null;
+    };
+    match value {
+        AnyValue::Null => QueryValue::Null,
+        AnyValue::Boolean(truth) => QueryValue::Boolean(truth),
+        AnyValue::String(text) => QueryValue::Text(text.into()),
+        AnyValue::StringOwned(text) => QueryValue::Text(text.to_string().into()),
+        AnyValue::Float64(number) => QueryValue::Number(number),
+        AnyValue::Float32(number) => QueryValue::Number(number.into()),
+        AnyValue::Int8(number) => QueryValue::Integer(number.into()),
+        AnyValue::Int16(number) => QueryValue::Integer(number.into()),
+        AnyValue::Int32(number) => QueryValue::Integer(number.into()),
+        AnyValue::Int64(number) => QueryValue::Integer(number.into()),
+        AnyValue::Int128(number) => QueryValue::Integer(number),
+        AnyValue::UInt8(number) => QueryValue::Integer(number.into()),
+        AnyValue::UInt16(number) => QueryValue::Integer(number.into()),
+        AnyValue::UInt32(number) => QueryValue::Integer(number.into()),
+        AnyValue::UInt64(number) => QueryValue::Integer(number.into()),
+        // Dates, lists and what else a query may make: as polars writes them.
+        other => QueryValue::Text(other.to_string().into()),
+    }
+}
+
+/// The fault of a query over `tables`, each a name with its columns.
+pub(crate) fn fault_of(error: &PolarsError, tables: &[(&str, Vec<String>)]) -> Error {
+    match error {
+        PolarsError::Context { error, .. } | PolarsError::ExprContext { error, .. } => {
+            fault_of(error, tables)
+        }
+        _ => {
+            let text = error.to_string();
+            let message = missing(&text)
+                .and_then(|name| unknown(name, tables))
+                .unwrap_or_else(|| first(&text));
+            Error::spec("SQL", message)
+        }
+    }
+}
+
+/// The column that polars did not find, if that is what it says.
+fn missing(text: &str) -> Option<&str> {
+    let after = [
+        "unable to find column \"",
+        "no column named '",
+        "no table or struct column named '",
+    ];
+    let rest = after
+        .into_iter()
+        .find_map(|words| text.split_once(words))?
+        .1;
+    rest.split(['"', '\'']).next()
+}
+
+/// Nothing where a table has the column: then it is lost on the way, and polars says where.
+fn unknown(name: &str, tables: &[(&str, Vec<String>)]) -> Option<String> {
+    let all = || {
+        tables
+            .iter()
+            .flat_map(|(_, columns)| columns)
+            .map(String::as_str)
+    };
+    if tables.is_empty() || all().any(|column| column == name) {
+        return None;
+    }
+    let hint = suggestion(name, all());
+    let known: Vec<String> = tables
+        .iter()
+        .map(|(table, columns)| format!("{table}: {}", columns.join(", ")))
+        .collect();
+    Some(format!(
+        "no column `{name}`{hint} Columns of {}",
+        known.join("; of ")
+    ))
+}
+
+/// Without the plan that polars prints below.
+fn first(text: &str) -> String {
+    text.split("\n\n").next().unwrap_or(text).trim().to_string()
 }

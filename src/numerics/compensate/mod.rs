@@ -7,7 +7,6 @@
 
 mod arm;
 mod correct;
-mod correction_uncertainty;
 mod gate;
 mod posture;
 mod remark;
@@ -18,7 +17,6 @@ mod uncertainty;
 
 pub use arm::{Circumstance, IdentifiedArm, Reach, Stated, load_matters, unstated_payload};
 pub use correct::{CommandTarget, CorrectionOptions, CorrectionTotals, Corrector, turns};
-pub use correction_uncertainty::CorrectionUncertainty;
 pub use gate::{Gate, GateLimits};
 pub use posture::StatedPosture;
 use remark::beyond_limits;
@@ -28,4 +26,4 @@ pub use sides::{ArmSides, SideShares, StatedSides};
 pub use solve::{
     Chain, CommandSolution, Nominal, SETTLED, ToolGoal, inverse, least_change, one_step,
 };
-pub use uncertainty::{PositionUncertainty, Scatter, Uncertainty};
+pub use uncertainty::{CorrectionUncertainty, PositionUncertainty, Scatter, Uncertainty};

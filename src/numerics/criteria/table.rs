@@ -7,16 +7,12 @@ pub struct CriterionRow {
     pub room: &'static str,
     /// Its name in the code.
     pub name: &'static str,
-    /// Its value as the code has it.
-    pub value: &'static str,
     /// What it decides.
     pub meaning: &'static str,
     /// Its unit.
     pub unit: &'static str,
     /// Where it is from.
     pub source: &'static str,
-    /// What halving and doubling it does to diagnoses; empty where that was not seen.
-    pub scaled: &'static str,
 }
 
 /// A table: `/// meaning`, `NAME: kind = value, "unit", "source", "what halving and doubling does";`.
@@ -32,15 +28,13 @@ macro_rules! criteria {
         )+
 
         /// The rows of the table.
-        pub const ROWS: &[super::CriterionRow] = &[
+        pub(crate) const ROWS: &[super::CriterionRow] = &[
             $(super::CriterionRow {
                 room: $room,
                 name: stringify!($name),
-                value: stringify!($value),
                 meaning: concat!($($doc),+),
                 unit: $unit,
                 source: $source,
-                scaled: $scaled,
             }),+
         ];
 

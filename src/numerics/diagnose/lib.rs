@@ -19,7 +19,6 @@ use crate as diagnose;
 
 mod closed_form;
 mod judge;
-mod linear;
 mod misfit;
 mod outside;
 mod regression;

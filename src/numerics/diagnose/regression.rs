@@ -1,11 +1,13 @@
 //! Least squares on one form at a time given a model, which takes its part of the rows first (Frisch, Waugh, Lovell): a coefficient on what
 //! the model cannot absorb is the one that a joint fit with it would give.
+//!
+//! Dense linear algebra on columns that are stored one after another.
 
-use super::linear::{dot, orthonormal, project};
-use super::whitened::WhitenedProblem;
 use crate::criteria::search::{IDLE, LEVELS};
 use crate::effect::{Form, Survey};
-use faer::Mat;
+use crate::whitened::WhitenedProblem;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -44,7 +46,7 @@ pub(super) struct Solution {
 
 impl<'p, 'a> FormRegression<'p, 'a> {
     /// `jacobian` is that of the model, which has `forms` besides; `residual` is what it leaves without these.
-    pub fn new(
+    pub(crate) fn new(
         problem: &'p WhitenedProblem<'a>,
         jacobian: &Mat<f64>,
         forms: &[&Form],
@@ -216,6 +218,55 @@ fn scale(column: &mut [f64]) -> f64 {
         .iter_mut()
         .for_each(|value| *value /= length.max(1e-300));
     length
+}
+
+/// An orthonormal basis of the columns of `matrix`, which are scaled to unit length first.
+pub(crate) fn orthonormal(matrix: &Mat<f64>) -> Mat<f64> {
+    let norm = |j: usize| matrix.col(j).norm_l2().max(1e-300);
+    let scale: Vec<f64> = (0..matrix.ncols()).map(norm).collect();
+    let scaled = Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
+        matrix[(i, j)] / scale[j]
+    });
+    scaled.qr().compute_thin_Q()
+}
+
+/// Removes from columns (one after another) what lies in the span of an orthonormal basis.
+pub(crate) fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {
+    let rows = basis.nrows();
+    let count = columns.len() / rows.max(1);
+    if basis.ncols() == 0 || count == 0 {
+        return;
+    }
+    let mut share = Mat::zeros(basis.ncols(), count);
+    let mut columns = MatMut::from_column_major_slice_mut(columns, rows, count);
+    matmul(
+        share.as_mut(),
+        Accum::Replace,
+        basis.transpose(),
+        columns.as_ref(),
+        1.0,
+        Par::Seq,
+    );
+    matmul(
+        columns.as_mut(),
+        Accum::Add,
+        basis,
+        share.as_ref(),
+        -1.0,
+        Par::Seq,
+    );
+}
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Four sums: the compiler may not reorder one.
+    let (mut sums, chunks) = ([0.0; 4], a.len() / 4);
+    for k in 0..chunks {
+        for lane in 0..4 {
+            sums[lane] += a[4 * k + lane] * b[4 * k + lane];
+        }
+    }
+    let tail: f64 = (4 * chunks..a.len()).map(|k| a[k] * b[k]).sum();
+    sums[0] + sums[1] + sums[2] + sums[3] + tail
 }
 
 #[cfg(test)]

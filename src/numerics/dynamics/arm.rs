@@ -116,17 +116,17 @@ fn joined(a: &Inertial, b: &Inertial) -> Inertial {
 #[derive(Debug, Clone)]
 pub(super) struct DeclaredInertials {
     /// 10 n, of the links alone.
-    pub links: Vec<f64>,
+    pub(crate) links: Vec<f64>,
     /// 10 n, with the declared payload on the last link.
     pub(crate) theta: Vec<f64>,
     /// The last link's numbers of a payload of 1 kg as declared (of a point at the tool where none is).
-    pub payload: [f64; INERTIAL_NUMBERS],
+    pub(crate) payload: [f64; INERTIAL_NUMBERS],
     /// Change of the last link's numbers per kg m by which a payload's centre is elsewhere, in three coordinates.
     pub(crate) payload_shift: [[f64; INERTIAL_NUMBERS]; 3],
     /// Per link: change of its numbers per m of its centre, in three coordinates.
     pub(crate) centre_shift: Vec<[[f64; INERTIAL_NUMBERS]; 3]>,
     /// Per link, 10 x 10 by columns: change of its numbers by one standard deviation of mass, centre (3), inertia (6).
-    pub tolerance: Vec<[[f64; INERTIAL_NUMBERS]; INERTIAL_NUMBERS]>,
+    pub(crate) tolerance: Vec<[[f64; INERTIAL_NUMBERS]; INERTIAL_NUMBERS]>,
 }
 
 impl DeclaredInertials {

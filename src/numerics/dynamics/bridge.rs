@@ -1,8 +1,8 @@
 //! Rows that were lost one or a few at a time: made up between their neighbours, so that filters go on over them.
 
 use super::clock::ClockPace;
-use super::recording::TorqueRecording;
 use crate::error::counted;
+use crate::types::TorqueRecording;
 
 /// Rows lost in a row, at most; a longer gap ends a stretch.
 const MOST: usize = 5;

@@ -103,7 +103,7 @@ impl ComponentSearch for TorqueTable<'_, '_> {
 
 impl<'a, 'b> TorqueTable<'a, 'b> {
     /// The cells of the listed forms.
-    pub fn new(choice: &'b CauseChoice<'a>) -> Self {
+    pub(crate) fn new(choice: &'b CauseChoice<'a>) -> Self {
         let all = &choice.problem.all;
         let mut keys: BTreeMap<(&'static str, &'static str, Place, [usize; 2]), Vec<usize>> =
             BTreeMap::new();

@@ -1,21 +1,20 @@
 //! One arm in two recordings: what of its torques changed, with payload, temperature, wear or repair. Both are fitted at once; masses and
 //! friction are common but for what the second recording shows to be another.
 
-use super::arm::DynamicArm;
-use super::arm::INERTIAL_NUMBERS;
+use super::arm::{DynamicArm, INERTIAL_NUMBERS};
 use super::cause::{COULOMB, OFFSET, TORQUE_CAUSES, TorqueForm, VISCOUS};
 use super::model::TorqueModel;
-use super::noise::NoiseMemory;
 use super::problem::TorqueProblem;
-use super::recording::TorqueSource;
 use super::rich::noise_of_fit;
-use super::stacked::StackedColumns;
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueQuestion};
 use super::used::UsedRecording;
 use crate::effect::Place;
 use crate::error::{Error, Result};
 use crate::estimate::tail;
+use crate::sweep::StackedColumns;
+use crate::types::TorqueSource;
+use crate::weighted::NoiseMemory;
 
 /// Residual rows of a test, at most: beyond it the tail does not change.
 const FREEDOM: f64 = 1e4;

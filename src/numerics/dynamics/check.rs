@@ -3,10 +3,10 @@
 use super::arm::DynamicArm;
 use super::check_gravity::gravity_faults;
 use super::clock::RecordingClock;
-use super::recording::TorqueRecording;
 use super::scene::ends;
 use crate::error::{Error, Fault, Result, counted};
 use crate::statistics::nearest;
+use crate::types::TorqueRecording;
 
 /// Rows, at least.
 const FEWEST: usize = 200;
@@ -339,7 +339,7 @@ pub(super) struct TorqueExtremes {
 
 impl TorqueExtremes {
     /// The extremes of no rows of n joints.
-    pub fn new(joints: usize) -> Self {
+    pub(crate) fn new(joints: usize) -> Self {
         Self {
             rows: 0,
             joints: vec![[(f64::INFINITY, 0), (f64::NEG_INFINITY, 0)]; joints],

@@ -1,13 +1,12 @@
 //! A recording against the gravity of the declared arm: torques in a wrong unit, with another sign or of another joint, and angles in a wrong
 //! unit or of another joint.
 
-use super::arm::DeclaredInertials;
-use super::arm::DynamicArm;
+use super::arm::{DeclaredInertials, DynamicArm};
 use super::newton_euler::{InverseDynamics, MotionRow};
-use super::recording::TorqueRecording;
 use crate::criteria::torque::{UNIT, WEIGHS, WEIGHTY};
 use crate::error::Fault;
 use crate::statistics::nearest;
+use crate::types::TorqueRecording;
 
 /// Ratio of measured to simulated torque: beyond it, or below its inverse, a unit is wrong.
 const UNIT_RATIO: f64 = 50.0;

@@ -17,7 +17,7 @@ pub(super) struct CauseChoice<'a> {
 
 impl<'a> CauseChoice<'a> {
     /// Over all forms of a problem.
-    pub fn new(problem: &'a TorqueProblem<'a>, weighted: &'a WeightedColumns) -> Self {
+    pub(crate) fn new(problem: &'a TorqueProblem<'a>, weighted: &'a WeightedColumns) -> Self {
         Self {
             problem,
             weighted,
@@ -92,7 +92,7 @@ impl<'a> CauseChoice<'a> {
     }
 
     /// Whether all of a set have what they modify.
-    pub fn is_whole(&self, set: &[usize]) -> bool {
+    pub(crate) fn is_whole(&self, set: &[usize]) -> bool {
         set.iter()
             .all(|number| self.has_what_it_modifies(*number, set))
     }

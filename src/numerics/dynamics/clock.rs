@@ -1,7 +1,7 @@
 //! The clock of a recording: its rate, and the runs of rows over which a filter may work.
 
-use super::recording::TorqueRecording;
 use crate::statistics::nearest;
+use crate::types::TorqueRecording;
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -180,7 +180,7 @@ impl JointPace {
 
 impl MotionPace {
     /// The sums of no rows of n joints.
-    pub fn new(joints: usize) -> Self {
+    pub(crate) fn new(joints: usize) -> Self {
         Self {
             joints: vec![JointPace::default(); joints],
         }

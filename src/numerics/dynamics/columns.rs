@@ -1,12 +1,11 @@
 //! Judged rows of the base and of every form, filtered and decimated alike.
 
 use super::arm::INERTIAL_NUMBERS;
-use super::base_parameters::base_parameters;
 use super::cause::{TORQUE_CAUSES, TorqueForm};
-use super::reduce::Reduction;
-use super::reduce::{ReducedRegressor, TorqueColumn};
+use super::reduce::{ReducedRegressor, Reduction, TorqueColumn};
 use super::scene::{DynamicScene, largest};
 use crate::criteria::torque::FRICTION;
+use crate::reduce::base_parameters;
 
 /// Base columns, then those of all forms, form after form.
 pub(super) struct TorqueColumns {
@@ -45,7 +44,7 @@ impl TorqueColumns {
     }
 
     /// The base, and all forms of all causes but `without`; `torque` is half the range of each joint's torque, Nm.
-    pub fn new(
+    pub(crate) fn new(
         scene: &DynamicScene,
         reduction: &Reduction,
         regressor: &ReducedRegressor,

@@ -1,6 +1,5 @@
 //! Pushes on the arm: times whose residual stands far above the rest and which one force at the tool explains.
 
-use super::noise::JointNoise;
 use super::problem::TorqueProblem;
 use super::types::ContactEvent;
 use crate::criteria::torque::{
@@ -8,6 +7,7 @@ use crate::criteria::torque::{
     PUSH_MOVING, PUSH_OTHERS, PUSH_OTHERS_GAIN, PUSH_SHARE, PUSH_TIMES_USUAL, PUSHES,
 };
 use crate::statistics::nearest;
+use crate::weighted::JointNoise;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 

@@ -4,12 +4,11 @@
 //! row as by an even clock, it is the stamps that err, and rows get even ones. A pause ends a stretch either way.
 
 use super::check::row_faults;
-use super::recording::TorqueRecording;
-use super::recording::TorqueSource;
-use super::resample::Resampler;
 use crate::criteria::torque::{PAUSE, UNEVEN, UNEVEN_ROWS};
 use crate::error::Result;
+use crate::filter::Resampler;
 use crate::statistics::nearest;
+use crate::types::{TorqueRecording, TorqueSource};
 
 /// Steps that tell what is usual, at most.
 const STEPS: usize = 1 << 16;

@@ -1,12 +1,12 @@
 //! How much later torques come than the positions of their rows, and by how much friction turns before the velocity does: friction that a
 //! simulator lets a solver find turns with velocity and acceleration, and velocities that a drive smooths lag behind the friction that it feels.
 
-use super::noise::NoiseMemory;
 use super::problem::TorqueProblem;
 use super::rich::{basic_forms, noise_of_fit};
-use super::sign_width::{FrictionFit, joint_sign_widths, sign_width};
 use super::sweep::SweptColumns;
 use super::weighted::{Weighing, WeightedColumns};
+use crate::shape_slopes::{FrictionFit, joint_sign_widths, sign_width};
+use crate::weighted::NoiseMemory;
 
 /// s: least, most, step of the shifts that are tried.
 const SHIFTS: [f64; 3] = [-0.016, 0.048, 0.004];

@@ -10,7 +10,6 @@ use calib_numerics::{criteria, effect, error, estimate, spatial};
 use crate as dynamics;
 
 mod arm;
-mod base_parameters;
 mod bridge;
 #[cfg(test)]
 mod cases;
@@ -24,13 +23,11 @@ mod check_gravity;
 mod choice;
 mod clock;
 mod columns;
-mod consistency;
 mod contact;
 mod enforce;
 mod even;
 mod excite;
 mod feed_forward;
-mod feed_gate;
 mod filter;
 mod findings;
 mod friction_curve;
@@ -38,47 +35,33 @@ mod judge;
 mod latency;
 mod masses;
 mod model;
-mod modelled;
-mod naming;
 mod newton_euler;
-mod noise;
 mod outcome;
 mod problem;
-mod recording;
 mod reduce;
 mod refine;
-mod resample;
 mod rich;
 mod scene;
-mod sets;
 mod shape_slopes;
-mod sign_width;
 mod solve;
-mod stacked;
 mod sweep;
 mod thin;
 mod types;
 mod used;
 mod weighted;
 
-pub use arm::INERTIAL_NAMES;
-pub use arm::INERTIAL_NUMBERS;
-pub use arm::{DynamicArm, Inertial, InertialTolerance};
-pub use cause::TorqueParameter;
-pub use cause::{COULOMB, FittedNumber};
+pub use arm::{DynamicArm, INERTIAL_NAMES, INERTIAL_NUMBERS, Inertial, InertialTolerance};
+pub use cause::{COULOMB, FittedNumber, TorqueParameter};
 pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
-pub use consistency::{BodyConsistency, inertial_numbers};
 pub use excite::{ExciteRequest, ExcitingMotion, ExpectedSigma, excite};
-pub use feed_forward::{NeededTorques, PlannedMotion};
-pub use feed_gate::{JudgedRow, TorqueGate, TorqueRemark};
-pub use masses::LinkFromTorques;
+pub use feed_forward::{JudgedRow, NeededTorques, PlannedMotion, TorqueGate, TorqueRemark};
+pub use masses::{BodyConsistency, LinkFromTorques, inertial_numbers};
 pub use model::{JointRange, TorqueModel, TorqueTerm};
 pub use newton_euler::{InverseDynamics, MotionRow};
-pub use recording::TorqueRecording;
-pub use recording::TorqueSource;
 pub use types::{
     ContactEvent, EnforcedBodies, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses,
     TorqueDiagnosis, TorqueErrors, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueQuestion,
+    TorqueRecording, TorqueSource,
 };
 
 use crate::error::{Error, Result};

@@ -75,7 +75,7 @@ impl InverseDynamics {
     }
 
     /// Number of joints n.
-    pub fn joints(&self) -> usize {
+    pub(crate) fn joints(&self) -> usize {
         self.axes.len()
     }
 

@@ -1,13 +1,11 @@
 //! The answer to a diagnosis of torques, from what was solved.
 
-use super::arm::INERTIAL_NUMBERS;
-use super::arm::{INERTIAL_NAMES, inertial_unit};
+use super::arm::{INERTIAL_NAMES, INERTIAL_NUMBERS, inertial_unit};
 use super::cause::TorqueParameter;
 use super::choice::CauseChoice;
 use super::enforce::with_bodies;
 use super::findings::{contact, findings, plain_finding};
 use super::model::TorqueModel;
-use super::noise::{JointNoise, NoiseMemory};
 use super::problem::TorqueProblem;
 use super::scene::{ends, largest};
 use super::solve::SolvedTorques;
@@ -19,6 +17,7 @@ use super::types::{
 use crate::diagnose::VerdictKind;
 use crate::effect::Place;
 use crate::error::counted;
+use crate::weighted::{JointNoise, NoiseMemory};
 
 /// Times the noise beyond which held-out rows are not explained.
 const UNEXPLAINED: f64 = 1.5;

@@ -1,20 +1,17 @@
 //! A recording prepared for least squares: measured and rigid torque, base and forms in judged rows, and which of these count.
 
-use super::arm::DynamicArm;
-use super::arm::INERTIAL_NUMBERS;
+use super::arm::{DynamicArm, INERTIAL_NUMBERS};
 use super::cause::{TorqueForm, friction_of};
-use super::clock::RecordingClock;
-use super::clock::column;
+use super::clock::{RecordingClock, column};
 use super::columns::TorqueColumns;
-use super::noise::JointNoise;
-use super::recording::TorqueRecording;
-use super::reduce::ReducedRegressor;
-use super::reduce::Reduction;
+use super::reduce::{ReducedRegressor, Reduction};
 use super::scene::{DynamicScene, ends};
 use super::sweep::value_of;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{Weighing, WeightedColumns};
 use crate::effect::Place;
+use crate::types::TorqueRecording;
+use crate::weighted::JointNoise;
 use std::ops::Range;
 
 /// s around an event whose rows do not count either.
@@ -51,7 +48,7 @@ pub(super) struct TorqueProblem<'a> {
 
 impl<'a> TorqueProblem<'a> {
     /// The problem of a checked recording.
-    pub fn new(
+    pub(crate) fn new(
         arm: &'a DynamicArm,
         recording: TorqueRecording,
         question: &TorqueQuestion,
@@ -223,7 +220,7 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Number of joints.
-    pub fn joints(&self) -> usize {
+    pub(crate) fn joints(&self) -> usize {
         self.measured.len()
     }
 

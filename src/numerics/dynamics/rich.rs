@@ -3,12 +3,12 @@
 //! Noise taken from the present model would be full of the very torque that is looked for.
 
 use super::cause::{COULOMB, OFFSET, ROTOR, VISCOUS};
-use super::noise::{JointNoise, NoiseMemory};
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::{Weighing, WeightedColumns};
 use crate::criteria::cells::FAR;
 use crate::statistics::nearest;
+use crate::weighted::{JointNoise, NoiseMemory};
 use std::ops::Range;
 
 /// Scale and weights find each other in so many rounds.

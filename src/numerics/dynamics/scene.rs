@@ -1,12 +1,10 @@
 //! The recording as causes see it: motion, rigid torque and clock at the recording's own rate, joint after joint.
 
-use super::arm::DeclaredInertials;
-use super::arm::DynamicArm;
+use super::arm::{DeclaredInertials, DynamicArm};
 use super::clock::{RecordingClock, column};
-use super::filter::ZeroPhase;
-use super::filter::derivatives;
+use super::filter::{ZeroPhase, derivatives};
 use super::newton_euler::{InverseDynamics, MotionRow, turn};
-use super::recording::TorqueRecording;
+use crate::types::TorqueRecording;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
 
@@ -47,7 +45,7 @@ pub(super) struct DynamicScene<'a> {
 
 impl<'a> DynamicScene<'a> {
     /// The scene of a checked recording; the final low-pass will be at `cutoff` (Hz).
-    pub fn new(
+    pub(crate) fn new(
         arm: &'a DynamicArm,
         recording: &TorqueRecording,
         clock: &RecordingClock,
@@ -109,7 +107,7 @@ impl<'a> DynamicScene<'a> {
     }
 
     /// Number of joints.
-    pub fn joints(&self) -> usize {
+    pub(crate) fn joints(&self) -> usize {
         self.position.len()
     }
 

@@ -6,21 +6,19 @@ use super::choice::CauseChoice;
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
 use super::judge::judge;
-use super::latency::take_friction_lead;
-use super::latency::{Latency, latency};
-use super::naming::{JudgedSet, settle_names, take_out_ends};
-use super::noise::NoiseMemory;
+use super::latency::{Latency, latency, take_friction_lead};
 use super::problem::TorqueProblem;
-use super::recording::TorqueRecording;
-use super::refine::polish;
-use super::refine::{one_power_of_speed, power_for_curve, refine};
+use super::refine::{one_power_of_speed, polish, power_for_curve, refine};
 use super::rich::{basic_forms, noise_apart, noise_left, noise_of_fit, rich_forms};
-use super::sets::{OtherInertials, faint, from_common, search, settle, settle_with_priors};
 use super::shape_slopes::ShapeSlopes;
-use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::WeightedColumns;
+use crate::findings::{JudgedSet, settle_names, take_out_ends};
+use crate::judge::{OtherInertials, faint, from_common, search, settle, settle_with_priors};
+use crate::shape_slopes::sign_width;
+use crate::types::TorqueRecording;
+use crate::weighted::NoiseMemory;
 
 /// Rounds in which others are looked for in place of forms with a number at an end of its search, at most.
 const END_ROUNDS: usize = 3;

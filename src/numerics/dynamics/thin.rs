@@ -5,15 +5,12 @@
 //! matter where they end.
 
 use super::bridge::Bridged;
-use super::check::TorqueExtremes;
-use super::check::row_faults;
-use super::clock::MotionPace;
-use super::clock::column;
-use super::clock::{ClockPace, RecordingClock};
+use super::check::{TorqueExtremes, row_faults};
+use super::clock::{ClockPace, MotionPace, RecordingClock, column};
 use super::filter::ZeroPhase;
-use super::recording::{TorqueRecording, TorqueSource};
 use crate::error::{Error, Result};
 use crate::statistics::nearest;
+use crate::types::{TorqueRecording, TorqueSource};
 use std::ops::Range;
 
 /// The rate of kept rows over the cut-off, at least: far from both, friction that turns with the direction is still sampled well.
@@ -38,7 +35,7 @@ pub(super) struct ThinningPlan {
 
 impl ThinningPlan {
     /// For at most `most` rows (and some more where rows were lost), with a cut-off that will be at `cutoff` Hz.
-    pub fn new(rows: usize, rate: f64, cutoff: f64, most: usize) -> Self {
+    pub(crate) fn new(rows: usize, rate: f64, cutoff: f64, most: usize) -> Self {
         let every = rows
             .div_ceil(most)
             .min((rate / (RATE_OVER_CUTOFF * cutoff)) as usize)

@@ -5,11 +5,9 @@ use super::bridge::{self, Bridged};
 use super::check;
 use super::clock::RecordingClock;
 use super::even::EvenSource;
-use super::recording::TorqueRecording;
-use super::recording::TorqueSource;
-use super::thin::RecordingSurvey;
-use super::thin::{ThinnedRecording, ThinningPlan};
+use super::thin::{RecordingSurvey, ThinnedRecording, ThinningPlan};
 use crate::error::Result;
+use crate::types::{TorqueRecording, TorqueSource};
 
 /// Rows that are used as they were recorded; of longer recordings about so many are kept, however long they are.
 const MOST: usize = 1 << 17;

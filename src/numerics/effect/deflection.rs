@@ -146,7 +146,7 @@ impl Deflection {
     }
 
     /// Moves a joint by `p[parameter] * rate`.
-    pub fn turn(&mut self, parameter: usize, p: &[f64], joint: usize, rate: f64) {
+    pub(crate) fn turn(&mut self, parameter: usize, p: &[f64], joint: usize, rate: f64) {
         self.joint[joint] += p[parameter] * rate;
         self.partial(parameter, Direction::Joint(joint, rate));
     }
@@ -157,7 +157,7 @@ impl Deflection {
     }
 
     /// Moves everything beyond a station by the twist `p[parameter] * rate`.
-    pub fn shift(&mut self, parameter: usize, p: &[f64], station: usize, rate: Twist) {
+    pub(crate) fn shift(&mut self, parameter: usize, p: &[f64], station: usize, rate: Twist) {
         self.station[station] += rate * p[parameter];
         self.partial(parameter, Direction::Station(station, rate));
     }

@@ -28,7 +28,7 @@ impl PartialEq for Factor {
 
 impl Factor {
     /// Functions of a variable, wherever it is.
-    pub const fn new(of: Variable, basis: Basis) -> Self {
+    pub(crate) const fn new(of: Variable, basis: Basis) -> Self {
         Self {
             of,
             basis,
@@ -37,7 +37,7 @@ impl Factor {
     }
 
     /// The same, fitted to rows of this range; a variable of several numbers has none.
-    pub fn held_within(self, [low, high]: [f64; 2]) -> Self {
+    pub(crate) fn held_within(self, [low, high]: [f64; 2]) -> Self {
         let held = self.of.components() == 1 && low <= high;
         Self {
             within: held.then_some([low, high]),
@@ -106,7 +106,7 @@ impl Factor {
     }
 
     /// How many functions it has.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.of.components() * self.basis.count()
     }
 
@@ -234,7 +234,7 @@ impl Law {
     }
 
     /// With another basis of the first variable.
-    pub fn with(self, basis: Basis) -> Self {
+    pub(crate) fn with(self, basis: Basis) -> Self {
         Self {
             first: Factor {
                 basis,

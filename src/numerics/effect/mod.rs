@@ -142,22 +142,22 @@ impl<'a> ArmState<'a> {
     }
 
     /// The number of the target that the row measured; none where the robot knows no such target.
-    pub fn target(&self, robot: &RobotModel) -> Option<usize> {
+    pub(crate) fn target(&self, robot: &RobotModel) -> Option<usize> {
         robot.setup().target(self.data.target(self.row))
     }
 
     /// The number of the anchor that the row measured from.
-    pub fn anchor(&self, robot: &RobotModel) -> Option<usize> {
+    pub(crate) fn anchor(&self, robot: &RobotModel) -> Option<usize> {
         robot.setup().anchor(self.data.anchor(self.row)?)
     }
 
     /// Motor currents, A, where recorded.
-    pub fn current(&self) -> Option<&'a [f64]> {
+    pub(crate) fn current(&self) -> Option<&'a [f64]> {
         self.data.current(self.row)
     }
 
     /// s, or the number of the row where the recording has no clock; infinite long after the recording, where laws take their limit.
-    pub fn time(&self) -> f64 {
+    pub(crate) fn time(&self) -> f64 {
         match self.data.row_time(self.row) {
             RowTime::At(time) => time,
             RowTime::LongAfter => f64::INFINITY,
@@ -165,7 +165,7 @@ impl<'a> ArmState<'a> {
     }
 
     /// C, where recorded.
-    pub fn temperature(&self) -> Option<f64> {
+    pub(crate) fn temperature(&self) -> Option<f64> {
         self.data.temperature(self.row)
     }
 
@@ -185,7 +185,7 @@ impl<'a> ArmState<'a> {
     }
 
     /// What a joint moved from the stop before, rad or m.
-    pub fn last_move(&self, joint: usize) -> f64 {
+    pub(crate) fn last_move(&self, joint: usize) -> f64 {
         self.data.last_move(self.row, joint)
     }
 
@@ -198,7 +198,7 @@ impl<'a> ArmState<'a> {
     }
 
     /// Velocity of a joint, rad/s or m/s; 0 where the arm stood.
-    pub fn velocity(&self, joint: usize) -> f64 {
+    pub(crate) fn velocity(&self, joint: usize) -> f64 {
         self.data.velocity(self.row, joint)
     }
 }

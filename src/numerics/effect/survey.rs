@@ -104,7 +104,7 @@ impl<'a> Survey<'a> {
     }
 
     /// Whether the arm moved while it was measured.
-    pub fn moves(&self) -> bool {
+    pub(crate) fn moves(&self) -> bool {
         self.data.in_motion(self.rows)
     }
 

@@ -51,7 +51,7 @@ impl Clock {
     }
 
     /// What time is called: `time`, or `row`.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Seconds { .. } => "time",
             Self::Rows => "row",

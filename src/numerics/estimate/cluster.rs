@@ -5,7 +5,7 @@
 use super::factor::StackedRows;
 use super::model::Model;
 use super::problem::{ObservationTerm, Problem};
-use super::triangle::Triangle;
+use crate::estimate::factor::Triangle;
 use crate::observation::KINDS;
 use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
 use rayon::prelude::*;

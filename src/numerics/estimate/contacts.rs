@@ -4,13 +4,13 @@
 //! With the residuals left in, the scale of the arm and rotations of the cell look seen, by as much as the points scatter: the scatter
 //! of an arm that is a little smaller is a little smaller.
 
-use super::error_scale::ErrorScale;
 use super::factor::TriangularFactor;
 use super::fit::{FitOptions, Session, fit};
 use super::levenberg::{FINE, minimise};
 use super::model::Model;
 use super::problem::Problem;
 use crate::effect::names;
+use crate::estimate::scale::ErrorScale;
 use crate::observation::{RowView, contacts, kinds};
 use crate::robot::Measurements;
 use nalgebra::Vector3;

@@ -1,17 +1,12 @@
 //! Estimation: robust least squares on streamed QR factors, what the data can see, and the model that comes of it.
 
-mod align;
 mod change;
 pub mod choose;
 mod cluster;
-mod constrained;
 mod contacts;
 mod covariance;
-mod error_scale;
 mod factor;
-pub mod fisher;
 mod fit;
-mod fold_factors;
 mod folds;
 mod gauge;
 mod length;
@@ -24,25 +19,21 @@ mod remedy;
 mod repeats;
 mod scale;
 mod screen;
-mod standing;
 pub mod swarm;
 pub mod threads;
-mod triangle;
 
-pub use align::{align, align_points};
 pub use change::{ParameterChange, changes};
 pub use contacts::{Reseat, placed_by_left_out, reseated};
-pub use covariance::Covariance;
-pub use error_scale::{ErrorScale, noise};
-pub use fisher::tail;
+pub use covariance::{Covariance, tail};
 pub use fit::{CLEARLY, FitOptions, Fitted, ParameterStatus, Session, fit, seen};
-pub use fold_factors::NearbyFits;
-pub use folds::{FoldKind, Folds, cross_validate, dealt, fold_poses, gather, leave_one_out};
-pub use gauge::gauge;
+pub use folds::{
+    FoldKind, Folds, NearbyFits, cross_validate, dealt, fold_poses, gather, leave_one_out,
+};
+pub use gauge::{align, align_points, gauge};
 pub use levenberg::{Iteration, Stop};
 pub use model::{Bounds, CONFLICT, Known, KnownLength, Model, Prior, PriorCheck, RowError};
 pub use observe::Visibility;
 pub use remedy::{Remedy, remedies};
 pub use repeats::{Poses, Repeated, autocorrelation_time, spread};
-pub use scale::{ArmScale, known_places, scale};
+pub use scale::{ArmScale, ErrorScale, known_places, noise, scale};
 pub use screen::{Screening, Suspect, SuspectKind, fit_screened};

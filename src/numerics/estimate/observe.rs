@@ -4,7 +4,7 @@
 //! value and says with whom it is redundant. Indices after Sun and Hollerbach, ICRA 2008.
 
 use super::factor::TriangularFactor;
-use super::triangle::{axpy, dot};
+use crate::estimate::factor::{axpy, dot};
 
 /// How a candidate parameter was classed.
 #[derive(Debug, Clone, PartialEq)]

@@ -249,7 +249,11 @@ impl ObservationTerm {
     }
 
     /// Derivatives of what was predicted, in standard deviations per unit of the parameter.
-    pub fn derivatives(&self, placed: &mut PlacedRow, emit: impl FnMut(usize, Vector3<f64>)) {
+    pub(crate) fn derivatives(
+        &self,
+        placed: &mut PlacedRow,
+        emit: impl FnMut(usize, Vector3<f64>),
+    ) {
         self.sensitivity.derivatives(placed, emit);
     }
 }

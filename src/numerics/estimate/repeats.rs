@@ -3,9 +3,9 @@
 //! Rows of one pose right after each other are one visit: the arm stood still and only the tracker's noise differs. Visits of a
 //! pose differ by the joints' repeatability too: covariance s2 J J' of the point, s by restricted maximum likelihood.
 
-use super::fisher::tail;
 use super::model::Model;
 use crate::effect::{EffectContext, EffectStack, Load, arm_effect};
+use crate::estimate::covariance::tail;
 use crate::observation::{Residual, Weight};
 use crate::robot::Measurements;
 use crate::robot::pose_groups::{NEAR, SAME, STILL, grouped, near};

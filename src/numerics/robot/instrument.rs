@@ -151,7 +151,7 @@ pub enum NoiseBasis {
 
 impl NoiseBasis {
     /// All of them, in order of preference.
-    pub const ALL: [Self; 3] = [Self::Repeats, Self::Instrument, Self::Inferred];
+    pub(crate) const ALL: [Self; 3] = [Self::Repeats, Self::Instrument, Self::Inferred];
 
     /// As tables hold it.
     pub fn name(self) -> &'static str {

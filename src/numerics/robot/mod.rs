@@ -1,7 +1,5 @@
 //! The robot as data, its import, its screws and its gravity torques.
 
-mod bound;
-mod circumstances;
 mod column;
 pub mod import;
 mod instrument;
@@ -15,25 +13,24 @@ mod posture;
 mod readings;
 mod rows;
 mod setup;
-mod visited;
 
-pub use bound::{Bound, ONE_AND_A_HALF_TURNS, too_far};
-pub use circumstances::{CIRCUMSTANCES, CircumstanceName, law_columns};
-pub use column::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
+pub use column::{
+    CIRCUMSTANCES, CircumstanceName, ColumnShape, Convention, Conventions, DeclaredColumn, Part,
+    law_columns,
+};
 pub use instrument::{
     INSTRUMENTS, Instrument, NoiseBasis, PublishedInstrument, START, SigmaSource,
 };
 pub use joint_convention::{CountedCoupling, JointConvention};
 pub use library::{LIBRARY, LibraryArm};
 pub use measurements::{Measurements, Memories, RowTime};
-pub use memory::Memory;
-pub use model::{RobotModel, Travel};
+pub use memory::{Memory, Unmeasured, Visited, numbered};
+pub use model::{Bound, ONE_AND_A_HALF_TURNS, RobotModel, Travel, too_far};
 pub use pose_groups::Sequence;
 pub use posture::{Carried, LoadCorrection, Posture};
 pub use readings::{Named, PointReadings, Reading, Readings};
 pub use rows::{DhRow, DhTable};
 pub use setup::{Anchor, MeasurementSetup, Shape, Target};
-pub use visited::{Unmeasured, Visited, numbered};
 
 #[cfg(test)]
 pub(crate) use tests::small_arm;

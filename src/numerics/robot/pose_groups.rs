@@ -114,12 +114,12 @@ impl Sequence {
     }
 
     /// The row at a place of the order.
-    pub fn row(&self, place: usize) -> usize {
+    pub(crate) fn row(&self, place: usize) -> usize {
         self.rows[place]
     }
 
     /// The place of a row.
-    pub fn rank_in_time(&self, row: usize) -> usize {
+    pub(crate) fn rank_in_time(&self, row: usize) -> usize {
         self.places[row]
     }
 }

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 impl RobotModel {
     /// True when every link has a mass, so that torques mean something without a payload.
-    pub fn has_masses(&self) -> bool {
+    pub(crate) fn has_masses(&self) -> bool {
         self.description()
             .joints
             .iter()

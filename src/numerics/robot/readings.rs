@@ -39,7 +39,7 @@ pub struct Reading<'a> {
 
 impl Readings {
     /// The readings of some rows, in their order.
-    pub fn subset(&self, rows: &[usize]) -> Self {
+    pub(crate) fn subset(&self, rows: &[usize]) -> Self {
         Self {
             kind: self.kind,
             width: self.width,

@@ -40,7 +40,7 @@ pub enum Shape {
 
 impl Shape {
     /// Numbers that say where such an anchor is: x, y, z of a point; a plane's offset and two tilts; a sphere's radius beside its centre.
-    pub fn parameters(&self) -> usize {
+    pub(crate) fn parameters(&self) -> usize {
         match self {
             Self::Point | Self::Plane(_) => 3,
             Self::Sphere(_) => 4,

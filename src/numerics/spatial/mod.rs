@@ -127,13 +127,13 @@ pub fn hat(w: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// The unit screw of a rotation about `axis` through `point` (m): v = -w x q (Modern Robotics, Eq. 3.79).
-pub fn screw(axis: &Vector3<f64>, point: &Vector3<f64>) -> Twist {
+pub(crate) fn screw(axis: &Vector3<f64>, point: &Vector3<f64>) -> Twist {
     let v = point.cross(axis);
     Twist::new(v.x, v.y, v.z, axis.x, axis.y, axis.z)
 }
 
 /// The left Jacobian J with exp(x + dx) = exp(J dx) exp(x), as series in the adjoint ad(x); meant for small motions (|w| < 1).
-pub fn left_jacobian(twist: &Twist) -> Matrix6<f64> {
+pub(crate) fn left_jacobian(twist: &Twist) -> Matrix6<f64> {
     let cross_v = hat(&twist.fixed_rows::<3>(0).into());
     let cross_w = hat(&twist.fixed_rows::<3>(3).into());
     let mut ad = Matrix6::zeros();

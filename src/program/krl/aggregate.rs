@@ -70,7 +70,7 @@ pub(super) struct Aggregate<'t> {
 }
 
 impl<'t> Aggregate<'t> {
-    pub fn new(source: ProgramText<'t>, tokens: &'t [Token]) -> Self {
+    pub(crate) fn new(source: ProgramText<'t>, tokens: &'t [Token]) -> Self {
         let mut inner = &tokens[1..tokens.len() - 1];
         let mut prefix = None;
         if let [name, colon, rest @ ..] = inner

@@ -236,7 +236,7 @@ pub(super) struct NamedRow {
 
 impl FileIds {
     /// Adds a usable row, whose content has this hash.
-    pub fn push(&mut self, row: &RecordedRow, content: u64, label: &str) -> Result<()> {
+    pub(crate) fn push(&mut self, row: &RecordedRow, content: u64, label: &str) -> Result<()> {
         self.ids.push(row.id.as_bytes());
         self.rows.push(NamedRow {
             number: narrow(row.number, label)?,
@@ -245,7 +245,7 @@ impl FileIds {
         });
         Ok(())
     }
-    pub fn rows(&self) -> impl Iterator<Item = (&[u8], NamedRow)> {
+    pub(crate) fn rows(&self) -> impl Iterator<Item = (&[u8], NamedRow)> {
         self.rows
             .iter()
             .enumerate()

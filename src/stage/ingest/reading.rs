@@ -1,21 +1,22 @@
 //! One reading of one file from top to bottom, row by row.
+//!
+//! Joint positions that a controller's program declares, as the rows of a table: `name`, the six joints, the external axes.
 
-use super::arm::RobotJoints;
-use super::bind::{Binding, FileHeader, bind};
-use super::external::ExternalAxes;
-use super::layout::{Decimal, FileLayout, LimitPolicy};
-use super::listing::ListedRows;
-use super::refusal::RowRefusal;
-use super::row::{RecordedRow, RowReader};
-use crate::error::{Error, Result, counted};
-use crate::program::listing as language;
+use crate::error::{Error, Fault, Result, counted};
+use crate::program::{JointList, Language, MOST_BYTES, joint_list, listing as language};
 use crate::raw::{
     self, BagRows, ColumnRows, Delimiter, InputSource, Record, RecordReader, TextLayout, TextRows,
     Workbook, failed, has_columns, is_bag, is_workbook, not_read,
 };
+use crate::stage::ingest::arm::RobotJoints;
+use crate::stage::ingest::bind::{Binding, FileHeader, bind};
+use crate::stage::ingest::external::ExternalAxes;
+use crate::stage::ingest::layout::{Decimal, FileLayout, LimitPolicy};
+use crate::stage::ingest::refusal::RowRefusal;
+use crate::stage::ingest::row::{RecordedRow, RowReader};
 use crate::stage::{Context, OpenedInput};
 use crate::table::{IntakeRow, RejectedRow, Robot};
-use std::io::{BufRead, BufReader, Cursor};
+use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
 
 /// How many rows pass between two signs of progress.
@@ -36,7 +37,37 @@ pub struct TableLayout<'l> {
     pub(crate) decimal: Decimal,
 }
 
-/// Opens a table of any kind: the first that a file is, text at last.
+/// What a file is.
+#[derive(Clone, Copy)]
+pub(crate) enum FileKind {
+    Workbook,
+    Bag,
+    /// A controller's, which declares joints.
+    Program(Language),
+    Columns,
+    /// What is known and not read, and why.
+    NotRead(&'static str),
+    Text,
+}
+
+impl FileKind {
+    /// By its name and how it begins.
+    pub(crate) fn of(name: &str, head: &[u8]) -> Self {
+        if is_workbook(head) {
+            Self::Workbook
+        } else if is_bag(head) {
+            Self::Bag
+        } else if let Some(language) = language(&raw::ending(Path::new(name)), head) {
+            Self::Program(language)
+        } else if has_columns(head) {
+            Self::Columns
+        } else {
+            not_read(head).map_or(Self::Text, Self::NotRead)
+        }
+    }
+}
+
+/// Opens a table of any kind.
 pub fn records(
     source: Box<dyn InputSource>,
     label: &str,
@@ -44,45 +75,44 @@ pub fn records(
 ) -> Result<Box<dyn RecordReader>> {
     let mut reader = BufReader::with_capacity(BUFFER, source);
     let head = reader.fill_buf().map_err(|error| failed(label, &error))?;
-    let (is_book, is_bag) = (is_workbook(head), is_bag(head));
+    let kind = FileKind::of(label, head);
     let data = |message: String| Error::data(label, message);
-    if let Some(sheet) = layout.sheet.filter(|_| !is_book) {
+    if let Some(sheet) = layout.sheet.filter(|_| !matches!(kind, FileKind::Workbook)) {
         return Err(data(format!(
             "is no workbook, and has no sheet `{sheet}`; allowed: a file .xlsx or .xlsm, or no `sheet`"
         )));
     }
-    if let Some(topic) = layout.topic.filter(|_| !is_bag) {
+    if let Some(topic) = layout.topic.filter(|_| !matches!(kind, FileKind::Bag)) {
         return Err(data(format!(
             "is no recording of ROS 2, and has no topic `{topic}`; allowed: a file .mcap or .db3, or no `topic`"
         )));
     }
-    Ok(if is_book {
-        let mut book = Workbook::read(reader).map_err(data)?;
-        let name = book.sheet(layout.sheet).map_err(data)?;
-        let mark = if layout.decimal == Decimal::Comma {
-            ','
-        } else {
-            '.'
-        };
-        let lines = book.lines(&name, mark).map_err(data)?;
-        let text = TextLayout {
-            delimiter: Delimiter::Byte(b'\t'),
-            ..layout.text
-        };
-        let label = format!("{label} sheet `{name}`");
-        Box::new(TextRows::open(Cursor::new(lines), &label, text)?)
-    } else if is_bag {
-        Box::new(BagRows::open(reader.into_inner(), label, layout.topic)?)
-    } else if let Some(language) = language(&raw::ending(Path::new(label)), head) {
-        Box::new(ListedRows::open(reader, label, language)?)
-    } else if has_columns(head) {
-        Box::new(ColumnRows::open(reader, label)?)
-    } else if let Some(what) = not_read(head) {
-        return Err(Error::data(label, what));
-    } else {
-        let reader = raw::without_utf16(reader).map_err(|error| failed(label, &error))?;
-        let reader = BufReader::with_capacity(BUFFER, reader);
-        Box::new(TextRows::open(reader, label, layout.text)?)
+    Ok(match kind {
+        FileKind::Workbook => {
+            let mut book = Workbook::read(reader).map_err(data)?;
+            let name = book.sheet(layout.sheet).map_err(data)?;
+            let mark = if layout.decimal == Decimal::Comma {
+                ','
+            } else {
+                '.'
+            };
+            let lines = book.lines(&name, mark).map_err(data)?;
+            let text = TextLayout {
+                delimiter: Delimiter::Byte(b'\t'),
+                ..layout.text
+            };
+            let label = format!("{label} sheet `{name}`");
+            Box::new(TextRows::open(Cursor::new(lines), &label, text)?)
+        }
+        FileKind::Bag => Box::new(BagRows::open(reader.into_inner(), label, layout.topic)?),
+        FileKind::Program(language) => Box::new(ListedRows::open(reader, label, language)?),
+        FileKind::Columns => Box::new(ColumnRows::open(reader, label)?),
+        FileKind::NotRead(what) => return Err(data(what.into())),
+        FileKind::Text => {
+            let reader = raw::without_utf16(reader).map_err(|error| failed(label, &error))?;
+            let reader = BufReader::with_capacity(BUFFER, reader);
+            Box::new(TextRows::open(reader, label, layout.text)?)
+        }
     })
 }
 
@@ -271,5 +301,137 @@ pub(super) fn intake(
         read,
         accepted,
         rejected,
+    }
+}
+
+/// Names of the columns: as the languages call the axes.
+const RAPID: [&str; 12] = [
+    "rax_1", "rax_2", "rax_3", "rax_4", "rax_5", "rax_6", "eax_a", "eax_b", "eax_c", "eax_d",
+    "eax_e", "eax_f",
+];
+const KRL: [&str; 12] = [
+    "A1", "A2", "A3", "A4", "A5", "A6", "E1", "E2", "E3", "E4", "E5", "E6",
+];
+
+const NUMBERED: [&str; 12] = [
+    "J1", "J2", "J3", "J4", "J5", "J6", "E1", "E2", "E3", "E4", "E5", "E6",
+];
+
+/// The joints that a program declares, row by row, in deg.
+pub(super) struct ListedRows {
+    label: String,
+    /// `name`, then the axes.
+    names: Vec<&'static str>,
+    /// With the line at which each stands.
+    rows: Vec<(u64, Vec<String>)>,
+    /// How many poses were left out.
+    poses: usize,
+    is_named: bool,
+    /// Rows handed out.
+    next: usize,
+}
+
+impl ListedRows {
+    /// Reads a program from first byte to last.
+    pub(super) fn open(source: impl Read, label: &str, language: Language) -> Result<Self> {
+        let mut bytes = Vec::new();
+        // One byte more than may be tells that there are too many.
+        source
+            .take(MOST_BYTES as u64 + 1)
+            .read_to_end(&mut bytes)
+            .map_err(|error| failed(label, &error))?;
+        let list = joint_list(&bytes, language).map_err(|notes| {
+            let fault = |note: crate::program::Note| {
+                let place = format!("{label}:{}:{}", note.line, note.column);
+                Fault::new(place, note.message)
+            };
+            Error::Data(notes.into_iter().map(fault).collect())
+        })?;
+        if list.rows.is_empty() {
+            return Err(Error::data(label, none(&list, language)));
+        }
+        let all = match language {
+            Language::Krl => KRL,
+            Language::Rapid => RAPID,
+            Language::Fanuc | Language::UrScript => NUMBERED,
+        };
+        // An axis that no position has makes no column.
+        let has = |k: &usize| {
+            let mut rows = list.rows.iter();
+            rows.any(|row| row.external.get(*k).is_some_and(Option::is_some))
+        };
+        let used: Vec<usize> = (0..6).filter(has).collect();
+        let names = std::iter::once("name")
+            .chain(all[..6].iter().copied())
+            .chain(used.iter().map(|k| all[6 + k]));
+        let rows = list.rows.iter().map(|row| {
+            let external = used.iter().map(|k| row.external[*k]);
+            let joints = row.joints.iter().map(|joint| Some(*joint));
+            let numbers = joints.chain(external);
+            let cells =
+                numbers.map(|number| number.map_or_else(String::new, |number| number.to_string()));
+            let cells = std::iter::once(row.name.clone()).chain(cells);
+            (row.line as u64, cells.collect())
+        });
+        Ok(Self {
+            label: label.into(),
+            names: names.collect(),
+            rows: rows.collect(),
+            poses: list.poses,
+            is_named: false,
+            next: 0,
+        })
+    }
+}
+
+/// That a program declares no joints, and how it would.
+fn none(list: &JointList, language: Language) -> String {
+    let example = match language {
+        Language::Krl => "DECL E6AXIS XP1={A1 0.0,A2 -90.0,A3 90.0,A4 0.0,A5 0.0,A6 0.0}",
+        Language::Fanuc => "P[1]{ GP1: UF : 0, UT : 1, J1= 0.000 deg, ... J6= 0.000 deg };",
+        Language::UrScript => "wp1_q = [0.0, -1.57, 1.57, 0.0, 1.57, 0.0]",
+        Language::Rapid => "CONST jointtarget p10:=[[0,-10,20,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]];",
+    };
+    let poses = if list.poses > 0 {
+        format!(" ({} without joints)", counted(list.poses, "pose"))
+    } else {
+        String::new()
+    };
+    format!("declares no joint position{poses}; allowed: declarations such as `{example}`")
+}
+
+impl RecordReader for ListedRows {
+    fn label(&self) -> &str {
+        &self.label
+    }
+    fn next(&mut self, record: &mut Record) -> Result<bool> {
+        if !std::mem::replace(&mut self.is_named, true) {
+            record.begin(1);
+            self.names
+                .iter()
+                .for_each(|name| record.push(name.as_bytes()));
+            return Ok(true);
+        }
+        let Some((line, cells)) = self.rows.get(self.next) else {
+            return Ok(false);
+        };
+        self.next += 1;
+        record.begin(*line);
+        cells.iter().for_each(|cell| record.push(cell.as_bytes()));
+        Ok(true)
+    }
+    /// The line of the last row handed out.
+    fn lines(&self) -> u64 {
+        self.next
+            .checked_sub(1)
+            .and_then(|row| self.rows.get(row))
+            .map_or(0, |(line, _)| *line)
+    }
+    fn bytes(&self) -> u64 {
+        self.next as u64
+    }
+    fn remark(&self) -> Option<String> {
+        let poses = self.poses;
+        (poses > 0).then(|| format!("{} without joints left out", counted(poses, "pose")))
     }
 }

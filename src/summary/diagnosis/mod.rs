@@ -3,10 +3,9 @@
 mod positions;
 mod torques;
 
-use super::labelled;
-use super::robot_of;
 use super::screen::{self, NextStep, declared_in_yaml};
 use super::short_finding::{Found, ShortFinding, words};
+use super::{labelled, robot_of};
 use crate::diagnose::VerdictKind;
 use crate::error::{Error, Result};
 use crate::pipeline::StageReport;

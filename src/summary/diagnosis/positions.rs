@@ -163,7 +163,7 @@ impl Positions {
     }
 
     /// What `--json` has of it.
-    pub fn document(&self) -> Value {
+    pub(crate) fn document(&self) -> Value {
         let v = &self.verdict;
         let columns = "verdict statement noise_floor_mm noise_basis held_out clock";
         let mut document = picked(v, columns);

@@ -102,7 +102,7 @@ impl Torques {
     }
 
     /// What `--json` has of it.
-    pub fn document(&self) -> Value {
+    pub(crate) fn document(&self) -> Value {
         let v = &self.verdict;
         let columns =
             "verdict statement inertials base_parameters signal cutoff_hz rate_hz held_out";

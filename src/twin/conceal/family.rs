@@ -8,9 +8,6 @@ mod gears;
 mod instruments;
 mod interactions;
 mod loads;
-mod memories;
-mod mounts;
-mod unlisted;
 
 use super::robots::{ALL_KINDS, KINDS, Kind};
 use crate::arm::Arm;
@@ -151,7 +148,7 @@ pub(crate) struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     /// Weighs the arm in every point to fit.
-    pub fn new(
+    pub(crate) fn new(
         robot: &'a RobotDescription,
         ranges_deg: &'a [[f64; 2]],
         points: &[Point],
@@ -174,7 +171,7 @@ impl<'a> Bench<'a> {
             for (peak, torque) in bench.peak.iter_mut().zip(&rest.torque) {
                 *peak = peak.max(torque.abs());
             }
-            let loads = crate::statics::Loads::new(&arm, &rest.posture, point.payload_kg);
+            let loads = crate::arm::Loads::new(&arm, &rest.posture, point.payload_kg);
             let (_, moment) = loads.wrench(0, [0.0; 3]);
             bench.overturning = bench.overturning.max(moment[0].hypot(moment[1]));
         }
@@ -302,16 +299,16 @@ pub const FAMILIES: &[Family] = &[
     alone("counterbalance", loads::counterbalance),
     alone("link_mass", loads::link_mass),
     alone("payload_error", loads::payload_error),
-    paired("thermal_growth", mounts::thermal_growth),
-    paired("tool_shift", mounts::tool_shift),
-    paired("base_shift", mounts::base_shift),
-    paired("tracker_drift", mounts::tracker_drift),
-    alone("joint_log_lag", mounts::joint_log_lag),
-    alone("tracker_scale", mounts::tracker_scale),
-    alone("unknown", unlisted::bump),
-    alone("unknown", unlisted::hinge),
-    alone("unknown", unlisted::product),
-    alone("unknown", unlisted::sway),
+    paired("thermal_growth", loads::thermal_growth),
+    paired("tool_shift", loads::tool_shift),
+    paired("base_shift", loads::base_shift),
+    paired("tracker_drift", loads::tracker_drift),
+    alone("joint_log_lag", loads::joint_log_lag),
+    alone("tracker_scale", loads::tracker_scale),
+    alone("unknown", foreign::bump),
+    alone("unknown", foreign::hinge),
+    alone("unknown", foreign::product),
+    alone("unknown", foreign::sway),
 ];
 
 /// Families of physics that no list of effects holds yet: instruments, memory, interactions.
@@ -322,10 +319,10 @@ pub const BEYOND: &[Family] = &[
     alone("tracker_refraction", instruments::refraction),
     alone("unknown", instruments::swing),
     alone("base_shift", instruments::knock),
-    alone("presliding", memories::presliding),
-    alone("joint_warming", memories::own_heat),
-    alone("joint_warming", memories::late_heat),
-    alone("thermal_growth", memories::lagging_link),
+    alone("presliding", interactions::presliding),
+    alone("joint_warming", interactions::own_heat),
+    alone("joint_warming", interactions::late_heat),
+    alone("thermal_growth", interactions::lagging_link),
     alone("gear_load", interactions::gear_load),
     alone("gear_flank", interactions::gear_flank),
     alone("joint_warming", interactions::warm_ratio),

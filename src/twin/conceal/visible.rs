@@ -1,16 +1,13 @@
 //! What is left of an effect when geometry, ratios and couplings have absorbed what they can: differences of the twin by its own
 //! true numbers, orthogonalised (modified Gram-Schmidt, twice), and the effect's displacement less its shadow on them.
 
-use crate::arm::Arm;
+use crate::arm::{Arm, Motion, Row};
 use crate::effect::{self, Physical};
 use crate::equilibrium::{Equilibrium, settle, sighted};
-use crate::matrix;
-use crate::memory;
-use crate::motion::Motion;
 use crate::plan::Point;
-use crate::statics::Row;
 use crate::tracker::Tracker;
 use crate::truth::TrueRobot;
+use crate::{matrix, memory};
 use calib_foundation::description::RobotDescription;
 
 /// What a recording is made of, but for its effects and its noise.

@@ -1,10 +1,9 @@
 //! What moves or changes bodies: links that bend and grow, masses that are not as described, the base, the tool.
 
 use super::{Motion, State, by_axis, effect};
-use crate::arm::Arm;
+use crate::arm::{Arm, step};
 use crate::matrix::{self, Vector};
 use crate::memory::{self, Moment};
-use crate::motion::step;
 
 // A uniform elastic beam, clamped at its joint and loaded at its far end by the weight of everything beyond. Under an end force F and an
 // end moment M a cantilever of length L turns by `M L/EI + F L^2/(2 EI)` and moves by `M L^2/(2 EI) + F L^3/(3 EI)` across its axis; along

@@ -1,10 +1,10 @@
 //! An effect that nobody listed: a drawn shape of one variable, or a product of two, in one direction of motion anywhere on the chain.
 
 use super::{Act, Motion, State, Stated, TrueValue, true_value};
+use crate::arm::Row;
 use crate::matrix::{self, Matrix, Vector};
 use crate::memory::Moment;
-use crate::polar::Polar;
-use crate::statics::Row;
+use crate::tracker::Polar;
 use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -16,9 +16,8 @@ pub use tracker::*;
 use super::arm::{Arm, Posture};
 use super::matrix::Vector;
 use super::memory::Moment;
-use super::motion::Motion;
-use super::statics::{Loads, Row};
 use super::true_value::{TrueValue, true_value};
+use crate::arm::{Loads, Motion, Row};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -182,7 +181,7 @@ macro_rules! effect {
     };
     (@act $name:ident turns |$me:ident, $at:ident| $turn:expr; $($more:tt)*) => {
         impl $crate::effect::Act for $name {
-            fn act(&$me, state: &$crate::effect::State, motion: &mut $crate::motion::Motion) {
+            fn act(&$me, state: &$crate::effect::State, motion: &mut $crate::arm::Motion) {
                 let $at = $crate::effect::AtJoint { joint: $me.joint - 1, state };
                 motion.joint[$at.joint] += $turn;
             }

@@ -1,11 +1,10 @@
 //! What is wrong with the instrument: its circles, its ranges, its air, its stand.
 
 use super::{Motion, State, by_axis, effect, sine_and_cosine};
+use crate::arm::{Row, step};
 use crate::matrix::{self, Vector};
 use crate::memory::{self, Moment};
-use crate::motion::step;
-use crate::polar::Polar;
-use crate::statics::Row;
+use crate::tracker::Polar;
 use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

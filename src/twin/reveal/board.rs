@@ -2,9 +2,9 @@
 
 use super::left_out::LeftOut;
 use super::mark::{Case, DUE, HeldOut, Marked, Outcome};
-use super::place::Places;
 use super::reliability::{Reliability, Subject, reliability};
 use super::share::Share;
+use crate::reveal::mark::Places;
 use serde::{Serialize, Serializer};
 use serde_json::json;
 use std::collections::BTreeMap;

@@ -2,9 +2,9 @@
 
 use super::mark::DUE;
 use super::paper::{Answer, Atoms, Cause, Name, Truth, all_atoms, atoms};
-use super::place::{GIVEN, NAMELESS};
 use super::reliability::{Statement, statements};
 use super::share::Share;
+use crate::reveal::mark::{GIVEN, NAMELESS};
 use std::collections::BTreeSet;
 
 /// A held-out error that exceeds the whole list's by this factor tells that something is left out.

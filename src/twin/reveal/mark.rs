@@ -1,9 +1,19 @@
 //! One case: what was found of every concealed cause, and what was said that is not there.
+//!
+//! Stated 95 % intervals against true numbers: the twin's numbers in the words and units of a diagnosis.
+//!
+//! Only numbers that mean the same in both are compared; a curve of another form has no true slope.
+//!
+//! Whether a diagnosis looked in the right place, gave no wrong name, and named `unknown` where it knew no name.
 
-use super::interval::{Interval, intervals};
-use super::paper::{Answer, Atoms, Cause, Finding, Name, Rival, Truth, all_atoms, atoms};
-use super::place::{POINT_FAULTS, Placed, placed};
-use super::reliability::{Statement, statements};
+use crate::reveal::paper::{
+    Answer, Atoms, Cause, Finding, Name, Number, Rival, Truth, all_atoms, atoms,
+};
+use crate::reveal::reliability::{Statement, statements};
+use crate::reveal::share::Share;
+use calib_foundation::units::Unit;
+use serde::Serialize;
+use std::collections::BTreeSet;
 
 /// From this visibility on an effect should be named.
 pub(crate) const DUE: f64 = 50.0;
@@ -236,4 +246,234 @@ fn held_out(truth: &Truth, answer: &Answer) -> Option<HeldOut> {
         after,
         bound,
     })
+}
+
+/// Whether a stated 95 % interval holds the true number.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Interval {
+    pub(crate) effect: String,
+    pub(crate) name: String,
+    /// Whether it holds the truth.
+    pub(crate) holds: bool,
+}
+
+/// Two-sided 95 % of a normal distribution.
+const NINETY_FIVE: f64 = 1.959_964;
+
+/// A true number as a diagnosis would state it.
+struct Expected {
+    name: String,
+    value: f64,
+    unit: &'static str,
+    /// The sign is a convention: sizes are compared.
+    unsigned: bool,
+}
+
+/// Intervals of what was found of a cause.
+pub(super) fn intervals(cause: &Cause, findings: &[Finding]) -> Vec<Interval> {
+    let same = findings
+        .iter()
+        .filter(|finding| finding.effect == cause.effect && finding.place == cause.place);
+    let stated: Vec<&Number> = same.flat_map(|finding| &finding.parameters).collect();
+    let judge = |truth: Expected| {
+        let full = format!("{}.{}", cause.effect, truth.name);
+        let number = stated
+            .iter()
+            .find(|number| number.name == truth.name || number.name == full)?;
+        let sigma = number.sigma.filter(|sigma| *sigma > 0.0)?;
+        let expected = convert(truth.value, truth.unit, &number.unit)?;
+        let off = if truth.unsigned {
+            number.value.abs() - expected.abs()
+        } else {
+            number.value - expected
+        };
+        Some(Interval {
+            effect: cause.effect.clone(),
+            name: truth.name,
+            holds: off.abs() <= NINETY_FIVE * sigma,
+        })
+    };
+    cause
+        .parameters
+        .iter()
+        .filter_map(|number| expected(cause, number))
+        .filter_map(judge)
+        .collect()
+}
+
+/// The true number `effect.seat.what` in the words of a diagnosis; none where it has no counterpart.
+fn expected(cause: &Cause, number: &Number) -> Option<Expected> {
+    let rest = number.name.strip_prefix(&cause.effect)?.strip_prefix('.')?;
+    let (seat, what) = rest.split_once('.').unwrap_or((rest, ""));
+    let signed = |name: String, value: f64, unit: &'static str| {
+        Some(Expected {
+            name,
+            value,
+            unit,
+            unsigned: false,
+        })
+    };
+    let value = number.value;
+    match (cause.effect.as_str(), what) {
+        ("joint_compliance", "") => signed(seat.into(), value, "rad/Nm"),
+        ("link_compliance", "middle") => signed(seat.into(), value, "rad/Nm"),
+        ("base_compliance", "x") if cause.form == "isotropic" => {
+            signed(seat.into(), value, "rad/Nm")
+        }
+        ("gear_cyclic" | "gear_motor_cyclic", ripple) => {
+            let kind = ["sin", "cos"]
+                .into_iter()
+                .find(|kind| ripple.starts_with(kind))?;
+            let order: f64 = ripple.strip_prefix(kind)?.parse().ok()?;
+            signed(format!("{seat}.order{order}.{kind}"), value, "arcsec")
+        }
+        ("backlash", "gap")
+            if ["by direction", "by sign of load"].contains(&cause.form.as_str()) =>
+        {
+            Some(Expected {
+                name: format!("{seat}.half_gap"),
+                value: 0.5 * value,
+                unit: "arcsec",
+                unsigned: true,
+            })
+        }
+        ("zero_shift", "step") => signed(format!("{seat}.step"), value, "arcsec"),
+        // A run of links grows as one.
+        ("thermal_growth", "expansion") => {
+            let run = cause.place.strip_prefix("link ")?.replace('-', "_");
+            let first = run.split('_').next() == seat.strip_prefix('l');
+            first.then(|| Expected {
+                name: format!("l{run}.per_kelvin"),
+                value: 1e-6 * value,
+                unit: "1",
+                unsigned: false,
+            })
+        }
+        ("tool_shift", shift) => signed(
+            format!("{seat}.{}", shift.strip_prefix("shift_")?),
+            1e-3 * value,
+            "mm",
+        ),
+        ("joint_log_lag", "share") => signed(format!("{seat}.share"), value, "1"),
+        ("payload_error", "mass") if value != 0.0 => signed(format!("{seat}.mass"), value, "1"),
+        ("link_mass", "mass") if value != 0.0 => signed(format!("{seat}.mass"), value, "1"),
+        _ => None,
+    }
+}
+
+/// A value in another unit; none where the units do not convert.
+fn convert(value: f64, from: &str, to: &str) -> Option<f64> {
+    if from == to {
+        return Some(value);
+    }
+    let (from, to) = (Unit::parse(from)?, Unit::parse(to)?);
+    (from.quantity() == to.quantity()).then(|| to.from_si(from.to_si(value)))
+}
+
+/// Faults of single points: they say nothing about where a cause sits.
+pub(super) const POINT_FAULTS: [&str; 2] = ["outlier", "mislabelled_point"];
+/// A name that is stated with this probability or more is given.
+pub(crate) const GIVEN: f64 = 0.5;
+/// What has a place and no name.
+pub const NAMELESS: &str = "unknown";
+
+/// What was named of a cause.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Placed {
+    /// The strongest finding, but for faults of points and what sits at the other causes' places, is at its place or at an accepted one.
+    pub place: bool,
+    /// It has its name or an accepted one, or `unknown` stands at its place.
+    pub name_or_unknown: bool,
+    /// A name was given that is not there: by a finding that is neither wanted nor accepted nor has such a rival, or as the first choice
+    /// at the right place.
+    pub wrong_name: bool,
+    /// The same with a probability of [`GIVEN`] or more.
+    pub(crate) wrong_given: bool,
+}
+
+fn places(names: &Atoms) -> BTreeSet<&str> {
+    names.iter().map(|(_, place)| place.as_str()).collect()
+}
+
+/// Judges what was named of `cause`; `known` are all names that are there or accepted, `reach` all that a finding may mean.
+pub(super) fn placed(
+    cause: &Cause,
+    truth: &Truth,
+    findings: &[Finding],
+    known: &Atoms,
+    reach: impl Fn(&Finding) -> Atoms,
+) -> Placed {
+    let own = cause.atoms();
+    let accepted = all_atoms(&truth.accepted);
+    let right: BTreeSet<&str> = places(&own).union(&places(&accepted)).copied().collect();
+    let others: Atoms = truth.effects.iter().flat_map(Cause::atoms).collect();
+    let elsewhere: BTreeSet<&str> = places(&others).difference(&right).copied().collect();
+
+    let named: Vec<(&Finding, Atoms)> = findings
+        .iter()
+        .map(|finding| (finding, finding.atoms()))
+        .collect();
+    let physical = || {
+        named
+            .iter()
+            .filter(|(finding, _)| !POINT_FAULTS.contains(&finding.effect.as_str()))
+    };
+    let there = |names: &Atoms| !places(names).is_disjoint(&right);
+    let found: Atoms = named.iter().flat_map(|(_, names)| names.clone()).collect();
+    let wrong = |finding: &Finding, names: &Atoms| {
+        finding.effect != NAMELESS
+            && names.is_disjoint(known)
+            && (there(names) || reach(finding).is_disjoint(known))
+    };
+    Placed {
+        place: physical()
+            .find(|(_, names)| !places(names).is_subset(&elsewhere))
+            .is_some_and(|(_, names)| there(names)),
+        name_or_unknown: own.is_subset(&found)
+            || !accepted.is_disjoint(&found)
+            || named
+                .iter()
+                .any(|(finding, names)| finding.effect == NAMELESS && there(names)),
+        wrong_name: named.iter().any(|(finding, names)| wrong(finding, names)),
+        wrong_given: named.iter().any(|(finding, names)| {
+            wrong(finding, names) && finding.probability.unwrap_or(1.0) >= GIVEN
+        }),
+    }
+}
+
+/// Shares of causes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub(crate) struct Places {
+    pub(crate) place: Share,
+    /// Right names, or `unknown` at the right place.
+    pub(crate) name_or_unknown: Share,
+    pub(crate) wrong_name: Share,
+    /// Wrong names with a probability of [`GIVEN`] or more.
+    #[serde(rename = "wrong_name_0.5")]
+    pub(crate) wrong_given: Share,
+}
+
+impl Places {
+    /// Each with a title.
+    pub(super) fn titled(&self) -> [(&'static str, Share); 4] {
+        [
+            ("place right", self.place),
+            (
+                "name right, or unknown at the right place",
+                self.name_or_unknown,
+            ),
+            ("a wrong name at all", self.wrong_name),
+            ("a wrong name with 0.5 or more", self.wrong_given),
+        ]
+    }
+    pub(super) fn of(causes: impl Iterator<Item = Placed>) -> Places {
+        let all: Vec<Placed> = causes.collect();
+        let share = |holds: fn(&Placed) -> bool| Share::of(all.iter().map(holds));
+        Places {
+            place: share(|one| one.place),
+            name_or_unknown: share(|one| one.name_or_unknown),
+            wrong_name: share(|one| one.wrong_name),
+            wrong_given: share(|one| one.wrong_given),
+        }
+    }
 }

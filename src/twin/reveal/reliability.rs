@@ -16,7 +16,7 @@ pub(crate) enum Subject {
 
 impl Subject {
     /// As people read it.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Name => "names",
             Self::Place => "places",

@@ -3,10 +3,10 @@
 use super::family::{FAMILIES, OPEN, Pool};
 use super::law::Law;
 use super::path::Path;
-use super::rigid::{Body, Machine};
 use crate::conceal::robots::Kind;
 use crate::matrix::{self, Vector};
 use crate::noise::{Noise, Purpose};
+use crate::torque::law::{Body, Machine};
 use calib_foundation::description::{
     DeclaredInertias, InertiaMoments, MassTolerance, RobotDescription,
 };

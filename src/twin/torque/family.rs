@@ -1,9 +1,9 @@
 //! What one recording may conceal beside the friction of all joints: a family of effects with sizes that arms have.
 
 use super::law::{Bristles, Fall, Law};
-use super::rigid::Machine;
 use crate::matrix;
 use crate::noise::Noise;
+use crate::torque::law::Machine;
 
 /// Families of the list; [`OPEN`] further ones are in no list.
 pub(super) const FAMILIES: usize = 23;

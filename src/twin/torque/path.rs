@@ -1,7 +1,7 @@
 //! How joints move while torques are recorded: sums of sines that begin and end at rest, and moves from point to point with pauses.
 
-use super::rigid::JointState;
 use crate::noise::Noise;
+use crate::torque::law::JointState;
 
 /// A stretch of the recording.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,8 +2,8 @@
 
 use super::draw::TorqueCase;
 use super::law::{Law, Moment};
-use super::rigid::{JointState, Machine};
 use crate::noise::{Noise, Purpose};
+use crate::torque::law::{JointState, Machine};
 
 /// Hz of the simulation, at least.
 const FINE: f64 = 500.0;

@@ -4,7 +4,7 @@
 use super::draw::TorqueCase;
 use super::law::{Fall, Law, Moment};
 use super::record::{AR1_COEFFICIENT, TorqueRows};
-use super::rigid::Machine;
+use crate::torque::law::Machine;
 use std::f64::consts::FRAC_PI_2;
 
 /// Rows that are averaged into one: as a low-pass does.
@@ -213,7 +213,7 @@ impl<'a> Columns<'a> {
                 (0..6).map(|k| self.of_machine(|machine| machine.links[joint].inertia[k] += 0.1));
             add(&Law::link_inertia(joint, 0.0), inertia.collect());
         }
-        let payload = |change: fn(&mut super::rigid::Body)| {
+        let payload = |change: fn(&mut crate::torque::law::Body)| {
             self.of_machine(|machine| machine.payload.iter_mut().for_each(change))
         };
         let payload: Vec<Vec<f64>> = vec![

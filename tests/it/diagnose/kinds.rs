@@ -11,7 +11,7 @@ use calib::estimate::gauge;
 use calib::observation::Dimension;
 use calib::robot::{Measurements, Named as Names, NoiseBasis, PointReadings, Readings, RobotModel};
 use calib::twin::effect::Physical;
-use calib::twin::given::GivenPose;
+use calib::twin::plan::GivenPose;
 use calib::twin::plan::{Block, Climate, Poses};
 use calib::twin::recorder::{Experiment, Motors, Shot};
 use calib::twin::tracker::Tracker;

@@ -91,13 +91,14 @@ fn a_recording_in_feather_files_is_diagnosed_as_its_text_is() {
 
 #[test]
 fn a_feather_file_that_cannot_be_read_is_refused_with_a_reason() {
-    let refused = |written: &dyn Fn(Vec<u8>) -> Vec<u8>| {
+    let refused_of = |compression, written: &dyn Fn(Vec<u8>) -> Vec<u8>| {
         let folder = tempfile::tempdir().unwrap();
-        case(folder.path(), |text| written(feather(text, None)));
+        case(folder.path(), |text| written(feather(text, compression)));
         let output = calib(folder.path(), "run p.yaml");
         assert_ne!(output.code, Some(0));
         output.err
     };
+    let refused = |written: &dyn Fn(Vec<u8>) -> Vec<u8>| refused_of(None, written);
     let said = refused(&|bytes| bytes[..bytes.len() / 2].to_vec());
     has(
         &said,
@@ -105,6 +106,21 @@ fn a_feather_file_that_cannot_be_read_is_refused_with_a_reason() {
     );
     let said = refused(&|bytes| [b"FEA1", &bytes[4..]].concat());
     has(&said, "is a Feather file of version 1; allowed: version 2");
+    // Before each frame of zstd stands how many bytes it unpacks to: numbers that no machine can hold, and none can have.
+    for length in [1_i64 << 60, 1 << 40, i64::MIN] {
+        let said = refused_of(Some(CompressionType::ZSTD), &|mut bytes| {
+            let frame = bytes
+                .windows(4)
+                .position(|at| at == 0xfd2f_b528_u32.to_le_bytes());
+            let at = frame.unwrap() - 8;
+            bytes[at..at + 8].copy_from_slice(&length.to_le_bytes());
+            bytes
+        });
+        has(
+            &said,
+            "is a Feather file that cannot be read: a column unpacks to ",
+        );
+    }
 }
 
 /// An array of NumPy, version 1, as `numpy.save` writes it.

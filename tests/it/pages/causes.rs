@@ -32,7 +32,7 @@ pub fn walk() -> String {
         "1. **Write a row** into [`table.rs`](table.rs), behind the causes that a model has before it, as `&Cause {{ .. }}`. A test compiles the one below as it \
          stands here and fits it to a recording (`cargo test --test it seat_compliance`).\n\n```rust\n{}\n```\n\n\
          2. **Run the laws**: `cargo test --test it forms`. Every form must be nothing without a size, have central differences as its partials, survive being \
-         stored, stay near its neighbours and have a sentence; `tests/it/forms/sentences.txt` and `proposed.txt` list what is said and proposed.\n\
+         stored, stay near its neighbours and have a sentence; `tests/it/forms/sentences.txt` lists them (`CALIB_UPDATE=1` writes it anew), `src/report/language/de_stored.po` has their German.\n\
          3. **Write the pages anew**: `CALIB_UPDATE=1 cargo test --test it pages`.\n\
          4. **Show that it is found**, and not where it is not: conceal it in the twin (`src/twin/effect/`, by mathematics of its own) and run \
          `calib simulate prove --out proof --seed 7 --cases 60 --nulls 0.5`.",

@@ -6,7 +6,7 @@ use calib::estimate::scale;
 use calib::observation::{only_contacts, rank};
 use calib::robot::{Measurements, Named, PointReadings, Readings};
 use calib::twin::arm::Arm;
-use calib::twin::motion::Motion;
+use calib::twin::arm::Motion;
 use nalgebra::Vector3;
 
 /// The tracker's noise, m.

@@ -7,7 +7,7 @@ use crate::identify::normal;
 use calib::estimate::scale;
 use calib::observation::rank;
 use calib::twin::arm::Arm;
-use calib::twin::motion::Motion;
+use calib::twin::arm::Motion;
 use calib::twin::touch::Fixture;
 use nalgebra::{DVector, Vector3};
 

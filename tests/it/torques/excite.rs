@@ -7,8 +7,8 @@ use calib::dynamics::{
 };
 use calib::effect::Place;
 use calib::excitation::{MotionProposal, MotionRequest, exciting_motion};
+use calib::twin::torque::JointState;
 use calib::twin::torque::TorqueCase;
-use calib::twin::torque::rigid::JointState;
 use std::path::PathBuf;
 
 fn request(robot: PathBuf, generations: usize) -> MotionRequest {

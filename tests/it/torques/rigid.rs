@@ -3,7 +3,7 @@
 use calib::dynamics::{
     DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow,
 };
-use calib::twin::torque::rigid::{Body, JointState, Machine};
+use calib::twin::torque::{Body, JointState, Machine};
 use serde_json::Value;
 
 fn numbers<const N: usize>(value: &Value) -> [f64; N] {

@@ -3,23 +3,24 @@
 //! Every formula of a grammar is fitted in place of the finding's curves, its shape numbers refined; price (parts and coefficients) and
 //! error on folds make a Pareto front of at most three. Rows that are held out for validation take no part. Each is a declaration of an
 //! effect of one's own, ready to be written.
+//!
+//! Formulas that none beats in both price and error (Pareto), and the one that is proposed.
+//!
+//! How well shape numbers are known: by the curvature of what is left, with all coefficients fitted at every step.
 
-mod front;
-mod grammar;
-mod shape_sigma;
-
-use super::judge::{Alternatives, FoldErrors};
-use super::regression::FormRegression;
-use super::round::{EstimatedCause, FitState, Fitter, RoundView};
-use super::types::{ClosedForm, Finding};
-use crate::criteria::closed_form::STARTS;
+use crate::closed_form::grammar::{NamedVariable, declarations};
+use crate::criteria::closed_form::{BETTER, LIKE, SHOWN, STARTS};
 use crate::effect::{
     DeclaredCause, DeclaredForm, Form, Motion, ParameterEstimate, Place, Survey, Variable, names,
     people,
 };
-use front::{Priced, front};
-use grammar::{NamedVariable, declarations};
-use shape_sigma::shape_sigmas;
+use crate::judge::{Alternatives, FoldErrors};
+use crate::regression::FormRegression;
+use crate::round::{EstimatedCause, FitState, Fitter, RoundView};
+use crate::types::{ClosedForm, Finding};
+use nalgebra::DMatrix;
+
+mod grammar;
 
 /// What formulas are looked for in: the fitted model, and the rows around it.
 pub(super) struct FormulaSearch<'a, 'b> {
@@ -275,5 +276,139 @@ fn unit(name: &str, variables: &[NamedVariable]) -> (&'static str, f64) {
         _ if all(|variable| variable.is_angle) => ("rad", 1.0),
         _ if all(|variable| variable.is_prismatic) => ("mm", 1e3),
         _ => ("SI", 1.0),
+    }
+}
+
+/// What a formula costs and how well it carries over to poses that it has not seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Priced {
+    pub(crate) price: usize,
+    /// Rms of folds, m.
+    pub(crate) error: f64,
+}
+
+/// Positions of the formulas worth showing, cheapest first, of those that are better than none at all; and which of them is proposed:
+/// the cheapest that is as good as the best, where that does what the free curve does.
+pub(crate) fn front(
+    all: &[Priced],
+    [without, curve]: [f64; 2],
+) -> Option<(Vec<usize>, Option<usize>)> {
+    let mut order: Vec<usize> = (0..all.len())
+        .filter(|k| all[*k].error.is_finite())
+        .collect();
+    order.sort_by(|a, b| {
+        all[*a]
+            .price
+            .cmp(&all[*b].price)
+            .then(all[*a].error.total_cmp(&all[*b].error))
+            .then(a.cmp(b))
+    });
+    let mut falls: Vec<(usize, f64)> = Vec::new();
+    let mut best = without;
+    for k in order {
+        if all[k].error < best * (1.0 - *BETTER) {
+            falls.push((k, best / all[k].error));
+            best = all[k].error;
+        }
+    }
+    let last = falls.last()?.0;
+    while falls.len() > *SHOWN {
+        // What gains least over the next cheaper one goes; the best stays.
+        let (least, _) = falls[..falls.len() - 1]
+            .iter()
+            .enumerate()
+            .min_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
+        falls.remove(least);
+    }
+    let shown: Vec<usize> = falls.into_iter().map(|(k, _)| k).collect();
+    let as_good = |k: &usize| all[*k].error <= all[last].error * (1.0 + *BETTER);
+    let chosen = shown
+        .iter()
+        .position(as_good)
+        .filter(|_| all[last].error <= *LIKE * curve);
+    Some((shown, chosen))
+}
+
+/// Steps as shares of a shape number's range.
+const STEP: f64 = 1e-3;
+
+/// One standard deviation of each shape number of a form that fits best; none where what is left has no minimum there.
+pub(crate) fn shape_sigmas(form: &Form, given: &FormRegression) -> Vec<Option<f64>> {
+    let Some(declared) = form.declared() else {
+        return Vec::new();
+    };
+    let steps = declared.shape_steps(STEP);
+    let count = steps.len();
+    let unknown = vec![None; count];
+    if count == 0 || declared.declaration().pattern().jumps() {
+        return unknown;
+    }
+    let at = |moves: &[(usize, f64)]| {
+        let mut shift = vec![0.0; count];
+        moves
+            .iter()
+            .for_each(|(k, times)| shift[*k] += times * steps[*k]);
+        declared.shifted(&shift)
+    };
+    let pairs: Vec<(usize, usize)> = (0..count)
+        .flat_map(|a| (0..=a).map(move |b| (a, b)))
+        .collect();
+    let corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+    let forms: Vec<Form> = pairs
+        .iter()
+        .flat_map(|(a, b)| corners.map(|(i, j)| at(&[(*a, i), (*b, j)])))
+        .collect();
+    let gains = given.gains(&forms);
+    // Squares of whitened residuals fall by the gain: half of their second derivatives is the information.
+    let mut information = DMatrix::zeros(count, count);
+    for ((a, b), gain) in pairs.into_iter().zip(gains.chunks(4)) {
+        let second = -(gain[0] - gain[1] - gain[2] + gain[3]) / (4.0 * steps[a] * steps[b]);
+        information[(a, b)] = 0.5 * second;
+        information[(b, a)] = 0.5 * second;
+    }
+    let Some(covariance) = information.try_inverse() else {
+        return unknown;
+    };
+    (0..count)
+        .map(|k| {
+            Some(covariance[(k, k)])
+                .filter(|variance| *variance > 0.0)
+                .map(f64::sqrt)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(all: &[(usize, f64)], curve: f64) -> Option<(Vec<usize>, Option<usize>)> {
+        front(
+            &all.iter()
+                .map(|(price, error)| Priced {
+                    price: *price,
+                    error: *error,
+                })
+                .collect::<Vec<_>>(),
+            [10.0, curve],
+        )
+    }
+
+    #[test]
+    fn the_front_holds_what_nothing_beats_in_both() {
+        // The third is dearer than the second and worse; the fourth hardly better than the second.
+        assert_eq!(
+            of(&[(2, 9.0), (4, 5.0), (6, 6.0), (8, 4.99), (9, 3.0)], 3.1),
+            Some((vec![0, 1, 4], Some(2)))
+        );
+        // Five that fall: the two that gain least over their neighbours go, never the best.
+        assert_eq!(
+            of(&[(1, 9.0), (2, 8.9), (3, 4.0), (4, 3.9), (5, 3.8)], 3.8),
+            Some((vec![0, 2, 4], Some(2)))
+        );
+        // The curve does better than any of them.
+        assert_eq!(of(&[(2, 9.0), (4, 5.0)], 3.0), Some((vec![0, 1], None)));
+        assert_eq!(of(&[(3, 10.0), (5, f64::NAN)], 3.0), None);
+        assert_eq!(of(&[], 3.0), None);
     }
 }

@@ -5,9 +5,9 @@
 //! where joints are counted rightly the point in the robot's frame, R s + t by the bodies' poses and the unknown seat s, is an affine image
 //! of the measured one, which is linear in all unknowns. Rigid placements judge the best of them.
 
-use super::pairs::{PointPairs, bodies, median};
 use crate::criteria::setup::{CLOUD, COUNTINGS, SAME, SCREENED, TRIM};
 use crate::robot::RobotModel;
+use crate::setup::placement::{PointPairs, bodies, median};
 use crate::spatial::Pose;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

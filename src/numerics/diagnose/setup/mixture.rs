@@ -2,11 +2,11 @@
 //!
 //! Rows are dealt to two placements of the nominal robot, from several starts, until each row is with the placement that has it nearest.
 
-use super::pairs::PointPairs;
 use super::placement::{Placement, place};
 use super::words::mm;
 use crate::criteria::setup::{MIXED_BETTER, MIXED_FAR, MIXED_ROUNDS, MIXED_ROWS, MIXED_SHARE};
 use crate::error::counted;
+use crate::setup::placement::PointPairs;
 use crate::statistics::nearest as quantile;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 

@@ -6,14 +6,8 @@
 
 mod compare;
 mod counting;
-mod manufacture;
 mod mixture;
-mod number;
-mod order;
-mod outcome;
-mod pairs;
 mod placement;
-mod sign_group;
 mod words;
 mod wrong;
 
@@ -64,16 +58,16 @@ pub fn wrong_setup(question: &Question) -> Option<Diagnosis> {
         } else {
             None
         };
-        return parted.map(|found| outcome::two_setups(question, &found));
+        return parted.map(|found| words::two_setups(question, &found));
     }
     if let Some(found) = stated.explained() {
-        return Some(outcome::explained(question, &stated, &found));
+        return Some(words::explained(question, &stated, &found));
     }
     match stated.two_setups() {
-        Some(found) => Some(outcome::two_setups(question, &found)),
+        Some(found) => Some(words::two_setups(question, &found)),
         None => stated
             .is_no_robot()
-            .then(|| outcome::unexplained(question, &stated)),
+            .then(|| words::unexplained(question, &stated)),
     }
 }
 
@@ -82,12 +76,12 @@ pub(crate) fn wrong_when_identified(question: &Question, now: &FitState) -> Opti
     let points = WholePoints::of(question);
     let question = &points.question(question)?;
     let stated = AsStated::of(question);
-    let beyond = manufacture::beyond(now, question.robot, stated.reach);
+    let beyond = compare::beyond(now, question.robot, stated.reach);
     if beyond.is_empty() {
         return None;
     }
     Some(match stated.explained() {
-        Some(found) => outcome::explained(question, &stated, &found),
-        None => outcome::implausible(question, &beyond),
+        Some(found) => words::explained(question, &stated, &found),
+        None => words::implausible(question, &beyond),
     })
 }

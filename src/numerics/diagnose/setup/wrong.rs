@@ -1,10 +1,17 @@
 //! The closed list of set-up errors, and what a recording is without one.
+//!
+//! Joints that a controller counts the other way together: makers reverse joints by the role of their axes, not one by one.
+//!
+//! Of an upright arm the axes of pitch are parallel to that of the first pitch joint, the others (swivel and roll) lie in the arm's
+//! plane: joints 1, 4 and 6 of the usual six, which are tried whatever the wrist. Then come all joints, and every two.
+//!
+//! Orders in which points and joints of two files are joined wrongly: shifted, reversed, or one of them sorted by name as text.
 
-use super::counting::Counting;
-use super::number::FreeNumber;
-use super::order::RowOrder;
-use super::pairs::PointPairs;
-use super::sign_group::SignGroup;
+use crate::criteria::setup::{FARTHEST, LONG, SHIFTS, SORTED};
+use crate::robot::RobotModel;
+use crate::setup::counting::Counting;
+use crate::setup::placement::{FreeNumber, PointPairs, median};
+use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// What an engineer may have got wrong; joints from 0.
@@ -169,5 +176,182 @@ impl WrongSetup {
             Self::Mirrored => pairs.with_points(|point| point.yxz()),
             Self::Order(_) | Self::Number(_) => pairs.clone(),
         }
+    }
+}
+
+/// Joints, from 0, as bits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SignGroup(u64);
+
+impl SignGroup {
+    /// The groups of two joints or more that a robot may have: swivel and roll, pitch, the pitch of the main axes, all, and every two.
+    pub(crate) fn all(robot: &RobotModel) -> Vec<Self> {
+        let turning: Vec<usize> = (0..robot.joints().min(64))
+            .filter(|joint| robot.is_revolute(*joint))
+            .collect();
+        let pitch = turning
+            .windows(2)
+            .find(|pair| robot.is_parallel(pair[0], pair[1]))
+            .map(|pair| pair[0]);
+        let of = |choose: &dyn Fn(usize) -> bool| {
+            Self::of(turning.iter().copied().filter(|joint| choose(*joint)))
+        };
+        let mut out = vec![of(&|joint| {
+            robot.joints() == 6 && [0, 3, 5].contains(&joint)
+        })];
+        if let Some(pitch) = pitch {
+            let is_pitch = |joint: usize| robot.is_parallel(pitch, joint);
+            let wrist = (pitch..robot.joints())
+                .find(|joint| !is_pitch(*joint))
+                .unwrap_or(robot.joints());
+            out.extend([
+                of(&|joint| !is_pitch(joint)),
+                of(&is_pitch),
+                of(&|joint| is_pitch(joint) && joint < wrist),
+            ]);
+        }
+        out.push(of(&|_| true));
+        let two = |k: usize| turning[k + 1..].iter().map(move |b| (k, *b));
+        out.extend(
+            (0..turning.len())
+                .flat_map(two)
+                .map(|(k, b)| Self::of([turning[k], b].into_iter())),
+        );
+        let mut all: Vec<Self> = Vec::new();
+        for group in out.into_iter().filter(|group| group.0.count_ones() > 1) {
+            if !all.contains(&group) {
+                all.push(group);
+            }
+        }
+        all
+    }
+
+    fn of(joints: impl Iterator<Item = usize>) -> Self {
+        Self(joints.fold(0, |bits, joint| bits | 1 << joint))
+    }
+
+    /// Its joints, from 0.
+    pub(crate) fn joints(self) -> impl Iterator<Item = usize> {
+        (0..64).filter(move |joint| self.0 >> joint & 1 == 1)
+    }
+}
+
+/// How the points stand beside the joints.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum RowOrder {
+    /// The point of a row stands so many rows further on.
+    Shifted(i64),
+    Reversed,
+    /// The points are sorted by name as text (1, 10, 11, 2), the joints are not; names count from `first`.
+    PointsByText {
+        first: usize,
+    },
+    /// The other way round.
+    JointsByText {
+        first: usize,
+    },
+}
+
+impl RowOrder {
+    /// Those that these rows, in their order, may be in.
+    pub(crate) fn all(pairs: &PointPairs) -> Vec<Self> {
+        let mut out = likely_shifts(pairs);
+        out.push(Self::Reversed);
+        if pairs.rows() >= *SORTED {
+            out.extend(
+                [1, 0]
+                    .into_iter()
+                    .flat_map(|first| [Self::PointsByText { first }, Self::JointsByText { first }]),
+            );
+        }
+        out
+    }
+
+    /// The row of the point that belongs to the joints of each of `count` rows.
+    pub(crate) fn partners(self, count: usize) -> Vec<usize> {
+        let by_text = |first: usize| {
+            let mut names: Vec<usize> = (first..first + count).collect();
+            names.sort_by_key(usize::to_string);
+            names
+                .into_iter()
+                .map(move |name| name - first)
+                .collect::<Vec<usize>>()
+        };
+        match self {
+            Self::Shifted(by) => (0..count)
+                .map(|row| (row as i64 + by).rem_euclid(count.max(1) as i64) as usize)
+                .collect(),
+            Self::Reversed => (0..count).rev().collect(),
+            Self::JointsByText { first } => by_text(first),
+            Self::PointsByText { first } => {
+                let mut out = vec![0; count];
+                by_text(first)
+                    .into_iter()
+                    .enumerate()
+                    .for_each(|(row, name)| out[name] = row);
+                out
+            }
+        }
+    }
+}
+
+/// The shifts by which the steps from point to point are most like those of the nominal arm: a rigid motion does not change them.
+fn likely_shifts(pairs: &PointPairs) -> Vec<RowOrder> {
+    let (robot, count) = (pairs.robot, pairs.rows());
+    let model: Vec<Vector3<f64>> = (0..count)
+        .map(|row| robot.forward(pairs.q(row)).translation)
+        .collect();
+    let (model, measured) = (steps(&model), steps(&pairs.points));
+    let likeness = |shift: usize| {
+        (0..count)
+            .map(|row| model[row] * measured[(row + shift) % count])
+            .sum::<f64>()
+    };
+    let tried = (1..count).filter(|shift| *shift.min(&(count - shift)) <= *FARTHEST);
+    let mut all: Vec<(f64, usize)> = tried.map(|shift| (likeness(shift), shift)).collect();
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let signed = |shift: usize| {
+        if 2 * shift > count {
+            shift as i64 - count as i64
+        } else {
+            shift as i64
+        }
+    };
+    all.into_iter()
+        .take(*SHIFTS)
+        .map(|(_, shift)| RowOrder::Shifted(signed(shift)))
+        .collect()
+}
+
+/// Distances from each point to the next, the first being next to the last, less their mean.
+fn steps(points: &[Vector3<f64>]) -> Vec<f64> {
+    let next = points.iter().cycle().skip(1);
+    let lengths: Vec<f64> = points
+        .iter()
+        .zip(next)
+        .map(|(a, b)| (b - a).norm())
+        .collect();
+    let limit = *LONG * median(&lengths);
+    let lengths: Vec<f64> = lengths
+        .into_iter()
+        .map(|length| length.min(limit))
+        .collect();
+    let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
+    lengths.into_iter().map(|length| length - mean).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::RowOrder;
+
+    #[test]
+    fn partners_undo_the_sorting_of_one_file() {
+        // Sorted as text, 1 to 12 stand as 1, 10, 11, 12, 2, ..., 9.
+        let points = RowOrder::PointsByText { first: 1 }.partners(12);
+        assert_eq!(points, [0, 4, 5, 6, 7, 8, 9, 10, 11, 1, 2, 3]);
+        let joints = RowOrder::JointsByText { first: 1 }.partners(12);
+        assert_eq!(joints, [0, 9, 10, 11, 1, 2, 3, 4, 5, 6, 7, 8]);
+        assert_eq!(RowOrder::Shifted(-1).partners(4), [3, 0, 1, 2]);
+        assert_eq!(RowOrder::Reversed.partners(3), [2, 1, 0]);
     }
 }

@@ -97,7 +97,8 @@ impl CauseTable<'_, '_> {
             };
             groups.entry((name, cell.place)).or_default().push(i);
         }
-        let found = groups.into_values().map(|members| {
+        let found = groups.into_values().map(|mut members| {
+            members.sort_by_key(|i| self.is_constant_of_a_curve(&components[*i], components));
             let mut found = self.found(components, &members, state.kappa);
             found.members = members.iter().flat_map(|i| ranges[*i].clone()).collect();
             found

@@ -44,7 +44,7 @@ pub(super) struct CauseTable<'f, 'a> {
 
 impl<'f, 'a> CauseTable<'f, 'a> {
     /// All cells of a recording.
-    pub fn new(
+    pub(crate) fn new(
         frame: &'f mut SearchRows<'a>,
         survey: &'f Survey<'f>,
         question: &Question,

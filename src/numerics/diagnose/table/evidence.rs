@@ -6,7 +6,7 @@
 //! integrated (inverse gamma about its statement with nu degrees of freedom), the amplitude a over a logarithmic grid.
 
 use crate::criteria::cells::{EXACT, LARGEST, NU, SMALLEST};
-use crate::diagnose::linear::dot;
+use crate::regression::dot;
 use nalgebra::{DMatrix, DVector};
 use std::sync::LazyLock;
 

@@ -2,8 +2,8 @@
 //! row by row, without writing the columns down.
 
 use super::cell::alternates;
-use crate::diagnose::linear::dot;
 use crate::effect::Motion;
+use crate::regression::dot;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{DMatrix, DVector};

@@ -6,9 +6,9 @@ use super::factored::{
     FactoredColumns, Functions, MotionRows, WeighedDirection, column, pairs, unit,
 };
 use super::noise_shape::NoiseShape;
-use crate::diagnose::linear::{dot, orthonormal, project};
 use crate::diagnose::round::{FitState, Fitter, RoundView};
 use crate::effect::{Basis, Factor, Form, Law, Motion, Variable};
+use crate::regression::{dot, orthonormal, project};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector, Vector3};

@@ -7,7 +7,7 @@ use super::component::{CellColumns, Component, PartProducts, SeenGroup};
 use super::evidence::{EvidenceRows, GroupEvidence, evidence_between};
 use super::frame::SearchRows;
 use crate::criteria::cells::NU;
-use crate::diagnose::linear::dot;
+use crate::regression::dot;
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
 };

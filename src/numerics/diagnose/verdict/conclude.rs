@@ -1,23 +1,23 @@
 //! The verdict: findings with their evidence, before and after on held-out rows, and what is left.
+//!
+//! What the way of a moving arm is too short or too slow to show: there geometry takes up most of what depends on the speed.
 
-use super::faults::stand_out_in_number;
-use super::findings::findings;
-use super::last_round::LastRound;
-use super::not_observable::{next, not_observable, not_tried};
-use super::unseen::unseen;
+use crate::closed_form::FormulaSearch;
 use crate::criteria::judge::FOLDS;
 use crate::criteria::noise::{MAX_CHI_SQUARE, MAX_CHI_SQUARE_OF_STRUCTURE, REPEATS};
 use crate::criteria::search::SIGNIFICANT;
-use crate::criteria::words::{NAMELESS, NOT_NOISE};
-use crate::diagnose::closed_form::FormulaSearch;
-use crate::diagnose::misfit::Misfit;
-use crate::diagnose::round::{FitState, Fitter};
-use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
-use crate::diagnose::words::{Ground, slower_than_noise, statement};
-use crate::effect::names;
+use crate::criteria::words::{FOUND, NAMELESS, NOT_NOISE};
+use crate::effect::{HiddenSize, names};
 use crate::estimate::{Model, cross_validate};
+use crate::misfit::Misfit;
 use crate::observation::Dimension;
 use crate::robot::NoiseBasis;
+use crate::round::{FitState, Fitter};
+use crate::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
+use crate::verdict::findings::{LastRound, findings};
+use crate::verdict::not_observable::{next, not_observable, not_tried, stand_out_in_number};
+use crate::words::{Ground, hidden, slower_than_noise, statement};
+use std::collections::BTreeMap;
 
 /// Draws the conclusions of the last round; `before` is what the base model leaves of every row.
 pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>]) -> Diagnosis {
@@ -218,4 +218,32 @@ fn signature(last: &LastRound, something_left: bool, remarks: [Option<&str>; 2])
         .chain(remarks.into_iter().flatten())
         .collect();
     (!parts.is_empty()).then(|| parts.join("; "))
+}
+
+/// Sentences for causes that could be as large as usual and would not be found, one a cause.
+pub(super) fn unseen(last: &LastRound) -> Vec<String> {
+    let mut causes: BTreeMap<&str, (HiddenSize, Vec<String>, f64)> = BTreeMap::new();
+    for (form, error) in &last.answer.hidden {
+        let Some(hidden) = form.cause().hidden(form, last.survey.robot) else {
+            continue;
+        };
+        // What cannot be seen at all has no standard error.
+        let limit = *FOUND * error;
+        if limit > hidden.least {
+            let (_, subjects, largest) =
+                causes
+                    .entry(form.name())
+                    .or_insert((hidden, Vec::new(), 0.0));
+            subjects.push(
+                hidden
+                    .subject
+                    .map_or_else(|| form.place().to_string(), String::from),
+            );
+            *largest = largest.max(limit);
+        }
+    }
+    causes
+        .into_iter()
+        .map(|(name, (of, subjects, largest))| hidden(name, &subjects.join(", "), &of, largest))
+        .collect()
 }

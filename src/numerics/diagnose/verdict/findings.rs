@@ -1,19 +1,22 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
+//!
+//! Causes that no data could tell from a finding.
+//!
+//! What the last round looked at, and what it found.
 
-use super::faults::{faults, rows_apart};
-use super::last_round::LastRound;
-use super::rivals::share_with_identities;
-use crate::criteria::cells::{DETAIL, FAINT, SMALLEST, TRACE};
+use crate::criteria::cells::{DETAIL, FAINT, IDENTITY, SMALLEST, TRACE};
 use crate::criteria::words::FIRM;
-use crate::diagnose::table::FoundCell;
-use crate::diagnose::types::{Evidence, Finding, RivalCause};
-use crate::diagnose::words::{left_out, not_so, sentence, small, with_size};
+use crate::diagnose::table::{Answer, FoundCell};
 use crate::effect::{
-    Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Variable, names,
-    people, turned_holder,
+    Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Survey, Variable,
+    moved_with_the_payload, names, people, turned_holder,
 };
-use crate::estimate::{Model, ParameterStatus, tail};
+use crate::estimate::{ErrorScale, Model, ParameterStatus, tail};
 use crate::observation::Dimension;
+use crate::round::{FitState, RoundView};
+use crate::types::{Evidence, Finding, RivalCause};
+use crate::verdict::not_observable::{faults, rows_apart};
+use crate::words::{left_out, not_so, sentence, small, with_size};
 
 /// The causes of the last round as findings, strongest first; whether they leave more than noise `at_fitted_rows` or anywhere.
 pub(super) fn findings(
@@ -295,4 +298,60 @@ fn size(last: &LastRound, members: &[usize]) -> f64 {
         whitened * last.scale.noise(problem.data, *row).powi(2) / values
     });
     (squares.sum::<f64>() / problem.rows.len().max(1) as f64).sqrt()
+}
+
+/// What does the same as a form of the finding in whatever data, as a rival that takes a share of the finding's probability `name`; what may have
+/// moved when a payload changed that changes only once, in place of a form that follows the payload, takes half of it. Returns what is left.
+pub(super) fn share_with_identities(
+    called: &str,
+    forms: &[Form],
+    survey: &Survey,
+    name: f64,
+    rivals: &mut Vec<RivalCause>,
+) -> f64 {
+    let mut left = name;
+    let moved = forms
+        .iter()
+        .filter_map(|form| moved_with_the_payload(form, survey))
+        .map(|same| (same, 0.5));
+    let same = forms
+        .iter()
+        .flat_map(|form| form.identities(called))
+        .map(|same| (same, *IDENTITY));
+    for ((effect, place), share) in moved.chain(same) {
+        if !rivals
+            .iter()
+            .any(|rival| (rival.effect, rival.place) == (effect, place))
+        {
+            rivals.push(RivalCause {
+                effect,
+                place,
+                delta_bic: 0.0,
+                probability: share * left,
+            });
+            left *= 1.0 - share;
+        }
+    }
+    rivals.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    left
+}
+
+/// The last round.
+pub(crate) struct LastRound<'a, 'b> {
+    pub(crate) view: &'b RoundView<'a>,
+    pub(crate) survey: &'b Survey<'a>,
+    /// The whole model with all causes.
+    pub(crate) state: FitState,
+    pub(crate) answer: Answer,
+    /// What errors of rows are compared and told in.
+    pub(crate) scale: ErrorScale,
+    /// Names of causes that are not to be given.
+    pub(crate) without: &'b [String],
+}
+
+impl LastRound<'_, '_> {
+    /// Whether a name is not to be given.
+    pub(crate) fn excludes(&self, effect: &str) -> bool {
+        self.without.iter().any(|name| name == effect)
+    }
 }

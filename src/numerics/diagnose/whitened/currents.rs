@@ -27,7 +27,7 @@ const FOLLOWS: std::ops::Range<f64> = 0.6..1.6;
 
 impl Currents {
     /// The usable motors at `rows` seen as `motions`; `None` where no current is usable.
-    pub fn new(
+    pub(crate) fn new(
         robot: &RobotModel,
         data: &Measurements,
         rows: &[usize],

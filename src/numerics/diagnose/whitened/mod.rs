@@ -2,28 +2,30 @@
 //!
 //! Residual rows are in standard deviations: of every row of the recording as many as it has measured numbers, of whatever kinds, then one for
 //! each usable motor current.
-
-mod autocorrelated;
-mod currents;
-mod reading_lines;
-mod travel;
+//!
+//! Which residual rows hold what a row of the recording measured: as many as its kinds have numbers there.
+//!
+//! Columns of laws of a joint's travel: functions of the row times what a unit travel of the joint does. Most hypotheses are such, and
+//! their columns and products follow from one number a row.
 
 use crate::effect::{
     Basis, Deflection, Direction, EffectStack, Form, Law, Motion, PlacementBuffers, PointMotion,
     Term, Unknown, Variable,
 };
 use crate::estimate::{Model, Prior};
-use crate::observation::{MeasurementKind, Residual, kinds};
+use crate::observation::{MeasurementKind, Residual, Sensitivity, kinds};
 use crate::robot::{Measurements, RobotModel};
-pub(crate) use autocorrelated::AutocorrelatedNoise;
-use autocorrelated::Innovations;
-use currents::Currents;
+pub(crate) use crate::whitened::autocorrelated::AutocorrelatedNoise;
+use crate::whitened::autocorrelated::Innovations;
+use crate::whitened::currents::Currents;
 use faer::Mat;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use reading_lines::{ReadingLines, SeenReading};
 use std::ops::Range;
 use std::sync::OnceLock;
+
+mod autocorrelated;
+mod currents;
 
 /// Fitted rows through the present model.
 pub(crate) struct WhitenedProblem<'a> {
@@ -47,7 +49,7 @@ pub(crate) struct WhitenedProblem<'a> {
 
 impl<'a> WhitenedProblem<'a> {
     /// The problem of what rows measured, without the motor currents.
-    pub fn new(model: &'a Model, data: &'a Measurements, rows: Vec<usize>) -> Self {
+    pub(crate) fn new(model: &'a Model, data: &'a Measurements, rows: Vec<usize>) -> Self {
         let kinds = kinds(data);
         let turns = kinds.iter().any(|kind| kind.about().rank.rotations);
         let look = |scratch: &mut PlacementBuffers, row: &usize| {
@@ -372,5 +374,132 @@ impl<'a> WhitenedProblem<'a> {
         currents
             .priors(&columns, &self.present(forms))
             .unwrap_or_default()
+    }
+}
+
+/// What a row measured of one kind, as the present model sees it.
+pub(crate) struct SeenReading {
+    pub(crate) kind: &'static dyn MeasurementKind,
+    /// Lines of the kind's residual that were measured.
+    pub(crate) lines: &'static [usize],
+    /// How it follows the target's motion, in standard deviations.
+    pub(crate) sensitivity: Sensitivity,
+}
+
+/// Readings of all rows, one row after another.
+#[derive(Default)]
+pub(crate) struct ReadingLines {
+    readings: Vec<SeenReading>,
+    /// The first residual row of each reading.
+    first: Vec<usize>,
+    /// By row: past its last reading.
+    end: Vec<usize>,
+    /// By row: past its last residual row.
+    end_line: Vec<usize>,
+    /// By residual row: the place of its row.
+    pub(crate) row_of: Vec<usize>,
+}
+
+impl ReadingLines {
+    /// Takes the readings of the next row.
+    pub(crate) fn push(&mut self, readings: Vec<SeenReading>) {
+        let place = self.end.len();
+        for reading in readings {
+            self.first.push(self.row_of.len());
+            self.row_of
+                .extend(std::iter::repeat_n(place, reading.lines.len()));
+            self.readings.push(reading);
+        }
+        self.end.push(self.readings.len());
+        self.end_line.push(self.row_of.len());
+    }
+
+    /// Readings of a row, each with its first residual row.
+    pub(crate) fn seen(&self, place: usize) -> impl Iterator<Item = (usize, &SeenReading)> {
+        let own = begin(&self.end, place)..self.end[place];
+        self.first[own.clone()]
+            .iter()
+            .copied()
+            .zip(&self.readings[own])
+    }
+
+    /// Residual rows of a row.
+    pub(crate) fn of_row(&self, place: usize) -> Range<usize> {
+        begin(&self.end_line, place)..self.end_line[place]
+    }
+}
+
+fn begin(end: &[usize], place: usize) -> usize {
+    place.checked_sub(1).map_or(0, |before| end[before])
+}
+
+impl WhitenedProblem<'_> {
+    /// The joint that a form makes travel, and the values of its functions, one after another, a number each row; none where the form does
+    /// anything else.
+    pub(crate) fn travel(&self, form: &Form) -> Option<(usize, Vec<f64>)> {
+        let term = form.term()?;
+        let joint = term.motion().travels()?;
+        let rows = self.rows.len();
+        let mut values = vec![0.0; term.law().count() * rows];
+        for (i, motion) in self.motions.iter().enumerate() {
+            motion.law(self.robot, self.data, term.law(), |k, value| {
+                values[k * rows + i] += value
+            });
+        }
+        Some((joint, values))
+    }
+
+    /// The same where every residual row says what it says by itself.
+    pub(crate) fn plain_travel(&self, form: &Form) -> Option<(usize, Vec<f64>)> {
+        if self.innovations.is_some() {
+            None
+        } else {
+            self.travel(form)
+        }
+    }
+
+    /// Column of a unit travel of a joint, whether noise is correlated or not.
+    pub(crate) fn unit_travel(&self, joint: usize) -> &[f64] {
+        let column = |joint: usize| {
+            // One in every row, and the angle, which is not asked.
+            let law = Law::new(
+                Variable::Angle { joint },
+                Basis::Straight {
+                    zero: 0.0,
+                    per: 1.0,
+                },
+            );
+            let mut columns =
+                self.motions_by_partials(&Term::new(&Unknown, Motion::Joint { joint }, law).into());
+            columns.truncate(self.residual_rows());
+            columns
+        };
+        &self
+            .travels
+            .get_or_init(|| (0..self.robot.joints()).map(column).collect())[joint]
+    }
+
+    /// Columns of functions of a joint's travel, one after another.
+    pub(crate) fn travelled(&self, joint: usize, values: &[f64]) -> Vec<f64> {
+        let unit = self.unit_travel(joint);
+        let mut out = Vec::with_capacity(values.len() / self.rows.len().max(1) * unit.len());
+        for values in values.chunks(self.rows.len().max(1)) {
+            out.extend(
+                unit.iter()
+                    .enumerate()
+                    .map(|(residual_row, unit)| unit * values[self.row_of(residual_row)]),
+            );
+        }
+        out
+    }
+
+    /// Sums, row by row, of the products of a column with that of a unit travel of a joint.
+    pub(crate) fn along_travel(&self, joint: usize, column: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; self.rows.len()];
+        for (residual_row, (value, unit)) in column.iter().zip(self.unit_travel(joint)).enumerate()
+        {
+            out[self.row_of(residual_row)] += value * unit;
+        }
+        out
     }
 }

@@ -1,6 +1,16 @@
 //! Friction of one joint by its velocity: viscous, Coulomb, and what modifies them.
+//!
+//! Gears of a wrist that turn with two joints: friction of the sum of two velocities, felt by both.
+//!
+//! Friction without a name: curves of speed, and friction that is greater at some angles.
 
-use super::{ColumnTorque, PLAIN, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, span};
+use crate::cause::angle::{UNKNOWN, ends};
+use crate::cause::{
+    ColumnTorque, PLAIN, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, plain, shape, span,
+};
+use crate::scene::largest;
+use nalgebra::{Matrix2, Vector2};
+use std::f64::consts::PI;
 
 /// Its name.
 pub const COULOMB: &str = "coulomb_friction";
@@ -236,6 +246,225 @@ pub(super) static WARMUP: TorqueCause = TorqueCause {
         format!(
             "friction of {} begins {:.3} Nm and {:.3} Nm s/rad higher and falls over {:.1} s",
             form.place, fitted[1].value, fitted[0].value, form.shape[0]
+        )
+    },
+    ..PLAIN
+};
+
+/// k of neighbouring joints of a wrist; of other pairs only gears of one to one are tried.
+const RATIOS: [f64; 14] = [
+    -1.4, -1.2, -1.0, -0.8, -0.6, -0.4, -0.2, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4,
+];
+const PLAIN_RATIOS: [f64; 2] = [-1.0, 1.0];
+/// Ratios that stand in the rich model.
+const USUAL: [f64; 2] = [-0.6, 1.0];
+const LEAST_RATIO: f64 = 0.15;
+/// Joints of a wrist begin here, from 0.
+const WRIST: usize = 3;
+
+/// x = v + k v_by, and its sign, at the joint and k times that at the other; `with` holds the other joint, and whether both are known or
+/// likely to share a gear.
+pub(super) static WRIST_COUPLING: TorqueCause = TorqueCause {
+    name: "wrist_coupling",
+    coefficients: &[("viscous", "Nm s/rad"), ("coulomb", "Nm")],
+    price: |form| if form.with[1] == 1 { 6.0 } else { 30.0 },
+    of_sign: true,
+    positive: true,
+    forms: |cause, scene| {
+        let mut forms = Vec::new();
+        for moved in 1..scene.joints() {
+            for by in (0..scene.joints()).filter(|by| *by != moved) {
+                let known = scene.arm.coupled.contains(&(moved, by));
+                let near = known || (by + 1 == moved && by >= WRIST && scene.joints() == 6);
+                if !near && by > moved {
+                    continue;
+                }
+                let ratios = if near { &RATIOS[..] } else { &PLAIN_RATIOS[..] };
+                forms.extend(ratios.iter().map(|ratio| TorqueForm {
+                    with: [by, usize::from(near)],
+                    ..TorqueForm::at_joint(cause, moved, 2).shaped(&[*ratio])
+                }));
+            }
+        }
+        forms
+    },
+    and_on: |form| Some(form.with[0]),
+    // Gears that hardly turn with the other joint do not turn with it.
+    is_itself: |form, _| form.shape[0].abs() > LEAST_RATIO,
+    // Friction brakes: neither of its numbers drives.
+    is_possible: |_, values| values.iter().all(|value| *value >= 0.0),
+    rich: |form| form.with[1] == 1 && USUAL.contains(&form.shape[0]),
+    spans: |form| {
+        let ends = if form.shape[0] > 0.0 {
+            [0.05, 2.0]
+        } else {
+            [-2.0, -0.05]
+        };
+        vec![ShapeSpan {
+            by_ratio: false,
+            ..span("ratio", "1", ends)
+        }]
+    },
+    cell: |form| form.with,
+    torque: ColumnTorque::Row(|column, row| {
+        let (form, velocity) = (column.form, &column.scene.velocity);
+        let ratio = form.shape[0];
+        let together = velocity[form.joint()][row] + ratio * velocity[form.with[0]][row];
+        let share = if column.joint == form.joint() {
+            1.0
+        } else {
+            ratio
+        };
+        share
+            * match column.column {
+                0 => together,
+                _ => column.scene.sign(together),
+            }
+    }),
+    parameters: |form, fitted| {
+        vec![
+            plain("viscous", fitted[0], "Nm s/rad"),
+            plain("coulomb", fitted[1], "Nm"),
+            shape("by_joint", (form.with[0] + 1) as f64, "1"),
+            shape("ratio", form.shape[0], "1"),
+        ]
+    },
+    statement: |form, fitted| {
+        format!(
+            "gears of {} turn with joint {} too (ratio {:.2}): friction of both together is {:.3} Nm and {:.3} Nm s/rad",
+            form.place,
+            form.with[0] + 1,
+            form.shape[0],
+            fitted[1].value,
+            fitted[0].value
+        )
+    },
+    ..PLAIN
+};
+
+/// Columns.
+const WAVES: usize = 4;
+/// Share of the fastest speed below which a joint hardly moves.
+const STILL: f64 = 0.02;
+
+/// A smooth curve of speed, of which viscous and Coulomb friction are the straight line: half a wave and a whole one of speed, up to the fastest
+/// (shape, rad/s), with the sign of the velocity, each without the straight line of speed that is nearest to it over the recorded rows (two
+/// further numbers each): that line is viscous and Coulomb friction, which so are those of the whole curve.
+pub(super) static BY_SPEED: TorqueCause = TorqueCause {
+    name: UNKNOWN,
+    coefficients: &[
+        ("half_wave_sin", "Nm"),
+        ("half_wave_cos", "Nm"),
+        ("wave_sin", "Nm"),
+        ("wave_cos", "Nm"),
+    ],
+    price: |_| 30.0,
+    of_sign: true,
+    modifies: &[VISCOUS, COULOMB],
+    may_repeat: true,
+    bends: true,
+    // Tables of before lines were taken off have none.
+    lengths: &[1, 1 + 2 * WAVES],
+    forms: |cause, scene| {
+        let form = |joint: usize| {
+            let fastest = largest(&scene.velocity[joint]).max(1e-6);
+            let speeds = scene.velocity[joint].iter().map(|v| v.abs() / fastest);
+            let speeds: Vec<f64> = speeds.filter(|speed| *speed > STILL).collect();
+            let lines = (0..WAVES).flat_map(|column| line(&speeds, column));
+            let shape: Vec<f64> = std::iter::once(fastest).chain(lines).collect();
+            TorqueForm::at_joint(cause, joint, WAVES).shaped(&shape)
+        };
+        (0..scene.joints()).map(form).collect()
+    },
+    torque: ColumnTorque::Row(|column, row| {
+        column.direction(row) * bent(column.form, column.column, column.velocity(row))
+    }),
+    friction: Some(|form, column, velocity, sign| sign * bent(form, column, velocity)),
+    statement: |form, _| {
+        format!(
+            "friction without a name acts at {}: a curve of how fast the joint moves, of which viscous and Coulomb friction are the straight line",
+            form.place
+        )
+    },
+    ..PLAIN
+};
+
+/// A wave of a speed, as a share of the fastest.
+fn wave(column: usize, speed: f64) -> f64 {
+    let phase = PI * [1.0, 2.0][column / 2] * speed;
+    if column.is_multiple_of(2) {
+        phase.sin()
+    } else {
+        phase.cos()
+    }
+}
+
+/// A wave at a velocity without its line. Faster than any row it stays what it was at the fastest.
+fn bent(form: &TorqueForm, column: usize, velocity: f64) -> f64 {
+    let speed = (velocity.abs() / form.shape[0]).min(1.0);
+    let line = form
+        .shape
+        .get(1 + 2 * column..3 + 2 * column)
+        .map_or(0.0, |line| line[0] + line[1] * speed);
+    wave(column, speed) - line
+}
+
+/// The line of speed nearest to a wave over some speeds: at none, and per share of the fastest.
+fn line(speeds: &[f64], column: usize) -> [f64; 2] {
+    let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+    for speed in speeds {
+        let row = Vector2::new(1.0, *speed);
+        normal += row * row.transpose();
+        right += row * wave(column, *speed);
+    }
+    normal
+        .cholesky()
+        .map_or([0.0; 2], |factor| factor.solve(&right).into())
+}
+
+/// Waves a turn.
+const ORDERS: usize = 4;
+
+/// Friction that is greater at some angles of its joint, as ways, seals and lubricant differ along a turn: so many waves a turn (`with`), with
+/// the sign of the velocity; shape: least and greatest angle of the joint, rad.
+pub(super) static BY_ANGLE: TorqueCause = TorqueCause {
+    name: UNKNOWN,
+    coefficients: &[("drag_cosine", "Nm"), ("drag_sine", "Nm")],
+    price: |_| 30.0,
+    of_sign: true,
+    modifies: &[COULOMB],
+    may_repeat: true,
+    lengths: &[2],
+    forms: |cause, scene| {
+        let of = |joint: usize| {
+            let ends = ends(scene, joint);
+            (1..=ORDERS).map(move |order| TorqueForm {
+                with: [order, 0],
+                ..TorqueForm::at_joint(cause, joint, 2).shaped(&ends)
+            })
+        };
+        (0..scene.joints()).flat_map(of).collect()
+    },
+    torque: ColumnTorque::Row(|column, row| {
+        let turn = column.form.with[0] as f64 * column.angle(row);
+        let wave = if column.column == 0 {
+            turn.cos()
+        } else {
+            turn.sin()
+        };
+        column.direction(row) * wave
+    }),
+    parameters: |form, fitted| {
+        vec![
+            plain("drag_cosine", fitted[0], "Nm"),
+            plain("drag_sine", fitted[1], "Nm"),
+            shape("order", form.with[0] as f64, "1"),
+        ]
+    },
+    statement: |form, _| {
+        format!(
+            "friction without a name acts at {} in addition to Coulomb friction; it depends on the angle of the joint",
+            form.place
         )
     },
     ..PLAIN

@@ -4,8 +4,7 @@ use super::{
     ColumnTorque, FittedNumber, PLAIN, TorqueCause, TorqueForm, at_each_link, plain, shape,
     size_of_two,
 };
-use crate::dynamics::arm::INERTIAL_NUMBERS;
-use crate::dynamics::arm::{INERTIAL_NAMES, inertial_unit};
+use crate::dynamics::arm::{INERTIAL_NAMES, INERTIAL_NUMBERS, inertial_unit};
 use crate::dynamics::cause::TorqueParameter;
 use crate::dynamics::scene::GRAVITY;
 use crate::effect::Place;

@@ -1,7 +1,9 @@
 //! Torques that remember rows before: what turns over after a travel, knocks after a reversal, swings.
 
-use super::{ColumnTorque, PLAIN, ShapeSpan, TorqueCause, at_each_joint, plain, shape, span};
-use super::{angle::UNKNOWN, friction::COULOMB};
+use super::{
+    ColumnTorque, PLAIN, ShapeSpan, TorqueCause, angle::UNKNOWN, at_each_joint, friction::COULOMB,
+    plain, shape, span,
+};
 use std::f64::consts::PI;
 
 /// rad: the travel that stands in the rich model, and all that are tried.

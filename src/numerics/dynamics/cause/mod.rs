@@ -8,11 +8,8 @@ mod drive;
 mod friction;
 mod masses;
 mod memory;
-mod shared_friction;
-mod unnamed_friction;
 
-use super::arm::DeclaredInertials;
-use super::arm::INERTIAL_NUMBERS;
+use super::arm::{DeclaredInertials, INERTIAL_NUMBERS};
 use super::scene::DynamicScene;
 use crate::criteria::torque::AT_END;
 use crate::effect::Place;
@@ -52,7 +49,7 @@ pub(super) static TORQUE_CAUSES: [&TorqueCause; 27] = [
     &angle::RIPPLE,
     &memory::ELASTICITY,
     &memory::SPIKES,
-    &shared_friction::WRIST_COUPLING,
+    &friction::WRIST_COUPLING,
     &masses::PAYLOAD,
     &masses::LINK_MASS,
     &masses::LINK_CENTRE,
@@ -60,8 +57,8 @@ pub(super) static TORQUE_CAUSES: [&TorqueCause; 27] = [
     &masses::GRAVITY_DIRECTION,
     &angle::TWO_ANGLES,
     &angle::ONE_ANGLE,
-    &unnamed_friction::BY_SPEED,
-    &unnamed_friction::BY_ANGLE,
+    &friction::BY_SPEED,
+    &friction::BY_ANGLE,
     &memory::HYSTERESIS,
 ];
 
@@ -396,7 +393,7 @@ impl TorqueForm {
     }
 
     /// Shape numbers that are found from the data, each once.
-    pub fn shape_numbers(&self) -> Vec<ShapeSpan> {
+    pub(crate) fn shape_numbers(&self) -> Vec<ShapeSpan> {
         let mut numbers: Vec<ShapeSpan> = Vec::new();
         for span in (self.cause.spans)(self) {
             let is_found = span.usual != Some(self.shape[span.index]);

@@ -1,15 +1,13 @@
 //! What torques along a motion tell of base parameters and friction: the information matrix under white noise.
 
-use super::super::arm::DynamicArm;
-use super::super::arm::INERTIAL_NUMBERS;
-use super::super::base_parameters::base_parameters;
+use super::super::arm::{DynamicArm, INERTIAL_NUMBERS};
 use super::super::clock::RecordingClock;
 use super::super::newton_euler::InverseDynamics;
-use super::super::recording::TorqueRecording;
-use super::super::reduce::ReducedRegressor;
-use super::super::reduce::Reduction;
+use super::super::reduce::{ReducedRegressor, Reduction};
 use super::super::scene::{DynamicScene, split};
 use super::series::{JointSeries, SeriesBasis};
+use crate::reduce::base_parameters;
+use crate::types::TorqueRecording;
 use nalgebra::{DMatrix, DVector};
 
 /// rad/s over which the sign of a velocity turns.

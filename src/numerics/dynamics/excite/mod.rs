@@ -4,8 +4,7 @@
 mod information;
 mod series;
 
-use super::arm::DynamicArm;
-use super::arm::{inertial_name, inertial_unit};
+use super::arm::{DynamicArm, inertial_name, inertial_unit};
 use super::scene::ends;
 use crate::error::{Error, Fault, Result};
 use crate::estimate::swarm::{Budget, ParticleSwarm, SearchBox, minimise};

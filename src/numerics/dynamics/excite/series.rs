@@ -42,7 +42,7 @@ pub(super) struct SeriesMotion {
 
 impl SeriesBasis {
     /// Over `seconds` with `rate` rows a second.
-    pub fn new(seconds: f64, rate: f64, harmonics: usize) -> Self {
+    pub(crate) fn new(seconds: f64, rate: f64, harmonics: usize) -> Self {
         let slowest = TAU * (seconds / PERIOD).ceil() / seconds;
         let time: Vec<f64> = (0..=(seconds * rate).round() as usize)
             .map(|row| row as f64 / rate)

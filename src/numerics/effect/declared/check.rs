@@ -38,7 +38,7 @@ impl DeclarationFaults {
         });
     }
 
-    pub fn name(&mut self, name: &str) {
+    pub(crate) fn name(&mut self, name: &str) {
         if cause(name).is_some() {
             self.add(
                 "name",
@@ -63,7 +63,7 @@ impl DeclarationFaults {
         seat
     }
 
-    pub fn moves(&mut self, seat: Seat, motion: Option<&str>) -> Option<Moves> {
+    pub(crate) fn moves(&mut self, seat: Seat, motion: Option<&str>) -> Option<Moves> {
         let allowed = seat.allowed();
         let Some(motion) = motion else {
             return Some(allowed[0].1);
@@ -247,7 +247,7 @@ impl DeclarationFaults {
         }
     }
 
-    pub fn sentence(&mut self, sentence: &str, names: &[String]) {
+    pub(crate) fn sentence(&mut self, sentence: &str, names: &[String]) {
         let words = || {
             ["place", "value", "values"]
                 .into_iter()

@@ -100,7 +100,11 @@ impl Formula {
     }
 
     /// The value with these shape numbers; `None` where the row lacks what it asks for.
-    pub fn value(&self, shape: &[f64], row: &dyn Fn(&RowQuantity) -> Option<f64>) -> Option<f64> {
+    pub(crate) fn value(
+        &self,
+        shape: &[f64],
+        row: &dyn Fn(&RowQuantity) -> Option<f64>,
+    ) -> Option<f64> {
         Some(match self {
             Self::Number(number) => *number,
             Self::Shape(k) => *shape.get(*k)?,
@@ -113,7 +117,7 @@ impl Formula {
     }
 
     /// Calls `visit` with every part, this one first.
-    pub fn walk(&self, visit: &mut dyn FnMut(&Formula)) {
+    pub(crate) fn walk(&self, visit: &mut dyn FnMut(&Formula)) {
         visit(self);
         match self {
             Self::Call(_, of) => of.walk(visit),

@@ -116,7 +116,7 @@ impl DeclaredPattern {
     }
 
     /// The coefficients at a place.
-    pub fn numbers(&self, motion: Motion, robot: &RobotModel) -> Vec<NumberSpec> {
+    pub(crate) fn numbers(&self, motion: Motion, robot: &RobotModel) -> Vec<NumberSpec> {
         let many = self.laws.len() > 1;
         let counted = |k: usize| {
             if many {

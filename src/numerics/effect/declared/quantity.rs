@@ -99,7 +99,7 @@ fn all() -> impl Iterator<Item = (&'static str, QuantityKind, bool, bool)> {
 }
 
 /// All names, for "allowed: ...".
-pub fn known() -> String {
+pub(crate) fn known() -> String {
     let word = |(name, _, _, constant): (&str, K, bool, bool)| {
         if constant {
             format!("{name}(constant)")
@@ -129,7 +129,7 @@ pub(crate) fn names() -> impl Iterator<Item = &'static str> {
 
 impl RowQuantity {
     /// The quantity of a name, and whether it takes a constant.
-    pub fn named(text: &str) -> Option<(QuantityKind, Whose, bool)> {
+    pub(crate) fn named(text: &str) -> Option<(QuantityKind, Whose, bool)> {
         if let Some((_, kind, jointed, constant)) = all().find(|row| row.0 == text) {
             return Some((
                 kind,

@@ -82,7 +82,7 @@ impl Seat {
 }
 
 impl Moves {
-    pub fn at(self, place: Place) -> Option<Motion> {
+    pub(crate) fn at(self, place: Place) -> Option<Motion> {
         Some(match (self, place) {
             (Self::Angle, Place::Joint(joint)) => Motion::Joint { joint },
             (Self::Axis { turning }, Place::Joint(joint)) => Motion::Axis {

@@ -6,9 +6,8 @@
 use super::point_jacobian::{PointJacobian, factor, product};
 use super::subset;
 use crate::criteria::choose::{PASSES, RIDGE, STEPS, WORTH};
-use crate::estimate::factor::TriangularFactor;
+use crate::estimate::factor::{TriangularFactor, axpy};
 use crate::estimate::model::Model;
-use crate::estimate::triangle::axpy;
 use crate::robot::Measurements;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
@@ -31,7 +30,7 @@ pub(super) struct Criterion {
 
 impl DesignTerm {
     /// `None` where the candidates do not tell the parameters.
-    pub fn new(
+    pub(crate) fn new(
         weight: f64,
         jacobian: PointJacobian,
         model: &Model,

@@ -2,8 +2,8 @@
 
 use super::point_jacobian::PointJacobian;
 use crate::effect::{EffectContext, EffectStack, Load, arm_effect};
+use crate::estimate::factor::{axpy, dot};
 use crate::estimate::model::Model;
-use crate::estimate::triangle::{axpy, dot};
 use crate::robot::Measurements;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};

@@ -91,7 +91,7 @@ impl Stance {
     }
 
     /// What a shift of `station` along its `axis` does, m per m.
-    pub fn shift(&self, station: usize, axis: usize) -> Vector3<f64> {
+    pub(crate) fn shift(&self, station: usize, axis: usize) -> Vector3<f64> {
         self.stations[station].rotation.column(axis).into_owned()
     }
 

@@ -148,7 +148,7 @@ pub(crate) struct BasisFunctions<'a> {
 
 impl<'a> BasisFunctions<'a> {
     /// Terms over an arm; those that move joints need one.
-    pub fn new(arm: Option<&'a ScrewArm>, terms: &'a [BasisTerm]) -> Self {
+    pub(crate) fn new(arm: Option<&'a ScrewArm>, terms: &'a [BasisTerm]) -> Self {
         let mut highest: Vec<usize> = Vec::new();
         for wave in terms.iter().flat_map(|term| &term.waves) {
             if let Wave::Sin(joint, order) | Wave::Cos(joint, order) = *wave {
@@ -167,7 +167,7 @@ impl<'a> BasisFunctions<'a> {
     }
 
     /// What each term does at joint positions `q`, m per unit of its coefficient. Terms through the arm are nothing without it.
-    pub fn at(&mut self, q: &[f64], mut put: impl FnMut(usize, [f64; 3])) {
+    pub(crate) fn at(&mut self, q: &[f64], mut put: impl FnMut(usize, [f64; 3])) {
         for (multiples, q) in self.multiples.iter_mut().zip(q) {
             for (order, entry) in multiples.iter_mut().enumerate() {
                 let (sin, cos) = (order as f64 * q).sin_cos();

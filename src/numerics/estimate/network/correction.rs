@@ -257,7 +257,7 @@ impl Correction {
     }
 
     /// Numbers that were learnt.
-    pub fn numbers(&self) -> usize {
+    pub(crate) fn numbers(&self) -> usize {
         match &self.body {
             Body::Linear(linear) => linear.terms.len(),
             Body::Process(_, process) => process.lengths.len() + 2 + OUTPUTS * process.rows.len(),

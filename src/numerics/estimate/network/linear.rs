@@ -137,7 +137,7 @@ impl Linear {
     }
 
     /// The correction and its standard deviation per axis beside the noise, m.
-    pub fn at(&self, q: &[f64]) -> ([f64; 3], f64) {
+    pub(crate) fn at(&self, q: &[f64]) -> ([f64; 3], f64) {
         let mut sums = vec![[0.0; 3]; self.members.len()];
         BasisFunctions::new(self.arm.as_ref(), &self.terms).at(q, |t, way| {
             for (sum, member) in sums.iter_mut().zip(&self.members) {

@@ -117,7 +117,7 @@ impl Process {
     }
 
     /// Mean of each output and the standard deviation of all beside the noise, scaled.
-    pub fn at(&self, x: &[f64]) -> ([f64; OUTPUTS], f64) {
+    pub(crate) fn at(&self, x: &[f64]) -> ([f64; OUTPUTS], f64) {
         let near: Vec<f64> = self.rows.iter().map(|row| self.kernel(x, row)).collect();
         let mut mean = [0.0; OUTPUTS];
         for (near, alpha) in near.iter().zip(&self.alpha) {

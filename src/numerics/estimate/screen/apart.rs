@@ -4,7 +4,7 @@
 //! where it does so only with the joints of rows further on, and all stretches so paired stand under one base, the two logs have slipped.
 
 use crate::criteria::screen::{NOMINAL, SLIPPED_BETTER, STEP, STRETCH, TOGETHER};
-use crate::estimate::align::{align_points, kabsch};
+use crate::estimate::gauge::{align_points, kabsch};
 use crate::robot::Measurements;
 use crate::spatial::Pose;
 use crate::statistics::nearest;

@@ -2,26 +2,29 @@
 //!
 //! A [`Method`] says how its first generation starts and how it goes on; [`minimise`] counts, records and stops. Random numbers
 //! are drawn on one thread and only evaluations are spread, so the result is the same for any number of threads.
+//!
+//! The five optimisers by name, with the parameters of their papers.
+//!
+//! Functions with known minima on which optimisers are compared.
+//!
+//! Michalewicz is Eq. 35 of Wang et al. (2020) with its sign, `-sum sin(x_i) sin(i x_i^2 / pi)^20` on `[0, pi]^n`; the others as in
+//! Jamil and Yang (2013), minimum 0.
 
-mod algorithm;
-mod bee_colony;
-mod beetle_antennae;
-mod beetle_swarm;
-mod genetic;
-mod landscape;
-mod particle_swarm;
-
-pub use algorithm::Algorithm;
-pub use bee_colony::BeeColony;
-pub use beetle_antennae::BeetleAntennae;
-pub use beetle_swarm::BeetleSwarm;
-pub use genetic::Genetic;
-pub use landscape::Landscape;
-pub use particle_swarm::ParticleSwarm;
-
+pub use crate::estimate::swarm::bee_colony::BeeColony;
+pub use crate::estimate::swarm::beetle_swarm::{BeetleAntennae, BeetleSwarm};
+pub use crate::estimate::swarm::genetic::Genetic;
+pub use crate::estimate::swarm::particle_swarm::ParticleSwarm;
 use crate::estimate::threads::in_order;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{E, PI};
+
+mod bee_colony;
+mod beetle_swarm;
+mod genetic;
+mod particle_swarm;
 
 /// A function to be made small. Values that are no number count as infinitely bad.
 pub trait Objective: Sync {
@@ -50,7 +53,7 @@ pub struct SearchBox {
 
 impl SearchBox {
     /// The box between two corners. Panics where they differ in length, are not finite or are in the wrong order.
-    pub fn new(lower: Vec<f64>, upper: Vec<f64>) -> Self {
+    pub(crate) fn new(lower: Vec<f64>, upper: Vec<f64>) -> Self {
         assert_eq!(lower.len(), upper.len(), "corners of one box");
         assert!(
             lower
@@ -281,5 +284,203 @@ pub fn minimise<M: Method, O: Objective>(
         history,
         evaluations: search.evaluations,
         stop,
+    }
+}
+
+/// An optimiser with the parameters of its paper.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Algorithm {
+    /// Beetle antennae search.
+    Bas,
+    /// Beetle swarm optimisation.
+    Bso,
+    /// Particle swarm optimisation.
+    Pso,
+    /// Genetic algorithm.
+    Ga,
+    /// Artificial bee colony.
+    Abc,
+}
+
+/// Runs the body with `$method` bound to the optimiser of a population.
+macro_rules! with {
+    ($algorithm:expr, $population:expr, |$method:ident| $body:expr) => {
+        match $algorithm {
+            Algorithm::Bas => {
+                let $method = BeetleAntennae::default();
+                $body
+            }
+            Algorithm::Bso => {
+                let $method = BeetleSwarm {
+                    beetles: $population,
+                    ..BeetleSwarm::default()
+                };
+                $body
+            }
+            Algorithm::Pso => {
+                let $method = ParticleSwarm {
+                    particles: $population,
+                    ..ParticleSwarm::default()
+                };
+                $body
+            }
+            Algorithm::Ga => {
+                let $method = Genetic {
+                    individuals: $population,
+                    ..Genetic::default()
+                };
+                $body
+            }
+            Algorithm::Abc => {
+                let $method = BeeColony {
+                    sources: $population.div_ceil(2),
+                    ..BeeColony::default()
+                };
+                $body
+            }
+        }
+    };
+}
+
+impl Algorithm {
+    /// All of them, as tables list them.
+    pub const ALL: [Self; 5] = [Self::Bas, Self::Bso, Self::Pso, Self::Ga, Self::Abc];
+
+    /// As tables hold it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bas => "bas",
+            Self::Bso => "bso",
+            Self::Pso => "pso",
+            Self::Ga => "ga",
+            Self::Abc => "abc",
+        }
+    }
+
+    /// Generations of a `population` that fit into so many evaluations.
+    pub fn generations(self, population: usize, evaluations: u64) -> usize {
+        with!(self, population, |method| {
+            let left = evaluations.saturating_sub(method.first() as u64);
+            (left / method.further().max(1) as u64) as usize
+        })
+    }
+
+    /// Evaluations that `generations` of a `population` take; a colony's scouts come on top.
+    pub fn evaluations(self, population: usize, generations: usize) -> u64 {
+        with!(
+            self,
+            population,
+            |method| (method.first() + generations * method.further()) as u64
+        )
+    }
+
+    /// Minimises with a `population` (at least 4; a lone beetle has none); see [`minimise`].
+    pub fn minimise<O: Objective>(
+        self,
+        population: usize,
+        objective: &O,
+        bounds: &SearchBox,
+        budget: &Budget,
+        observe: impl FnMut(&Generation, &[f64]),
+    ) -> SwarmResult {
+        with!(self, population, |method| minimise(
+            &method, objective, bounds, budget, observe
+        ))
+    }
+}
+
+/// A function to be minimised in any number of dimensions.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Landscape {
+    /// Flat with narrow valleys; the paper's. In 2, 5 or 10 dimensions.
+    Michalewicz,
+    /// A bowl with a lattice of minima.
+    Rastrigin,
+    /// A bent valley.
+    Rosenbrock,
+    /// A plateau of small minima around a funnel.
+    Ackley,
+}
+
+impl Landscape {
+    /// As tables hold it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Michalewicz => "michalewicz",
+            Self::Rastrigin => "rastrigin",
+            Self::Rosenbrock => "rosenbrock",
+            Self::Ackley => "ackley",
+        }
+    }
+
+    /// Its value at a point of any dimension.
+    pub fn value(self, x: &[f64]) -> f64 {
+        let n = x.len() as f64;
+        match self {
+            Self::Michalewicz => -x
+                .iter()
+                .zip(1..)
+                .map(|(x, i)| x.sin() * (f64::from(i) * x * x / PI).sin().powi(20))
+                .sum::<f64>(),
+            Self::Rastrigin => x
+                .iter()
+                .map(|x| x * x - 10.0 * (2.0 * PI * x).cos() + 10.0)
+                .sum(),
+            Self::Rosenbrock => x
+                .windows(2)
+                .map(|x| 100.0 * (x[1] - x[0] * x[0]).powi(2) + (1.0 - x[0]).powi(2))
+                .sum(),
+            Self::Ackley => {
+                let squares: f64 = x.iter().map(|x| x * x).sum::<f64>() / n;
+                let cosines: f64 = x.iter().map(|x| (2.0 * PI * x).cos()).sum::<f64>() / n;
+                20.0 - 20.0 * (-0.2 * squares.sqrt()).exp() + E - cosines.exp()
+            }
+        }
+    }
+
+    /// The box that is searched.
+    pub(crate) fn bounds(self, dimensions: usize) -> SearchBox {
+        let (lower, upper) = match self {
+            Self::Michalewicz => (0.0, PI),
+            Self::Rastrigin => (-5.12, 5.12),
+            Self::Rosenbrock => (-2.048, 2.048),
+            Self::Ackley => (-32.768, 32.768),
+        };
+        SearchBox::cube(dimensions, lower, upper)
+    }
+
+    /// One search for its minimum; `population` as of [`Algorithm::minimise`].
+    pub fn search(
+        self,
+        dimensions: usize,
+        method: Algorithm,
+        population: usize,
+        budget: &Budget,
+    ) -> SwarmResult {
+        method.minimise(
+            population,
+            &|x: &[f64]| self.value(x),
+            &self.bounds(dimensions),
+            budget,
+            |_, _| {},
+        )
+    }
+
+    /// The smallest value, where it is known.
+    pub fn minimum(self, dimensions: usize) -> Option<f64> {
+        match (self, dimensions) {
+            (Self::Michalewicz, 2) => Some(-1.801_303_41),
+            (Self::Michalewicz, 5) => Some(-4.687_658_18),
+            (Self::Michalewicz, 10) => Some(-9.660_151_72),
+            (Self::Michalewicz, _) => None,
+            (Self::Rosenbrock, 0 | 1) => None,
+            _ => Some(0.0),
+        }
     }
 }

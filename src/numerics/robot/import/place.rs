@@ -169,7 +169,7 @@ impl<'a> DocumentNode<'a> {
             ..self
         }
     }
-    pub fn get(&self, key: &str) -> Self {
+    pub(crate) fn get(&self, key: &str) -> Self {
         let path = join(&self.path, key);
         match self.content {
             Content::There(node) if matches!(node.value, YamlValue::Map(_)) => {
@@ -183,7 +183,7 @@ impl<'a> DocumentNode<'a> {
             Content::Missing => self.child(None, path),
         }
     }
-    pub fn items(&self) -> Vec<Self> {
+    pub(crate) fn items(&self) -> Vec<Self> {
         match self.value() {
             Some(YamlValue::List(items)) => items
                 .iter()
