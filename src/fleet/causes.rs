@@ -15,7 +15,7 @@ use crate::stage::Given;
 use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey, TableRef};
 use crate::table::{CellEvidence, CellEvidenceRow, Table};
 use serde_json::json;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// The stage's id and name in keys and paths.
@@ -23,11 +23,11 @@ const STAGE: &str = "fleet_diagnose";
 /// Where its tables are noted among the fleet's.
 pub(super) const NOTE: &str = "causes.json";
 
-/// What a group has so far, which sets of cells it had, what was dropped how often, and the gain in ln of odds for which each set was left.
+/// What a group has so far, how often it had each set of cells, what was dropped how often, and the gain in ln of odds for which each set was left.
 #[derive(Default)]
 struct GroupSearch {
     given: Vec<Given>,
-    had: BTreeSet<Vec<String>>,
+    had: BTreeMap<Vec<String>, usize>,
     dropped: BTreeMap<String, usize>,
     left: BTreeMap<Vec<String>, f64>,
 }
@@ -136,8 +136,11 @@ fn given(cell: &str, shape: Option<&str>, size_mm: f64) -> Given {
 impl GroupSearch {
     /// Drops, exchanges or adds cells by the sums; whether any did.
     fn step(&mut self, sums: &GroupSums) -> bool {
-        self.had.insert(Self::key(&self.given));
-        self.drop_weak(sums) || self.exchange(sums) || self.add(sums)
+        let times = self.had.entry(Self::key(&self.given)).or_default();
+        *times += 1;
+        // What two additions led back to stays.
+        let grows = *times <= 2;
+        self.drop_weak(sums) || self.exchange(sums) || grows && self.add(sums)
     }
 
     fn key(given: &[Given]) -> Vec<String> {
@@ -200,7 +203,7 @@ impl GroupSearch {
             let mut cells = Self::key(&self.given);
             cells.push(cell.into());
             cells.sort();
-            self.had.contains(&cells)
+            self.had.contains_key(&cells)
         };
         let may = |total: &CellTotal| {
             // What is plain in one robot alone is that robot's; a set that was left by drops and exchanges would be left again.
@@ -365,7 +368,7 @@ mod tests {
             given: vec![given("c", None, 0.05)],
             ..GroupSearch::default()
         };
-        search.had.insert(vec!["b".into(), "c".into()]);
+        search.had.insert(vec!["b".into(), "c".into()], 1);
         assert!(search.add(&sums));
         assert_eq!(GroupSearch::key(&search.given), ["a", "c"]);
     }
