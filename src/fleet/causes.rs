@@ -23,10 +23,11 @@ const STAGE: &str = "fleet_diagnose";
 /// Where its tables are noted among the fleet's.
 pub(super) const NOTE: &str = "causes.json";
 
-/// What a group has so far, what was dropped how often, and the gain in ln of odds for which each set of cells was left.
+/// What a group has so far, how often it had each set of cells, what was dropped how often, and the gain in ln of odds for which each set was left.
 #[derive(Default)]
 struct GroupSearch {
     given: Vec<Given>,
+    had: BTreeMap<Vec<String>, usize>,
     dropped: BTreeMap<String, usize>,
     left: BTreeMap<Vec<String>, f64>,
 }
@@ -135,7 +136,11 @@ fn given(cell: &str, shape: Option<&str>, size_mm: f64) -> Given {
 impl GroupSearch {
     /// Drops, exchanges or adds cells by the sums; whether any did.
     fn step(&mut self, sums: &GroupSums) -> bool {
-        self.drop_weak(sums) || self.exchange(sums) || self.add(sums)
+        let times = self.had.entry(Self::key(&self.given)).or_default();
+        *times += 1;
+        // What two additions led back to stays.
+        let grows = *times <= 2;
+        self.drop_weak(sums) || self.exchange(sums) || grows && self.add(sums)
     }
 
     fn key(given: &[Given]) -> Vec<String> {
@@ -194,10 +199,17 @@ impl GroupSearch {
         if self.given.len() >= *COMPONENTS {
             return false;
         }
+        let had_with = |cell: &str| {
+            let mut cells = Self::key(&self.given);
+            cells.push(cell.into());
+            cells.sort();
+            self.had.contains_key(&cells)
+        };
         let may = |total: &CellTotal| {
-            // What is plain in one robot alone is that robot's.
+            // What is plain in one robot alone is that robot's; a set that was left by drops and exchanges would be left again.
             total.odds >= *JOINS
                 && total.of_the_others > 0.0
+                && !had_with(total.cell)
                 && self.dropped.get(total.cell).is_none_or(|times| *times < 2)
         };
         let all: Vec<CellTotal> = sums.cells("").collect();
@@ -308,9 +320,8 @@ pub(super) fn noted<T: Table>(ledger: &Ledger, port: &str) -> Result<Option<T>> 
 mod tests {
     use super::*;
 
-    /// Sums of one robot that was asked in the place of a cell.
-    fn in_place_of(present: &str, odds: [(&str, f64); 2]) -> GroupSums {
-        let row = |(cell, log_evidence): (&str, f64)| CellEvidenceRow {
+    fn row(present: &str, (cell, log_evidence): (&str, f64)) -> CellEvidenceRow {
+        CellEvidenceRow {
             given: present.into(),
             cell: cell.into(),
             shape: String::new(),
@@ -321,9 +332,14 @@ mod tests {
             log_prior: 0.0,
             size_mm: 0.05,
             sigma_mm: None,
-        };
+        }
+    }
+
+    /// Sums of one robot that was asked in the place of a cell.
+    fn in_place_of(present: &str, odds: [(&str, f64); 2]) -> GroupSums {
         let mut sums = GroupSums::default();
-        sums.add(&odds.map(row), &[given(present, None, 0.05)]);
+        let rows = odds.map(|odds| row(present, odds));
+        sums.add(&rows, &[given(present, None, 0.05)]);
         sums
     }
 
@@ -342,6 +358,19 @@ mod tests {
         assert_eq!(cells(&search), ["a"]);
         assert!(!search.exchange(&in_place_of("a", [("a", 50.0), ("b", 60.0)])));
         assert_eq!(cells(&search), ["a"]);
+    }
+
+    #[test]
+    fn a_set_that_was_left_is_not_grown_into_again() {
+        let mut sums = in_place_of("", [("a", 50.0), ("b", 60.0)]);
+        sums.add(&[row("", ("a", 50.0)), row("", ("b", 60.0))], &[]);
+        let mut search = GroupSearch {
+            given: vec![given("c", None, 0.05)],
+            ..GroupSearch::default()
+        };
+        search.had.insert(vec!["b".into(), "c".into()], 1);
+        assert!(search.add(&sums));
+        assert_eq!(GroupSearch::key(&search.given), ["a", "c"]);
     }
 
     #[test]
