@@ -193,32 +193,67 @@ fn broken(label: &str, what: &str, error: impl Display) -> Error {
 /// Refuses messages of Arrow whose columns unpack to more than may be: the decoder asks for that memory unseen, and ends the program where it
 /// is not granted. What else is wrong is the decoder's to say.
 fn bounded(content: &[u8]) -> std::result::Result<(), String> {
+    // The end of a file says where its messages and their columns begin; those of a stream follow each other.
+    for (at, body) in blocks(content).unwrap_or_default() {
+        if let Some((message, _)) = message(content, at) {
+            unpacks(content, &message, body)?;
+        }
+    }
     let first = content.chunks(8).position(|at| at.starts_with(STREAM));
     let mut at = 8 * first.unwrap_or(content.len());
     while let Some((message, body)) = message(content, at) {
-        let beyond = |by: i64| body.saturating_add(usize::try_from(by).unwrap_or(usize::MAX));
-        let batch = message.header_as_record_batch().or_else(|| {
-            let dictionary = message.header_as_dictionary_batch();
-            dictionary.and_then(|dictionary| dictionary.data())
-        });
-        let packed = batch.filter(|batch| batch.compression().is_some());
-        for buffer in packed.iter().filter_map(|batch| batch.buffers()).flatten() {
-            let stated = content.get(beyond(buffer.offset())..);
-            let stated = stated
-                .and_then(<[u8]>::first_chunk)
-                .filter(|_| buffer.length() > 0);
-            let bytes = stated.map_or(0, |bytes| i64::from_le_bytes(*bytes));
-            // -1: it is not packed.
-            if !(-1..=MOST_UNPACKED).contains(&bytes) {
-                return Err(format!(
-                    "a column unpacks to {bytes} bytes; allowed: {} GB a batch",
-                    MOST_UNPACKED >> 30
-                ));
-            }
-        }
-        at = beyond(message.bodyLength());
+        unpacks(content, &message, body)?;
+        at = beyond(body, message.bodyLength());
     }
     Ok(())
+}
+
+/// Where the messages of a Feather file and their columns begin; none where its end is not one.
+fn blocks(content: &[u8]) -> Option<Vec<(usize, usize)>> {
+    let (head, length) = content.strip_suffix(FEATHER[1])?.split_last_chunk()?;
+    let first = head
+        .len()
+        .checked_sub(u32::from_le_bytes(*length) as usize)?;
+    let footer = arrow_ipc::root_as_footer(head.get(first..)?).ok()?;
+    let blocks = [footer.dictionaries(), footer.recordBatches()];
+    let place = |block: &arrow_ipc::Block| {
+        let at = beyond(0, block.offset());
+        (at, beyond(at, block.metaDataLength().into()))
+    };
+    Some(blocks.iter().flatten().flatten().map(place).collect())
+}
+
+/// Refuses a message whose columns, which begin at `body`, unpack to more than may be.
+fn unpacks(
+    content: &[u8],
+    message: &arrow_ipc::Message<'_>,
+    body: usize,
+) -> std::result::Result<(), String> {
+    let batch = message.header_as_record_batch().or_else(|| {
+        let dictionary = message.header_as_dictionary_batch();
+        dictionary.and_then(|dictionary| dictionary.data())
+    });
+    let packed = batch.filter(|batch| batch.compression().is_some());
+    for buffer in packed.iter().filter_map(|batch| batch.buffers()).flatten() {
+        let stated = content.get(beyond(body, buffer.offset())..);
+        let stated = stated
+            .and_then(<[u8]>::first_chunk)
+            .filter(|_| buffer.length() > 0);
+        let bytes = stated.map_or(0, |bytes| i64::from_le_bytes(*bytes));
+        // -1: it is not packed.
+        if !(-1..=MOST_UNPACKED).contains(&bytes) {
+            return Err(format!(
+                "a column unpacks to {bytes} bytes; allowed: {} GB a batch",
+                MOST_UNPACKED >> 30
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// A place beyond another, the end of everything if it is none.
+fn beyond(at: usize, by: i64) -> usize {
+    at.saturating_add(usize::try_from(by).unwrap_or(usize::MAX))
 }
 
 /// The message of Arrow that begins at a place, and where its columns begin.

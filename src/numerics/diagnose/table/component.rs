@@ -4,6 +4,7 @@
 use super::cell::{CellShape, ShapeGroup};
 use super::factored::FactoredColumns;
 use super::frame::{SearchRows, UnitColumns, product, view};
+use crate::criteria::cells::ROW_BY_ROW;
 use crate::effect::Form;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, Par};
@@ -52,13 +53,10 @@ pub(super) struct CellColumns {
     pub(crate) between: [f64; 2],
 }
 
-/// Residual rows above which products of whole columns take less time than products row by row.
-const ROW_BY_ROW: usize = 1500;
-
 impl CellColumns {
     pub(crate) fn of(groups: Vec<ShapeGroup>, frame: &SearchRows) -> Self {
         let forms = groups.iter().flat_map(|group| &group.forms);
-        let factored: Option<Vec<_>> = (frame.residual().len() <= ROW_BY_ROW)
+        let factored: Option<Vec<_>> = (frame.residual().len() <= *ROW_BY_ROW)
             .then(|| forms.clone().map(|form| frame.factored(form)).collect())
             .flatten();
         let values = OnceLock::new();
