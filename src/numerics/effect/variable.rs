@@ -61,7 +61,7 @@ pub enum Variable {
     },
     /// C, where recorded.
     Temperature,
-    /// s, or the number of the row where the recording has no clock: see [`ArmState::time`].
+    /// s, or the number of the row where the recording has no clock: see `ArmState::time`.
     Time,
     /// A circumstance that the recording declares and laws read by name, SI.
     Circumstance {

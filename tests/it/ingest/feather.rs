@@ -107,13 +107,22 @@ fn a_feather_file_that_cannot_be_read_is_refused_with_a_reason() {
     let said = refused(&|bytes| [b"FEA1", &bytes[4..]].concat());
     has(&said, "is a Feather file of version 1; allowed: version 2");
     // Before each frame of zstd stands how many bytes it unpacks to: numbers that no machine can hold, and none can have.
-    for length in [1_i64 << 60, 1 << 40, i64::MIN] {
+    // The message before them may be damaged, too: the end of the file says where its columns are.
+    for (length, is_alone) in [
+        (1_i64 << 60, true),
+        (1 << 40, true),
+        (i64::MIN, true),
+        (1 << 40, false),
+    ] {
         let said = refused_of(Some(CompressionType::ZSTD), &|mut bytes| {
             let frame = bytes
                 .windows(4)
                 .position(|at| at == 0xfd2f_b528_u32.to_le_bytes());
             let at = frame.unwrap() - 8;
             bytes[at..at + 8].copy_from_slice(&length.to_le_bytes());
+            if !is_alone {
+                bytes[12..16].copy_from_slice(&u32::MAX.to_le_bytes());
+            }
             bytes
         });
         has(
