@@ -48,7 +48,7 @@ impl SimulateArguments {
 /// Record an experiment on a robot with stated effects.
 ///
 /// Runs the stage `simulate` of a pipeline and what it needs, and writes what a user of that robot would have: robot.json,
-/// controller.csv and tracker.csv, or of a ball at fixtures a file of joints under the name of each; and beside them truth.csv with every
+/// controller.csv and tracker.csv, or of a ball at fixtures a file of joints under the name of each; and next to them truth.csv with every
 /// true number. Joints and points keep 9 decimals, joints at fixtures 12.
 #[derive(Args)]
 #[command(after_help = "Examples:

@@ -49,7 +49,7 @@ pub struct Accepted {
 }
 
 crate::stage::stage! {
-    Report, "report", 24, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
+    Report, "report", 25, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
         ReportReads {
             statistics: Statistics,
             prediction: Vec<Labelled<Prediction>>,

@@ -1,7 +1,7 @@
 //! Tables of targets, as delimited text or Parquet: joints are replaced, or written where there are none, and what is known of each
 //! target is appended; everything else stays as it is. A target that is not reached gets no joints.
 //!
-//! Targets beside what was measured when the robot went there: the table of targets as it was before correction, with the measured point of
+//! Targets with what was measured when the robot went there: the table of targets as it was before correction, with the measured point of
 //! each row in x, y, z.
 //!
 //! Files that appear only when they are whole.

@@ -145,9 +145,9 @@ pub struct Motion {
     pub(crate) link_end: Vec<Matrix>,
     /// Shift of the measured point, last link's frame, m.
     pub(crate) tool: Vector,
-    /// What turns each joint besides gravity, Nm: springs and hoses. The gear carries it too.
+    /// What turns each joint in addition to gravity, Nm: springs and hoses. The gear carries it too.
     pub(crate) load: Vec<f64>,
-    /// What each motor carries besides gravity, Nm at the joint.
+    /// What each motor carries in addition to gravity, Nm at the joint.
     pub(crate) motor_torque: Vec<f64>,
 }
 
@@ -276,7 +276,7 @@ impl Loads {
     }
 }
 
-/// What holds in one row besides the loads.
+/// What holds in one row in addition to the loads.
 #[derive(Debug, Clone)]
 pub struct Row {
     /// Joint positions that the controller reports, rad or m.

@@ -315,7 +315,7 @@ fn hostile_names_are_shown_and_not_run() {
 #[test]
 fn reference_figures_stand_beside_ours_only_where_there_are_any() {
     assert!(
-        !html(Report::default(), tables("Heavy 6R, cell 4")).contains("Beside reference figures")
+        !html(Report::default(), tables("Heavy 6R, cell 4")).contains("Compared with reference figures")
     );
     let mut reads = tables("Heavy 6R, cell 4");
     let row = reads
@@ -330,7 +330,7 @@ fn reference_figures_stand_beside_ours_only_where_there_are_any() {
     let ours = format!("{:.3}", row.mean_mm);
     let page = html(Report::default(), reads);
     let table = page
-        .split("Beside reference figures")
+        .split("Compared with reference figures")
         .nth(1)
         .and_then(|rest| rest.split("</table>").next())
         .expect("a table");

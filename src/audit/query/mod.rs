@@ -72,7 +72,7 @@ fn names(frame: &mut LazyFrame) -> PolarsResult<Vec<String>> {
         .collect())
 }
 
-/// The same plan, with every step that may lose the order told to keep it.
+/// The same plan, with every step that may lose the order set to keep it.
 pub(crate) fn kept(plan: DslPlan) -> DslPlan {
     match plan {
         // What polars noted about a plan while it read the SQL; it does so again.

@@ -226,7 +226,7 @@ impl Uncertainty {
         (squares / rows.max(1) as f64).sqrt()
     }
 
-    /// How certain the correction (m, tracker frame) is that brought the command to `q`, under the circumstances that `reach` is set to.
+    /// Standard uncertainty of the correction (m, tracker frame) that led to the command `q`, under the circumstances that `reach` is set to.
     pub(crate) fn of_correction(
         &self,
         reach: &mut Reach,

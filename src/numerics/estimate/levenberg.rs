@@ -247,7 +247,7 @@ impl Model {
     /// The step of [`TriangularFactor::solve`] that stays within the bounds of the `free` parameters. `None` if singular.
     ///
     /// An active set: who stands on a bound and is pulled outwards stays; who would go beyond is put on the bound, and the others
-    /// take their best step beside.
+    /// take their best step at the same time.
     pub(crate) fn step_within_bounds(
         &self,
         free: &[usize],

@@ -196,7 +196,7 @@ fn beyond_priors(model: &Model, covariance: &Covariance) -> f64 {
 /// What errors of rows are compared in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ErrorScale {
-    /// Lengths of what is left of points, or of other lengths, m.
+    /// Lengths of the residuals of points, or of other lengths, m.
     Lengths,
     /// Standard deviations of what a row measured, root mean square over its numbers, times the noise.
     Noise {
@@ -278,7 +278,7 @@ pub fn noise(data: &Measurements, row: usize, of: Dimension) -> Option<f64> {
 }
 
 impl Model {
-    /// Sizes (m or rad) of what is left of every row, of the first kind of a dimension that it measured.
+    /// Sizes (m or rad) of the residual of every row, of the first kind of a dimension that it measured.
     pub fn error_sizes(&self, data: &Measurements, of: Dimension) -> Vec<Option<f64>> {
         let kinds: Vec<_> = kinds(data)
             .into_iter()

@@ -6,7 +6,7 @@
 //!
 //! Formulas that none beats in both price and error (Pareto), and the one that is proposed.
 //!
-//! How well shape numbers are known: by the curvature of what is left, with all coefficients fitted at every step.
+//! How well shape numbers are known: by the curvature of the residual, with all coefficients fitted at every step.
 
 use crate::closed_form::grammar::{NamedVariable, declarations};
 use crate::criteria::closed_form::{BETTER, LIKE, SHOWN, STARTS};
@@ -332,7 +332,7 @@ pub(crate) fn front(
 /// Steps as shares of a shape number's range.
 const STEP: f64 = 1e-3;
 
-/// One standard deviation of each shape number of a form that fits best; none where what is left has no minimum there.
+/// One standard deviation of each shape number of a form that fits best; none where the residual has no minimum there.
 pub(crate) fn shape_sigmas(form: &Form, given: &FormRegression) -> Vec<Option<f64>> {
     let Some(declared) = form.declared() else {
         return Vec::new();

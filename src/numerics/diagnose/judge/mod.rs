@@ -11,7 +11,7 @@ use crate::round::{EstimatedCause, FitState, Fitter, with_causes};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// A fitted state beside which causes are left out, and rivals that may come in.
+/// A fitted state of which causes are left out, and rivals that may come in.
 pub(crate) struct Alternatives<'a> {
     state: &'a FitState,
     fitter: &'a Fitter<'a>,
@@ -83,7 +83,7 @@ pub(crate) struct NearAlternatives<'n> {
 }
 
 impl NearAlternatives<'_> {
-    /// Steps of what is left out: some causes (by their positions), and all rivals but one (by its own).
+    /// Steps without some causes (by their positions), and all rivals but one (by its own).
     fn steps(&self, out: &[usize], rival: Option<usize>) -> Vec<Option<f64>> {
         let Alternatives {
             state,

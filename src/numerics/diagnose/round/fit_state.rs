@@ -75,7 +75,7 @@ pub(crate) struct Fitter<'a> {
     pub(crate) question: &'a Question<'a>,
     /// The recording; its spread is what the joints' repeatability makes of each row.
     pub(crate) data: Measurements,
-    /// What errors of rows are compared and told in.
+    /// Unit in which errors of rows are compared and stated.
     pub(crate) scale: ErrorScale,
     /// Base parameters to estimate, in order of precedence; at first all.
     free: Vec<usize>,

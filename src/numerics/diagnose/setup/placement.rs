@@ -1,7 +1,7 @@
 //! The nominal robot placed on measured points: its base and where each target sits on the tool, and one number of the robot file where
 //! that is asked. Gauss-Newton from Kabsch's solution, with far points trimmed.
 //!
-//! Commanded joints beside measured points, as the files say or as they would be with a set-up error mended.
+//! Commanded joints with measured points, as the files say or as they would be with a set-up error mended.
 //!
 //! One number of the robot file that may be wrong: a length between two axes, the place of one axis, or the zero of a joint.
 
@@ -239,7 +239,7 @@ pub(super) fn sampled(rows: &[usize]) -> Vec<usize> {
 }
 
 impl<'a> PointPairs<'a> {
-    /// Joints of rows, each beside the point of a row that has a whole one.
+    /// Joints of rows, each with the point of a row that has a whole one.
     pub(crate) fn of(
         robot: &'a RobotModel,
         data: &Measurements,

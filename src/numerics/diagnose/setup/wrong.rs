@@ -236,7 +236,7 @@ impl SignGroup {
     }
 }
 
-/// How the points stand beside the joints.
+/// How the points are matched with the joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum RowOrder {
     /// The point of a row stands so many rows further on.

@@ -153,7 +153,7 @@ impl MotionRows {
                 before[j] = whole;
             }
         }
-        // What the base has all of cannot be told from rounding.
+        // What lies in the span of the base cannot be distinguished from rounding.
         let rounding = 1e-12;
         for j in 0..columns.len() {
             if gram[(j, j)] >= rounding * before[j] {

@@ -1,4 +1,4 @@
-//! How the noise of the rows differs from what they state, by what a model leaves of them.
+//! How the noise of the rows differs from what they state, by the residual of a model.
 
 use crate::criteria::cells::{EVEN, FAR, UNEVEN};
 use crate::diagnose::round::RoundView;
@@ -11,7 +11,7 @@ pub(super) struct NoiseShape {
     pub(super) weights: Vec<f64>,
     /// What makes the three numbers of a point white, in the axes of the recording.
     pub(super) whitening: Option<Matrix3<f64>>,
-    /// By what motor currents are multiplied, so that they leave as much as points do.
+    /// Factor of motor currents, so that their residual is as large as that of points.
     pub(super) currents: Option<f64>,
 }
 
@@ -26,7 +26,7 @@ impl NoiseShape {
         }
     }
 
-    /// By what a fitted model leaves of the rows: those that are far off count less, and a noise that is stronger in some direction is made
+    /// By the residual of a fitted model: rows that are far off count less, and a noise that is stronger in some direction is made
     /// even.
     pub(crate) fn of(view: &RoundView, rows: usize) -> Self {
         let problem = &view.problem;

@@ -301,7 +301,7 @@ fn size(last: &LastRound, members: &[usize]) -> f64 {
 }
 
 /// What does the same as a form of the finding in whatever data, as a rival that takes a share of the finding's probability `name`; what may have
-/// moved when a payload changed that changes only once, in place of a form that follows the payload, takes half of it. Returns what is left.
+/// moved when a payload changed that changes only once, in place of a form that follows the payload, takes half of it. Returns the residual.
 pub(super) fn share_with_identities(
     called: &str,
     forms: &[Form],
@@ -343,7 +343,7 @@ pub(crate) struct LastRound<'a, 'b> {
     /// The whole model with all causes.
     pub(crate) state: FitState,
     pub(crate) answer: Answer,
-    /// What errors of rows are compared and told in.
+    /// Unit in which errors of rows are compared and stated.
     pub(crate) scale: ErrorScale,
     /// Names of causes that are not to be given.
     pub(crate) without: &'b [String],

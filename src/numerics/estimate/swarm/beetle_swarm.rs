@@ -241,7 +241,7 @@ fn unit_vector<O: Objective>(search: &mut Search<O>) -> Vec<f64> {
             .map(|_| search.rng.random_range(-1.0..1.0))
             .collect();
         let length = b.iter().map(|x| x * x).sum::<f64>().sqrt();
-        // A direction cannot be told from a vector this short; with one coordinate or more it is drawn again at once.
+        // A vector this short has no direction; with one coordinate or more it is drawn again at once.
         if length > 1e-9 {
             return b.into_iter().map(|x| x / length).collect();
         }
