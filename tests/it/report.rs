@@ -315,7 +315,8 @@ fn hostile_names_are_shown_and_not_run() {
 #[test]
 fn reference_figures_stand_beside_ours_only_where_there_are_any() {
     assert!(
-        !html(Report::default(), tables("Heavy 6R, cell 4")).contains("Compared with reference figures")
+        !html(Report::default(), tables("Heavy 6R, cell 4"))
+            .contains("Compared with reference figures")
     );
     let mut reads = tables("Heavy 6R, cell 4");
     let row = reads
