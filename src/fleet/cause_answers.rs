@@ -24,7 +24,7 @@ pub(crate) struct Answers {
     pub(crate) outliers: FleetOutliers,
 }
 
-/// Sizes of robots, mm: the usual one and how it scatters from robot to robot.
+/// Sizes of robots, in their unit: the usual one and how it scatters from robot to robot.
 pub(super) struct Population {
     pub(crate) usual: f64,
     pub(crate) spread: f64,
@@ -45,7 +45,7 @@ pub(super) fn of(
         let given = round.groups.get(&group).map_or(&[][..], Vec::as_slice);
         sums.entry(group.clone()).or_default().add(rows, given);
         for row in rows {
-            let Some(sigma) = row.sigma_mm else { continue };
+            let Some(sigma) = row.sigma else { continue };
             follows
                 .entry(row.cell.clone())
                 .or_insert_with(|| row.follows.clone());
@@ -60,8 +60,9 @@ pub(super) fn of(
                 place: row.place.clone(),
                 log_evidence: row.log_evidence,
                 probability: 1.0,
-                size_mm: row.size_mm,
-                sigma_mm: sigma.max(1e-6),
+                size: row.size,
+                sigma: sigma.max(1e-6),
+                unit: row.unit.clone(),
                 deviation: None,
             });
         }
@@ -77,6 +78,7 @@ pub(super) fn of(
         let (Some(first), Some(sums)) = (robots.first(), sums.get(&group)) else {
             continue;
         };
+        let unit = first.unit.clone();
         let mut words = format!("{} at {}", first.effect.replace('_', " "), first.place);
         let finding = FleetFindingRow {
             group: group.clone(),
@@ -91,8 +93,9 @@ pub(super) fn of(
             log_odds: 0.0,
             probability: 0.0,
             rival: None,
-            size_mm: 0.0,
-            spread_mm: None,
+            size: 0.0,
+            spread: None,
+            unit: first.unit.clone(),
             trend: None,
             decided: Some(true),
             statement: String::new(),
@@ -107,15 +110,15 @@ pub(super) fn of(
                     continue;
                 }
                 let statement = format!(
-                    "{}: {words}, {} mm; its siblings do not show it",
+                    "{}: {words}, {}; its siblings do not show it",
                     robot.robot,
-                    length(&robot)
+                    size_of(&robot)
                 );
                 out.findings.0.push(FleetFindingRow {
                     robot: robot.robot.clone(),
                     log_odds: odds,
                     probability: (1.0 - *MISLED) / (1.0 + (-odds).exp()),
-                    size_mm: robot.size_mm,
+                    size: robot.size,
                     statement: statement.clone(),
                     ..finding.clone()
                 });
@@ -139,7 +142,7 @@ pub(super) fn of(
             words = format!("{words} or {name}");
         }
         let statement = format!(
-            "{words} in {have} of {}: {:.3} mm, {:.3} from robot to robot{}",
+            "{words} in {have} of {}: {:.3} {unit}, {:.3} from robot to robot{}",
             counted(sums.robots, "robot"),
             population.usual,
             population.spread,
@@ -154,17 +157,16 @@ pub(super) fn of(
             log_odds,
             probability,
             rival: rival.map(|(name, probability)| format!("{name} ({probability:.2})")),
-            size_mm: population.usual,
-            spread_mm: Some(population.spread),
+            size: population.usual,
+            spread: Some(population.spread),
             trend,
             decided: Some(decided),
             statement,
             ..finding
         });
         for mut robot in robots {
-            let deviation =
-                (robot.size_mm - population.usual) / population.spread.hypot(robot.sigma_mm);
-            let ratio = robot.size_mm / population.usual.max(1e-9);
+            let deviation = (robot.size - population.usual) / population.spread.hypot(robot.sigma);
+            let ratio = robot.size / population.usual.max(1e-9);
             robot.deviation = Some(deviation);
             let kind = match () {
                 () if have < *SIBLINGS => None,
@@ -175,16 +177,16 @@ pub(super) fn of(
                 () => None,
             };
             if let Some(kind) = kind {
-                let size = length(&robot);
+                let size = size_of(&robot);
                 let statement = match kind {
                     "lacks" => format!(
-                        "{}: {}no {words} ({size} mm), which {have} of {} have",
+                        "{}: {}no {words} ({size}), which {have} of {} have",
                         robot.robot,
                         if has(&robot) { "perhaps " } else { "" },
                         sums.robots
                     ),
                     _ => format!(
-                        "{}: {words} moves the tool by {size} mm, {ratio:.1} times that of its siblings",
+                        "{}: {words} is {size}, {ratio:.1} times that of its siblings",
                         robot.robot
                     ),
                 };
@@ -226,8 +228,9 @@ fn not_asked(fleet: &Fleet, round: &Round, records: &[Option<RobotRecord>]) -> F
             kind: "not_asked".into(),
             cell: String::new(),
             group: round.by.of(&robot.groups).into(),
-            size_mm: None,
-            usual_mm: None,
+            size: None,
+            usual: None,
+            unit: None,
             probability: None,
             statement: format!("{}: {}", robot.name, reason.unwrap_or("failed")),
         })
@@ -253,21 +256,21 @@ pub(super) fn population(robots: &mut [FleetCellRow]) -> Population {
             let mut values: Vec<f64> = robots.iter().filter(|robot| has(robot)).map(of).collect();
             nearest(&mut values, 0.5)
         };
-        let Some(usual) = median(&|robot| robot.size_mm) else {
+        let Some(usual) = median(&|robot| robot.size) else {
             break;
         };
-        let scatter = 1.4826 * median(&|robot| (robot.size_mm - usual).abs()).unwrap_or(0.0);
-        let error = median(&|robot| robot.sigma_mm).unwrap_or(0.0);
+        let scatter = 1.4826 * median(&|robot| (robot.size - usual).abs()).unwrap_or(0.0);
+        let error = median(&|robot| robot.sigma).unwrap_or(0.0);
         let least = *LEAST_SPREAD * usual;
         let spread = (scatter * scatter - error * error)
             .max(least * least)
             .sqrt();
         population = Population { usual, spread };
         for robot in robots.iter_mut() {
-            let wide = spread.hypot(robot.sigma_mm);
-            let off = ((robot.size_mm - usual).min(0.0) / wide).powi(2);
-            let none = (robot.size_mm / robot.sigma_mm).powi(2);
-            let log = 0.5 * (none - off) + (robot.sigma_mm / wide).ln() - 2f64.ln();
+            let wide = spread.hypot(robot.sigma);
+            let off = ((robot.size - usual).min(0.0) / wide).powi(2);
+            let none = (robot.size / robot.sigma).powi(2);
+            let log = 0.5 * (none - off) + (robot.sigma / wide).ln() - 2f64.ln();
             let odds = (share / (1.0 - share)).ln() + log;
             robot.probability = 1.0 / (1.0 + (-odds).exp());
         }
@@ -328,7 +331,7 @@ fn trend(robots: &[FleetCellRow], tests: f64) -> Option<String> {
     let sentence = |label: fn(&FleetCellRow) -> Option<&String>| {
         let mut by: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
         for robot in robots.iter().filter(|robot| has(robot)) {
-            by.entry(label(robot)?).or_default().push(robot.size_mm);
+            by.entry(label(robot)?).or_default().push(robot.size);
         }
         by.retain(|_, sizes| sizes.len() > 1);
         let count: usize = by.values().map(Vec::len).sum();
@@ -351,7 +354,7 @@ fn trend(robots: &[FleetCellRow], tests: f64) -> Option<String> {
         (tail(ratio, freedom[0], freedom[1]) < *CHANCE / tests.min(20.0)).then(|| {
             let sentences = by
                 .iter()
-                .map(|(label, sizes)| format!("{:.3} mm at {label}", mean(sizes)));
+                .map(|(label, sizes)| format!("{:.3} {} at {label}", mean(sizes), robots[0].unit));
             sentences.collect::<Vec<_>>().join(", ")
         })
     };
@@ -359,14 +362,14 @@ fn trend(robots: &[FleetCellRow], tests: f64) -> Option<String> {
     (!sentences.is_empty()).then(|| sentences.join("; "))
 }
 
-fn length(robot: &FleetCellRow) -> String {
-    format!("{:.3} +- {:.3}", robot.size_mm, robot.sigma_mm)
+fn size_of(robot: &FleetCellRow) -> String {
+    format!("{:.3} +- {:.3} {}", robot.size, robot.sigma, robot.unit)
 }
 
 fn outlier(
     robot: &FleetCellRow,
     kind: &str,
-    usual_mm: Option<f64>,
+    usual: Option<f64>,
     statement: String,
 ) -> FleetOutlierRow {
     FleetOutlierRow {
@@ -374,8 +377,9 @@ fn outlier(
         kind: kind.into(),
         cell: robot.cell.clone(),
         group: robot.group.clone(),
-        size_mm: Some(robot.size_mm),
-        usual_mm,
+        size: Some(robot.size),
+        usual,
+        unit: Some(robot.unit.clone()),
         probability: (kind == "lacks").then_some(1.0 - robot.probability),
         statement,
     }

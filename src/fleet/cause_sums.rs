@@ -47,6 +47,8 @@ pub(super) struct Sum {
     less: [f64; 3],
     /// Sums of that cell's log evidence in the same robots, and of its square.
     owner: [f64; 2],
+    /// Robots that have found it by themselves.
+    pub(crate) found: usize,
 }
 
 impl Sum {
@@ -61,6 +63,7 @@ impl Sum {
             sized: (0.0, 0.0),
             less: [0.0; 3],
             owner: [0.0; 2],
+            found: 0,
         }
     }
 
@@ -70,6 +73,7 @@ impl Sum {
         for (sum, value) in self.less.iter_mut().zip([1.0, less, less * less]) {
             *sum += value;
         }
+        self.found += usize::from(row.given.is_empty() && row.sigma.is_some());
         self.owner[0] += owner;
         self.owner[1] += owner * owner;
         for (sum, share) in self.logs.iter_mut().zip(shares()) {
@@ -77,7 +81,7 @@ impl Sum {
         }
         self.strongest = self.strongest.max(log);
         let weight = 1.0 / (1.0 + (-log).exp());
-        self.sized.0 += weight * row.size_mm.max(1e-6).ln();
+        self.sized.0 += weight * row.size.max(1e-6).ln();
         self.sized.1 += weight;
     }
 
@@ -106,11 +110,11 @@ impl Sum {
         (square - sum * sum / count.max(1.0)).max(0.0)
     }
 
-    /// A usual size, mm.
-    pub(crate) fn size_mm(&self) -> f64 {
+    /// A usual size, in its unit.
+    pub(crate) fn size(&self) -> f64 {
         (self.sized.0 / self.sized.1.max(f64::MIN_POSITIVE))
             .exp()
-            .clamp(1e-3, 100.0)
+            .clamp(1e-3, 1e5)
     }
 }
 
@@ -253,8 +257,9 @@ mod tests {
             follows: "approach".into(),
             log_evidence: log,
             log_prior: 0.0,
-            size_mm: 0.05,
-            sigma_mm: None,
+            size: 0.05,
+            sigma: None,
+            unit: "mm".into(),
         }
     }
 
@@ -288,7 +293,7 @@ mod tests {
         let asked = [Given {
             cell: "a".into(),
             shape: None,
-            size_mm: 0.05,
+            size: 0.05,
         }];
         sums.add(&[given("a", 3.0), given("b", 2.0)], &asked);
         sums.add(&[given("a", 6.0), given("b", 2.0)], &asked);

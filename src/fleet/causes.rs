@@ -6,8 +6,9 @@ use super::cause_sums::{CellTotal, GroupSums, each};
 use super::ledger::RobotRecord;
 use super::round::{GroupColumn, Round};
 use super::{Fleet, Ledger};
-use crate::criteria::cells::{COMPONENTS, JOINS, LEAVES};
+use crate::criteria::cells::{JOINS, LEAVES};
 use crate::criteria::fleet::{ALONE, EXCHANGED};
+use crate::criteria::torque::COMPONENTS;
 use crate::effect::names;
 use crate::error::{Result, visible};
 use crate::report::fleet_causes as page;
@@ -114,22 +115,22 @@ impl CauseSearch {
     }
 }
 
-/// The cell that a robot by itself shows, if its odds alone are strong.
+/// The cell that a robot by itself shows next to those in its model, if its odds alone are strong.
 fn likeliest(rows: &[CellEvidenceRow]) -> Option<Given> {
     let odds = |row: &CellEvidenceRow| row.log_evidence + row.log_prior;
     let best = rows
         .iter()
-        .filter(|row| row.given.is_empty() && row.shape.is_empty())
+        .filter(|row| row.given.is_empty() && row.shape.is_empty() && row.sigma.is_none())
         .max_by(|a, b| odds(a).total_cmp(&odds(b)))?;
-    (odds(best) >= *JOINS).then(|| given(&best.cell, None, best.size_mm))
+    (odds(best) >= *JOINS).then(|| given(&best.cell, None, best.size))
 }
 
 /// A cell with a size of two digits: equal rounds have equal keys.
-fn given(cell: &str, shape: Option<&str>, size_mm: f64) -> Given {
+fn given(cell: &str, shape: Option<&str>, size: f64) -> Given {
     Given {
         cell: cell.into(),
         shape: shape.map(Into::into),
-        size_mm: format!("{:.1e}", size_mm.max(1e-3)).parse().unwrap_or(0.01),
+        size: format!("{:.1e}", size.max(1e-3)).parse().unwrap_or(0.01),
     }
 }
 
@@ -183,7 +184,7 @@ impl GroupSearch {
                 continue;
             };
             let mut next = self.given.clone();
-            next[i] = given(best.cell, best.shape, best.sum.size_mm());
+            next[i] = given(best.cell, best.shape, best.sum.size());
             // Of two sets of which each is left for the other one, that stays which gains less by it.
             let gain = best.odds - stays;
             if self.left.get(&Self::key(&next)).is_none_or(|by| gain > *by) {
@@ -218,6 +219,11 @@ impl GroupSearch {
             .filter(|total| may(total))
             .max_by(|a, b| a.odds.total_cmp(&b.odds));
         let Some(best) = best else { return false };
+        // What most robots have found by themselves, each next to all others, joins with it.
+        let found = |total: &&CellTotal| 2 * total.sum.found > sums.robots && may(total);
+        let joining: Vec<&CellTotal> = std::iter::once(best)
+            .chain(all.iter().filter(found))
+            .collect();
         // One link that bends may look better than any one joint that yields, and worse than all of them.
         let is_first = self.given.is_empty() && self.dropped.is_empty();
         if is_first && best.sum.follows == "load" {
@@ -225,12 +231,14 @@ impl GroupSearch {
                 .iter()
                 .filter(|total| total.sum.effect == names::JOINT_COMPLIANCE);
             self.given = yields
-                .map(|total| given(total.cell, None, total.sum.size_mm()))
+                .map(|total| given(total.cell, None, total.sum.size()))
                 .collect();
         }
-        if !self.given.iter().any(|given| given.cell == best.cell) {
-            self.given
-                .push(given(best.cell, best.shape, best.sum.size_mm()));
+        for total in joining {
+            if !self.given.iter().any(|given| given.cell == total.cell) {
+                self.given
+                    .push(given(total.cell, total.shape, total.sum.size()));
+            }
         }
         true
     }
@@ -274,7 +282,7 @@ pub(crate) fn publish(
         key_format: KEY_FORMAT,
         id: STAGE.into(),
         stage: STAGE.into(),
-        implementation: 3,
+        implementation: 4,
         settings: json!({ "robots": robots.collect::<Vec<_>>(), "round": search.round() }),
         reads: BTreeMap::new(),
         files: BTreeMap::new(),
@@ -330,8 +338,9 @@ mod tests {
             follows: "approach".into(),
             log_evidence,
             log_prior: 0.0,
-            size_mm: 0.05,
-            sigma_mm: None,
+            size: 0.05,
+            sigma: None,
+            unit: "mm".into(),
         }
     }
 

@@ -110,7 +110,7 @@ impl Fleet {
 /// What a cause of the model lets expect of a robot, by the sizes of the others.
 fn expected(row: &FleetFindingRow, sizes: &[FleetCellRow], robot: &str) -> Value {
     let (mut having, mut all) = (row.robots, row.of_robots);
-    let (mut size_mm, mut spread_mm) = (row.size_mm, row.spread_mm.unwrap_or(0.0));
+    let (mut size_mm, mut spread_mm) = (row.size, row.spread.unwrap_or(0.0));
     let mut others = sizes.to_vec();
     others.retain(|other| other.robot != robot);
     if others.len() < sizes.len() {
@@ -217,8 +217,9 @@ mod tests {
             place: "joint 2".into(),
             log_evidence: if size_mm > 0.0 { 9.0 } else { -2.0 },
             probability: f64::from(size_mm > 0.0),
-            size_mm,
-            sigma_mm: 0.002,
+            size: size_mm,
+            sigma: 0.002,
+            unit: "mm".into(),
             deviation: None,
         };
         let sizes = [
@@ -242,8 +243,9 @@ mod tests {
             log_odds: 30.0,
             probability: 1.0,
             rival: None,
-            size_mm: 0.06,
-            spread_mm: Some(0.01),
+            size: 0.06,
+            spread: Some(0.01),
+            unit: "mm".into(),
             trend: None,
             decided: Some(true),
             statement: String::new(),

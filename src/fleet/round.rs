@@ -4,7 +4,9 @@ use super::file::Groups;
 use super::robot::FleetRobot;
 use crate::error::{Error, Result};
 use crate::pipeline::Plan;
-use crate::stage::{Given, STAGES};
+use crate::stage::{
+    CellEvidence, DIAGNOSES, DeclaredStage, Diagnose, Given, STAGES, TorqueEvidence,
+};
 use crate::yaml;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -61,16 +63,16 @@ impl Round {
         group.into_iter().chain(own).flatten().cloned().collect()
     }
 
-    /// The plan of a robot up to its last stage `diagnose`, which says what its cells do in place of a diagnosis.
+    /// The plan of a robot up to its last stage `diagnose` or `diagnose_torques`, which says what its cells do in place of a diagnosis.
     pub(super) fn plan(&self, plan: Plan, robot: &FleetRobot) -> Result<Plan> {
         let at = plan
             .stages
             .iter()
-            .rposition(|stage| stage.entry.name == "diagnose");
+            .rposition(|stage| DIAGNOSES.contains(&stage.entry.name));
         let at = at.ok_or_else(|| {
             Error::spec(
                 plan.file.display().to_string(),
-                "has no stage `diagnose`, whose settings say what is asked of each robot: add `- uses: diagnose`",
+                "has no stage `diagnose` or `diagnose_torques`, whose settings say what is asked of each robot: add `- uses: diagnose`",
             )
         })?;
         let mut plan = plan.needed_for(at);
@@ -87,10 +89,14 @@ impl Round {
                 .into();
         }
         let settings = json!({ "diagnose": settings, "given": self.given(robot) });
-        let entry = STAGES.iter().find(|entry| entry.name == "cell_evidence");
+        let name = match stage.entry.name {
+            Diagnose::NAME => CellEvidence::NAME,
+            _ => TorqueEvidence::NAME,
+        };
+        let entry = STAGES.iter().find(|entry| entry.name == name);
         let (tree, _) = yaml::parse(&settings.to_string());
         let (Some(entry), Some(tree)) = (entry, tree) else {
-            return Err(Error::Bug("no stage cell_evidence".into()));
+            return Err(Error::Bug(format!("no stage {name}")));
         };
         let body = (entry.parse)(&tree).map_err(|troubles| {
             let faults = troubles.into_iter().map(|trouble| trouble.fault("given"));

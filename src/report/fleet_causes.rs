@@ -14,7 +14,7 @@ const UNNAMED: &str = "unknown";
 const NAMED: usize = 40;
 /// Standard deviations from its siblings from which a robot is marked.
 const OFF: f64 = 4.0;
-/// Sizes (mm) at the ends of the scale of colours.
+/// Sizes (mm) at the ends of the scale of colours; of torques (Nm) a hundred times as much.
 const SCALE: [f64; 2] = [0.003, 1.0];
 
 /// The page.
@@ -79,12 +79,12 @@ fn words(effect: &str, place: &str) -> String {
     format!("{} at {place}", effect.replace('_', " "))
 }
 
-/// A size in the unit in which it is short.
-fn length(mm: f64) -> String {
-    if mm >= 1.0 {
-        format!("{mm:.1} mm")
-    } else {
-        format!("{:.0} \u{b5}m", 1e3 * mm)
+/// A size; a length in the unit in which it is short.
+fn short(size: f64, unit: &str) -> String {
+    match unit {
+        "mm" if size < 1.0 => format!("{:.0} \u{b5}m", 1e3 * size),
+        "mm" => format!("{size:.1} mm"),
+        _ => format!("{size:.2} {unit}"),
     }
 }
 
@@ -118,17 +118,22 @@ fn group(name: &str, findings: &[&FleetFindingRow], cells: &FleetCells) -> Value
             let Some(first) = here.first() else {
                 return json!({ "name": "", "open": false });
             };
-            let size = here.iter().map(|row| row.size_mm).fold(0.0, f64::max);
+            let size = here.iter().map(|row| row.size).fold(0.0, f64::max);
             let effects: Vec<String> = here
                 .iter()
                 .map(|row| row.effect.replace('_', " "))
                 .collect();
             let share = first.robots as f64 / first.of_robots.max(1) as f64;
-            let strong = (size / SCALE[0]).max(1.0).ln() / (SCALE[1] / SCALE[0]).ln();
+            let scaled = if first.unit == "mm" {
+                size
+            } else {
+                0.01 * size
+            };
+            let strong = (scaled / SCALE[0]).max(1.0).ln() / (SCALE[1] / SCALE[0]).ln();
             json!({
                 "name": effects.join(", "),
                 "open": here.iter().any(|row| row.effect == UNNAMED),
-                "size": length(size),
+                "size": short(size, &first.unit),
                 "share": format!("{} of {}", first.robots, first.of_robots),
                 "height": (100.0 * share).round(),
                 "strong": (20.0 + 50.0 * strong.min(1.0)).round(),
@@ -155,7 +160,7 @@ fn group(name: &str, findings: &[&FleetFindingRow], cells: &FleetCells) -> Value
             .filter(|cell| cell.cell == row.cell && cell.group == row.group)
             .filter(|cell| cell.deviation.is_some())
             .collect();
-        json!({ "title": words(&row.effect, &row.place), "svg": strip(&own, row.size_mm) })
+        json!({ "title": words(&row.effect, &row.place), "svg": strip(&own, row) })
     });
     json!({
         "name": visible(name),
@@ -170,7 +175,8 @@ fn group(name: &str, findings: &[&FleetFindingRow], cells: &FleetCells) -> Value
 const WIDTH: [f64; 2] = [760.0, 110.0];
 
 /// Every robot's size with its standard deviation, a lane for each plant.
-fn strip(robots: &[&FleetCellRow], usual: f64) -> String {
+fn strip(robots: &[&FleetCellRow], finding: &FleetFindingRow) -> String {
+    let usual = finding.size;
     let mut lanes: BTreeMap<&str, Vec<&FleetCellRow>> = BTreeMap::new();
     for robot in robots {
         lanes
@@ -180,7 +186,7 @@ fn strip(robots: &[&FleetCellRow], usual: f64) -> String {
     }
     let largest = robots
         .iter()
-        .map(|robot| robot.size_mm + robot.sigma_mm)
+        .map(|robot| robot.size + robot.sigma)
         .fold(usual, f64::max);
     let at = |mm: f64| WIDTH[1] + (WIDTH[0] - WIDTH[1] - 20.0) * mm.max(0.0) / largest.max(1e-9);
     let high = |count: usize| (3.0 * count as f64).clamp(26.0, 150.0);
@@ -193,18 +199,18 @@ fn strip(robots: &[&FleetCellRow], usual: f64) -> String {
     let mut svg = Svg::new(&locale, WIDTH[0], height);
     let mut top = 2.0;
     for (name, mut lane) in lanes {
-        lane.sort_by(|a, b| a.size_mm.total_cmp(&b.size_mm));
+        lane.sort_by(|a, b| a.size.total_cmp(&b.size));
         let (space, count) = (high(lane.len()), lane.len() as f64);
         svg.text("lane", [2.0, top + 0.5 * space + 4.0], &visible(name));
         for (k, robot) in lane.iter().enumerate() {
             let y = top + space * (k as f64 + 0.5) / count;
             let is_off =
                 robot.deviation.is_some_and(|by| by.abs() > OFF) || robot.probability < 0.2;
-            let [from, to] = [-1.0, 1.0].map(|sign| at(robot.size_mm + sign * robot.sigma_mm));
+            let [from, to] = [-1.0, 1.0].map(|sign| at(robot.size + sign * robot.sigma));
             svg.line("sigma", [from, y], [to, y]);
             svg.circle(
                 if is_off { "off" } else { "robot" },
-                [at(robot.size_mm), y],
+                [at(robot.size), y],
                 if is_off { 3.2 } else { 2.0 },
             );
         }
@@ -213,8 +219,15 @@ fn strip(robots: &[&FleetCellRow], usual: f64) -> String {
     svg.line("usual", [at(usual), 0.0], [at(usual), top]);
     svg.line("axis", [at(0.0), top], [at(largest), top]);
     svg.text("first", [at(0.0), top + 16.0], "0");
-    svg.text("end", [at(largest), top + 16.0], &length(largest));
-    svg.finish(&format!("Size of every robot, {} as a rule", length(usual)))
+    svg.text(
+        "end",
+        [at(largest), top + 16.0],
+        &short(largest, &finding.unit),
+    );
+    svg.finish(&format!(
+        "Size of every robot, {} as a rule",
+        short(usual, &finding.unit)
+    ))
 }
 
 /// A row for each robot with its size of every shared cause.
@@ -247,7 +260,7 @@ fn robots(shared: &[&FleetFindingRow], cells: &FleetCells) -> Vec<Value> {
         let robot = by
             .entry(&cell.robot)
             .or_insert_with(|| (vec![Value::Null; shared.len()], 0.0, label()));
-        robot.0[*k] = json!({ "value": cell.size_mm, "shown": format!("{:.3} \u{b1} {:.3}", cell.size_mm, cell.sigma_mm) });
+        robot.0[*k] = json!({ "value": cell.size, "shown": format!("{:.3} \u{b1} {:.3}", cell.size, cell.sigma) });
         let off = cell.deviation.unwrap_or(0.0);
         if off.abs() > robot.1.abs() {
             robot.1 = off;

@@ -1,9 +1,13 @@
 //! `cell_evidence`: what every cell of the table of causes says of a robot given cells that its fleet has accepted. `calib fleet diagnose` puts
-//! it in the place of a stage `diagnose`, with that stage's settings.
+//! it in the place of a stage `diagnose`, with that stage's settings; `torque_evidence` in that of a stage `diagnose_torques`.
 
 use crate::diagnose::{CellAnswer, GivenCell, cell_evidence};
+use crate::dynamics;
 use crate::error::{Error, Place, Result};
-use crate::stage::{AskedRows, Context, Diagnose, DiagnoseReads, RawFile, Stage};
+use crate::stage::{
+    AskedRows, Context, Diagnose, DiagnoseReads, DiagnoseTorques, DiagnoseTorquesReads, RawFile,
+    Stage,
+};
 use crate::table::{CellEvidence as CellEvidenceTable, CellEvidenceRow};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,12 +32,12 @@ pub struct Given {
     /// Key of the shape that all robots share; the robot's likeliest if none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) shape: Option<String>,
-    /// Rms motion at the tool that is expected of it, mm.
-    pub(crate) size_mm: f64,
+    /// Rms motion at the tool that is expected of it, mm, or rms torque, Nm.
+    pub(crate) size: f64,
 }
 
 crate::stage::stage! {
-    CellEvidence, "cell_evidence", 4, "says what every possible cause explains of one robot, for the sum over a fleet",
+    CellEvidence, "cell_evidence", 5, "says what every possible cause explains of one robot, for the sum over a fleet",
         DiagnoseReads -> CellEvidenceWrites {
             cell_evidence: CellEvidenceTable,
         }
@@ -42,12 +46,7 @@ crate::stage::stage! {
 impl Stage for CellEvidence {
     fn faults(&self, at: &mut Place) {
         self.diagnose.faults(&mut at.at("diagnose"));
-        for (k, given) in self.given.iter().enumerate() {
-            at.at(format!("given[{k}].size_mm")).must(
-                given.size_mm > 0.0 && given.size_mm < 1e3,
-                "expected a length above 0 and below 1000 mm",
-            );
-        }
+        must_have_sizes(&self.given, at);
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
@@ -66,24 +65,69 @@ impl Stage for CellEvidence {
     fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<CellEvidenceWrites> {
         let asked = AskedRows::of(&self.diagnose, &reads, context)?;
         let question = asked.question(&self.diagnose, context.seed);
-        let given: Vec<GivenCell> = self
-            .given
-            .iter()
-            .map(|given| GivenCell {
-                cell: given.cell.clone(),
-                shape: given.shape.clone(),
-                size: 1e-3 * given.size_mm,
-            })
-            .collect();
-        let answers = cell_evidence(&question, &given)
+        let answers = cell_evidence(&question, &cells(&self.given, 1e-3))
             .map_err(|message| Error::data("table recording", message))?;
         Ok(CellEvidenceWrites {
-            cell_evidence: table(answers),
+            cell_evidence: table(answers, ("mm", 1e3)),
         })
     }
 }
 
-fn table(answers: Vec<CellAnswer>) -> CellEvidenceTable {
+/// Settings of `torque_evidence`.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TorqueEvidence {
+    /// Settings as of a stage `diagnose_torques`.
+    pub(crate) diagnose: DiagnoseTorques,
+    /// Cells that are taken to be in the robot.
+    #[serde(default)]
+    pub(crate) given: Vec<Given>,
+}
+
+crate::stage::stage! {
+    TorqueEvidence, "torque_evidence", 1, "says what every possible cause explains of the torques of one robot, for the sum over a fleet",
+        DiagnoseTorquesReads -> TorqueEvidenceWrites {
+            cell_evidence: CellEvidenceTable,
+        }
+}
+
+impl Stage for TorqueEvidence {
+    fn faults(&self, at: &mut Place) {
+        self.diagnose.faults(&mut at.at("diagnose"));
+        must_have_sizes(&self.given, at);
+    }
+
+    fn run(&self, reads: DiagnoseTorquesReads, context: &Context) -> Result<TorqueEvidenceWrites> {
+        let (arm, recording, question) = self.diagnose.asked(&reads, context)?;
+        let given = cells(&self.given, 1.0);
+        let tell = &mut |line| context.note(line);
+        let answers = dynamics::cell_evidence(&arm, &recording, &question, &given, tell)?;
+        Ok(TorqueEvidenceWrites {
+            cell_evidence: table(answers, ("Nm", 1.0)),
+        })
+    }
+}
+
+fn must_have_sizes(given: &[Given], at: &mut Place) {
+    for (k, given) in given.iter().enumerate() {
+        at.at(format!("given[{k}].size")).must(
+            given.size > 0.0 && given.size < 1e6,
+            "expected a size above 0 and below 1e6",
+        );
+    }
+}
+
+/// Given cells with their sizes in SI.
+fn cells(given: &[Given], unit: f64) -> Vec<GivenCell> {
+    let cell = |given: &Given| GivenCell {
+        cell: given.cell.clone(),
+        shape: given.shape.clone(),
+        size: unit * given.size,
+    };
+    given.iter().map(cell).collect()
+}
+
+fn table(answers: Vec<CellAnswer>, (unit, per_si): (&str, f64)) -> CellEvidenceTable {
     // So many digits decide nothing, and they would fill the store.
     let rounded = |value: f64| (1e3 * value).round() / 1e3;
     let row = |answer: CellAnswer| CellEvidenceRow {
@@ -95,8 +139,11 @@ fn table(answers: Vec<CellAnswer>) -> CellEvidenceTable {
         follows: answer.follows.into(),
         log_evidence: rounded(answer.log),
         log_prior: rounded(answer.log_prior),
-        size_mm: rounded(1e6 * answer.size) / 1e3,
-        sigma_mm: answer.sigma.map(|sigma| rounded(1e6 * sigma) / 1e3),
+        size: rounded(1e3 * per_si * answer.size) / 1e3,
+        sigma: answer
+            .sigma
+            .map(|sigma| rounded(1e3 * per_si * sigma) / 1e3),
+        unit: unit.into(),
     };
     let mut rows: Vec<CellEvidenceRow> = answers
         .into_iter()

@@ -1,6 +1,6 @@
 //! `diagnose_torques`: which physics the rigid inverse dynamics of the robot file lacks while the arm moves.
 
-use crate::dynamics::{TorqueQuestion, TorqueSource, diagnose};
+use crate::dynamics::{DynamicArm, TorqueQuestion, TorqueSource, diagnose};
 use crate::error::{Error, Place, Result, counted};
 use crate::stage::dynamic_arm::{HeldOut, RecordedTorques, dynamic_arm, must_be_bodies};
 use crate::stage::{Chunks, Context, Stage};
@@ -128,6 +128,39 @@ impl Stage for DiagnoseTorques {
     }
 
     fn run(&self, reads: DiagnoseTorquesReads, context: &Context) -> Result<DiagnoseTorquesWrites> {
+        let (arm, recording, question) = self.asked(&reads, context)?;
+        let diagnosis = diagnose(&arm, &recording, &question, &mut |line| context.note(line))?;
+        diagnosis
+            .remarks
+            .iter()
+            .for_each(|remark| context.note(remark.clone()));
+        let sequence = sequences(&reads.motion, &diagnosis.courses.row)?;
+        Ok(DiagnoseTorquesWrites {
+            verdict: TorqueVerdict::of(context.id, &diagnosis, recording.is_current()),
+            sentences: VerdictSentences::of_torques(context.id, &diagnosis),
+            findings: TorqueFindings::of(&diagnosis),
+            numbers: TorqueNumbers::of(&diagnosis),
+            rivals: TorqueRivals::of(&diagnosis),
+            joints: JointTorques::of(&diagnosis),
+            course: TorqueCourse::of(&diagnosis, recording.joints(), &sequence),
+            friction: FrictionCurves::of(&diagnosis),
+            inertials: Inertials::of(&diagnosis),
+            contacts: Contacts::of(&diagnosis),
+            consistency: BodyConsistencies::of(&diagnosis),
+            parameters: TorqueParameters::of(&diagnosis.model)?
+                .of_robot(&reads.robot.to_description()?),
+            covariance: TorqueCovariance::of(&diagnosis.model)?,
+        })
+    }
+}
+
+impl DiagnoseTorques {
+    /// The arm, its recording, and what is asked of it.
+    pub(super) fn asked<'r>(
+        &'r self,
+        reads: &'r DiagnoseTorquesReads,
+        context: &Context,
+    ) -> Result<(DynamicArm, RecordedTorques<'r>, TorqueQuestion)> {
         let robot = reads.robot.to_description()?;
         must_be_bodies(&robot)?;
         let (mut arm, notes) = dynamic_arm(&robot)?;
@@ -149,27 +182,7 @@ impl Stage for DiagnoseTorques {
             without: self.without.clone(),
             enforce_bodies,
         };
-        let diagnosis = diagnose(&arm, &recording, &question, &mut |line| context.note(line))?;
-        diagnosis
-            .remarks
-            .iter()
-            .for_each(|remark| context.note(remark.clone()));
-        let sequence = sequences(&reads.motion, &diagnosis.courses.row)?;
-        Ok(DiagnoseTorquesWrites {
-            verdict: TorqueVerdict::of(context.id, &diagnosis, recording.is_current()),
-            sentences: VerdictSentences::of_torques(context.id, &diagnosis),
-            findings: TorqueFindings::of(&diagnosis),
-            numbers: TorqueNumbers::of(&diagnosis),
-            rivals: TorqueRivals::of(&diagnosis),
-            joints: JointTorques::of(&diagnosis),
-            course: TorqueCourse::of(&diagnosis, recording.joints(), &sequence),
-            friction: FrictionCurves::of(&diagnosis),
-            inertials: Inertials::of(&diagnosis),
-            contacts: Contacts::of(&diagnosis),
-            consistency: BodyConsistencies::of(&diagnosis),
-            parameters: TorqueParameters::of(&diagnosis.model)?.of_robot(&robot),
-            covariance: TorqueCovariance::of(&diagnosis.model)?,
-        })
+        Ok((arm, recording, question))
     }
 }
 

@@ -30,7 +30,9 @@ mod stiffness;
 mod transfer;
 mod validate;
 
-pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given};
+pub use cell_evidence::{
+    CellEvidence, CellEvidenceWrites, Given, TorqueEvidence, TorqueEvidenceWrites,
+};
 pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};
 use diagnose::AskedRows;
@@ -237,6 +239,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<CellEvidence>(),
     StageEntry::of::<ingest::IngestTorques>(),
     StageEntry::of::<DiagnoseTorques>(),
+    StageEntry::of::<TorqueEvidence>(),
     StageEntry::of::<Masses>(),
     StageEntry::of::<CompareTorques>(),
     StageEntry::of::<ReportTorques>(),

@@ -3,6 +3,7 @@
 
     python3 tests/reference/fleet_causes.py OUT --calib target/debug/calib [--fleets 10] [--robots 20] [--points 100] [--nulls 10] [--seed N]
     ... --mujoco medium6      arms of mujoco_maker.py instead of twins (needs mujoco and numpy)
+    ... --torques seven7r     torques of moving arms: recordings of `simulate conceal --dynamics`, to which a ripple of a joint is added
     ... --short 30            of each fleet 20 further robots with so few points, diagnosed with and without what the fleet says
     ... --size 2000           one fleet of so many robots: CPU time and memory, killed and resumed
 
@@ -93,12 +94,48 @@ class Arms:
         return [str(case.resolve())]
 
 
+class Torques:
+    """Torques of moving arms of one model, with friction of their own, as `simulate conceal --dynamics` makes them; a gear's ripple is added."""
+
+    diagnosis = "diagnose_torques"
+    causes = [("torque_ripple", "joint", lambda j, a, r: dict(joint=j, order=2 + j % 3, amplitude=a, phase=r.uniform(0, 2 * math.pi)), 0.3)]
+
+    def __init__(self, args):
+        text = open(os.path.join(ROOT, "pipelines/dynamics/pipeline.yaml")).read()
+        before, after = text.index("stages:\n") + len("stages:\n"), text.index("  # What the simulated torques lack")
+        self.stages, self.header, self.calib, self.arm, self.made = text[before:after], "set.case", args.calib, args.torques, []
+
+    def more(self, folder, r):
+        """Further recordings of the arm without a concealed effect; half of them have friction of all joints."""
+        seed = r.randrange(1 << 30)
+        out = pathlib.Path(folder, f"concealed{seed}")
+        subprocess.run([self.calib, "simulate", "conceal", "--dynamics", "--nulls", "1", "--cases", "40", "--seed", str(seed), "--out", out],
+                       check=True, capture_output=True)
+        self.made += [case for case in sorted(out.glob("recordings/*")) if json.load(open(case / "robot.json"))["name"] == self.arm]
+
+    def robot(self, folder, name, points, own, r):
+        while not self.made:
+            self.more(folder, r)
+        case, new = self.made.pop(), pathlib.Path(folder, "cases", name)
+        shutil.rmtree(new, ignore_errors=True)
+        shutil.copytree(case, new)
+        lines = [line.split(",") for line in open(case / "recording.csv").read().splitlines()]
+        for effect in own:
+            j = effect["joint"]
+            q, tau = (lines[0].index(column) for column in (f"q{j}_deg", f"tau{j}_nm"))
+            for row in lines[1:]:
+                row[tau] = f"{float(row[tau]) + effect['amplitude'] * math.cos(effect['order'] * math.radians(float(row[q])) + effect['phase']):.4f}"
+        with open(new / "recording.csv", "w") as file:
+            file.write("\n".join(",".join(row) for row in lines) + "\n")
+        return [str(new.resolve())]
+
+
 def fleet(folder, name, effects, world, r, points, prior=""):
     """A fleet whose robot k has effects[k]."""
     os.makedirs(folder, exist_ok=True)
     variables = "variables: {case: none}\n" if world.header == "set.case" else ""
     with open(os.path.join(folder, f"{name}.pipeline.yaml"), "w") as file:
-        file.write(f"calib: 1\nname: {name}\nseed: 5\n{variables}stages:\n{world.stages.replace('POINTS', str(points))}  - uses: diagnose\n")
+        file.write(f"calib: 1\nname: {name}\nseed: 5\n{variables}stages:\n{world.stages.replace('POINTS', str(points))}  - uses: {getattr(world, 'diagnosis', 'diagnose')}\n")
     lines = ["robot,model,plant," + world.header.replace("set.case", "folder")]
     for k, own in enumerate(effects):
         quoted = ",".join('"' + cell.replace('"', '""') + '"' for cell in world.robot(folder, f"{name}-{k:05}", points, own, r))
@@ -232,6 +269,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--robot-file", default=None)
     parser.add_argument("--mujoco", default=None)
+    parser.add_argument("--torques", default=None)
     parser.add_argument("--short", type=int, default=0)
     parser.add_argument("--size", type=int, default=0)
     parser.add_argument("--strength", type=float, default=None, help="of the cause of a large fleet, without a search for it")
@@ -241,7 +279,7 @@ def main():
     print(f"seed {seed}", flush=True)
     r = random.Random(seed)
     os.makedirs(args.out, exist_ok=True)
-    world = Arms(args) if args.mujoco else Twins(args)
+    world = Arms(args) if args.mujoco else Torques(args) if args.torques else Twins(args)
     if args.size:
         return size(world, args, r)
     score = {"named": 0, "one of two": 0, "other": 0, "lacking listed": 0, "others listed": 0, "single": 0, "robots": 0}

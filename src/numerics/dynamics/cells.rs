@@ -17,12 +17,12 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// A cause at a place in every shape that is listed of it.
-struct TorqueCell {
-    name: &'static str,
-    place: Place,
-    log_prior: f64,
+pub(super) struct TorqueCell {
+    pub(super) name: &'static str,
+    pub(super) place: Place,
+    pub(super) log_prior: f64,
     /// Numbers of its forms.
-    forms: Vec<usize>,
+    pub(super) forms: Vec<usize>,
 }
 
 /// A form in the covariance.
@@ -37,18 +37,18 @@ pub(super) struct TorqueComponent {
 pub(super) struct CellPosterior {
     /// ln of its posterior odds.
     pub(super) log_odds: f64,
-    best: TorqueComponent,
+    pub(super) best: TorqueComponent,
 }
 
 /// A form's columns at unit amplitude, the base swept out: with each other, and with the measured torque.
-type FormProducts = (DMatrix<f64>, DVector<f64>);
+pub(super) type FormProducts = (DMatrix<f64>, DVector<f64>);
 
 /// Whether a form is of a kind.
 type FormKind = fn(&TorqueForm) -> bool;
 
 /// Components in the covariance.
 pub(super) struct TorqueState {
-    known: KnownState,
+    pub(super) known: KnownState,
     /// Their columns and the roots of their prior variances.
     pub(super) columns: Vec<(usize, f64)>,
     set: Vec<usize>,
@@ -56,11 +56,11 @@ pub(super) struct TorqueState {
 
 /// All cells of a problem.
 pub(super) struct TorqueTable<'a, 'b> {
-    choice: &'b CauseChoice<'a>,
-    cells: Vec<TorqueCell>,
-    cell_of: BTreeMap<usize, usize>,
+    pub(super) choice: &'b CauseChoice<'a>,
+    pub(super) cells: Vec<TorqueCell>,
+    pub(super) cell_of: BTreeMap<usize, usize>,
     rows: EvidenceRows,
-    forms: Vec<FormProducts>,
+    pub(super) forms: Vec<FormProducts>,
     /// Coefficient of each column at unit amplitude.
     unit: Vec<f64>,
     /// Forms that do not leave.
@@ -221,7 +221,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// A form's products seen through the covariance.
-    fn seen(&self, number: usize, state: &TorqueState) -> FormProducts {
+    pub(super) fn seen(&self, number: usize, state: &TorqueState) -> FormProducts {
         let own: Vec<usize> = self.choice.problem.all.of(number).collect();
         let left: Vec<Rc<Vec<f64>>> = state
             .columns
@@ -237,7 +237,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// ln of the evidence of a form given a state, and its amplitude; none of one that is impossible.
-    fn form(&self, number: usize, state: &TorqueState) -> Option<(f64, f64)> {
+    pub(super) fn form(&self, number: usize, state: &TorqueState) -> Option<(f64, f64)> {
         let (gram, along) = self.seen(number, state);
         let columns: Vec<usize> = self.choice.problem.all.of(number).collect();
         let shares = vec![1.0 / columns.len() as f64; columns.len()];
@@ -263,38 +263,33 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// ln of the number of shapes of a cell that may be chosen.
-    fn log_count(&self, cell: usize) -> f64 {
+    pub(super) fn log_count(&self, cell: usize) -> f64 {
         let forms = self.cells[cell].forms.iter();
         let open = forms.filter(|form| **form < self.choice.open).count();
         (open.max(1) as f64).ln()
     }
 
+    /// ln of the evidence of every shape of a cell that may join a state.
+    pub(super) fn shapes(&self, cell: usize, state: &TorqueState) -> Vec<(f64, TorqueComponent)> {
+        let shape = |form: usize| {
+            let (log, amplitude) = self.form(form, state)?;
+            Some((log, TorqueComponent { form, amplitude }))
+        };
+        let forms = self.cells[cell].forms.iter().copied();
+        forms
+            .filter(|form| *form < self.choice.open && self.choice.may_join(*form, &state.set))
+            .filter_map(shape)
+            .collect()
+    }
+
     /// The posterior of a cell given a state.
-    fn cell(&self, cell: usize, state: &TorqueState) -> Option<CellPosterior> {
-        let own = &self.cells[cell];
-        let open = self.choice.open;
-        let asked = own
-            .forms
-            .iter()
-            .filter(|form| **form < open && self.choice.may_join(**form, &state.set));
-        let all: Vec<(f64, TorqueComponent)> = asked
-            .filter_map(|form| {
-                self.form(*form, state).map(|(log, amplitude)| {
-                    (
-                        log,
-                        TorqueComponent {
-                            form: *form,
-                            amplitude,
-                        },
-                    )
-                })
-            })
-            .collect();
+    pub(super) fn cell(&self, cell: usize, state: &TorqueState) -> Option<CellPosterior> {
+        let all = self.shapes(cell, state);
         let best = all.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
         let log =
             log_sum(&all.iter().map(|(log, _)| *log).collect::<Vec<_>>()) - self.log_count(cell);
         Some(CellPosterior {
-            log_odds: own.log_prior + log,
+            log_odds: self.cells[cell].log_prior + log,
             best: best.1,
         })
     }
@@ -570,7 +565,7 @@ pub(super) fn forms(components: &[TorqueComponent]) -> Vec<usize> {
     components.iter().map(|component| component.form).collect()
 }
 
-fn without(components: &[TorqueComponent], place: usize) -> Vec<TorqueComponent> {
+pub(super) fn without(components: &[TorqueComponent], place: usize) -> Vec<TorqueComponent> {
     components
         .iter()
         .enumerate()

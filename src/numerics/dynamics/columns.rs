@@ -170,17 +170,22 @@ impl TorqueColumns {
 
     /// Rms of a column over half the range of the torque, over the joints that it acts on.
     pub(crate) fn size(&self, column: usize) -> f64 {
+        let range = |joint: usize| self.torque.get(joint).copied().unwrap_or(1.0);
+        self.rms(column, |joint| range(joint).max(f64::MIN_POSITIVE))
+    }
+
+    /// Rms of a column, Nm per unit of its coefficient, over the joints that it acts on.
+    pub(crate) fn newton_metres(&self, column: usize) -> f64 {
+        self.rms(column, |_| 1.0)
+    }
+
+    fn rms(&self, column: usize, unit: impl Fn(usize) -> f64) -> f64 {
         let own = &self.columns[column];
         let of = |(joint, course): (&usize, &Vec<f64>)| {
-            let range = self
-                .torque
-                .get(*joint)
-                .copied()
-                .unwrap_or(1.0)
-                .max(f64::MIN_POSITIVE);
+            let unit = unit(*joint);
             course
                 .iter()
-                .map(|value| (value / range).powi(2))
+                .map(|value| (value / unit).powi(2))
                 .sum::<f64>()
                 / course.len().max(1) as f64
         };

@@ -31,6 +31,7 @@ mod feed_forward;
 mod filter;
 mod findings;
 mod friction_curve;
+mod given;
 mod judge;
 mod latency;
 mod masses;
@@ -65,6 +66,7 @@ pub use types::{
 };
 
 use crate::error::{Error, Result};
+pub use diagnose::{CellAnswer, GivenCell};
 use used::UsedRecording;
 
 /// What torques that come late are called.
@@ -96,18 +98,45 @@ pub fn diagnose(
     )
 }
 
+/// What every cell of the table of torques says of a recording given some of them, for the sum over a fleet; sizes in Nm.
+///
+/// # Errors
+/// As of [`diagnose()`].
+pub fn cell_evidence(
+    arm: &DynamicArm,
+    recording: &dyn TorqueSource,
+    question: &TorqueQuestion,
+    given: &[GivenCell],
+    tell: &mut dyn FnMut(String),
+) -> Result<Vec<CellAnswer>> {
+    let used = UsedRecording::of(arm, recording, question.cutoff)?;
+    let mut solved = solved(arm, used.recording, &used.clock, question, tell)?;
+    Ok(given::answers(&mut solved, given))
+}
+
 fn diagnose_used(
     arm: &DynamicArm,
     used: UsedRecording,
     question: &TorqueQuestion,
     tell: &mut dyn FnMut(String),
 ) -> Result<TorqueDiagnosis> {
-    let UsedRecording {
-        recording,
-        clock,
-        origin,
-        remarks,
-    } = used;
+    let solved = solved(arm, used.recording, &used.clock, question, tell)?;
+    let mut diagnosis = outcome::outcome(&solved, question, used.remarks);
+    diagnosis
+        .courses
+        .row
+        .iter_mut()
+        .for_each(|row| *row = used.origin[*row]);
+    Ok(diagnosis)
+}
+
+fn solved<'a>(
+    arm: &'a DynamicArm,
+    recording: TorqueRecording,
+    clock: &clock::RecordingClock,
+    question: &TorqueQuestion,
+    tell: &mut dyn FnMut(String),
+) -> Result<solve::SolvedTorques<'a>> {
     if clock
         .stretches
         .iter()
@@ -122,14 +151,7 @@ fn diagnose_used(
     }
     let cutoff = question
         .cutoff
-        .unwrap_or_else(|| clock::cutoff(&recording, &clock))
+        .unwrap_or_else(|| clock::cutoff(&recording, clock))
         .min(HIGHEST_CUTOFF * clock.rate);
-    let solved = solve::solve(arm, recording, question, &clock, cutoff, tell);
-    let mut diagnosis = outcome::outcome(&solved, question, remarks);
-    diagnosis
-        .courses
-        .row
-        .iter_mut()
-        .for_each(|row| *row = origin[*row]);
-    Ok(diagnosis)
+    Ok(solve::solve(arm, recording, question, clock, cutoff, tell))
 }

@@ -153,8 +153,9 @@ fn size(robot: usize) -> FleetCellRow {
         place: "joint 3".into(),
         log_evidence: 5.0,
         probability: 1.0,
-        size_mm: 0.03 + 0.003 * deviation,
-        sigma_mm: 0.003,
+        size: 0.03 + 0.003 * deviation,
+        sigma: 0.003,
+        unit: "mm".into(),
         deviation: Some(deviation),
     }
 }
@@ -174,8 +175,9 @@ fn the_page_of_two_thousand_robots_is_small_and_the_furthest_robot_comes_first()
         log_odds: 900.0,
         probability: 0.97,
         rival: None,
-        size_mm: 0.03,
-        spread_mm: Some(0.002),
+        size: 0.03,
+        spread: Some(0.002),
+        unit: "mm".into(),
         trend: None,
         decided: Some(true),
         statement: "backlash at joint 3 in 1500 of 2000 robots".into(),

@@ -23,7 +23,7 @@ pub struct GivenCell {
     pub cell: String,
     /// Key of its shape (an order, a knee), where all robots share it; else the robot's likeliest.
     pub shape: Option<String>,
-    /// Rms motion at the tool that is expected of it, m.
+    /// Rms motion at the tool that is expected of it, m; of a torque Nm.
     pub size: f64,
 }
 
@@ -46,9 +46,9 @@ pub struct CellAnswer {
     pub log: f64,
     /// ln of its prior odds; of a shape ln of its weight within its cell.
     pub log_prior: f64,
-    /// Rms motion at the tool, m: the likeliest amplitude, of a given cell its estimate.
+    /// Rms motion at the tool, m, or torque, Nm: the likeliest amplitude, of a given cell its estimate.
     pub size: f64,
-    /// One standard deviation of the size of a given cell, m.
+    /// One standard deviation of the size of a given cell, in its unit.
     pub sigma: Option<f64>,
 }
 
@@ -303,29 +303,38 @@ impl CauseTable<'_, '_> {
         let whole = product(matrix(&own.values), matrix(&own.values));
         let along = self.frame.along(matrix(&own.values));
         let (gram, gradient) = state.see((&whole, &along), &across, 0);
-        let prior: Vec<f64> = own
-            .shape
-            .shares
-            .iter()
+        let prior = own.shape.shares.iter();
+        let prior: Vec<f64> = prior
             .map(|share| own.amplitude * own.amplitude * share)
             .collect();
-        let seen: Vec<usize> = (0..prior.len()).filter(|k| prior[*k] > 0.0).collect();
-        let pick = |matrix: &DMatrix<f64>| {
-            DMatrix::from_fn(seen.len(), seen.len(), |i, j| matrix[(seen[i], seen[j])])
-        };
-        let mut precision = pick(&gram);
-        (0..seen.len()).for_each(|i| precision[(i, i)] += 1.0 / prior[seen[i]]);
-        let covariance = precision.cholesky()?.inverse();
-        let values = &covariance * DVector::from_fn(seen.len(), |i, _| gradient[seen[i]]);
-        // Motion of unit columns together, by how alike they are.
-        let length = |k: usize| whole[(k, k)].sqrt().max(f64::MIN_POSITIVE);
-        let alike = DMatrix::from_fn(seen.len(), seen.len(), |i, j| {
-            whole[(seen[i], seen[j])] / length(seen[i]) / length(seen[j])
-        });
-        let square = (values.transpose() * &alike * &values)[0].max(f64::MIN_POSITIVE);
-        let by = &alike * &values;
-        let variance = (by.transpose() * &covariance * &by)[0] / square;
-        let noise = (&alike * &covariance).trace() - variance;
-        Some(((square - noise.max(0.0)).max(0.0).sqrt(), variance.sqrt()))
+        rms_size(&gram, &gradient, &whole, &prior)
     }
+}
+
+/// Rms of what some columns do together and the standard deviation of that, what noise adds to the square taken off; by their products seen
+/// through the rest of a model, with each other alone, and their variances beforehand.
+pub fn rms_size(
+    gram: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    whole: &DMatrix<f64>,
+    prior: &[f64],
+) -> Option<(f64, f64)> {
+    let seen: Vec<usize> = (0..prior.len()).filter(|k| prior[*k] > 0.0).collect();
+    let pick = |matrix: &DMatrix<f64>| {
+        DMatrix::from_fn(seen.len(), seen.len(), |i, j| matrix[(seen[i], seen[j])])
+    };
+    let mut precision = pick(gram);
+    (0..seen.len()).for_each(|i| precision[(i, i)] += 1.0 / prior[seen[i]]);
+    let covariance = precision.cholesky()?.inverse();
+    let values = &covariance * DVector::from_fn(seen.len(), |i, _| gradient[seen[i]]);
+    // What unit columns do together, by how alike they are.
+    let length = |k: usize| whole[(k, k)].sqrt().max(f64::MIN_POSITIVE);
+    let alike = DMatrix::from_fn(seen.len(), seen.len(), |i, j| {
+        whole[(seen[i], seen[j])] / length(seen[i]) / length(seen[j])
+    });
+    let square = (values.transpose() * &alike * &values)[0].max(f64::MIN_POSITIVE);
+    let by = &alike * &values;
+    let variance = (by.transpose() * &covariance * &by)[0] / square;
+    let noise = (&alike * &covariance).trace() - variance;
+    Some(((square - noise.max(0.0)).max(0.0).sqrt(), variance.sqrt()))
 }

@@ -9,13 +9,14 @@ use crate::criteria::words::FIRM;
 use crate::diagnose::table::{Answer, FoundCell};
 use crate::effect::{
     Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Survey, Variable,
-    moved_with_the_payload, names, people, turned_holder,
+    figure, moved_with_the_payload, names, people, turned_holder,
 };
 use crate::estimate::{ErrorScale, Model, ParameterStatus, tail};
 use crate::observation::Dimension;
 use crate::round::{FitState, RoundView};
 use crate::types::{Evidence, Finding, RivalCause};
 use crate::verdict::not_observable::{faults, rows_apart};
+use crate::verdict::windup::turns_back;
 use crate::words::{left_out, not_so, sentence, small, with_size};
 
 /// The causes of the last round as findings, strongest first; whether they leave more than noise `at_fitted_rows` or anywhere.
@@ -195,6 +196,12 @@ fn modelled(last: &LastRound, called: &'static str, forms: &[Form]) -> Option<Mo
 /// Why causes cannot be what they are called: a number that the fit of the whole model puts beyond what physics allows, or beyond what the
 /// recording holds.
 fn impossible(last: &LastRound, found: &FoundCell) -> Option<String> {
+    if let Some(loads) = turns_back(last, found) {
+        let [from, to] = loads.map(|load| figure(load, 0));
+        return Some(format!(
+            "no joint turns back as its load grows from {from} to {to} Nm"
+        ));
+    }
     let state = &last.state;
     found
         .members

@@ -3,6 +3,7 @@
 mod conclude;
 mod findings;
 mod not_observable;
+mod windup;
 
 pub(crate) use conclude::conclude;
 pub(crate) use findings::LastRound;

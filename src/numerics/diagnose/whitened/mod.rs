@@ -240,6 +240,11 @@ impl<'a> WhitenedProblem<'a> {
         out
     }
 
+    /// How each row's point moves.
+    pub(crate) fn motions(&self) -> &[PointMotion] {
+        &self.motions
+    }
+
     /// The same whether noise is correlated or not: whitened motions of the points per unit of each parameter.
     pub(crate) fn motions_by(&self, form: &Form) -> Vec<f64> {
         match self.travel(form) {

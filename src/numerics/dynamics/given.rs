@@ -1,0 +1,207 @@
+//! What every cell of torques says of one robot given cells that its fleet has accepted: the numbers that a fleet sums.
+//!
+//! Causes that a robot shows by itself stay in its model; what they are worth is the evidence of each given all others.
+
+use super::cause::{TorqueForm, UNKNOWN};
+use super::cells::{TorqueCell, TorqueComponent, TorqueState, TorqueTable, without};
+use super::choice::CauseChoice;
+use super::solve::SolvedTorques;
+use crate::criteria::torque::PER_METRE;
+use crate::diagnose::table::{ComponentSearch, log_sum, rms_size};
+use crate::diagnose::{CellAnswer, GivenCell};
+use std::collections::BTreeMap;
+
+/// What all cells say given some, and what each of those says and its rivals say in its place; sizes in Nm.
+pub(super) fn answers(solved: &mut SolvedTorques, given: &[GivenCell]) -> Vec<CellAnswer> {
+    // What the rows of one robot do not confirm, those of all may.
+    solved.problem.barred.clear();
+    let choice = CauseChoice::new(&solved.problem, &solved.weighted);
+    let mut table = TorqueTable::new(&choice);
+    let components = table.components(&solved.judged.set);
+    let components = table.with_given(components, given);
+    let (state, mut out) = (table.state(&components, None), Vec::new());
+    let kappa = state.known.kappa;
+    let taken: Vec<usize> = components
+        .iter()
+        .map(|own| table.cell_of[&own.form])
+        .collect();
+    let open = || (0..table.cells.len()).filter(|cell| !taken.contains(cell));
+    for cell in open() {
+        out.extend(table.answer(cell, &state, None));
+    }
+    for (place, own) in components.iter().enumerate() {
+        let state = table.state(&without(&components, place), Some(kappa));
+        let key = table.key(taken[place]);
+        let left_out = table.kept.contains(&own.form).then_some(key.as_str());
+        let mut shapes = table.answer(taken[place], &state, left_out);
+        shapes.retain(|answer| answer.shape.is_some());
+        out.extend(shapes);
+        out.extend(table.in_place(&components, place, (&state, kappa), left_out));
+        if left_out.is_some() {
+            let rivals =
+                open().filter(|cell| choice.compete(table.cells[*cell].forms[0], own.form));
+            for cell in rivals {
+                out.extend(table.answer(cell, &state, left_out));
+            }
+        }
+    }
+    out
+}
+
+impl TorqueTable<'_, '_> {
+    /// Key of a cell: its name and place, and of what has no name what it depends on.
+    fn key(&self, cell: usize) -> String {
+        let own = &self.cells[cell];
+        let form = self.choice.form(own.forms[0]);
+        let kind = form.cause.coefficients.first();
+        let kind = kind.filter(|_| own.name == UNKNOWN);
+        let kind = kind.map_or(String::new(), |(kind, _)| format!(":{kind}"));
+        let [one, two] = (form.cause.cell)(form);
+        let with = match [one, two] {
+            [0, 0] => String::new(),
+            _ => format!(":{},{}", one + 1, two + 1),
+        };
+        format!("{}@{}{kind}{with}", own.name, own.place)
+    }
+
+    /// Nm of a form's torque at unit amplitude.
+    fn newton_metres(&self, form: usize) -> f64 {
+        let all = &self.choice.problem.all;
+        let column = all.of(form).start;
+        *PER_METRE * all.newton_metres(column) / all.size(column).max(f64::MIN_POSITIVE)
+    }
+
+    /// Components with given cells, which do not leave, each in its likeliest shape; those that pay no longer leave.
+    fn with_given(
+        &mut self,
+        mut components: Vec<TorqueComponent>,
+        given: &[GivenCell],
+    ) -> Vec<TorqueComponent> {
+        for one in given {
+            let Some(cell) = (0..self.cells.len()).find(|cell| self.key(*cell) == one.cell) else {
+                continue;
+            };
+            let is_shape = |form: usize| {
+                let shape = one.shape.as_deref();
+                shape.is_none_or(|shape| shape_key(self.choice.form(form)) == shape)
+            };
+            let place = components
+                .iter()
+                .position(|own| self.cell_of[&own.form] == cell && is_shape(own.form));
+            let place = place.or_else(|| {
+                let state = self.state(&components, None);
+                let mut shapes = self.shapes(cell, &state);
+                shapes.retain(|(_, own)| is_shape(own.form));
+                let (_, own) = shapes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+                components.push(own);
+                Some(components.len() - 1)
+            });
+            if let Some(place) = place {
+                let form = components[place].form;
+                components[place].amplitude = one.size / self.newton_metres(form);
+                self.kept.push(form);
+            }
+        }
+        self.prune(components)
+    }
+
+    /// What a cell says given a state, and each of its shapes that robots may share.
+    fn answer(&self, cell: usize, state: &TorqueState, left_out: Option<&str>) -> Vec<CellAnswer> {
+        let Some(posterior) = self.cell(cell, state) else {
+            return Vec::new();
+        };
+        let own = &self.cells[cell];
+        let best = posterior.best;
+        let whole = CellAnswer {
+            left_out: left_out.map(Into::into),
+            cell: self.key(cell),
+            shape: None,
+            effect: own.name,
+            place: own.place,
+            follows: follows(self.choice.form(best.form)),
+            log: posterior.log_odds - own.log_prior,
+            log_prior: own.log_prior,
+            size: best.amplitude * self.newton_metres(best.form),
+            sigma: None,
+        };
+        // Forms of each shape, and ln of the evidence of those that may be.
+        let mut shapes: BTreeMap<String, (usize, Vec<f64>)> = BTreeMap::new();
+        for form in own.forms.iter().filter(|form| **form < self.choice.open) {
+            let key = shape_key(self.choice.form(*form));
+            shapes.entry(key).or_default().0 += 1;
+        }
+        if shapes.len() < 2 {
+            return vec![whole];
+        }
+        for (log, component) in self.shapes(cell, state) {
+            let key = shape_key(self.choice.form(component.form));
+            shapes.entry(key).or_default().1.push(log);
+        }
+        let shapes = shapes.into_iter().filter(|(_, (_, logs))| !logs.is_empty());
+        let shapes = shapes.map(|(key, (count, logs))| {
+            let count = (count as f64).ln();
+            CellAnswer {
+                log: log_sum(&logs) - count,
+                log_prior: count - self.log_count(cell),
+                shape: Some(key),
+                ..whole.clone()
+            }
+        });
+        let shapes: Vec<CellAnswer> = shapes.collect();
+        [vec![whole], shapes].concat()
+    }
+
+    /// What a component says given all others, and its size.
+    fn in_place(
+        &self,
+        components: &[TorqueComponent],
+        place: usize,
+        (state, kappa): (&TorqueState, f64),
+        left_out: Option<&str>,
+    ) -> Option<CellAnswer> {
+        let own = components[place];
+        let cell = self.cell_of[&own.form];
+        let (gram, along) = self.seen(own.form, state);
+        let prior = vec![own.amplitude.powi(2) / along.len() as f64; along.len()];
+        let (size, sigma) = rms_size(&gram, &along, &self.forms[own.form].0, &prior)?;
+        let unit = self.newton_metres(own.form);
+        let TorqueCell {
+            name,
+            place: at,
+            log_prior,
+            ..
+        } = self.cells[cell];
+        Some(CellAnswer {
+            left_out: left_out.map(Into::into),
+            cell: self.key(cell),
+            shape: None,
+            effect: name,
+            place: at,
+            follows: follows(self.choice.form(own.form)),
+            log: self.odds_of(components, place, kappa).log_odds - log_prior,
+            log_prior,
+            size: size * unit,
+            sigma: Some(sigma * unit),
+        })
+    }
+}
+
+/// Key of a shape that robots of a model may share: an order, or which joints.
+fn shape_key(form: &TorqueForm) -> String {
+    match form.with {
+        [0, 0] => String::new(),
+        [one, two] => format!("{one},{two}"),
+    }
+}
+
+/// The kind of variable that a form follows, as of positions.
+fn follows(form: &TorqueForm) -> &'static str {
+    let cause = form.cause;
+    match () {
+        () if cause.inertial || cause.of_rigid => "load",
+        () if cause.brakes || cause.of_sign || cause.friction.is_some() => "speed",
+        () if cause.alike_at_joints => "other angle",
+        () if cause.of_angle => "own angle",
+        () => "constant",
+    }
+}
