@@ -46,6 +46,7 @@ pub use types::{
 pub use verdict::other_means;
 
 use crate::criteria::cells::SETTLED;
+use crate::criteria::screen::MISTAKES;
 use crate::criteria::search::FEWEST;
 use round::{FitState, Fitter, RoundView, correlation_left_by};
 use table::{Answer, FoundCell, Rounds, answers, given_causes};
@@ -57,69 +58,127 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
     if question.fit.len() < *FEWEST {
         return too_few::not_asked(question);
     }
-    let (mut fitter, mut now) = Fitter::start(question);
-    if let Some(wrong) = setup::wrong_when_identified(question, &now) {
-        return wrong;
+    let first = match Attempt::new(question, false, &mut tell) {
+        Ok(first) => first,
+        Err(wrong) => return *wrong,
+    };
+    if first.set_aside() <= *MISTAKES {
+        return first.conclude();
     }
-    let before = now
-        .model
-        .error_sizes(&fitter.data, fitter.scale.dimension());
-    tell(words::of_the_base(&now, &fitter));
-    let mut rounds = Rounds::default();
-    loop {
-        let view = RoundView::of(&now, &fitter);
-        let round = rounds.search(&view, &now, &fitter);
-        tell(words::of_a_round(
-            rounds.count(),
-            round.cells,
-            round.causes.iter().map(|cause| &cause.form),
-        ));
-        let next = fitter.fit(&now.model, round.causes);
-        let Some(mut answer) = round.answer else {
-            now = next;
-            fitter.follow(&now);
-            continue;
-        };
-        // What lasts from row to row of standing points is noise where no cause is left that would explain it, or where a cause that follows
-        // time may be that noise.
-        let settled = answer.nothing_last > *SETTLED;
-        let asked = settled || fitter.data.in_motion(&next.screening.kept) || next.follows_time();
-        if let Some(change) = asked
-            .then(|| correlation_left_by(&next, &mut answer, &fitter))
-            .flatten()
-        {
-            let kept = fitter.take_correlation(&change, &next);
-            tell(words::of_the_correlation(&fitter));
-            now = fitter.fit(&next.model, kept);
-            fitter.follow(&now);
-            rounds.again();
-            continue;
+    // More rows than mistakes are: a cause that the model lacks may be what moves them, and it is looked for in all rows.
+    tell(words::of_all_rows(first.set_aside()));
+    let explains = |second: &Attempt| {
+        let aside = second.set_aside();
+        2 * aside <= first.set_aside() && first.set_aside() - aside > *MISTAKES
+    };
+    match Attempt::new(question, true, &mut tell) {
+        Ok(second) if explains(&second) => second.conclude(),
+        _ => first.conclude(),
+    }
+}
+
+/// A search until nothing changes.
+struct Attempt<'a> {
+    fitter: Fitter<'a>,
+    /// What the base model leaves of every row.
+    before: Vec<Option<f64>>,
+    /// The model around which the last round searched, and the one that it led to.
+    now: FitState,
+    next: FitState,
+    answer: Answer,
+}
+
+impl<'a> Attempt<'a> {
+    /// Searches with all rows until something is found, or with those that belong; a wrong set-up instead of an attempt.
+    fn new(
+        question: &'a Question<'a>,
+        keeps_all: bool,
+        tell: &mut dyn FnMut(String),
+    ) -> Result<Self, Box<Diagnosis>> {
+        let (mut fitter, mut now) = Fitter::start(question, keeps_all);
+        if let Some(wrong) = setup::wrong_when_identified(question, &now) {
+            return Err(Box::new(wrong));
         }
-        // What is left and nothing explains may be a noise that is misjudged.
-        let quiet = settled || answer.found.is_empty();
-        if let Some(sigma) = quiet.then(|| fitter.noise_left_by(&next)).flatten() {
-            fitter.learn(sigma);
-            now = fitter.fit(&next.model, next.causes);
-            fitter.follow(&now);
-            rounds.again();
-            continue;
+        let before = now
+            .model
+            .error_sizes(&fitter.data, fitter.scale.dimension());
+        tell(words::of_the_base(&now, &fitter));
+        let mut rounds = Rounds::default();
+        loop {
+            let view = RoundView::of(&now, &fitter);
+            let round = rounds.search(&view, &now, &fitter);
+            tell(words::of_a_round(
+                rounds.count(),
+                round.cells,
+                round.causes.iter().map(|cause| &cause.form),
+            ));
+            if !round.causes.is_empty() {
+                fitter.set_aside();
+            }
+            let next = fitter.fit(&now.model, round.causes);
+            let Some(mut answer) = round.answer else {
+                now = next;
+                fitter.follow(&now);
+                continue;
+            };
+            // What lasts from row to row of standing points is noise where no cause is left that would explain it, or where a cause that
+            // follows time may be that noise.
+            let settled = answer.nothing_last > *SETTLED;
+            let asked =
+                settled || fitter.data.in_motion(&next.screening.kept) || next.follows_time();
+            if let Some(change) = asked
+                .then(|| correlation_left_by(&next, &mut answer, &fitter))
+                .flatten()
+            {
+                let kept = fitter.take_correlation(&change, &next);
+                tell(words::of_the_correlation(&fitter));
+                now = fitter.fit(&next.model, kept);
+                fitter.follow(&now);
+                rounds.again();
+                continue;
+            }
+            // What is left and nothing explains may be a noise that is misjudged.
+            let quiet = settled || answer.found.is_empty();
+            if let Some(sigma) = quiet.then(|| fitter.noise_left_by(&next)).flatten() {
+                fitter.learn(sigma);
+                now = fitter.fit(&next.model, next.causes);
+                fitter.follow(&now);
+                rounds.again();
+                continue;
+            }
+            // The search saw a linear picture of each: what comes to nothing in the whole model is not asked again.
+            let next = fitter.held_to_a_common_size(next);
+            if rounds.again_without(&empty(&next, &answer)) {
+                continue;
+            }
+            tell(words::of_the_conclusions(&next));
+            return Ok(Self {
+                fitter,
+                before,
+                now,
+                next,
+                answer,
+            });
         }
-        // The search saw a linear picture of each: what comes to nothing in the whole model is not asked again.
-        let next = fitter.held_to_a_common_size(next);
-        if rounds.again_without(&empty(&next, &answer)) {
-            continue;
-        }
-        tell(words::of_the_conclusions(&next));
+    }
+
+    /// Rows to fit that are set aside.
+    fn set_aside(&self) -> usize {
+        self.fitter.question.fit.len() - self.next.screening.kept.len()
+    }
+
+    fn conclude(self) -> Diagnosis {
+        let view = RoundView::of(&self.now, &self.fitter);
         let survey = view.survey();
         let last = LastRound {
             view: &view,
             survey: &survey,
-            state: next,
-            answer,
-            scale: fitter.scale,
-            without: question.without,
+            state: self.next,
+            answer: self.answer,
+            scale: self.fitter.scale,
+            without: self.fitter.question.without,
         };
-        return conclude(last, &fitter, &before);
+        conclude(last, &self.fitter, &self.before)
     }
 }
 
@@ -132,7 +191,7 @@ pub fn cell_evidence(question: &Question, given: &[GivenCell]) -> Result<Vec<Cel
     if let Some(wrong) = wrong_setup(question) {
         return Err(wrong.statement);
     }
-    let (mut fitter, mut now) = Fitter::start(question);
+    let (mut fitter, mut now) = Fitter::start(question, false);
     if let Some(wrong) = setup::wrong_when_identified(question, &now) {
         return Err(wrong.statement);
     }

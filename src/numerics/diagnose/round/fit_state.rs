@@ -10,7 +10,7 @@ use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, arm_effect, names};
 use crate::estimate::{
     CLEARLY, ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening,
-    Session, fit_screened, seen,
+    Session, fit, fit_screened, seen,
 };
 use crate::robot::Measurements;
 use std::ops::Range;
@@ -96,11 +96,13 @@ pub(crate) struct Fitter<'a> {
     estimated: usize,
     /// Correlation of rows along a path.
     on_path: PathCorrelation,
+    /// Whether no row is set aside: where many stand out, it may be the model that is wrong.
+    keeps_all: bool,
 }
 
 impl<'a> Fitter<'a> {
-    /// The base model fitted, with the noise that repeats show.
-    pub(crate) fn start(question: &'a Question<'a>) -> (Self, FitState) {
+    /// The base model fitted, with the noise that repeats show; with all rows until causes are found, or with those that belong.
+    pub(crate) fn start(question: &'a Question<'a>, keeps_all: bool) -> (Self, FitState) {
         let mut fitter = Self {
             question,
             data: question.data.clone(),
@@ -118,6 +120,7 @@ impl<'a> Fitter<'a> {
             correlated: None,
             estimated: 0,
             on_path: PathCorrelation::Unasked,
+            keeps_all,
         };
         let base = base_model(question.robot, &fitter.data, question.fit, question.without);
         let mut now = fitter.fit(&base, Vec::new());
@@ -281,6 +284,11 @@ impl<'a> Fitter<'a> {
         }
     }
 
+    /// From now on rows that no model follows are set aside.
+    pub(crate) fn set_aside(&mut self) {
+        self.keeps_all = false;
+    }
+
     /// The base effects of `from` with other causes, which start at their coefficients, fitted to the rows that belong.
     pub(crate) fn fit(&self, from: &Model, causes: Vec<EstimatedCause>) -> FitState {
         let (start, ranges) = with_causes(from, &causes);
@@ -296,8 +304,17 @@ impl<'a> Fitter<'a> {
             rows: self.question.fit,
             candidates: &candidates,
         };
-        let (model, fitted, screening) =
-            fit_screened(&start, &self.data, &options, self.question.set);
+        let (model, fitted, screening) = if self.keeps_all {
+            let (model, fitted) = fit(&start, &self.data, &options);
+            let kept = options.rows.to_vec();
+            let screening = Screening {
+                kept,
+                ..Screening::default()
+            };
+            (model, fitted, screening)
+        } else {
+            fit_screened(&start, &self.data, &options, self.question.set)
+        };
         let estimated = |(cause, range): (EstimatedCause, &Range<usize>)| EstimatedCause {
             coefficients: model.x[range.clone()].to_vec(),
             ..cause

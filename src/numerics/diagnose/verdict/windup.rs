@@ -28,6 +28,11 @@ pub(super) fn turns_back(last: &LastRound, found: &FoundCell) -> Option<[f64; 2]
         return None;
     }
     let state = &last.state;
+    // A stated shape fits to its rows as well as it can.
+    let is_stated = |i: &usize| state.causes[*i].form.words(&[]).is_some();
+    if found.members.iter().any(is_stated) {
+        return None;
+    }
     let parameters: Vec<usize> = found
         .members
         .iter()

@@ -67,6 +67,14 @@ pub(crate) fn of_a_round<'f>(
     format!("round {round}: {cells} possible causes compared, {causes}{shown}")
 }
 
+/// Why it is searched again, in a line.
+pub(crate) fn of_all_rows(aside: usize) -> String {
+    format!(
+        "{} stand out: searched again with all rows",
+        counted(aside as u64, "row")
+    )
+}
+
 /// What follows the last round in a line.
 pub(crate) fn of_the_conclusions(found: &FitState) -> String {
     format!(
