@@ -304,12 +304,6 @@ impl Law {
         std::iter::once(&self.first).chain(&self.times)
     }
 
-    /// Whether it is the same everywhere: no range is below zero.
-    pub fn is_constant(&self) -> bool {
-        let Factor { of, basis, .. } = self.first;
-        of == Variable::Range && basis == Basis::After { at: 0.0 } && self.times.is_none()
-    }
-
     /// What it depends on.
     pub fn variables(&self) -> Vec<Variable> {
         self.factors().map(|factor| factor.of).collect()

@@ -1,7 +1,8 @@
 //! `unknown`: laws without a name, for what no cause of the list explains: placed and described, never christened.
 
 use super::{
-    Axes, Basis, Cause, Clock, Motion, NumberSpec, Place, Polar, Summary, Term, Variable, names,
+    Axes, AxisPoint, Basis, Cause, Clock, Motion, NumberSpec, Place, Polar, Summary, Term,
+    Variable, names,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -137,7 +138,25 @@ pub(super) fn identities(term: &Term, called: &str) -> Vec<(&'static str, Place)
         // No motor current tells of a pull.
         _ if called == names::CABLE_DRAG => vec![(names::UNKNOWN, place)],
         _ if joint && term.two_angles().is_some() => vec![(names::CABLE_DRAG, place)],
-        _ => Vec::new(),
+        _ => the_same_motion(term.motion())
+            .map(|place| (names::UNKNOWN, place))
+            .into_iter()
+            .collect(),
+    }
+}
+
+/// The other place of which a motion is: what carries a joint is the end of the link before it, and a joint that moves with another one moves.
+fn the_same_motion(motion: Motion) -> Option<Place> {
+    match motion {
+        Motion::Axis {
+            joint,
+            about: None,
+            turning: false,
+            at: AxisPoint::Own,
+        }
+        | Motion::Slide { joint, .. } => joint.checked_sub(1).map(|link| Place::Links(link, link)),
+        Motion::Coupled { moved, .. } => Some(Place::Joint(moved)),
+        _ => None,
     }
 }
 

@@ -89,16 +89,9 @@ impl CauseTable<'_, '_> {
         let mut groups: BTreeMap<(&'static str, Place), Vec<usize>> = BTreeMap::new();
         for (i, component) in components.iter().enumerate() {
             let cell = &self.cells[component.cell];
-            let is_of_a_curve = self.is_constant_of_a_curve(component, components);
-            let name = if is_of_a_curve {
-                names::UNKNOWN
-            } else {
-                cell.name
-            };
-            groups.entry((name, cell.place)).or_default().push(i);
+            groups.entry((cell.name, cell.place)).or_default().push(i);
         }
-        let found = groups.into_values().map(|mut members| {
-            members.sort_by_key(|i| self.is_constant_of_a_curve(&components[*i], components));
+        let found = groups.into_values().map(|members| {
             let mut found = self.found(components, &members, state.kappa);
             found.members = members.iter().flat_map(|i| ranges[*i].clone()).collect();
             found
@@ -123,22 +116,6 @@ impl CauseTable<'_, '_> {
         }
     }
 
-    /// Whether a component is the constant of a motion that follows something in a way without a name: a curve has no constant itself.
-    fn is_constant_of_a_curve(&self, component: &Component, all: &[Component]) -> bool {
-        let [form] = &component.forms[..] else {
-            return false;
-        };
-        let constant = form.term().filter(|term| term.law().is_constant());
-        let follows = |other: &Component| {
-            let motion = other
-                .forms
-                .first()
-                .and_then(|form| Some(form.term()?.motion()));
-            !self.cells[other.cell].is_named() && motion == constant.map(|term| term.motion())
-        };
-        constant.is_some() && self.cells[component.cell].is_named() && all.iter().any(follows)
-    }
-
     /// The finding of some components: names and places given all others, at a noise.
     fn found(&self, components: &[Component], members: &[usize], kappa: f64) -> FoundCell {
         let others = without(components, members);
@@ -152,7 +129,6 @@ impl CauseTable<'_, '_> {
         let strongest = members
             .iter()
             .copied()
-            .filter(|i| !self.is_constant_of_a_curve(&components[*i], components))
             .max_by(|a, b| log_of(*a, &state, &rest).total_cmp(&log_of(*b, &state, &rest)));
         let main = strongest.unwrap_or(members[0]);
         let cell = components[main].cell;

@@ -1,7 +1,9 @@
 //! Cells: a cause at a place in every shape that it may have, or a motion of a place over a variable that no cause of the list has.
 
 use crate::criteria::cells::{BENDING, BENT, EACH, FEW, LENGTHS, MARGIN, ROUGHLY, STEPS};
-use crate::effect::{Basis, Form, Law, Motion, Place, Survey, Term, Unknown, Variable, names};
+use crate::effect::{
+    Basis, Form, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names,
+};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 
@@ -153,14 +155,55 @@ impl FreeShape {
             is_bent: false,
         };
         vec![ShapeGroup {
-            forms: vec![self.term(Law::new(self.of, Basis::Cosines { low, high, count }))],
-            shapes: matern(count, lengths, self.motion)
-                .into_iter()
-                .map(shape)
-                .collect(),
+            forms: vec![self.term(Law::new(self.of, self.cosines([low, high], count)))],
+            shapes: self.matern(count, lengths).into_iter().map(shape).collect(),
             positive: false,
             largest: f64::INFINITY,
         }]
+    }
+
+    /// Whether a constant of its motion is neither geometry nor a place of the instrument, so that its curves have a mean.
+    fn has_mean(&self) -> bool {
+        matches!(
+            self.motion,
+            Motion::Instrument {
+                of: Polar::Elevation | Polar::Range,
+                ..
+            }
+        )
+    }
+
+    /// A line over values of its variable.
+    fn line(&self, values: &[f64]) -> Option<Basis> {
+        match line(values)? {
+            Basis::Linear { zero, per } if self.has_mean() => Some(Basis::Straight { zero, per }),
+            line => Some(line),
+        }
+    }
+
+    /// So many cosines over a range of its variable.
+    fn cosines(&self, [low, high]: [f64; 2], count: usize) -> Basis {
+        if self.has_mean() {
+            let count = count + 1;
+            Basis::Series { low, high, count }
+        } else {
+            Basis::Cosines { low, high, count }
+        }
+    }
+
+    /// Shares of its cosines, half of all for the mean where it has one.
+    fn with_mean(&self, shares: Vec<f64>) -> Vec<f64> {
+        if !self.has_mean() {
+            return shares;
+        }
+        let others = shares.into_iter().map(|share| 0.5 * share);
+        std::iter::once(0.5).chain(others).collect()
+    }
+
+    /// Shares of a smooth curve, one list a correlation length.
+    fn matern(&self, count: usize, lengths: usize) -> Vec<Vec<f64>> {
+        let all = matern(count, lengths, self.motion).into_iter();
+        all.map(|shares| self.with_mean(shares)).collect()
     }
 
     pub(crate) fn groups(
@@ -185,7 +228,7 @@ impl FreeShape {
                     .collect()
             }
             Over::Line => {
-                let Some(line) = values(self.of).and_then(|values| line(&values)) else {
+                let Some(line) = values(self.of).and_then(|values| self.line(&values)) else {
                     return Vec::new();
                 };
                 vec![ShapeGroup::of(self.term(Law::new(self.of, line)), 0.0)]
@@ -198,25 +241,23 @@ impl FreeShape {
                 let Some(values) = values(self.of) else {
                     return Vec::new();
                 };
-                let Some(line) = line(&values) else {
+                let Some(line) = self.line(&values) else {
                     return Vec::new();
                 };
+                let straight = fields * line.count();
                 let line = self.term(Law::new(self.of, line));
                 if has_few(&values) {
                     return vec![ShapeGroup::of(line, 0.0)];
                 }
                 let count = if closely { count } else { first };
                 let [low, high] = support(&values);
-                let curve = self.term(Law::new(self.of, Basis::Cosines { low, high, count }));
+                let curve = self.term(Law::new(self.of, self.cosines([low, high], count)));
                 let lengths = if closely { lengths } else { lengths.min(2) };
+                let rough = (closely && lengths > 3)
+                    .then(|| self.with_mean(over_fields(cornered(count), self.motion, fields)));
                 vec![ShapeGroup {
                     forms: vec![line, curve],
-                    shapes: line_and_curve(
-                        fields,
-                        self.motion,
-                        &matern(count, lengths, self.motion),
-                        closely && lengths > 3,
-                    ),
+                    shapes: line_and_curve(straight, &self.matern(count, lengths), rough),
                     positive: false,
                     largest: f64::INFINITY,
                 }]
@@ -256,8 +297,9 @@ impl FreeShape {
                         .iter()
                         .flat_map(|x| second.iter().map(move |y| x * y))
                         .collect();
-                    // The constant is geometry.
-                    shares[0] = 0.0;
+                    if !self.has_mean() {
+                        shares[0] = 0.0;
+                    }
                     let sum: f64 = shares.iter().sum();
                     let shares = shares.into_iter().map(|share| share / sum).collect();
                     CellShape {
@@ -404,13 +446,8 @@ pub(super) fn not_quite_straight(
     })
 }
 
-/// A line, curves of some correlation lengths, and lines that are not quite straight.
-fn line_and_curve(
-    line: usize,
-    motion: Motion,
-    lengths: &[Vec<f64>],
-    rough: bool,
-) -> Vec<CellShape> {
+/// A line of so many columns, curves of some correlation lengths, lines that are not quite straight, and a curve with corners.
+fn line_and_curve(line: usize, lengths: &[Vec<f64>], rough: Option<Vec<f64>>) -> Vec<CellShape> {
     let curve = lengths[0].len();
     let half = 0.5_f64.ln();
     let straight = std::iter::repeat_n(1.0 / line as f64, line)
@@ -448,9 +485,8 @@ fn line_and_curve(
             });
         }
     }
-    if rough {
-        let all = over_fields(cornered(curve / line), motion, line);
-        let shares = std::iter::repeat_n(0.0, line).chain(all).collect();
+    if let Some(rough) = rough {
+        let shares = std::iter::repeat_n(0.0, line).chain(rough).collect();
         out.push(CellShape {
             shares,
             log_weight: half - count,

@@ -243,7 +243,7 @@ pub(super) fn cell(free: FreeShape, log_prior: f64, survey: &Survey) -> CauseCel
 }
 
 /// Places of cells without a name.
-pub(super) fn places(survey: &Survey) -> Vec<Place> {
+pub(crate) fn places(survey: &Survey) -> Vec<Place> {
     let joints = 0..survey.joints();
     let length = |link: usize| (survey.robot.point(link + 1) - survey.robot.point(link)).norm();
     let links = joints

@@ -25,6 +25,7 @@ mod state;
 pub(crate) use answer::{Answer, FoundCell};
 pub use evidence::{AMPLITUDES, EvidenceRows, GroupEvidence, evidence, log_sum};
 pub(crate) use forms::forms_of;
+pub(crate) use generated::places;
 pub use given::{CellAnswer, GivenCell, rms_size};
 pub(crate) use given::{answers, given_causes};
 pub use search::ComponentSearch;

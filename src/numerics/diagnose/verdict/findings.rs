@@ -6,7 +6,7 @@
 
 use crate::criteria::cells::{DETAIL, FAINT, IDENTITY, SMALLEST, TRACE};
 use crate::criteria::words::FIRM;
-use crate::diagnose::table::{Answer, FoundCell};
+use crate::diagnose::table::{Answer, FoundCell, places};
 use crate::effect::{
     Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Survey, Variable,
     figure, moved_with_the_payload, names, people, turned_holder,
@@ -321,15 +321,25 @@ pub(super) fn share_with_identities(
         .iter()
         .filter_map(|form| moved_with_the_payload(form, survey))
         .map(|same| (same, 0.5));
-    let same = forms
+    let mut same: Vec<_> = forms
         .iter()
         .flat_map(|form| form.identities(called))
-        .map(|same| (same, *IDENTITY));
+        .filter(|(_, place)| is_a_place(*place, survey))
+        .collect();
+    same.dedup();
+    let same = same.into_iter().map(|same| (same, *IDENTITY));
     for ((effect, place), share) in moved.chain(same) {
-        if !rivals
-            .iter()
-            .any(|rival| (rival.effect, rival.place) == (effect, place))
-        {
+        let is_same = |rival: &&mut RivalCause| (rival.effect, rival.place) == (effect, place);
+        let known = rivals.iter_mut().find(is_same);
+        // Of one motion that is of two places neither is the usual one.
+        let is_motion = [effect, called] == [names::UNKNOWN; 2];
+        let share = if is_motion { 0.5 } else { share };
+        if let Some(known) = known {
+            if is_motion {
+                known.probability += share * left;
+                left *= 1.0 - share;
+            }
+        } else {
             rivals.push(RivalCause {
                 effect,
                 place,
@@ -341,6 +351,14 @@ pub(super) fn share_with_identities(
     }
     rivals.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     left
+}
+
+/// Whether a link is a place of its own: two joints at one point have none between them.
+fn is_a_place(place: Place, survey: &Survey) -> bool {
+    match place {
+        Place::Links(first, last) if first == last => places(survey).contains(&place),
+        _ => true,
+    }
 }
 
 /// The last round.
