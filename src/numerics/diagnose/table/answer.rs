@@ -4,10 +4,10 @@
 use super::cause_table::CauseTable;
 use super::component::{CellColumns, Component};
 use super::evidence::log_sum;
-use super::scan::CellScan;
+use super::scan::{CellEvidence, CellScan};
 use super::search::without;
 use super::state::KnownState;
-use crate::criteria::cells::{BENDS, MISLED, RIVAL};
+use crate::criteria::cells::{BENDS, MISLED, RIVAL, SWAPS};
 use crate::diagnose::types::{
     ExplainedCell, ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine,
 };
@@ -61,6 +61,8 @@ pub(crate) struct Answer {
     pub(crate) located_last: Located,
     /// Standard errors of forms that geometry may hide: cause and place with the form and its error, SI.
     pub(crate) hidden: Vec<(Form, f64)>,
+    /// Positions of the components of a finding, and what is more probable in their stead.
+    pub(super) better: Option<(Vec<usize>, Component)>,
 }
 
 impl CauseTable<'_, '_> {
@@ -91,12 +93,14 @@ impl CauseTable<'_, '_> {
             let cell = &self.cells[component.cell];
             groups.entry((cell.name, cell.place)).or_default().push(i);
         }
-        let found = groups.into_values().map(|members| {
-            let mut found = self.found(components, &members, state.kappa);
-            found.members = members.iter().flat_map(|i| ranges[*i].clone()).collect();
-            found
-        });
-        let found = found.collect();
+        let (mut found, mut better) = (Vec::new(), None);
+        for members in groups.into_values() {
+            let (mut one, instead) = self.found(components, &members, state.kappa);
+            one.members = members.iter().flat_map(|i| ranges[*i].clone()).collect();
+            found.push(one);
+            better = better.or(instead.map(|instead| (members, instead)));
+        }
+        let better = better.map(|(members, (cell, found))| (members, self.component(cell, &found)));
         let next = scan
             .best()
             .filter(|best| scan.log_odds[*best] > 0.0)
@@ -113,11 +117,17 @@ impl CauseTable<'_, '_> {
             located_first: first.0,
             located_last: self.locate(&state),
             hidden,
+            better,
         }
     }
 
-    /// The finding of some components: names and places given all others, at a noise.
-    fn found(&self, components: &[Component], members: &[usize], kappa: f64) -> FoundCell {
+    /// The finding of some components: names and places given all others, at a noise; and a cell that alone is more probable than they are.
+    fn found(
+        &self,
+        components: &[Component],
+        members: &[usize],
+        kappa: f64,
+    ) -> (FoundCell, Option<(usize, CellEvidence)>) {
         let others = without(components, members);
         let rest: Vec<&Component> = others.iter().collect();
         let state = self.state(&rest, Some(kappa));
@@ -146,8 +156,16 @@ impl CauseTable<'_, '_> {
             .collect();
         let alike = self.alike(&components[main], 60);
         let mut scan = self.scan_instead(&components[main], &alike, &state, &rest, 8, &also);
-        // Others are asked what the strongest does: further ones of its cell add to any of them.
-        scan.log_odds[cell] = self.cells[cell].log_prior + log_main;
+        let log_prior = members
+            .iter()
+            .map(|i| self.cells[components[*i].cell].log_prior)
+            .sum::<f64>();
+        // Others are asked what the strongest does, and compete with all of them.
+        scan.log_odds[cell] = (self.cells[cell].log_prior + log_main).max(log_prior + log);
+        let better = scan
+            .best()
+            .filter(|best| scan.log_odds[*best] > scan.log_odds[cell] + *SWAPS);
+        let better = better.and_then(|best| Some((best, scan.closely.get(&best)?.clone())));
         let (effect, place) = (self.name_of(&components[main]), self.cells[cell].place);
         let (probabilities, rivals) = self.weigh((effect, place), cell, &components[main], &scan);
         let mut bounds = Vec::new();
@@ -160,21 +178,19 @@ impl CauseTable<'_, '_> {
             );
         }
         let gain = (state.rows.square - with.rows.square).max(0.0);
-        FoundCell {
+        let found = FoundCell {
             effect,
             place,
             members: Vec::new(),
             log,
-            log_prior: members
-                .iter()
-                .map(|i| self.cells[components[*i].cell].log_prior)
-                .sum(),
+            log_prior,
             gain,
             numbers: members.iter().map(|i| components[*i].part.ncols()).sum(),
             probabilities,
             rivals,
             bounds,
-        }
+        };
+        (found, better)
     }
 
     /// Probabilities of a name and a place, and the rivals, by the odds of every cell and of nothing.
@@ -200,7 +216,7 @@ impl CauseTable<'_, '_> {
                 continue;
             }
             // A bend pays for its further numbers here as where shapes are chosen.
-            let bends = |found: &super::scan::CellEvidence| {
+            let bends = |found: &CellEvidence| {
                 let bent = (found.bent - found.log).exp().clamp(0.0, 1.0);
                 let paid = bent * (-*BENDS).exp();
                 paid / (paid + 1.0 - bent).max(f64::MIN_POSITIVE)

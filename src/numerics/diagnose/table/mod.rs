@@ -62,6 +62,8 @@ pub(crate) struct Rounds {
     round: usize,
     /// Keys of cells that are not asked again: in the whole model they came to nothing.
     empty: BTreeSet<String>,
+    /// Keys of the cells of sets that were answered, or that an answer led to.
+    exchanged: BTreeSet<Vec<String>>,
 }
 
 /// What a round found.
@@ -167,10 +169,11 @@ impl Rounds {
             }
             components = table.by_several(components);
         }
-        let keys: Vec<String> = components
-            .iter()
-            .map(|component| table.cells[component.cell].key.clone())
-            .collect();
+        let keys_of = |table: &CauseTable, components: &[Component]| -> Vec<String> {
+            let key = |component: &Component| table.cells[component.cell].key.clone();
+            components.iter().map(key).collect()
+        };
+        let mut keys = keys_of(&table, &components);
         let sorted = |keys: &[String]| {
             let mut keys = keys.to_vec();
             keys.sort();
@@ -212,10 +215,22 @@ impl Rounds {
                 self.pairs = Some(seen);
             }
         }
-        let answer = is_last.then(|| {
+        let mut answer = is_last.then(|| {
             table.add_siblings(&components, &self.empty);
             table.answer(&components, self.first.clone().unwrap_or_default())
         });
+        // A closer look may find something more probable in the stead of a finding; what it led away from is not taken up again.
+        self.exchanged.insert(sorted(&keys));
+        if let Some((members, component)) = answer.as_ref().and_then(|answer| answer.better.clone())
+        {
+            let mut next = search::without(&components, &members);
+            next.push(component);
+            let next = table.backfit(next, 1);
+            let next_keys = keys_of(&table, &next);
+            if self.exchanged.insert(sorted(&next_keys)) {
+                (components, keys, answer) = (next, next_keys, None);
+            }
+        }
         let mut causes = estimated(&table, &components);
         by_currents(&mut causes, view);
         let cells = table.cells.len();
