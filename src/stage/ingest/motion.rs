@@ -4,10 +4,12 @@
 //! that is worth is seen from the same with neighbours twice as far (Richardson: the difference is three times the error).
 
 use super::arm::RobotJoints;
+use super::rows::FileRows;
 use crate::error::{Error, Result, counted};
 use crate::stage::Context;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// How joint velocities follow from the joints over time, where no columns give them: a parabola through each row and its
 /// neighbours in the file, never across gaps.
@@ -36,7 +38,7 @@ const OTHER_UNIT: f64 = 3.0;
 /// Times and joints of a file's usable rows.
 #[derive(Default)]
 pub(super) struct JointSamples {
-    numbers: Vec<u64>,
+    rows: Vec<usize>,
     time: Vec<f64>,
     q: Vec<f64>,
     /// Velocities that the file gives.
@@ -51,13 +53,22 @@ pub(super) struct Track {
 }
 
 impl JointSamples {
-    pub(super) fn push(&mut self, number: u64, time: f64, q: &[f64], given: &[f64]) {
-        if time.is_finite() {
-            self.numbers.push(number);
-            self.time.push(time);
-            self.q.extend_from_slice(q);
-            self.given.extend_from_slice(given);
+    /// Of the usable rows of a file, which gives velocities or not.
+    pub(super) fn of(rows: &FileRows, arm: &RobotJoints, gives_velocity: bool) -> Self {
+        let (mut samples, slots) = (Self::default(), &arm.slots);
+        let all =
+            |row: usize, places: Range<usize>| places.map(move |place| rows.value(row, place));
+        for row in rows.usable() {
+            let time = rows.value(row, slots.time);
+            if time.is_finite() {
+                samples.rows.push(row);
+                samples.time.push(time);
+                samples.q.extend(all(row, slots.q.clone()));
+                let given = all(row, slots.velocity.clone());
+                samples.given.extend(given.filter(|_| gives_velocity));
+            }
         }
+        samples
     }
 
     /// Neighbours of a row in one stretch without a gap: the rows of its parabola (the same twice where there are but two), `wide`
@@ -97,7 +108,7 @@ impl JointSamples {
     pub(super) fn track(
         self,
         motion: Option<&VelocitySettings>,
-        rows: u64,
+        rows: usize,
         arm: &RobotJoints,
         label: &str,
         context: &Context,
@@ -130,7 +141,7 @@ impl JointSamples {
         let reach = (0.5 * motion.map_or(0.0, |motion| motion.over_s) / usual - 1e-9)
             .ceil()
             .max(1.0) as usize;
-        let mut rates = vec![f64::NAN; rows as usize * 2 * joints];
+        let mut rates = vec![f64::NAN; rows * 2 * joints];
         let (mut isolated, mut start) = (0, 0);
         let (mut squares, mut errors) = (vec![0.0; joints], vec![0.0; joints]);
         let (mut reported, mut both) = (vec![0.0; joints], vec![0.0; joints]);
@@ -151,7 +162,7 @@ impl JointSamples {
                 let far = self
                     .around(i, [start, end], 2 * reach)
                     .filter(|far| far[0] < near[0] && far[2] > near[2]);
-                let at = (self.numbers[i] as usize - 1) * 2 * joints;
+                let at = self.rows[i] * 2 * joints;
                 for joint in 0..joints {
                     let [velocity, acceleration] = self.rate(joints, joint, i, near);
                     rates[at + joint] = velocity;
@@ -263,8 +274,8 @@ fn same_unit(joint: usize, reported: f64, both: f64, label: &str) -> Result<()> 
 }
 
 impl Track {
-    fn of(&self, number: u64) -> Option<(&[f64], &[f64])> {
-        let at = usize::try_from(number).ok()?.checked_sub(1)? * 2 * self.joints;
+    fn of(&self, row: usize) -> Option<(&[f64], &[f64])> {
+        let at = row * 2 * self.joints;
         Some(
             self.rates
                 .get(at..at + 2 * self.joints)?
@@ -272,9 +283,9 @@ impl Track {
         )
     }
 
-    /// Velocities of a data row (from 1) into those of `velocity` that are not known.
-    pub(super) fn fill(&self, number: u64, velocity: &mut [f64]) {
-        let Some((derived, _)) = self.of(number) else {
+    /// Velocities of a row into those of `velocity` that are not known.
+    pub(super) fn fill(&self, row: usize, velocity: &mut [f64]) {
+        let Some((derived, _)) = self.of(row) else {
             return;
         };
         for (known, derived) in velocity
@@ -286,9 +297,9 @@ impl Track {
         }
     }
 
-    /// Acceleration of a joint in a data row (from 1), zero where it is not known.
-    pub(super) fn acceleration(&self, number: u64, joint: usize) -> f64 {
-        self.of(number)
+    /// Acceleration of a joint in a row, zero where it is not known.
+    pub(super) fn acceleration(&self, row: usize, joint: usize) -> f64 {
+        self.of(row)
             .and_then(|(_, all)| all.get(joint))
             .copied()
             .filter(|value| value.is_finite())
@@ -301,12 +312,12 @@ mod tests {
     use super::*;
 
     fn samples(times: &[f64], q: impl Fn(f64) -> f64) -> JointSamples {
-        let mut samples = JointSamples::default();
-        times
-            .iter()
-            .zip(1..)
-            .for_each(|(time, number)| samples.push(number, *time, &[q(*time)], &[]));
-        samples
+        JointSamples {
+            rows: (0..times.len()).collect(),
+            time: times.to_vec(),
+            q: times.iter().map(|time| q(*time)).collect(),
+            given: Vec::new(),
+        }
     }
 
     #[test]

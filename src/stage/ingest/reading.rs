@@ -15,7 +15,7 @@ use crate::stage::ingest::layout::{Decimal, FileLayout, LimitPolicy};
 use crate::stage::ingest::refusal::RowRefusal;
 use crate::stage::ingest::row::{RecordedRow, RowReader};
 use crate::stage::{Context, OpenedInput};
-use crate::table::{IntakeRow, RejectedRow, Robot};
+use crate::table::{IntakeRow, Robot};
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
 
@@ -238,10 +238,6 @@ impl<'a> OpenedFile<'a> {
     /// The present row as it stands.
     pub(super) fn text(&self) -> &[u8] {
         &self.record.text
-    }
-    /// The present row as one that is not used, of the file that tables call `name`.
-    pub(super) fn rejected(&self, name: &str, refusal: RowRefusal) -> RejectedRow {
-        self.row.rejected(name, &self.record.text, refusal)
     }
     /// Reads the next row into `self.row`: used or refused; `None` at the end.
     pub(super) fn next(&mut self) -> Result<Option<Result<(), RowRefusal>>> {

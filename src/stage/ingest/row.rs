@@ -7,15 +7,11 @@ use super::layout::{Decimal, LimitPolicy};
 use super::refusal::{Reason, RowRefusal, refuse};
 use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
 use crate::robot::ONE_AND_A_HALF_TURNS;
-use crate::table::RejectedRow;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
 /// Numbers of rows go up to here: the targets of wide rows have room beyond.
 const LARGEST_SEQUENCE: i64 = 1 << 52;
-
-/// Letters that are shown of a row that is not used.
-const SHOWN: usize = 200;
 
 /// The quantities of one row; reused from row to row.
 #[derive(Default)]
@@ -50,17 +46,6 @@ impl RecordedRow {
             texts,
             values: vec![f64::NAN; arm.slots.count],
             ..Self::default()
-        }
-    }
-    /// The row as one that is not used, of the file that tables call `name`; `text` is what stands there.
-    pub(super) fn rejected(&self, name: &str, text: &[u8], refusal: RowRefusal) -> RejectedRow {
-        RejectedRow {
-            file: name.into(),
-            line: self.line as i64,
-            point_id: (!self.id.is_empty()).then(|| self.id.clone()),
-            reason: refusal.reason.word().into(),
-            detail: refusal.detail,
-            text: crate::raw::shown(text).chars().take(SHOWN).collect(),
         }
     }
 }

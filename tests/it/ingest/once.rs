@@ -1,10 +1,8 @@
-//! Files that fit into memory are read once, whatever becomes of their rows.
+//! Files are read once, whatever becomes of their rows.
 
-use super::{HEAD, TWO, Taken, good, robot, rr, settings, take, taken};
+use super::{HEAD, TWO, Taken, good, robot, rr, take};
 use crate::answer::starts_with;
 use crate::desk::Desk;
-use calib::stage::Writes;
-use calib::stage::ingest::{IngestReads, IngestWrites};
 
 const JOINED: &str = r#"
 files:
@@ -113,39 +111,4 @@ fn an_id_that_stands_twice_is_known_before_anything_is_written() {
         ("tracker.csv", 2, "unmatched"),
     ];
     assert_eq!(refused(&taken), places);
-}
-
-#[test]
-fn files_that_do_not_fit_into_memory_are_read_twice_and_give_the_same_tables() {
-    let (arm, tracker) = (
-        "A,1\nB,2\nA,3\nC,bad\nD,4\nE,5\n",
-        "E,5,5,5\nX,1,1,1\nB,3,3,3\nD,4,4,4\n",
-    );
-    let yaml = format!("{JOINED}max_rejected_fraction: 0.9\n");
-    for (tracker, times) in [
-        (tracker, [2, 2]),
-        (&tracker.replace("X,1,1,1\n", ""), [2, 1]),
-    ] {
-        let (held, opened) = read(arm, tracker, &yaml);
-        assert_eq!(opened, [1, 1]);
-        let desk = Desk::default()
-            .with("arm.csv", format!("k,q1\n{arm}"))
-            .with("tracker.csv", format!("k,x,y,z\n{tracker}"));
-        let reads = IngestReads {
-            robot: robot("r", 2.0),
-        };
-        let tables = desk.written(&IngestWrites::ports(), |context| {
-            settings(&yaml).run_holding(0, reads, context)?.give()
-        });
-        let again = taken(tables.unwrap()).unwrap();
-        let opened = desk.opened.lock().unwrap().clone();
-        assert_eq!(
-            ["arm.csv", "tracker.csv"]
-                .map(|name| opened.iter().filter(|file| *file == name).count()),
-            times
-        );
-        assert_eq!(again.recording, held.recording);
-        assert_eq!(again.rejected, held.rejected);
-        assert_eq!(again.recording.point_id, ["B", "D", "E"]);
-    }
 }
