@@ -208,10 +208,9 @@ impl<'a> Trajectory<'a> {
                 .iter()
                 .flat_map(|all| &all[own.clone()])
                 .for_each(|u95| number(Some(*u95)));
-            let remark = judged.to_string();
-            let quote = if remark.contains(between) { "\"" } else { "" };
             text.push(between);
-            text.extend([quote, &remark, quote, "\n"]);
+            text::push_text(&mut text, &judged.to_string(), between);
+            text.push('\n');
         }
         text
     }
