@@ -159,7 +159,7 @@ fn targets(
     before: usize,
 ) -> Result<Vec<CommandTarget>> {
     let mut numbers = Vec::new();
-    for (index, role) in &columns.roles {
+    for (index, role, unit) in &columns.read {
         let column = batch.column(*index);
         let name = batch.schema().field(*index).name().clone();
         let cast = cast(column, &DataType::Float64).map_err(|_| {
@@ -171,19 +171,20 @@ fn targets(
                 ),
             )
         })?;
-        numbers.push((*role, name, cast));
+        numbers.push((*role, *unit, name, cast));
     }
     (0..batch.num_rows())
         .map(|row| {
             let mut taken = TargetRow::default();
-            for (role, name, column) in &numbers {
+            for (role, unit, name, column) in &numbers {
                 let values = column.as_primitive::<Float64Type>();
                 if !values.is_null(row) && values.value(row).is_finite() {
                     if let Some(message) = role.fault(values.value(row)) {
                         let place = format!("row {}: column `{name}`", before + row + 1);
                         return Err(Error::data(layout.place, format!("{place}: {message}")));
                     }
-                    taken.take(*role, values.value(row), layout.robot.joints.len());
+                    let number = unit.to_si(values.value(row));
+                    taken.take(*role, number, layout.robot.joints.len());
                 } else if role.is_needed() {
                     return Err(Error::data(
                         layout.place,

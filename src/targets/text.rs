@@ -377,7 +377,7 @@ pub(super) fn row(
         ));
     }
     let mut row = TargetRow::default();
-    for (index, role) in &columns.roles {
+    for (index, role, unit) in &columns.read {
         let (range, text) = &cells[*index];
         let (column, field) = (range.start + 1, index + 1);
         let value = parse(text, delimiter)
@@ -386,7 +386,7 @@ pub(super) fn row(
             if let Some(message) = role.fault(value) {
                 return Err(format!("column {column}: field {field}: {message}"));
             }
-            row.take(*role, value, layout.robot.joints.len());
+            row.take(*role, unit.to_si(value), layout.robot.joints.len());
         } else if role.is_needed() {
             return Err(format!("column {column} is empty"));
         }
