@@ -231,6 +231,27 @@ impl ExaminedFile {
         format!("{quantity}: {{column: {}{unit}}}", self.reference(column))
     }
 
+    /// Lines of three quantities, a column each.
+    pub(crate) fn lines(
+        &self,
+        quantities: [&str; 3],
+        columns: [usize; 3],
+        unit: &str,
+    ) -> Vec<String> {
+        let each = quantities.iter().zip(columns);
+        each.map(|(quantity, column)| self.line(quantity, column, Some(unit)))
+            .collect()
+    }
+
+    /// Columns as a list of the pipeline.
+    pub(crate) fn references(&self, columns: &[usize]) -> String {
+        let all: Vec<String> = columns
+            .iter()
+            .map(|column| self.reference(*column))
+            .collect();
+        format!("[{}]", all.join(", "))
+    }
+
     /// Maps a quantity to single columns, best first.
     pub(crate) fn map(
         &mut self,
@@ -278,13 +299,10 @@ impl ExaminedFile {
         };
         match pattern(&names).filter(|pattern| alone && !more(pattern)) {
             Some(pattern) => format!("{quantity}: {{column: {}{unit}}}", quoted(&pattern)),
-            None => {
-                let list: Vec<String> = columns
-                    .iter()
-                    .map(|column| self.reference(*column))
-                    .collect();
-                format!("{quantity}: {{columns: [{}]{unit}}}", list.join(", "))
-            }
+            None => format!(
+                "{quantity}: {{columns: {}{unit}}}",
+                self.references(columns)
+            ),
         }
     }
 

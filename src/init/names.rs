@@ -154,27 +154,8 @@ pub(super) fn joints(
     // The letters of a Yaskawa with seven axes hold those of one with six.
     found.sort_by_key(|columns| std::cmp::Reverse(columns.len()));
     found.truncate(1);
-    let parts: Vec<Option<(String, usize)>> = names.iter().map(Name::joint).collect();
-    let mut numbered: BTreeMap<&str, BTreeMap<usize, usize>> = BTreeMap::new();
-    for (column, (key, number)) in parts
-        .iter()
-        .enumerate()
-        .filter_map(|(column, part)| Some((column, part.as_ref()?)))
-    {
-        numbered
-            .entry(key)
-            .or_default()
-            .entry(*number)
-            .or_insert(column);
-    }
-    let run = |columns: &BTreeMap<usize, usize>| -> Vec<usize> {
-        let first = usize::from(!columns.contains_key(&0));
-        (first..).map_while(|n| columns.get(&n).copied()).collect()
-    };
-    let runs: Vec<(&str, Vec<usize>)> = numbered
-        .iter()
-        .map(|(key, columns)| (*key, run(columns)))
-        .collect();
+    let parts = names.iter().map(Name::joint).enumerate();
+    let runs = numbered(parts.filter_map(|(column, part)| Some((column, part?))));
     let mut usual: Vec<(usize, usize, Vec<usize>)> = Vec::new();
     for (key, columns) in runs.iter().filter(|(_, columns)| columns.len() > 1) {
         if let Some(rank) = usual_name(key) {
@@ -194,6 +175,24 @@ pub(super) fn joints(
     let longest = found.first().map_or(0, Vec::len);
     found.retain(|columns| columns.len() == longest);
     found
+}
+
+/// Columns that are numbered through from 0 or 1, by what they are called.
+pub(super) fn numbered(
+    parts: impl Iterator<Item = (usize, (String, usize))>,
+) -> Vec<(String, Vec<usize>)> {
+    let mut found: BTreeMap<String, BTreeMap<usize, usize>> = BTreeMap::new();
+    for (column, (key, number)) in parts {
+        let columns = found.entry(key).or_default();
+        columns.entry(number).or_insert(column);
+    }
+    let run = |columns: BTreeMap<usize, usize>| {
+        let first = usize::from(!columns.contains_key(&0));
+        let run = (first..).map_while(|number| columns.get(&number).copied());
+        run.collect()
+    };
+    let runs = found.into_iter();
+    runs.map(|(key, columns)| (key, run(columns))).collect()
 }
 
 /// Columns of joints that have names instead of numbers, in the order of the arm.

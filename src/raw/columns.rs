@@ -7,8 +7,10 @@ use super::arrays::{arrays, is_arrays};
 use super::record::{Record, RecordReader, failed};
 use super::{decoded, parquet};
 use crate::error::{Error, Result};
-use arrow::array::{Array, ArrayRef, AsArray, Int64Array, RecordBatch, RecordBatchReader};
-use arrow::compute::take;
+use arrow::array::{
+    Array, ArrayRef, AsArray, Int64Array, LargeListArray, RecordBatch, RecordBatchReader,
+};
+use arrow::compute::{cast, take};
 use arrow::datatypes::{DataType, Field, FieldRef, Schema, SchemaRef};
 use arrow::error::ArrowError;
 use arrow::util::display::{ArrayFormatter, FormatOptions};
@@ -303,49 +305,45 @@ fn decoder_message(error: &ArrowError) -> String {
 
 /// The same with lists of numbers as columns, as many as the longest list of the first rows has; a shorter list has blank cells.
 fn unfolded(schema: SchemaRef, mut batches: Batches) -> (SchemaRef, Batches) {
-    let fields = schema.fields();
-    if fields.iter().all(|field| number_of_list(field).is_none()) {
+    let numbers: Vec<Option<DataType>> = schema.fields().iter().map(number_of_list).collect();
+    if numbers.iter().all(Option::is_none) {
         return (schema, batches);
     }
     let first = batches.next();
-    let longest = |column: usize| {
-        let rows = first.as_ref().and_then(|batch| batch.as_ref().ok());
-        rows.map_or(0, |batch| {
-            lists(batch.column(column))
-                .1
-                .windows(2)
-                .map(|ends| ends[1] - ends[0])
-                .max()
-                .unwrap_or(0)
-        })
+    // Of a list of numbers its kind of numbers, and how many columns it becomes.
+    let longest = |column: usize, number: &DataType| {
+        let rows = first.as_ref()?.as_ref().ok()?;
+        let lists = lists(rows.column(column), number).ok()?;
+        let lengths = lists
+            .value_offsets()
+            .windows(2)
+            .map(|ends| ends[1] - ends[0]);
+        lengths.max().map(|longest| longest as usize)
     };
-    let width = |column: usize| Some(longest(column)).filter(|width| (1..=LONGEST).contains(width));
-    let widths: Vec<Option<usize>> = (0..fields.len())
-        .map(|k| number_of_list(&fields[k]).and_then(|_| width(k)))
-        .collect();
-    let columns = fields.iter().zip(&widths).flat_map(|(field, width)| {
-        match (number_of_list(field), width) {
-            (Some(number), Some(width)) => (1..=*width)
-                .map(|k| {
-                    Arc::new(Field::new(
-                        format!("{}[{k}]", field.name()),
-                        number.clone(),
-                        true,
-                    ))
-                })
-                .collect(),
-            _ => vec![field.clone()],
+    let wide = |(column, number): (usize, Option<DataType>)| {
+        let number = number?;
+        let width = longest(column, &number)?;
+        (1..=LONGEST).contains(&width).then_some((number, width))
+    };
+    let wide: Vec<Option<(DataType, usize)>> = numbers.into_iter().enumerate().map(wide).collect();
+    let columns = schema.fields().iter().zip(&wide);
+    let columns = columns.flat_map(|(field, wide)| match wide {
+        None => vec![field.clone()],
+        Some((number, width)) => {
+            let named = |k| Field::new(format!("{}[{k}]", field.name()), number.clone(), true);
+            (1..=*width).map(|k| Arc::new(named(k))).collect()
         }
     });
     let schema = Arc::new(Schema::new(columns.collect::<Vec<FieldRef>>()));
     let (rows, own) = (first.into_iter().chain(batches), schema.clone());
     let batches = rows.map(move |batch| {
-        let columns = batch?
-            .columns()
-            .iter()
-            .zip(&widths)
-            .map(|(column, width)| cells(column, *width))
-            .collect::<std::result::Result<Vec<_>, _>>();
+        let batch = batch?;
+        let columns = batch.columns().iter().zip(&wide);
+        let columns = columns.map(|(column, wide)| match wide {
+            None => Ok(vec![column.clone()]),
+            Some((number, width)) => cells(column, number, *width),
+        });
+        let columns = columns.collect::<std::result::Result<Vec<_>, _>>();
         columns
             .and_then(|columns| RecordBatch::try_new(own.clone(), columns.concat()))
             .map_err(|error| error.to_string())
@@ -354,58 +352,35 @@ fn unfolded(schema: SchemaRef, mut batches: Batches) -> (SchemaRef, Batches) {
 }
 
 /// What kind of numbers the lists of a column hold; none where it holds none.
-fn number_of_list(field: &Field) -> Option<&DataType> {
-    match field.data_type() {
-        DataType::List(of) | DataType::LargeList(of) | DataType::FixedSizeList(of, _) => {
-            Some(of.data_type())
-        }
-        _ => None,
-    }
-    .filter(|of| of.is_numeric())
+fn number_of_list(field: &FieldRef) -> Option<DataType> {
+    let (DataType::List(of) | DataType::LargeList(of) | DataType::FixedSizeList(of, _)) =
+        field.data_type()
+    else {
+        return None;
+    };
+    Some(of.data_type().clone()).filter(DataType::is_numeric)
 }
 
-/// The numbers of all lists of a column, and where each list begins among them, with the end of the last.
-fn lists(column: &ArrayRef) -> (&ArrayRef, Vec<usize>) {
-    if let Some(list) = column.as_list_opt::<i32>() {
-        return (
-            list.values(),
-            list.value_offsets().iter().map(|at| *at as usize).collect(),
-        );
-    }
-    if let Some(list) = column.as_list_opt::<i64>() {
-        return (
-            list.values(),
-            list.value_offsets().iter().map(|at| *at as usize).collect(),
-        );
-    }
-    let list = column.as_fixed_size_list();
-    (
-        list.values(),
-        (0..=list.len())
-            .map(|row| row * list.value_length() as usize)
-            .collect(),
-    )
+fn lists(column: &ArrayRef, number: &DataType) -> std::result::Result<LargeListArray, ArrowError> {
+    let of = Arc::new(Field::new_list_field(number.clone(), true));
+    cast(column, &DataType::LargeList(of)).map(|lists| lists.as_list().clone())
 }
 
-/// A column as it is, or so many columns of the numbers of its lists.
+/// The numbers of the lists of a column as so many columns.
 fn cells(
     column: &ArrayRef,
-    width: Option<usize>,
+    number: &DataType,
+    width: usize,
 ) -> std::result::Result<Vec<ArrayRef>, ArrowError> {
-    let Some(width) = width else {
-        return Ok(vec![column.clone()]);
-    };
-    let (values, starts) = lists(column);
-    let number = |k: usize| {
+    let lists = lists(column, number)?;
+    let starts = lists.value_offsets();
+    let numbers = |k: i64| {
         let at = |row: usize| {
-            (starts[row] + k < starts[row + 1] && !column.is_null(row))
-                .then_some((starts[row] + k) as i64)
+            let is_there = starts[row] + k < starts[row + 1] && !lists.is_null(row);
+            is_there.then_some(starts[row] + k)
         };
-        take(
-            values,
-            &(0..column.len()).map(at).collect::<Int64Array>(),
-            None,
-        )
+        let at: Int64Array = (0..lists.len()).map(at).collect();
+        take(lists.values(), &at, None)
     };
-    (0..width).map(number).collect()
+    (0..width as i64).map(numbers).collect()
 }

@@ -1,11 +1,16 @@
 //! Numbers as people write them.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
-/// The mark before decimals that a file announces.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The decimal mark.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Decimal")]
 pub enum DecimalMark {
     /// `0.365`
+    #[default]
     Point,
     /// `0,365`
     Comma,

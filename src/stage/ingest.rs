@@ -28,7 +28,7 @@ mod write;
 pub use clock::is_clock_time;
 pub use columns::Columns;
 pub use later::LaterFiles;
-pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
+pub use layout::{Axis, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
 pub use mapped::{
     ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, NameMatch,
     ScalarColumn, TextColumn, UncertaintyColumn, last_number,

@@ -5,13 +5,13 @@
 use crate::error::{Error, Fault, Result, counted};
 use crate::program::{JointList, Language, MOST_BYTES, joint_list, listing as language};
 use crate::raw::{
-    self, BagRows, ColumnRows, Delimiter, InputSource, Record, RecordReader, TextLayout, TextRows,
-    Workbook, failed, has_columns, is_bag, is_workbook, not_read,
+    self, BagRows, ColumnRows, DecimalMark, Delimiter, InputSource, Record, RecordReader,
+    TextLayout, TextRows, Workbook, failed, has_columns, is_bag, is_workbook, not_read,
 };
 use crate::stage::ingest::arm::RobotJoints;
 use crate::stage::ingest::bind::{Binding, FileHeader, bind};
 use crate::stage::ingest::external::ExternalAxes;
-use crate::stage::ingest::layout::{Decimal, FileLayout, LimitPolicy};
+use crate::stage::ingest::layout::{FileLayout, LimitPolicy};
 use crate::stage::ingest::refusal::RowRefusal;
 use crate::stage::ingest::row::{RecordedRow, RowReader};
 use crate::stage::{Context, OpenedInput};
@@ -34,7 +34,7 @@ pub struct TableLayout<'l> {
     /// How its rows are written, of text.
     pub(crate) text: TextLayout,
     /// The decimal mark of its numbers, of text and workbooks.
-    pub(crate) decimal: Decimal,
+    pub(crate) decimal: DecimalMark,
 }
 
 /// What a file is.
@@ -91,12 +91,7 @@ pub fn records(
         FileKind::Workbook => {
             let mut book = Workbook::read(reader).map_err(data)?;
             let name = book.sheet(layout.sheet).map_err(data)?;
-            let mark = if layout.decimal == Decimal::Comma {
-                ','
-            } else {
-                '.'
-            };
-            let lines = book.lines(&name, mark).map_err(data)?;
+            let lines = book.lines(&name, layout.decimal).map_err(data)?;
             let text = TextLayout {
                 delimiter: Delimiter::Byte(b'\t'),
                 ..layout.text
@@ -157,7 +152,7 @@ impl<'a> OpenedFile<'a> {
         let (header, decimal) = if reader.is_text() {
             (layout.header, layout.decimal)
         } else {
-            (true, Decimal::Point)
+            (true, DecimalMark::Point)
         };
         let mut record = Record::default();
         if !reader.next(&mut record)? {
@@ -316,13 +311,10 @@ const NUMBERED: [&str; 12] = [
 /// The joints that a program declares, row by row, in deg.
 pub(super) struct ListedRows {
     label: String,
-    /// `name`, then the axes.
-    names: Vec<&'static str>,
-    /// With the line at which each stands.
+    /// `name` and the axes, then the positions, each with the line at which it stands.
     rows: Vec<(u64, Vec<String>)>,
     /// How many poses were left out.
     poses: usize,
-    is_named: bool,
     /// Rows handed out.
     next: usize,
 }
@@ -357,24 +349,21 @@ impl ListedRows {
             rows.any(|row| row.external.get(*k).is_some_and(Option::is_some))
         };
         let used: Vec<usize> = (0..6).filter(has).collect();
-        let names = std::iter::once("name")
-            .chain(all[..6].iter().copied())
-            .chain(used.iter().map(|k| all[6 + k]));
-        let rows = list.rows.iter().map(|row| {
+        let names = std::iter::once("name").chain(all[..6].iter().copied());
+        let names = names.chain(used.iter().map(|k| all[6 + k]));
+        let mut rows = vec![(1, names.map(String::from).collect())];
+        rows.extend(list.rows.iter().map(|row| {
             let external = used.iter().map(|k| row.external[*k]);
-            let joints = row.joints.iter().map(|joint| Some(*joint));
-            let numbers = joints.chain(external);
+            let numbers = row.joints.iter().map(|joint| Some(*joint)).chain(external);
             let cells =
                 numbers.map(|number| number.map_or_else(String::new, |number| number.to_string()));
             let cells = std::iter::once(row.name.clone()).chain(cells);
             (row.line as u64, cells.collect())
-        });
+        }));
         Ok(Self {
             label: label.into(),
-            names: names.collect(),
-            rows: rows.collect(),
+            rows,
             poses: list.poses,
-            is_named: false,
             next: 0,
         })
     }
@@ -401,13 +390,6 @@ impl RecordReader for ListedRows {
         &self.label
     }
     fn next(&mut self, record: &mut Record) -> Result<bool> {
-        if !std::mem::replace(&mut self.is_named, true) {
-            record.begin(1);
-            self.names
-                .iter()
-                .for_each(|name| record.push(name.as_bytes()));
-            return Ok(true);
-        }
         let Some((line, cells)) = self.rows.get(self.next) else {
             return Ok(false);
         };
@@ -418,10 +400,8 @@ impl RecordReader for ListedRows {
     }
     /// The line of the last row handed out.
     fn lines(&self) -> u64 {
-        self.next
-            .checked_sub(1)
-            .and_then(|row| self.rows.get(row))
-            .map_or(0, |(line, _)| *line)
+        let last = self.next.checked_sub(1).filter(|last| *last > 0);
+        last.map_or(0, |last| self.rows[last].0)
     }
     fn bytes(&self) -> u64 {
         self.next as u64
