@@ -10,7 +10,6 @@ mod kinds;
 mod later;
 mod moving;
 mod noise;
-mod once;
 mod programs;
 mod refusals;
 mod together;

@@ -3,9 +3,9 @@
 use super::Ingest;
 use super::arm::RobotJoints;
 use super::layout::Join;
-use super::pair::{GivenUp, Partners};
+use super::pair::Partners;
 use super::refusal::{Reason, RowRefusal};
-use super::rows::FileRows;
+use super::rows::{FileRows, GivenUp};
 use crate::observation::{KINDS, Part};
 
 /// All files of a measurement, as they were read, and what they decide together.

@@ -4,12 +4,10 @@
 //! that is worth is seen from the same with neighbours twice as far (Richardson: the difference is three times the error).
 
 use super::arm::RobotJoints;
-use super::rows::FileRows;
 use crate::error::{Error, Result, counted};
 use crate::stage::Context;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 
 /// How joint velocities follow from the joints over time, where no columns give them: a parabola through each row and its
 /// neighbours in the file, never across gaps.
@@ -38,11 +36,11 @@ const OTHER_UNIT: f64 = 3.0;
 /// Times and joints of a file's usable rows.
 #[derive(Default)]
 pub(super) struct JointSamples {
-    rows: Vec<usize>,
-    time: Vec<f64>,
-    q: Vec<f64>,
+    pub(crate) rows: Vec<usize>,
+    pub(crate) time: Vec<f64>,
+    pub(crate) q: Vec<f64>,
     /// Velocities that the file gives.
-    given: Vec<f64>,
+    pub(crate) given: Vec<f64>,
 }
 
 /// Velocity and acceleration of the joints by data row. 16 bytes a joint and row.
@@ -53,24 +51,6 @@ pub(super) struct Track {
 }
 
 impl JointSamples {
-    /// Of the usable rows of a file, which gives velocities or not.
-    pub(super) fn of(rows: &FileRows, arm: &RobotJoints, gives_velocity: bool) -> Self {
-        let (mut samples, slots) = (Self::default(), &arm.slots);
-        let all =
-            |row: usize, places: Range<usize>| places.map(move |place| rows.value(row, place));
-        for row in rows.usable() {
-            let time = rows.value(row, slots.time);
-            if time.is_finite() {
-                samples.rows.push(row);
-                samples.time.push(time);
-                samples.q.extend(all(row, slots.q.clone()));
-                let given = all(row, slots.velocity.clone());
-                samples.given.extend(given.filter(|_| gives_velocity));
-            }
-        }
-        samples
-    }
-
     /// Neighbours of a row in one stretch without a gap: the rows of its parabola (the same twice where there are but two), `wide`
     /// times as far apart.
     fn around(&self, i: usize, [start, end]: [usize; 2], reach: usize) -> Option<[usize; 3]> {

@@ -2,22 +2,9 @@
 
 use super::Ingest;
 use super::layout::{Duplicates, Join};
-use super::rows::FileRows;
+use super::rows::{FileRows, GivenUp};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
-
-/// Why a row that can be used is not used after all; files and rows from 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum GivenUp {
-    /// A row of a file has the same id; `copied`: it has the same values too, and is used.
-    Duplicate {
-        file: usize,
-        row: usize,
-        copied: bool,
-    },
-    /// It has no partner in this file; where it is of another than the first, none in the first that has all others.
-    Unmatched { file: usize },
-}
 
 /// By file but the first, the row that belongs to each row of the first. Empty without a join.
 pub(super) type Partners = Vec<Vec<Option<usize>>>;

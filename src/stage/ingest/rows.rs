@@ -3,10 +3,9 @@
 //! Memory: 8 bytes a number and row, the texts, and the beginning of each line where another row may still be a reason not to use it.
 
 use super::Ingest;
-use super::arm::RobotJoints;
+use super::arm::{RobotJoints, Slots};
 use super::layout::{Duplicates, FileLayout};
 use super::motion::{JointSamples, Track};
-use super::pair::GivenUp;
 use super::reading::{OpenedFile, STRIDE};
 use super::refusal::{Refusals, beginning};
 use super::row::RecordedRow;
@@ -14,6 +13,7 @@ use crate::error::{Error, Result};
 use crate::stage::Context;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Texts one behind the other.
@@ -46,6 +46,19 @@ impl FileOddities {
         self.rows += 1;
         self.first.get_or_insert((line, joint, value));
     }
+}
+
+/// Why a row that can be used is not used after all; files and rows from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum GivenUp {
+    /// A row of a file has the same id; `copied`: it has the same values too, and is used.
+    Duplicate {
+        file: usize,
+        row: usize,
+        copied: bool,
+    },
+    /// It has no partner in this file; where it is of another than the first, none in the first that has all others.
+    Unmatched { file: usize },
 }
 
 /// The rows of a file, counted from 0.
@@ -180,6 +193,28 @@ impl FileRows {
             && (self.usable().zip(other.usable()))
                 .all(|(here, there)| here == there && self.says_same(here, other, there))
     }
+    /// When the usable rows were recorded, and where the joints were then.
+    fn samples(&self, slots: &Slots, gives_velocity: bool) -> JointSamples {
+        let mut samples = JointSamples::default();
+        for row in self.usable() {
+            let all = |places: &Range<usize>| {
+                places
+                    .clone()
+                    .map(|place| self.value(row, place))
+                    .collect::<Vec<_>>()
+            };
+            let time = self.value(row, slots.time);
+            if time.is_finite() {
+                samples.rows.push(row);
+                samples.time.push(time);
+                samples.q.extend(all(&slots.q));
+                if gives_velocity {
+                    samples.given.extend(all(&slots.velocity));
+                }
+            }
+        }
+        samples
+    }
     /// How far a joint turns over the rows at most, rad or m.
     pub(super) fn largest_turn(&self) -> f64 {
         let turns = self.ranges.iter().map(|[least, most]| most - least);
@@ -255,7 +290,7 @@ pub(super) fn read(
     for (rows, layout) in all.iter_mut().zip(&settings.files) {
         context.warn_each(rows.loss.take());
         if is_track(settings, layout) {
-            let samples = JointSamples::of(rows, arm, layout.columns.has("velocity"));
+            let samples = rows.samples(&arm.slots, layout.columns.has("velocity"));
             let count = rows.count();
             let track = samples.track(settings.motion.as_ref(), count, arm, &rows.label, context);
             rows.track = Some(track?);
