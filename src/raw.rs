@@ -64,7 +64,6 @@ pub fn text(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
-/// The bytes of a regular file.
 pub(crate) fn bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.read_to_end(&mut bytes)?;
@@ -107,7 +106,6 @@ pub(crate) fn decoded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
 
 /// A Parquet file, batch by batch; what is wrong with it comes in words, once.
 pub struct ParquetFile {
-    /// Its columns, as the file declares them.
     pub(crate) schema: SchemaRef,
     /// Rows by its footer.
     pub(crate) rows: u64,

@@ -52,7 +52,6 @@ pub(super) struct ExaminedFile {
     pub(crate) mappings: Vec<Mapping>,
     /// Seconds in the unit of a time column.
     pub(crate) second: f64,
-    /// Lines of comment.
     pub(crate) remarks: Vec<String>,
 }
 
@@ -128,7 +127,6 @@ impl ExaminedFile {
         self.remarks.extend(lines);
     }
 
-    /// What was found, for the terminal.
     pub(crate) fn account(&self) -> String {
         let mut parts: Vec<String> = self
             .sheet
@@ -231,7 +229,6 @@ impl ExaminedFile {
         format!("{quantity}: {{column: {}{unit}}}", self.reference(column))
     }
 
-    /// Lines of three quantities, a column each.
     pub(crate) fn lines(
         &self,
         quantities: [&str; 3],

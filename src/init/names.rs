@@ -36,7 +36,6 @@ impl Name {
         self.words.join("_")
     }
 
-    /// The unit, if it is one of these.
     pub(crate) fn unit_of(&self, allowed: &[&str]) -> Option<&'static str> {
         self.unit.filter(|unit| allowed.contains(unit))
     }
@@ -110,7 +109,6 @@ impl Name {
     }
 }
 
-/// Units of a coordinate.
 pub(super) const LENGTHS: [&str; 4] = ["mm", "m", "um", "in"];
 
 /// The axis that a word names, and what it says besides: `x`, `dx`, `xist`, `x2`.
@@ -247,7 +245,6 @@ pub(super) fn pattern(names: &[&str]) -> Option<String> {
     ones.into_iter().find(fits)
 }
 
-/// Whether a word is one of a list.
 pub(super) fn lists(list: &str, word: &str) -> bool {
     list.split(' ').any(|listed| listed == word)
 }
@@ -256,7 +253,6 @@ pub(super) fn lists(list: &str, word: &str) -> bool {
 pub(super) const JOINTS: &str = "q a rax j joint axis theta achse gelenk axe asse eje jnt joint_angle joint_state joint_states \
     observation_state qpos observation_qpos articulación";
 
-/// Names of joints without numbers.
 pub(super) const NAMED_JOINTS: [&[&str]; 3] = [
     &["s", "l", "u", "r", "b", "t"],
     &["s", "l", "e", "u", "r", "b", "t"],
@@ -304,7 +300,6 @@ pub(super) const SIGMA: &str =
 /// What columns of uncertainties with 95 % coverage are called.
 pub(super) const U95: &str = "u95";
 
-/// What columns of points' names are called.
 pub(super) const IDS: &str = "point point_id pointid point_name pointname id name pose pose_id nr no number nummer num punkt \
     punktname punktnummer punkt_nr messpunkt bezeichnung index label target measurement pt pts p nom \
     nombre nome punto point_no row sample messung repere repère n";

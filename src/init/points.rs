@@ -39,7 +39,6 @@ pub(super) struct Points {
     pub(crate) said: bool,
     /// Points of several targets side by side, by the targets' names; none where the names do not say so.
     pub(crate) targets: Vec<(String, [usize; 3])>,
-    /// A point that is wanted only.
     pub(crate) wanted: Option<[usize; 3]>,
     pub(crate) sigma: Option<[usize; 3]>,
 }

@@ -8,7 +8,6 @@ pub(super) use crate::raw::number_of_any_mark as number;
 /// So many lines say what separates fields.
 const ENOUGH: usize = 500;
 
-/// How comments begin.
 const COMMENTS: [&str; 4] = ["//", "#", "%", "!"];
 
 /// Fewer columns are no table of joints or points.
@@ -23,7 +22,6 @@ pub(super) struct Sheet {
     /// What else is to be known of it, in the pipeline and on the terminal.
     pub(crate) notes: Vec<String>,
     pub(crate) delimiter: char,
-    /// Decimal comma.
     pub(crate) comma: bool,
     /// Lines above the header, or above the data where there is none.
     pub(crate) skip: usize,
@@ -34,7 +32,6 @@ pub(super) struct Sheet {
     pub(crate) header: bool,
     /// Names of the columns; in a file without a header the numbers from 1.
     pub(crate) names: Vec<String>,
-    /// From a row of units.
     pub(crate) units: Vec<Option<&'static str>>,
     pub(crate) rows: Vec<Vec<String>>,
     /// Why nothing was understood, and what stands in the file.
@@ -106,7 +103,6 @@ impl Sheet {
         }
     }
 
-    /// A file of columns.
     pub(crate) fn of_columns(names: Vec<String>, rows: Vec<Vec<String>>) -> Self {
         Self {
             delimiter: ',',

@@ -44,9 +44,7 @@ impl Delimiter {
 /// A row that is taken apart, as far as it was read.
 #[derive(Debug, Clone, Copy, Default)]
 struct Splitter {
-    /// Bytes that were read.
     seen: usize,
-    /// Where the present field begins.
     start: usize,
     /// Where the quote stands that opened it and was not closed yet.
     open: Option<usize>,
@@ -107,7 +105,6 @@ impl Splitter {
         }
     }
 
-    /// Ends the present field before `at`.
     fn end_field(&mut self, text: &[u8], at: usize, fields: &mut Vec<Range<usize>>) {
         fields.push(self.start..at);
         self.start = at + 1;
@@ -163,7 +160,6 @@ pub fn unquoted_text(field: &str) -> Cow<'_, str> {
     }
 }
 
-/// The same of bytes.
 fn unquoted(field: &[u8]) -> Cow<'_, [u8]> {
     let field = field.trim_ascii();
     let Some(inner) = field.strip_prefix(b"\"") else {
@@ -190,7 +186,6 @@ fn unquoted(field: &[u8]) -> Cow<'_, [u8]> {
 /// How a delimited text is written; without more, commas between fields and a header on the first line.
 #[derive(Debug, Clone)]
 pub struct TextLayout {
-    /// What separates fields.
     pub(crate) delimiter: Delimiter,
     /// How lines begin that are no rows.
     pub(crate) comment: Option<String>,

@@ -45,7 +45,6 @@ impl Record {
         self.is_quoted = false;
         self.fault = None;
     }
-    /// Adds a field.
     pub(crate) fn push(&mut self, field: &[u8]) {
         if !self.fields.is_empty() {
             self.text.push(b',');
@@ -54,7 +53,6 @@ impl Record {
         self.text.extend_from_slice(field);
         self.fields.push(start..self.text.len());
     }
-    /// How many fields.
     pub(crate) fn len(&self) -> usize {
         self.fields.len()
     }

@@ -15,9 +15,7 @@ use std::io::{Cursor, Read};
 const MOST_BYTES: u64 = 512 << 20;
 /// Bytes of the texts of all cells.
 const MOST_TEXTS: u64 = 64 << 20;
-/// Cells of a sheet.
 const MOST_CELLS: usize = 10_000_000;
-/// Bytes of a sheet as text.
 const MOST_LINES: usize = 512 << 20;
 /// Rows of a sheet, by the format.
 const MOST_ROWS: u32 = 1 << 20;
@@ -301,7 +299,6 @@ fn texts(part: &mut impl Read, name: &str) -> Result<u64, String> {
     }
 }
 
-/// A cell as text.
 fn written(texts: &mut String, value: &DataRef, decimal: DecimalMark, is_1904: bool) {
     let start = texts.len();
     let result = match value {

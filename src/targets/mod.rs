@@ -159,9 +159,7 @@ fn corrected(
 /// The targets of a table that are not reached; their joints are empty.
 #[derive(Debug, Default)]
 pub(crate) struct Unreached {
-    /// How many targets were read.
     pub(crate) count: u64,
-    /// The first of them.
     pub(crate) faults: Vec<Fault>,
 }
 
@@ -180,9 +178,7 @@ impl Unreached {
 /// A target and the point that was measured, m, tracker's frame.
 #[derive(Debug, Clone)]
 pub struct MeasuredTarget {
-    /// As it was before correction.
     pub(crate) target: CommandTarget,
-    /// What was measured.
     pub(crate) point: Vector3<f64>,
 }
 

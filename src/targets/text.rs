@@ -144,7 +144,6 @@ pub(super) fn fields(line: &str, delimiter: char) -> Result<Vec<TextField<'_>>, 
     }
 }
 
-/// A table in memory.
 pub(super) struct TableText<'t> {
     pub(crate) delimiter: char,
     pub(crate) header: &'t str,
@@ -170,7 +169,6 @@ pub(super) fn table<'t>(text: &'t str, place: &str, expected: &str) -> Result<Ta
     })
 }
 
-/// The fields of a header.
 fn names<'t>(
     header: &'t str,
     delimiter: char,

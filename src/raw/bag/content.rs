@@ -11,11 +11,9 @@ use std::collections::BTreeMap;
 pub struct BagTopic {
     /// As the setting `topic` names it.
     pub(crate) name: String,
-    /// Its type.
     pub(crate) kind: String,
     /// Whether messages of this type are read.
     pub(crate) is_read: bool,
-    /// How many.
     pub(crate) messages: u64,
     /// When the first and the last were received, s since 1970.
     pub(crate) received: [f64; 2],
@@ -66,9 +64,7 @@ impl BagTopic {
 
 /// What a bag holds.
 pub struct BagContent {
-    /// Its topics by name.
     pub(crate) topics: Vec<BagTopic>,
-    /// What of it is lost.
     pub(crate) loss: Option<String>,
     source: Box<dyn InputSource>,
 }

@@ -51,7 +51,6 @@ pub(super) enum TextBinding {
     Value(String),
 }
 
-/// A column of numbers.
 pub(super) struct NumberBinding {
     /// Place in a row's numbers.
     pub(crate) index: usize,
@@ -69,7 +68,6 @@ pub(super) struct NumberBinding {
     pub(crate) sign: f64,
     /// The column, as people call it: `x_mm`, or `column 4`.
     pub(crate) name: String,
-    /// What is added to it.
     pub(crate) difference: Option<Difference>,
     /// Whether it holds clock times as text.
     pub(crate) is_clock: bool,

@@ -75,7 +75,6 @@ impl ExternalAxes {
         }
     }
 
-    /// Takes a row.
     pub(super) fn see(&mut self, record: &Record) {
         for (column, .., [least, most]) in &mut self.columns {
             if let Some(number) = number(record.field(*column), self.decimal)

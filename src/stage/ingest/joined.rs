@@ -14,7 +14,6 @@ pub(super) struct Measurement<'a> {
     pub(crate) arm: &'a RobotJoints,
     pub(crate) files: Vec<FileRows>,
     pub(crate) partners: Partners,
-    /// Names of the files in tables.
     pub(crate) names: &'a [String],
 }
 
