@@ -29,8 +29,6 @@ pub(super) struct Binding {
     pub(crate) conventions: Vec<(Range<usize>, &'static DeclaredColumn, &'static Convention)>,
     /// Whether the file has what a kind of measurement measured.
     pub(crate) measures: bool,
-    /// The kinds of measurement of which the file has something.
-    pub(crate) kinds: Vec<usize>,
     pub(crate) sequence: Option<usize>,
     pub(crate) cells: Vec<NumberBinding>,
     /// The point of each target of a wide row.
@@ -95,20 +93,12 @@ impl Binding {
             kind.name
                 .is_some_and(|name| self.texts.get(name).is_some_and(Option::is_some))
         };
-        let is_filled = |place: &usize| self.filled.binary_search(place).is_ok();
         let is_read = |kind: &KindSlots| {
-            kind.values
-                .iter()
-                .any(|place| self.cells.iter().any(|cell| cell.index == *place))
+            let mut cells = self.cells.iter();
+            cells.any(|cell| kind.values.contains(&cell.index))
         };
-        let kinds = &arm.slots.kinds;
-        self.measures = is_wide || kinds.iter().any(|kind| is_named(kind) || is_read(kind));
-        let is_bound = |kind: &KindSlots| {
-            is_named(kind) || kind.values.iter().chain(&kind.sigma).any(is_filled)
-        };
-        self.kinds = (0..kinds.len())
-            .filter(|index| is_bound(&kinds[*index]))
-            .collect();
+        let mut kinds = arm.slots.kinds.iter();
+        self.measures = is_wide || kinds.any(|kind| is_named(kind) || is_read(kind));
     }
     /// Columns that are read, and whether a row may lack them.
     pub(super) fn columns(&self) -> Vec<(usize, bool)> {

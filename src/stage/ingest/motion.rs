@@ -286,34 +286,3 @@ impl Track {
             .unwrap_or(0.0)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn samples(times: &[f64], q: impl Fn(f64) -> f64) -> JointSamples {
-        JointSamples {
-            rows: (0..times.len()).collect(),
-            time: times.to_vec(),
-            q: times.iter().map(|time| q(*time)).collect(),
-            given: Vec::new(),
-        }
-    }
-
-    #[test]
-    fn a_parabola_in_time_has_its_own_slope_everywhere() {
-        let samples = samples(&[0.0, 0.01, 0.025, 0.03, 0.05], |t| 3.0 * t * t - t);
-        for i in 0..5 {
-            for reach in 1..3 {
-                let around = samples.around(i, [0, 4], reach).unwrap();
-                let [velocity, acceleration] = samples.rate(1, 0, i, around);
-                assert!(
-                    (velocity - (6.0 * samples.time[i] - 1.0)).abs() < 1e-12
-                        && (acceleration - 6.0).abs() < 1e-9
-                );
-            }
-        }
-        assert_eq!(samples.around(2, [2, 2], 1), None);
-        assert_eq!(samples.around(2, [1, 2], 1), Some([1, 1, 2]));
-    }
-}

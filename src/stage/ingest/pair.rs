@@ -203,15 +203,6 @@ mod tests {
     }
 
     #[test]
-    fn rows_pair_with_their_mutual_nearest_in_time_only() {
-        let pairs = by_time(times(&[1.0, 2.0, 2.2, 9.0]), times(&[0.9, 2.15, 5.0]), 0.25);
-        assert_eq!(pairs, [(1, 1), (3, 2)]);
-        assert_eq!(by_time(times(&[1.0]), times(&[1.5]), 0.5), [(1, 1)]);
-        assert_eq!(by_time(times(&[1.0]), times(&[1.6]), 0.5), []);
-        assert_eq!(by_time(times(&[]), times(&[1.6]), 0.5), []);
-    }
-
-    #[test]
     fn clocks_that_stand_still_pair_one_row_in_linear_time() {
         let still = times(&vec![2.0e13; 200_000]);
         assert_eq!(by_time(still.clone(), still, 1.0), [(1, 1)]);

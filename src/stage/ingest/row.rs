@@ -224,12 +224,7 @@ impl<'a> RowReader<'a> {
     /// A row measured something, and what needs a standard deviation has one; of what this file holds.
     fn measured(&self, row: &RecordedRow) -> Result<(), RowRefusal> {
         let there = |index: &usize| row.values.get(*index).is_some_and(|value| !value.is_nan());
-        let kinds = || {
-            self.binding
-                .kinds
-                .iter()
-                .map(|kind| &self.arm.slots.kinds[*kind])
-        };
+        let kinds = self.arm.slots.kinds.iter();
         let is_named = |kind: &KindSlots| {
             kind.name
                 .and_then(|name| row.texts.get(name))
@@ -238,11 +233,13 @@ impl<'a> RowReader<'a> {
         let seen = row.points.iter().any(|point| !point[0].is_nan());
         if self.binding.measures
             && !seen
-            && !kinds().any(|kind| kind.values.iter().any(there) || is_named(kind))
+            && !kinds
+                .clone()
+                .any(|kind| kind.values.iter().any(there) || is_named(kind))
         {
             return refuse(Reason::Blank, "nothing was measured in this row".into());
         }
-        for slots in kinds().filter(|slots| slots.own_sigma) {
+        for slots in kinds.filter(|slots| slots.own_sigma) {
             let KindSlots {
                 kind,
                 values,
