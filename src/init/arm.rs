@@ -270,19 +270,7 @@ impl ExaminedFile {
     }
 
     fn drive(&mut self, quantity: &'static str, rows: &[Vec<usize>], unit: &str, check: Vec<&str>) {
-        let choice = |columns: &Vec<usize>| {
-            Choice::of(
-                vec![self.joints_line(quantity, columns, Some(unit))],
-                columns.clone(),
-            )
-        };
-        let (first, last) = (rows[0][0], rows[0][rows[0].len() - 1]);
-        let account = format!(
-            "{quantity} ({} to {})",
-            self.sheet.names[first], self.sheet.names[last]
-        );
-        let choices: Vec<Choice> = rows.iter().map(choice).collect();
-        let check = check.into_iter().map(String::from);
-        self.propose(quantity, choices, check, account);
+        let checks = check.into_iter().map(String::from);
+        self.propose_joints(quantity, rows, Some(unit), checks, quantity);
     }
 }

@@ -303,6 +303,30 @@ impl ExaminedFile {
         }
     }
 
+    /// Proposes rows of columns, one column a joint, best first.
+    pub(crate) fn propose_joints(
+        &mut self,
+        quantity: &'static str,
+        rows: &[Vec<usize>],
+        unit: Option<&str>,
+        checks: impl IntoIterator<Item = String>,
+        what: &str,
+    ) {
+        let choice = |columns: &Vec<usize>| {
+            Choice::of(
+                vec![self.joints_line(quantity, columns, unit)],
+                columns.clone(),
+            )
+        };
+        let choices: Vec<Choice> = rows.iter().map(choice).collect();
+        let ends = [rows[0].first(), rows[0].last()].into_iter().flatten();
+        let ends: Vec<&str> = ends
+            .map(|column| self.sheet.names[*column].as_str())
+            .collect();
+        let account = format!("{what} ({})", ends.join(" to "));
+        self.propose(quantity, choices, checks, account);
+    }
+
     pub(crate) fn distinct(&self, column: usize) -> usize {
         self.sheet
             .texts(column)

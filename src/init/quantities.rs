@@ -120,20 +120,8 @@ impl ExaminedFile {
         let of_list = (numbers > count)
             .then(|| format!("of the {numbers} numbers of the list the first {count}"));
         let checks = several.into_iter().chain(of_list).chain(why);
-        let account = format!(
-            "{} joints ({} to {})",
-            best.len(),
-            self.sheet.names[best[0]],
-            self.sheet.names[best[best.len() - 1]]
-        );
-        let choice = |columns: &Vec<usize>| {
-            Choice::of(
-                vec![self.joints_line("q", columns, Some(unit))],
-                columns.clone(),
-            )
-        };
-        let choices: Vec<Choice> = rows.iter().map(choice).collect();
-        self.propose("q", choices, checks, account);
+        let what = format!("{} joints", best.len());
+        self.propose_joints("q", &rows, Some(unit), checks, &what);
     }
 
     /// Whether four columns are a quaternion.

@@ -317,8 +317,8 @@ fn written(texts: &mut String, value: &DataRef, decimal: DecimalMark, is_1904: b
         DataRef::SharedString(text) => return quoted(texts, text),
     };
     if result.is_ok() && decimal == DecimalMark::Comma && matches!(value, DataRef::Float(_)) {
-        let own = texts.split_off(start).replace('.', ",");
-        texts.push_str(&own);
+        let number = texts.split_off(start).replace('.', ",");
+        texts.push_str(&number);
     }
 }
 

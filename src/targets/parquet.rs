@@ -89,8 +89,8 @@ impl<W: Write + Send> TargetTable for ParquetTable<'_, W> {
             Arc::new(numbers.collect::<Float64Array>())
         };
         let joints = &self.columns.joints;
-        let own = self.batch.iter().flat_map(RecordBatch::columns).enumerate();
-        let own = own.map(|(index, column)| {
+        let kept = self.batch.iter().flat_map(RecordBatch::columns).enumerate();
+        let kept = kept.map(|(index, column)| {
             let joint = joints.iter().position(|(column, _)| *column == index);
             joint.map_or_else(
                 || column.clone(),
@@ -114,7 +114,7 @@ impl<W: Write + Send> TargetTable for ParquetTable<'_, W> {
                 column => numbers(*column),
             }
         });
-        let batch = RecordBatch::try_new(self.schema.clone(), own.chain(appended).collect())
+        let batch = RecordBatch::try_new(self.schema.clone(), kept.chain(appended).collect())
             .map_err(|error| Error::Bug(error.to_string()))?;
         let written = self.writer.write(&batch);
         written
@@ -125,7 +125,7 @@ impl<W: Write + Send> TargetTable for ParquetTable<'_, W> {
 
 fn described(schema: &Schema, columns: &TargetColumns, appended: &[Appended]) -> Schema {
     let joint = |index: usize| columns.joints.iter().any(|(column, _)| *column == index);
-    let own = schema
+    let kept = schema
         .fields()
         .iter()
         .enumerate()
@@ -147,7 +147,7 @@ fn described(schema: &Schema, columns: &TargetColumns, appended: &[Appended]) ->
         Arc::new(Field::new(column.name(), kind, is_joint))
     });
     Schema::new_with_metadata(
-        own.chain(appended).collect::<Vec<_>>(),
+        kept.chain(appended).collect::<Vec<_>>(),
         schema.metadata().clone(),
     )
 }

@@ -1,6 +1,5 @@
 //! Raw files become a recording; what does not is named with file, line and reason.
 
-mod blocks;
 mod clocks;
 mod counting;
 mod external;
@@ -8,6 +7,7 @@ mod feather;
 mod foreign;
 mod kinds;
 mod later;
+mod long;
 mod moving;
 mod noise;
 mod programs;
