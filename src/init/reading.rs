@@ -76,7 +76,7 @@ fn first_rows(
         topic,
         ..TableLayout::default()
     };
-    let mut rows = records(source, label, layout)?;
+    let (_, mut rows) = records(source, label, layout)?;
     let (mut record, mut found) = (Record::default(), Vec::new());
     while found.len() <= LINES && rows.next(&mut record)? {
         if record.fault.is_none() {

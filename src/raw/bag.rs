@@ -178,7 +178,6 @@ impl Messages {
 
 /// Reads one topic of a bag, message by message.
 pub struct BagRows {
-    label: String,
     messages: Messages,
     /// The topic, and the frames of it that are wanted.
     topic: String,
@@ -242,10 +241,9 @@ impl BagRows {
             ));
         };
         cells.is_closed = true;
-        let (label, topic, frames) = (label.into(), name.to_string(), frames.map(String::from));
+        let (topic, frames) = (name.to_string(), frames.map(String::from));
         let text = zmij::Buffer::new();
         Ok(Self {
-            label,
             messages,
             topic,
             frames,
@@ -310,9 +308,6 @@ fn time(ns: i64) -> String {
 }
 
 impl RecordReader for BagRows {
-    fn label(&self) -> &str {
-        &self.label
-    }
     fn next(&mut self, record: &mut Record) -> Result<bool> {
         record.begin(self.rows);
         if !std::mem::replace(&mut self.is_named, true) {

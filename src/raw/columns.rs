@@ -150,9 +150,6 @@ impl ColumnRows {
 }
 
 impl RecordReader for ColumnRows {
-    fn label(&self) -> &str {
-        &self.label
-    }
     fn next(&mut self, record: &mut Record) -> Result<bool> {
         record.begin(self.rows);
         if !std::mem::replace(&mut self.is_named, true) {

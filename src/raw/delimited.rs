@@ -329,9 +329,6 @@ impl<R: BufRead> TextRows<R> {
 }
 
 impl<R: BufRead + Send> RecordReader for TextRows<R> {
-    fn label(&self) -> &str {
-        &self.label
-    }
     fn next(&mut self, record: &mut Record) -> Result<bool> {
         loop {
             record.text.clear();

@@ -82,8 +82,6 @@ impl Record {
 
 /// Hands out the rows of one file, from its first byte to its last.
 pub trait RecordReader: Send {
-    /// The file as the person named it, of a workbook with its sheet.
-    fn label(&self) -> &str;
     /// The names of the columns where it has them, then row by row; false at the end. Fails where the file is damaged.
     fn next(&mut self, record: &mut Record) -> Result<bool>;
     /// Lines of the file read so far; rows where it has no lines.

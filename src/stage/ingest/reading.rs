@@ -67,12 +67,12 @@ impl FileKind {
     }
 }
 
-/// Opens a table of any kind.
+/// Opens a table of any kind; with its name for messages, of a workbook with its sheet.
 pub fn records(
     source: Box<dyn InputSource>,
     label: &str,
     layout: TableLayout,
-) -> Result<Box<dyn RecordReader>> {
+) -> Result<(String, Box<dyn RecordReader>)> {
     let mut reader = BufReader::with_capacity(BUFFER, source);
     let head = reader.fill_buf().map_err(|error| failed(label, &error))?;
     let kind = FileKind::of(label, head);
@@ -87,17 +87,18 @@ pub fn records(
             "is no recording of ROS 2, and has no topic `{topic}`; allowed: a file .mcap or .db3, or no `topic`"
         )));
     }
-    Ok(match kind {
+    let mut name = label.to_string();
+    let rows: Box<dyn RecordReader> = match kind {
         FileKind::Workbook => {
             let mut book = Workbook::read(reader).map_err(data)?;
-            let name = book.sheet(layout.sheet).map_err(data)?;
-            let lines = book.lines(&name, layout.decimal).map_err(data)?;
+            let sheet = book.sheet(layout.sheet).map_err(data)?;
+            let lines = book.lines(&sheet, layout.decimal).map_err(data)?;
             let text = TextLayout {
                 delimiter: Delimiter::Byte(b'\t'),
                 ..layout.text
             };
-            let label = format!("{label} sheet `{name}`");
-            Box::new(TextRows::open(Cursor::new(lines), &label, text)?)
+            name.push_str(&format!(" sheet `{sheet}`"));
+            Box::new(TextRows::open(Cursor::new(lines), &name, text)?)
         }
         FileKind::Bag => Box::new(BagRows::open(reader.into_inner(), label, layout.topic)?),
         FileKind::Program(language) => Box::new(ListedRows::open(reader, label, language)?),
@@ -108,7 +109,8 @@ pub fn records(
             let reader = BufReader::with_capacity(BUFFER, reader);
             Box::new(TextRows::open(reader, label, layout.text)?)
         }
-    })
+    };
+    Ok((name, rows))
 }
 
 /// An opened file below its header.
@@ -147,8 +149,7 @@ impl<'a> OpenedFile<'a> {
             },
             decimal: layout.decimal,
         };
-        let mut reader = records(source.reader, &source.label, table)?;
-        let label = reader.label().to_string();
+        let (label, mut reader) = records(source.reader, &source.label, table)?;
         let (header, decimal) = if reader.is_text() {
             (layout.header, layout.decimal)
         } else {
@@ -310,7 +311,6 @@ const NUMBERED: [&str; 12] = [
 
 /// The joints that a program declares, row by row, in deg.
 pub(super) struct ListedRows {
-    label: String,
     /// `name` and the axes, then the positions, each with the line at which it stands.
     rows: Vec<(u64, Vec<String>)>,
     /// How many poses were left out.
@@ -361,7 +361,6 @@ impl ListedRows {
             (row.line as u64, cells.collect())
         }));
         Ok(Self {
-            label: label.into(),
             rows,
             poses: list.poses,
             next: 0,
@@ -386,9 +385,6 @@ fn none(list: &JointList, language: Language) -> String {
 }
 
 impl RecordReader for ListedRows {
-    fn label(&self) -> &str {
-        &self.label
-    }
     fn next(&mut self, record: &mut Record) -> Result<bool> {
         let Some((line, cells)) = self.rows.get(self.next) else {
             return Ok(false);
