@@ -5,13 +5,14 @@
 
 use super::arrays::{arrays, is_arrays};
 use super::record::{Record, RecordReader, failed};
-use super::{decoded, parquet};
+use super::{BatchFile, decoded, parquet};
 use crate::error::{Error, Result};
 use arrow::array::{
-    Array, ArrayRef, AsArray, Int64Array, LargeListArray, RecordBatch, RecordBatchReader,
+    Array, ArrayRef, AsArray, Int64Array, LargeListArray, RecordBatch, RecordBatchIterator,
+    RecordBatchReader,
 };
 use arrow::compute::{cast, take};
-use arrow::datatypes::{DataType, Field, FieldRef, Schema, SchemaRef};
+use arrow::datatypes::{DataType, Field, FieldRef, Schema};
 use arrow::error::ArrowError;
 use arrow::util::display::{ArrayFormatter, FormatOptions};
 use arrow_ipc::reader::{FileReader, StreamReader};
@@ -32,8 +33,6 @@ const MOST_UNPACKED: i64 = 1 << 30;
 /// How a stream of Arrow begins: a message of some length follows.
 const STREAM: &[u8] = b"\xff\xff\xff\xff";
 
-type Batches = Box<dyn Iterator<Item = std::result::Result<RecordBatch, String>> + Send>;
-
 /// Whether a file that begins so is one of columns.
 pub fn has_columns(head: &[u8]) -> bool {
     [PARQUET, FEATHER[0], FEATHER[1], STREAM]
@@ -47,11 +46,9 @@ pub struct ColumnRows {
     label: String,
     /// E.g. `a Parquet file`.
     what: &'static str,
-    schema: SchemaRef,
-    batches: Batches,
-    /// Bytes of the file, and its rows where it says so.
+    file: BatchFile,
+    /// Bytes of the file.
     size: u64,
-    all: Option<u64>,
     is_named: bool,
     batch: Option<RecordBatch>,
     /// The cells of some rows, column by column.
@@ -74,10 +71,7 @@ impl ColumnRows {
         let size = content.len() as u64;
         let mut remark = None;
         let (what, opened) = if content.starts_with(PARQUET) {
-            let opened = parquet(bytes::Bytes::from(content), HELD).map(|file| {
-                let (schema, rows) = (file.schema.clone(), file.rows);
-                (schema, Some(rows), Box::new(file) as Batches)
-            });
+            let opened = parquet(bytes::Bytes::from(content), HELD);
             ("a Parquet file", opened)
         } else if content.starts_with(FEATHER[0]) {
             let message = "is a Feather file of version 1; allowed: version 2, which every writer of today makes, Parquet or text";
@@ -85,32 +79,26 @@ impl ColumnRows {
         } else if is_arrays(&content) {
             let table = arrays(content).map(|(table, left)| {
                 remark = left;
-                let (schema, rows) = (table.schema(), table.num_rows() as u64);
-                (
-                    schema,
-                    Some(rows),
-                    Box::new(std::iter::once(Ok(table))) as Batches,
-                )
+                let (schema, rows) = (table.schema(), Some(table.num_rows() as u64));
+                let file = BatchFile::of(RecordBatchIterator::new([Ok(table)], schema));
+                BatchFile { rows, ..file }
             });
             ("an archive of NumPy arrays", table)
         } else if content.starts_with(STREAM) {
             let file = bounded(&content)
                 .and_then(|()| decoded(|| StreamReader::try_new(Cursor::new(content), None)));
-            ("a stream of Arrow", file.and_then(batches_of))
+            ("a stream of Arrow", file.and_then(in_memory))
         } else {
             let file = bounded(&content)
                 .and_then(|()| decoded(|| FileReader::try_new(Cursor::new(content), None)));
-            ("a Feather file", file.and_then(batches_of))
+            ("a Feather file", file.and_then(in_memory))
         };
-        let (schema, all, batches) = opened.map_err(|error| broken(label, what, error))?;
-        let (schema, batches) = unfolded(schema, batches);
+        let file = unfolded(opened.map_err(|error| broken(label, what, error))?);
         Ok(Self {
             label: label.into(),
             what,
-            schema,
-            batches,
+            file,
             size,
-            all,
             is_named: false,
             batch: None,
             text: String::new(),
@@ -126,7 +114,7 @@ impl ColumnRows {
         let broken = |error: &dyn Display| broken(&self.label, self.what, error);
         let batch = match self.batch.take() {
             Some(batch) => batch,
-            None => match self.batches.next() {
+            None => match self.file.next() {
                 Some(batch) => batch.map_err(|error| broken(&error))?,
                 None => return Ok(false),
             },
@@ -153,7 +141,8 @@ impl RecordReader for ColumnRows {
     fn next(&mut self, record: &mut Record) -> Result<bool> {
         record.begin(self.rows);
         if !std::mem::replace(&mut self.is_named, true) {
-            self.schema
+            self.file
+                .schema
                 .fields()
                 .iter()
                 .for_each(|field| record.push(field.name().as_bytes()));
@@ -179,7 +168,7 @@ impl RecordReader for ColumnRows {
     }
     /// Progress as a part of the file.
     fn bytes(&self) -> u64 {
-        let all = self.all.unwrap_or_default().max(1);
+        let all = self.file.rows.unwrap_or_default().max(1);
         (u128::from(self.size) * u128::from(self.rows.min(all)) / u128::from(all)) as u64
     }
 }
@@ -265,48 +254,31 @@ fn message(content: &[u8], at: usize) -> Option<(arrow_ipc::Message<'_>, usize)>
 }
 
 /// Columns of Arrow as they stand in memory, in a Feather file, as pandas, polars and R write them, or in a stream; uncompressed or by zstd.
-fn batches_of<R>(
-    opened: std::result::Result<R, ArrowError>,
-) -> std::result::Result<(SchemaRef, Option<u64>, Batches), String>
-where
-    R: RecordBatchReader + Send + 'static,
-{
-    let mut file = opened.map_err(|error| error.to_string())?;
-    let schema = file.schema();
-    // A decoder that gave up is not asked again.
-    let mut whole = true;
-    let batches = std::iter::from_fn(move || {
-        let next = if whole {
-            decoded(|| file.next())
-        } else {
-            Ok(None)
-        };
-        let batch = next.map_or_else(
-            |message| Some(Err(message)),
-            |batch| batch.map(|batch| batch.map_err(|error| decoder_message(&error))),
-        );
-        whole = matches!(batch, Some(Ok(_)));
-        batch
-    });
-    Ok((schema, None, Box::new(batches)))
-}
-
-/// What the decoder says, and what to do where the file is compressed in a way that it does not know.
-fn decoder_message(error: &ArrowError) -> String {
-    let text = error.to_string();
-    if text.contains("lz4") {
-        return "its columns are compressed by LZ4; allowed: none or zstd, e.g. `to_feather(FILE, compression=\"zstd\")`".into();
+fn in_memory(
+    opened: std::result::Result<impl RecordBatchReader + Send + 'static, ArrowError>,
+) -> std::result::Result<BatchFile, String> {
+    let file = BatchFile::of(opened.map_err(|error| error.to_string())?);
+    let advised = |message: String| {
+        match message.contains("lz4") {
+        true => "its columns are compressed by LZ4; allowed: none or zstd, e.g. `to_feather(FILE, compression=\"zstd\")`".into(),
+        false => message,
     }
-    text
+    };
+    let batches = file.batches.map(move |batch| batch.map_err(advised));
+    Ok(BatchFile {
+        batches: Box::new(batches),
+        ..file
+    })
 }
 
 /// The same with lists of numbers as columns, as many as the longest list of the first rows has; a shorter list has blank cells.
-fn unfolded(schema: SchemaRef, mut batches: Batches) -> (SchemaRef, Batches) {
-    let numbers: Vec<Option<DataType>> = schema.fields().iter().map(number_of_list).collect();
+fn unfolded(mut file: BatchFile) -> BatchFile {
+    let fields = file.schema.fields().clone();
+    let numbers: Vec<Option<DataType>> = fields.iter().map(number_of_list).collect();
     if numbers.iter().all(Option::is_none) {
-        return (schema, batches);
+        return file;
     }
-    let first = batches.next();
+    let first = file.next();
     // Of a list of numbers its kind of numbers, and how many columns it becomes.
     let longest = |column: usize, number: &DataType| {
         let rows = first.as_ref()?.as_ref().ok()?;
@@ -323,7 +295,7 @@ fn unfolded(schema: SchemaRef, mut batches: Batches) -> (SchemaRef, Batches) {
         (1..=LONGEST).contains(&width).then_some((number, width))
     };
     let wide: Vec<Option<(DataType, usize)>> = numbers.into_iter().enumerate().map(wide).collect();
-    let columns = schema.fields().iter().zip(&wide);
+    let columns = fields.iter().zip(&wide);
     let columns = columns.flat_map(|(field, wide)| match wide {
         None => vec![field.clone()],
         Some((number, width)) => {
@@ -332,8 +304,8 @@ fn unfolded(schema: SchemaRef, mut batches: Batches) -> (SchemaRef, Batches) {
         }
     });
     let schema = Arc::new(Schema::new(columns.collect::<Vec<FieldRef>>()));
-    let (rows, own) = (first.into_iter().chain(batches), schema.clone());
-    let batches = rows.map(move |batch| {
+    let unfolded = schema.clone();
+    let batches = first.into_iter().chain(file.batches).map(move |batch| {
         let batch = batch?;
         let columns = batch.columns().iter().zip(&wide);
         let columns = columns.map(|(column, wide)| match wide {
@@ -342,10 +314,14 @@ fn unfolded(schema: SchemaRef, mut batches: Batches) -> (SchemaRef, Batches) {
         });
         let columns = columns.collect::<std::result::Result<Vec<_>, _>>();
         columns
-            .and_then(|columns| RecordBatch::try_new(own.clone(), columns.concat()))
+            .and_then(|columns| RecordBatch::try_new(unfolded.clone(), columns.concat()))
             .map_err(|error| error.to_string())
     });
-    (schema, Box::new(batches))
+    BatchFile {
+        schema,
+        rows: file.rows,
+        batches: Box::new(batches),
+    }
 }
 
 /// What kind of numbers the lists of a column hold; none where it holds none.

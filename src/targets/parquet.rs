@@ -4,7 +4,7 @@ use super::columns::{TargetColumns, TargetRow};
 use super::{Appended, Layout, TargetTable, Unreached, corrected};
 use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
 use crate::error::{Error, Result};
-use crate::raw::{self, ParquetFile};
+use crate::raw::{self, BatchFile};
 use crate::units::Unit;
 use arrow::array::{Array, ArrayRef, AsArray, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
@@ -63,7 +63,7 @@ struct ParquetTable<'a, W: Write + Send> {
     layout: &'a Layout<'a>,
     columns: &'a TargetColumns,
     appended: Vec<Appended>,
-    reader: ParquetFile,
+    reader: BatchFile,
     /// The rows that were read last, and how many were read before them.
     batch: Option<RecordBatch>,
     rows: usize,
