@@ -305,14 +305,17 @@ fn columns(place: &str, names: &[String], robot: &RobotDescription) -> Result<Ve
     if faults.is_empty() && !has(ColumnRole::Time) {
         faults.push(Fault::new(place, "has no column time_s"));
     }
-    let per_joint: [(&str, bool, fn(usize) -> ColumnRole); 3] = [
-        ("q", true, ColumnRole::Joint),
-        ("dq", false, ColumnRole::Velocity),
-        ("ddq", false, ColumnRole::Acceleration),
+    let roles = [
+        ColumnRole::Joint,
+        ColumnRole::Velocity,
+        ColumnRole::Acceleration,
     ];
-    for (what, needed, role) in per_joint {
+    for (what, role) in ["q", "dq", "ddq"]
+        .into_iter()
+        .zip(roles as [fn(usize) -> ColumnRole; 3])
+    {
         let found = (0..n).filter(|joint| has(role(*joint))).count();
-        if faults.is_empty() && found != n && (needed || found > 0) {
+        if faults.is_empty() && found != n && (what == "q" || found > 0) {
             let message = format!(
                 "has columns {what} of {found} of the robot's {n} joints: give all of them"
             );

@@ -186,13 +186,13 @@ impl<'a> RecordingChunks<'a> {
         }
         let parts = || joined.iter().map(|(file, row)| (&all.files[*file], *row));
         // By id, all have the same one.
-        let id = parts()
-            .map(|(rows, row)| rows.id(row))
-            .filter(|id| !id.is_empty())
-            .last();
+        let mut ids = parts().rev().map(|(rows, row)| rows.id(row));
+        let id = ids.find(|id| !id.is_empty());
         let text = |place: usize| {
-            let texts = parts().filter_map(|(rows, row)| rows.text(row, place));
-            texts.last().unwrap_or_default()
+            let mut texts = parts()
+                .rev()
+                .filter_map(|(rows, row)| rows.text(row, place));
+            texts.next().unwrap_or_default()
         };
         self.carry(all, &joined);
         let number = self.before + row + 1;
@@ -209,8 +209,8 @@ impl<'a> RecordingChunks<'a> {
                 })?;
         self.merged[slots.time] = time;
         let unnamed = || {
-            let names = slots.kinds.iter().filter_map(|kind| kind.name).map(text);
-            names.filter(|name| !name.is_empty()).next().map_or_else(
+            let mut names = slots.kinds.iter().filter_map(|kind| kind.name).map(text);
+            names.find(|name| !name.is_empty()).map_or_else(
                 || format!("row {number}"),
                 |name| format!("{name} row {}", row + 1),
             )
