@@ -256,17 +256,6 @@ impl<R: BufRead> TextRows<R> {
     }
     /// Appends one physical line without its end; false at the end of the file.
     fn line(&mut self, text: &mut Vec<u8>) -> Result<bool> {
-        let buffer = self
-            .reader
-            .fill_buf()
-            .map_err(|error| failed(&self.label, &error))?;
-        if let Some(end) = memchr(b'\n', buffer).filter(|end| text.len() + end < LONGEST) {
-            text.extend_from_slice(buffer[..end].strip_suffix(b"\r").unwrap_or(&buffer[..end]));
-            self.reader.consume(end + 1);
-            (self.bytes, self.lines) = (self.bytes + end as u64 + 1, self.lines + 1);
-            return Ok(true);
-        }
-        // It ends beyond what is held, or is the last one.
         let room = LONGEST.saturating_sub(text.len()) as u64;
         let read = (&mut self.reader)
             .take(room)

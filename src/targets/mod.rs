@@ -23,8 +23,10 @@ pub(crate) mod parquet;
 pub(crate) mod text;
 mod trajectory;
 
-/// Rows that are told of one file.
+/// Faults that are named of one file.
 const MOST: usize = 20;
+/// Rows held in memory at a time.
+const BATCH: usize = 1 << 13;
 
 /// What holds for a whole table.
 pub struct Layout<'a> {

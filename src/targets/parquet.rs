@@ -1,7 +1,7 @@
 //! Targets in Parquet: batch by batch, columns of joints replaced, all others passed on, what is known of each target appended.
 
 use super::columns::{TargetColumns, TargetRow};
-use super::{Appended, Layout, TargetTable, Unreached, corrected};
+use super::{Appended, BATCH, Layout, TargetTable, Unreached, corrected};
 use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
 use crate::error::{Error, Result};
 use crate::raw::{self, BatchFile};
@@ -13,9 +13,6 @@ use parquet::arrow::ArrowWriter;
 use std::fs::File;
 use std::io::Write;
 use std::sync::Arc;
-
-/// Rows held in memory at a time.
-const BATCH: usize = 1 << 13;
 
 /// Reads targets from a Parquet file and writes them corrected as another.
 pub(crate) fn stream(

@@ -1,7 +1,7 @@
 //! Targets in delimited text: read in batches, every byte kept but the numbers of joints; what is known of each is appended.
 
 use super::columns::{TargetColumns, TargetRow};
-use super::{Appended, Layout, TargetTable, Unreached, corrected};
+use super::{Appended, BATCH, Layout, MOST, TargetTable, Unreached, corrected};
 use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
 use crate::error::{Error, Fault, Result};
 use crate::raw::{self, DecimalMark, Delimiter, NumberFault, number, unquoted_text};
@@ -12,14 +12,8 @@ use std::fmt::Write as _;
 use std::io::{BufRead, ErrorKind, Read, Write};
 use std::ops::Range;
 
-/// Rows held in memory at a time.
-const BATCH: usize = 1 << 13;
-
 /// Rows that one thread writes at a time.
 const CHUNK: usize = 256;
-
-/// Faults told of one file.
-const FAULTS: usize = 20;
 
 /// Bytes of a line; a device that never ends a line must not fill the memory.
 const LONGEST: u64 = 16 << 20;
@@ -241,7 +235,7 @@ impl TargetTable for TextTable<'_> {
                     targets.extend(target.map(|target| (number, target)));
                     self.rows.push((line, spans));
                 }
-                Err(message) if faults.len() < FAULTS => {
+                Err(message) if faults.len() < MOST => {
                     faults.push(Fault::new(self.place(number), message));
                 }
                 Err(_) => {}
