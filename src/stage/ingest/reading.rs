@@ -296,18 +296,16 @@ pub(super) fn intake(
     }
 }
 
-/// Names of the columns: as the languages call the axes.
-const RAPID: [&str; 12] = [
-    "rax_1", "rax_2", "rax_3", "rax_4", "rax_5", "rax_6", "eax_a", "eax_b", "eax_c", "eax_d",
-    "eax_e", "eax_f",
-];
-const KRL: [&str; 12] = [
-    "A1", "A2", "A3", "A4", "A5", "A6", "E1", "E2", "E3", "E4", "E5", "E6",
-];
-
-const NUMBERED: [&str; 12] = [
-    "J1", "J2", "J3", "J4", "J5", "J6", "E1", "E2", "E3", "E4", "E5", "E6",
-];
+/// As a language calls an axis: six of the arm from 0, then six external ones.
+fn axis(language: Language, k: usize) -> String {
+    match (language, k) {
+        (Language::Rapid, ..6) => format!("rax_{}", k + 1),
+        (Language::Rapid, _) => format!("eax_{}", char::from(b'a' + (k - 6) as u8)),
+        (Language::Krl, ..6) => format!("A{}", k + 1),
+        (_, ..6) => format!("J{}", k + 1),
+        _ => format!("E{}", k - 5),
+    }
+}
 
 /// The joints that a program declares, row by row, in deg.
 pub(super) struct ListedRows {
@@ -338,20 +336,15 @@ impl ListedRows {
         if list.rows.is_empty() {
             return Err(Error::data(label, none(&list, language)));
         }
-        let all = match language {
-            Language::Krl => KRL,
-            Language::Rapid => RAPID,
-            Language::Fanuc | Language::UrScript => NUMBERED,
-        };
         // An axis that no position has makes no column.
         let has = |k: &usize| {
             let mut rows = list.rows.iter();
             rows.any(|row| row.external.get(*k).is_some_and(Option::is_some))
         };
         let used: Vec<usize> = (0..6).filter(has).collect();
-        let names = std::iter::once("name").chain(all[..6].iter().copied());
-        let names = names.chain(used.iter().map(|k| all[6 + k]));
-        let mut rows = vec![(1, names.map(String::from).collect())];
+        let axes = (0..6).chain(used.iter().map(|k| 6 + k));
+        let names = axes.map(|k| axis(language, k));
+        let mut rows = vec![(1, std::iter::once("name".into()).chain(names).collect())];
         rows.extend(list.rows.iter().map(|row| {
             let external = used.iter().map(|k| row.external[*k]);
             let numbers = row.joints.iter().map(|joint| Some(*joint)).chain(external);
