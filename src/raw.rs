@@ -22,9 +22,9 @@ pub use record::{InputSource, Record, RecordFault, RecordReader, failed, source}
 pub use text::{decoded_text, is_utf16, not_read, shown, without_utf16};
 pub use workbook::{Workbook, is_workbook};
 
-use arrow::array::RecordBatch;
+use arrow::array::{RecordBatch, RecordBatchReader};
 use arrow::datatypes::SchemaRef;
-use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::file::reader::ChunkReader;
 use std::fs::{self, File, FileType};
 use std::io::{self, ErrorKind, Read};
@@ -64,7 +64,6 @@ pub fn text(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
-/// The bytes of a regular file.
 pub(crate) fn bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.read_to_end(&mut bytes)?;
@@ -105,47 +104,54 @@ pub(crate) fn decoded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
-/// A Parquet file, batch by batch; what is wrong with it comes in words, once.
-pub struct ParquetFile {
-    /// Its columns, as the file declares them.
+pub(crate) type Batches = Box<dyn Iterator<Item = Result<RecordBatch, String>> + Send>;
+
+/// A file of columns, batch by batch; what is wrong with it comes in words, once.
+pub struct BatchFile {
     pub(crate) schema: SchemaRef,
-    /// Rows by its footer.
-    pub(crate) rows: u64,
-    reader: Option<ParquetRecordBatchReader>,
+    /// Rows, where the file says it.
+    pub(crate) rows: Option<u64>,
+    batches: Batches,
 }
 
 /// Opens Parquet from a file or from bytes, for batches of so many rows.
-pub fn parquet(input: impl ChunkReader + 'static, batch: usize) -> Result<ParquetFile, String> {
+pub fn parquet(input: impl ChunkReader + 'static, batch: usize) -> Result<BatchFile, String> {
     let opened = decoded(|| {
         let builder = ParquetRecordBatchReaderBuilder::try_new(input)?;
-        let schema = builder.schema().clone();
-        let rows = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or_default();
-        let reader = builder.with_batch_size(batch).build()?;
-        Ok(ParquetFile {
-            schema,
-            rows,
-            reader: Some(reader),
-        })
+        let rows = u64::try_from(builder.metadata().file_metadata().num_rows());
+        let file = BatchFile::of(builder.with_batch_size(batch).build()?);
+        let rows = Some(rows.unwrap_or_default());
+        Ok(BatchFile { rows, ..file })
     });
     opened?.map_err(|error: parquet::errors::ParquetError| error.to_string())
 }
 
-impl Iterator for ParquetFile {
+impl Iterator for BatchFile {
     type Item = Result<RecordBatch, String>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let reader = self.reader.as_mut()?;
-        let batch = decoded(|| reader.next());
-        let batch = batch.map(|batch| batch.map(|batch| batch.map_err(|error| error.to_string())));
-        let batch = batch.unwrap_or_else(|message| Some(Err(message)));
-        if !matches!(batch, Some(Ok(_))) {
-            self.reader = None;
-        }
-        batch
+        self.batches.next()
     }
 }
 
-impl ParquetFile {
+impl BatchFile {
+    pub(crate) fn of(reader: impl RecordBatchReader + Send + 'static) -> Self {
+        let schema = reader.schema();
+        // A decoder that gave up is not asked again.
+        let mut reader = Some(reader);
+        let batches = std::iter::from_fn(move || {
+            let batch = decoded(|| reader.as_mut()?.next());
+            let batch = batch.map(|batch| Some(batch?.map_err(|error| error.to_string())));
+            let batch = batch.unwrap_or_else(|message| Some(Err(message)));
+            reader = reader.take().filter(|_| matches!(batch, Some(Ok(_))));
+            batch
+        });
+        Self {
+            schema,
+            rows: None,
+            batches: Box::new(batches),
+        }
+    }
     /// All rows as one batch.
     pub fn whole(mut self) -> Result<RecordBatch, String> {
         let batches = self.by_ref().collect::<Result<Vec<_>, String>>()?;

@@ -3,14 +3,15 @@
 //! What drives say of joints while the arm moves: torques or motor currents, velocities; and whether recordings are of them.
 
 use super::columns::{Choice, ExaminedFile};
-use super::names::{CURRENTS, NAMED_JOINTS, TORQUES, TRAJECTORIES, VELOCITIES, WANTED, lists};
+use super::names::{
+    CURRENTS, NAMED_JOINTS, TORQUES, TRAJECTORIES, VELOCITIES, WANTED, lists, numbered,
+};
 use super::robots::{self, RobotFileKind};
 use super::{InitRequest, KINDS};
 use crate::description::JointKind;
 use crate::error::{Error, Result, counted};
 use crate::raw;
 use crate::robot::import::{RobotFileText, UrdfOutline, read_calib, urdf_outline};
-use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What recordings and pipeline must know of the arm.
@@ -178,37 +179,27 @@ impl ExaminedFile {
             return Vec::new();
         };
         let others = [TORQUES, CURRENTS, VELOCITIES];
-        let mut runs: BTreeMap<String, BTreeMap<usize, usize>> = BTreeMap::new();
-        for (column, name) in self
-            .said
-            .iter()
-            .enumerate()
-            .filter(|(column, _)| self.sheet.is_numeric(*column))
-        {
+        let part = |column: usize| {
+            let name = &self.said[column];
             let named = || {
                 let (stem, joints) = (name.stem(), NAMED_JOINTS[2]);
                 let joint = joints.iter().position(|joint| stem.contains(joint))?;
                 Some((stem.replace(joints[joint], "#"), joint))
             };
-            let Some((key, number)) = named().or_else(|| name.joint()) else {
-                continue;
-            };
-            let has = |list| key.split(['_', '#']).any(|word| lists(list, word));
-            if has(listed) && !others.iter().any(|other| *other != listed && has(other)) {
-                runs.entry(key).or_default().entry(number).or_insert(column);
-            }
-        }
-        let mut rows: Vec<(bool, Vec<usize>)> = Vec::new();
-        for (key, columns) in runs {
-            let first = usize::from(!columns.contains_key(&0));
-            let run: Vec<usize> = (first..)
-                .map_while(|number| columns.get(&number).copied())
-                .take(count)
-                .collect();
-            if run.len() == count {
-                rows.push((key.split(['_', '#']).any(|word| lists(WANTED, word)), run));
-            }
-        }
+            named().or_else(|| name.joint())
+        };
+        let has = |key: &str, list| key.split(['_', '#']).any(|word| lists(list, word));
+        let is_meant = |key: &str| {
+            let mut others = others.iter().filter(|other| **other != listed);
+            has(key, listed) && !others.any(|other| has(key, other))
+        };
+        let numeric = (0..self.said.len()).filter(|column| self.sheet.is_numeric(*column));
+        let parts = numeric.filter_map(|column| Some((column, part(column)?)));
+        let runs = numbered(parts.filter(|(_, (key, _))| is_meant(key))).into_iter();
+        let mut rows: Vec<(bool, Vec<usize>)> = runs
+            .filter(|(_, run)| run.len() >= count)
+            .map(|(key, run)| (has(&key, WANTED), run[..count].to_vec()))
+            .collect();
         rows.sort();
         rows.into_iter().map(|(_, run)| run).collect()
     }
@@ -279,19 +270,7 @@ impl ExaminedFile {
     }
 
     fn drive(&mut self, quantity: &'static str, rows: &[Vec<usize>], unit: &str, check: Vec<&str>) {
-        let choice = |columns: &Vec<usize>| {
-            Choice::of(
-                vec![self.joints_line(quantity, columns, Some(unit))],
-                columns.clone(),
-            )
-        };
-        let (first, last) = (rows[0][0], rows[0][rows[0].len() - 1]);
-        let account = format!(
-            "{quantity} ({} to {})",
-            self.sheet.names[first], self.sheet.names[last]
-        );
-        let choices: Vec<Choice> = rows.iter().map(choice).collect();
-        let check = check.into_iter().map(String::from);
-        self.propose(quantity, choices, check, account);
+        let checks = check.into_iter().map(String::from);
+        self.propose_joints(quantity, rows, Some(unit), checks, quantity);
     }
 }

@@ -52,7 +52,6 @@ pub(super) struct ExaminedFile {
     pub(crate) mappings: Vec<Mapping>,
     /// Seconds in the unit of a time column.
     pub(crate) second: f64,
-    /// Lines of comment.
     pub(crate) remarks: Vec<String>,
 }
 
@@ -128,7 +127,6 @@ impl ExaminedFile {
         self.remarks.extend(lines);
     }
 
-    /// What was found, for the terminal.
     pub(crate) fn account(&self) -> String {
         let mut parts: Vec<String> = self
             .sheet
@@ -231,6 +229,26 @@ impl ExaminedFile {
         format!("{quantity}: {{column: {}{unit}}}", self.reference(column))
     }
 
+    pub(crate) fn lines(
+        &self,
+        quantities: [&str; 3],
+        columns: [usize; 3],
+        unit: &str,
+    ) -> Vec<String> {
+        let each = quantities.iter().zip(columns);
+        each.map(|(quantity, column)| self.line(quantity, column, Some(unit)))
+            .collect()
+    }
+
+    /// Columns as a list of the pipeline.
+    pub(crate) fn references(&self, columns: &[usize]) -> String {
+        let all: Vec<String> = columns
+            .iter()
+            .map(|column| self.reference(*column))
+            .collect();
+        format!("[{}]", all.join(", "))
+    }
+
     /// Maps a quantity to single columns, best first.
     pub(crate) fn map(
         &mut self,
@@ -278,14 +296,35 @@ impl ExaminedFile {
         };
         match pattern(&names).filter(|pattern| alone && !more(pattern)) {
             Some(pattern) => format!("{quantity}: {{column: {}{unit}}}", quoted(&pattern)),
-            None => {
-                let list: Vec<String> = columns
-                    .iter()
-                    .map(|column| self.reference(*column))
-                    .collect();
-                format!("{quantity}: {{columns: [{}]{unit}}}", list.join(", "))
-            }
+            None => format!(
+                "{quantity}: {{columns: {}{unit}}}",
+                self.references(columns)
+            ),
         }
+    }
+
+    /// Proposes rows of columns, one column a joint, best first.
+    pub(crate) fn propose_joints(
+        &mut self,
+        quantity: &'static str,
+        rows: &[Vec<usize>],
+        unit: Option<&str>,
+        checks: impl IntoIterator<Item = String>,
+        what: &str,
+    ) {
+        let choice = |columns: &Vec<usize>| {
+            Choice::of(
+                vec![self.joints_line(quantity, columns, unit)],
+                columns.clone(),
+            )
+        };
+        let choices: Vec<Choice> = rows.iter().map(choice).collect();
+        let ends = [rows[0].first(), rows[0].last()].into_iter().flatten();
+        let ends: Vec<&str> = ends
+            .map(|column| self.sheet.names[*column].as_str())
+            .collect();
+        let account = format!("{what} ({})", ends.join(" to "));
+        self.propose(quantity, choices, checks, account);
     }
 
     pub(crate) fn distinct(&self, column: usize) -> usize {

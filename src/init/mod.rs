@@ -22,7 +22,6 @@ use pipeline::missing;
 use quantities::examine;
 use std::path::{Path, PathBuf};
 
-/// What is there and what is wanted.
 pub(crate) struct InitRequest<'a> {
     /// The folder of robot.yaml and pipeline.yaml.
     pub(crate) folder: &'a Path,
@@ -36,11 +35,9 @@ pub(crate) struct InitRequest<'a> {
     pub(crate) tip: &'a str,
 }
 
-/// Files to start from.
 pub(crate) struct StarterFiles {
     /// Text of `robot.yaml`; none where it is there already.
     pub(crate) robot: Option<String>,
-    /// Text of `pipeline.yaml`.
     pub(crate) pipeline: String,
     /// What was found in each recording, and which.
     pub(crate) accounts: Vec<(PathBuf, String)>,

@@ -36,7 +36,6 @@ impl Name {
         self.words.join("_")
     }
 
-    /// The unit, if it is one of these.
     pub(crate) fn unit_of(&self, allowed: &[&str]) -> Option<&'static str> {
         self.unit.filter(|unit| allowed.contains(unit))
     }
@@ -110,7 +109,6 @@ impl Name {
     }
 }
 
-/// Units of a coordinate.
 pub(super) const LENGTHS: [&str; 4] = ["mm", "m", "um", "in"];
 
 /// The axis that a word names, and what it says besides: `x`, `dx`, `xist`, `x2`.
@@ -154,27 +152,8 @@ pub(super) fn joints(
     // The letters of a Yaskawa with seven axes hold those of one with six.
     found.sort_by_key(|columns| std::cmp::Reverse(columns.len()));
     found.truncate(1);
-    let parts: Vec<Option<(String, usize)>> = names.iter().map(Name::joint).collect();
-    let mut numbered: BTreeMap<&str, BTreeMap<usize, usize>> = BTreeMap::new();
-    for (column, (key, number)) in parts
-        .iter()
-        .enumerate()
-        .filter_map(|(column, part)| Some((column, part.as_ref()?)))
-    {
-        numbered
-            .entry(key)
-            .or_default()
-            .entry(*number)
-            .or_insert(column);
-    }
-    let run = |columns: &BTreeMap<usize, usize>| -> Vec<usize> {
-        let first = usize::from(!columns.contains_key(&0));
-        (first..).map_while(|n| columns.get(&n).copied()).collect()
-    };
-    let runs: Vec<(&str, Vec<usize>)> = numbered
-        .iter()
-        .map(|(key, columns)| (*key, run(columns)))
-        .collect();
+    let parts = names.iter().map(Name::joint).enumerate();
+    let runs = numbered(parts.filter_map(|(column, part)| Some((column, part?))));
     let mut usual: Vec<(usize, usize, Vec<usize>)> = Vec::new();
     for (key, columns) in runs.iter().filter(|(_, columns)| columns.len() > 1) {
         if let Some(rank) = usual_name(key) {
@@ -194,6 +173,24 @@ pub(super) fn joints(
     let longest = found.first().map_or(0, Vec::len);
     found.retain(|columns| columns.len() == longest);
     found
+}
+
+/// Columns that are numbered through from 0 or 1, by what they are called.
+pub(super) fn numbered(
+    parts: impl Iterator<Item = (usize, (String, usize))>,
+) -> Vec<(String, Vec<usize>)> {
+    let mut found: BTreeMap<String, BTreeMap<usize, usize>> = BTreeMap::new();
+    for (column, (key, number)) in parts {
+        let columns = found.entry(key).or_default();
+        columns.entry(number).or_insert(column);
+    }
+    let run = |columns: BTreeMap<usize, usize>| {
+        let first = usize::from(!columns.contains_key(&0));
+        let run = (first..).map_while(|number| columns.get(&number).copied());
+        run.collect()
+    };
+    let runs = found.into_iter();
+    runs.map(|(key, columns)| (key, run(columns))).collect()
 }
 
 /// Columns of joints that have names instead of numbers, in the order of the arm.
@@ -248,7 +245,6 @@ pub(super) fn pattern(names: &[&str]) -> Option<String> {
     ones.into_iter().find(fits)
 }
 
-/// Whether a word is one of a list.
 pub(super) fn lists(list: &str, word: &str) -> bool {
     list.split(' ').any(|listed| listed == word)
 }
@@ -257,7 +253,6 @@ pub(super) fn lists(list: &str, word: &str) -> bool {
 pub(super) const JOINTS: &str = "q a rax j joint axis theta achse gelenk axe asse eje jnt joint_angle joint_state joint_states \
     observation_state qpos observation_qpos articulación";
 
-/// Names of joints without numbers.
 pub(super) const NAMED_JOINTS: [&[&str]; 3] = [
     &["s", "l", "u", "r", "b", "t"],
     &["s", "l", "e", "u", "r", "b", "t"],
@@ -305,7 +300,6 @@ pub(super) const SIGMA: &str =
 /// What columns of uncertainties with 95 % coverage are called.
 pub(super) const U95: &str = "u95";
 
-/// What columns of points' names are called.
 pub(super) const IDS: &str = "point point_id pointid point_name pointname id name pose pose_id nr no number nummer num punkt \
     punktname punktnummer punkt_nr messpunkt bezeichnung index label target measurement pt pts p nom \
     nombre nome punto point_no row sample messung repere repère n";

@@ -196,7 +196,6 @@ pub(super) fn missing(found: &[ExaminedFile]) -> [bool; 2] {
 struct Lacks {
     joints: bool,
     point: bool,
-    /// Joints of the robot.
     count: usize,
 }
 
@@ -299,7 +298,6 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     out
 }
 
-/// Quantities in the order in which they are written.
 const ORDER: [&str; 13] = [
     "point_id",
     "time",
@@ -438,9 +436,7 @@ const MARKS: [(&str, &str, &str); 2] = [
 
 /// Lines that are left as `calib init` marked them.
 pub struct MarkedLines {
-    /// The label of their kind.
     pub(crate) label: &'static str,
-    /// What is to be done with them.
     pub(crate) what: &'static str,
     /// File, number of the line and its text.
     pub(crate) lines: Vec<(String, usize, String)>,

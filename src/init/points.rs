@@ -39,7 +39,6 @@ pub(super) struct Points {
     pub(crate) said: bool,
     /// Points of several targets side by side, by the targets' names; none where the names do not say so.
     pub(crate) targets: Vec<(String, [usize; 3])>,
-    /// A point that is wanted only.
     pub(crate) wanted: Option<[usize; 3]>,
     pub(crate) sigma: Option<[usize; 3]>,
 }
@@ -205,95 +204,4 @@ fn targets(candidates: &[Family]) -> Vec<(String, [usize; 3])> {
     let alike =
         stems.windows(2).all(|pair| pair[0] == pair[1]) && named.iter().enumerate().all(is_one);
     if alike { named } else { Vec::new() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn found(texts: &[&str]) -> Points {
-        points(&texts.iter().map(|text| Name::of(text)).collect::<Vec<_>>())
-    }
-
-    #[test]
-    fn the_measured_point_is_never_its_target() {
-        let way = |columns: [usize; 3]| {
-            vec![PointColumns {
-                columns,
-                difference: None,
-            }]
-        };
-        for texts in [
-            ["X_soll", "Y_soll", "Z_soll", "X_ist", "Y_ist", "Z_ist"],
-            ["Goal x", "Goal y", "Goal z", "x", "y", "z"],
-            ["xt", "yt", "zt", "X [mm]", "Y [mm]", "Z [mm]"],
-            ["x_t", "y_t", "z_t", "x", "y", "z"],
-            ["std_x", "std_y", "std_z", "x_act", "y_act", "z_act"],
-        ] {
-            let found = found(&texts);
-            assert_eq!(
-                (found.ways, found.question),
-                (way([3, 4, 5]), None),
-                "{texts:?}"
-            );
-        }
-        let target = found(&["x_t", "y_t", "z_t", "x_dif", "y_dif", "z_dif"]);
-        assert_eq!(
-            target.ways,
-            [PointColumns {
-                columns: [0, 1, 2],
-                difference: Some(([3, 4, 5], true))
-            }]
-        );
-        assert!(target.question.is_some());
-        let alone = found(&["x_soll", "y_soll", "z_soll"]);
-        assert_eq!((alone.ways.len(), alone.wanted), (0, Some([0, 1, 2])));
-        assert!(found(&["x", "y"]).ways.is_empty());
-    }
-
-    #[test]
-    fn points_that_fit_alike_are_asked_about() {
-        let two = found(&["smrA_x", "smrA_y", "smrA_z", "smrB_x", "smrB_y", "smrB_z"]);
-        assert_eq!((two.ways.len(), two.question.is_some()), (2, true));
-        assert_eq!(
-            two.targets,
-            [
-                ("smra".to_string(), [0, 1, 2]),
-                ("smrb".to_string(), [3, 4, 5])
-            ]
-        );
-        let numbered = found(&["X1", "Y1", "Z1", "X2", "Y2", "Z2"]).targets;
-        assert_eq!(
-            numbered,
-            [
-                ("target_1".to_string(), [0, 1, 2]),
-                ("target_2".to_string(), [3, 4, 5])
-            ]
-        );
-        let apart = found(&[
-            "SMR 1 x", "SMR 1 y", "SMR 1 z", "SMR 2 x", "SMR 2 y", "SMR 2 z",
-        ])
-        .targets;
-        assert_eq!(
-            apart
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .collect::<Vec<_>>(),
-            ["smr1", "smr2"]
-        );
-        assert_eq!(
-            found(&[
-                "x_before", "y_before", "z_before", "x_after", "y_after", "z_after"
-            ])
-            .targets,
-            []
-        );
-        let twice = found(&["X", "Y", "Z", "X", "Y", "Z"]);
-        assert_eq!(
-            (twice.ways[1].columns, twice.question.is_some()),
-            ([3, 4, 5], true)
-        );
-        let beside = found(&["X", "Y", "Z", "dX", "dY", "dZ"]);
-        assert_eq!(beside.ways[1].difference, Some(([3, 4, 5], false)));
-    }
 }

@@ -57,11 +57,8 @@ impl ExaminedFile {
         let (quantity, lines, what) = match columns[..] {
             [x, y, z] => {
                 let unit = self.length_unit(&[x, y, z]).0;
-                let lines = ["x", "y", "z"]
-                    .iter()
-                    .zip([x, y, z])
-                    .map(|(name, column)| self.line(name, column, Some(unit)));
-                ("x", lines.collect(), "the point".to_string())
+                let lines = self.lines(["x", "y", "z"], [x, y, z], unit);
+                ("x", lines, "the point".to_string())
             }
             // Seven numbers may be a point with a quaternion.
             [_, _, _, _, _, _] | [_, _, _, _, _, _, _]
@@ -123,20 +120,8 @@ impl ExaminedFile {
         let of_list = (numbers > count)
             .then(|| format!("of the {numbers} numbers of the list the first {count}"));
         let checks = several.into_iter().chain(of_list).chain(why);
-        let account = format!(
-            "{} joints ({} to {})",
-            best.len(),
-            self.sheet.names[best[0]],
-            self.sheet.names[best[best.len() - 1]]
-        );
-        let choice = |columns: &Vec<usize>| {
-            Choice::of(
-                vec![self.joints_line("q", columns, Some(unit))],
-                columns.clone(),
-            )
-        };
-        let choices: Vec<Choice> = rows.iter().map(choice).collect();
-        self.propose("q", choices, checks, account);
+        let what = format!("{} joints", best.len());
+        self.propose_joints("q", &rows, Some(unit), checks, &what);
     }
 
     /// Whether four columns are a quaternion.
@@ -193,11 +178,7 @@ impl ExaminedFile {
                 true => (["u95_x", "u95_y", "u95_z"], "two standard deviations"),
                 false => (["sigma_x", "sigma_y", "sigma_z"], "one standard deviation"),
             };
-            let lines = names
-                .iter()
-                .zip(sigma)
-                .map(|(name, column)| self.line(name, column, Some(unit)));
-            let lines: Vec<String> = lines.collect();
+            let lines = self.lines(names, sigma, unit);
             self.remarks.push(format!(
                 "{}   # CHECK: {what}, if rows are to be weighted by it",
                 lines[0]
@@ -248,13 +229,9 @@ impl ExaminedFile {
         let Some(columns) = found.filter(unit).filter(|_| self.get("x").is_some()) else {
             return;
         };
-        let names = columns
-            .iter()
-            .map(|column| self.reference(*column))
-            .collect::<Vec<_>>()
-            .join(", ");
+        let names = self.references(&columns);
         self.remarks.push(format!(
-            "orientation: {{quaternion: [{names}]}}   # CHECK: full poses, with the line below and your instrument's figure"
+            "orientation: {{quaternion: {names}}}   # CHECK: full poses, with the line below and your instrument's figure"
         ));
         self.remarks
             .push("sigma_orientation: {value: 30, unit: arcsec}".into());
@@ -267,13 +244,7 @@ impl ExaminedFile {
         };
         let unit = self.length_unit(first).0;
         let one = |(name, columns): &(String, [usize; 3])| {
-            format!(
-                "{name}: [{}]",
-                columns
-                    .each_ref()
-                    .map(|column| self.reference(*column))
-                    .join(", ")
-            )
+            format!("{name}: {}", self.references(columns))
         };
         let all: Vec<String> = found.targets.iter().map(one).collect();
         let columns = found
@@ -310,28 +281,23 @@ impl ExaminedFile {
 
     fn way(&self, way: &PointColumns) -> Choice {
         let unit = self.length_unit(&way.columns).0;
-        let mut columns = way.columns.to_vec();
-        let lines = ["x", "y", "z"]
-            .iter()
-            .enumerate()
-            .map(|(axis, name)| match &way.difference {
-                None => self.line(name, way.columns[axis], Some(unit)),
-                Some((difference, minus)) => {
-                    let (key, column) = (if *minus { "minus" } else { "plus" }, difference[axis]);
-                    let other = self.said[column]
-                        .unit_of(&LENGTHS)
-                        .filter(|other| *other != unit);
-                    let other = other
-                        .map(|other| format!(", difference_unit: {other}"))
-                        .unwrap_or_default();
-                    let (target, column) =
-                        (self.reference(way.columns[axis]), self.reference(column));
-                    format!("{name}: {{column: {target}, {key}: {column}, unit: {unit}{other}}}")
-                }
-            });
-        let lines = lines.collect();
-        columns.extend(way.difference.iter().flat_map(|(columns, _)| columns));
-        Choice::of(lines, columns)
+        let Some((difference, minus)) = way.difference else {
+            let lines = self.lines(["x", "y", "z"], way.columns, unit);
+            return Choice::of(lines, way.columns.to_vec());
+        };
+        let key = if minus { "minus" } else { "plus" };
+        let lines = (["x", "y", "z"].iter().zip(way.columns).zip(difference)).map(
+            |((name, target), column)| {
+                let other = self.said[column].unit_of(&LENGTHS);
+                let other = other
+                    .filter(|other| *other != unit)
+                    .map(|other| format!(", difference_unit: {other}"))
+                    .unwrap_or_default();
+                let [target, column] = [target, column].map(|column| self.reference(column));
+                format!("{name}: {{column: {target}, {key}: {column}, unit: {unit}{other}}}")
+            },
+        );
+        Choice::of(lines.collect(), [way.columns, difference].concat())
     }
 
     /// The unit of coordinates, and whether their size alone says so.

@@ -3,7 +3,8 @@
 use super::sheet::Sheet;
 use crate::error::{Error, Result};
 use crate::raw::{
-    self, BagTopic, InputSource, Record, Workbook, bag_content, failed, is_utf16, shown,
+    self, BagTopic, DecimalMark, InputSource, Record, Workbook, bag_content, failed, is_utf16,
+    shown,
 };
 use crate::stage::ingest::{FileKind, TableLayout, records};
 use std::io::{BufRead, BufReader, Read, Seek};
@@ -75,7 +76,7 @@ fn first_rows(
         topic,
         ..TableLayout::default()
     };
-    let mut rows = records(source, label, layout)?;
+    let (_, mut rows) = records(source, label, layout)?;
     let (mut record, mut found) = (Record::default(), Vec::new());
     while found.len() <= LINES && rows.next(&mut record)? {
         if record.fault.is_none() {
@@ -132,7 +133,7 @@ fn sheets(source: impl Read, places: usize) -> Result<Vec<Sheet>, String> {
     let names = if one[0].is_empty() { &tables[..] } else { &one };
     let sheet = |name: &String| {
         let lines: Vec<String> = book
-            .lines(name, '.')?
+            .lines(name, DecimalMark::Point)?
             .lines()
             .take(LINES)
             .map(String::from)

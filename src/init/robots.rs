@@ -7,15 +7,10 @@ use crate::yaml::quoted;
 /// Kinds of arms that a robot file starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RobotFileKind {
-    /// Six joints, the last three axes meet in a point.
     Spherical6,
-    /// Six joints, offset wrist.
     Offset6,
-    /// Seven joints, alternating axes.
     Seven,
-    /// Six joints as a DH table.
     Dh6,
-    /// A common arm as its maker and public models describe it.
     Arm(&'static LibraryArm),
 }
 
@@ -34,7 +29,6 @@ impl RobotFileKind {
         typical.or_else(|| LibraryArm::find(name).map(Self::Arm))
     }
 
-    /// As the command line names it.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Spherical6 => "spherical6",
@@ -45,7 +39,6 @@ impl RobotFileKind {
         }
     }
 
-    /// What it is, in one line.
     pub(crate) fn help(self) -> &'static str {
         match self {
             Self::Spherical6 => {

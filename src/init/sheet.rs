@@ -8,7 +8,6 @@ pub(super) use crate::raw::number_of_any_mark as number;
 /// So many lines say what separates fields.
 const ENOUGH: usize = 500;
 
-/// How comments begin.
 const COMMENTS: [&str; 4] = ["//", "#", "%", "!"];
 
 /// Fewer columns are no table of joints or points.
@@ -23,7 +22,6 @@ pub(super) struct Sheet {
     /// What else is to be known of it, in the pipeline and on the terminal.
     pub(crate) notes: Vec<String>,
     pub(crate) delimiter: char,
-    /// Decimal comma.
     pub(crate) comma: bool,
     /// Lines above the header, or above the data where there is none.
     pub(crate) skip: usize,
@@ -34,7 +32,6 @@ pub(super) struct Sheet {
     pub(crate) header: bool,
     /// Names of the columns; in a file without a header the numbers from 1.
     pub(crate) names: Vec<String>,
-    /// From a row of units.
     pub(crate) units: Vec<Option<&'static str>>,
     pub(crate) rows: Vec<Vec<String>>,
     /// Why nothing was understood, and what stands in the file.
@@ -106,7 +103,6 @@ impl Sheet {
         }
     }
 
-    /// A file of columns.
     pub(crate) fn of_columns(names: Vec<String>, rows: Vec<Vec<String>>) -> Self {
         Self {
             delimiter: ',',
@@ -394,85 +390,4 @@ fn commented_header(
 /// The first row of a file without a header.
 fn bare_rows(table: &[Vec<String>]) -> Option<usize> {
     (0..table.len()).find(|k| is_data(table, *k, table[*k].len()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn sheet(text: &str) -> Sheet {
-        Sheet::of(&text.lines().map(String::from).collect::<Vec<_>>())
-    }
-
-    #[test]
-    fn delimiter_decimal_mark_and_header_follow_from_the_rows() {
-        let german =
-            sheet("Messung vom Dienstag\n\nName;A1;A2;ok\nP1;10,5;-3,25;ja\nP2;11,0;3;ja\n");
-        assert_eq!(
-            (
-                german.delimiter,
-                german.comma,
-                german.skip,
-                german.names.len()
-            ),
-            (';', true, 2, 4)
-        );
-        let quoted = sheet("Name,A1,A2\n\"P,1\",\"1,5\",\"2,5\"\n\"P,2\",\"1,5\",\"2,5\"\n");
-        assert_eq!(
-            (quoted.delimiter, quoted.comma, quoted.rows[0][0].as_str()),
-            (',', true, "P,1")
-        );
-        let blanks = sheet("Name  X   Y  Z\nP1  1.0 2.0 3.0\nP2  1.0 2.0 3.0\n");
-        assert_eq!(
-            (blanks.delimiter, blanks.comma, blanks.rows.len()),
-            (' ', false, 2)
-        );
-        let units = sheet("Name;X;Y;Z\n;[mm];[mm];[mm]\nP1;1;2;3\nP2;1;2;3\n");
-        assert_eq!(
-            (units.unit_row, units.units[1], units.rows.len()),
-            (true, Some("mm"), 2)
-        );
-    }
-
-    #[test]
-    fn a_header_may_be_a_comment_and_a_mark_may_be_a_name() {
-        let exported = sheet(
-            "// made today\n// Collection Group Target X Y Z\nA G P1 1 2 3\nA G P2 1 2 3\nA G P3 1 2 3\n// end\nA G P4 1 2 3\n",
-        );
-        assert_eq!(
-            (exported.comment, exported.header_in_comment, exported.skip),
-            (Some("//"), true, 1)
-        );
-        assert_eq!(
-            (exported.names[2].as_str(), exported.rows.len()),
-            ("Target", 4)
-        );
-        let number = sheet("#,X,Y,Z\n1,1,2,3\n2,1,2,3\n3,1,2,3\n");
-        assert_eq!(
-            (
-                number.comment,
-                number.header_in_comment,
-                number.names[0].as_str()
-            ),
-            (None, false, "#")
-        );
-    }
-
-    #[test]
-    fn marks_of_thousands_are_no_decimal_marks() {
-        let german =
-            sheet("Name;X;Y;Z\nP1;1.234,50;-2.000,25;900,5\nP2;1.235,50;-2.001,25;901,5\n");
-        assert_eq!((german.comma, german.is_numeric(1)), (true, true));
-    }
-
-    #[test]
-    fn without_a_header_columns_have_numbers() {
-        let bare = sheet("1.5;2.5;3.5\n4;5;6\n");
-        assert_eq!(
-            (bare.header, bare.names.join(" ").as_str(), bare.rows.len()),
-            (false, "1 2 3", 2)
-        );
-        assert_eq!(bare.seen(0), "column 1: 1.5 to 4");
-        assert!(sheet("nothing\n").trouble.is_some());
-    }
 }

@@ -53,10 +53,8 @@ struct Message {
 /// The bytes of a bag: of all its parts, one behind the other.
 type BagSource = BufReader<Box<dyn InputSource>>;
 
-/// Bytes that are read at a time.
 const BLOCK: usize = 1 << 18;
 
-/// A part of a bag.
 trait Container: Send {
     /// The next message of a topic of which a name is wanted; false at the end. Fails with what is lost, once.
     fn next(
@@ -69,9 +67,7 @@ trait Container: Send {
     fn remark(&self) -> Option<String> {
         None
     }
-    /// Topics that were met so far.
     fn topics(&self) -> Vec<Arc<Topic>>;
-    /// Place in the source.
     fn position(&self) -> u64;
 }
 
@@ -80,12 +76,10 @@ pub fn is_bag(head: &[u8]) -> bool {
     head.starts_with(mcap::MAGIC) || head.starts_with(sqlite::MAGIC)
 }
 
-/// The messages of all parts of a bag.
 struct Messages {
     source: BagSource,
     container: Option<Box<dyn Container>>,
     bounds: Vec<u64>,
-    /// The next part.
     part: usize,
     topics: Vec<Arc<Topic>>,
     losses: Vec<String>,
@@ -184,7 +178,6 @@ impl Messages {
 
 /// Reads one topic of a bag, message by message.
 pub struct BagRows {
-    label: String,
     messages: Messages,
     /// The topic, and the frames of it that are wanted.
     topic: String,
@@ -248,10 +241,9 @@ impl BagRows {
             ));
         };
         cells.is_closed = true;
-        let (label, topic, frames) = (label.into(), name.to_string(), frames.map(String::from));
+        let (topic, frames) = (name.to_string(), frames.map(String::from));
         let text = zmij::Buffer::new();
         Ok(Self {
-            label,
             messages,
             topic,
             frames,
@@ -316,9 +308,6 @@ fn time(ns: i64) -> String {
 }
 
 impl RecordReader for BagRows {
-    fn label(&self) -> &str {
-        &self.label
-    }
     fn next(&mut self, record: &mut Record) -> Result<bool> {
         record.begin(self.rows);
         if !std::mem::replace(&mut self.is_named, true) {

@@ -5,11 +5,14 @@
 
 use super::arrays::{arrays, is_arrays};
 use super::record::{Record, RecordReader, failed};
-use super::{decoded, parquet};
+use super::{BatchFile, decoded, parquet};
 use crate::error::{Error, Result};
-use arrow::array::{Array, ArrayRef, AsArray, Int64Array, RecordBatch, RecordBatchReader};
-use arrow::compute::take;
-use arrow::datatypes::{DataType, Field, FieldRef, Schema, SchemaRef};
+use arrow::array::{
+    Array, ArrayRef, AsArray, Int64Array, LargeListArray, RecordBatch, RecordBatchIterator,
+    RecordBatchReader,
+};
+use arrow::compute::{cast, take};
+use arrow::datatypes::{DataType, Field, FieldRef, Schema};
 use arrow::error::ArrowError;
 use arrow::util::display::{ArrayFormatter, FormatOptions};
 use arrow_ipc::reader::{FileReader, StreamReader};
@@ -30,8 +33,6 @@ const MOST_UNPACKED: i64 = 1 << 30;
 /// How a stream of Arrow begins: a message of some length follows.
 const STREAM: &[u8] = b"\xff\xff\xff\xff";
 
-type Batches = Box<dyn Iterator<Item = std::result::Result<RecordBatch, String>> + Send>;
-
 /// Whether a file that begins so is one of columns.
 pub fn has_columns(head: &[u8]) -> bool {
     [PARQUET, FEATHER[0], FEATHER[1], STREAM]
@@ -45,11 +46,9 @@ pub struct ColumnRows {
     label: String,
     /// E.g. `a Parquet file`.
     what: &'static str,
-    schema: SchemaRef,
-    batches: Batches,
-    /// Bytes of the file, and its rows where it says so.
+    file: BatchFile,
+    /// Bytes of the file.
     size: u64,
-    all: Option<u64>,
     is_named: bool,
     batch: Option<RecordBatch>,
     /// The cells of some rows, column by column.
@@ -72,10 +71,7 @@ impl ColumnRows {
         let size = content.len() as u64;
         let mut remark = None;
         let (what, opened) = if content.starts_with(PARQUET) {
-            let opened = parquet(bytes::Bytes::from(content), HELD).map(|file| {
-                let (schema, rows) = (file.schema.clone(), file.rows);
-                (schema, Some(rows), Box::new(file) as Batches)
-            });
+            let opened = parquet(bytes::Bytes::from(content), HELD);
             ("a Parquet file", opened)
         } else if content.starts_with(FEATHER[0]) {
             let message = "is a Feather file of version 1; allowed: version 2, which every writer of today makes, Parquet or text";
@@ -83,32 +79,26 @@ impl ColumnRows {
         } else if is_arrays(&content) {
             let table = arrays(content).map(|(table, left)| {
                 remark = left;
-                let (schema, rows) = (table.schema(), table.num_rows() as u64);
-                (
-                    schema,
-                    Some(rows),
-                    Box::new(std::iter::once(Ok(table))) as Batches,
-                )
+                let (schema, rows) = (table.schema(), Some(table.num_rows() as u64));
+                let file = BatchFile::of(RecordBatchIterator::new([Ok(table)], schema));
+                BatchFile { rows, ..file }
             });
             ("an archive of NumPy arrays", table)
         } else if content.starts_with(STREAM) {
             let file = bounded(&content)
                 .and_then(|()| decoded(|| StreamReader::try_new(Cursor::new(content), None)));
-            ("a stream of Arrow", file.and_then(batches_of))
+            ("a stream of Arrow", file.and_then(in_memory))
         } else {
             let file = bounded(&content)
                 .and_then(|()| decoded(|| FileReader::try_new(Cursor::new(content), None)));
-            ("a Feather file", file.and_then(batches_of))
+            ("a Feather file", file.and_then(in_memory))
         };
-        let (schema, all, batches) = opened.map_err(|error| broken(label, what, error))?;
-        let (schema, batches) = unfolded(schema, batches);
+        let file = unfolded(opened.map_err(|error| broken(label, what, error))?);
         Ok(Self {
             label: label.into(),
             what,
-            schema,
-            batches,
+            file,
             size,
-            all,
             is_named: false,
             batch: None,
             text: String::new(),
@@ -124,7 +114,7 @@ impl ColumnRows {
         let broken = |error: &dyn Display| broken(&self.label, self.what, error);
         let batch = match self.batch.take() {
             Some(batch) => batch,
-            None => match self.batches.next() {
+            None => match self.file.next() {
                 Some(batch) => batch.map_err(|error| broken(&error))?,
                 None => return Ok(false),
             },
@@ -148,13 +138,11 @@ impl ColumnRows {
 }
 
 impl RecordReader for ColumnRows {
-    fn label(&self) -> &str {
-        &self.label
-    }
     fn next(&mut self, record: &mut Record) -> Result<bool> {
         record.begin(self.rows);
         if !std::mem::replace(&mut self.is_named, true) {
-            self.schema
+            self.file
+                .schema
                 .fields()
                 .iter()
                 .for_each(|field| record.push(field.name().as_bytes()));
@@ -180,7 +168,7 @@ impl RecordReader for ColumnRows {
     }
     /// Progress as a part of the file.
     fn bytes(&self) -> u64 {
-        let all = self.all.unwrap_or_default().max(1);
+        let all = self.file.rows.unwrap_or_default().max(1);
         (u128::from(self.size) * u128::from(self.rows.min(all)) / u128::from(all)) as u64
     }
 }
@@ -266,146 +254,106 @@ fn message(content: &[u8], at: usize) -> Option<(arrow_ipc::Message<'_>, usize)>
 }
 
 /// Columns of Arrow as they stand in memory, in a Feather file, as pandas, polars and R write them, or in a stream; uncompressed or by zstd.
-fn batches_of<R>(
-    opened: std::result::Result<R, ArrowError>,
-) -> std::result::Result<(SchemaRef, Option<u64>, Batches), String>
-where
-    R: RecordBatchReader + Send + 'static,
-{
-    let mut file = opened.map_err(|error| error.to_string())?;
-    let schema = file.schema();
-    // A decoder that gave up is not asked again.
-    let mut whole = true;
-    let batches = std::iter::from_fn(move || {
-        let next = if whole {
-            decoded(|| file.next())
-        } else {
-            Ok(None)
-        };
-        let batch = next.map_or_else(
-            |message| Some(Err(message)),
-            |batch| batch.map(|batch| batch.map_err(|error| decoder_message(&error))),
-        );
-        whole = matches!(batch, Some(Ok(_)));
-        batch
-    });
-    Ok((schema, None, Box::new(batches)))
-}
-
-/// What the decoder says, and what to do where the file is compressed in a way that it does not know.
-fn decoder_message(error: &ArrowError) -> String {
-    let text = error.to_string();
-    if text.contains("lz4") {
-        return "its columns are compressed by LZ4; allowed: none or zstd, e.g. `to_feather(FILE, compression=\"zstd\")`".into();
+fn in_memory(
+    opened: std::result::Result<impl RecordBatchReader + Send + 'static, ArrowError>,
+) -> std::result::Result<BatchFile, String> {
+    let file = BatchFile::of(opened.map_err(|error| error.to_string())?);
+    let advised = |message: String| {
+        match message.contains("lz4") {
+        true => "its columns are compressed by LZ4; allowed: none or zstd, e.g. `to_feather(FILE, compression=\"zstd\")`".into(),
+        false => message,
     }
-    text
+    };
+    let batches = file.batches.map(move |batch| batch.map_err(advised));
+    Ok(BatchFile {
+        batches: Box::new(batches),
+        ..file
+    })
 }
 
 /// The same with lists of numbers as columns, as many as the longest list of the first rows has; a shorter list has blank cells.
-fn unfolded(schema: SchemaRef, mut batches: Batches) -> (SchemaRef, Batches) {
-    let fields = schema.fields();
-    if fields.iter().all(|field| number_of_list(field).is_none()) {
-        return (schema, batches);
+fn unfolded(mut file: BatchFile) -> BatchFile {
+    let fields = file.schema.fields().clone();
+    let numbers: Vec<Option<DataType>> = fields.iter().map(number_of_list).collect();
+    if numbers.iter().all(Option::is_none) {
+        return file;
     }
-    let first = batches.next();
-    let longest = |column: usize| {
-        let rows = first.as_ref().and_then(|batch| batch.as_ref().ok());
-        rows.map_or(0, |batch| {
-            lists(batch.column(column))
-                .1
-                .windows(2)
-                .map(|ends| ends[1] - ends[0])
-                .max()
-                .unwrap_or(0)
-        })
+    let first = file.next();
+    // Of a list of numbers its kind of numbers, and how many columns it becomes.
+    let longest = |column: usize, number: &DataType| {
+        let rows = first.as_ref()?.as_ref().ok()?;
+        let lists = lists(rows.column(column), number).ok()?;
+        let lengths = lists
+            .value_offsets()
+            .windows(2)
+            .map(|ends| ends[1] - ends[0]);
+        lengths.max().map(|longest| longest as usize)
     };
-    let width = |column: usize| Some(longest(column)).filter(|width| (1..=LONGEST).contains(width));
-    let widths: Vec<Option<usize>> = (0..fields.len())
-        .map(|k| number_of_list(&fields[k]).and_then(|_| width(k)))
-        .collect();
-    let columns = fields.iter().zip(&widths).flat_map(|(field, width)| {
-        match (number_of_list(field), width) {
-            (Some(number), Some(width)) => (1..=*width)
-                .map(|k| {
-                    Arc::new(Field::new(
-                        format!("{}[{k}]", field.name()),
-                        number.clone(),
-                        true,
-                    ))
-                })
-                .collect(),
-            _ => vec![field.clone()],
+    let wide = |(column, number): (usize, Option<DataType>)| {
+        let number = number?;
+        let width = longest(column, &number)?;
+        (1..=LONGEST).contains(&width).then_some((number, width))
+    };
+    let wide: Vec<Option<(DataType, usize)>> = numbers.into_iter().enumerate().map(wide).collect();
+    let columns = fields.iter().zip(&wide);
+    let columns = columns.flat_map(|(field, wide)| match wide {
+        None => vec![field.clone()],
+        Some((number, width)) => {
+            let named = |k| Field::new(format!("{}[{k}]", field.name()), number.clone(), true);
+            (1..=*width).map(|k| Arc::new(named(k))).collect()
         }
     });
     let schema = Arc::new(Schema::new(columns.collect::<Vec<FieldRef>>()));
-    let (rows, own) = (first.into_iter().chain(batches), schema.clone());
-    let batches = rows.map(move |batch| {
-        let columns = batch?
-            .columns()
-            .iter()
-            .zip(&widths)
-            .map(|(column, width)| cells(column, *width))
-            .collect::<std::result::Result<Vec<_>, _>>();
+    let unfolded = schema.clone();
+    let batches = first.into_iter().chain(file.batches).map(move |batch| {
+        let batch = batch?;
+        let columns = batch.columns().iter().zip(&wide);
+        let columns = columns.map(|(column, wide)| match wide {
+            None => Ok(vec![column.clone()]),
+            Some((number, width)) => cells(column, number, *width),
+        });
+        let columns = columns.collect::<std::result::Result<Vec<_>, _>>();
         columns
-            .and_then(|columns| RecordBatch::try_new(own.clone(), columns.concat()))
+            .and_then(|columns| RecordBatch::try_new(unfolded.clone(), columns.concat()))
             .map_err(|error| error.to_string())
     });
-    (schema, Box::new(batches))
+    BatchFile {
+        schema,
+        rows: file.rows,
+        batches: Box::new(batches),
+    }
 }
 
 /// What kind of numbers the lists of a column hold; none where it holds none.
-fn number_of_list(field: &Field) -> Option<&DataType> {
-    match field.data_type() {
-        DataType::List(of) | DataType::LargeList(of) | DataType::FixedSizeList(of, _) => {
-            Some(of.data_type())
-        }
-        _ => None,
-    }
-    .filter(|of| of.is_numeric())
+fn number_of_list(field: &FieldRef) -> Option<DataType> {
+    let (DataType::List(of) | DataType::LargeList(of) | DataType::FixedSizeList(of, _)) =
+        field.data_type()
+    else {
+        return None;
+    };
+    Some(of.data_type().clone()).filter(DataType::is_numeric)
 }
 
-/// The numbers of all lists of a column, and where each list begins among them, with the end of the last.
-fn lists(column: &ArrayRef) -> (&ArrayRef, Vec<usize>) {
-    if let Some(list) = column.as_list_opt::<i32>() {
-        return (
-            list.values(),
-            list.value_offsets().iter().map(|at| *at as usize).collect(),
-        );
-    }
-    if let Some(list) = column.as_list_opt::<i64>() {
-        return (
-            list.values(),
-            list.value_offsets().iter().map(|at| *at as usize).collect(),
-        );
-    }
-    let list = column.as_fixed_size_list();
-    (
-        list.values(),
-        (0..=list.len())
-            .map(|row| row * list.value_length() as usize)
-            .collect(),
-    )
+fn lists(column: &ArrayRef, number: &DataType) -> std::result::Result<LargeListArray, ArrowError> {
+    let of = Arc::new(Field::new_list_field(number.clone(), true));
+    cast(column, &DataType::LargeList(of)).map(|lists| lists.as_list().clone())
 }
 
-/// A column as it is, or so many columns of the numbers of its lists.
+/// The numbers of the lists of a column as so many columns.
 fn cells(
     column: &ArrayRef,
-    width: Option<usize>,
+    number: &DataType,
+    width: usize,
 ) -> std::result::Result<Vec<ArrayRef>, ArrowError> {
-    let Some(width) = width else {
-        return Ok(vec![column.clone()]);
-    };
-    let (values, starts) = lists(column);
-    let number = |k: usize| {
+    let lists = lists(column, number)?;
+    let starts = lists.value_offsets();
+    let numbers = |k: i64| {
         let at = |row: usize| {
-            (starts[row] + k < starts[row + 1] && !column.is_null(row))
-                .then_some((starts[row] + k) as i64)
+            let is_there = starts[row] + k < starts[row + 1] && !lists.is_null(row);
+            is_there.then_some(starts[row] + k)
         };
-        take(
-            values,
-            &(0..column.len()).map(at).collect::<Int64Array>(),
-            None,
-        )
+        let at: Int64Array = (0..lists.len()).map(at).collect();
+        take(lists.values(), &at, None)
     };
-    (0..width).map(number).collect()
+    (0..width as i64).map(numbers).collect()
 }

@@ -44,9 +44,7 @@ impl Delimiter {
 /// A row that is taken apart, as far as it was read.
 #[derive(Debug, Clone, Copy, Default)]
 struct Splitter {
-    /// Bytes that were read.
     seen: usize,
-    /// Where the present field begins.
     start: usize,
     /// Where the quote stands that opened it and was not closed yet.
     open: Option<usize>,
@@ -107,7 +105,6 @@ impl Splitter {
         }
     }
 
-    /// Ends the present field before `at`.
     fn end_field(&mut self, text: &[u8], at: usize, fields: &mut Vec<Range<usize>>) {
         fields.push(self.start..at);
         self.start = at + 1;
@@ -163,7 +160,6 @@ pub fn unquoted_text(field: &str) -> Cow<'_, str> {
     }
 }
 
-/// The same of bytes.
 fn unquoted(field: &[u8]) -> Cow<'_, [u8]> {
     let field = field.trim_ascii();
     let Some(inner) = field.strip_prefix(b"\"") else {
@@ -190,7 +186,6 @@ fn unquoted(field: &[u8]) -> Cow<'_, [u8]> {
 /// How a delimited text is written; without more, commas between fields and a header on the first line.
 #[derive(Debug, Clone)]
 pub struct TextLayout {
-    /// What separates fields.
     pub(crate) delimiter: Delimiter,
     /// How lines begin that are no rows.
     pub(crate) comment: Option<String>,
@@ -261,17 +256,6 @@ impl<R: BufRead> TextRows<R> {
     }
     /// Appends one physical line without its end; false at the end of the file.
     fn line(&mut self, text: &mut Vec<u8>) -> Result<bool> {
-        let buffer = self
-            .reader
-            .fill_buf()
-            .map_err(|error| failed(&self.label, &error))?;
-        if let Some(end) = memchr(b'\n', buffer).filter(|end| text.len() + end < LONGEST) {
-            text.extend_from_slice(buffer[..end].strip_suffix(b"\r").unwrap_or(&buffer[..end]));
-            self.reader.consume(end + 1);
-            (self.bytes, self.lines) = (self.bytes + end as u64 + 1, self.lines + 1);
-            return Ok(true);
-        }
-        // It ends beyond what is held, or is the last one.
         let room = LONGEST.saturating_sub(text.len()) as u64;
         let read = (&mut self.reader)
             .take(room)
@@ -334,9 +318,6 @@ impl<R: BufRead> TextRows<R> {
 }
 
 impl<R: BufRead + Send> RecordReader for TextRows<R> {
-    fn label(&self) -> &str {
-        &self.label
-    }
     fn next(&mut self, record: &mut Record) -> Result<bool> {
         loop {
             record.text.clear();

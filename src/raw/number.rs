@@ -1,11 +1,16 @@
 //! Numbers as people write them.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
-/// The mark before decimals that a file announces.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The decimal mark.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Decimal")]
 pub enum DecimalMark {
     /// `0.365`
+    #[default]
     Point,
     /// `0,365`
     Comma,
@@ -29,15 +34,15 @@ pub enum NumberFault {
 /// A finite number, or why the cell is none. Blanks around it were removed.
 #[inline]
 pub fn number(cell: &[u8], mark: DecimalMark) -> Result<f64, NumberFault> {
-    let comma = cell.iter().position(|byte| *byte == b',');
-    let plain = match comma.filter(|_| mark == DecimalMark::Comma) {
-        Some(at) => Cow::Owned([&cell[..at], b".", &cell[at + 1..]].concat()),
-        None => Cow::Borrowed(cell),
+    let text = std::str::from_utf8(cell).map_err(|_| NumberFault::Text)?;
+    let found = match mark {
+        DecimalMark::Point => text.parse(),
+        DecimalMark::Comma if text.contains('.') => return unusual(text, mark),
+        DecimalMark::Comma => text.replacen(',', ".", 1).parse(),
     };
-    let is_pointed = mark == DecimalMark::Comma && cell.contains(&b'.');
-    match fast_float2::parse::<f64, _>(plain) {
-        Ok(value) if value.is_finite() && !is_pointed => Ok(value),
-        _ => unusual(cell, mark),
+    match found {
+        Ok(value) if f64::is_finite(value) => Ok(value),
+        _ => unusual(text, mark),
     }
 }
 
@@ -48,10 +53,7 @@ pub fn number_of_any_mark(text: &str) -> Option<f64> {
     by(DecimalMark::Point).or_else(|| by(DecimalMark::Comma).filter(|_| !is_ended))
 }
 
-fn unusual(cell: &[u8], mark: DecimalMark) -> Result<f64, NumberFault> {
-    let Ok(text) = std::str::from_utf8(cell) else {
-        return Err(NumberFault::Text);
-    };
+fn unusual(text: &str, mark: DecimalMark) -> Result<f64, NumberFault> {
     if text.is_empty() {
         return Err(NumberFault::Blank);
     }

@@ -45,7 +45,6 @@ impl Record {
         self.is_quoted = false;
         self.fault = None;
     }
-    /// Adds a field.
     pub(crate) fn push(&mut self, field: &[u8]) {
         if !self.fields.is_empty() {
             self.text.push(b',');
@@ -54,7 +53,6 @@ impl Record {
         self.text.extend_from_slice(field);
         self.fields.push(start..self.text.len());
     }
-    /// How many fields.
     pub(crate) fn len(&self) -> usize {
         self.fields.len()
     }
@@ -84,8 +82,6 @@ impl Record {
 
 /// Hands out the rows of one file, from its first byte to its last.
 pub trait RecordReader: Send {
-    /// The file as the person named it, of a workbook with its sheet.
-    fn label(&self) -> &str;
     /// The names of the columns where it has them, then row by row; false at the end. Fails where the file is damaged.
     fn next(&mut self, record: &mut Record) -> Result<bool>;
     /// Lines of the file read so far; rows where it has no lines.

@@ -4,7 +4,7 @@
 //! archive may hold a thousand times its size, and the decoder believes what a file says of its own sizes.
 
 use super::arrays::is_arrays;
-use super::decoded;
+use super::{DecimalMark, decoded};
 use calamine::{Cell, DataRef, ExcelDateTime, Reader, SheetVisible, Xlsx, XlsxError};
 use jiff::SignedDuration;
 use jiff::civil::date;
@@ -15,9 +15,7 @@ use std::io::{Cursor, Read};
 const MOST_BYTES: u64 = 512 << 20;
 /// Bytes of the texts of all cells.
 const MOST_TEXTS: u64 = 64 << 20;
-/// Cells of a sheet.
 const MOST_CELLS: usize = 10_000_000;
-/// Bytes of a sheet as text.
 const MOST_LINES: usize = 512 << 20;
 /// Rows of a sheet, by the format.
 const MOST_ROWS: u32 = 1 << 20;
@@ -146,7 +144,7 @@ impl Workbook {
     }
 
     /// A sheet as lines, numbers with this decimal mark.
-    pub(crate) fn lines(&mut self, sheet: &str, decimal: char) -> Result<String, String> {
+    pub(crate) fn lines(&mut self, sheet: &str, decimal: DecimalMark) -> Result<String, String> {
         let is_1904 = self.is_1904;
         let mut texts = String::new();
         let mut cells: Vec<([u32; 2], [usize; 2])> = Vec::new();
@@ -301,8 +299,7 @@ fn texts(part: &mut impl Read, name: &str) -> Result<u64, String> {
     }
 }
 
-/// A cell as text.
-fn written(texts: &mut String, value: &DataRef, decimal: char, is_1904: bool) {
+fn written(texts: &mut String, value: &DataRef, decimal: DecimalMark, is_1904: bool) {
     let start = texts.len();
     let result = match value {
         DataRef::Empty => Ok(()),
@@ -319,11 +316,9 @@ fn written(texts: &mut String, value: &DataRef, decimal: char, is_1904: bool) {
         }
         DataRef::SharedString(text) => return quoted(texts, text),
     };
-    if result.is_ok() && decimal != '.' && matches!(value, DataRef::Float(_)) {
-        let own = texts
-            .split_off(start)
-            .replace('.', decimal.encode_utf8(&mut [0; 4]));
-        texts.push_str(&own);
+    if result.is_ok() && decimal == DecimalMark::Comma && matches!(value, DataRef::Float(_)) {
+        let number = texts.split_off(start).replace('.', ",");
+        texts.push_str(&number);
     }
 }
 

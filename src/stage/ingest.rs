@@ -1,8 +1,7 @@
 //! `ingest`: from raw files (text, workbooks, columns) to one recording; what is not used goes to `rejected` with file, line and reason.
 //!
-//! Every file is read once (`reading`), row by row: bytes to records (`raw`), records to quantities or the reason why not (`row`). What all rows
-//! together say is decided (`pair`, `verdict`), then rows are written (`write`) from memory (`held`), of files that are too large for that by
-//! a second reading. Per file, accepted + rejected = read.
+//! Every file is read once (`rows`), row by row: bytes to records (`raw`), records to quantities or the reason why not (`row`). What all rows
+//! together say is decided (`pair`, `verdict`), then rows are written (`write`). Per file, accepted + rejected = read.
 
 mod arm;
 mod bind;
@@ -10,7 +9,6 @@ mod check;
 mod clock;
 mod columns;
 mod external;
-mod held;
 mod joined;
 mod later;
 mod layout;
@@ -21,7 +19,7 @@ mod pair;
 mod reading;
 mod refusal;
 mod row;
-mod scan;
+mod rows;
 mod stretch;
 mod torques;
 mod verdict;
@@ -30,7 +28,7 @@ mod write;
 pub use clock::is_clock_time;
 pub use columns::Columns;
 pub use later::LaterFiles;
-pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
+pub use layout::{Axis, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
 pub use mapped::{
     ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, NameMatch,
     ScalarColumn, TextColumn, UncertaintyColumn, last_number,
@@ -41,6 +39,8 @@ pub(crate) use reading::FileKind;
 pub use reading::{TableLayout, records};
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 
+use joined::Measurement;
+
 use crate::error::{Error, Place, Result};
 use crate::robot::{CountedCoupling, JointConvention};
 use crate::stage::{Context, RawFile, Stage, StreamedTable};
@@ -49,9 +49,6 @@ use crate::units::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-
-/// Bytes of memory for rows that are held until they are written: some five million of ten numbers.
-const MOST_HELD: usize = 1 << 30;
 
 /// Reads raw files into a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -128,59 +125,48 @@ impl Stage for Ingest {
         reading::headers(layouts, robot.as_ref(), self.limits, context).map(|()| None)
     }
     fn run(&self, reads: IngestReads, context: &Context) -> Result<IngestWrites> {
-        self.run_holding(MOST_HELD, reads, context)
-    }
-}
-
-impl Ingest {
-    /// Runs the stage with rows held in so many bytes of memory; files of which more would be held are read again to write them.
-    pub fn run_holding(
-        &self,
-        most: usize,
-        reads: IngestReads,
-        context: &Context,
-    ) -> Result<IngestWrites> {
         Error::if_spec(self.check())?;
         let arm = arm::RobotJoints::of(&reads.robot)?;
         let measurements = self.measurements();
-        let mut scanned = Vec::new();
-        for one in &measurements {
-            let scans = scan::files(one, &arm, most / measurements.len(), context)?;
-            let decisions = pair::decide(&scans, self.join.as_ref(), self.duplicates);
-            verdict::judge(one, &scans, &decisions, &arm, context)?;
-            scanned.push((scans, decisions));
+        let mut read = Vec::new();
+        for settings in &measurements {
+            let mut files = rows::read(settings, &arm, context)?;
+            let partners = pair::decide(&mut files, settings, arm.slots.time);
+            let one = Measurement {
+                settings,
+                arm: &arm,
+                files,
+                partners,
+                names: &[],
+            };
+            verdict::judge(&one, context)?;
+            read.push(one);
         }
-        verdict::no_copies(&scanned)?;
-        let names = names(
-            scanned
-                .iter()
-                .flat_map(|(scans, _)| scans)
-                .map(|scan| scan.label.as_str()),
-        );
-        let each = measurements
-            .iter()
-            .zip(&scanned)
-            .zip(names.chunks(self.files.len().max(1)));
-        let decided: Vec<joined::JoinDecisions> = each
-            .map(
-                |((settings, (scans, decisions)), names)| joined::JoinDecisions {
-                    settings,
-                    arm: &arm,
-                    scans,
-                    decisions,
-                    names,
-                },
-            )
-            .collect();
+        verdict::no_copies(&read)?;
+        let files = read.iter().flat_map(|one| &one.files);
+        let names = names(files.map(|rows| rows.label.as_str()));
+        for (one, names) in read.iter_mut().zip(names.chunks(self.files.len().max(1))) {
+            one.names = names;
+        }
         let gaps: Vec<Option<f64>> = self.later.iter().map(LaterFiles::gap).collect();
-        let (recording, rejected) = write::write(&decided, &gaps, &names, context)?;
+        let (recording, rejected) = write::write(&read, &gaps, &names, context)?;
         let convention = JointConventions::of(&self.convention(&arm), &arm.prismatic);
         Ok(IngestWrites {
             recording,
             rejected,
-            intake: intake(&decided, context),
+            intake: intake(&read, &names, context),
             convention,
         })
+    }
+}
+
+impl Ingest {
+    /// Whether rows of the other files belong to rows of the first.
+    fn is_joined(&self) -> bool {
+        !matches!(self.join, None | Some(Join::Append {}))
+    }
+    fn is_joined_by_time(&self) -> bool {
+        matches!(self.join, Some(Join::Time { .. }))
     }
 
     /// How the file that holds the joints counts them.
@@ -234,13 +220,11 @@ fn names<'a>(labels: impl Iterator<Item = &'a str>) -> Vec<String> {
     names
 }
 
-fn intake(decided: &[joined::JoinDecisions], context: &Context) -> Intake {
-    let files = decided
-        .iter()
-        .flat_map(|one| one.scans.iter().zip(one.decisions).zip(one.names));
-    let row = |((scan, decision), name): ((&scan::Scan, _), &String)| {
-        let accepted = verdict::accepted(scan, decision);
-        reading::intake(name, scan.lines, [scan.read, accepted], context)
+fn intake(read: &[Measurement], names: &[String], context: &Context) -> Intake {
+    let files = read.iter().flat_map(|one| &one.files).zip(names);
+    let row = |(rows, name): (&rows::FileRows, &String)| {
+        let counts = [rows.count() as u64, rows.count_used()];
+        reading::intake(name, rows.lines, counts, context)
     };
     let mut rows: Vec<IntakeRow> = files.map(row).collect();
     rows.sort_by(|a, b| a.file.cmp(&b.file));

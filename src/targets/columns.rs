@@ -13,12 +13,14 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 /// What a column holds; joints and axes from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum ColumnRole {
-    Joint(usize, Unit),
-    Axis(usize, Unit),
+    Joint(usize),
+    Velocity(usize),
+    Acceleration(usize),
+    Axis(usize),
     /// w, x, y, z.
     Quaternion(usize),
     /// A about z, then B about the new y, then C about the new x.
-    Turn(usize, Unit),
+    Turn(usize),
     Payload,
     Temperature,
     Time,
@@ -31,7 +33,7 @@ impl ColumnRole {
     pub(crate) fn is_needed(self) -> bool {
         matches!(
             self,
-            Self::Joint(..) | Self::Axis(..) | Self::Quaternion(_) | Self::Turn(..)
+            Self::Joint(_) | Self::Axis(_) | Self::Quaternion(_) | Self::Turn(_)
         )
     }
     /// What is wrong with a number of the column by itself.
@@ -43,6 +45,29 @@ impl ColumnRole {
             _ => None,
         }
     }
+}
+
+/// A column that is read: its place in a row, what it holds, and a unit of its numbers or what one is in SI.
+pub(super) type ReadColumn<U> = (usize, ColumnRole, U);
+
+/// The columns with a meaning, and what is wrong with their names; none has the meaning of another.
+pub(super) fn read_columns<U>(
+    place: &str,
+    names: &[String],
+    meaning: impl Fn(&str) -> Result<Option<(ColumnRole, U)>, String>,
+) -> (Vec<ReadColumn<U>>, Vec<Fault>) {
+    let (mut columns, mut faults) = (Vec::<ReadColumn<U>>::new(), Vec::new());
+    for (index, name) in names.iter().enumerate() {
+        match meaning(name) {
+            Ok(Some((role, _))) if columns.iter().any(|(_, known, _)| *known == role) => {
+                let message = format!("column `{name}` repeats what another column gives");
+                faults.push(Fault::new(place, message));
+            }
+            Ok(found) => columns.extend(found.map(|(role, unit)| (index, role, unit))),
+            Err(message) => faults.push(Fault::new(place, message)),
+        }
+    }
+    (columns, faults)
 }
 
 /// Units of columns whose names do not end in one.
@@ -58,7 +83,7 @@ pub struct Units {
 #[derive(Debug, Clone)]
 pub(super) struct TargetColumns {
     pub(crate) count: usize,
-    pub(crate) roles: Vec<(usize, ColumnRole)>,
+    pub(crate) read: Vec<ReadColumn<Unit>>,
     /// Column and unit of each joint; empty where joints are not given.
     pub(crate) joints: Vec<(usize, Unit)>,
     pub(crate) point: bool,
@@ -78,33 +103,21 @@ impl TargetColumns {
         robot: &RobotDescription,
         units: Units,
     ) -> Result<Self> {
-        let mut faults = Vec::new();
-        let mut roles = Vec::new();
-        for (index, name) in header.iter().enumerate() {
-            match role(name, robot, units) {
-                Ok(Some(role)) if roles.iter().any(|(_, known)| same(known, &role)) => {
-                    faults.push(Fault::new(
-                        place,
-                        format!("column `{name}` repeats what another column gives"),
-                    ));
-                }
-                Ok(Some(role)) => roles.push((index, role)),
-                Ok(None) => {}
-                Err(message) => faults.push(Fault::new(place, message)),
-            }
-        }
+        let (columns, mut faults) = read_columns(place, header, |name| role(name, robot, units));
         let n = robot.joints.len();
         let joint = |j: usize| {
-            roles.iter().find_map(|(index, role)| match role {
-                ColumnRole::Joint(k, unit) if *k == j => Some((*index, *unit)),
-                _ => None,
-            })
+            let mut columns = columns.iter();
+            let found = columns.find(|(_, role, _)| *role == ColumnRole::Joint(j))?;
+            Some((found.0, found.2))
         };
         let joints: Vec<(usize, Unit)> = (0..n).filter_map(joint).collect();
-        let count = |of: fn(&ColumnRole) -> bool| roles.iter().filter(|(_, role)| of(role)).count();
-        let point = count(|role| matches!(role, ColumnRole::Axis(..)));
-        let quaternion = count(|role| matches!(role, ColumnRole::Quaternion(_)));
-        let turns = count(|role| matches!(role, ColumnRole::Turn(..)));
+        let count = |of: fn(usize) -> ColumnRole, most: usize| {
+            let has = |k: &usize| columns.iter().any(|(_, role, _)| *role == of(*k));
+            (0..most).filter(has).count()
+        };
+        let point = count(ColumnRole::Axis, 3);
+        let quaternion = count(ColumnRole::Quaternion, 4);
+        let turns = count(ColumnRole::Turn, 3);
         if !joints.is_empty() && joints.len() < n {
             let missing: Vec<String> = (0..n)
                 .filter(|j| joint(*j).is_none())
@@ -147,7 +160,7 @@ impl TargetColumns {
         }
         Ok(Self {
             count: header.len(),
-            roles,
+            read: columns,
             joints,
             point: point == 3,
             quaternion: quaternion == 4,
@@ -156,16 +169,12 @@ impl TargetColumns {
     }
 }
 
-fn same(a: &ColumnRole, b: &ColumnRole) -> bool {
-    match (a, b) {
-        (ColumnRole::Joint(a, _), ColumnRole::Joint(b, _))
-        | (ColumnRole::Axis(a, _), ColumnRole::Axis(b, _))
-        | (ColumnRole::Turn(a, _), ColumnRole::Turn(b, _)) => a == b,
-        _ => a == b,
-    }
-}
-
-fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<ColumnRole>, String> {
+/// What the column of this name holds in which unit; none where it holds nothing of a target.
+fn role(
+    name: &str,
+    robot: &RobotDescription,
+    units: Units,
+) -> Result<Option<(ColumnRole, Unit)>, String> {
     let lower = name.trim().to_lowercase();
     let named = |text: &str| {
         robot
@@ -213,11 +222,11 @@ fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<Col
             JointKind::Revolute => of(Quantity::Angle, units.angle, "--angle deg")?,
             JointKind::Prismatic => of(Quantity::Length, units.length, "--length mm")?,
         };
-        return Ok(unit.map(|unit| ColumnRole::Joint(joint, unit)));
+        return Ok(unit.map(|unit| (ColumnRole::Joint(joint), unit)));
     }
     if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == stem) {
         return Ok(of(Quantity::Length, units.length, "--length mm")?
-            .map(|unit| ColumnRole::Axis(axis, unit)));
+            .map(|unit| (ColumnRole::Axis(axis), unit)));
     }
     if let (Some(part), None) = (
         ["qw", "qx", "qy", "qz"]
@@ -225,19 +234,21 @@ fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<Col
             .position(|part| *part == stem),
         unit,
     ) {
-        return Ok(Some(ColumnRole::Quaternion(part)));
+        return Ok(Some((ColumnRole::Quaternion(part), Unit::One)));
     }
     if let Some(turn) = ["a", "b", "c"].iter().position(|turn| *turn == stem) {
         return Ok(of(Quantity::Angle, units.angle, "--angle deg")?
-            .map(|unit| ColumnRole::Turn(turn, unit)));
+            .map(|unit| (ColumnRole::Turn(turn), unit)));
     }
-    Ok(match (stem, unit) {
+    let role = match (stem, unit) {
         ("payload", Some(Unit::Kilogram)) => Some(ColumnRole::Payload),
         ("temp" | "temperature", Some(Unit::Celsius)) => Some(ColumnRole::Temperature),
         ("time", Some(Unit::Second)) => Some(ColumnRole::Time),
         (_, Some(Unit::Ampere)) => numbered("i").map(|n| ColumnRole::Current(n - 1)),
         _ => numbered("dir").map(|n| ColumnRole::Direction(n - 1)),
-    })
+    };
+    // Their numbers are taken as they stand.
+    Ok(role.map(|role| (role, Unit::One)))
 }
 
 /// The numbers of one row, by their meaning.
@@ -250,20 +261,22 @@ pub(super) struct TargetRow {
 }
 
 impl TargetRow {
+    /// Takes a number, SI.
     pub(crate) fn take(&mut self, role: ColumnRole, value: f64, joints: usize) {
         let put = |slot: &mut Option<Vec<f64>>, joint: usize, value: f64| {
             slot.get_or_insert_with(|| vec![0.0; joints])[joint] = value
         };
         match role {
-            ColumnRole::Joint(joint, unit) => put(&mut self.target.q, joint, unit.to_si(value)),
-            ColumnRole::Axis(axis, unit) => self.point[axis] = unit.to_si(value),
+            ColumnRole::Joint(joint) => put(&mut self.target.q, joint, value),
+            ColumnRole::Axis(axis) => self.point[axis] = value,
             ColumnRole::Quaternion(part) => self.quaternion[part] = value,
-            ColumnRole::Turn(turn, unit) => self.turns[turn] = unit.to_si(value),
+            ColumnRole::Turn(turn) => self.turns[turn] = value,
             ColumnRole::Payload => self.target.payload = Some(value),
             ColumnRole::Temperature => self.target.temperature = Some(value),
             ColumnRole::Time => self.target.time = Some(value),
             ColumnRole::Direction(joint) => put(&mut self.target.direction, joint, value),
             ColumnRole::Current(joint) => put(&mut self.target.current, joint, value),
+            ColumnRole::Velocity(_) | ColumnRole::Acceleration(_) => {}
         }
     }
 

@@ -6,13 +6,14 @@
 //!
 //! Files that appear only when they are whole.
 
-use crate::compensate::CommandTarget;
-use crate::description::RobotDescription;
+use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
+use crate::description::{JointKind, RobotDescription};
 use crate::error::{Error, Fault, Result};
-use crate::targets::columns::TargetColumns;
 pub use crate::targets::columns::Units;
+use crate::targets::columns::{FarTurned, TargetColumns};
 use crate::targets::text::{fields, row, table};
 pub use crate::targets::trajectory::Trajectory;
+use crate::units::Unit;
 use nalgebra::Vector3;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -22,8 +23,10 @@ pub(crate) mod parquet;
 pub(crate) mod text;
 mod trajectory;
 
-/// Rows that are told of one file.
+/// Faults that are named of one file.
 const MOST: usize = 20;
+/// Rows held in memory at a time.
+const BATCH: usize = 1 << 13;
 
 /// What holds for a whole table.
 pub struct Layout<'a> {
@@ -43,30 +46,122 @@ pub struct Layout<'a> {
     pub(crate) force: bool,
 }
 
-/// Columns that calib appends, and that no other table of targets has together.
-const APPENDED: [&str; 3] = ["uncorrected_mm", "residual_mm", "iterations"];
+/// A column that calib appends.
+#[derive(Clone, Copy, PartialEq)]
+enum Appended {
+    /// From 0, where the table has no joints.
+    Joint(usize, Unit),
+    Uncorrected,
+    Residual,
+    Iterations,
+    Sigma,
+    U95,
+    Remark,
+}
+
+impl Appended {
+    fn name(self) -> String {
+        match self {
+            Self::Joint(joint, unit) => format!("q{}_{unit}", joint + 1),
+            Self::Uncorrected => "uncorrected_mm".into(),
+            Self::Residual => "residual_mm".into(),
+            Self::Iterations => "iterations".into(),
+            Self::Sigma => "sigma_mm".into(),
+            Self::U95 => "u95_mm".into(),
+            Self::Remark => "remark".into(),
+        }
+    }
+    /// The number that it holds, of a joint that is reached.
+    fn number(self, answer: &CorrectedCommand) -> Option<f64> {
+        match self {
+            Self::Joint(joint, unit) => Some(unit.from_si(answer.q.as_ref()?[joint])),
+            Self::Uncorrected => Some(answer.uncorrected * 1e3),
+            Self::Residual => Some(answer.residual * 1e3),
+            Self::Iterations => Some(answer.iterations as f64),
+            Self::Sigma => Some(answer.uncertainty?.sigma * 1e3),
+            Self::U95 => Some(answer.uncertainty?.u95 * 1e3),
+            Self::Remark => None,
+        }
+    }
+}
+
+/// Columns that no other table of targets has together.
+const OURS: [Appended; 3] = [
+    Appended::Uncorrected,
+    Appended::Residual,
+    Appended::Iterations,
+];
 
 impl Layout<'_> {
-    /// Why a table is refused by its columns: it was corrected already.
-    fn refused(&self, names: &[String]) -> Result<()> {
-        if !self.force
-            && APPENDED
-                .iter()
-                .all(|own| names.iter().any(|name| name == own))
-        {
+    /// The columns of a table with these names. Fails where it was corrected already.
+    fn columns(&self, names: &[String]) -> Result<TargetColumns> {
+        if !self.force && OURS.iter().all(|ours| names.contains(&ours.name())) {
             let message = "was compensated by calib already (columns uncorrected_mm, residual_mm, iterations): a second correction would move the robot twice as far. Take the table of before, or insist with --force";
             return Err(Error::data(self.place, message));
         }
-        Ok(())
+        TargetColumns::read(self.place, names, self.robot, self.units)
     }
+
+    /// What is appended to the columns of a table, joints that turn in this unit.
+    fn appended(&self, columns: &TargetColumns, angle: Unit, sigma: bool) -> Vec<Appended> {
+        let unit = |kind| match kind {
+            JointKind::Revolute => angle,
+            JointKind::Prismatic => Unit::Millimetre,
+        };
+        let joints = self.robot.joints.iter().enumerate();
+        let joints = joints.filter(|_| columns.joints.is_empty());
+        let joints = joints.map(|(j, joint)| Appended::Joint(j, unit(joint.kind)));
+        let sigma = [Appended::Sigma, Appended::U95]
+            .into_iter()
+            .filter(move |_| sigma);
+        let known = OURS.into_iter().chain(sigma).chain([Appended::Remark]);
+        joints.chain(known.filter(|_| !self.plain)).collect()
+    }
+}
+
+/// A table of targets that is read, corrected and written some rows at a time.
+trait TargetTable {
+    /// The targets of the next rows, with the numbers of their rows; none at the end.
+    fn read(&mut self) -> Result<Option<Vec<(usize, CommandTarget)>>>;
+    /// A row for messages.
+    fn place(&self, number: usize) -> String;
+    /// Writes the rows that were read last; false where nobody takes them any more, which is no fault.
+    fn write(&mut self, answers: &[CorrectedCommand]) -> Result<bool>;
+}
+
+/// Corrects a table to its end.
+fn corrected(
+    table: &mut impl TargetTable,
+    columns: &TargetColumns,
+    layout: &Layout,
+    corrector: &mut Corrector,
+) -> Result<Unreached> {
+    let (mut unreached, mut turned) = (Unreached::default(), FarTurned::default());
+    while let Some(targets) = table.read()? {
+        for (number, target) in &targets {
+            turned.count(|| table.place(*number), target, layout.robot);
+        }
+        if let Some(fault) = turned.fault(columns) {
+            return Err(Error::Data(vec![fault]));
+        }
+        let (numbers, targets): (Vec<usize>, _) = targets.into_iter().unzip();
+        let answers = corrector.batch(targets);
+        for (number, answer) in numbers.iter().zip(&answers) {
+            if answer.q.is_none() {
+                unreached.push(|| table.place(*number), &answer.remark());
+            }
+        }
+        if !table.write(&answers)? {
+            break;
+        }
+    }
+    Ok(unreached)
 }
 
 /// The targets of a table that are not reached; their joints are empty.
 #[derive(Debug, Default)]
 pub(crate) struct Unreached {
-    /// How many targets were read.
     pub(crate) count: u64,
-    /// The first of them.
     pub(crate) faults: Vec<Fault>,
 }
 
@@ -85,9 +180,7 @@ impl Unreached {
 /// A target and the point that was measured, m, tracker's frame.
 #[derive(Debug, Clone)]
 pub struct MeasuredTarget {
-    /// As it was before correction.
     pub(crate) target: CommandTarget,
-    /// What was measured.
     pub(crate) point: Vector3<f64>,
 }
 
@@ -100,7 +193,7 @@ pub fn measured(text: &str, layout: &Layout) -> Result<Vec<MeasuredTarget>> {
         .into_iter()
         .map(|field| field.1.into_owned())
         .collect();
-    let columns = TargetColumns::read(layout.place, &names, layout.robot, layout.units)?;
+    let columns = layout.columns(&names)?;
     if columns.joints.is_empty() || !columns.point {
         let message = "has no columns of joints (the targets before correction), or no x_mm, y_mm, z_mm (the measured points)";
         return Err(Error::spec(layout.place, message));

@@ -1,22 +1,18 @@
 //! Targets in Parquet: batch by batch, columns of joints replaced, all others passed on, what is known of each target appended.
 
-use super::columns::{FarTurned, TargetColumns, TargetRow};
-use super::{Layout, Unreached};
+use super::columns::{TargetColumns, TargetRow};
+use super::{Appended, BATCH, Layout, TargetTable, Unreached, corrected};
 use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
-use crate::description::JointKind;
 use crate::error::{Error, Result};
-use crate::raw;
+use crate::raw::{self, BatchFile};
 use crate::units::Unit;
 use arrow::array::{Array, ArrayRef, AsArray, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Field, Float64Type, Schema};
+use arrow::datatypes::{DataType, Field, Float64Type, Schema, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use std::fs::File;
 use std::io::Write;
 use std::sync::Arc;
-
-/// Rows held in memory at a time.
-const BATCH: usize = 1 << 13;
 
 /// Reads targets from a Parquet file and writes them corrected as another.
 pub(crate) fn stream(
@@ -25,113 +21,132 @@ pub(crate) fn stream(
     layout: &Layout,
     corrector: &mut Corrector,
 ) -> Result<Unreached> {
-    let fault = |message: String| {
-        Error::data(
-            layout.place,
-            format!("not a readable Parquet file: {message}"),
-        )
-    };
-    let reader = raw::parquet(input, BATCH).map_err(fault)?;
-    let schema = reader.schema.clone();
-    let names: Vec<String> = schema
+    let reader = raw::parquet(input, BATCH).map_err(|message| unreadable(layout, &message))?;
+    let names = reader
+        .schema
         .fields()
         .iter()
-        .map(|field| field.name().clone())
-        .collect();
-    layout.refused(&names)?;
-    let columns = TargetColumns::read(layout.place, &names, layout.robot, layout.units)?;
-    let out_schema = Arc::new(described(
-        &schema,
-        &columns,
-        layout,
-        corrector.has_uncertainty(),
-    ));
-    let mut writer = ArrowWriter::try_new(output, out_schema.clone(), None)
+        .map(|field| field.name().clone());
+    let columns = layout.columns(&names.collect::<Vec<String>>())?;
+    let appended = layout.appended(&columns, Unit::Radian, corrector.has_uncertainty());
+    let schema = Arc::new(described(&reader.schema, &columns, &appended));
+    let writer = ArrowWriter::try_new(output, schema.clone(), None)
         .map_err(|error| Error::Bug(error.to_string()))?;
-    let (mut unreached, mut turned) = (Unreached::default(), FarTurned::default());
-    let mut rows = 0;
-    for batch in reader {
-        let batch = batch.map_err(fault)?;
-        let targets = targets(&batch, &columns, layout, rows)?;
-        for (k, target) in targets.iter().enumerate() {
-            turned.count(
-                || format!("{}: row {}", layout.place, rows + k + 1),
-                target,
-                layout.robot,
-            );
-        }
-        if let Some(fault) = turned.fault(&columns) {
-            return Err(Error::Data(vec![fault]));
-        }
-        let answers = corrector.batch(targets);
-        for (k, answer) in answers
-            .iter()
-            .enumerate()
-            .filter(|(_, answer)| answer.q.is_none())
-        {
-            unreached.push(
-                || format!("{}: row {}", layout.place, rows + k + 1),
-                &answer.remark(),
-            );
-        }
-        let columns = answered(&batch, &columns, layout, &answers);
-        let batch = RecordBatch::try_new(out_schema.clone(), columns)
-            .map_err(|error| Error::Bug(error.to_string()))?;
-        writer
-            .write(&batch)
-            .map_err(|error| Error::store("output", error.to_string()))?;
-        rows += batch.num_rows();
-    }
-    writer
-        .close()
+    let mut table = ParquetTable {
+        layout,
+        columns: &columns,
+        appended,
+        reader,
+        batch: None,
+        rows: 0,
+        schema,
+        writer,
+    };
+    let unreached = corrected(&mut table, &columns, layout, corrector)?;
+    let closed = table.writer.close();
+    closed
         .map(|_| unreached)
         .map_err(|error| Error::store("output", error.to_string()))
 }
 
-fn described(schema: &Schema, columns: &TargetColumns, layout: &Layout, sigma: bool) -> Schema {
-    let joint = |index: usize| columns.joints.iter().any(|(column, _)| *column == index);
-    let mut fields: Vec<Arc<Field>> = Vec::new();
-    for (index, field) in schema.fields().iter().enumerate() {
-        fields.push(if joint(index) {
-            // Null where a target is not reached.
-            Arc::new(
-                Field::new(field.name(), DataType::Float64, true)
-                    .with_metadata(field.metadata().clone()),
-            )
-        } else {
-            field.clone()
-        });
-    }
-    if columns.joints.is_empty() {
-        for (j, joint) in layout.robot.joints.iter().enumerate() {
-            fields.push(Arc::new(Field::new(
-                format!("q{}_{}", j + 1, stored(joint.kind).symbol()),
-                DataType::Float64,
-                true,
-            )));
-        }
-    }
-    let mut append =
-        |name: &str, kind: DataType| fields.push(Arc::new(Field::new(name, kind, false)));
-    if !layout.plain {
-        append("uncorrected_mm", DataType::Float64);
-        append("residual_mm", DataType::Float64);
-        append("iterations", DataType::Int64);
-        if sigma {
-            append("sigma_mm", DataType::Float64);
-            append("u95_mm", DataType::Float64);
-        }
-        append("remark", DataType::Utf8);
-    }
-    Schema::new_with_metadata(fields, schema.metadata().clone())
+fn unreadable(layout: &Layout, message: &str) -> Error {
+    Error::data(
+        layout.place,
+        format!("not a readable Parquet file: {message}"),
+    )
 }
 
-fn stored(kind: JointKind) -> Unit {
-    if kind == JointKind::Revolute {
-        Unit::Radian
-    } else {
-        Unit::Millimetre
+struct ParquetTable<'a, W: Write + Send> {
+    layout: &'a Layout<'a>,
+    columns: &'a TargetColumns,
+    appended: Vec<Appended>,
+    reader: BatchFile,
+    /// The rows that were read last, and how many were read before them.
+    batch: Option<RecordBatch>,
+    rows: usize,
+    schema: SchemaRef,
+    writer: ArrowWriter<W>,
+}
+
+impl<W: Write + Send> TargetTable for ParquetTable<'_, W> {
+    fn read(&mut self) -> Result<Option<Vec<(usize, CommandTarget)>>> {
+        self.rows += self.batch.as_ref().map_or(0, RecordBatch::num_rows);
+        let batch = self.reader.next().transpose();
+        self.batch = batch.map_err(|message| unreadable(self.layout, &message))?;
+        let targets = |batch| targets(batch, self.columns, self.layout, self.rows);
+        let targets = self.batch.as_ref().map(targets).transpose()?;
+        Ok(targets.map(|targets| (self.rows + 1..).zip(targets).collect()))
     }
+    fn place(&self, number: usize) -> String {
+        format!("{}: row {number}", self.layout.place)
+    }
+    fn write(&mut self, answers: &[CorrectedCommand]) -> Result<bool> {
+        let numbers = |column: Appended| -> ArrayRef {
+            let numbers = answers.iter().map(|answer| column.number(answer));
+            Arc::new(numbers.collect::<Float64Array>())
+        };
+        let joints = &self.columns.joints;
+        let kept = self.batch.iter().flat_map(RecordBatch::columns).enumerate();
+        let kept = kept.map(|(index, column)| {
+            let joint = joints.iter().position(|(column, _)| *column == index);
+            joint.map_or_else(
+                || column.clone(),
+                |j| numbers(Appended::Joint(j, joints[j].1)),
+            )
+        });
+        let appended = self.appended.iter().map(|column| -> ArrayRef {
+            match column {
+                Appended::Iterations => Arc::new(
+                    answers
+                        .iter()
+                        .map(|answer| answer.iterations as i64)
+                        .collect::<Int64Array>(),
+                ),
+                Appended::Remark => Arc::new(
+                    answers
+                        .iter()
+                        .map(|answer| Some(answer.remark()))
+                        .collect::<StringArray>(),
+                ),
+                column => numbers(*column),
+            }
+        });
+        let batch = RecordBatch::try_new(self.schema.clone(), kept.chain(appended).collect())
+            .map_err(|error| Error::Bug(error.to_string()))?;
+        let written = self.writer.write(&batch);
+        written
+            .map(|()| true)
+            .map_err(|error| Error::store("output", error.to_string()))
+    }
+}
+
+fn described(schema: &Schema, columns: &TargetColumns, appended: &[Appended]) -> Schema {
+    let joint = |index: usize| columns.joints.iter().any(|(column, _)| *column == index);
+    let kept = schema
+        .fields()
+        .iter()
+        .enumerate()
+        .map(|(index, field)| match joint(index) {
+            // Null where a target is not reached.
+            true => Arc::new(
+                Field::new(field.name(), DataType::Float64, true)
+                    .with_metadata(field.metadata().clone()),
+            ),
+            false => field.clone(),
+        });
+    let appended = appended.iter().map(|column| {
+        let kind = match column {
+            Appended::Iterations => DataType::Int64,
+            Appended::Remark => DataType::Utf8,
+            _ => DataType::Float64,
+        };
+        let is_joint = matches!(column, Appended::Joint(..));
+        Arc::new(Field::new(column.name(), kind, is_joint))
+    });
+    Schema::new_with_metadata(
+        kept.chain(appended).collect::<Vec<_>>(),
+        schema.metadata().clone(),
+    )
 }
 
 fn targets(
@@ -141,7 +156,7 @@ fn targets(
     before: usize,
 ) -> Result<Vec<CommandTarget>> {
     let mut numbers = Vec::new();
-    for (index, role) in &columns.roles {
+    for (index, role, unit) in &columns.read {
         let column = batch.column(*index);
         let name = batch.schema().field(*index).name().clone();
         let cast = cast(column, &DataType::Float64).map_err(|_| {
@@ -153,19 +168,20 @@ fn targets(
                 ),
             )
         })?;
-        numbers.push((*role, name, cast));
+        numbers.push((*role, *unit, name, cast));
     }
     (0..batch.num_rows())
         .map(|row| {
             let mut taken = TargetRow::default();
-            for (role, name, column) in &numbers {
+            for (role, unit, name, column) in &numbers {
                 let values = column.as_primitive::<Float64Type>();
                 if !values.is_null(row) && values.value(row).is_finite() {
                     if let Some(message) = role.fault(values.value(row)) {
                         let place = format!("row {}: column `{name}`", before + row + 1);
                         return Err(Error::data(layout.place, format!("{place}: {message}")));
                     }
-                    taken.take(*role, values.value(row), layout.robot.joints.len());
+                    let number = unit.to_si(values.value(row));
+                    taken.take(*role, number, layout.robot.joints.len());
                 } else if role.is_needed() {
                     return Err(Error::data(
                         layout.place,
@@ -179,64 +195,4 @@ fn targets(
             taken.target(columns, layout).map_err(faulty)
         })
         .collect()
-}
-
-fn answered(
-    batch: &RecordBatch,
-    columns: &TargetColumns,
-    layout: &Layout,
-    answers: &[CorrectedCommand],
-) -> Vec<ArrayRef> {
-    let numbers = |of: &dyn Fn(&CorrectedCommand) -> f64| -> ArrayRef {
-        Arc::new(answers.iter().map(of).collect::<Float64Array>())
-    };
-    let joint_numbers = |joint: usize, unit: Unit| -> ArrayRef {
-        Arc::new(
-            answers
-                .iter()
-                .map(|answer| Some(unit.from_si(answer.q.as_ref()?[joint])))
-                .collect::<Float64Array>(),
-        )
-    };
-    let mut out: Vec<ArrayRef> = Vec::new();
-    for (index, column) in batch.columns().iter().enumerate() {
-        let joint = columns
-            .joints
-            .iter()
-            .position(|(column, _)| *column == index);
-        out.push(match joint {
-            Some(joint) => joint_numbers(joint, columns.joints[joint].1),
-            None => column.clone(),
-        });
-    }
-    if columns.joints.is_empty() {
-        for (j, joint) in layout.robot.joints.iter().enumerate() {
-            out.push(joint_numbers(j, stored(joint.kind)));
-        }
-    }
-    if !layout.plain {
-        out.push(numbers(&|answer| answer.uncorrected * 1e3));
-        out.push(numbers(&|answer| answer.residual * 1e3));
-        out.push(Arc::new(
-            answers
-                .iter()
-                .map(|answer| answer.iterations as i64)
-                .collect::<Int64Array>(),
-        ));
-        if answers.iter().any(|answer| answer.uncertainty.is_some()) {
-            out.push(numbers(&|answer| {
-                answer.uncertainty.map_or(0.0, |known| known.sigma) * 1e3
-            }));
-            out.push(numbers(&|answer| {
-                answer.uncertainty.map_or(0.0, |known| known.u95) * 1e3
-            }));
-        }
-        out.push(Arc::new(
-            answers
-                .iter()
-                .map(|answer| Some(answer.remark()))
-                .collect::<StringArray>(),
-        ));
-    }
-    out
 }

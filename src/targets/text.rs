@@ -1,27 +1,19 @@
 //! Targets in delimited text: read in batches, every byte kept but the numbers of joints; what is known of each is appended.
-//!
-//! Numbers with a fixed count of decimals, many a microsecond.
 
-use super::columns::{FarTurned, TargetColumns, TargetRow};
-use super::{Layout, Unreached};
+use super::columns::{TargetColumns, TargetRow};
+use super::{Appended, BATCH, Layout, MOST, TargetTable, Unreached, corrected};
 use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
-use crate::description::JointKind;
 use crate::error::{Error, Fault, Result};
-use crate::raw::{self, Delimiter, unquoted_text};
+use crate::raw::{self, DecimalMark, Delimiter, NumberFault, number, unquoted_text};
 use crate::units::Unit;
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::io::{BufRead, Read, Write};
+use std::fmt::Write as _;
+use std::io::{BufRead, ErrorKind, Read, Write};
 use std::ops::Range;
-
-/// Rows held in memory at a time.
-const BATCH: usize = 1 << 13;
 
 /// Rows that one thread writes at a time.
 const CHUNK: usize = 256;
-
-/// Faults told of one file.
-const FAULTS: usize = 20;
 
 /// Bytes of a line; a device that never ends a line must not fill the memory.
 const LONGEST: u64 = 16 << 20;
@@ -36,7 +28,6 @@ pub(crate) fn stream(
     layout: &Layout,
     corrector: &mut Corrector,
 ) -> Result<Unreached> {
-    let (mut unreached, mut turned) = (Unreached::default(), FarTurned::default());
     let (mut number, mut head) = (0, String::new());
     let header = loop {
         let Some(line) = next(input, layout.place)? else {
@@ -53,148 +44,50 @@ pub(crate) fn stream(
     };
     let delimiter = delimiter(&header);
     let (body, ending) = split_ending(&header);
-    let body_names = body.trim_start_matches('\u{feff}');
-    let names: Vec<String> = names(body_names, delimiter, layout.place, number)?
+    let names = names(
+        body.trim_start_matches('\u{feff}'),
+        delimiter,
+        layout.place,
+        number,
+    )?;
+    let names: Vec<String> = names
         .into_iter()
         .map(|field| field.1.into_owned())
         .collect();
-    layout.refused(&names)?;
-    let columns = TargetColumns::read(layout.place, &names, layout.robot, layout.units)?;
-    let mut joints: Vec<(usize, usize, Unit)> = columns
-        .joints
-        .iter()
-        .enumerate()
+    let columns = layout.columns(&names)?;
+    let joints = columns.joints.iter().enumerate();
+    let mut joints: Vec<(usize, usize, Unit)> = joints
         .map(|(joint, (index, unit))| (*index, joint, *unit))
         .collect();
     joints.sort_unstable_by_key(|(index, ..)| *index);
-    let table = TextTable {
+    let appended = layout.appended(&columns, Unit::Degree, corrector.has_uncertainty());
+    // Written with the first rows: a fault among them leaves nothing half done.
+    head.push_str(body);
+    for column in &appended {
+        head.extend([delimiter.to_string(), column.name()]);
+    }
+    head.push_str(ending);
+    let form = TextForm {
         layout,
         columns: &columns,
+        appended,
         joints,
         delimiter,
     };
-    // Written with the first rows: a fault among them leaves nothing half done.
-    head.push_str(&format!(
-        "{body}{}{ending}",
-        table.appended_names(corrector.has_uncertainty())
-    ));
-    let mut block = Block::default();
-    loop {
-        let first = number + 1;
-        block.fill(input, layout.place)?;
-        let lines: Vec<&str> = block.lines()?;
-        number += lines.len();
-        if lines.is_empty() {
-            put(output, &head)?;
-            return match output.flush() {
-                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-                    Err(refused(&error))
-                }
-                _ => Ok(unreached),
-            };
-        }
-        let parsed: Vec<Result<Option<(CommandTarget, Spans)>, String>> = lines
-            .par_iter()
-            .map(|line| {
-                if line.trim().is_empty() {
-                    Ok(None)
-                } else {
-                    table.target(line).map(Some)
-                }
-            })
-            .collect();
-        let faults: Vec<Fault> = (parsed.iter().enumerate())
-            .filter_map(|(k, row)| {
-                Some(Fault::new(
-                    format!("{}:{}", layout.place, first + k),
-                    row.as_ref().err()?,
-                ))
-            })
-            .take(FAULTS)
-            .collect();
-        if !faults.is_empty() {
-            return Err(Error::Data(faults));
-        }
-        let (mut targets, mut spans) = (
-            Vec::with_capacity(lines.len()),
-            Vec::with_capacity(lines.len()),
-        );
-        for (k, row) in parsed.into_iter().filter_map(Result::ok).enumerate() {
-            let (target, span) = row.unzip();
-            if let Some(target) = &target {
-                turned.count(
-                    || format!("{}:{}", layout.place, first + k),
-                    target,
-                    layout.robot,
-                );
-            }
-            targets.extend(target);
-            spans.push(span);
-        }
-        if let Some(fault) = turned.fault(&columns) {
-            return Err(Error::Data(vec![fault]));
-        }
-        let mut answers = corrector.batch(targets).into_iter();
-        let rows: Vec<(&str, Option<(Spans, CorrectedCommand)>)> = lines
-            .into_iter()
-            .zip(spans)
-            .map(|(line, spans)| (line, spans.and_then(|spans| Some((spans, answers.next()?)))))
-            .collect();
-        for (k, answer) in rows
-            .iter()
-            .enumerate()
-            .filter_map(|(k, (_, answered))| Some((k, &answered.as_ref()?.1)))
-        {
-            if answer.q.is_none() {
-                unreached.push(
-                    || format!("{}:{}", layout.place, first + k),
-                    &answer.remark(),
-                );
-            }
-        }
-        let written: Vec<String> = rows
-            .par_chunks(CHUNK)
-            .map(|rows| table.lines(rows))
-            .collect();
-        for text in std::iter::once(&std::mem::take(&mut head)).chain(&written) {
-            if !put(output, text)? {
-                return Ok(unreached);
-            }
-        }
-    }
-}
-
-/// Lines of the input as they stand there, a batch at a time.
-#[derive(Default)]
-struct Block {
-    bytes: Vec<u8>,
-    ends: Vec<usize>,
-    place: String,
-}
-
-impl Block {
-    /// Reads the next batch; none at the end of the input.
-    fn fill(&mut self, input: &mut dyn BufRead, place: &str) -> Result<()> {
-        self.bytes.clear();
-        self.ends.clear();
-        place.clone_into(&mut self.place);
-        while self.ends.len() < BATCH {
-            if read_line(input, &mut self.bytes, place)? == 0 {
-                break;
-            }
-            self.ends.push(self.bytes.len());
-        }
-        Ok(())
-    }
-
-    fn lines(&self) -> Result<Vec<&str>> {
-        let text = std::str::from_utf8(&self.bytes)
-            .map_err(|_| Error::data(&*self.place, "is no text in UTF-8"))?;
-        let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        Ok(starts
-            .zip(&self.ends)
-            .map(|(start, end)| &text[start..*end])
-            .collect())
+    let mut table = TextTable {
+        input,
+        output,
+        form,
+        number,
+        head,
+        rows: Vec::new(),
+    };
+    let unreached = corrected(&mut table, &columns, layout, corrector)?;
+    let head = std::mem::take(&mut table.head);
+    put(table.output, &head)?;
+    match table.output.flush() {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(refused(&error)),
+        _ => Ok(unreached),
     }
 }
 
@@ -206,14 +99,15 @@ fn refused(error: &std::io::Error) -> Error {
 fn put(output: &mut dyn Write, text: &str) -> Result<bool> {
     match output.write_all(text.as_bytes()) {
         Ok(()) => Ok(true),
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(false),
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
         Err(error) => Err(refused(&error)),
     }
 }
 
-/// Appends the next line; gives its bytes, 0 at the end of the input.
-fn read_line(input: &mut dyn BufRead, bytes: &mut Vec<u8>, place: &str) -> Result<usize> {
-    let read = input.take(LONGEST).read_until(b'\n', bytes);
+/// The next line as it stands there; none at the end of the input.
+fn next(input: &mut dyn BufRead, place: &str) -> Result<Option<String>> {
+    let mut bytes = Vec::new();
+    let read = input.take(LONGEST).read_until(b'\n', &mut bytes);
     let read = read.map_err(|error| Error::store(place, format!("cannot be read: {error}")))?;
     if read as u64 == LONGEST {
         return Err(Error::data(
@@ -224,16 +118,8 @@ fn read_line(input: &mut dyn BufRead, bytes: &mut Vec<u8>, place: &str) -> Resul
             ),
         ));
     }
-    Ok(read)
-}
-
-fn next(input: &mut dyn BufRead, place: &str) -> Result<Option<String>> {
-    let mut bytes = Vec::new();
-    if read_line(input, &mut bytes, place)? == 0 {
-        return Ok(None);
-    }
-    String::from_utf8(bytes)
-        .map(Some)
+    let line = String::from_utf8(bytes);
+    line.map(|line| Some(line).filter(|line| !line.is_empty()))
         .map_err(|_| Error::data(place, "is no text in UTF-8"))
 }
 
@@ -252,7 +138,6 @@ pub(super) fn fields(line: &str, delimiter: char) -> Result<Vec<TextField<'_>>, 
     }
 }
 
-/// A table in memory.
 pub(super) struct TableText<'t> {
     pub(crate) delimiter: char,
     pub(crate) header: &'t str,
@@ -278,7 +163,6 @@ pub(super) fn table<'t>(text: &'t str, place: &str, expected: &str) -> Result<Ta
     })
 }
 
-/// The fields of a header.
 fn names<'t>(
     header: &'t str,
     delimiter: char,
@@ -311,43 +195,91 @@ struct Spans {
 }
 
 struct TextTable<'a> {
+    input: &'a mut dyn BufRead,
+    output: &'a mut dyn Write,
+    form: TextForm<'a>,
+    /// Lines that were read.
+    number: usize,
+    /// What is written before the next rows.
+    head: String,
+    /// The lines that were read last; blank ones hold no target.
+    rows: Vec<(String, Option<Spans>)>,
+}
+
+impl TargetTable for TextTable<'_> {
+    fn read(&mut self) -> Result<Option<Vec<(usize, CommandTarget)>>> {
+        let first = self.number + 1;
+        let mut lines = Vec::new();
+        while lines.len() < BATCH {
+            let Some(line) = next(self.input, self.form.layout.place)? else {
+                break;
+            };
+            lines.push(line);
+        }
+        self.number += lines.len();
+        if lines.is_empty() {
+            return Ok(None);
+        }
+        let form = &self.form;
+        let read = lines.par_iter().map(|line| {
+            let is_blank = line.trim().is_empty();
+            (!is_blank).then(|| form.target(line)).transpose()
+        });
+        let (mut faults, mut targets) = (Vec::new(), Vec::with_capacity(lines.len()));
+        let read: Vec<Result<Option<(CommandTarget, Spans)>, String>> = read.collect();
+        self.rows.clear();
+        for ((number, line), read) in (first..).zip(lines).zip(read) {
+            match read {
+                Ok(read) => {
+                    let (target, spans) = read.unzip();
+                    targets.extend(target.map(|target| (number, target)));
+                    self.rows.push((line, spans));
+                }
+                Err(message) if faults.len() < MOST => {
+                    faults.push(Fault::new(self.place(number), message));
+                }
+                Err(_) => {}
+            }
+        }
+        Error::if_data(faults).map(|()| Some(targets))
+    }
+    fn place(&self, number: usize) -> String {
+        format!("{}:{number}", self.form.layout.place)
+    }
+    fn write(&mut self, answers: &[CorrectedCommand]) -> Result<bool> {
+        let form = &self.form;
+        let mut answers = answers.iter();
+        let rows = self.rows.iter().map(|(line, spans)| {
+            let answered = spans
+                .as_ref()
+                .and_then(|spans| Some((spans, answers.next()?)));
+            (line.as_str(), answered)
+        });
+        let rows: Vec<(&str, Option<(&Spans, &CorrectedCommand)>)> = rows.collect();
+        let written: Vec<String> = rows
+            .par_chunks(CHUNK)
+            .map(|rows| form.lines(rows))
+            .collect();
+        for text in std::iter::once(&std::mem::take(&mut self.head)).chain(&written) {
+            if !put(self.output, text)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// How a table is written.
+struct TextForm<'a> {
     layout: &'a Layout<'a>,
     columns: &'a TargetColumns,
+    appended: Vec<Appended>,
     /// Column, joint, unit; in the order of the columns.
     joints: Vec<(usize, usize, Unit)>,
     delimiter: char,
 }
 
-impl TextTable<'_> {
-    /// Header of what is appended, with its delimiters.
-    fn appended_names(&self, sigma: bool) -> String {
-        let mut names = Vec::new();
-        if self.columns.joints.is_empty() {
-            names.extend(
-                self.layout
-                    .robot
-                    .joints
-                    .iter()
-                    .enumerate()
-                    .map(|(j, joint)| format!("q{}_{}", j + 1, own_unit(joint.kind).symbol())),
-            );
-        }
-        if !self.layout.plain {
-            names.extend(["uncorrected_mm", "residual_mm", "iterations"].map(String::from));
-            names.extend(
-                ["sigma_mm", "u95_mm"]
-                    .into_iter()
-                    .filter(|_| sigma)
-                    .map(String::from),
-            );
-            names.push("remark".into());
-        }
-        names
-            .iter()
-            .map(|name| format!("{}{name}", self.delimiter))
-            .collect()
-    }
-
+impl TextForm<'_> {
     fn target(&self, line: &str) -> Result<(CommandTarget, Spans), String> {
         let (body, _) = split_ending(line);
         let cells = fields(body, self.delimiter)?;
@@ -355,11 +287,8 @@ impl TextTable<'_> {
         let comma = self.delimiter != ','
             && body.contains(',')
             && cells.iter().any(|(_, text)| is_comma_number(text));
-        let joints = self
-            .joints
-            .iter()
-            .map(|(index, ..)| cells[*index].0.clone())
-            .collect();
+        let joints = self.joints.iter();
+        let joints = joints.map(|(index, ..)| cells[*index].0.clone()).collect();
         Ok((
             row.target(self.columns, self.layout)?,
             Spans { joints, comma },
@@ -367,7 +296,7 @@ impl TextTable<'_> {
     }
 
     /// Lines with their targets' results; lines without one as they are.
-    fn lines(&self, rows: &[(&str, Option<(Spans, CorrectedCommand)>)]) -> String {
+    fn lines(&self, rows: &[(&str, Option<(&Spans, &CorrectedCommand)>)]) -> String {
         let mut out = String::with_capacity(rows.iter().map(|(line, _)| line.len() + 64).sum());
         for (line, answered) in rows {
             match answered {
@@ -381,63 +310,43 @@ impl TextTable<'_> {
     fn line(&self, out: &mut String, line: &str, spans: &Spans, answer: &CorrectedCommand) {
         let (body, ending) = split_ending(line);
         let point = if spans.comma { ',' } else { '.' };
+        let number = |out: &mut String, column: Appended| {
+            if let Some(value) = column.number(answer) {
+                push_decimal(out, value, decimals(column), point);
+            }
+        };
         let mut at = 0;
         for (range, (_, joint, unit)) in spans.joints.iter().zip(&self.joints) {
             out.push_str(&body[at..range.start]);
-            if let Some(q) = &answer.q {
-                push_decimal(out, unit.from_si(q[*joint]), decimals(*unit), point);
-            }
+            number(out, Appended::Joint(*joint, *unit));
             at = range.end;
         }
         out.push_str(&body[at..]);
-        let mut append = |value: Option<f64>, decimals: usize| {
+        for column in &self.appended {
             out.push(self.delimiter);
-            if let Some(value) = value {
-                push_decimal(out, value, decimals, point);
-            }
-        };
-        if self.columns.joints.is_empty() {
-            for (j, joint) in self.layout.robot.joints.iter().enumerate() {
-                let unit = own_unit(joint.kind);
-                append(
-                    answer.q.as_ref().map(|q| unit.from_si(q[j])),
-                    decimals(unit),
-                );
-            }
-        }
-        if !self.layout.plain {
-            append(Some(answer.uncorrected * 1e3), 4);
-            append(Some(answer.residual * 1e3), 6);
-            append(Some(answer.iterations as f64), 0);
-            if let Some(known) = answer.uncertainty {
-                append(Some(known.sigma * 1e3), 4);
-                append(Some(known.u95 * 1e3), 4);
-            }
-            let remark = answer.remark();
-            let quote = if remark.contains(self.delimiter) {
-                "\""
+            if *column == Appended::Remark {
+                push_text(out, &answer.remark(), self.delimiter);
             } else {
-                ""
-            };
-            out.push(self.delimiter);
-            out.extend([quote, &remark, quote]);
+                number(out, *column);
+            }
         }
         out.push_str(ending);
     }
 }
 
-fn own_unit(kind: JointKind) -> Unit {
-    if kind == JointKind::Revolute {
-        Unit::Degree
-    } else {
-        Unit::Millimetre
-    }
+/// Appends a text, in quotes where it holds the delimiter.
+pub(super) fn push_text(out: &mut String, text: &str, delimiter: char) {
+    let quote = if text.contains(delimiter) { "\"" } else { "" };
+    out.extend([quote, text, quote]);
 }
 
-fn decimals(unit: Unit) -> usize {
-    match unit {
-        Unit::Radian | Unit::Metre => DECIMALS + 2,
-        _ => DECIMALS,
+fn decimals(column: Appended) -> usize {
+    match column {
+        Appended::Joint(_, Unit::Radian | Unit::Metre) => DECIMALS + 2,
+        Appended::Joint(..) => DECIMALS,
+        Appended::Residual => 6,
+        Appended::Iterations => 0,
+        _ => 4,
     }
 }
 
@@ -460,7 +369,7 @@ pub(super) fn row(
         ));
     }
     let mut row = TargetRow::default();
-    for (index, role) in &columns.roles {
+    for (index, role, unit) in &columns.read {
         let (range, text) = &cells[*index];
         let (column, field) = (range.start + 1, index + 1);
         let value = parse(text, delimiter)
@@ -469,7 +378,7 @@ pub(super) fn row(
             if let Some(message) = role.fault(value) {
                 return Err(format!("column {column}: field {field}: {message}"));
             }
-            row.take(*role, value, layout.robot.joints.len());
+            row.take(*role, unit.to_si(value), layout.robot.joints.len());
         } else if role.is_needed() {
             return Err(format!("column {column} is empty"));
         }
@@ -479,97 +388,28 @@ pub(super) fn row(
 
 /// A number, or none where the field is empty.
 pub(super) fn parse(text: &str, delimiter: char) -> Result<Option<f64>, ()> {
-    if text.is_empty() {
-        return Ok(None);
-    }
-    let value = match text.parse::<f64>() {
-        Ok(value) => value,
-        Err(_) if delimiter != ',' && is_comma_number(text) => {
-            text.replacen(',', ".", 1).parse().map_err(|_| ())?
-        }
-        Err(_) => return Err(()),
+    let mark = match delimiter != ',' && is_comma_number(text) {
+        true => DecimalMark::Comma,
+        false => DecimalMark::Point,
     };
-    if value.is_finite() {
-        Ok(Some(value))
-    } else {
-        Err(())
+    match number(text.as_bytes(), mark) {
+        Ok(value) => Ok(Some(value)),
+        Err(NumberFault::Blank) => Ok(None),
+        Err(_) => Err(()),
     }
 }
 
-/// Above this (2^53) whole numbers are no longer exact in f64.
-const EXACT: f64 = 9_007_199_254_740_992.0;
-
-/// Appends `value` with so many decimals (at most 15), after `point` (ASCII); rounded to the nearest.
+/// Appends `value` with so many decimals, after `point`, rounded to the nearest; no zero has a sign.
 pub(super) fn push_decimal(out: &mut String, value: f64, decimals: usize, point: char) {
-    let scaled = (value.abs() * 10f64.powi(decimals as i32)).round_ties_even();
-    if scaled.is_nan() || scaled >= EXACT || decimals > 15 {
-        let text = format!("{value:.decimals$}");
-        out.extend(text.chars().map(|c| if c == '.' { point } else { c }));
-        return;
+    let start = out.len();
+    let _ = write!(out, "{value:.decimals$}");
+    let text = &out[start..];
+    if text.starts_with('-') && !text.contains(|digit| ('1'..='9').contains(&digit)) {
+        out.remove(start);
     }
-    let (mut rest, negative) = (scaled as u64, value < 0.0 && scaled > 0.0);
-    // From the last digit to the first, at least one before the point.
-    let mut text = [b'0'; 24];
-    let mut at = text.len();
-    let mut put = |byte: u8| {
-        at -= 1;
-        text[at] = byte;
-    };
-    let mut count = 0;
-    while rest > 0 || count <= decimals {
-        if count == decimals && decimals > 0 {
-            put(point as u8);
-        }
-        put(b'0' + (rest % 10) as u8);
-        (rest, count) = (rest / 10, count + 1);
-    }
-    if negative {
-        put(b'-');
-    }
-    out.extend(std::str::from_utf8(&text[at..]));
-}
-
-#[cfg(test)]
-mod tests {
-    use super::push_decimal;
-
-    #[test]
-    fn a_number_is_written_to_half_a_unit_of_its_last_decimal() {
-        let mut seed = 1u64;
-        for _ in 0..20_000 {
-            seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            let value = (seed >> 11) as f64 / (1u64 << 53) as f64 * 400.0 - 200.0;
-            for decimals in [0, 4, 7, 9] {
-                let mut text = String::new();
-                push_decimal(&mut text, value, decimals, '.');
-                let whole: f64 = text.parse().expect("a number");
-                // Half a unit of the last place and a rounding of the product.
-                assert!(
-                    (whole - value).abs() <= 0.500_1 * 10f64.powi(-(decimals as i32)),
-                    "{value} {text}"
-                );
-                assert_eq!(text.len(), format!("{whole:.decimals$}").len());
-            }
-        }
-        let write = |value, decimals, point| {
-            let mut text = String::new();
-            push_decimal(&mut text, value, decimals, point);
-            text
-        };
-        assert_eq!(write(-12.5, 3, ','), "-12,500");
-        assert_eq!(
-            (
-                write(-1e-9, 4, '.'),
-                write(0.05, 1, '.'),
-                write(3.0, 0, '.')
-            ),
-            ("0.0000".into(), "0.0".into(), "3".into())
-        );
-        assert_eq!(
-            (write(1e30, 2, ',').len(), write(f64::NAN, 2, '.')),
-            (34, "NaN".into())
-        );
+    if point != '.'
+        && let Some(at) = out[start..].find('.')
+    {
+        out.replace_range(start + at..=start + at, point.encode_utf8(&mut [0; 4]));
     }
 }

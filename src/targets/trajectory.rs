@@ -1,5 +1,6 @@
 //! A planned motion as delimited text: times and joints in even steps; what it needs of torque is appended, all else stays.
 
+use super::columns::{ColumnRole, ReadColumn, read_columns};
 use super::text::{TableText, TextField, fields, parse, table};
 use super::{MOST, text};
 use crate::description::RobotDescription;
@@ -11,15 +12,8 @@ const UNEVEN: f64 = 0.02;
 /// Decimals of torques (Nm) and currents (A).
 const DECIMALS: usize = 6;
 
-/// What a column holds; joints from 0.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum MotionColumn {
-    Time(f64),
-    Position(usize, f64),
-    Velocity(usize, f64),
-    Acceleration(usize, f64),
-    Temperature,
-}
+/// A column of a motion, and what its unit is in SI.
+type MotionColumn = ReadColumn<f64>;
 
 /// A file's motion, and its lines.
 pub struct Trajectory<'a> {
@@ -115,7 +109,7 @@ impl<'a> Trajectory<'a> {
                     continue;
                 }
             };
-            for (column, (_, cell)) in columns.iter().zip(cells) {
+            for ((_, role, unit), (_, cell)) in columns.iter().zip(cells) {
                 let Ok(Some(value)) = parse(&cell, self.delimiter) else {
                     fault(format!("`{cell}` is not a number"));
                     continue;
@@ -123,7 +117,7 @@ impl<'a> Trajectory<'a> {
                 if self.delimiter != ',' && cell.contains(',') {
                     self.point = ',';
                 }
-                put(&mut self.motion, row, *column, value);
+                put(&mut self.motion, row, *role, unit * value);
             }
         }
         if faults.is_empty() {
@@ -208,10 +202,9 @@ impl<'a> Trajectory<'a> {
                 .iter()
                 .flat_map(|all| &all[own.clone()])
                 .for_each(|u95| number(Some(*u95)));
-            let remark = judged.to_string();
-            let quote = if remark.contains(between) { "\"" } else { "" };
             text.push(between);
-            text.extend([quote, &remark, quote, "\n"]);
+            text::push_text(&mut text, &judged.to_string(), between);
+            text.push('\n');
         }
         text
     }
@@ -257,37 +250,31 @@ fn kept(place: &str, names: &[TextField], joints: usize, force: bool) -> Result<
     Ok(first)
 }
 
-/// What only `dq` and `ddq` of all joints make.
+/// A motion of so many joints without rows, with the lists that the columns fill.
 fn empty_motion(joints: usize, columns: &[MotionColumn]) -> PlannedMotion {
-    let has = |is: fn(&MotionColumn) -> bool| columns.iter().any(is).then(Vec::new);
+    let has = |role| columns.iter().any(|column| column.1 == role).then(Vec::new);
     PlannedMotion {
         joints,
         time: Vec::new(),
         position: Vec::new(),
-        velocity: has(|column| matches!(column, MotionColumn::Velocity(..))),
-        acceleration: has(|column| matches!(column, MotionColumn::Acceleration(..))),
-        temperature: has(|column| matches!(column, MotionColumn::Temperature)),
+        velocity: has(ColumnRole::Velocity(0)),
+        acceleration: has(ColumnRole::Acceleration(0)),
+        temperature: has(ColumnRole::Temperature),
         since_start: None,
     }
 }
 
 /// Takes a number of a row.
-fn put(motion: &mut PlannedMotion, row: usize, column: MotionColumn, value: f64) {
-    let n = motion.joints;
-    let (list, joint, unit) = match column {
-        MotionColumn::Time(unit) => return motion.time[row] = unit * value,
-        MotionColumn::Temperature => {
-            return motion
-                .temperature
-                .iter_mut()
-                .for_each(|all| all[row] = value);
-        }
-        MotionColumn::Position(joint, unit) => (Some(&mut motion.position), joint, unit),
-        MotionColumn::Velocity(joint, unit) => (motion.velocity.as_mut(), joint, unit),
-        MotionColumn::Acceleration(joint, unit) => (motion.acceleration.as_mut(), joint, unit),
+fn put(motion: &mut PlannedMotion, row: usize, role: ColumnRole, value: f64) {
+    let (list, joint, n) = match role {
+        ColumnRole::Joint(joint) => (Some(&mut motion.position), joint, motion.joints),
+        ColumnRole::Velocity(joint) => (motion.velocity.as_mut(), joint, motion.joints),
+        ColumnRole::Acceleration(joint) => (motion.acceleration.as_mut(), joint, motion.joints),
+        ColumnRole::Temperature => (motion.temperature.as_mut(), 0, 1),
+        _ => (Some(&mut motion.time), 0, 1),
     };
     if let Some(list) = list {
-        list[n * row + joint] = unit * value;
+        list[n * row + joint] = value;
     }
 }
 
@@ -305,49 +292,34 @@ const PER_JOINT: [(&str, &str, f64); 6] = [
 
 fn columns(place: &str, names: &[String], robot: &RobotDescription) -> Result<Vec<MotionColumn>> {
     let n = robot.joints.len();
-    let mut faults = Vec::new();
-    let mut columns = Vec::new();
-    for name in names {
-        match column(name, robot) {
-            Some(column) if columns.iter().any(|known| same(known, &column)) => {
-                faults.push(Fault::new(place, format!("column `{name}` repeats what another column gives")));
-            }
-            Some(column) => columns.push(column),
-            None => faults.push(Fault::new(
-                place,
-                format!(
-                    "unknown column `{name}`; allowed: time_s or time_ms, q1_deg to q{n}_deg or _rad (or the robot's joint names), \
-                     dq1_deg_s or _rad_s, ddq1_deg_s2 or _rad_s2, temp_c"
-                ),
-            )),
-        }
-    }
-    let count =
-        |is: &dyn Fn(&MotionColumn) -> bool| columns.iter().filter(|column| is(column)).count();
-    if faults.is_empty() && count(&|column| matches!(column, MotionColumn::Time(_))) == 0 {
+    let (columns, mut faults) = read_columns(place, names, |name| {
+        let unknown = || {
+            format!(
+                "unknown column `{name}`; allowed: time_s or time_ms, q1_deg to q{n}_deg or _rad (or the robot's joint names), \
+                 dq1_deg_s or _rad_s, ddq1_deg_s2 or _rad_s2, temp_c"
+            )
+        };
+        column(name, robot).map(Some).ok_or_else(unknown)
+    });
+    let has = |role: ColumnRole| columns.iter().any(|column| column.1 == role);
+    if faults.is_empty() && !has(ColumnRole::Time) {
         faults.push(Fault::new(place, "has no column time_s"));
     }
-    for (what, needed, is) in [
-        (
-            "q",
-            true,
-            (|column| matches!(column, MotionColumn::Position(..))) as fn(&MotionColumn) -> bool,
-        ),
-        ("dq", false, |column| {
-            matches!(column, MotionColumn::Velocity(..))
-        }),
-        ("ddq", false, |column| {
-            matches!(column, MotionColumn::Acceleration(..))
-        }),
-    ] {
-        let found = count(&is);
-        if faults.is_empty() && found != n && (needed || found > 0) {
-            faults.push(Fault::new(
-                place,
-                format!(
-                    "has columns {what} of {found} of the robot's {n} joints: give all of them"
-                ),
-            ));
+    let roles = [
+        ColumnRole::Joint,
+        ColumnRole::Velocity,
+        ColumnRole::Acceleration,
+    ];
+    for (what, role) in ["q", "dq", "ddq"]
+        .into_iter()
+        .zip(roles as [fn(usize) -> ColumnRole; 3])
+    {
+        let found = (0..n).filter(|joint| has(role(*joint))).count();
+        if faults.is_empty() && found != n && (what == "q" || found > 0) {
+            let message = format!(
+                "has columns {what} of {found} of the robot's {n} joints: give all of them"
+            );
+            faults.push(Fault::new(place, message));
         }
     }
     if faults.is_empty() {
@@ -357,24 +329,13 @@ fn columns(place: &str, names: &[String], robot: &RobotDescription) -> Result<Ve
     }
 }
 
-fn same(a: &MotionColumn, b: &MotionColumn) -> bool {
-    use MotionColumn::{Acceleration, Position, Temperature, Time, Velocity};
-    match (a, b) {
-        (Time(_), Time(_)) | (Temperature, Temperature) => true,
-        (Position(a, _), Position(b, _))
-        | (Velocity(a, _), Velocity(b, _))
-        | (Acceleration(a, _), Acceleration(b, _)) => a == b,
-        _ => false,
-    }
-}
-
-fn column(name: &str, robot: &RobotDescription) -> Option<MotionColumn> {
+fn column(name: &str, robot: &RobotDescription) -> Option<(ColumnRole, f64)> {
     let lower = name.trim().to_lowercase();
     if let Some((_, unit)) = TIMES.iter().find(|(known, _)| *known == lower) {
-        return Some(MotionColumn::Time(*unit));
+        return Some((ColumnRole::Time, *unit));
     }
     if lower == "temp_c" {
-        return Some(MotionColumn::Temperature);
+        return Some((ColumnRole::Temperature, 1.0));
     }
     for (what, ending, unit) in PER_JOINT {
         let Some(stem) = lower.strip_suffix(ending) else {
@@ -393,11 +354,12 @@ fn column(name: &str, robot: &RobotDescription) -> Option<MotionColumn> {
                 .position(|joint| what == "q" && joint.name.to_lowercase() == stem)
         };
         if let Some(joint) = numbered.or_else(named) {
-            return Some(match what {
-                "q" => MotionColumn::Position(joint, unit),
-                "dq" => MotionColumn::Velocity(joint, unit),
-                _ => MotionColumn::Acceleration(joint, unit),
-            });
+            let role = match what {
+                "q" => ColumnRole::Joint(joint),
+                "dq" => ColumnRole::Velocity(joint),
+                _ => ColumnRole::Acceleration(joint),
+            };
+            return Some((role, unit));
         }
     }
     None

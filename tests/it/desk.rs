@@ -20,8 +20,6 @@ pub struct Desk {
     files: BTreeMap<PathBuf, Vec<u8>>,
     pub notes: Mutex<Vec<String>>,
     pub warnings: Mutex<Vec<String>>,
-    /// Names of files, each time that one is opened.
-    pub opened: Mutex<Vec<String>>,
     chunks: Chunks,
 }
 
@@ -111,7 +109,6 @@ impl Sink for Keep {
 impl Services for Desk {
     fn open(&self, file: &RawFile) -> Result<OpenedInput> {
         let label = file.0.display().to_string();
-        self.opened.lock().unwrap().push(label.clone());
         if let Some(content) = self.files.get(&file.0) {
             let reader = Box::new(std::io::Cursor::new(content.clone()));
             return Ok(OpenedInput {

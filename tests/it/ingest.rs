@@ -1,6 +1,5 @@
 //! Raw files become a recording; what does not is named with file, line and reason.
 
-mod blocks;
 mod clocks;
 mod counting;
 mod external;
@@ -8,9 +7,9 @@ mod feather;
 mod foreign;
 mod kinds;
 mod later;
+mod long;
 mod moving;
 mod noise;
-mod once;
 mod programs;
 mod refusals;
 mod together;

@@ -53,7 +53,7 @@ fn a_decoder_that_gives_up_is_a_fault_of_the_file() {
         damaged
     });
     let read = |bytes: &Vec<u8>| {
-        raw::parquet(bytes::Bytes::from(bytes.clone()), 8).and_then(raw::ParquetFile::whole)
+        raw::parquet(bytes::Bytes::from(bytes.clone()), 8).and_then(raw::BatchFile::whole)
     };
     let gives_up: Vec<Vec<u8>> = damaged
         .filter(|bytes| read(bytes).is_err_and(|message| message.contains("its decoder gives up")))

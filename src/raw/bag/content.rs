@@ -1,7 +1,7 @@
 //! What a bag holds: its topics with their rates and gaps, which of them are read, and what is lost.
 
 use super::message::{self, KINDS};
-use super::{Message, Messages};
+use super::{Message, Messages, Topic};
 use crate::error::{Error, Result, counted};
 use crate::raw::{InputSource, failed};
 use std::collections::BTreeMap;
@@ -11,11 +11,9 @@ use std::collections::BTreeMap;
 pub struct BagTopic {
     /// As the setting `topic` names it.
     pub(crate) name: String,
-    /// Its type.
     pub(crate) kind: String,
     /// Whether messages of this type are read.
     pub(crate) is_read: bool,
-    /// How many.
     pub(crate) messages: u64,
     /// When the first and the last were received, s since 1970.
     pub(crate) received: [f64; 2],
@@ -66,9 +64,7 @@ impl BagTopic {
 
 /// What a bag holds.
 pub struct BagContent {
-    /// Its topics by name.
     pub(crate) topics: Vec<BagTopic>,
-    /// What of it is lost.
     pub(crate) loss: Option<String>,
     source: Box<dyn InputSource>,
 }
@@ -77,43 +73,31 @@ pub struct BagContent {
 pub fn bag_content(source: Box<dyn InputSource>, label: &str) -> Result<BagContent> {
     let mut messages = Messages::open(source).map_err(|error| failed(label, &error))?;
     let (mut message, mut found) = (Message::default(), BTreeMap::<String, BagTopic>::new());
+    let unseen = |name: &str, topic: &Topic| BagTopic {
+        name: name.into(),
+        kind: topic.kind.clone(),
+        is_read: topic.known().is_some(),
+        ..BagTopic::default()
+    };
+    let of_frames = |topic: &Topic| topic.known().is_some_and(|kind| kind.of_frames);
     while messages.next(&|_| true, &mut message) {
         let topic = &message.topic;
-        let kind = topic.known();
-        let names = match kind.filter(|kind| kind.of_frames) {
-            Some(_) => message::frames(&message.data)
+        let names = match of_frames(topic) {
+            true => message::frames(&message.data)
                 .into_iter()
                 .map(|frames| format!("{} {frames}", topic.name))
                 .collect(),
-            None => vec![topic.name.clone()],
+            false => vec![topic.name.clone()],
         };
         for name in names {
-            let new = || BagTopic {
-                name: name.clone(),
-                kind: topic.kind.clone(),
-                is_read: kind.is_some(),
-                ..BagTopic::default()
-            };
-            found
-                .entry(name.clone())
-                .or_insert_with(new)
-                .see(message.received as f64 * 1e-9);
+            let seen = unseen(&name, topic);
+            let seen = found.entry(name).or_insert(seen);
+            seen.see(message.received as f64 * 1e-9);
         }
     }
-    for topic in messages.topics {
-        let of_frames = topic.known().is_some_and(|kind| kind.of_frames);
-        if !of_frames && !found.contains_key(&topic.name) {
-            let is_read = topic.known().is_some();
-            found.insert(
-                topic.name.clone(),
-                BagTopic {
-                    name: topic.name.clone(),
-                    kind: topic.kind.clone(),
-                    is_read,
-                    ..BagTopic::default()
-                },
-            );
-        }
+    for topic in messages.topics.iter().filter(|topic| !of_frames(topic)) {
+        let unseen = unseen(&topic.name, topic);
+        found.entry(topic.name.clone()).or_insert(unseen);
     }
     let loss = (!messages.losses.is_empty()).then(|| messages.losses.join("; "));
     Ok(BagContent {
@@ -197,10 +181,6 @@ pub(super) fn no_topic(topic: &str, content: &BagContent) -> String {
             format!("{first}; {}{others}", listed(found))
         }
     };
-    message
-        + &content
-            .loss
-            .iter()
-            .map(|loss| format!("; {loss}"))
-            .collect::<String>()
+    let loss = content.loss.iter().map(|loss| format!("; {loss}"));
+    message + &loss.collect::<String>()
 }

@@ -11,7 +11,6 @@ use std::sync::Arc;
 
 /// How a file begins.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// Bytes of a record at most.
 const LONGEST: usize = 1 << 30;
 /// Bytes of a message before its content: channel, sequence, time of the record and of the publisher.
 const HEADER: usize = 22;

@@ -12,7 +12,6 @@ enum FieldType {
     Text(&'static str),
     /// A number of 64 bits: a column of this name.
     Number(&'static str),
-    /// Names of joints.
     Names,
     /// A list of numbers, one for each name: columns `NAME.position`, and so on. It may be empty.
     OfNames(&'static str),
@@ -22,7 +21,6 @@ enum FieldType {
     List(&'static str),
 }
 
-/// A type of message that is read.
 pub(super) struct MessageKind {
     pub(crate) name: &'static str,
     /// It holds any number of them; its two frames select the one that is read.
@@ -45,7 +43,6 @@ const TRANSFORM: &[FieldType] = &[
     Number("rotation.w"),
 ];
 
-/// Types of messages that are read.
 pub(super) const KINDS: &[MessageKind] = &[
     MessageKind {
         name: "sensor_msgs/msg/JointState",
@@ -127,7 +124,6 @@ struct Cdr<'a> {
     is_big: bool,
 }
 
-/// Why a message cannot be read.
 pub(super) type FieldFault = String;
 
 impl<'a> Cdr<'a> {
@@ -211,7 +207,6 @@ pub(super) struct MessageCells {
 }
 
 impl MessageCells {
-    /// Sets a cell.
     pub(super) fn set(&mut self, name: &str, cell: FieldValue) {
         if let Some(place) = self.place(name) {
             self.cells[place] = cell;
@@ -220,7 +215,6 @@ impl MessageCells {
     pub(super) fn clear(&mut self) {
         self.cells.fill(FieldValue::Absent);
     }
-    /// Names of joints of the last message.
     pub(super) fn joints(&self) -> String {
         let mut cdr = Cdr {
             data: &self.joints,

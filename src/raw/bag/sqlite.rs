@@ -17,7 +17,6 @@ const DEEPEST: usize = 24;
 /// Bytes of a row, at most.
 const LONGEST: u64 = 1 << 30;
 
-/// The pages of a file.
 struct DatabasePages {
     start: u64,
     size: u64,
@@ -41,7 +40,6 @@ struct PageCell {
     overflow: u32,
 }
 
-/// What a column of a row holds.
 enum Value<'a> {
     Nothing,
     Integer(i64),
@@ -288,7 +286,6 @@ pub(super) struct SqliteMessages {
     messages: TableRows,
     /// Places of topic, time and content among the columns.
     places: [usize; 3],
-    /// Rows that cannot be read.
     cut: u64,
 }
 

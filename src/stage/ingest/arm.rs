@@ -6,7 +6,6 @@ use crate::observation::{DeclaredColumn, KINDS, MeasurementKind, Part};
 use crate::table::{Robot, recording_columns};
 use std::ops::Range;
 
-/// The joints of the robot table.
 pub(super) struct RobotJoints {
     /// Names of the joints; none where no robot is known.
     pub(crate) names: Vec<String>,
@@ -96,13 +95,10 @@ pub(super) struct Slots {
     pub(crate) time: usize,
     pub(crate) q: Range<usize>,
     pub(crate) velocity: Range<usize>,
-    /// The places of a measured point.
     pub(crate) point: Range<usize>,
-    /// What each kind of measurement takes.
     pub(crate) kinds: Vec<KindSlots>,
 }
 
-/// Where a kind's numbers are.
 pub(super) struct KindSlots {
     pub(crate) kind: &'static dyn MeasurementKind,
     pub(crate) values: Vec<usize>,
@@ -160,7 +156,6 @@ impl Slots {
         slots.kinds = kinds.collect();
         slots
     }
-    /// The places of a setting's numbers.
     pub(super) fn of(&self, setting: &str) -> Range<usize> {
         let found = self
             .columns

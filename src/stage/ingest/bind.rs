@@ -4,7 +4,7 @@ use super::arm::{KindSlots, RobotJoints};
 use super::clock::CLOCK;
 use super::columns::Columns;
 use super::layout::{FileLayout, WideTargets};
-use super::mapped::{ColumnRef, JointColumns, NameRule, ScalarColumn};
+use super::mapped::{ColumnRef, JointColumns, ScalarColumn, TextColumn};
 use crate::error::{Error, Fault, Result, counted, did_you_mean, first_of};
 use crate::observation::{Convention, DeclaredColumn};
 use crate::table::recording_columns;
@@ -29,8 +29,6 @@ pub(super) struct Binding {
     pub(crate) conventions: Vec<(Range<usize>, &'static DeclaredColumn, &'static Convention)>,
     /// Whether the file has what a kind of measurement measured.
     pub(crate) measures: bool,
-    /// The kinds of measurement of which the file has something.
-    pub(crate) kinds: Vec<usize>,
     pub(crate) sequence: Option<usize>,
     pub(crate) cells: Vec<NumberBinding>,
     /// The point of each target of a wide row.
@@ -47,15 +45,10 @@ pub(super) struct Binding {
 
 /// Text from a column, or for every row the same.
 pub(super) enum TextBinding {
-    Column {
-        column: usize,
-        optional: bool,
-        rule: NameRule,
-    },
+    Column(usize, TextColumn),
     Value(String),
 }
 
-/// A column of numbers.
 pub(super) struct NumberBinding {
     /// Place in a row's numbers.
     pub(crate) index: usize,
@@ -73,7 +66,6 @@ pub(super) struct NumberBinding {
     pub(crate) sign: f64,
     /// The column, as people call it: `x_mm`, or `column 4`.
     pub(crate) name: String,
-    /// What is added to it.
     pub(crate) difference: Option<Difference>,
     /// Whether it holds clock times as text.
     pub(crate) is_clock: bool,
@@ -101,20 +93,12 @@ impl Binding {
             kind.name
                 .is_some_and(|name| self.texts.get(name).is_some_and(Option::is_some))
         };
-        let is_filled = |place: &usize| self.filled.binary_search(place).is_ok();
         let is_read = |kind: &KindSlots| {
-            kind.values
-                .iter()
-                .any(|place| self.cells.iter().any(|cell| cell.index == *place))
+            let mut cells = self.cells.iter();
+            cells.any(|cell| kind.values.contains(&cell.index))
         };
-        let kinds = &arm.slots.kinds;
-        self.measures = is_wide || kinds.iter().any(|kind| is_named(kind) || is_read(kind));
-        let is_bound = |kind: &KindSlots| {
-            is_named(kind) || kind.values.iter().chain(&kind.sigma).any(is_filled)
-        };
-        self.kinds = (0..kinds.len())
-            .filter(|index| is_bound(&kinds[*index]))
-            .collect();
+        let mut kinds = arm.slots.kinds.iter();
+        self.measures = is_wide || kinds.any(|kind| is_named(kind) || is_read(kind));
     }
     /// Columns that are read, and whether a row may lack them.
     pub(super) fn columns(&self) -> Vec<(usize, bool)> {
@@ -123,23 +107,18 @@ impl Binding {
             .iter()
             .chain(self.texts.iter().flatten())
             .filter_map(|text| match text {
-                TextBinding::Column {
-                    column, optional, ..
-                } => Some((*column, !optional)),
+                TextBinding::Column(column, text) => Some((*column, !text.optional)),
                 TextBinding::Value(_) => None,
             });
-        let points = self.points.iter().flat_map(|(_, cells)| cells);
-        let numbers = self.cells.iter().chain(points).flat_map(|cell| {
+        let numbers = self.cells.iter().flat_map(|cell| {
             let other = cell.difference.as_ref().map(|other| other.column);
-            [Some(cell.column), other]
-                .into_iter()
-                .flatten()
-                .map(|column| (column, !cell.optional))
+            let columns = [Some(cell.column), other].into_iter().flatten();
+            columns.map(|column| (column, !cell.optional))
         });
-        texts
-            .chain(numbers)
-            .chain(self.sequence.map(|column| (column, true)))
-            .collect()
+        let points = self.points.iter().flat_map(|(_, cells)| cells);
+        let others = points.map(|cell| cell.column).chain(self.sequence);
+        let others = others.map(|column| (column, true));
+        texts.chain(numbers).chain(others).collect()
     }
     /// Slots that this file fills.
     pub(super) fn slots(&self) -> Vec<usize> {
@@ -183,11 +162,8 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
         let setting = declared.setting;
         let value = text.value.clone().map(TextBinding::Value);
         let bound = value.or_else(|| {
-            Some(TextBinding::Column {
-                column: binder.column(text.column.as_ref()?, setting, text.optional)?,
-                optional: text.optional,
-                rule: text.rule(),
-            })
+            let column = binder.column(text.column.as_ref()?, setting, text.optional)?;
+            Some(TextBinding::Column(column, text.clone()))
         });
         let texts = arm.slots.texts();
         match texts.iter().position(|name| *name == setting) {
@@ -405,8 +381,10 @@ impl Binder<'_> {
                 .each_ref()
                 .map(|reference| self.column(reference, target, false));
             if let [Some(a), Some(b), Some(c)] = found {
-                let cells = [(x, a), (y, b), (z, c)]
-                    .map(|(declared, column)| self.cell(declared, false, 0, column, unit));
+                let cells = [(x, a), (y, b), (z, c)].map(|(declared, column)| NumberBinding {
+                    optional: true,
+                    ..self.cell(declared, false, usize::MAX, column, unit)
+                });
                 self.binding.points.push((target.clone(), cells));
             }
         }

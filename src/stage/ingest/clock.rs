@@ -113,13 +113,4 @@ mod tests {
             assert_eq!(parsed(text), None, "{text}");
         }
     }
-
-    #[test]
-    fn a_recording_goes_on_after_midnight() {
-        let mut clock = ClockColumn::default();
-        let times: Vec<f64> = ["23:59:58", "23:59:59.5", "00:00:01", "00:00:00.5"]
-            .map(|text| clock.read(text.as_bytes()).expect("a time"))
-            .to_vec();
-        assert_eq!(times, [86_398.0, 86_399.5, 86_401.0, 86_400.5]);
-    }
 }

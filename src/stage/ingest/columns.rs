@@ -30,9 +30,9 @@ enum Mapped {
     Uncertainty(UncertaintyColumn),
 }
 
+/// All mapped columns of a kind, and the one of a setting.
 macro_rules! mapped {
-    ($(#[$doc:meta])* $all:ident, $one:ident, $variant:ident, $type:ty) => {
-        $(#[$doc])*
+    ($($all:ident, $one:ident: $variant:ident($type:ty);)*) => {$(
         pub(super) fn $all(&self) -> impl Iterator<Item = (&'static DeclaredColumn, &$type)> {
             self.0.iter().filter_map(|(column, mapped)| match mapped {
                 Mapped::$variant(mapped) => Some((*column, mapped)),
@@ -42,38 +42,16 @@ macro_rules! mapped {
         pub(super) fn $one(&self, setting: &str) -> Option<&$type> {
             self.$all().find(|(column, _)| column.setting == setting).map(|(_, mapped)| mapped)
         }
-    };
+    )*};
 }
 
 impl Columns {
-    mapped!(
-        #[doc = "The mapped texts."]
-        texts,
-        text,
-        Text,
-        TextColumn
-    );
-    mapped!(
-        #[doc = "The mapped whole numbers."]
-        counts,
-        count,
-        Count,
-        CountColumn
-    );
-    mapped!(
-        #[doc = "The mapped single numbers."]
-        numbers,
-        number,
-        Number,
-        ScalarColumn
-    );
-    mapped!(
-        #[doc = "The mapped numbers per joint."]
-        joints,
-        joint,
-        Joints,
-        JointColumns
-    );
+    mapped! {
+        texts, text: Text(TextColumn);
+        counts, count: Count(CountColumn);
+        numbers, number: Number(ScalarColumn);
+        joints, joint: Joints(JointColumns);
+    }
 
     /// The mapped quantities of several numbers.
     pub(super) fn conventions(

@@ -1,8 +1,7 @@
 //! Axes beside the arm's own (a track, a positioner) that a file records and nobody mapped: where they move, base or workpiece move with them.
 
-use super::layout::Decimal;
 use crate::error::{Error, Result};
-use crate::raw::{Record, number};
+use crate::raw::{DecimalMark, Record, number};
 
 /// What such columns are called at controllers, without a number and a unit.
 const NAMES: [&str; 11] = [
@@ -50,7 +49,7 @@ fn external(name: &str) -> Option<&'static str> {
 pub(super) struct ExternalAxes {
     /// Column, name, unit, least and largest number.
     columns: Vec<(usize, String, &'static str, [f64; 2])>,
-    decimal: Decimal,
+    decimal: DecimalMark,
 }
 
 impl ExternalAxes {
@@ -58,7 +57,7 @@ impl ExternalAxes {
     pub(super) fn among<'n>(
         unmapped: impl Iterator<Item = (usize, &'n String)>,
         has_joints: bool,
-        decimal: Decimal,
+        decimal: DecimalMark,
     ) -> Self {
         let axes = unmapped
             .filter(|_| has_joints)
@@ -76,10 +75,9 @@ impl ExternalAxes {
         }
     }
 
-    /// Takes a row.
     pub(super) fn see(&mut self, record: &Record) {
         for (column, .., [least, most]) in &mut self.columns {
-            if let Some(number) = number(record.field(*column), self.decimal.mark())
+            if let Some(number) = number(record.field(*column), self.decimal)
                 .ok()
                 .filter(|number| number.abs() < NONE)
             {

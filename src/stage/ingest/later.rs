@@ -173,31 +173,3 @@ impl Continuation {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_later_measurement_follows_and_its_clock_goes_on_only_where_it_starts_again() {
-        let mut rows = Continuation::default();
-        assert_eq!(rows.next(1, 10.0), Ok((1, 10.0)));
-        assert_eq!(rows.next(2, 20.0), Ok((2, 20.0)));
-        assert_eq!(rows.next(2, 30.0), Err((2, 2)));
-        rows.begin(Some(100.0));
-        assert_eq!(rows.next(1, 5.0), Ok((3, 130.0)));
-        assert_eq!(rows.next(2, 6.0), Ok((4, 131.0)));
-        rows.begin(Some(100.0));
-        assert_eq!(rows.next(9, 500.0), Ok((9, 500.0)));
-        rows.begin(Some(0.0));
-        // What was measured at the same poses has the same times.
-        let mut together = Continuation::default();
-        assert_eq!(together.next(1, 10.0), Ok((1, 10.0)));
-        together.begin(None);
-        assert_eq!(together.next(1, 10.0), Ok((2, 10.0)));
-        assert!(
-            rows.next(1, f64::NAN)
-                .is_ok_and(|(sequence, time)| sequence == 10 && time.is_nan())
-        );
-    }
-}

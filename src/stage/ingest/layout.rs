@@ -32,7 +32,7 @@ pub struct FileLayout {
     pub(crate) delimiter: String,
     /// The decimal mark of the numbers.
     #[serde(default)]
-    pub(crate) decimal: Decimal,
+    pub(crate) decimal: DecimalMark,
     /// Whether a row of column names stands above the data.
     #[serde(default = "yes")]
     pub(crate) header: bool,
@@ -93,26 +93,6 @@ fn yes() -> bool {
 
 fn is_false(value: &bool) -> bool {
     !value
-}
-
-/// The decimal mark.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Decimal {
-    /// `0.365`
-    #[default]
-    Point,
-    /// `0,365`
-    Comma,
-}
-
-impl Decimal {
-    pub(super) fn mark(self) -> DecimalMark {
-        match self {
-            Self::Point => DecimalMark::Point,
-            Self::Comma => DecimalMark::Comma,
-        }
-    }
 }
 
 /// An axis of the tracker's frame.

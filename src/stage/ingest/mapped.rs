@@ -1,48 +1,21 @@
 //! Where a quantity stands in a file: a column or several of them, or one value for every row.
 
 use schemars::JsonSchema;
-use serde::de::{self, Deserializer, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
 
 /// A column by its name in the header, or by its number from 1.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(untagged)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected the name of a column, or its number from 1"
+)]
 pub enum ColumnRef {
     /// Number from 1.
     Number(u32),
     /// Name in the header, as it stands there (blanks around it do not count).
     Name(String),
-}
-
-impl<'de> Deserialize<'de> for ColumnRef {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        // By hand, so that the message says what is allowed.
-        deserializer.deserialize_any(NameOrNumber)
-    }
-}
-
-struct NameOrNumber;
-
-impl Visitor<'_> for NameOrNumber {
-    type Value = ColumnRef;
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the name of a column, or its number from 1")
-    }
-    fn visit_str<E: de::Error>(self, name: &str) -> Result<ColumnRef, E> {
-        Ok(ColumnRef::Name(name.into()))
-    }
-    fn visit_u64<E: de::Error>(self, number: u64) -> Result<ColumnRef, E> {
-        u32::try_from(number)
-            .map(ColumnRef::Number)
-            .map_err(|_| E::invalid_value(Unexpected::Unsigned(number), &self))
-    }
-    fn visit_i64<E: de::Error>(self, number: i64) -> Result<ColumnRef, E> {
-        u32::try_from(number)
-            .map(ColumnRef::Number)
-            .map_err(|_| E::invalid_value(Unexpected::Signed(number), &self))
-    }
 }
 
 impl fmt::Display for ColumnRef {
@@ -88,25 +61,15 @@ pub enum NameMatch {
     Number,
 }
 
-/// What of a name counts, of the column that holds it.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct NameRule {
-    matching: Option<NameMatch>,
-    strip: Option<String>,
-}
-
-impl NameRule {
-    /// The name that counts; none where it has no number, and one is asked for.
-    pub(super) fn applied<'a>(&self, name: &'a str) -> Option<&'a str> {
-        let stripped = self
-            .strip
-            .as_deref()
-            .and_then(|prefix| name.strip_prefix(prefix))
-            .unwrap_or(name);
-        if self.matching.is_none() {
-            Some(stripped)
-        } else {
-            last_number(stripped)
+impl TextColumn {
+    /// What of a name counts; none where it has no number, and one is asked for.
+    pub(super) fn counts<'a>(&self, name: &'a str) -> Option<&'a str> {
+        let prefix = self.strip.as_deref();
+        let stripped = prefix.and_then(|prefix| name.strip_prefix(prefix));
+        let stripped = stripped.unwrap_or(name);
+        match self.matching {
+            None => Some(stripped),
+            Some(NameMatch::Number) => last_number(stripped),
         }
     }
 }
@@ -119,16 +82,6 @@ pub fn last_number(name: &str) -> Option<&str> {
         .len();
     let digits = name[start..end].trim_start_matches('0');
     Some(if digits.is_empty() { "0" } else { digits })
-}
-
-impl TextColumn {
-    /// What of its names counts.
-    pub(super) fn rule(&self) -> NameRule {
-        NameRule {
-            matching: self.matching,
-            strip: self.strip.clone(),
-        }
-    }
 }
 
 /// A column of whole numbers.
@@ -257,14 +210,10 @@ impl ScalarColumn {
 
 #[cfg(test)]
 mod tests {
-    use super::{NameMatch, NameRule};
+    use super::{TextColumn, last_number};
 
     #[test]
     fn names_count_by_their_last_number_or_without_a_prefix() {
-        let number = NameRule {
-            matching: Some(NameMatch::Number),
-            strip: None,
-        };
         for (name, counts) in [
             ("Pose 17", Some("17")),
             ("pt_017", Some("17")),
@@ -272,14 +221,11 @@ mod tests {
             ("P\u{e4}000", Some("0")),
             ("home", None),
         ] {
-            assert_eq!(number.applied(name), counts, "{name}");
+            assert_eq!(last_number(name), counts, "{name}");
         }
-        let strip = NameRule {
-            matching: None,
-            strip: Some("pt_".into()),
-        };
+        let strip: TextColumn = serde_json::from_str(r#"{"column": 1, "strip": "pt_"}"#).unwrap();
         assert_eq!(
-            [strip.applied("pt_17"), strip.applied("17")],
+            [strip.counts("pt_17"), strip.counts("17")],
             [Some("17"), Some("17")]
         );
     }

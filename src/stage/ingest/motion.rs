@@ -36,11 +36,11 @@ const OTHER_UNIT: f64 = 3.0;
 /// Times and joints of a file's usable rows.
 #[derive(Default)]
 pub(super) struct JointSamples {
-    numbers: Vec<u64>,
-    time: Vec<f64>,
-    q: Vec<f64>,
+    pub(crate) rows: Vec<usize>,
+    pub(crate) time: Vec<f64>,
+    pub(crate) q: Vec<f64>,
     /// Velocities that the file gives.
-    given: Vec<f64>,
+    pub(crate) given: Vec<f64>,
 }
 
 /// Velocity and acceleration of the joints by data row. 16 bytes a joint and row.
@@ -51,15 +51,6 @@ pub(super) struct Track {
 }
 
 impl JointSamples {
-    pub(super) fn push(&mut self, number: u64, time: f64, q: &[f64], given: &[f64]) {
-        if time.is_finite() {
-            self.numbers.push(number);
-            self.time.push(time);
-            self.q.extend_from_slice(q);
-            self.given.extend_from_slice(given);
-        }
-    }
-
     /// Neighbours of a row in one stretch without a gap: the rows of its parabola (the same twice where there are but two), `wide`
     /// times as far apart.
     fn around(&self, i: usize, [start, end]: [usize; 2], reach: usize) -> Option<[usize; 3]> {
@@ -97,7 +88,7 @@ impl JointSamples {
     pub(super) fn track(
         self,
         motion: Option<&VelocitySettings>,
-        rows: u64,
+        rows: usize,
         arm: &RobotJoints,
         label: &str,
         context: &Context,
@@ -130,7 +121,7 @@ impl JointSamples {
         let reach = (0.5 * motion.map_or(0.0, |motion| motion.over_s) / usual - 1e-9)
             .ceil()
             .max(1.0) as usize;
-        let mut rates = vec![f64::NAN; rows as usize * 2 * joints];
+        let mut rates = vec![f64::NAN; rows * 2 * joints];
         let (mut isolated, mut start) = (0, 0);
         let (mut squares, mut errors) = (vec![0.0; joints], vec![0.0; joints]);
         let (mut reported, mut both) = (vec![0.0; joints], vec![0.0; joints]);
@@ -151,7 +142,7 @@ impl JointSamples {
                 let far = self
                     .around(i, [start, end], 2 * reach)
                     .filter(|far| far[0] < near[0] && far[2] > near[2]);
-                let at = (self.numbers[i] as usize - 1) * 2 * joints;
+                let at = self.rows[i] * 2 * joints;
                 for joint in 0..joints {
                     let [velocity, acceleration] = self.rate(joints, joint, i, near);
                     rates[at + joint] = velocity;
@@ -263,8 +254,8 @@ fn same_unit(joint: usize, reported: f64, both: f64, label: &str) -> Result<()> 
 }
 
 impl Track {
-    fn of(&self, number: u64) -> Option<(&[f64], &[f64])> {
-        let at = usize::try_from(number).ok()?.checked_sub(1)? * 2 * self.joints;
+    fn of(&self, row: usize) -> Option<(&[f64], &[f64])> {
+        let at = row * 2 * self.joints;
         Some(
             self.rates
                 .get(at..at + 2 * self.joints)?
@@ -272,9 +263,9 @@ impl Track {
         )
     }
 
-    /// Velocities of a data row (from 1) into those of `velocity` that are not known.
-    pub(super) fn fill(&self, number: u64, velocity: &mut [f64]) {
-        let Some((derived, _)) = self.of(number) else {
+    /// Velocities of a row into those of `velocity` that are not known.
+    pub(super) fn fill(&self, row: usize, velocity: &mut [f64]) {
+        let Some((derived, _)) = self.of(row) else {
             return;
         };
         for (known, derived) in velocity
@@ -286,43 +277,12 @@ impl Track {
         }
     }
 
-    /// Acceleration of a joint in a data row (from 1), zero where it is not known.
-    pub(super) fn acceleration(&self, number: u64, joint: usize) -> f64 {
-        self.of(number)
+    /// Acceleration of a joint in a row, zero where it is not known.
+    pub(super) fn acceleration(&self, row: usize, joint: usize) -> f64 {
+        self.of(row)
             .and_then(|(_, all)| all.get(joint))
             .copied()
             .filter(|value| value.is_finite())
             .unwrap_or(0.0)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn samples(times: &[f64], q: impl Fn(f64) -> f64) -> JointSamples {
-        let mut samples = JointSamples::default();
-        times
-            .iter()
-            .zip(1..)
-            .for_each(|(time, number)| samples.push(number, *time, &[q(*time)], &[]));
-        samples
-    }
-
-    #[test]
-    fn a_parabola_in_time_has_its_own_slope_everywhere() {
-        let samples = samples(&[0.0, 0.01, 0.025, 0.03, 0.05], |t| 3.0 * t * t - t);
-        for i in 0..5 {
-            for reach in 1..3 {
-                let around = samples.around(i, [0, 4], reach).unwrap();
-                let [velocity, acceleration] = samples.rate(1, 0, i, around);
-                assert!(
-                    (velocity - (6.0 * samples.time[i] - 1.0)).abs() < 1e-12
-                        && (acceleration - 6.0).abs() < 1e-9
-                );
-            }
-        }
-        assert_eq!(samples.around(2, [2, 2], 1), None);
-        assert_eq!(samples.around(2, [1, 2], 1), Some([1, 1, 2]));
     }
 }

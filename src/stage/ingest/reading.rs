@@ -5,17 +5,17 @@
 use crate::error::{Error, Fault, Result, counted};
 use crate::program::{JointList, Language, MOST_BYTES, joint_list, listing as language};
 use crate::raw::{
-    self, BagRows, ColumnRows, Delimiter, InputSource, Record, RecordReader, TextLayout, TextRows,
-    Workbook, failed, has_columns, is_bag, is_workbook, not_read,
+    self, BagRows, ColumnRows, DecimalMark, Delimiter, InputSource, Record, RecordReader,
+    TextLayout, TextRows, Workbook, failed, has_columns, is_bag, is_workbook, not_read,
 };
 use crate::stage::ingest::arm::RobotJoints;
 use crate::stage::ingest::bind::{Binding, FileHeader, bind};
 use crate::stage::ingest::external::ExternalAxes;
-use crate::stage::ingest::layout::{Decimal, FileLayout, LimitPolicy};
+use crate::stage::ingest::layout::{FileLayout, LimitPolicy};
 use crate::stage::ingest::refusal::RowRefusal;
 use crate::stage::ingest::row::{RecordedRow, RowReader};
 use crate::stage::{Context, OpenedInput};
-use crate::table::{IntakeRow, RejectedRow, Robot};
+use crate::table::{IntakeRow, Robot};
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
 
@@ -34,7 +34,7 @@ pub struct TableLayout<'l> {
     /// How its rows are written, of text.
     pub(crate) text: TextLayout,
     /// The decimal mark of its numbers, of text and workbooks.
-    pub(crate) decimal: Decimal,
+    pub(crate) decimal: DecimalMark,
 }
 
 /// What a file is.
@@ -67,12 +67,12 @@ impl FileKind {
     }
 }
 
-/// Opens a table of any kind.
+/// Opens a table of any kind; with its name for messages, of a workbook with its sheet.
 pub fn records(
     source: Box<dyn InputSource>,
     label: &str,
     layout: TableLayout,
-) -> Result<Box<dyn RecordReader>> {
+) -> Result<(String, Box<dyn RecordReader>)> {
     let mut reader = BufReader::with_capacity(BUFFER, source);
     let head = reader.fill_buf().map_err(|error| failed(label, &error))?;
     let kind = FileKind::of(label, head);
@@ -87,22 +87,18 @@ pub fn records(
             "is no recording of ROS 2, and has no topic `{topic}`; allowed: a file .mcap or .db3, or no `topic`"
         )));
     }
-    Ok(match kind {
+    let mut name = label.to_string();
+    let rows: Box<dyn RecordReader> = match kind {
         FileKind::Workbook => {
             let mut book = Workbook::read(reader).map_err(data)?;
-            let name = book.sheet(layout.sheet).map_err(data)?;
-            let mark = if layout.decimal == Decimal::Comma {
-                ','
-            } else {
-                '.'
-            };
-            let lines = book.lines(&name, mark).map_err(data)?;
+            let sheet = book.sheet(layout.sheet).map_err(data)?;
+            let lines = book.lines(&sheet, layout.decimal).map_err(data)?;
             let text = TextLayout {
                 delimiter: Delimiter::Byte(b'\t'),
                 ..layout.text
             };
-            let label = format!("{label} sheet `{name}`");
-            Box::new(TextRows::open(Cursor::new(lines), &label, text)?)
+            name.push_str(&format!(" sheet `{sheet}`"));
+            Box::new(TextRows::open(Cursor::new(lines), &name, text)?)
         }
         FileKind::Bag => Box::new(BagRows::open(reader.into_inner(), label, layout.topic)?),
         FileKind::Program(language) => Box::new(ListedRows::open(reader, label, language)?),
@@ -113,7 +109,8 @@ pub fn records(
             let reader = BufReader::with_capacity(BUFFER, reader);
             Box::new(TextRows::open(reader, label, layout.text)?)
         }
-    })
+    };
+    Ok((name, rows))
 }
 
 /// An opened file below its header.
@@ -152,12 +149,11 @@ impl<'a> OpenedFile<'a> {
             },
             decimal: layout.decimal,
         };
-        let mut reader = records(source.reader, &source.label, table)?;
-        let label = reader.label().to_string();
+        let (label, mut reader) = records(source.reader, &source.label, table)?;
         let (header, decimal) = if reader.is_text() {
             (layout.header, layout.decimal)
         } else {
-            (true, Decimal::Point)
+            (true, DecimalMark::Point)
         };
         let mut record = Record::default();
         if !reader.next(&mut record)? {
@@ -239,10 +235,6 @@ impl<'a> OpenedFile<'a> {
     pub(super) fn text(&self) -> &[u8] {
         &self.record.text
     }
-    /// The present row as one that is not used, of the file that tables call `name`.
-    pub(super) fn rejected(&self, name: &str, refusal: RowRefusal) -> RejectedRow {
-        self.row.rejected(name, &self.record.text, refusal)
-    }
     /// Reads the next row into `self.row`: used or refused; `None` at the end.
     pub(super) fn next(&mut self) -> Result<Option<Result<(), RowRefusal>>> {
         if !std::mem::take(&mut self.is_ahead) && !self.reader.next(&mut self.record)? {
@@ -304,29 +296,23 @@ pub(super) fn intake(
     }
 }
 
-/// Names of the columns: as the languages call the axes.
-const RAPID: [&str; 12] = [
-    "rax_1", "rax_2", "rax_3", "rax_4", "rax_5", "rax_6", "eax_a", "eax_b", "eax_c", "eax_d",
-    "eax_e", "eax_f",
-];
-const KRL: [&str; 12] = [
-    "A1", "A2", "A3", "A4", "A5", "A6", "E1", "E2", "E3", "E4", "E5", "E6",
-];
-
-const NUMBERED: [&str; 12] = [
-    "J1", "J2", "J3", "J4", "J5", "J6", "E1", "E2", "E3", "E4", "E5", "E6",
-];
+/// As a language calls an axis: six of the arm from 0, then six external ones.
+fn axis(language: Language, k: usize) -> String {
+    match (language, k) {
+        (Language::Rapid, ..6) => format!("rax_{}", k + 1),
+        (Language::Rapid, _) => format!("eax_{}", char::from(b'a' + (k - 6) as u8)),
+        (Language::Krl, ..6) => format!("A{}", k + 1),
+        (_, ..6) => format!("J{}", k + 1),
+        _ => format!("E{}", k - 5),
+    }
+}
 
 /// The joints that a program declares, row by row, in deg.
 pub(super) struct ListedRows {
-    label: String,
-    /// `name`, then the axes.
-    names: Vec<&'static str>,
-    /// With the line at which each stands.
+    /// `name` and the axes, then the positions, each with the line at which it stands.
     rows: Vec<(u64, Vec<String>)>,
     /// How many poses were left out.
     poses: usize,
-    is_named: bool,
     /// Rows handed out.
     next: usize,
 }
@@ -350,35 +336,26 @@ impl ListedRows {
         if list.rows.is_empty() {
             return Err(Error::data(label, none(&list, language)));
         }
-        let all = match language {
-            Language::Krl => KRL,
-            Language::Rapid => RAPID,
-            Language::Fanuc | Language::UrScript => NUMBERED,
-        };
         // An axis that no position has makes no column.
         let has = |k: &usize| {
             let mut rows = list.rows.iter();
             rows.any(|row| row.external.get(*k).is_some_and(Option::is_some))
         };
         let used: Vec<usize> = (0..6).filter(has).collect();
-        let names = std::iter::once("name")
-            .chain(all[..6].iter().copied())
-            .chain(used.iter().map(|k| all[6 + k]));
-        let rows = list.rows.iter().map(|row| {
+        let axes = (0..6).chain(used.iter().map(|k| 6 + k));
+        let names = axes.map(|k| axis(language, k));
+        let mut rows = vec![(1, std::iter::once("name".into()).chain(names).collect())];
+        rows.extend(list.rows.iter().map(|row| {
             let external = used.iter().map(|k| row.external[*k]);
-            let joints = row.joints.iter().map(|joint| Some(*joint));
-            let numbers = joints.chain(external);
+            let numbers = row.joints.iter().map(|joint| Some(*joint)).chain(external);
             let cells =
                 numbers.map(|number| number.map_or_else(String::new, |number| number.to_string()));
             let cells = std::iter::once(row.name.clone()).chain(cells);
             (row.line as u64, cells.collect())
-        });
+        }));
         Ok(Self {
-            label: label.into(),
-            names: names.collect(),
-            rows: rows.collect(),
+            rows,
             poses: list.poses,
-            is_named: false,
             next: 0,
         })
     }
@@ -401,17 +378,7 @@ fn none(list: &JointList, language: Language) -> String {
 }
 
 impl RecordReader for ListedRows {
-    fn label(&self) -> &str {
-        &self.label
-    }
     fn next(&mut self, record: &mut Record) -> Result<bool> {
-        if !std::mem::replace(&mut self.is_named, true) {
-            record.begin(1);
-            self.names
-                .iter()
-                .for_each(|name| record.push(name.as_bytes()));
-            return Ok(true);
-        }
         let Some((line, cells)) = self.rows.get(self.next) else {
             return Ok(false);
         };
@@ -422,10 +389,8 @@ impl RecordReader for ListedRows {
     }
     /// The line of the last row handed out.
     fn lines(&self) -> u64 {
-        self.next
-            .checked_sub(1)
-            .and_then(|row| self.rows.get(row))
-            .map_or(0, |(line, _)| *line)
+        let last = self.next.checked_sub(1).filter(|last| *last > 0);
+        last.map_or(0, |last| self.rows[last].0)
     }
     fn bytes(&self) -> u64 {
         self.next as u64

@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::raw::RecordFault;
 use crate::stage::{Context, Sink, StreamedTable};
 use crate::table::{Rejected, RejectedRow, Table};
+use std::collections::BTreeMap;
 
 /// Why a row is not used; the stable word in the table `rejected`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -60,6 +61,51 @@ impl From<RecordFault> for Reason {
 pub(super) struct RowRefusal {
     pub(crate) reason: Reason,
     pub(crate) detail: String,
+}
+
+impl RowRefusal {
+    /// The row of the table, of the file that tables call `file`.
+    pub(super) fn rejected(self, file: &str, line: u64, id: &str, begin: &str) -> RejectedRow {
+        RejectedRow {
+            file: file.into(),
+            line: line as i64,
+            point_id: (!id.is_empty()).then(|| id.into()),
+            reason: self.reason.word().into(),
+            detail: self.detail,
+            text: begin.into(),
+        }
+    }
+}
+
+/// Refused rows of a file, from 0.
+pub(super) type Refusals = BTreeMap<usize, RowRefusal>;
+
+/// Letters that are shown of a row that is not used.
+const SHOWN: usize = 200;
+
+/// How a row begins, for people.
+pub(super) fn beginning(row: &[u8]) -> String {
+    crate::raw::shown(row).chars().take(SHOWN).collect()
+}
+
+/// How many rows were refused for a reason, and the first of them.
+#[derive(Debug, Clone)]
+pub(super) struct RefusalCount {
+    pub(crate) rows: u64,
+    pub(crate) first_line: u64,
+    pub(crate) first_detail: String,
+}
+
+pub(super) type RefusalCounts = BTreeMap<Reason, RefusalCount>;
+
+/// Counts one refusal.
+pub(super) fn tally(counts: &mut RefusalCounts, line: u64, refusal: &RowRefusal) {
+    let new = || RefusalCount {
+        rows: 0,
+        first_line: line,
+        first_detail: refusal.detail.clone(),
+    };
+    counts.entry(refusal.reason).or_insert_with(new).rows += 1;
 }
 
 pub(super) fn refuse<T>(reason: Reason, detail: String) -> Result<T, RowRefusal> {

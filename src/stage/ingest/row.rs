@@ -3,19 +3,15 @@
 use super::arm::{KindSlots, RobotJoints};
 use super::bind::{Binding, NumberBinding, TextBinding};
 use super::clock::{ALLOWED, CLOCK, ClockColumn, ClockTime};
-use super::layout::{Decimal, LimitPolicy};
+use super::layout::LimitPolicy;
 use super::refusal::{Reason, RowRefusal, refuse};
 use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
 use crate::robot::ONE_AND_A_HALF_TURNS;
-use crate::table::RejectedRow;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
 /// Numbers of rows go up to here: the targets of wide rows have room beyond.
 const LARGEST_SEQUENCE: i64 = 1 << 52;
-
-/// Letters that are shown of a row that is not used.
-const SHOWN: usize = 200;
 
 /// The quantities of one row; reused from row to row.
 #[derive(Default)]
@@ -52,17 +48,6 @@ impl RecordedRow {
             ..Self::default()
         }
     }
-    /// The row as one that is not used, of the file that tables call `name`; `text` is what stands there.
-    pub(super) fn rejected(&self, name: &str, text: &[u8], refusal: RowRefusal) -> RejectedRow {
-        RejectedRow {
-            file: name.into(),
-            line: self.line as i64,
-            point_id: (!self.id.is_empty()).then(|| self.id.clone()),
-            reason: refusal.reason.word().into(),
-            detail: refusal.detail,
-            text: crate::raw::shown(text).chars().take(SHOWN).collect(),
-        }
-    }
 }
 
 /// Reads rows of one file.
@@ -79,13 +64,13 @@ pub(super) struct RowReader<'a> {
 impl<'a> RowReader<'a> {
     pub(super) fn new(
         binding: Binding,
-        decimal: Decimal,
+        mark: DecimalMark,
         limits: LimitPolicy,
         arm: &'a RobotJoints,
     ) -> Self {
         Self {
             binding,
-            mark: decimal.mark(),
+            mark,
             limits,
             arm,
             last_sequence: None,
@@ -162,52 +147,13 @@ impl<'a> RowReader<'a> {
 
     fn numbers(&mut self, record: &Record, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         for cell in &self.binding.cells {
-            let number = match cell.is_clock {
-                true => Self::moment(&mut self.clock, record, cell)?,
-                false => self.number(record, cell.column, &cell.name, cell.optional)?,
-            };
-            let Some(number) = number else { continue };
-            let mut value = cell.unit.to_si(number);
-            if let Some(other) = &cell.difference {
-                let Some(added) = self.number(record, other.column, &other.name, cell.optional)?
-                else {
-                    continue;
-                };
-                value += other.sign * other.unit.to_si(added);
-            }
-            value = cell.sign * (value - cell.zero) / cell.divisor;
+            let value = value(&mut self.clock, self.mark, record, cell)?;
+            let Some(value) = value else { continue };
             let joint = cell.index.wrapping_sub(self.arm.slots.q.start);
             if self.arm.prismatic.get(joint) == Some(&false) && value.abs() > ONE_AND_A_HALF_TURNS {
                 row.turned.get_or_insert((joint, value));
             }
-            let [lower, upper] = cell.range;
-            let direction = cell.is_direction && ![-1.0, 0.0, 1.0].contains(&value);
-            if !(lower..=upper).contains(&value) || direction {
-                let unit = cell.unit;
-                let allowed = if direction {
-                    "1, -1 or 0".to_string()
-                } else {
-                    format!(
-                        "{} to {} {unit}",
-                        round(unit.from_si(lower)),
-                        round(unit.from_si(cell.divisor * upper))
-                    )
-                };
-                let text = |column: usize| shown(record, column);
-                let found = match &cell.difference {
-                    None => format!("{}: `{}`", cell.name, text(cell.column)),
-                    Some(other) => {
-                        let sign = if other.sign < 0.0 { "-" } else { "+" };
-                        let names = format!("{} {sign} {}", cell.name, other.name);
-                        format!(
-                            "{names}: `{}` {sign} `{}`",
-                            text(cell.column),
-                            text(other.column)
-                        )
-                    }
-                };
-                return refuse(Reason::OutOfRange, format!("{found}; allowed: {allowed}"));
-            }
+            in_range(record, cell, value)?;
             if let Some(slot) = row.values.get_mut(cell.index) {
                 *slot = value;
             }
@@ -223,26 +169,13 @@ impl<'a> RowReader<'a> {
     }
 
     /// The points of a wide row: of a target that was not seen all cells are blank, or 0.
-    fn points(&self, record: &Record, row: &mut RecordedRow) -> Result<(), RowRefusal> {
+    fn points(&mut self, record: &Record, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         for (target, cells) in &self.binding.points {
             let mut point = [f64::NAN; 3];
-            for (value, cell) in point.iter_mut().zip(cells) {
-                let Some(number) = self.number(record, cell.column, &cell.name, true)? else {
-                    continue;
-                };
-                *value = cell.unit.to_si(number);
-                let [lower, upper] = cell.range;
-                if !(lower..=upper).contains(value) {
-                    let [lower, upper] =
-                        [lower, upper].map(|limit| round(cell.unit.from_si(limit)));
-                    let found = shown(record, cell.column);
-                    return refuse(
-                        Reason::OutOfRange,
-                        format!(
-                            "{}: `{found}`; allowed: {lower} to {upper} {}",
-                            cell.name, cell.unit
-                        ),
-                    );
+            for (number, cell) in point.iter_mut().zip(cells) {
+                if let Some(found) = value(&mut self.clock, self.mark, record, cell)? {
+                    in_range(record, cell, found)?;
+                    *number = found;
                 }
             }
             let blank = point.iter().filter(|value| value.is_nan()).count();
@@ -259,46 +192,6 @@ impl<'a> RowReader<'a> {
             });
         }
         Ok(())
-    }
-
-    /// The clock time in a cell, s; nothing where it may be blank and is.
-    fn moment(
-        clock: &mut ClockColumn,
-        record: &Record,
-        cell: &NumberBinding,
-    ) -> Result<Option<f64>, RowRefusal> {
-        let field = record.field(cell.column);
-        match clock.read(field) {
-            Some(seconds) => Ok(Some(seconds)),
-            None if field.is_empty() && cell.optional => Ok(None),
-            None if field.is_empty() => refuse(Reason::Blank, format!("{} is blank", cell.name)),
-            None => {
-                let found = shown(record, cell.column);
-                refuse(
-                    Reason::NotANumber,
-                    format!(
-                        "{}: `{found}` is no clock time; allowed: {ALLOWED}",
-                        cell.name
-                    ),
-                )
-            }
-        }
-    }
-
-    /// The number in a column, in the file's unit; nothing where it may be blank and is.
-    #[inline]
-    fn number(
-        &self,
-        record: &Record,
-        column: usize,
-        name: &str,
-        optional: bool,
-    ) -> Result<Option<f64>, RowRefusal> {
-        match number(record.field(column), self.mark) {
-            Ok(value) => Ok(Some(value)),
-            Err(NumberFault::Blank) if optional => Ok(None),
-            Err(fault) => no_number(record, column, name, fault),
-        }
     }
 
     /// Makes what a recording keeps of quantities of several numbers.
@@ -331,12 +224,7 @@ impl<'a> RowReader<'a> {
     /// A row measured something, and what needs a standard deviation has one; of what this file holds.
     fn measured(&self, row: &RecordedRow) -> Result<(), RowRefusal> {
         let there = |index: &usize| row.values.get(*index).is_some_and(|value| !value.is_nan());
-        let kinds = || {
-            self.binding
-                .kinds
-                .iter()
-                .map(|kind| &self.arm.slots.kinds[*kind])
-        };
+        let kinds = self.arm.slots.kinds.iter();
         let is_named = |kind: &KindSlots| {
             kind.name
                 .and_then(|name| row.texts.get(name))
@@ -345,11 +233,13 @@ impl<'a> RowReader<'a> {
         let seen = row.points.iter().any(|point| !point[0].is_nan());
         if self.binding.measures
             && !seen
-            && !kinds().any(|kind| kind.values.iter().any(there) || is_named(kind))
+            && !kinds
+                .clone()
+                .any(|kind| kind.values.iter().any(there) || is_named(kind))
         {
             return refuse(Reason::Blank, "nothing was measured in this row".into());
         }
-        for slots in kinds().filter(|slots| slots.own_sigma) {
+        for slots in kinds.filter(|slots| slots.own_sigma) {
             let KindSlots {
                 kind,
                 values,
@@ -430,6 +320,82 @@ impl<'a> RowReader<'a> {
     }
 }
 
+/// What a cell holds, SI; nothing where it may be blank and is.
+#[inline]
+fn value(
+    clock: &mut ClockColumn,
+    mark: DecimalMark,
+    record: &Record,
+    cell: &NumberBinding,
+) -> Result<Option<f64>, RowRefusal> {
+    let number = |column: usize, name: &str| match number(record.field(column), mark) {
+        Ok(value) => Ok(Some(value)),
+        Err(NumberFault::Blank) if cell.optional => Ok(None),
+        Err(fault) => no_number(record, column, name, fault),
+    };
+    let found = match cell.is_clock {
+        true => moment(clock, record, cell)?,
+        false => number(cell.column, &cell.name)?,
+    };
+    let Some(found) = found else { return Ok(None) };
+    let mut value = cell.unit.to_si(found);
+    if let Some(other) = &cell.difference {
+        let Some(added) = number(other.column, &other.name)? else {
+            return Ok(None);
+        };
+        value += other.sign * other.unit.to_si(added);
+    }
+    Ok(Some(cell.sign * (value - cell.zero) / cell.divisor))
+}
+
+/// The clock time in a cell, s; nothing where it may be blank and is.
+fn moment(
+    clock: &mut ClockColumn,
+    record: &Record,
+    cell: &NumberBinding,
+) -> Result<Option<f64>, RowRefusal> {
+    let field = record.field(cell.column);
+    match clock.read(field) {
+        Some(seconds) => Ok(Some(seconds)),
+        None if field.is_empty() && cell.optional => Ok(None),
+        None if field.is_empty() => refuse(Reason::Blank, format!("{} is blank", cell.name)),
+        None => {
+            let found = shown(record, cell.column);
+            let message = format!(
+                "{}: `{found}` is no clock time; allowed: {ALLOWED}",
+                cell.name
+            );
+            refuse(Reason::NotANumber, message)
+        }
+    }
+}
+
+/// Refuses a value (SI) that no recording may hold.
+#[inline]
+fn in_range(record: &Record, cell: &NumberBinding, value: f64) -> Result<(), RowRefusal> {
+    let [lower, upper] = cell.range;
+    let no_direction = cell.is_direction && ![-1.0, 0.0, 1.0].contains(&value);
+    if (lower..=upper).contains(&value) && !no_direction {
+        return Ok(());
+    }
+    let unit = cell.unit;
+    let [lower, upper] = [lower, cell.divisor * upper].map(|limit| round(unit.from_si(limit)));
+    let allowed = match no_direction {
+        true => "1, -1 or 0".to_string(),
+        false => format!("{lower} to {upper} {unit}"),
+    };
+    let (name, text) = (&cell.name, shown(record, cell.column));
+    let found = match &cell.difference {
+        None => format!("{name}: `{text}`"),
+        Some(other) => {
+            let sign = if other.sign < 0.0 { "-" } else { "+" };
+            let (second, difference) = (&other.name, shown(record, other.column));
+            format!("{name} {sign} {second}: `{text}` {sign} `{difference}`")
+        }
+    };
+    refuse(Reason::OutOfRange, format!("{found}; allowed: {allowed}"))
+}
+
 #[cold]
 fn no_number<T>(
     record: &Record,
@@ -478,18 +444,14 @@ fn text(
 ) -> Result<(), RowRefusal> {
     match source {
         Some(TextBinding::Value(value)) => into.push_str(value),
-        Some(TextBinding::Column {
-            column,
-            optional,
-            rule,
-        }) => {
+        Some(TextBinding::Column(column, mapped)) => {
             let bytes = record.field(*column);
             match decoded_text(bytes).as_deref() {
-                Some("") if !optional && complete => {
+                Some("") if !mapped.optional && complete => {
                     return refuse(Reason::Blank, format!("{name} is blank"));
                 }
                 Some("") => {}
-                Some(text) => match rule.applied(text) {
+                Some(text) => match mapped.counts(text) {
                     Some(counts) => into.push_str(counts),
                     None => {
                         return refuse(

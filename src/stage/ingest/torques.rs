@@ -8,13 +8,14 @@ use crate::error::{Error, Fault, Place, Result, counted};
 use crate::stage::ingest::arm::RobotJoints;
 use crate::stage::ingest::layout::{FileLayout, LimitPolicy};
 use crate::stage::ingest::reading::{OpenedFile, STRIDE};
-use crate::stage::ingest::refusal::{Reason, Rejections, RowRefusal};
+use crate::stage::ingest::refusal::{
+    Reason, RefusalCounts, Rejections, RowRefusal, beginning, tally,
+};
 use crate::stage::ingest::row::RecordedRow;
-use crate::stage::ingest::scan::{RefusalCounts, tally};
 use crate::stage::ingest::stretch::Stretches;
 use crate::stage::ingest::{check, reading};
 use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable};
-use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, RejectedRow, Robot, Table};
+use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, Robot, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -243,10 +244,8 @@ impl<'a> MotionRows<'a> {
                 }
                 Err(refusal) => {
                     tally(&mut refused, open.row.line, &refusal);
-                    rejected.push(RejectedRow {
-                        point_id: None,
-                        ..open.rejected(name, refusal)
-                    })?;
+                    let begin = beginning(open.text());
+                    rejected.push(refusal.rejected(name, open.row.line, "", &begin))?;
                 }
             }
             if open.row.number.is_multiple_of(STRIDE) {

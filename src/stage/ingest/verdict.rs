@@ -1,12 +1,11 @@
 //! What is wrong with a file as a whole, or with several files as copies of each other: errors for the owner of the measurements, before any table is written.
 
-use super::Ingest;
 use super::arm::RobotJoints;
 use super::columns::Columns;
+use super::joined::Measurement;
 use super::layout::{Join, LimitPolicy};
-use super::pair::FileDecision;
-use super::refusal::Reason;
-use super::scan::{RefusalCount, Scan};
+use super::refusal::{Reason, RefusalCount, RefusalCounts, tally};
+use super::rows::{FileRows, GivenUp};
 use crate::error::{Error, Fault, Result, counted};
 use crate::robot::too_far;
 use crate::stage::Context;
@@ -23,30 +22,14 @@ const EXAMPLES: usize = 1000;
 /// Joints that are recorded for calibration turn by more, rad.
 const FAR: f64 = 2.0;
 
-/// Rows of a file that become part of the recording.
-pub(super) fn accepted(scan: &Scan, decision: &FileDecision) -> u64 {
-    if decision.partners.is_empty() {
-        return scan.used() - decision.twins.len() as u64;
-    }
-    (1..=scan.read as usize)
-        .filter(|number| decision.is_whole(*number))
-        .count() as u64
-}
-
 /// Fails where a file cannot be what the settings say it is; warns where it is odd.
-pub(super) fn judge(
-    settings: &Ingest,
-    scans: &[Scan],
-    decisions: &[FileDecision],
-    arm: &RobotJoints,
-    context: &Context,
-) -> Result<()> {
-    let mut faults = unequal(settings, scans);
-    for (index, (scan, layout)) in scans.iter().zip(&settings.files).enumerate() {
-        let angles = implausible(scan, &layout.columns, settings.limits, arm);
-        let fault = angles.or_else(|| too_many_rejected(settings, scans, decisions, index));
+pub(super) fn judge(all: &Measurement, context: &Context) -> Result<()> {
+    let (limits, mut faults) = (all.settings.limits, unequal(all));
+    for (index, (rows, layout)) in all.files.iter().zip(&all.settings.files).enumerate() {
+        let angles = implausible(rows, &layout.columns, limits, all.arm);
+        let fault = angles.or_else(|| too_many_rejected(all, index));
         if fault.is_none() {
-            warn(scan, &layout.columns, settings.limits, arm, context);
+            warn(rows, &layout.columns, limits, all.arm, context);
         }
         faults.extend(fault);
     }
@@ -62,17 +45,16 @@ pub(super) fn judge(
 }
 
 /// Rows that belong together by their order alone are as many in each file, whatever became of them.
-fn unequal(settings: &Ingest, scans: &[Scan]) -> Vec<Fault> {
-    let (Some(Join::Order {}), Some((first, others))) = (&settings.join, scans.split_first())
-    else {
+fn unequal(all: &Measurement) -> Vec<Fault> {
+    let (Some(Join::Order {}), [first, others @ ..]) = (&all.settings.join, &all.files[..]) else {
         return Vec::new();
     };
-    let other = others.iter().filter(|other| other.last != first.last);
+    let other = others.iter().filter(|other| other.filled != first.filled);
     let faults = other.map(|other| {
         let message = format!(
             "{} data rows, {} has {}: rows cannot be joined by order; allowed: as many rows in each file, or `join: {{by: id}}` or \
              `{{by: time, tolerance_s: ...}}`",
-            other.last, first.label, first.last
+            other.filled, first.label, first.filled
         );
         Fault::new(&other.label, message)
     });
@@ -80,32 +62,28 @@ fn unequal(settings: &Ingest, scans: &[Scan]) -> Vec<Fault> {
 }
 
 fn implausible(
-    scan: &Scan,
+    rows: &FileRows,
     columns: &Columns,
     limits: LimitPolicy,
     arm: &RobotJoints,
 ) -> Option<Fault> {
     let unit = columns.joint("q")?.unit.as_deref().unwrap_or("rad");
-    let judged = scan.used()
-        + scan
-            .tally
-            .get(&Reason::OutOfRange)
-            .map_or(0, |count| count.rows);
-    if scan.turns.rows * 2 > judged
-        && let Some((line, joint, value)) = scan.turns.first
+    let judged = rows.count_usable() + out_of_range(rows);
+    if rows.turns.rows * 2 > judged
+        && let Some((line, joint, value)) = rows.turns.first
     {
         let advice = match unit {
             "rad" => "; if the file holds degrees, say `unit: deg`",
             _ => "",
         };
-        let message = too_far("q", unit, [scan.turns.rows, judged], joint, value) + advice;
-        return Some(Fault::new(format!("{}:{line}", scan.label), message));
+        let message = too_far("q", unit, [rows.turns.rows, judged], joint, value) + advice;
+        return Some(Fault::new(format!("{}:{line}", rows.label), message));
     }
     if limits == LimitPolicy::Warn
-        && scan.beyond.rows * 2 > judged
-        && let Some((line, joint, value)) = scan.beyond.first
+        && rows.beyond.rows * 2 > judged
+        && let Some((line, joint, value)) = rows.beyond.first
         // Joints that turn this far are in the unit that is declared, whatever they are counted from.
-        && (arm.prismatic.get(joint) == Some(&true) || unit != "deg" && scan.largest_turn() < FAR)
+        && (arm.prismatic.get(joint) == Some(&true) || unit != "deg" && rows.largest_turn() < FAR)
     {
         let degrees = if unit == "deg" {
             ""
@@ -115,89 +93,76 @@ fn implausible(
         let message = format!(
             "{} of {judged} rows are beyond the robot's joint limits, here {}; allowed: the unit and order of columns that the file has, or \
              `limits: ignore`{degrees}",
-            scan.beyond.rows,
+            rows.beyond.rows,
             arm.beyond(joint, value)
         );
-        return Some(Fault::new(format!("{}:{line}", scan.label), message));
+        return Some(Fault::new(format!("{}:{line}", rows.label), message));
     }
     None
 }
 
-fn too_many_rejected(
-    settings: &Ingest,
-    scans: &[Scan],
-    decisions: &[FileDecision],
-    index: usize,
-) -> Option<Fault> {
-    let (scan, decision, layout) = (
-        scans.get(index)?,
-        decisions.get(index)?,
-        settings.files.get(index)?,
+fn too_many_rejected(all: &Measurement, index: usize) -> Option<Fault> {
+    let (files, rows, allowed) = (
+        &all.files,
+        &all.files[index],
+        all.settings.max_rejected_fraction,
     );
-    let accepted = accepted(scan, decision);
-    let rejected = scan.read - accepted;
-    if accepted > 0 && rejected as f64 <= settings.max_rejected_fraction * scan.read as f64 {
+    let (read, accepted) = (rows.count() as u64, rows.count_used());
+    let rejected = read - accepted;
+    if accepted > 0 && rejected as f64 <= allowed * read as f64 {
         return None;
     }
-    let twins = decision.twins.len() as u64;
-    let copies = decision.twins.values().filter(|twin| twin.copied).count() as u64;
-    let unmatched = scan.used() - accepted - twins;
-    // Every other file is joined to the first; where the rows that lack a partner decide, the shorter file is at fault.
-    let partner = scans
-        .iter()
-        .enumerate()
-        .filter(|(other, _)| *other != index && (index == 0 || *other == 0));
-    let partner_at = partner
-        .min_by_key(|(_, other)| other.used())
-        .map(|(other, _)| other);
-    let partner = partner_at.and_then(|other| scans.get(other));
-    let cut = partner
-        .filter(|other| 2 * unmatched > rejected && accepted > 0 && other.used() < scan.used());
-    let mut counts = scan.tally.clone();
-    let first = |copied: bool| {
-        let of_kind = decision.twins.values().filter(|twin| twin.copied == copied);
-        of_kind
-            .map(|twin| u64::from(twin.line))
-            .min()
-            .unwrap_or_default()
+    let duplicates = |of_copies: bool| {
+        let lines = rows.given_up.values().filter_map(move |why| match why {
+            GivenUp::Duplicate { file, row, copied } if *copied == of_copies => {
+                Some(files[*file].line(*row))
+            }
+            _ => None,
+        });
+        (
+            lines.clone().count() as u64,
+            lines.min().unwrap_or_default(),
+        )
     };
-    let without_partner = partner_at.map_or_else(
+    let ((ids, first_id), (copies, first_copy)) = (duplicates(false), duplicates(true));
+    let unmatched = rows.given_up.len() as u64 - ids - copies;
+    // Every other file is joined to the first; where the rows that lack a partner decide, the shorter file is at fault.
+    let partners = (0..files.len()).filter(|other| *other != index && (index == 0 || *other == 0));
+    let partner = partners.min_by_key(|other| files[*other].count_usable());
+    let cut = partner.map(|other| &files[other]).filter(|other| {
+        2 * unmatched > rejected && accepted > 0 && other.count_usable() < rows.count_usable()
+    });
+    let mut counts = RefusalCounts::new();
+    for (row, refusal) in &rows.refused {
+        tally(&mut counts, rows.line(*row), refusal);
+    }
+    let without_partner = partner.map_or_else(
         || "no partner in another file".to_string(),
         |other| {
-            format!(
-                "no partner in {}{}",
-                scans[other].label,
-                Some(&settings.join)
-                    .filter(|join| matches!(join, Some(Join::Id {})))
-                    .and_then(|_| unlike(scans, decisions, [index, other]))
-                    .unwrap_or_default()
-            )
+            let by_id = matches!(all.settings.join, Some(Join::Id {}));
+            let unlike = by_id.then(|| unlike(all, [index, other])).flatten();
+            let unlike = unlike.unwrap_or_default();
+            format!("no partner in {}{unlike}", files[other].label)
         },
     );
     for (reason, rows, first_line, detail) in [
         (
             Reason::DuplicateId,
-            twins - copies,
-            first(false),
-            "point ids that occur more than once".to_string(),
+            ids,
+            first_id,
+            "point ids that occur more than once",
         ),
-        (
-            Reason::DuplicateRow,
-            copies,
-            first(true),
-            "duplicate rows".to_string(),
-        ),
-        (Reason::Unmatched, unmatched, 0, without_partner),
+        (Reason::DuplicateRow, copies, first_copy, "duplicate rows"),
+        (Reason::Unmatched, unmatched, 0, &without_partner),
     ] {
         if rows > 0 {
-            counts.insert(
-                reason,
-                RefusalCount {
-                    rows,
-                    first_line,
-                    first_detail: detail,
-                },
-            );
+            let first_detail = detail.to_string();
+            let count = RefusalCount {
+                rows,
+                first_line,
+                first_detail,
+            };
+            counts.insert(reason, count);
         }
     }
     let mut reasons: Vec<_> = counts.iter().collect();
@@ -223,37 +188,34 @@ fn too_many_rejected(
         (_, Some(_)) => {
             format!(
                 "has partners for {} of the {} rows of {}, {rejected} of which are rejected",
-                scan.read - unmatched,
-                scan.read,
-                scan.label
+                read - unmatched,
+                read,
+                rows.label
             )
         }
-        _ => format!("{rejected} of {} rows are rejected", scan.read),
+        _ => format!("{rejected} of {read} rows are rejected"),
     };
-    let allowed = settings.max_rejected_fraction * 100.0;
+    let allowed = allowed * 100.0;
     let place = match (cut, reasons.first()) {
         (Some(cut), _) => cut.label.clone(),
         (_, Some((_, count))) if count.first_line > 0 => {
-            format!("{}:{}", scan.label, count.first_line)
+            format!("{}:{}", rows.label, count.first_line)
         }
-        _ => scan.label.clone(),
+        _ => rows.label.clone(),
     };
     Some(Fault::new(
         place,
         format!(
             "{share}; allowed: up to {allowed} % (`max_rejected_fraction`); reasons: {}{}",
             listed.join("; "),
-            smaller(scan, &layout.columns)
+            smaller(rows, &all.settings.files[index].columns)
         ),
     ))
 }
 
 /// What points that are too large for their unit usually are, where most are.
-fn smaller(scan: &Scan, columns: &Columns) -> &'static str {
-    let most = scan
-        .tally
-        .get(&Reason::OutOfRange)
-        .is_some_and(|count| 2 * count.rows > scan.read);
+fn smaller(rows: &FileRows, columns: &Columns) -> &'static str {
+    let most = 2 * out_of_range(rows) > rows.count() as u64;
     match columns
         .number("x")
         .filter(|_| most)
@@ -266,15 +228,16 @@ fn smaller(scan: &Scan, columns: &Columns) -> &'static str {
 }
 
 /// An id of each of two files that the other one lacks, where both have such: of a pair that differs in case alone, if there is one.
-fn unlike(scans: &[Scan], decisions: &[FileDecision], files: [usize; 2]) -> Option<String> {
-    let without_partner = |file: usize| -> Option<Vec<&str>> {
-        let (scan, decision) = (scans.get(file)?, decisions.get(file)?);
-        let rows = scan.ids.rows().take(EXAMPLES).filter(|(_, row)| {
-            !decision.is_whole(row.number as usize) && !decision.twins.contains_key(&row.number)
-        });
-        rows.map(|(id, _)| std::str::from_utf8(id).ok()).collect()
+fn unlike(all: &Measurement, files: [usize; 2]) -> Option<String> {
+    let without_partner = |file: usize| -> Vec<&str> {
+        let rows = &all.files[file];
+        let named = rows.usable().filter(|row| !rows.id(*row).is_empty());
+        let alone = named
+            .take(EXAMPLES)
+            .filter(|row| matches!(rows.given_up.get(row), Some(GivenUp::Unmatched { .. })));
+        alone.map(|row| rows.id(row)).collect()
     };
-    let [here, there] = [without_partner(files[0])?, without_partner(files[1])?];
+    let [here, there] = files.map(without_partner);
     // Of three files a row may lack its partner in the third.
     let (ours, known): (BTreeSet<&str>, BTreeSet<&str>) = (
         here.iter().copied().collect(),
@@ -299,85 +262,93 @@ fn unlike(scans: &[Scan], decisions: &[FileDecision], files: [usize; 2]) -> Opti
     ))
 }
 
-fn warn(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJoints, context: &Context) {
+fn warn(
+    rows: &FileRows,
+    columns: &Columns,
+    limits: LimitPolicy,
+    arm: &RobotJoints,
+    context: &Context,
+) {
     if limits == LimitPolicy::Warn
-        && let Some((line, joint, value)) = scan.beyond.first
+        && let Some((line, joint, value)) = rows.beyond.first
     {
         context.warn(format!(
             "{}: {} with a joint beyond the robot's limits, used all the same; first line {line}, {}{}",
-            scan.label,
-            counted(scan.beyond.rows, "row"),
+            rows.label,
+            counted(rows.beyond.rows, "row"),
             arm.beyond(joint, value),
-            if 2 * scan.beyond.rows > scan.used() { COUNTED } else { "" }
+            if 2 * rows.beyond.rows > rows.count_usable() { COUNTED } else { "" }
         ));
     }
     let degrees = columns
         .joint("q")
         .is_some_and(|q| q.unit.as_deref() == Some("deg"));
     if degrees
-        && scan.largest > 0.0
-        && scan.largest.to_degrees() < SMALL_IN_DEGREES
-        && scan.used() >= 10
+        && rows.largest > 0.0
+        && rows.largest.to_degrees() < SMALL_IN_DEGREES
+        && rows.count_usable() >= 10
     {
         context.warn(format!(
             "{}: no joint is ever beyond {:.2} deg; if the file holds rad, say `unit: rad`",
-            scan.label,
-            scan.largest.to_degrees()
+            rows.label,
+            rows.largest.to_degrees()
         ));
     }
 }
 
-/// A file that was read, and its place below `with`.
-struct ReadFile<'a> {
-    place: String,
-    scan: &'a Scan,
-    decision: &'a FileDecision,
+/// Rows that hold something out of range.
+fn out_of_range(rows: &FileRows) -> u64 {
+    let reasons = rows.refused.values().map(|refusal| refusal.reason);
+    reasons
+        .filter(|reason| *reason == Reason::OutOfRange)
+        .count() as u64
 }
 
 /// Fails where the same measured rows would be used twice. One log of several days with a file of joints for each day is none: of its
 /// rows each is used once.
-pub(super) fn no_copies(scanned: &[(Vec<Scan>, Vec<FileDecision>)]) -> Result<()> {
-    let mut read: Vec<ReadFile> = Vec::new();
+pub(super) fn no_copies(read: &[Measurement]) -> Result<()> {
+    let place = |set: usize, index: usize| match set.checked_sub(1) {
+        None => format!("files[{index}].file"),
+        Some(later) => format!("later[{later}].files[{index}]"),
+    };
+    let sets = read.iter().enumerate();
+    let all = sets.flat_map(|(set, one)| {
+        let files = one.files.iter().enumerate();
+        files.map(move |(index, rows)| (place(set, index), one, rows))
+    });
+    let all: Vec<(String, &Measurement, &FileRows)> = all.collect();
     let mut faults = Vec::new();
-    for (set, (scans, decisions)) in scanned.iter().enumerate() {
-        for (index, (scan, decision)) in scans.iter().zip(decisions).enumerate() {
-            let place = match set.checked_sub(1) {
-                None => format!("files[{index}].file"),
-                Some(later) => format!("later[{later}].files[{index}]"),
-            };
-            let this = ReadFile {
-                place,
-                scan,
-                decision,
-            };
-            let found = read
-                .iter()
-                .find_map(|other| Some((other, shared(other, &this).filter(|rows| *rows > 0)?)));
-            if let Some((other, rows)) = found {
-                let message = format!(
-                    "`{}` measured what `{}` of `{}` did, and {} would be used twice: copies look like perfect repeatability; name the \
-                     file of another measurement, or take this one out",
-                    scan.label,
-                    other.scan.label,
-                    other.place,
-                    counted(rows, "row")
-                );
-                faults.push(Fault::new(format!("with.{}", this.place), message));
-            }
-            read.push(this);
+    for (k, (place, one, rows)) in all.iter().enumerate() {
+        let twice = |(_, of_other, other): &&(String, &Measurement, &FileRows)| {
+            let rows_twice = used_twice([*one, *of_other], [*rows, *other]);
+            (rows_twice > 0).then_some(rows_twice)
+        };
+        if let Some((other, rows_twice)) = all[..k]
+            .iter()
+            .find_map(|other| Some((other, twice(&other)?)))
+        {
+            let message = format!(
+                "`{}` measured what `{}` of `{}` did, and {} would be used twice: copies look like perfect repeatability; name the                  file of another measurement, or take this one out",
+                rows.label,
+                other.2.label,
+                other.0,
+                counted(rows_twice, "row")
+            );
+            faults.push(Fault::new(format!("with.{place}"), message));
         }
     }
     Error::if_data(faults)
 }
 
 /// Rows that are used of both files; none where what they measured differs.
-fn shared(one: &ReadFile, other: &ReadFile) -> Option<u64> {
-    if one.scan.measured? != other.scan.measured? {
-        return None;
+fn used_twice(of: [&Measurement; 2], files: [&FileRows; 2]) -> u64 {
+    let [one, other] = files;
+    if !one.measured_same(other) {
+        return 0;
     }
-    if one.decision.partners.is_empty() || other.decision.partners.is_empty() {
-        return Some(accepted(one.scan, one.decision).min(accepted(other.scan, other.decision)));
+    if of.iter().any(|of| of.partners.is_empty()) {
+        return one.count_used().min(other.count_used());
     }
-    let both = |number: &usize| one.decision.is_whole(*number) && other.decision.is_whole(*number);
-    Some((1..=one.scan.read as usize).filter(both).count() as u64)
+    let both = |row: &usize| one.is_used(*row) && other.is_used(*row);
+    (0..one.count()).filter(both).count() as u64
 }

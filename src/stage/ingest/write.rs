@@ -1,20 +1,18 @@
 //! The recording in chunks, and every row that is not part of it with its reason.
 
-use super::joined::JoinDecisions;
+use super::joined::{JoinedRow, Measurement};
 use super::later::Continuation;
-use super::layout::FileLayout;
 use super::noise::NoiseSlots;
-use super::pair::FileDecision;
 use super::reading::STRIDE;
 use super::refusal::Rejections;
-use super::row::RecordedRow;
-use super::{scan, verdict};
+use super::rows::FileRows;
 use crate::error::{Error, Result, counted};
 use crate::observation::{KINDS, Part};
 use crate::robot::{START, SigmaSource};
 use crate::stage::{Context, Sink, StreamedTable};
 use crate::table::{Recording, Rejected, SIGMA_SOURCE, Table, TextCells, recording_frame};
 use crate::units::Unit;
+use std::borrow::Cow;
 
 /// Rows of the recording in memory at once.
 const CHUNK: usize = 1 << 16;
@@ -22,88 +20,46 @@ const CHUNK: usize = 1 << 16;
 /// Writes the streamed tables of all measurements, `names` being those of all their files; `gaps` come before the later ones, s, none where
 /// the clock is the same.
 pub(super) fn write(
-    decided: &[JoinDecisions],
+    all: &[Measurement],
     gaps: &[Option<f64>],
     names: &[String],
     context: &Context,
 ) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
-    let rows = decided
-        .iter()
-        .flat_map(|one| one.scans.iter().zip(one.decisions).take(one.leading()));
-    let rows = rows
-        .map(|(scan, decision)| verdict::accepted(scan, decision))
-        .sum();
+    let leading = all.iter().flat_map(|one| one.leading());
+    let rows = leading.map(FileRows::count_used).sum();
     context
         .services
         .begin("writing the recording", Some(rows), "rows");
-    let mut recording = RecordingChunks::new(decided, context)?;
+    let mut recording = RecordingChunks::new(all, context)?;
     let mut rejected = Rejections::new(names, context)?;
-    for (one, gap) in decided
-        .iter()
-        .zip(std::iter::once(None).chain(gaps.iter().map(Some)))
-    {
+    let gaps = std::iter::once(None).chain(gaps.iter().map(Some));
+    for (one, gap) in all.iter().zip(gaps) {
         gap.into_iter().for_each(|gap| recording.rows.begin(*gap));
-        for (index, layout) in one.settings.files.iter().enumerate() {
-            file(
-                one,
-                index,
-                layout,
-                (index < one.leading()).then_some(&mut recording),
-                &mut rejected,
-                context,
-            )?;
+        for (file, rows) in one.files.iter().enumerate() {
+            let leads = file < one.leading().len();
+            for row in 0..rows.count() {
+                let given_up = || Some(one.refusal(file, row, *rows.given_up.get(&row)?));
+                match rows.refused.get(&row).cloned().or_else(given_up) {
+                    Some(refusal) => {
+                        let (line, id) = (rows.line(row), rows.id(row));
+                        let begin = rows.begin(row);
+                        rejected.push(refusal.rejected(&one.names[file], line, id, begin))?;
+                    }
+                    None if leads => {
+                        recording.push(one, file, row)?;
+                        if recording.written.is_multiple_of(STRIDE) {
+                            context.services.advance(recording.written, "");
+                        }
+                    }
+                    None => {}
+                }
+            }
+            if leads {
+                recording.before += rows.count();
+            }
         }
     }
     Ok((recording.finish(context)?, rejected.finish()?))
-}
-
-/// Rows of file `index`: rejected ones, and used ones where the recording takes them.
-fn file(
-    decided: &JoinDecisions,
-    index: usize,
-    layout: &FileLayout,
-    mut recording: Option<&mut RecordingChunks>,
-    rejected: &mut Rejections,
-    context: &Context,
-) -> Result<()> {
-    let (Some(scan), Some(decision), Some(name)) = (
-        decided.scans.get(index),
-        decided.decisions.get(index),
-        decided.names.get(index),
-    ) else {
-        return Err(Error::Bug(format!("file {index} was not scanned")));
-    };
-    let used = verdict::accepted(scan, decision);
-    if recording.is_none() && used == scan.read {
-        return Ok(());
-    }
-    let mut rows = scan::rows(scan, (decided.settings, layout), decided.arm, context)?;
-    let mut accepted = 0u64;
-    while let Some(judged) = rows.next()? {
-        match judged.and_then(|()| decided.outcome(index, decision, rows.row())) {
-            Ok(()) => {
-                accepted += 1;
-                if let Some(chunks) = &mut recording {
-                    chunks.push(rows.row(), index, decision, decided)?;
-                    if accepted.is_multiple_of(STRIDE) {
-                        context.services.advance(chunks.written, "");
-                    }
-                }
-            }
-            Err(refusal) => rejected.push(rows.row().rejected(name, rows.text(), refusal))?,
-        }
-    }
-    let read = rows.row().number;
-    if let Some(chunks) = recording {
-        chunks.before += read;
-    }
-    if (read, accepted) != (scan.read, used) {
-        return Err(Error::data(
-            &scan.label,
-            "changed while it was read; run again",
-        ));
-    }
-    Ok(())
 }
 
 /// A stored column that some file fills, as far as it is known.
@@ -136,32 +92,30 @@ struct RecordingChunks<'a> {
     rows: Continuation,
     written: u64,
     /// Data rows of the files before this one.
-    before: u64,
+    before: usize,
     /// The most targets of a wide row; 1 where there is none.
     widest: i64,
 }
 
 impl<'a> RecordingChunks<'a> {
-    fn new(all: &[JoinDecisions], context: &Context<'a>) -> Result<Self> {
-        let [decided, ..] = all else {
+    fn new(all: &[Measurement], context: &Context<'a>) -> Result<Self> {
+        let [first, ..] = all else {
             return Err(Error::Bug("nothing was read".into()));
         };
-        let slots = &decided.arm.slots;
+        let slots = &first.arm.slots;
         let mut has = vec![false; slots.count];
         for slot in all
             .iter()
-            .flat_map(|one| one.scans)
-            .flat_map(|scan| &scan.slots)
+            .flat_map(|one| &one.files)
+            .flat_map(|rows| &rows.slots)
         {
-            if let Some(has) = has.get_mut(*slot) {
-                *has = true;
-            }
+            has[*slot] = true;
         }
-        if decided.settings.motion.is_some() {
+        if first.settings.motion.is_some() {
             has[slots.velocity.clone()].fill(true);
         }
-        let noise = NoiseSlots::new(slots, decided.settings.instrument);
-        let files = &decided.settings.files;
+        let noise = NoiseSlots::new(slots, first.settings.instrument);
+        let files = &first.settings.files;
         let points = || KINDS[..1].iter().flat_map(|kind| kind.columns(Part::Value));
         let measured = files
             .iter()
@@ -181,7 +135,7 @@ impl<'a> RecordingChunks<'a> {
         let mut numbers = Vec::new();
         for (column, places) in slots.numbers() {
             for ((name, unit), place) in column
-                .columns(&decided.arm.prismatic)
+                .columns(&first.arm.prismatic)
                 .into_iter()
                 .zip(places.clone())
             {
@@ -201,7 +155,7 @@ impl<'a> RecordingChunks<'a> {
             ids: TextCells::default(),
             texts: slots.texts().iter().map(text).collect(),
             numbers,
-            merged: Vec::new(),
+            merged: vec![f64::NAN; slots.count],
             noise,
             sources: measured.then(TextCells::default),
             inferred: 0,
@@ -221,79 +175,49 @@ impl<'a> RecordingChunks<'a> {
                 .unwrap_or(1),
         })
     }
-    fn push(
-        &mut self,
-        row: &RecordedRow,
-        index: usize,
-        decision: &FileDecision,
-        decided: &JoinDecisions,
-    ) -> Result<()> {
-        self.merged.clone_from(&row.values);
-        for (at, held) in decided.partners(row, decision) {
-            let width = held.places.len();
-            let values = held
-                .values
-                .get(at * width..(at + 1) * width)
-                .unwrap_or_default();
-            for (slot, value) in held.places.iter().zip(values) {
-                // Mapped in both files, for a join by time: the time of a row is that of the file that leads.
-                if let Some(merged) = self.merged.get_mut(*slot).filter(|merged| merged.is_nan()) {
-                    *merged = *value;
-                }
-            }
+    /// A used row of a file that leads.
+    fn push(&mut self, all: &Measurement, file: usize, row: usize) -> Result<()> {
+        let (rows, slots) = (&all.files[file], &all.arm.slots);
+        let joined = all.joined(file, row);
+        // Mapped in both files, for a join by time: the time of a row is that of the file that leads.
+        self.merged.fill(f64::NAN);
+        for (file, row) in &joined {
+            all.files[*file].fill(*row, &mut self.merged);
         }
-        // By id, both rows have the same one.
-        let ids = decided
-            .partners(row, decision)
-            .filter_map(|(at, held)| held.ids.get(at).filter(|id| !id.is_empty()));
-        let id = ids.last().unwrap_or(&row.id);
+        let parts = || joined.iter().map(|(file, row)| (&all.files[*file], *row));
+        // By id, all have the same one.
+        let mut ids = parts().rev().map(|(rows, row)| rows.id(row));
+        let id = ids.find(|id| !id.is_empty());
         let text = |place: usize| {
-            let others = decided
-                .partners(row, decision)
-                .filter_map(|(at, held)| held.text(place, at));
-            others
-                .last()
-                .or(row.texts.get(place).map(String::as_str))
-                .unwrap_or_default()
+            let mut texts = parts()
+                .rev()
+                .filter_map(|(rows, row)| rows.text(row, place));
+            texts.next().unwrap_or_default()
         };
-        self.carry(decided, index, row, decision);
-        let number = self.before + row.number;
-        let time = self.merged[decided.arm.slots.time];
-        let (sequence, time) = self
-            .rows
-            .next(row.sequence.unwrap_or(number as i64), time)
-            .map_err(|(sequence, last)| {
-                // Within a file such a row is refused: this is the first row of a file that continues another.
-                let message = format!(
-                    "sequence {sequence} does not follow {last}, the last of the file before"
-                );
-                let label = decided
-                    .scans
-                    .get(index)
-                    .map_or("", |scan| scan.label.as_str());
-                Error::data(format!("{label}:{}", row.line), message)
-            })?;
-        self.merged[decided.arm.slots.time] = time;
-        let unnamed;
-        let id = if id.is_empty() {
-            let name = decided
-                .arm
-                .slots
-                .kinds
-                .iter()
-                .filter_map(|kind| kind.name)
-                .map(text)
-                .find(|name| !name.is_empty());
-            unnamed = name.map_or_else(
+        self.carry(all, &joined);
+        let number = self.before + row + 1;
+        let sequence = rows.sequence(row).unwrap_or(number as i64);
+        let (sequence, time) =
+            self.rows
+                .next(sequence, self.merged[slots.time])
+                .map_err(|(sequence, last)| {
+                    // Within a file such a row is refused: this is the first row of a file that continues another.
+                    let message = format!(
+                        "sequence {sequence} does not follow {last}, the last of the file before"
+                    );
+                    Error::data(format!("{}:{}", rows.label, rows.line(row)), message)
+                })?;
+        self.merged[slots.time] = time;
+        let unnamed = || {
+            let mut names = slots.kinds.iter().filter_map(|kind| kind.name).map(text);
+            names.find(|name| !name.is_empty()).map_or_else(
                 || format!("row {number}"),
-                |name| format!("{name} row {}", row.number),
-            );
-            &unnamed
-        } else {
-            id
+                |name| format!("{name} row {}", row + 1),
+            )
         };
-        let Some(points) = decided.points(index, row, decision) else {
-            return self.one(sequence, id, text);
+        let id = id.map_or_else(|| unnamed().into(), Cow::Borrowed);
+        let Some(points) = all.points(&joined) else {
+            return self.one(sequence, &id, text);
         };
         // Numbered through: the targets of a row follow each other.
         let first = sequence.saturating_sub(1).saturating_mul(self.widest);
@@ -303,15 +227,15 @@ impl<'a> RecordingChunks<'a> {
         );
         for (at, target, point) in points {
             self.merged.clone_from(&merged);
-            self.merged[decided.arm.slots.point.clone()].copy_from_slice(&point);
+            self.merged[slots.point.clone()].copy_from_slice(&point);
             let text = |place| {
                 if Some(place) == of_target {
-                    target.as_str()
+                    target
                 } else {
                     text(place)
                 }
             };
-            self.one(first.saturating_add(at), id, text)?;
+            self.one(first.saturating_add(at), &id, text)?;
         }
         Ok(())
     }
@@ -338,44 +262,27 @@ impl<'a> RecordingChunks<'a> {
         Ok(())
     }
     /// Velocities that follow from the joints over time; with a join by time joints and velocities at the moment of the point.
-    fn carry(
-        &mut self,
-        decided: &JoinDecisions,
-        index: usize,
-        row: &RecordedRow,
-        decision: &FileDecision,
-    ) {
-        let slots = &decided.arm.slots;
+    fn carry(&mut self, all: &Measurement, joined: &JoinedRow) {
+        let slots = &all.arm.slots;
         // Of files that continue each other each has its own joints.
-        let moving = if decision.partners.is_empty() {
-            index
-        } else {
-            self.moving
+        let moving = match joined {
+            [(file, _)] => *file,
+            _ => self.moving,
         };
-        let track = decided
-            .scans
-            .get(moving)
-            .and_then(|scan| scan.track.as_ref())
-            .zip(decided.number(moving, index, row, decision));
-        if let (Some((track, number)), Some(_)) = (track, &decided.settings.motion)
-            && let Some(velocity) = self.merged.get_mut(slots.velocity.clone())
-        {
-            track.fill(number, velocity);
+        let part = joined.iter().find(|(file, _)| *file == moving);
+        let track = part.and_then(|(file, row)| Some((all.files[*file].track.as_ref()?, *row)));
+        let motion = all.settings.motion.as_ref();
+        if let (Some((track, row)), Some(_)) = (track, motion) {
+            track.fill(row, &mut self.merged[slots.velocity.clone()]);
         }
-        let apart = decided.later(moving, row, decision);
-        let known = decided
-            .settings
-            .motion
-            .as_ref()
-            .map_or(0.0, |motion| motion.later_s);
-        let later = apart.unwrap_or(0.0) + known;
+        let known = motion.map_or(0.0, |motion| motion.later_s);
+        let later = all.later(moving, joined).unwrap_or(0.0) + known;
         if later == 0.0 {
             return;
         }
         for (joint, (q, rate)) in slots.q.clone().zip(slots.velocity.clone()).enumerate() {
             let velocity = self.merged[rate];
-            let acceleration =
-                track.map_or(0.0, |(track, number)| track.acceleration(number, joint));
+            let acceleration = track.map_or(0.0, |(track, row)| track.acceleration(row, joint));
             if velocity.is_finite() {
                 self.merged[q] += later * (velocity + 0.5 * later * acceleration);
                 self.merged[rate] += later * acceleration;

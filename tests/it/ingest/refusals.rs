@@ -20,6 +20,31 @@ fn a_missing_column_is_named_with_those_that_are_there() {
 }
 
 #[test]
+fn text_behind_a_closing_quote_refuses_its_row() {
+    let text = "id,q1,q2,x,y,z\nA,1,2,3,4,5\nB,\"1\"0,2,3,4,5\nC,\"1\",2,3,4,5\n\"D\"x,1,2,3,4,5\n";
+    let yaml = format!("{TWO}max_rejected_fraction: 0.9\n");
+    let taken = take(&Desk::default().with("a.csv", text), &yaml, rr()).unwrap();
+    assert_eq!(taken.recording.point_id, ["A", "C"]);
+    let refused = taken
+        .rejected
+        .0
+        .iter()
+        .map(|row| (row.line, row.reason.as_str()));
+    assert_eq!(
+        refused.collect::<Vec<_>>(),
+        [(3, "damaged"), (5, "damaged")]
+    );
+    let detail = &taken.rejected.0[0].detail;
+    starts_with(
+        detail,
+        "column 2: text behind the closing `\"` of a field; allowed:",
+    );
+    let desk = Desk::default().with("a.csv", format!("\"id\"x,q1,q2,x,y,z\n{}", good(3)));
+    let header = take(&desk, TWO, rr()).err().unwrap().to_string();
+    starts_with(&header, "a.csv:1: column 1: text behind");
+}
+
+#[test]
 fn a_file_that_is_none_says_what_it_is() {
     assert_eq!(
         with("", TWO),

@@ -364,6 +364,8 @@ fn nominal_and_actual_points_are_told_apart_in_every_order() {
         ("x_nom,y_nom,z_nom,x_act,y_act,z_act", "x_act"),
         ("X Ist,Y Ist,Z Ist,X Soll,Y Soll,Z Soll", "X Ist"),
         ("x_mes,y_mes,z_mes,x_theo,y_theo,z_theo", "x_mes"),
+        ("xt,yt,zt,X [mm],Y [mm],Z [mm]", "X [mm]"),
+        ("x_t,y_t,z_t,x,y,z", "x"),
     ] {
         let made = one(table(
             &format!("Axis_1,Axis_2,Axis_3,Axis_4,Axis_5,Axis_6,{header}"),
@@ -398,6 +400,14 @@ fn of_two_points_that_fit_alike_both_are_listed() {
     made.has(&[&format!("targets: {{unit: mm, columns: {both}")])
         .says(&["# x: {column: \"smrB_x\", unit: mm}   # CHECK"])
         .runs(60);
+    let numbered =
+        "{target_1: [\"X1\", \"Y1\", \"Z1\"], target_2: [\"X2\", \"Y2\", \"Z2\"]}}   # CHECK";
+    two("X1,Y1,Z1,X2,Y2,Z2").has(&[&format!("targets: {{unit: mm, columns: {numbered}")]);
+    two("SMR 1 x,SMR 1 y,SMR 1 z,SMR 2 x,SMR 2 y,SMR 2 z")
+        .has(&["targets: {unit: mm, columns: {smr1: "]);
+    two("X,Y,Z,X,Y,Z")
+        .has(&["x: {column: 7, unit: m"])
+        .says(&["# x: {column: 10, unit: m"]);
 }
 
 #[test]

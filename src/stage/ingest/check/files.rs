@@ -6,7 +6,6 @@ use crate::stage::ingest::Ingest;
 use crate::stage::ingest::columns::Columns;
 use crate::stage::ingest::layout::{Duplicates, FileLayout, Join};
 
-/// All of them.
 pub(super) fn faults(settings: &Ingest, at: &mut Place) {
     axes(settings, at);
     together(settings, at);

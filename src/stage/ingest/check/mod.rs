@@ -14,7 +14,6 @@ use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
 use std::collections::BTreeMap;
 
-/// All faults at once.
 pub(super) fn faults(settings: &Ingest, at: &mut Place) {
     if settings.files.is_empty() {
         return at.at("files").fault("no file; name at least one");
@@ -30,7 +29,6 @@ pub(super) fn faults(settings: &Ingest, at: &mut Place) {
     noise::faults(settings, at);
 }
 
-/// Faults of one file's settings.
 pub(super) fn file(file: &FileLayout, at: &mut Place) {
     if Delimiter::parse(&file.delimiter).is_none() {
         at.at("delimiter").fault(format!(
@@ -402,7 +400,6 @@ fn unit(symbol: Option<&str>, quantity: Quantity, at: &mut Place) {
     }
 }
 
-/// A mapped column.
 struct Use {
     /// As people call it, e.g. `x`.
     name: String,
