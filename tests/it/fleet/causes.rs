@@ -5,6 +5,7 @@ use crate::answer::{has, read, root};
 use crate::fixture::spread;
 use calib::report::fleet_causes::html;
 use calib::table::{FleetCellRow, FleetCells, FleetFindingRow, FleetFindings, FleetOutliers};
+use calib::twin::torque::{TorqueCase, TorqueDesign};
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -213,4 +214,70 @@ fn a_fleet_without_a_common_cause_names_none_and_a_robot_alone_is_reported() {
         (&"robot 2".into(), &"backlash".into())
     );
     assert_eq!(rows(&answer, "outliers")[0]["kind"], "alone");
+}
+
+#[test]
+fn arms_of_a_model_have_their_friction_and_a_ripple_of_a_gear_in_common() {
+    let folder = tempfile::tempdir().unwrap();
+    let (folder, store) = (folder.path(), folder.path().join("store"));
+    let design = TorqueDesign {
+        seed: 3,
+        cases: 8,
+        nulls: 1.0,
+        pairs: 0.0,
+        open: 0.0,
+        other_forms: 0.0,
+        seconds: 20.0,
+        rate: 50.0,
+    };
+    let has_sensors = |case: &TorqueCase| case.recording()[1].1.contains("tau1_nm");
+    let mut cases = (0..8).map(|number| TorqueCase::draw(&design, number));
+    let arm = cases.find(has_sensors).expect("an arm with sensors");
+    let mut list = "robot,model,folder\n".to_string();
+    for robot in 0..3 {
+        let [(_, file), (_, rows)] = arm.clone().on_other_paths(70 + robot, 20.0).recording();
+        write(folder.join(format!("{robot}/robot.json")), &file);
+        write(
+            folder.join(format!("{robot}/recording.csv")),
+            &rippled(&rows, 0.7 * robot as f64),
+        );
+        writeln!(list, "arm {robot},seven7r,{robot}").unwrap();
+    }
+    write(folder.join("list.csv"), &list);
+    let pipeline = root("pipelines/dynamics/pipeline.yaml");
+    let text = format!(
+        "calib: 1\nname: arms\npipeline: {}\nrobots:\n  - {{list: list.csv, variable: case}}\n",
+        pipeline.display()
+    );
+    let answer = diagnose(&write(folder.join("arms.yaml"), &text), &store, &[]);
+    let ripple = rows(&answer, "findings").into_iter().find(|row| {
+        row["effect"] == "torque_ripple" && row["place"] == "joint 4" && row["robot"] == ""
+    });
+    let ripple = ripple.unwrap_or_else(|| panic!("{answer:#}"));
+    assert_eq!(
+        (&ripple["robots"], &ripple["unit"]),
+        (&3.into(), &"Nm".into()),
+        "{answer:#}"
+    );
+    // 0.5 Nm is 0.35 Nm rms.
+    let size = ripple["size"].as_f64().unwrap();
+    assert!((size - 0.35).abs() < 0.08, "{size}");
+}
+
+/// Rows of a recording with a torque at joint 4 that comes back three times a turn.
+fn rippled(rows: &str, phase: f64) -> String {
+    let mut lines = rows.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let heads = lines.next().unwrap();
+    let column = |name: &str| heads.iter().position(|head| *head == name).unwrap();
+    let (angle, torque) = (column("q4_deg"), column("tau4_nm"));
+    let mut out = heads.join(",") + "\n";
+    for line in lines {
+        let q: f64 = line[angle].parse().unwrap();
+        let tau: f64 = line[torque].parse().unwrap();
+        let tau = format!("{:.4}", tau + 0.5 * (3.0 * q.to_radians() + phase).cos());
+        let cells = line.iter().enumerate();
+        let cells = cells.map(|(k, cell)| if k == torque { &*tau } else { cell });
+        out += &(cells.collect::<Vec<_>>().join(",") + "\n");
+    }
+    out
 }
