@@ -10,6 +10,7 @@ pub mod arm;
 pub mod conceal;
 pub mod effect;
 pub mod equilibrium;
+pub mod families;
 pub mod folder;
 pub mod matrix;
 pub mod memory;

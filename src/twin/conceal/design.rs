@@ -1,8 +1,9 @@
 //! What a set of concealed recordings is drawn from, and which kind each of its cases is.
 
-use super::family::{Collection, Family};
+use super::family::{Collection, DrawEffect};
 use super::layout::Layout;
 use super::robots::Kind;
+use crate::families::Family;
 use crate::noise::{Noise, Purpose};
 use crate::tracker::Scatter;
 
@@ -86,7 +87,7 @@ pub enum Content {
 impl Design {
     /// Rows of the families that single effects are drawn from.
     fn listed(&self) -> Vec<usize> {
-        let chosen = |family: &Family| match self.families.is_empty() {
+        let chosen = |family: &Family<DrawEffect>| match self.families.is_empty() {
             true => self.collection == Collection::Beyond || family.name != "unknown",
             false => self.families.iter().any(|name| name == family.name),
         };

@@ -4,15 +4,15 @@
 //! they are. Names and places are the canonical ones.
 
 pub(super) mod foreign;
-mod gears;
-mod instruments;
-mod interactions;
-mod loads;
+mod table;
+
+pub use table::{BEYOND, FAMILIES};
 
 use super::robots::{ALL_KINDS, KINDS, Kind};
 use crate::arm::Arm;
-use crate::effect::Physical;
+use crate::effect::{JointCompliance, Physical};
 use crate::equilibrium::settle;
+use crate::families::{Family, families};
 use crate::matrix::{self, Vector};
 use crate::noise::Noise;
 use crate::plan::Point;
@@ -47,7 +47,7 @@ pub struct Cause {
 
 /// What a family has drawn.
 #[derive(Debug, Clone)]
-pub(crate) struct Draft {
+pub struct Draft {
     /// The form, in a few words.
     pub(crate) form: &'static str,
     /// More than one where they act together.
@@ -75,9 +75,35 @@ impl Draft {
         form: &'static str,
         effect: &'static str,
         place: impl Into<String>,
-        physical: Vec<Physical>,
+        physical: impl Into<Vec<Physical>>,
     ) -> Draft {
-        Draft::new(form, vec![sized(effect, place.into(), physical)])
+        let cause = Cause {
+            sized: true,
+            ..fixed(effect, place.into(), physical)
+        };
+        Draft::new(form, vec![cause])
+    }
+    /// A cause of the size that it was drawn with, which shows through the springs of all loaded joints.
+    fn on_springs(
+        form: &'static str,
+        effect: &'static str,
+        place: impl Into<String>,
+        physical: Physical,
+        on: &Bench,
+        draw: &mut Noise,
+    ) -> Draft {
+        let mut causes = vec![fixed(effect, place.into(), [physical])];
+        causes.extend(springs(on, draw));
+        Draft::new(form, causes)
+    }
+    /// With the linear spring of its joint, of a size between two bounds: it may be named, or counted to what is concealed.
+    fn over_spring(mut self, on: &Bench, number: usize, sizes: [f64; 2], draw: &mut Noise) -> Self {
+        let linear = [spring(on, number, draw.size(sizes[0], sizes[1]))];
+        self.causes.push(Cause {
+            wanted: false,
+            ..fixed("joint_compliance", joint(number), linear)
+        });
+        self
     }
     fn accepting(mut self, effect: &'static str, place: String) -> Draft {
         self.accepted.push((effect, place));
@@ -87,29 +113,34 @@ impl Draft {
         self.needs.extend(columns);
         self
     }
-    fn hiding(mut self, column: Column) -> Draft {
-        self.hides.push(column);
-        self
-    }
 }
 
-/// A cause whose size may be changed.
-fn sized(effect: &'static str, place: String, physical: Vec<Physical>) -> Cause {
+/// A cause of the size that it was drawn with.
+fn fixed(effect: &'static str, place: String, physical: impl Into<Vec<Physical>>) -> Cause {
     Cause {
         effect,
         place,
-        physical,
-        sized: true,
+        physical: physical.into(),
+        sized: false,
         wanted: true,
     }
 }
 
-/// A cause of the size that it was drawn with.
-fn fixed(effect: &'static str, place: String, physical: Vec<Physical>) -> Cause {
-    Cause {
-        sized: false,
-        ..sized(effect, place, physical)
-    }
+/// The linear spring of a joint that turns by so many arcsec under its largest torque.
+fn spring(on: &Bench, number: usize, arcsec: f64) -> Physical {
+    JointCompliance::effect(number, on.softness(number, arcsec))
+}
+
+/// The springs of all loaded joints, of their natural size.
+fn springs(on: &Bench, draw: &mut Noise) -> Vec<Cause> {
+    let spring = |number| {
+        fixed(
+            "joint_compliance",
+            joint(number),
+            [spring(on, number, draw.size(60.0, 250.0))],
+        )
+    };
+    on.loaded().into_iter().map(spring).collect()
 }
 
 fn joint(number: usize) -> String {
@@ -120,18 +151,9 @@ fn link(number: usize) -> String {
     format!("link {number}")
 }
 
-/// Whether a form is the one that a library would hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Form {
-    /// As a library would hold it.
-    Obvious,
-    /// Otherwise.
-    Other,
-}
-
 /// What a family may look at: the robot, the plan, and the loads of the undeflected arm.
 #[derive(Debug)]
-pub(crate) struct Bench<'a> {
+pub struct Bench<'a> {
     /// As its owner believes it to be.
     pub(crate) robot: &'a RobotDescription,
     /// Ranges of every joint, deg.
@@ -256,81 +278,8 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Draws an effect; none where this robot cannot have it.
-type Draw = fn(&Bench, Form, &mut Noise) -> Option<Draft>;
-
-/// A family of effects.
-pub struct Family {
-    /// The canonical name of the effect; `unknown` for what is in no list.
-    pub name: &'static str,
-    /// Draws one.
-    pub(crate) draw: Draw,
-    /// May stand beside another one.
-    pub(crate) paired: bool,
-}
-
-const fn alone(name: &'static str, draw: Draw) -> Family {
-    Family {
-        name,
-        draw,
-        paired: false,
-    }
-}
-
-const fn paired(name: &'static str, draw: Draw) -> Family {
-    Family {
-        paired: true,
-        ..alone(name, draw)
-    }
-}
-
-/// Families in canonical names; several rows of one name are different causes.
-pub const FAMILIES: &[Family] = &[
-    paired("joint_compliance", gears::joint_compliance),
-    alone("joint_hardening", gears::joint_hardening),
-    paired("gear_cyclic", gears::gear_cyclic),
-    paired("gear_motor_cyclic", gears::gear_motor_cyclic),
-    paired("backlash", gears::backlash),
-    paired("axis_wobble", gears::axis_wobble),
-    paired("zero_shift", gears::zero_shift),
-    alone("cable_drag", gears::cable_drag),
-    paired("link_compliance", loads::link_compliance),
-    paired("base_compliance", loads::base_compliance),
-    alone("counterbalance", loads::counterbalance),
-    alone("link_mass", loads::link_mass),
-    alone("payload_error", loads::payload_error),
-    paired("thermal_growth", loads::thermal_growth),
-    paired("tool_shift", loads::tool_shift),
-    paired("base_shift", loads::base_shift),
-    paired("tracker_drift", loads::tracker_drift),
-    alone("joint_log_lag", loads::joint_log_lag),
-    alone("tracker_scale", loads::tracker_scale),
-    alone("unknown", foreign::bump),
-    alone("unknown", foreign::hinge),
-    alone("unknown", foreign::product),
-    alone("unknown", foreign::sway),
-];
-
-/// Families of physics that no list of effects holds yet: instruments, memory, interactions.
-pub const BEYOND: &[Family] = &[
-    alone("tracker_circle", instruments::circle),
-    alone("tracker_elevation", instruments::elevation),
-    alone("tracker_offset", instruments::offset),
-    alone("tracker_refraction", instruments::refraction),
-    alone("unknown", instruments::swing),
-    alone("base_shift", instruments::knock),
-    alone("presliding", interactions::presliding),
-    alone("joint_warming", interactions::own_heat),
-    alone("joint_warming", interactions::late_heat),
-    alone("thermal_growth", interactions::lagging_link),
-    alone("gear_load", interactions::gear_load),
-    alone("gear_flank", interactions::gear_flank),
-    alone("joint_warming", interactions::warm_ratio),
-    alone("joint_warming", interactions::warm_spring),
-    alone("backlash", interactions::spring_by_direction),
-    alone("backlash", interactions::growing_gap),
-    alone("unknown", interactions::bent_link),
-];
+/// Draws an effect, in another form than the obvious one if that is asked for; none where this robot cannot have it.
+pub type DrawEffect = fn(&Bench, bool, &mut Noise) -> Option<Draft>;
 
 /// What a set of recordings is drawn from.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -344,7 +293,7 @@ pub enum Collection {
 
 impl Collection {
     /// Kinds of effects that are drawn.
-    pub fn families(self) -> &'static [Family] {
+    pub fn families(self) -> &'static [Family<DrawEffect>] {
         match self {
             Self::Library => FAMILIES,
             Self::Beyond => BEYOND,

@@ -1,7 +1,7 @@
 //! How large concealed effects are: each is scaled until it is as visible as drawn, when geometry has absorbed what it can.
 
 use super::design::{Content, Design};
-use super::family::{Bench, Cause, Draft, Form, foreign::foreign};
+use super::family::{Bench, Cause, Draft, foreign::foreign};
 use super::visible::{Shadow, Site, norm};
 use crate::effect::Physical;
 use crate::noise::Noise;
@@ -71,12 +71,8 @@ pub(super) fn drafts(
     let mut out: Vec<Draft> = Vec::new();
     for row in rows {
         for _ in 0..50 {
-            let form = if draw.chance(design.other_forms) {
-                Form::Other
-            } else {
-                Form::Obvious
-            };
-            let Some(draft) = (design.collection.families()[row].draw)(bench, form, draw) else {
+            let other = draw.chance(design.other_forms);
+            let Some(draft) = (design.collection.families()[row].draw)(bench, other, draw) else {
                 continue;
             };
             let taken = |place: &str| {
@@ -201,14 +197,10 @@ pub(super) fn beyond(
     let Content::Single(row) = content else {
         return (Vec::new(), Vec::new());
     };
-    let form = if draw.chance(design.other_forms) {
-        Form::Other
-    } else {
-        Form::Obvious
-    };
+    let other = draw.chance(design.other_forms);
     let mut out = (Vec::new(), Vec::new());
     for left in (0..DRAWS).rev() {
-        let Some(draft) = (design.collection.families()[row].draw)(bench, form, draw) else {
+        let Some(draft) = (design.collection.families()[row].draw)(bench, other, draw) else {
             continue;
         };
         let wanted = draw.size(PLAIN[0], PLAIN[1]);
@@ -222,9 +214,7 @@ pub(super) fn beyond(
             causes[index].0.scale(factor);
         }
         let mut concealed = seen(causes, sight);
-        concealed
-            .iter_mut()
-            .for_each(|one| one.strange = form == Form::Other);
+        concealed.iter_mut().for_each(|one| one.strange = other);
         let plain = concealed
             .iter()
             .filter(|one| one.cause.sized)
