@@ -10,6 +10,8 @@ use crate::estimate::threads::in_order;
 use crate::proof::{
     self, ConcealedSet, LEFT_OUT, RECORDINGS, SEAL, SEALED, Seal, board, write_scoreboard,
 };
+use crate::summary::scoreboard;
+use crate::twin::reveal::board::Board;
 use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -122,16 +124,22 @@ impl ProveArguments {
         );
         diagnosed.into_iter().collect::<Result<()>>()?;
         let sealed = Seal::check(folder)?;
-        let board = proof::board(folder, &sealed, &verdicts)?;
-        if self.conceal.json {
-            return emit_json(&board.document());
-        }
-        emit(&format!(
-            "the seal holds: {}, all as they were\n{}",
-            counted(sealed.len(), "file"),
-            board.text()
-        ))
+        let board = board(folder, &sealed, &verdicts)?;
+        show(&board, sealed.len(), self.conceal.json)
     }
+}
+
+/// Prints a scoreboard after a seal of so many files held.
+fn show(board: &Board, sealed: usize, json: bool) -> Result<()> {
+    let document = board.document();
+    if json {
+        return emit_json(&document);
+    }
+    emit(&format!(
+        "the seal holds: {}, all as they were\n{}",
+        counted(sealed, "file"),
+        scoreboard(&document, &board.details())
+    ))
 }
 
 /// The case that a sealed truth is of.
@@ -231,13 +239,6 @@ impl RevealArguments {
         if let Some(path) = &self.out {
             write_scoreboard(path, &board)?;
         }
-        if self.json {
-            return emit_json(&board.document());
-        }
-        emit(&format!(
-            "the seal holds: {}, all as they were\n{}",
-            counted(sealed.len(), "file"),
-            board.text()
-        ))
+        show(&board, sealed.len(), self.json)
     }
 }

@@ -166,6 +166,15 @@ macro_rules! named {
 }
 named! { Name Cause Finding Rival }
 
+impl Finding {
+    /// What it may mean with which probability: itself and its rivals.
+    pub(super) fn names(&self) -> impl Iterator<Item = (Option<f64>, Atoms)> {
+        let rivals = self.rivals.iter();
+        std::iter::once((self.probability, self.atoms()))
+            .chain(rivals.map(|rival| (rival.probability, rival.atoms())))
+    }
+}
+
 /// Those of several.
 pub(super) fn all_atoms<'a>(names: impl IntoIterator<Item = &'a Name>) -> Atoms {
     names.into_iter().flat_map(Name::atoms).collect()

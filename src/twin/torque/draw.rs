@@ -1,6 +1,6 @@
 //! A case of a seed: which arm, which masses within their tolerance, which effects in which sizes and forms.
 
-use super::family::{FAMILIES, OPEN, Pool};
+use super::family::{OPEN, Pool, TORQUES};
 use super::law::Law;
 use super::path::Path;
 use crate::conceal::robots::Kind;
@@ -31,59 +31,37 @@ pub struct TorqueDesign {
     pub rate: f64,
 }
 
-/// How much a recording conceals, the friction of all joints apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum TorqueContent {
-    /// Nothing.
-    Null,
-    /// An effect of the list.
-    Single,
-    /// Two of them.
-    Pair,
-    /// One that is in no list.
-    Open,
-}
-
-impl TorqueContent {
-    /// As a truth has it.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Null => "null",
-            Self::Single => "single",
-            Self::Pair => "pair",
-            Self::Open => "open",
-        }
-    }
-}
-
 impl TorqueDesign {
-    /// The content of the recording of this number: shares are kept by multiples of the golden ratio, whose order says nothing.
-    fn content(&self, number: usize) -> TorqueContent {
+    /// What the recording of this number conceals, the friction of all joints apart: `null`, `single`, `pair`, or `open` for one effect that is
+    /// in no list. Shares are kept by multiples of the golden ratio, whose order says nothing.
+    fn content(&self, number: usize) -> &'static str {
         let begin = Noise::new(self.seed, Purpose::Design).uniform(0.0, 1.0);
         let at = (begin + number as f64 * 0.618_033_988_749_895).fract();
         let shares = [
-            (TorqueContent::Null, self.nulls),
-            (TorqueContent::Pair, self.pairs),
-            (TorqueContent::Open, self.open),
+            ("null", self.nulls),
+            ("pair", self.pairs),
+            ("open", self.open),
         ];
         let mut end = 0.0;
-        for (content, share) in shares {
+        let mut within = |(_, share): &(&str, f64)| {
             end += share;
-            if at < end {
-                return content;
-            }
-        }
-        TorqueContent::Single
+            at < end
+        };
+        let content = shares.into_iter().find(&mut within);
+        content.map_or("single", |(content, _)| content)
     }
 
     /// Families in an order of the seed: in turn, all are drawn.
     fn family(&self, number: usize) -> usize {
         let mut draw = Noise::new(self.seed, Purpose::Faults);
-        let mut order: Vec<usize> = (0..FAMILIES).collect();
+        let mut order: Vec<usize> = (0..LISTED).collect();
         draw.shuffle(&mut order);
-        order[number % FAMILIES]
+        order[number % LISTED]
     }
 }
+
+/// Families that are in the list.
+const LISTED: usize = TORQUES.len() - OPEN;
 
 /// A recording to be made.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,7 +71,7 @@ pub struct TorqueCase {
     pub(crate) seed: u64,
     /// The arm as its user believes it to be.
     pub robot: RobotDescription,
-    pub(super) content: TorqueContent,
+    pub(super) content: &'static str,
     /// What is concealed, friction of all joints first; joints from 0.
     pub(super) laws: Vec<Law>,
     /// How many laws are friction of all joints.
@@ -196,8 +174,7 @@ impl TorqueCase {
         let floor = peak.iter().copied().fold(0.0, f64::max) * 0.01;
         let scale: Vec<f64> = peak.iter().map(|peak| peak.max(floor)).collect();
         let width = noise.uniform(0.004, 0.012);
-        let null = self.content == TorqueContent::Null;
-        if noise.chance(if null { 0.5 } else { COMMON }) {
+        if noise.chance(if self.content == "null" { 0.5 } else { COMMON }) {
             for (joint, scale) in scale.iter().enumerate() {
                 let other = noise.chance(design.other_forms * 0.3);
                 let exponent = if other { noise.uniform(0.6, 0.8) } else { 1.0 };
@@ -214,36 +191,36 @@ impl TorqueCase {
             }
         }
         self.common = self.laws.len();
-        let pool = Pool {
-            width,
-            common: self.common > 0,
-            sensors: self.sensors,
-            scale: &scale,
-            machine: &self.stated,
-            touched: self.paths[0].duration,
-        };
         let wanted = match self.content {
-            TorqueContent::Null => 0,
-            TorqueContent::Single | TorqueContent::Open => 1,
-            TorqueContent::Pair => 2,
+            "null" => 0,
+            "pair" => 2,
+            _ => 1,
         };
         let mut drawn: Vec<(usize, Law)> = Vec::new();
         let mut family = match self.content {
-            TorqueContent::Open => FAMILIES + noise.index(OPEN),
+            "open" => LISTED + noise.index(OPEN),
             _ => design.family(number),
         };
         while drawn.len() < wanted {
             let other = noise.chance(design.other_forms);
-            let law = pool.law(family, noise, other);
+            let pool = Pool {
+                joint: noise.index(scale.len()),
+                width,
+                common: self.common > 0,
+                sensors: self.sensors,
+                scale: &scale,
+                machine: &self.stated,
+                touched: self.paths[0].duration,
+            };
+            let law = (TORQUES[family].draw)(&pool, other, noise);
             // One of a kind, and one a joint: two hide each other.
             let apart = |law: &Law| {
                 drawn.iter().all(|(known, one)| {
                     *known != family && (one.joint().is_none() || one.joint() != law.joint())
                 })
             };
-            let law = law.filter(apart);
-            drawn.extend(law.map(|law| (family, law)));
-            family = noise.index(FAMILIES);
+            drawn.extend(law.filter(apart).map(|law| (family, law)));
+            family = noise.index(LISTED);
         }
         self.laws.extend(drawn.into_iter().map(|(_, law)| law));
     }

@@ -50,7 +50,7 @@ impl TorqueCase {
         let names: Vec<&str> = self.laws[self.common..].iter().map(Law::name).collect();
         let to_fit = rows.to_fit();
         pretty(&json!({
-            "case": self.name, "content": self.content.name(), "family": names.join("+"), "robot": self.robot.name,
+            "case": self.name, "content": self.content, "family": names.join("+"), "robot": self.robot.name,
             "seed": self.seed, "accepted": accepted, "effects": effects, "tampered": [],
             "points": { "fit": to_fit, "validate": rows.validate.len() - to_fit },
             "noise_nm": { "white": self.white, "lasting": self.lasting },
