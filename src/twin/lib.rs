@@ -18,6 +18,7 @@ pub mod noise;
 pub mod plan;
 pub mod recorder;
 pub mod reveal;
+pub(crate) mod shadow;
 pub mod torque;
 pub mod touch;
 pub mod tracker;

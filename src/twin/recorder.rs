@@ -10,7 +10,7 @@ use super::noise::{Noise, Purpose};
 use super::plan::{self, Block, Climate, Point, Poses};
 use super::tracker::{Beam, Tracker};
 use super::truth::{ARCSEC, TrueRobot};
-use super::way::{Path, Way};
+use super::way::{JointState, Path, Way};
 use crate::arm::{Motion, Row};
 use calib_foundation::description::RobotDescription;
 use schemars::JsonSchema;
@@ -154,7 +154,7 @@ impl Experiment<'_> {
         };
         let course = times.map(|since_s| {
             (
-                path.at(since_s + later).0,
+                path.at(since_s + later).q,
                 clock(since_s).0,
                 clock(since_s).1,
             )
@@ -187,8 +187,12 @@ impl Experiment<'_> {
         let mut shots = Vec::with_capacity(rows);
         for (row, (block, load)) in blocks.enumerate() {
             let since_s = row as f64 / way.rate_hz;
-            let (q, logged) = path.at(since_s);
-            let (command, velocity) = path.at(since_s + later);
+            let JointState { q, v: logged, .. } = path.at(since_s);
+            let JointState {
+                q: command,
+                v: velocity,
+                ..
+            } = path.at(since_s + later);
             let mut drive = self.truth.drive(self.robot, &command);
             for (((position, astray), sigma), link) in drive
                 .iter_mut()

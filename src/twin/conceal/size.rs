@@ -2,9 +2,10 @@
 
 use super::design::{Content, Design};
 use super::family::{Bench, Cause, Draft, foreign::foreign};
-use super::visible::{Shadow, Site, norm};
+use super::visible::Site;
 use crate::effect::Physical;
 use crate::noise::Noise;
+use crate::shadow::{Shadow, norm};
 
 /// A cause with how visible it is at the points to fit.
 #[derive(Debug, Clone)]

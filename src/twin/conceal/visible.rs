@@ -1,10 +1,11 @@
 //! What is left of an effect when geometry, ratios and couplings have absorbed what they can: differences of the twin by its own
-//! true numbers, orthogonalised (modified Gram-Schmidt, twice), and the effect's displacement less its shadow on them.
+//! true numbers, and the effect's displacement less its shadow on them. Columns are coordinates of all points, tracker frame, m.
 
 use crate::arm::{Arm, Motion, Row};
 use crate::effect::{self, Physical};
 use crate::equilibrium::{Equilibrium, settle, sighted};
 use crate::plan::Point;
+use crate::shadow::{Column, Shadow, norm};
 use crate::tracker::Tracker;
 use crate::truth::TrueRobot;
 use crate::{matrix, memory};
@@ -22,9 +23,6 @@ pub(crate) struct Site<'a> {
     /// In the order of measurement.
     pub(crate) points: &'a [Point],
 }
-
-/// Coordinates of all points after each other, tracker frame, m.
-type Column = Vec<f64>;
 
 impl Site<'_> {
     /// What the tracker would see without effects and noise of the joints that are logged under `effects`.
@@ -186,76 +184,6 @@ impl Site<'_> {
 
     /// The space of everything that geometry can do.
     pub(crate) fn shadow(&self) -> Shadow {
-        let mut shadow = Shadow { basis: Vec::new() };
-        let mut left: Vec<Column> = self.geometry().into_iter().filter_map(unit).collect();
-        // The column with most of its own comes first, so that what hardly differs from the others cannot pass on its rounding.
-        while let Some(most) =
-            (0..left.len()).max_by(|a, b| norm(&left[*a]).total_cmp(&norm(&left[*b])))
-        {
-            let column = left.swap_remove(most);
-            if norm(&column) < OWN {
-                break;
-            }
-            shadow.add(column);
-            if let Some(direction) = shadow.basis.last() {
-                left.iter_mut().for_each(|other| take_out(other, direction));
-            }
-        }
-        shadow
+        Shadow::of(self.geometry())
     }
-}
-
-/// An orthonormal basis.
-#[derive(Debug, Clone)]
-pub(crate) struct Shadow {
-    basis: Vec<Column>,
-}
-
-/// What is left of a column below this share of it is rounding, not a direction of its own.
-const OWN: f64 = 1e-6;
-
-impl Shadow {
-    /// Dimension of the space.
-    pub(crate) fn rank(&self) -> usize {
-        self.basis.len()
-    }
-
-    /// Takes a direction in; none where the space holds it already.
-    pub(crate) fn add(&mut self, column: Column) {
-        let size = norm(&column);
-        let left = self.outside(column);
-        if norm(&left) > OWN * size {
-            self.basis.extend(unit(left));
-        }
-    }
-
-    /// What of a column lies outside of the space.
-    pub(crate) fn outside(&self, mut column: Column) -> Column {
-        for _ in 0..2 {
-            self.basis
-                .iter()
-                .for_each(|direction| take_out(&mut column, direction));
-        }
-        column
-    }
-}
-
-/// Length of a column.
-pub(crate) fn norm(column: &[f64]) -> f64 {
-    column.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-/// Takes what lies along a unit direction out of a column.
-fn take_out(column: &mut [f64], direction: &[f64]) {
-    let along: f64 = direction.iter().zip(&*column).map(|(a, b)| a * b).sum();
-    column
-        .iter_mut()
-        .zip(direction)
-        .for_each(|(x, d)| *x -= along * d);
-}
-
-/// The column at length 1; none for one of no length.
-fn unit(column: Column) -> Option<Column> {
-    let length = norm(&column);
-    (length > 0.0).then(|| column.into_iter().map(|x| x / length).collect())
 }

@@ -2,11 +2,12 @@
 
 use super::family::{OPEN, Pool, TORQUES};
 use super::law::Law;
-use super::path::Path;
+use super::path::{moves, sines};
 use crate::conceal::robots::Kind;
 use crate::matrix::{self, Vector};
 use crate::noise::{Noise, Purpose};
 use crate::torque::law::{Body, Machine};
+use crate::way::Path;
 use calib_foundation::description::{
     DeclaredInertias, InertiaMoments, MassTolerance, RobotDescription,
 };
@@ -80,7 +81,8 @@ pub struct TorqueCase {
     pub(super) scattered: Machine,
     /// Hz of the rows.
     pub(super) rate: f64,
-    pub(super) paths: Vec<Path>,
+    /// How long each lasts, s, and the way.
+    pub(super) paths: Vec<(f64, Path)>,
     /// Paths to fit; the others judge.
     pub(super) fitted: usize,
     /// Nm, by joint: white noise, and noise that lasts.
@@ -210,7 +212,7 @@ impl TorqueCase {
                 sensors: self.sensors,
                 scale: &scale,
                 machine: &self.stated,
-                touched: self.paths[0].duration,
+                touched: self.paths[0].0,
             };
             let law = (TORQUES[family].draw)(&pool, other, noise);
             // One of a kind, and one a joint: two hide each other.
@@ -325,7 +327,7 @@ pub(super) fn paths(
     speed: f64,
     seconds: f64,
     noise: &mut Noise,
-) -> (Vec<Path>, usize) {
+) -> (Vec<(f64, Path)>, usize) {
     let ranges: Vec<[f64; 2]> = robot
         .joints
         .iter()
@@ -335,9 +337,10 @@ pub(super) fn paths(
             [middle - reach, middle + reach]
         })
         .collect();
-    let paths = STRETCHES.iter().enumerate().map(|(k, share)| match k % 2 {
-        0 => Path::sines(noise, &ranges, speed, share * seconds),
-        _ => Path::moves(noise, &ranges, speed, share * seconds),
+    let paths = STRETCHES.iter().enumerate().map(|(k, share)| {
+        let draw = if k % 2 == 0 { sines } else { moves };
+        let duration = share * seconds;
+        (duration, draw(noise, &ranges, speed, duration))
     });
     (paths.collect(), FITTED)
 }

@@ -5,9 +5,9 @@
 use crate::folder::robot_json;
 use crate::noise::{Noise, Purpose};
 use crate::torque::draw::{TorqueCase, paths};
-use crate::torque::law::{Body, Fall, JointState, Law};
-use crate::torque::path::Path;
+use crate::torque::law::{Body, Fall, Law};
 use crate::torque::record::TorqueRows;
+use crate::way::{JointState, Path};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -149,9 +149,8 @@ impl TorqueCase {
     /// The same arm and physics on a motion that is given in even steps (s), to fit, and on its own paths that judge.
     pub fn on_motion(mut self, step: f64, states: Vec<JointState>) -> Self {
         let judging = self.paths.split_off(self.fitted);
-        self.paths = std::iter::once(Path::given(step, states))
-            .chain(judging)
-            .collect();
+        let given = (step * states.len() as f64, Path::Given(step, states));
+        self.paths = std::iter::once(given).chain(judging).collect();
         self.fitted = 1;
         self
     }

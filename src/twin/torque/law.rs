@@ -5,6 +5,7 @@
 
 use crate::matrix;
 use crate::matrix::{Matrix, Vector, add, cross, dot, minus, scale};
+use crate::way::JointState;
 
 /// How friction at creeping speed falls with speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -383,17 +384,6 @@ pub struct Machine {
     pub payload: Option<Body>,
     /// m/s2.
     pub gravity: Vector,
-}
-
-/// Where joints are and how they move: rad, rad/s, rad/s2.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct JointState {
-    /// rad.
-    pub q: Vec<f64>,
-    /// rad/s.
-    pub v: Vec<f64>,
-    /// rad/s2.
-    pub a: Vec<f64>,
 }
 
 /// What a body takes: force at its centre and moment about it.

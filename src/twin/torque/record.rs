@@ -3,7 +3,8 @@
 use super::draw::TorqueCase;
 use super::law::{Law, Moment};
 use crate::noise::{Noise, Purpose};
-use crate::torque::law::{JointState, Machine};
+use crate::torque::law::Machine;
+use crate::way::JointState;
 
 /// Hz of the simulation, at least.
 const FINE: f64 = 500.0;
@@ -67,10 +68,10 @@ impl TorqueCase {
         let (late, filter) = (behind(false), behind(true));
         let mut rows = TorqueRows::default();
         let mut begin = 0.0;
-        for (number, path) in self.paths.iter().enumerate() {
+        for (number, (duration, path)) in self.paths.iter().enumerate() {
             let mut past: Vec<_> = Vec::new();
             let mut fine: Vec<Vec<f64>> = Vec::new();
-            for k in 0..(path.duration * self.rate) as usize * fine_steps {
+            for k in 0..(duration * self.rate) as usize * fine_steps {
                 let time = k as f64 * step;
                 let state = path.at(time);
                 let rigid = machine.torque(&state);
@@ -136,7 +137,7 @@ impl TorqueCase {
                 rows.torque
                     .extend((0..n).map(|j| fine[low][j] * (1.0 - part) + fine[high][j] * part));
             }
-            begin += path.duration + PAUSE;
+            begin += duration + PAUSE;
         }
         rows
     }

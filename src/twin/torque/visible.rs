@@ -4,6 +4,7 @@
 use super::draw::TorqueCase;
 use super::law::{Fall, Law, Moment};
 use super::record::{AR1_COEFFICIENT, TorqueRows};
+use crate::shadow::{Column, Shadow, norm};
 use crate::torque::law::Machine;
 use std::f64::consts::FRAC_PI_2;
 
@@ -14,8 +15,8 @@ const SAME_SHARE: f64 = 0.02;
 const SAME: f64 = 12.0;
 /// Ripples of more a turn are like nothing else.
 const LARGEST_ORDER: usize = 3;
-/// Added to the diagonal so that what is not determined absorbs nothing, as a share.
-const HELD: f64 = 1e-9;
+/// A rival's column of which the others leave less than this share of it is none of its own.
+const COLLINEAR: f64 = 1e-3;
 
 /// An effect as data show it.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +25,7 @@ pub(super) struct Visible {
     pub(crate) l: f64,
     pub(crate) before: f64,
     /// Names and places that say the same.
-    pub(crate) same: Vec<(String, String)>,
+    pub(crate) same: Vec<(&'static str, String)>,
 }
 
 /// Averaged and whitened columns of the rows to fit.
@@ -39,69 +40,68 @@ struct Columns<'a> {
 impl TorqueCase {
     /// How visible each law is; `rows` are those with all of them. No other names are looked for of the friction of all joints.
     pub(super) fn visible(&self, rows: &TorqueRows) -> Vec<Visible> {
-        let all: Vec<usize> = (0..self.laws.len()).collect();
         let columns = Columns::new(self, rows);
+        let inertial = columns.inertial();
+        // Masses cost what their tolerance says: one more row for each of their numbers, in which a standard deviation of it is 1.
+        let numbers = inertial.len();
+        let priced = |mut column: Column, number: Option<usize>| {
+            column.extend((0..numbers).map(|row| f64::from(number == Some(row))));
+            column
+        };
         let effect = |index: usize| {
             if index < self.common {
-                return columns.of_law(&self.laws[index]);
+                return priced(columns.of_law(&self.laws[index]), None);
             }
-            let others: Vec<usize> = all
-                .iter()
-                .copied()
+            let others: Vec<usize> = (0..self.laws.len())
                 .filter(|other| *other != index)
                 .collect();
             let less = self.rows(&others);
-            columns.of(rows
-                .torque
-                .iter()
-                .zip(&less.torque)
-                .map(|(with, less)| with - less))
+            let pairs = rows.torque.iter().zip(&less.torque);
+            priced(columns.of(pairs.map(|(with, less)| with - less)), None)
         };
-        let effects: Vec<Vec<f64>> = all.iter().map(|index| effect(*index)).collect();
-        let base = columns.inertial();
-        // Masses cost what their tolerance says: their columns are in standard deviations, with 1 on the diagonal.
-        let beside = |index: Option<usize>| -> Vec<(&[f64], f64)> {
+        let effects: Vec<Column> = (0..self.laws.len()).map(effect).collect();
+        let mut masses = Shadow::default();
+        for (number, column) in inertial.into_iter().enumerate() {
+            masses.add(priced(column, Some(number)));
+        }
+        let rivals = match self.common < self.laws.len() {
+            true => columns.rivals(),
+            false => Vec::new(),
+        };
+        let seen = |index: usize| {
+            let mut shadow = masses.clone();
             let others = effects
                 .iter()
                 .enumerate()
-                .filter(|(other, _)| Some(*other) != index)
-                .map(|(_, c)| c.as_slice());
-            base.iter()
-                .map(|c| (c.as_slice(), 1.0))
-                .chain(others.map(|c| (c, 0.0)))
-                .collect()
-        };
-        let whole = Space::new(&beside(None));
-        let rivals = if self.common < self.laws.len() {
-            columns.rivals()
-        } else {
-            Vec::new()
-        };
-        let seen = |index: usize| {
-            let (l, before) = (whole.alone(base.len() + index), square(&effects[index]));
-            if index < self.common {
-                return Visible {
-                    l,
-                    before,
-                    same: Vec::new(),
-                };
-            }
+                .filter(|(other, _)| *other != index);
+            others.for_each(|(_, column)| shadow.add(column.clone()));
+            let visible = shadow.outside(effects[index].clone());
+            let l = norm(&visible).powi(2);
             let law = &self.laws[index];
-            let known = (law.name().to_string(), law.place());
-            let space = Space::new(&beside(Some(index)));
-            let own = space.projected(&effects[index]);
-            let l = space.dot(&own, &own);
-            let says_the_same = |rival: &&(String, String, Vec<Vec<f64>>)| {
-                space.left(&own, &rival.2, l) < SAME.max(SAME_SHARE * l)
+            let known = (law.name(), law.place());
+            let says_the_same = |(name, place, columns): &(&'static str, String, Vec<Column>)| {
+                let mut space = Shadow::default();
+                for column in columns.iter().map(|column| priced(column.clone(), None)) {
+                    let size = norm(&column);
+                    let outside = shadow.outside(column);
+                    if norm(&outside) > COLLINEAR * size {
+                        space.add(outside);
+                    }
+                }
+                (*name, place) != (known.0, &known.1)
+                    && norm(&space.outside(visible.clone())).powi(2) < SAME.max(SAME_SHARE * l)
             };
-            let same = rivals
-                .iter()
-                .filter(says_the_same)
-                .map(|(name, place, _)| (name.clone(), place.clone()));
-            let same = same.filter(|rival| *rival != known).collect();
-            Visible { l, before, same }
+            let rivals = rivals.iter().filter(|_| index >= self.common);
+            Visible {
+                l,
+                before: norm(&effects[index]).powi(2),
+                same: rivals
+                    .filter(|rival| says_the_same(rival))
+                    .map(|(name, place, _)| (*name, place.clone()))
+                    .collect(),
+            }
         };
-        all.iter().map(|index| seen(*index)).collect()
+        (0..self.laws.len()).map(seen).collect()
     }
 }
 
@@ -179,12 +179,11 @@ impl<'a> Columns<'a> {
     }
 
     /// Linear effects of unit size, by name and place.
-    fn rivals(&self) -> Vec<(String, String, Vec<Vec<f64>>)> {
+    fn rivals(&self) -> Vec<(&'static str, String, Vec<Column>)> {
         let n = self.weight.len();
-        let mut rivals: Vec<(String, String, Vec<Vec<f64>>)> = Vec::new();
-        let mut add = |law: &Law, columns: Vec<Vec<f64>>| {
-            rivals.push((law.name().into(), law.place(), columns))
-        };
+        let mut rivals = Vec::new();
+        let mut add =
+            |law: &Law, columns: Vec<Column>| rivals.push((law.name(), law.place(), columns));
         for joint in 0..n {
             for law in per_joint(joint) {
                 add(&law, vec![self.of_law(&law)]);
@@ -282,113 +281,4 @@ fn waves(joint: usize) -> Vec<Vec<Law>> {
     std::iter::once(balancer)
         .chain((1..=LARGEST_ORDER).map(ripple))
         .collect()
-}
-
-fn square(column: &[f64]) -> f64 {
-    column.iter().map(|x| x * x).sum()
-}
-
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// The space of held columns, each with what its number costs; a Cholesky factor of their normal matrix.
-struct Space<'a> {
-    held: Vec<&'a [f64]>,
-    factor: Vec<Vec<f64>>,
-}
-
-/// A column beside what the held ones make of it.
-struct Projected {
-    column: Vec<f64>,
-    /// L^-1 of its products with the held columns.
-    seen: Vec<f64>,
-}
-
-impl<'a> Space<'a> {
-    fn new(held: &[(&'a [f64], f64)]) -> Self {
-        let gram = |i: usize, j: usize| {
-            let own = product(held[i].0, held[j].0);
-            if i == j {
-                own * (1.0 + HELD) + held[i].1 + f64::MIN_POSITIVE
-            } else {
-                own
-            }
-        };
-        let mut factor: Vec<Vec<f64>> = Vec::with_capacity(held.len());
-        for i in 0..held.len() {
-            let mut row = Vec::with_capacity(i + 1);
-            for j in 0..=i {
-                let sum: f64 = product(
-                    &row,
-                    &factor.get(j).map_or(&row[..], |other| other)[..j.min(row.len())],
-                );
-                let rest = gram(i, j) - sum;
-                row.push(if i == j {
-                    rest.max(HELD * gram(i, i)).max(f64::MIN_POSITIVE).sqrt()
-                } else {
-                    rest / factor[j][j]
-                });
-            }
-            factor.push(row);
-        }
-        Self {
-            held: held.iter().map(|(column, _)| *column).collect(),
-            factor,
-        }
-    }
-
-    /// What a held column leaves beside all others: the inverse of its diagonal in the normal matrix's inverse.
-    fn alone(&self, index: usize) -> f64 {
-        let mut solved: Vec<f64> = vec![0.0; index];
-        for row in &self.factor[index..] {
-            let unit = if solved.len() == index { 1.0 } else { 0.0 };
-            solved.push((unit - product(&row[..solved.len()], &solved)) / row[solved.len()]);
-        }
-        1.0 / square(&solved)
-    }
-
-    fn projected(&self, column: &[f64]) -> Projected {
-        let mut seen: Vec<f64> = Vec::with_capacity(self.held.len());
-        for (row, held) in self.factor.iter().zip(&self.held) {
-            let rest = product(held, column) - product(&row[..seen.len()], &seen);
-            seen.push(rest / row[seen.len()]);
-        }
-        Projected {
-            column: column.to_vec(),
-            seen,
-        }
-    }
-
-    fn dot(&self, a: &Projected, b: &Projected) -> f64 {
-        product(&a.column, &b.column) - product(&a.seen, &b.seen)
-    }
-
-    /// What is left of `own` (of square `l`) beside these columns.
-    fn left(&self, own: &Projected, columns: &[Vec<f64>], l: f64) -> f64 {
-        let mut basis: Vec<Projected> = Vec::new();
-        let mut left = l;
-        for column in columns {
-            let mut next = self.projected(column);
-            let before = square(column).max(f64::MIN_POSITIVE);
-            for other in &basis {
-                let share = self.dot(&next, other) / self.dot(other, other);
-                next.column
-                    .iter_mut()
-                    .zip(&other.column)
-                    .for_each(|(x, y)| *x -= share * y);
-                next.seen
-                    .iter_mut()
-                    .zip(&other.seen)
-                    .for_each(|(x, y)| *x -= share * y);
-            }
-            let size = self.dot(&next, &next);
-            if size > 1e-6 * before {
-                let along = self.dot(own, &next);
-                left -= along * along / size;
-                basis.push(next);
-            }
-        }
-        left
-    }
 }
