@@ -7,9 +7,7 @@ use super::super::{emit, emit_json};
 use super::conceal::{self, ConcealArguments};
 use crate::error::{Error, Result, counted};
 use crate::estimate::threads::in_order;
-use crate::proof::{
-    self, ConcealedSet, LEFT_OUT, RECORDINGS, SEAL, SEALED, Seal, board, write_scoreboard,
-};
+use crate::proof::{self, LEFT_OUT, RECORDINGS, SEAL, SEALED, Seal, board, write_scoreboard};
 use crate::summary::scoreboard;
 use crate::twin::reveal::board::Board;
 use clap::Args;
@@ -48,19 +46,14 @@ pub(super) struct ProveArguments {
 
 const VERDICTS: &str = "verdicts";
 
-/// Where a set's recordings are read and diagnosed.
-fn pipeline(arguments: &ProveArguments, set: &ConcealedSet) -> PathBuf {
-    let usual = match set {
-        ConcealedSet::Positions(_) => "pipelines/case/pipeline.yaml",
-        ConcealedSet::Torques(_) => "pipelines/dynamics/pipeline.yaml",
-    };
-    arguments.pipeline.clone().unwrap_or_else(|| usual.into())
-}
-
 impl ProveArguments {
     pub fn run(&self) -> Result<()> {
         let (design, folder) = (conceal::design(&self.conceal)?, &self.conceal.out);
-        let pipeline = pipeline(self, &design);
+        let usual = match design.dynamics {
+            false => "pipelines/case/pipeline.yaml",
+            true => "pipelines/dynamics/pipeline.yaml",
+        };
+        let pipeline = self.pipeline.clone().unwrap_or_else(|| usual.into());
         if !pipeline.is_file() {
             return Err(Error::spec(
                 "--pipeline",

@@ -44,6 +44,13 @@ pub struct Design {
     pub layout: Layout,
     /// Mass (kg) on the flange that neither the robot file nor the payload column states.
     pub tool_mass_kg: f64,
+    /// Torques of an arm that moves instead of points: of what is above, seed, cases, shares (nulls have friction of all joints in half of
+    /// them, the others in most) and forms count.
+    pub dynamics: bool,
+    /// Seconds of a recording of torques: two stretches to fit, two that judge.
+    pub seconds: f64,
+    /// Rows a second of it.
+    pub rate: f64,
 }
 
 impl Default for Design {
@@ -67,6 +74,9 @@ impl Default for Design {
             log_step_deg: 0.0,
             layout: Layout::default(),
             tool_mass_kg: 0.0,
+            dynamics: false,
+            seconds: 48.0,
+            rate: 100.0,
         }
     }
 }

@@ -6,13 +6,10 @@ use super::family::Column;
 use super::points::FIT;
 use super::size::Concealed;
 use crate::effect::Physical;
-use crate::folder::{Decimals, Log, robot};
+use crate::folder::{Decimals, File, Log, pretty, robot};
 use crate::recorder::Shot;
 use calib_foundation::description::RobotDescription;
 use serde_json::{Value, json};
-
-/// A file's name and its bytes.
-pub(crate) type File = (&'static str, String);
 
 /// A controller's display and a tracker's.
 const DECIMALS: Decimals = Decimals {
@@ -138,10 +135,6 @@ fn title(column: Column) -> &'static str {
         Column::Current => "current",
         Column::Direction => "direction",
     }
-}
-
-fn pretty(value: &Value) -> String {
-    format!("{value:#}\n")
 }
 
 fn effect(one: &Concealed) -> Value {

@@ -3,7 +3,8 @@
 use super::family::{OPEN, Pool, TORQUES};
 use super::law::Law;
 use super::path::{moves, sines};
-use crate::conceal::robots::Kind;
+use crate::conceal::design::Design;
+use crate::conceal::robots::{ALL_KINDS, Kind};
 use crate::matrix::{self, Vector};
 use crate::noise::{Noise, Purpose};
 use crate::torque::law::{Body, Machine};
@@ -12,30 +13,10 @@ use calib_foundation::description::{
     DeclaredInertias, InertiaMoments, MassTolerance, RobotDescription,
 };
 
-/// What a set of recordings is drawn from.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TorqueDesign {
-    /// The same seed gives the same recordings.
-    pub seed: u64,
-    pub cases: usize,
-    /// Shares of recordings without any effect but, in half of them, friction of all joints; with two effects beside that friction; with
-    /// one that is in no list. The rest has one.
-    pub nulls: f64,
-    pub pairs: f64,
-    /// With an effect that is in no list.
-    pub open: f64,
-    /// Share of effects in a form that is not the usual formula.
-    pub other_forms: f64,
-    /// Seconds of the recording: two stretches to fit, two that judge.
-    pub seconds: f64,
-    /// Rows a second.
-    pub rate: f64,
-}
-
-impl TorqueDesign {
+impl Design {
     /// What the recording of this number conceals, the friction of all joints apart: `null`, `single`, `pair`, or `open` for one effect that is
     /// in no list. Shares are kept by multiples of the golden ratio, whose order says nothing.
-    fn content(&self, number: usize) -> &'static str {
+    fn torque_content(&self, number: usize) -> &'static str {
         let begin = Noise::new(self.seed, Purpose::Design).uniform(0.0, 1.0);
         let at = (begin + number as f64 * 0.618_033_988_749_895).fract();
         let shares = [
@@ -53,7 +34,7 @@ impl TorqueDesign {
     }
 
     /// Families in an order of the seed: in turn, all are drawn.
-    fn family(&self, number: usize) -> usize {
+    fn torque_family(&self, number: usize) -> usize {
         let mut draw = Noise::new(self.seed, Purpose::Faults);
         let mut order: Vec<usize> = (0..LISTED).collect();
         draw.shuffle(&mut order);
@@ -96,8 +77,6 @@ pub struct TorqueCase {
     pub(super) sensors: bool,
 }
 
-/// Arms that torques are recorded of.
-const ARMS: [Kind; 4] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r, Kind::Five5r];
 /// Payload that is carried, least and most, as a share of the rated one.
 const CARRIED: [f64; 2] = [0.2, 0.6];
 /// Shares of the recording of each stretch: sines and moves to fit, sines and moves that judge.
@@ -113,13 +92,13 @@ const MOST_OFF: f64 = 2.0;
 
 impl TorqueCase {
     /// The case of this number.
-    pub fn draw(design: &TorqueDesign, number: usize) -> Self {
+    pub fn draw(design: &Design, number: usize) -> Self {
         let seed = design
             .seed
             .wrapping_mul(1_000_003)
             .wrapping_add(number as u64);
         let mut noise = Noise::new(seed, Purpose::Design);
-        let kind = ARMS[noise.index(ARMS.len())];
+        let kind = ALL_KINDS[noise.index(ALL_KINDS.len())];
         let robot = declared(kind, &mut noise);
         let stated = machine(&robot);
         let scattered = scattered(&stated, &mut noise);
@@ -139,7 +118,7 @@ impl TorqueCase {
         let mut case = Self {
             name: format!("torque_{number:03}"),
             seed,
-            content: design.content(number),
+            content: design.torque_content(number),
             laws: Vec::new(),
             common: 0,
             stated,
@@ -172,7 +151,7 @@ impl TorqueCase {
         case
     }
 
-    fn conceal(&mut self, design: &TorqueDesign, number: usize, peak: &[f64], noise: &mut Noise) {
+    fn conceal(&mut self, design: &Design, number: usize, peak: &[f64], noise: &mut Noise) {
         let floor = peak.iter().copied().fold(0.0, f64::max) * 0.01;
         let scale: Vec<f64> = peak.iter().map(|peak| peak.max(floor)).collect();
         let width = noise.uniform(0.004, 0.012);
@@ -201,7 +180,7 @@ impl TorqueCase {
         let mut drawn: Vec<(usize, Law)> = Vec::new();
         let mut family = match self.content {
             "open" => LISTED + noise.index(OPEN),
-            _ => design.family(number),
+            _ => design.torque_family(number),
         };
         while drawn.len() < wanted {
             let other = noise.chance(design.other_forms);

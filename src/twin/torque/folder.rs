@@ -2,21 +2,17 @@
 //!
 //! A case once more: the same arm with further physics, on other paths or on a motion that is given, and its truth in numbers.
 
-use crate::folder::robot_json;
+use crate::folder::{File, Sheet, pretty, robot_json};
 use crate::noise::{Noise, Purpose};
 use crate::torque::draw::{TorqueCase, paths};
 use crate::torque::law::{Body, Fall, Law};
 use crate::torque::record::TorqueRows;
 use crate::way::{JointState, Path};
 use serde_json::{Value, json};
-use std::fmt::Write;
-
-/// A file's name and its bytes.
-pub type TorqueFile = (&'static str, String);
 
 impl TorqueCase {
     /// robot.json and recording.csv.
-    pub fn recording(&self) -> [TorqueFile; 2] {
+    pub fn recording(&self) -> [File; 2] {
         let rows = self.true_rows();
         [
             ("robot.json", pretty(&self.robot_json())),
@@ -60,42 +56,23 @@ impl TorqueCase {
     fn csv(&self, rows: &TorqueRows) -> String {
         let n = self.stated.axes.len();
         let (angles, signal) = self.measured(rows);
-        let names = |name: &str| {
-            (1..=n)
-                .map(|j| name.replace("{j}", &j.to_string()))
-                .collect::<Vec<_>>()
-                .join(",")
-        };
-        let (signal_name, decimals) = if self.sensors {
-            ("tau{j}_nm", 2)
-        } else {
-            ("i{j}_a", 3)
-        };
-        let mut text = format!(
-            "time_s,traj,use,{},{}\n",
-            names("q{j}_deg"),
-            names(signal_name)
-        );
-        for row in 0..rows.time.len() {
-            let usage = if rows.validate[row] {
+        let mut sheet = Sheet::default();
+        sheet.add("time_s", |row| format!("{:.3}", rows.time[row]));
+        sheet.add("traj", |row| rows.trajectory[row].to_string());
+        let usage = |row: usize| {
+            if rows.validate[row] {
                 "validate"
             } else {
                 "fit"
-            };
-            let _ = write!(
-                text,
-                "{:.3},{},{usage}",
-                rows.time[row], rows.trajectory[row]
-            );
-            angles[row * n..(row + 1) * n].iter().for_each(|angle| {
-                let _ = write!(text, ",{angle:.5}");
-            });
-            signal[row * n..(row + 1) * n].iter().for_each(|value| {
-                let _ = write!(text, ",{value:.decimals$}");
-            });
-            text.push('\n');
+            }
+        };
+        sheet.add("use", move |row| usage(row).into());
+        sheet.of_joints("q{}_deg", n, &angles, |angle| format!("{angle:.5}"));
+        match self.sensors {
+            true => sheet.of_joints("tau{}_nm", n, &signal, |torque| format!("{torque:.2}")),
+            false => sheet.of_joints("i{}_a", n, &signal, |current| format!("{current:.3}")),
         }
-        text
+        sheet.text(rows.time.len())
     }
 
     /// What the robot file of points states, and what moving bodies take.
@@ -110,10 +87,6 @@ impl TorqueCase {
         }));
         out
     }
-}
-
-fn pretty(value: &Value) -> String {
-    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
 }
 
 impl TorqueCase {

@@ -13,7 +13,6 @@ mod record;
 mod visible;
 
 pub use crate::way::JointState;
-pub use draw::{TorqueCase, TorqueDesign};
-pub use folder::TorqueFile;
+pub use draw::TorqueCase;
 pub use law::{Body, Machine};
 pub use record::TorqueRows;
