@@ -4,7 +4,7 @@ use super::design::{Content, Design};
 use super::family::{Bench, Collection, Column, Draft};
 use super::points::{self, Amount, FIT};
 use super::robots::Kind;
-use super::size::{Concealed, Sight, beyond, drafts, drawn, size};
+use super::size::{Concealed, Sight, conceal};
 use super::visible::Site;
 use crate::effect::{HoldingFriction, Physical};
 use crate::noise::{Noise, Purpose};
@@ -12,7 +12,7 @@ use crate::plan::{Climate, Point, Poses};
 use crate::recorder::{Experiment, Motors, Shot};
 use crate::tracker::{SCATTERS, Scatter, Tracker};
 use crate::truth::{ARCSEC, CouplingError, LinkError, TrueRobot};
-use calib_foundation::description::{JointKind, RobotDescription};
+use calib_foundation::description::{Coupling, JointKind, RobotDescription};
 use std::collections::BTreeSet;
 
 /// A recording that was tampered with.
@@ -88,7 +88,7 @@ impl Case {
         let (kind, robot) = arm(design, &mut draw);
         let truth = errors(&robot, &mut draw);
         let beyond_list = design.collection == Collection::Beyond;
-        let tracker = instrument(design, kind, content, &mut draw);
+        let tracker = tracker(design, kind, content, &mut draw);
         let (play_rad, repeated) = if draw.chance(0.5) {
             (1e-6 * draw.uniform(4.0, 16.0), 0.1)
         } else {
@@ -133,7 +133,7 @@ impl Case {
             shadow: &shadow,
             noise: 1e-3 * noise_mm[0],
         };
-        let (drafts, concealed) = concealing(design, content, &bench, &sight, &mut draw);
+        let (drafts, concealed) = conceal(design, content, &bench, &sight, &mut draw);
         let mut hidden = hidden(&drafts, &mut draw);
         hidden.extend(design.bare.then_some(Column::Current));
         let (payload_kg, warmth): (Vec<f64>, Vec<f64>) = points
@@ -253,25 +253,6 @@ fn arm(design: &Design, draw: &mut Noise) -> (Kind, RobotDescription) {
     (kind, kind.description(aside))
 }
 
-/// What the case conceals, each effect as visible as drawn.
-fn concealing(
-    design: &Design,
-    content: Content,
-    bench: &Bench,
-    sight: &Sight,
-    draw: &mut Noise,
-) -> (Vec<Draft>, Vec<Concealed>) {
-    if content == Content::Foreign {
-        return drawn(bench, sight, draw);
-    }
-    if design.collection == Collection::Beyond {
-        return beyond(design, content, bench, sight, draw);
-    }
-    let drafts = drafts(design, content, bench, draw);
-    let concealed = size(design, &drafts, sight, draw);
-    (drafts, concealed)
-}
-
 /// Clock and temperature of a recording that lasts so many seconds: two time constants, more or less.
 fn weather(lasts_s: f64, swings: bool, draw: &mut Noise) -> Climate {
     let warm_up_h = lasts_s / draw.uniform(1.5, 3.5) / 3600.0;
@@ -290,19 +271,6 @@ fn weather(lasts_s: f64, swings: bool, draw: &mut Noise) -> Climate {
         swing_k: draw.uniform(2.0, 4.0),
         swing_h: lasts_s / draw.uniform(2.0, 5.0) / 3600.0,
         ..climate
-    }
-}
-
-/// The tracker, with the scatter that the design asks for.
-fn instrument(design: &Design, kind: Kind, content: Content, draw: &mut Noise) -> Tracker {
-    let tracker = tracker(kind, content == Content::Null, draw);
-    let beyond_list = design.collection == Collection::Beyond;
-    let scatter = design
-        .scatter
-        .or_else(|| beyond_list.then(|| scatter(draw)));
-    Tracker {
-        scatter: scatter.unwrap_or(tracker.scatter),
-        ..tracker
     }
 }
 
@@ -336,72 +304,59 @@ fn errors(robot: &RobotDescription, draw: &mut Noise) -> TrueRobot {
     } else {
         1e-4
     };
+    let offset_deg = (0..joints)
+        .map(|_| (5e-4 * draw.normal()).to_degrees())
+        .collect();
+    let ratio = (0..joints).map(|_| 1.0 + gear * draw.normal()).collect();
+    let mut links = Vec::new();
+    for link in 1..=joints {
+        let shift_mm = [(); 3].map(|()| 0.4 * draw.normal());
+        let tilt_arcsec = match link == joints {
+            true => [0.0; 3],
+            false => [(); 3].map(|()| 3e-4 / ARCSEC * draw.normal()),
+        };
+        links.push(LinkError {
+            link,
+            shift_mm,
+            tilt_arcsec,
+        });
+    }
+    let coupling = |pair: &Coupling| CouplingError {
+        moved: pair.moved + 1,
+        by: pair.by + 1,
+        error: 3e-4 * draw.normal(),
+    };
     TrueRobot {
-        offset_deg: (0..joints)
-            .map(|_| (5e-4 * draw.normal()).to_degrees())
-            .collect(),
-        ratio: (0..joints).map(|_| 1.0 + gear * draw.normal()).collect(),
-        links: (1..=joints)
-            .map(|link| LinkError {
-                link,
-                shift_mm: std::array::from_fn(|_| 0.4 * draw.normal()),
-                tilt_arcsec: std::array::from_fn(|_| {
-                    if link == joints {
-                        0.0
-                    } else {
-                        3e-4 / ARCSEC * draw.normal()
-                    }
-                }),
-            })
-            .collect(),
-        couplings: robot
-            .couplings
-            .iter()
-            .map(|pair| CouplingError {
-                moved: pair.moved + 1,
-                by: pair.by + 1,
-                error: 3e-4 * draw.normal(),
-            })
-            .collect(),
+        offset_deg,
+        ratio,
+        links,
+        couplings: robot.couplings.iter().map(coupling).collect(),
         ..TrueRobot::default()
     }
 }
 
-/// A tracker somewhere around the robot, turned anyhow; nulls see other scatter, too.
-fn tracker(kind: Kind, null: bool, draw: &mut Noise) -> Tracker {
-    let (far, angle) = (
-        kind.reach_m() * draw.uniform(1.2, 2.0),
-        draw.uniform(-180.0, 180.0f64),
-    );
-    let (sine, cosine) = angle.to_radians().sin_cos();
-    Tracker {
-        position_mm: [
-            1e3 * far * cosine,
-            1e3 * far * sine,
-            1e3 * draw.uniform(0.0, 1.5),
-        ]
-        .map(f64::round),
-        roll_pitch_yaw_deg: [
-            draw.uniform(-10.0, 10.0),
-            draw.uniform(-10.0, 10.0),
-            draw.uniform(-180.0, 180.0),
-        ],
-        scatter: match (null, draw.index(3)) {
-            (true, 1) => Scatter::Student,
-            (true, 2) => Scatter::Uneven,
-            _ => Scatter::Gaussian,
-        },
-        ..Tracker::default()
+/// A tracker somewhere around the robot, turned anyhow, with the scatter that the design asks for. Unasked nulls of the library see other
+/// scatter than the Gaussian one, and beyond the library now and then everything does.
+fn tracker(design: &Design, kind: Kind, content: Content, draw: &mut Noise) -> Tracker {
+    let far = kind.reach_m() * draw.uniform(1.2, 2.0);
+    let (sine, cosine) = draw.uniform(-180.0, 180.0f64).to_radians().sin_cos();
+    let high = draw.uniform(0.0, 1.5);
+    let position_mm = [1e3 * far * cosine, 1e3 * far * sine, 1e3 * high].map(f64::round);
+    let roll_pitch_yaw_deg = [10.0, 10.0, 180.0].map(|most| draw.uniform(-most, most));
+    let mut scatter = match (content == Content::Null, draw.index(3)) {
+        (true, 1) => Scatter::Student,
+        (true, 2) => Scatter::Uneven,
+        _ => Scatter::Gaussian,
+    };
+    if design.collection == Collection::Beyond && design.scatter.is_none() {
+        let (plain, other) = (draw.chance(0.6), draw.index(SCATTERS.len() - 1));
+        scatter = SCATTERS[if plain { 0 } else { 1 + other }];
     }
-}
-
-/// Mostly Gaussian, else one of the other kinds.
-fn scatter(draw: &mut Noise) -> Scatter {
-    let (plain, other) = (draw.chance(0.6), draw.index(SCATTERS.len() - 1));
-    if plain {
-        Scatter::Gaussian
-    } else {
-        SCATTERS[1 + other]
+    Tracker {
+        position_mm,
+        roll_pitch_yaw_deg,
+        scatter: design.scatter.unwrap_or(scatter),
+        ..Tracker::default()
     }
 }
 
