@@ -9,9 +9,7 @@ use calib::stage::{
     Sink, Stage,
 };
 use calib::table::Robot;
-use calib::twin::arm::Arm;
-use calib::twin::arm::Motion;
-use calib::twin::arm::Row;
+use calib::twin::arm::{Arm, Motion, Row};
 use calib::twin::effect::{
     Backlash, BaseCompliance, GearCyclic, JointCompliance, LinkCompliance, Physical,
 };
@@ -95,26 +93,21 @@ fn assert_near(found: [f64; 3], expected: [f64; 3], within: f64) {
 #[test]
 fn quarter_turns_put_the_tool_where_paper_and_pencil_do() {
     let robot = sr210d();
-    let turned = |joints: &[usize]| {
-        let q: Vec<f64> = (1..=6)
-            .map(|joint| {
-                if joints.contains(&joint) {
-                    FRAC_PI_2
-                } else {
-                    0.0
-                }
-            })
-            .collect();
-        tool_mm(&robot, &TrueRobot::default(), &q)
-    };
-    assert_near(turned(&[]), [1854.0, 50.0, 1340.0], 1e-9);
-    assert_near(turned(&[1]), [-50.0, 1854.0, 1340.0], 1e-9);
-    assert_near(turned(&[2]), [312.0 - 1340.0, 50.0, 1542.0], 1e-9);
-    assert_near(turned(&[3]), [312.0 - 265.0, 50.0, 1075.0 + 1542.0], 1e-9);
-    assert_near(turned(&[4]), [1854.0, -30.0, 1360.0], 1e-9);
-    assert_near(turned(&[5]), [1594.0 - 30.0, 50.0, 1310.0 + 260.0], 1e-9);
-    assert_near(turned(&[6]), [1854.0, -30.0, 1360.0], 1e-9);
-    assert_near(turned(&[1, 2]), [-50.0, 312.0 - 1340.0, 1542.0], 1e-9);
+    let turns: [(&[usize], [f64; 3]); 8] = [
+        (&[], [1854.0, 50.0, 1340.0]),
+        (&[1], [-50.0, 1854.0, 1340.0]),
+        (&[2], [312.0 - 1340.0, 50.0, 1542.0]),
+        (&[3], [312.0 - 265.0, 50.0, 1075.0 + 1542.0]),
+        (&[4], [1854.0, -30.0, 1360.0]),
+        (&[5], [1594.0 - 30.0, 50.0, 1310.0 + 260.0]),
+        (&[6], [1854.0, -30.0, 1360.0]),
+        (&[1, 2], [-50.0, 312.0 - 1340.0, 1542.0]),
+    ];
+    for (joints, tool) in turns {
+        let mut q = [0.0; 6];
+        joints.iter().for_each(|joint| q[joint - 1] = FRAC_PI_2);
+        assert_near(tool_mm(&robot, &TrueRobot::default(), &q), tool, 1e-9);
+    }
 }
 
 #[test]
@@ -175,10 +168,7 @@ fn errors_of_lengths_gears_and_couplings_move_the_tool_as_they_should() {
 
 #[test]
 fn a_mass_on_a_compliant_joint_sags_until_torque_and_wind_up_agree() {
-    let spring = Physical::JointCompliance(JointCompliance {
-        joint: 1,
-        rad_per_nm: 1e-5,
-    });
+    let spring = JointCompliance::effect(1, 1e-5);
     let found = rest(&lever(), &[spring], &[0.0], 100.0);
     // 100 kg, 10 m/s2, 2 m: sag = 0.02 rad cos(sag); the first two terms of its series leave 2e-9.
     let mut sag: f64 = 0.0;
@@ -196,11 +186,7 @@ fn a_mass_on_a_compliant_joint_sags_until_torque_and_wind_up_agree() {
 
 #[test]
 fn a_beam_bends_by_the_cantilever_formula() {
-    let beam = Physical::LinkCompliance(LinkCompliance {
-        link: 1,
-        bending_rad_per_nm: 3e-7,
-        torsion_rad_per_nm: 0.0,
-    });
+    let beam = LinkCompliance::effect(1, 3e-7, 0.0);
     let found = rest(&lever(), &[beam], &[0.0], 100.0);
     // F L^3 / (3 EI) with L/EI = 3e-7: 1000 N * 4 m2 * 3e-7 / 3.
     assert_near(found.posture.tool, [2.0, 0.0, -4e-4], 1e-9);
@@ -208,50 +194,27 @@ fn a_beam_bends_by_the_cantilever_formula() {
 
 #[test]
 fn a_foundation_tilts_towards_the_load() {
-    let base = BaseCompliance {
-        rad_per_nm: [1e-8, 1e-8],
-        pivot_mm: [0.0, 0.0, -1000.0],
-    };
-    let found = rest(&lever(), &[Physical::BaseCompliance(base)], &[0.0], 100.0);
+    let base = BaseCompliance::effect([1e-8, 1e-8], [0.0, 0.0, -1000.0]);
+    let found = rest(&lever(), &[base], &[0.0], 100.0);
     // 2000 Nm tilt by 2e-5 rad about 1 m below: the tool goes down by 2 m of it and forwards by 1 m of it.
     assert_near(found.posture.tool, [2.0 + 2e-5, 0.0, -4e-5], 1e-8);
 }
 
 #[test]
 fn a_joint_trails_by_half_its_gap_and_more_under_load() {
-    let gap = |arcsec_per_nm| {
-        [Physical::Backlash(Backlash {
-            joint: 1,
-            gap_arcsec: 20.0,
-            arcsec_per_nm,
-            closing_nm: 0.0,
-            soft_nm: 0.0,
-        })]
+    let turned = |arcsec_per_nm, closing_nm| {
+        let gap = Backlash::effect(1, 20.0, arcsec_per_nm, closing_nm, 0.0);
+        rest(&lever(), &[gap], &[0.0], 100.0).motion.joint[0] / ARCSEC
     };
-    let turned =
-        |effects: &[Physical]| rest(&lever(), effects, &[0.0], 100.0).motion.joint[0] / ARCSEC;
-    assert!((turned(&gap(0.0)) + 10.0).abs() < 1e-9);
-    assert!((turned(&gap(0.01)) + 20.0).abs() < 1e-6);
-    let closed = Backlash {
-        joint: 1,
-        gap_arcsec: 20.0,
-        arcsec_per_nm: 0.0,
-        closing_nm: 500.0,
-        soft_nm: 0.0,
-    };
-    assert!((turned(&[Physical::Backlash(closed)]) + 10.0).abs() < 1e-9);
+    assert!((turned(0.0, 0.0) + 10.0).abs() < 1e-9);
+    assert!((turned(0.01, 0.0) + 20.0).abs() < 1e-6);
+    assert!((turned(0.0, 500.0) + 10.0).abs() < 1e-9);
 }
 
 #[test]
 fn a_gear_ripple_follows_the_reported_angle() {
-    let ripple = GearCyclic {
-        joint: 1,
-        order: 3.0,
-        amplitude_arcsec: 12.0,
-        arcsec_per_nm: 0.0,
-        phase_deg: 30.0,
-    };
-    let found = rest(&lever(), &[Physical::GearCyclic(ripple)], &[PI / 9.0], 0.0);
+    let ripple = GearCyclic::effect(1, 3.0, 12.0, 0.0, 30.0);
+    let found = rest(&lever(), &[ripple], &[PI / 9.0], 0.0);
     assert!(
         (found.motion.joint[0] - 12.0 * ARCSEC).abs() < 1e-15,
         "sin(3 * 20 deg + 30 deg) = 1"
@@ -483,10 +446,7 @@ fn currents_carry_the_load_in_the_controllers_sign() {
     let arm = Arm::new(&robot, &settings.truth);
     let spring = |joint: usize, factor: f64| {
         let link = &arm.links[joint - 1];
-        Physical::JointCompliance(JointCompliance {
-            joint,
-            rad_per_nm: factor / (link.gear * link.motor_constant),
-        })
+        JointCompliance::effect(joint, factor / (link.gear * link.motor_constant))
     };
     for index in 0..recording.rows() {
         let q = recording.q(index);
