@@ -14,6 +14,7 @@ pub mod families;
 pub mod folder;
 pub mod matrix;
 pub mod memory;
+pub(crate) mod names;
 pub mod noise;
 pub mod plan;
 pub mod recorder;

@@ -14,22 +14,27 @@ use crate::effect::{JointCompliance, Physical};
 use crate::equilibrium::settle;
 use crate::families::{Family, families};
 use crate::matrix::{self, Vector};
+use crate::names::named;
 use crate::noise::Noise;
 use crate::plan::Point;
 use crate::truth::ARCSEC;
 use calib_foundation::description::RobotDescription;
 
-/// A column of the recording that may be missing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Column {
-    /// The clock.
-    Time,
-    /// The temperature.
-    Temperature,
-    /// Motor currents.
-    Current,
-    /// Sides of approach.
-    Direction,
+named! {
+    /// A column of the recording that may be missing.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    Column,
+    /// All of them.
+    COLUMNS: 4 {
+        /// The clock.
+        Time "time_s",
+        /// The temperature.
+        Temperature "temp_c",
+        /// Motor currents.
+        Current "current",
+        /// Sides of approach.
+        Direction "direction",
+    }
 }
 
 /// One concealed cause: what a diagnosis should name, and what the twin does for it.

@@ -46,7 +46,7 @@ impl Case {
     pub fn sealed(&self) -> String {
         let pair =
             |(effect, place): &(&'static str, String)| json!({ "effect": effect, "where": place });
-        let hidden: Vec<&str> = self.hidden.iter().map(|column| title(*column)).collect();
+        let hidden: Vec<&str> = self.hidden.iter().map(|column| column.name()).collect();
         let tampered = self.tampered.iter().map(|one| {
             let points: Vec<String> = one.rows.iter().map(|row| id(*row)).collect();
             json!({ "effect": one.effect, "where": "recording", "points": points })
@@ -126,15 +126,6 @@ impl Case {
 
 fn id(row: usize) -> String {
     format!("P{:04}", row + 1)
-}
-
-fn title(column: Column) -> &'static str {
-    match column {
-        Column::Time => "time_s",
-        Column::Temperature => "temp_c",
-        Column::Current => "current",
-        Column::Direction => "direction",
-    }
 }
 
 fn effect(one: &Concealed) -> Value {

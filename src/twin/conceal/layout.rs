@@ -1,38 +1,31 @@
 //! The order of measured poses: anywhere from row to row, or one after the other along lines and curves in joint space.
 
 use crate::arm::Arm;
+use crate::names::named;
 use crate::noise::Noise;
 use crate::plan::{self, Poses};
 use std::ops::Range;
 
-/// How poses follow each other.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Layout {
-    /// Every pose is drawn anew.
-    #[default]
-    Random,
-    /// One after the other along lines and curves.
-    Path,
-    /// The poses of the same paths in random order, under the same payloads.
-    Shuffled,
+named! {
+    /// How poses follow each other.
+    #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+    Layout,
+    /// All of them.
+    LAYOUTS: 3 {
+        /// Every pose is drawn anew.
+        #[default]
+        Random "random",
+        /// One after the other along lines and curves.
+        Path "path",
+        /// The poses of the same paths in random order, under the same payloads.
+        Shuffled "shuffled",
+    }
 }
-
-/// All of them.
-pub const LAYOUTS: [Layout; 3] = [Layout::Random, Layout::Path, Layout::Shuffled];
 
 /// Fewest and most points of a line or curve.
 const POINTS: [f64; 2] = [15.0, 120.0];
 
 impl Layout {
-    /// As it is written.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Random => "random",
-            Self::Path => "path",
-            Self::Shuffled => "shuffled",
-        }
-    }
-
     /// Poses (rad) in order of measurement, each of `blocks` shuffled by itself; none where every pose is drawn anew. Ends and bends of the
     /// curves are allowed poses, between them neither floor nor clearance is kept. Fails where no pose is allowed.
     pub(super) fn poses(

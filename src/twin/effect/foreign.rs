@@ -42,6 +42,27 @@ impl ForeignMotion {
     pub(crate) fn is_sighted(self) -> bool {
         matches!(self, Self::Range | Self::Azimuth | Self::Elevation)
     }
+
+    /// Whether it is a turn, arcsec; else it is a shift, um.
+    fn is_turn(self) -> bool {
+        use ForeignMotion::*;
+        matches!(
+            self,
+            JointTurn | JointTilt | LinkBend | BaseTurn | Azimuth | Elevation
+        )
+    }
+
+    /// Where it acts: on a joint or link of this number, or on what has none.
+    pub(crate) fn place(self, seat: usize) -> String {
+        use ForeignMotion::*;
+        match self {
+            JointTurn | JointShift | JointTilt => format!("joint {seat}"),
+            LinkShift | LinkBend => format!("link {seat}"),
+            BaseShift | BaseTurn => "base".into(),
+            ToolShift => "tool".into(),
+            Range | Azimuth | Elevation => "tracker".into(),
+        }
+    }
 }
 
 /// `size * shape(variable)`, or the product of two shapes.
@@ -133,23 +154,26 @@ impl Foreign {
             .product()
     }
 
-    fn shift(&self, share: f64) -> Vector {
-        matrix::scale(self.direction, 1e-6 * self.size * share)
+    /// The motion, m or rad along its direction.
+    fn along(&self, share: f64) -> Vector {
+        let unit = if self.motion.is_turn() { ARCSEC } else { 1e-6 };
+        matrix::scale(self.direction, unit * self.size * share)
     }
 
     /// The step of a body, whichever of the two it is.
     fn step(&self, share: f64) -> Matrix {
-        match self.motion {
-            ForeignMotion::JointTilt | ForeignMotion::LinkBend | ForeignMotion::BaseTurn => {
-                matrix::turn_by(matrix::scale(self.direction, ARCSEC * self.size * share))
-            }
-            _ => matrix::shift(self.shift(share)),
+        let along = self.along(share);
+        if self.motion.is_turn() {
+            matrix::turn_by(along)
+        } else {
+            matrix::shift(along)
         }
     }
 }
 
 impl Act for Foreign {
     fn act(&self, state: &State, motion: &mut Motion) {
+        use ForeignMotion::*;
         let seen = Seen {
             row: state.row,
             memory: state.memory,
@@ -159,18 +183,14 @@ impl Act for Foreign {
         let share = self.share(&seen);
         let index = self.seat - 1;
         match self.motion {
-            ForeignMotion::JointTurn => motion.joint[index] += ARCSEC * self.size * share,
-            ForeignMotion::JointShift | ForeignMotion::JointTilt => {
+            JointTurn => motion.joint[index] += ARCSEC * self.size * share,
+            JointShift | JointTilt => {
                 motion.move_axis(state.arm.foot, index, &self.step(share));
             }
-            ForeignMotion::LinkShift | ForeignMotion::LinkBend => {
-                motion.move_end(index, &self.step(share));
-            }
-            ForeignMotion::BaseShift | ForeignMotion::BaseTurn => {
-                motion.base = matrix::times(&self.step(share), &motion.base);
-            }
-            ForeignMotion::ToolShift => motion.tool = matrix::add(motion.tool, self.shift(share)),
-            ForeignMotion::Range | ForeignMotion::Azimuth | ForeignMotion::Elevation => {}
+            LinkShift | LinkBend => motion.move_end(index, &self.step(share)),
+            BaseShift | BaseTurn => motion.base = matrix::times(&self.step(share), &motion.base),
+            ToolShift => motion.tool = matrix::add(motion.tool, self.along(share)),
+            Range | Azimuth | Elevation => {}
         }
     }
     fn remember(&self, past: &[Moment]) -> Vec<f64> {
@@ -209,18 +229,12 @@ impl Stated for Foreign {
         self.size *= by;
     }
     fn truth(&self) -> Vec<TrueValue> {
-        use ForeignMotion::*;
-        let (place, unit) = match self.motion {
-            JointTurn | JointTilt => (format!("joint {}", self.seat), "arcsec"),
-            JointShift => (format!("joint {}", self.seat), "um"),
-            LinkShift => (format!("link {}", self.seat), "um"),
-            LinkBend => (format!("link {}", self.seat), "arcsec"),
-            BaseShift => ("base".into(), "um"),
-            BaseTurn => ("base".into(), "arcsec"),
-            ToolShift => ("tool".into(), "um"),
-            Range => ("tracker".into(), "um"),
-            Azimuth | Elevation => ("tracker".into(), "arcsec"),
+        let unit = if self.motion.is_turn() {
+            "arcsec"
+        } else {
+            "um"
         };
+        let place = self.motion.place(self.seat);
         vec![true_value(
             "unknown", "foreign", place, "size", unit, self.size,
         )]

@@ -1,6 +1,6 @@
 //! The scoreboard: outcomes by visibility, by family and by what was said instead, false alarms, held-out errors, intervals.
 
-use super::mark::{Case, DUE, GIVEN, HeldOut, LeftOut, Marked, Outcome};
+use super::mark::{Case, DUE, GIVEN, HeldOut, LeftOut, Marked, OUTCOMES, Outcome};
 use super::stated::{Share, Statement, Subject, mixed, reliability};
 use calib_foundation::statistics::quantile;
 use serde_json::{Value, json};
@@ -45,11 +45,13 @@ pub struct Board {
 /// Outcomes of causes.
 fn outcomes<'a>(causes: impl IntoIterator<Item = &'a Marked>) -> Value {
     let all: Vec<Outcome> = causes.into_iter().map(|cause| cause.outcome).collect();
-    let share = |outcome: Outcome| Share::of(all.iter().map(|one| *one == outcome));
-    let [exact, in_set] = [Outcome::Exact, Outcome::InSet].map(share);
-    let [wrong, silent] = [Outcome::Wrong, Outcome::Silent].map(share);
-    json!({ "n": exact.of, "exact": exact.count, "in_set": in_set.count, "wrong": wrong.count, "silent": silent.count,
-        "exact_wilson_95": exact.limits() })
+    let count = |outcome: &Outcome| all.iter().filter(|one| *one == outcome).count();
+    let exact = Share::of(all.iter().map(|one| *one == Outcome::Exact));
+    let mut out = json!({ "n": exact.of, "exact_wilson_95": exact.limits() });
+    for outcome in &OUTCOMES {
+        out[outcome.name()] = json!(count(outcome));
+    }
+    out
 }
 
 /// Whether places and names of causes are right.

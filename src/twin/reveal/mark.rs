@@ -6,33 +6,26 @@
 use super::intervals::{Interval, intervals};
 use super::paper::{Answer, Atoms, Cause, Finding, Name, Truth, all_atoms, atoms};
 use super::stated::{Statement, statements};
+use crate::names::named;
 use std::collections::BTreeSet;
 
 /// From this visibility on an effect should be named.
 pub(crate) const DUE: f64 = 50.0;
 
-/// How a cause was named.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Outcome {
-    /// Named, at its place, as the first choice; by a name and place that data cannot separate from it, too.
-    Exact,
-    /// Among the explanations that the data cannot separate, or by a name that is accepted for it.
-    InSet,
-    /// Not named, and something else was.
-    Wrong,
-    /// Not named, and nothing else was.
-    Silent,
-}
-
-impl Outcome {
-    /// As tables hold it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Outcome::Exact => "exact",
-            Outcome::InSet => "in_set",
-            Outcome::Wrong => "wrong",
-            Outcome::Silent => "silent",
-        }
+named! {
+    /// How a cause was named.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    Outcome,
+    /// All of them.
+    OUTCOMES: 4 {
+        /// Named, at its place, as the first choice; by a name and place that data cannot separate from it, too.
+        Exact "exact",
+        /// Among the explanations that the data cannot separate, or by a name that is accepted for it.
+        InSet "in_set",
+        /// Not named, and something else was.
+        Wrong "wrong",
+        /// Not named, and nothing else was.
+        Silent "silent",
     }
 }
 
