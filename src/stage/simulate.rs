@@ -302,21 +302,14 @@ impl Simulate {
 
     /// What the tracker states of its noise; nothing where it has none, since no fit can weigh by zero.
     fn noise(&self) -> (Instrument, SigmaSource) {
-        let Tracker {
-            noise_um,
-            noise_um_per_m,
-            coverage,
-            ..
-        } = self.tracker;
         let stated = Instrument {
-            constant_um: noise_um,
-            per_metre_um: noise_um_per_m,
-            coverage,
+            constant_um: self.tracker.noise_um,
+            per_metre_um: self.tracker.noise_um_per_m,
+            coverage: self.tracker.coverage,
         };
-        if stated.fault().is_none() {
-            (stated, SigmaSource::Instrument)
-        } else {
-            (START, SigmaSource::Inferred)
+        match stated.fault() {
+            None => (stated, SigmaSource::Instrument),
+            Some(_) => (START, SigmaSource::Inferred),
         }
     }
 
@@ -330,58 +323,45 @@ impl Simulate {
             ids.push(format!("{usage}-{count:04}"));
         }
         let (figures, source) = self.noise();
+        let of_joints = |value: fn(&Shot) -> &Vec<f64>| -> Vec<f64> {
+            shots.iter().flat_map(value).copied().collect()
+        };
+        let of_rows = |value: fn(&Shot) -> f64| Some(shots.iter().map(value).collect());
+        let usage = |shot: &Shot| self.blocks[shot.block].usage.as_str();
+        let sigma = |shot: &Shot| [figures.sigma(&shot.position.into()); 3];
+        let logs_velocity = self.motion.as_ref().is_some_and(|way| way.log_velocity);
         Recording {
-            joints: robot.joints.len(),
-            prismatic: robot
-                .joints
-                .iter()
-                .map(|joint| joint.kind == JointKind::Prismatic)
-                .collect(),
-            sequence: (0..shots.len() as i64).collect(),
             point_id: ids,
-            usage: shots
-                .iter()
-                .map(|shot| Some(self.blocks[shot.block].usage.clone()))
-                .collect(),
-            q: shots
-                .iter()
-                .flat_map(|shot| shot.q.iter().copied())
-                .collect(),
+            q: of_joints(|shot| &shot.q),
             position: shots.iter().map(|shot| shot.position).collect(),
-            position_sigma: Some(
-                shots
-                    .iter()
-                    .map(|shot| [figures.sigma(&shot.position.into()); 3])
-                    .collect(),
-            ),
+            position_sigma: Some(shots.iter().map(sigma).collect()),
             sigma_source: Some(vec![source; shots.len()]),
-            time: Some(shots.iter().map(|shot| shot.time_s).collect()),
-            payload: Some(shots.iter().map(|shot| shot.payload_kg).collect()),
-            temperature: Some(shots.iter().map(|shot| shot.temperature_c).collect()),
-            current: self.motion.is_none().then(|| {
-                shots
-                    .iter()
-                    .flat_map(|shot| shot.current.iter().copied())
-                    .collect()
-            }),
-            velocity: self
+            time: of_rows(|shot| shot.time_s),
+            payload: of_rows(|shot| shot.payload_kg),
+            temperature: of_rows(|shot| shot.temperature_c),
+            current: self
                 .motion
-                .as_ref()
-                .is_some_and(|way| way.log_velocity)
-                .then(|| {
-                    shots
-                        .iter()
-                        .flat_map(|shot| shot.velocity.iter().copied())
-                        .collect()
-                }),
-            direction: Some(
-                shots
-                    .iter()
-                    .flat_map(|shot| shot.direction.iter().copied())
-                    .collect(),
-            ),
-            ..Recording::default()
+                .is_none()
+                .then(|| of_joints(|shot| &shot.current)),
+            velocity: logs_velocity.then(|| of_joints(|shot| &shot.velocity)),
+            direction: Some(of_joints(|shot| &shot.direction)),
+            ..blank(robot, shots.iter().map(usage))
         }
+    }
+}
+
+/// A recording of rows of this usage, of which nothing else is known yet.
+fn blank<'a>(robot: &RobotDescription, usage: impl Iterator<Item = &'a str>) -> Recording {
+    let joints = robot.joints.iter();
+    let usage: Vec<Option<String>> = usage.map(|usage| Some(usage.to_string())).collect();
+    Recording {
+        joints: robot.joints.len(),
+        prismatic: joints
+            .map(|joint| joint.kind == JointKind::Prismatic)
+            .collect(),
+        sequence: (0..usage.len() as i64).collect(),
+        usage,
+        ..Recording::default()
     }
 }
 
@@ -398,31 +378,19 @@ fn truth(
         .chain(tracker.values())
         .chain(effects.iter().flat_map(Physical::truth));
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
-    let rows = values.map(
-        |TrueValue {
-             name,
-             effect,
-             place,
-             unit,
-             value,
-         }| {
-            let count = seen.entry(name.clone()).or_default();
-            *count += 1;
-            let name = if *count == 1 {
-                name
-            } else {
-                format!("{name}#{count}")
-            };
-            TruthRow {
-                name,
-                effect: effect.into(),
-                place,
-                unit: unit.into(),
-                value,
-            }
-        },
-    );
-    let mut rows: Vec<TruthRow> = rows.collect();
+    let row = |one: TrueValue| {
+        let count = seen.entry(one.name.clone()).or_default();
+        *count += 1;
+        let ending = (*count > 1).then(|| format!("#{count}"));
+        TruthRow {
+            name: one.name + &ending.unwrap_or_default(),
+            effect: one.effect.into(),
+            place: one.place,
+            unit: one.unit.into(),
+            value: one.value,
+        }
+    };
+    let mut rows: Vec<TruthRow> = values.map(row).collect();
     rows.sort_by(|a, b| a.name.cmp(&b.name));
     Truth(rows)
 }
@@ -469,19 +437,9 @@ pub(super) fn contact_recording(
         counts[touch.fixture] += 1;
         format!("{}-{:04}", fixture_of(touch).name, counts[touch.fixture])
     };
+    let usage = touches.iter().map(|touch| fixture_of(touch).usage.as_str());
     Recording {
-        joints: robot.joints.len(),
-        prismatic: robot
-            .joints
-            .iter()
-            .map(|joint| joint.kind == JointKind::Prismatic)
-            .collect(),
-        sequence: (0..touches.len() as i64).collect(),
         point_id: touches.iter().map(&mut name).collect(),
-        usage: touches
-            .iter()
-            .map(|touch| Some(fixture_of(touch).usage.clone()))
-            .collect(),
         q: touches
             .iter()
             .flat_map(|touch| touch.q.iter().copied())
@@ -491,7 +449,7 @@ pub(super) fn contact_recording(
         temperature: Some(touches.iter().map(|touch| touch.temperature_c).collect()),
         readings,
         names,
-        ..Recording::default()
+        ..blank(robot, usage)
     }
 }
 
@@ -505,14 +463,10 @@ pub(super) fn fixture_truth(fixture: &Fixture) -> Vec<TruthRow> {
         value,
     };
     let [x, y, z] = fixture.centre_mm;
-    let centre = [row("x", x), row("y", y), row("z", z)];
-    let radius = fixture
-        .radius_mm
-        .filter(|_| fixture.kind == FixtureKind::Sphere)
-        .map(|radius| row("radius", radius));
-    centre
-        .into_iter()
-        .filter(|_| fixture.kind != FixtureKind::Plane)
-        .chain(radius)
-        .collect()
+    let radius = fixture.radius_mm.unwrap_or_default();
+    match fixture.kind {
+        FixtureKind::Plane => vec![],
+        FixtureKind::Socket => vec![row("x", x), row("y", y), row("z", z)],
+        FixtureKind::Sphere => vec![row("x", x), row("y", y), row("z", z), row("radius", radius)],
+    }
 }

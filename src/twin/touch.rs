@@ -4,12 +4,11 @@
 //! A posture is found by Newton's steps on the settled arm, by differences of its own tool point, from a random one.
 
 use super::arm::Arm;
-use super::effect::Physical;
 use super::equilibrium::settle;
 use super::matrix::{self, Vector};
 use super::noise::{Noise, Purpose};
 use super::plan::{self, Climate, Poses};
-use super::recorder::Experiment;
+use super::recorder::{Experiment, Scene};
 use crate::arm::Row;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -152,9 +151,7 @@ impl Fixture {
 impl Experiment<'_> {
     /// Brings the ball to every fixture in turn, as often as it says. Fails with the name of what cannot be reached.
     pub fn touch(&self, fixtures: &[Fixture]) -> Result<Vec<Touch>, String> {
-        let mut arm = Arm::new(self.robot, self.truth);
-        let effects = self.all_effects(&arm);
-        effects.iter().for_each(|effect| effect.shape(&mut arm));
+        let scene = self.scene();
         let ranges = plan::ranges(self.robot, self.poses)?;
         let mut draw = Noise::new(self.seed, Purpose::Poses);
         let mut noise = Noise::new(self.seed, Purpose::Tracker);
@@ -170,8 +167,7 @@ impl Experiment<'_> {
                 let there = fixture.point(&mut draw, &mut noise);
                 let before = touches.last().map(|touch: &Touch| touch.q.clone());
                 let q = self.reach(
-                    &arm,
-                    &effects,
+                    &scene,
                     &ranges,
                     (there, before.as_deref()),
                     [time_s, temperature_c],
@@ -198,8 +194,7 @@ impl Experiment<'_> {
     /// Joints at which the settled arm holds the ball at a point, m, coming from joints `before`.
     fn reach(
         &self,
-        arm: &Arm,
-        effects: &[Physical],
+        Scene { arm, effects, .. }: &Scene,
         ranges: &[[f64; 2]],
         (there, before): (Vector, Option<&[f64]>),
         [time_s, temperature_c]: [f64; 2],
@@ -210,14 +205,15 @@ impl Experiment<'_> {
             let row = Row {
                 command: q.to_vec(),
                 drive: self.truth.drive(self.robot, q),
-                direction: match before {
-                    Some(before) => q
-                        .iter()
-                        .zip(before)
-                        .map(|(q, before)| (q - before).signum())
-                        .collect(),
-                    None => vec![0.0; joints],
-                },
+                direction: before.map_or_else(
+                    || vec![0.0; joints],
+                    |before| {
+                        q.iter()
+                            .zip(before)
+                            .map(|(q, before)| (q - before).signum())
+                            .collect()
+                    },
+                ),
                 time_s,
                 temperature_c,
                 payload_kg: 0.0,
