@@ -285,9 +285,7 @@ pub struct Row {
     pub drive: Vec<f64>,
     /// +1, -1 or 0: last move of each joint.
     pub direction: Vec<f64>,
-    /// s.
     pub time_s: f64,
-    /// C.
     pub temperature_c: f64,
     /// Declared, kg.
     pub payload_kg: f64,

@@ -38,7 +38,6 @@ pub struct Log {
     pub velocity: Option<Vec<f64>>,
     /// Whether the tracker's stamps are the controller's: of standing points it looks some time after the arm has settled.
     pub at_once: bool,
-    /// C.
     pub temperature_c: Option<Vec<f64>>,
     /// Tracker frame, m.
     pub position: Vec<Vector>,

@@ -58,9 +58,7 @@ pub struct Shot {
     pub q: Vec<f64>,
     /// Side from which each joint came, +1 or -1.
     pub direction: Vec<f64>,
-    /// s.
     pub time_s: f64,
-    /// C.
     pub temperature_c: f64,
     /// Declared mass at the flange, kg.
     pub payload_kg: f64,

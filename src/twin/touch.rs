@@ -63,9 +63,7 @@ pub struct Touch {
     pub fixture: usize,
     /// Reported joint positions, rad or m.
     pub q: Vec<f64>,
-    /// s.
     pub time_s: f64,
-    /// C.
     pub temperature_c: f64,
 }
 
@@ -233,7 +231,7 @@ impl Experiment<'_> {
                 let tool = ball(&q);
                 let left = matrix::minus(there, tool);
                 if matrix::norm(left) < THERE {
-                    if within(&q, ranges) && self.is_above_floor(arm, &q) {
+                    if within(&q, ranges, 0.0) && self.is_above_floor(arm, &q) {
                         return Some(q);
                     }
                     break;
@@ -252,7 +250,7 @@ impl Experiment<'_> {
                 q.iter_mut()
                     .zip(&step)
                     .for_each(|(q, turn)| *q += share * turn);
-                if !near(&q, ranges) {
+                if !within(&q, ranges, FAR) {
                     break;
                 }
             }
@@ -271,17 +269,10 @@ impl Experiment<'_> {
     }
 }
 
-fn within(q: &[f64], ranges: &[[f64; 2]]) -> bool {
-    q.iter()
-        .zip(ranges)
-        .all(|(q, [lower, upper])| q >= lower && q <= upper)
-}
-
-/// Not hopelessly out of the ranges: Newton's steps may come back.
-fn near(q: &[f64], ranges: &[[f64; 2]]) -> bool {
-    q.iter()
-        .zip(ranges)
-        .all(|(q, [lower, upper])| *q >= lower - FAR && *q <= upper + FAR)
+/// Whether joints are in their ranges, or out of them by no more than this: Newton's steps may come back.
+fn within(q: &[f64], ranges: &[[f64; 2]], beyond: f64) -> bool {
+    let mut joints = q.iter().zip(ranges);
+    joints.all(|(q, [lower, upper])| *q >= lower - beyond && *q <= upper + beyond)
 }
 
 /// The shortest step whose columns sum up to `left`; none near a singular posture.

@@ -150,45 +150,35 @@ fn shares_are_kept_and_pairs_sit_in_two_places() {
     }
 }
 
-fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
-    let mut out = Vec::new();
-    let mut folders = vec![folder.to_path_buf()];
-    while let Some(next) = folders.pop() {
-        for entry in std::fs::read_dir(next).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let name = path
-                    .strip_prefix(folder)
-                    .unwrap()
-                    .to_string_lossy()
-                    .into_owned();
-                out.push((name, std::fs::read(&path).unwrap()));
-            }
-        }
-    }
-    out.sort();
-    out
-}
-
+/// The hash of every file is in the seal.
 #[test]
 fn a_seed_gives_the_same_bytes_on_one_and_two_threads() {
     let root = tempfile::tempdir().unwrap();
-    let made: Vec<Vec<(String, Vec<u8>)>> = ["1", "2"]
-        .map(|jobs| {
-            let out = root.path().join(jobs);
-            let text = out.to_string_lossy().into_owned();
-            calib(
-                ".",
-                &format!("simulate conceal --out {text} --cases 4 --points 30 --jobs {jobs}"),
-            )
-            .code(0);
-            files(&out)
-        })
-        .into();
-    assert_eq!(made[0].len(), 4 * 4 + 1);
-    assert_eq!(made[0], made[1]);
+    for (kind, files, options) in [
+        ("points", 4 * 4, "--cases 4 --points 30"),
+        (
+            "torques",
+            3 * 3,
+            "--dynamics --cases 3 --seconds 16 --rate 20 --open 0.4",
+        ),
+    ] {
+        let seals = ["1", "2"].map(|jobs| {
+            let out = root.path().join(format!("{kind}{jobs}"));
+            let words = format!(
+                "simulate conceal --out {} {options} --jobs {jobs}",
+                out.display()
+            );
+            calib(".", &words).code(0);
+            read(out.join("seal.json"))
+        });
+        let seal: Value = serde_json::from_str(&seals[0]).unwrap();
+        assert_eq!(
+            seal["files"].as_object().map(|all| all.len()),
+            Some(files),
+            "{kind}"
+        );
+        assert_eq!(seals[0], seals[1], "{kind}");
+    }
 }
 
 /// Recordings with single effects, pairs, open ones and nulls, and verdicts that say what `say` makes of each truth.

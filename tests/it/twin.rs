@@ -1,13 +1,11 @@
 //! The twin: its own kinematics and statics against numbers worked out by hand, its noise, its seeds, and the stage.
 
 use crate::answer::{read, root};
+use crate::desk::Desk;
 use crate::fixture::robot_of;
 use calib::description::{JointDescription, JointKind, RobotDescription};
 use calib::error::Result;
-use calib::stage::{
-    Context, OpenedInput, RawFile, Remainder, Services, Simulate, SimulateReads, SimulateWrites,
-    Sink, Stage,
-};
+use calib::stage::{Context, Remainder, Simulate, SimulateReads, SimulateWrites, Stage};
 use calib::table::Robot;
 use calib::twin::arm::{Arm, Motion, Row};
 use calib::twin::effect::{
@@ -298,20 +296,6 @@ fn a_directional_tracker_errs_across_the_beam_more_than_along_it() {
     );
 }
 
-struct Quiet;
-impl Services for Quiet {
-    fn open(&self, _file: &RawFile) -> Result<OpenedInput> {
-        panic!("simulate opens no file")
-    }
-    fn sink(&self, _kind: &'static str) -> Result<Box<dyn Sink>> {
-        panic!("simulate streams nothing")
-    }
-    fn begin(&self, _what: &str, _total: Option<u64>, _unit: &str) {}
-    fn advance(&self, _done: u64, _message: &str) {}
-    fn note(&self, _line: String) {}
-    fn warn(&self, _line: String) {}
-}
-
 fn simulate(settings: &Simulate, seed: u64) -> Result<SimulateWrites> {
     let robot = Robot::from_description(&sr210d());
     settings.clone().run(
@@ -320,7 +304,7 @@ fn simulate(settings: &Simulate, seed: u64) -> Result<SimulateWrites> {
             id: "simulate",
             seed,
             jobs: 1,
-            services: &Quiet,
+            services: &Desk::default(),
         },
     )
 }

@@ -63,7 +63,6 @@ pub struct Case {
     pub shots: Vec<Shot>,
     /// Declared payload of every shot, kg, and what the arm's thermometer says, C.
     pub payload_kg: Vec<f64>,
-    /// C.
     pub thermometer_c: Vec<f64>,
     /// How many of the points, from the first, are to be fitted.
     pub fit: usize,

@@ -169,7 +169,6 @@ pub struct Bench<'a> {
     pub(crate) overturning: f64,
     /// When the last point to fit is measured, and when the load changes, s.
     pub(crate) end_s: f64,
-    /// s.
     pub(crate) change_s: f64,
 }
 

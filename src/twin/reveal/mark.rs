@@ -77,7 +77,6 @@ pub struct Case {
     pub name: String,
     /// What it conceals: null, single, pair or open.
     pub content: String,
-    pub(crate) family: String,
     pub robot: String,
     pub points: usize,
     pub verdict: String,
@@ -171,7 +170,6 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
     Case {
         name: truth.case.clone(),
         content: truth.content.clone(),
-        family: truth.family.clone(),
         robot: truth.robot.clone(),
         points: truth.points.fit,
         verdict: answer.verdict.clone(),
@@ -196,27 +194,16 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
 fn probability_of(name: &Atoms, findings: &[Finding]) -> Option<f64> {
     let stated = findings.iter().flat_map(Finding::names);
     let stated = stated.filter_map(|(probability, stated)| Some((stated == *name, probability?)));
-    let of_name = |most: Option<f64>, (same, probability): (bool, f64)| {
-        Some(
-            most.unwrap_or(0.0)
-                .max(if same { probability } else { 0.0 }),
-        )
-    };
-    stated.fold(None, of_name)
+    let of_it = stated.map(|(same, probability)| if same { probability } else { 0.0 });
+    of_it.reduce(f64::max)
 }
 
 fn held_out(truth: &Truth, answer: &Answer) -> Option<HeldOut> {
     let before = answer.before.as_ref()?.validate_rms_mm?;
     let after = answer.after.as_ref()?.validate_rms_mm?;
-    let found: usize = answer
-        .findings
-        .iter()
-        .map(|finding| finding.parameters.len())
-        .sum();
-    let (p, n) = (
-        (truth.geometry_rank + found) as f64,
-        3.0 * truth.points.fit as f64,
-    );
+    let numbers = answer.findings.iter().map(|one| one.parameters.len());
+    let p = (truth.geometry_rank + numbers.sum::<usize>()) as f64;
+    let n = 3.0 * truth.points.fit as f64;
     let noise = truth.noise.as_ref()?;
     let square = noise.validate_rms_per_axis_mm.powi(2) * (1.0 + p / (n - p - 1.0).max(1.0));
     let bound = (3.0 * (square + noise.unseen_rms_per_axis_mm.powi(2))).sqrt();

@@ -81,7 +81,7 @@ pub struct TorqueCase {
 const CARRIED: [f64; 2] = [0.2, 0.6];
 /// Shares of the recording of each stretch: sines and moves to fit, sines and moves that judge.
 const STRETCHES: [f64; 4] = [0.3, 0.25, 0.25, 0.2];
-const FITTED: usize = 2;
+pub(super) const FITTED: usize = 2;
 const TOLERANCE: MassTolerance = MassTolerance {
     mass: 0.01,
     centre: 0.004,
@@ -103,12 +103,8 @@ impl TorqueCase {
         let stated = machine(&robot);
         let scattered = scattered(&stated, &mut noise);
         let speed = noise.uniform(0.8, 1.5) * if kind == Kind::Sr210d { 0.9 } else { 1.2 };
-        let (paths, fitted) = paths(
-            &robot,
-            speed,
-            design.seconds,
-            &mut Noise::new(seed, Purpose::Poses),
-        );
+        let mut way = Noise::new(seed, Purpose::Poses);
+        let paths = paths(&robot, speed, design.seconds, &mut way);
         let sensors = kind == Kind::Seven7r;
         let n = robot.joints.len();
         let per_unit = robot.joints.iter().map(|joint| match sensors {
@@ -125,7 +121,7 @@ impl TorqueCase {
             scattered,
             rate: design.rate,
             paths,
-            fitted,
+            fitted: FITTED,
             white: vec![0.0; n],
             lasting: vec![0.0; n],
             per_unit: per_unit.collect(),
@@ -306,7 +302,7 @@ pub(super) fn paths(
     speed: f64,
     seconds: f64,
     noise: &mut Noise,
-) -> (Vec<(f64, Path)>, usize) {
+) -> Vec<(f64, Path)> {
     let ranges: Vec<[f64; 2]> = robot
         .joints
         .iter()
@@ -321,7 +317,7 @@ pub(super) fn paths(
         let duration = share * seconds;
         (duration, draw(noise, &ranges, speed, duration))
     });
-    (paths.collect(), FITTED)
+    paths.collect()
 }
 
 /// Largest rigid torque of each joint, Nm.

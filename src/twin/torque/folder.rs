@@ -4,7 +4,7 @@
 
 use crate::folder::{File, Sheet, pretty, robot_json};
 use crate::noise::{Noise, Purpose};
-use crate::torque::draw::{TorqueCase, paths};
+use crate::torque::draw::{FITTED, TorqueCase, paths};
 use crate::torque::law::{Body, Fall, Law};
 use crate::torque::record::TorqueRows;
 use crate::way::{JointState, Path};
@@ -112,10 +112,9 @@ impl TorqueCase {
 
     /// The same arm and physics on other paths, with other noise.
     pub fn on_other_paths(mut self, seed: u64, seconds: f64) -> Self {
-        let speed = 1.0;
         let mut noise = Noise::new(seed, Purpose::Poses);
-        (self.paths, self.fitted) = paths(&self.robot, speed, seconds, &mut noise);
-        self.seed = seed;
+        self.paths = paths(&self.robot, 1.0, seconds, &mut noise);
+        (self.fitted, self.seed) = (FITTED, seed);
         self
     }
 
@@ -136,13 +135,11 @@ impl TorqueCase {
     /// Torques of rows with the noise of the recording, Nm, row-major.
     pub fn noisy(&self, rows: &TorqueRows) -> Vec<f64> {
         let (_, signal) = self.measured(rows);
+        let units = self.per_unit.iter().cycle();
         signal
-            .chunks_exact(self.per_unit.len())
-            .flat_map(|row| {
-                row.iter()
-                    .zip(&self.per_unit)
-                    .map(|(value, unit)| value * unit)
-            })
+            .iter()
+            .zip(units)
+            .map(|(value, unit)| value * unit)
             .collect()
     }
 
@@ -153,22 +150,16 @@ impl TorqueCase {
 
     /// Viscous (Nm s/rad) and Coulomb friction (Nm) by joint; none where it is not concealed.
     pub fn plain_friction(&self) -> Vec<[Option<f64>; 2]> {
-        let of = |joint: usize| {
-            let viscous = self.laws.iter().find_map(|law| match law {
-                Law::Viscous {
-                    joint: at, size, ..
-                } if *at == joint => Some(*size),
-                _ => None,
-            });
-            let coulomb = self.laws.iter().find_map(|law| match law {
-                Law::Coulomb {
-                    joint: at, size, ..
-                } if *at == joint => Some(*size),
-                _ => None,
-            });
-            [viscous, coulomb]
-        };
-        (0..self.stated.axes.len()).map(of).collect()
+        let mut friction = vec![[None; 2]; self.stated.axes.len()];
+        for law in &self.laws {
+            let (joint, kind, size) = match law {
+                Law::Viscous { joint, size, .. } => (joint, 0, size),
+                Law::Coulomb { joint, size, .. } => (joint, 1, size),
+                _ => continue,
+            };
+            friction[*joint][kind].get_or_insert(*size);
+        }
+        friction
     }
 
     /// The last link and what it carries as they are.

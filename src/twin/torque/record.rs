@@ -2,6 +2,7 @@
 
 use super::draw::TorqueCase;
 use super::law::{Law, Moment};
+use crate::matrix;
 use crate::noise::{Noise, Purpose};
 use crate::torque::law::Machine;
 use crate::way::JointState;
@@ -200,18 +201,18 @@ impl Law {
                     let share = 1.0 + mass / payload.mass;
                     payload.mass += mass;
                     payload.inertia = payload.inertia.map(|moment| moment * share);
-                    payload.centre = std::array::from_fn(|i| payload.centre[i] + centre[i]);
+                    payload.centre = matrix::add(payload.centre, *centre);
                 }
             }
             Self::LinkMass { link, share, away } => {
                 let body = &mut machine.links[*link];
                 body.mass *= 1.0 + share;
-                body.centre =
-                    std::array::from_fn(|i| body.centre[i] + share / (1.0 + share) * away[i]);
+                let moved = matrix::scale(*away, share / (1.0 + share));
+                body.centre = matrix::add(body.centre, moved);
             }
             Self::LinkCentre { link, shift } => {
                 let body = &mut machine.links[*link];
-                body.centre = std::array::from_fn(|i| body.centre[i] + shift[i]);
+                body.centre = matrix::add(body.centre, *shift);
             }
             Self::LinkInertia { link, share } => {
                 let body = &mut machine.links[*link];
@@ -220,8 +221,8 @@ impl Law {
             Self::Tilt {
                 by: [about_x, about_y],
             } => {
-                let turned = crate::matrix::turn_by([*about_x, *about_y, 0.0]);
-                machine.gravity = crate::matrix::see(&turned, machine.gravity);
+                let turned = matrix::turn_by([*about_x, *about_y, 0.0]);
+                machine.gravity = matrix::see(&turned, machine.gravity);
             }
             _ => {}
         }

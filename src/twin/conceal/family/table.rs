@@ -296,19 +296,13 @@ families! {
     alone "unknown" {
         let (shift_um, turn_arcsec) = stand(15.0, draw);
         let (period_s, phase_deg) = ((on.end_s / draw.uniform(2.0, 6.0)).round(), draw.phase());
-        let (form, fading_s) = match other {
-            false => ("slow swing", 0.0),
-            true => ("fading swing", (draw.uniform(0.3, 0.8) * on.end_s).round()),
-        };
+        let (form, fading_s) = if other { ("fading swing", (draw.uniform(0.3, 0.8) * on.end_s).round()) } else { ("slow swing", 0.0) };
         let sway = TrackerSway::effect(shift_um, turn_arcsec, period_s, phase_deg, fading_s);
         Draft::one(form, name, "tracker", [sway]).needing(&[Column::Time]).accepting(name, "base".into())
     };
     alone "base_shift" {
         let (shift_um, turn_arcsec) = (draw.vector(30.0, 150.0).map(f64::round), draw.vector(2.0, 15.0));
-        let (form, back_share) = match other {
-            false => ("knock", 0.0),
-            true => ("knock, settling back in part", draw.uniform(0.3, 0.7)),
-        };
+        let (form, back_share) = if other { ("knock, settling back in part", draw.uniform(0.3, 0.7)) } else { ("knock", 0.0) };
         let back_s = (draw.uniform(0.05, 0.15) * on.end_s).round().max(1.0);
         let knock = TrackerKnock::effect(shift_um, turn_arcsec, on.moment(draw), back_share, back_s);
         Draft::one(form, name, "base", [knock]).needing(&[Column::Time]).accepting("tracker_drift", "tracker".into())
@@ -351,10 +345,7 @@ families! {
     };
     alone "thermal_growth" {
         let number = on.long_link(draw)?;
-        let (form, core_s) = match other {
-            false => ("behind the temperature", 0.0),
-            true => ("skin and core", draw.uniform(0.2, 0.5) * on.end_s),
-        };
+        let (form, core_s) = if other { ("skin and core", draw.uniform(0.2, 0.5) * on.end_s) } else { ("behind the temperature", 0.0) };
         let (um_per_m_k, lag_s) = (draw.uniform(8.0, 16.0), draw.uniform(0.05, 0.2) * on.end_s);
         let growth = ThermalLag::effect(number, um_per_m_k, 20.0, lag_s.round(), core_s.round());
         Draft::one(form, name, link(number), [growth]).needing(&[Column::Temperature, Column::Time])
@@ -363,10 +354,7 @@ families! {
         let number = on.bearing(draw)?;
         let peak = on.peak[number - 1].max(1e-9);
         let (order, phase_deg) = (1.0 + draw.index(5) as f64, draw.phase());
-        let (form, full_nm) = match other {
-            false => ("with the load", 0.0),
-            true => ("with the load, saturating", peak * draw.uniform(0.2, 0.5)),
-        };
+        let (form, full_nm) = if other { ("with the load, saturating", peak * draw.uniform(0.2, 0.5)) } else { ("with the load", 0.0) };
         Draft::one(form, name, joint(number), [GearLoad::effect(number, order, draw.size(15.0, 60.0) / peak, phase_deg, full_nm)])
     };
     alone "gear_flank" {
@@ -419,10 +407,7 @@ families! {
     };
     alone "backlash" {
         let number = on.turning(draw);
-        let (form, time_s) = match other {
-            false => ("grows with time", on.end_s),
-            true => ("grows and settles", draw.uniform(0.15, 0.5) * on.end_s),
-        };
+        let (form, time_s) = if other { ("grows and settles", draw.uniform(0.15, 0.5) * on.end_s) } else { ("grows with time", on.end_s) };
         let gap = BacklashGrowth::effect(number, draw.size(20.0, 80.0), draw.uniform(0.1, 0.4), time_s.round(), other);
         Draft::one(form, name, joint(number), [gap])
             .needing(&[Column::Direction, Column::Time])
@@ -430,10 +415,7 @@ families! {
     };
     alone "unknown" {
         let number = on.long_link(draw)?;
-        let (form, power) = match other {
-            false => ("by the cosine of the next joint", 1),
-            true => ("by the squared cosine of the next joint", 2),
-        };
+        let (form, power) = if other { ("by the squared cosine of the next joint", 2) } else { ("by the cosine of the next joint", 1) };
         Draft::one(form, name, link(number), [ThermalBow::effect(number, draw.uniform(8.0, 16.0), 20.0, power)])
             .needing(&[Column::Temperature])
             .accepting("thermal_growth", link(number))
