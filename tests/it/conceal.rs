@@ -5,7 +5,7 @@ use calib::effect::CAUSES;
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
 use calib::twin::conceal::family::FAMILIES;
-use calib::twin::conceal::layout::Layout;
+use calib::twin::conceal::points::Layout;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

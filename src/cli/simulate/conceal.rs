@@ -6,7 +6,7 @@ use crate::error::{Error, Fault, Result, counted, nearest};
 use crate::proof::{RECORDINGS, SEAL, conceal, vacant};
 use crate::twin::conceal::design::Design;
 use crate::twin::conceal::family::Collection;
-use crate::twin::conceal::layout::LAYOUTS;
+use crate::twin::conceal::points::LAYOUTS;
 use crate::twin::conceal::robots::{ALL_KINDS, Kind};
 use crate::twin::tracker::SCATTERS;
 use clap::{Args, ValueEnum};

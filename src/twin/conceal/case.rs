@@ -12,7 +12,7 @@ use crate::plan::{Climate, Point, Poses};
 use crate::recorder::{Experiment, Motors, Shot};
 use crate::tracker::{SCATTERS, Scatter, Tracker};
 use crate::truth::{ARCSEC, CouplingError, LinkError, TrueRobot};
-use calib_foundation::description::{Coupling, JointKind, RobotDescription};
+use calib_foundation::description::{Coupling, RobotDescription};
 use std::collections::BTreeSet;
 
 /// A recording that was tampered with.
@@ -88,42 +88,36 @@ impl Case {
         let truth = errors(&robot, &mut draw);
         let beyond_list = design.collection == Collection::Beyond;
         let tracker = tracker(design, kind, content, &mut draw);
-        let (play_rad, repeated) = if draw.chance(0.5) {
-            (1e-6 * draw.uniform(4.0, 16.0), 0.1)
-        } else {
-            (0.0, 0.0)
+        let (play_rad, repeated) = match draw.chance(0.5) {
+            true => (1e-6 * draw.uniform(4.0, 16.0), 0.1),
+            false => (0.0, 0.0),
         };
-        let fit = design
-            .points
-            .unwrap_or_else(|| draw.size(50.0, 400.0).round() as usize);
+        let points = design.points;
+        let fit = points.unwrap_or_else(|| draw.size(50.0, 400.0).round() as usize);
         let validate = (draw.uniform(0.25, 0.5) * fit as f64).round().max(1.0) as usize;
         let climate = weather((fit + validate) as f64 * 19.0, beyond_list, &mut draw);
-        let ranges: Vec<[f64; 2]> = robot
+        let limits = robot
             .joints
             .iter()
-            .map(|joint| narrowed(joint.limits.unwrap_or_default(), &mut draw))
-            .collect();
-        let near = if beyond_list { NEAR } else { 0.0 };
+            .map(|joint| joint.limits.unwrap_or_default());
+        let ranges: Vec<[f64; 2]> = limits.map(|limits| narrowed(limits, &mut draw)).collect();
         let amount = Amount {
             fit,
             validate,
             repeated,
-            near,
+            near: if beyond_list { NEAR } else { 0.0 },
             loaded: !design.bare,
             layout: design.layout,
         };
         let points = points::plan(kind, &ranges, amount, &climate, seed)?;
-        let to_fit = &points[..fit.min(points.len())];
-        let site = Site {
+        let (to_fit, held_out) = points.split_at(fit);
+        let at = |points| Site {
             robot: &robot,
             truth: &truth,
             tracker: &tracker,
-            points: to_fit,
+            points,
         };
-        let held_out = Site {
-            points: &points[fit.min(points.len())..],
-            ..site
-        };
+        let (site, held_out) = (at(to_fit), at(held_out));
         let noise_mm = [&site, &held_out].map(|site| 1e3 * site.noise(play_rad));
         let shadow = site.shadow();
         let bench = Bench::new(&robot, &ranges, to_fit);
@@ -135,26 +129,13 @@ impl Case {
         let (drafts, concealed) = conceal(design, content, &bench, &sight, &mut draw);
         let mut hidden = hidden(&drafts, &mut draw);
         hidden.extend(design.bare.then_some(Column::Current));
-        let (payload_kg, warmth): (Vec<f64>, Vec<f64>) = points
-            .iter()
-            .map(|point| (point.payload_kg, point.temperature_c))
-            .unzip();
+        let payload_kg = points.iter().map(|point| point.payload_kg).collect();
         let (friction, motors) = drives(&robot, &bench, &mut draw);
-        let effects: Vec<Physical> = concealed
-            .iter()
-            .flat_map(|one| one.cause.physical.clone())
-            .chain(friction.iter().cloned())
-            .collect();
-        let unseen_mm = 1e3
-            * Site {
-                points: &points,
-                ..site
-            }
-            .unseen(fit, &effects);
-        let (play, poses) = (
-            vec![play_rad / ARCSEC; robot.joints.len()],
-            Poses::default(),
-        );
+        let causes = concealed.iter().flat_map(|one| &one.cause.physical);
+        let effects: Vec<Physical> = causes.chain(&friction).cloned().collect();
+        let unseen_mm = 1e3 * at(&points).unseen(fit, &effects);
+        let play = vec![play_rad / ARCSEC; robot.joints.len()];
+        let poses = Poses::default();
         let experiment = Experiment {
             robot: &robot,
             truth: &truth,
@@ -173,26 +154,23 @@ impl Case {
         });
         let mut shots = experiment.measure(carried.collect(), || ());
         let mut faults = Noise::new(seed, Purpose::Faults);
-        let thermometer_c = warmth
-            .iter()
-            .map(|celsius| celsius + THERMOMETER_K * faults.normal())
-            .collect();
+        let mut shown = |shot: &Shot| shot.temperature_c + THERMOMETER_K * faults.normal();
+        let thermometer_c = shots.iter().map(&mut shown).collect();
         let tampered = tamper(design, &mut shots, fit, &mut faults);
         if design.log_step_deg > 0.0 {
-            shots
-                .iter_mut()
-                .for_each(|shot| round(&mut shot.q, &robot, design.log_step_deg));
+            // As a controller's log does; all joints turn.
+            let step = design.log_step_deg.to_radians();
+            let angles = shots.iter_mut().flat_map(|shot| &mut shot.q);
+            angles.for_each(|angle| *angle = (*angle / step).round() * step);
         }
+        let accepted = drafts.into_iter().flat_map(|draft| draft.accepted);
         Ok(Case {
             name: format!("c{:04}", number + 1),
             content,
             collection: design.collection,
             seed,
             kind,
-            accepted: drafts
-                .iter()
-                .flat_map(|draft| draft.accepted.clone())
-                .collect(),
+            accepted: accepted.collect(),
             geometry_rank: shadow.rank(),
             robot,
             bare: design.bare,
@@ -227,16 +205,12 @@ impl Case {
     fn names(&self, which: fn(&Concealed) -> bool) -> Vec<(&'static str, String)> {
         let mut causes: Vec<&Concealed> = self.concealed.iter().filter(|one| which(one)).collect();
         causes.sort_by(|a, b| b.strength.total_cmp(&a.strength));
-        let named = causes
-            .into_iter()
-            .map(|one| (one.cause.effect, one.cause.place.clone()));
-        named
-            .chain(
-                self.tampered
-                    .iter()
-                    .map(|one| (one.effect, "recording".to_string())),
-            )
-            .collect()
+        let named = |one: &Concealed| (one.cause.effect, one.cause.place.clone());
+        let tampered = self
+            .tampered
+            .iter()
+            .map(|one| (one.effect, "recording".to_string()));
+        causes.into_iter().map(named).chain(tampered).collect()
     }
 }
 
@@ -359,16 +333,6 @@ fn tracker(design: &Design, kind: Kind, content: Content, draw: &mut Noise) -> T
     }
 }
 
-/// Rounds angles (rad) of revolute joints to whole steps, as a controller's log does.
-fn round(q: &mut [f64], robot: &RobotDescription, step_deg: f64) {
-    let step = step_deg.to_radians();
-    let angles = q
-        .iter_mut()
-        .zip(&robot.joints)
-        .filter(|(_, joint)| joint.kind == JointKind::Revolute);
-    angles.for_each(|(angle, _)| *angle = (*angle / step).round() * step);
-}
-
 /// A part of a joint's range that a cell may leave free, deg.
 fn narrowed(limits: [f64; 2], draw: &mut Noise) -> [f64; 2] {
     let [lower, upper] = limits.map(f64::to_degrees);
@@ -381,7 +345,7 @@ fn narrowed(limits: [f64; 2], draw: &mut Noise) -> [f64; 2] {
 fn hidden(drafts: &[Draft], draw: &mut Noise) -> BTreeSet<Column> {
     let mut out: BTreeSet<Column> = drafts
         .iter()
-        .flat_map(|draft| draft.hides.iter().copied())
+        .flat_map(|draft| draft.hides.clone())
         .collect();
     for (column, share) in [
         (Column::Temperature, 0.15),

@@ -1,7 +1,7 @@
 //! What a set of concealed recordings is drawn from, and which kind each of its cases is.
 
 use super::family::{Collection, DrawEffect};
-use super::layout::Layout;
+use super::points::Layout;
 use super::robots::Kind;
 use crate::families::Family;
 use crate::noise::{Noise, Purpose};

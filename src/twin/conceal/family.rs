@@ -51,7 +51,7 @@ pub struct Cause {
 }
 
 /// What a family has drawn.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Draft {
     /// The form, in a few words.
     pub(crate) form: &'static str,
@@ -70,9 +70,7 @@ impl Draft {
         Draft {
             form,
             causes,
-            accepted: Vec::new(),
-            needs: Vec::new(),
-            hides: Vec::new(),
+            ..Draft::default()
         }
     }
     /// A draft of one cause whose size may be changed.
@@ -210,10 +208,14 @@ impl<'a> Bench<'a> {
 
     /// Joints (from 1) that gravity loads, but for the last, whose turn moves the tool little.
     fn loaded(&self) -> Vec<usize> {
+        self.carrying(0.02)
+    }
+
+    /// Those of them that carry more than a share of what the most loaded one does.
+    fn carrying(&self, share: f64) -> Vec<usize> {
         let most = self.peak.iter().copied().fold(0.0, f64::max);
-        (1..self.joints())
-            .filter(|number| self.peak[number - 1] > 0.02 * most)
-            .collect()
+        let carries = |number: &usize| self.peak[number - 1] > share * most;
+        (1..self.joints()).filter(carries).collect()
     }
 
     /// A joint that turns the tool: any but the last.
@@ -223,18 +225,9 @@ impl<'a> Bench<'a> {
 
     /// One of the loaded joints, mostly one of the heavily loaded.
     fn bearing(&self, draw: &mut Noise) -> Option<usize> {
-        let loaded = self.loaded();
-        let most = self.peak.iter().copied().fold(0.0, f64::max);
-        let heavy: Vec<usize> = loaded
-            .iter()
-            .copied()
-            .filter(|number| self.peak[number - 1] > 0.2 * most)
-            .collect();
-        let list = if draw.chance(0.7) && !heavy.is_empty() {
-            heavy
-        } else {
-            loaded
-        };
+        let heavy = self.carrying(0.2);
+        let is_heavy = draw.chance(0.7) && !heavy.is_empty();
+        let list = if is_heavy { heavy } else { self.loaded() };
         list.get(draw.index(list.len())).copied()
     }
 

@@ -56,15 +56,12 @@ impl TorqueCase {
         let n = machine.axes.len();
         let fine_steps = (FINE / self.rate).ceil().max(1.0) as usize;
         let step = 1.0 / (self.rate * fine_steps as f64);
-        let behind = |filtered: bool| {
-            let time = |law: &&Law| {
-                if let Law::Latency { time, filter } = law {
-                    (*filter == filtered).then_some(*time)
-                } else {
-                    None
-                }
+        let behind = |filtered: bool| -> f64 {
+            let time = |law: &&Law| match law {
+                Law::Latency { time, filter } if *filter == filtered => *time,
+                _ => 0.0,
             };
-            laws.iter().filter_map(time).sum::<f64>()
+            laws.iter().map(time).sum()
         };
         let (late, filter) = (behind(false), behind(true));
         let mut rows = TorqueRows::default();
@@ -107,10 +104,8 @@ impl TorqueCase {
                             let push =
                                 force.map(|f| f * if *held { (3.0 * wave).min(1.0) } else { wave });
                             let against = machine.against(&state.q, push);
-                            torque
-                                .iter_mut()
-                                .zip(against)
-                                .for_each(|(torque, against)| *torque += against);
+                            let joints = torque.iter_mut().zip(against);
+                            joints.for_each(|(torque, against)| *torque += against);
                         }
                         Law::TorqueConstant { joint, share, half } => {
                             torque[*joint] *= 1.0 + share / (1.0 + torque[*joint].abs() / half);
@@ -159,17 +154,11 @@ impl TorqueCase {
         let mut lasting = vec![0.0; n];
         let (mut angles, mut signal) = (Vec::new(), Vec::new());
         for (state, torque) in rows.state.iter().zip(rows.torque.chunks_exact(n)) {
-            angles.extend(
-                state
-                    .q
-                    .iter()
-                    .map(|q| (q.to_degrees() / self.encoder_deg).round() * self.encoder_deg),
-            );
+            let shown = |q: &f64| (q.to_degrees() / self.encoder_deg).round() * self.encoder_deg;
+            angles.extend(state.q.iter().map(shown));
             for j in 0..n {
-                lasting[j] = AR1_COEFFICIENT * lasting[j]
-                    + (1.0 - AR1_COEFFICIENT * AR1_COEFFICIENT).sqrt()
-                        * self.lasting[j]
-                        * noise.normal();
+                let fresh = (1.0 - AR1_COEFFICIENT * AR1_COEFFICIENT).sqrt() * self.lasting[j];
+                lasting[j] = AR1_COEFFICIENT * lasting[j] + fresh * noise.normal();
                 let stated =
                     (torque[j] + lasting[j] + self.white[j] * noise.normal()) / self.per_unit[j];
                 signal.push((stated / self.resolution).round() * self.resolution);
