@@ -108,11 +108,10 @@ impl Design {
     }
 
     /// Robots to draw from.
-    pub(crate) fn kinds(&self) -> Vec<Kind> {
-        if self.robots.is_empty() {
-            self.collection.robots().to_vec()
-        } else {
-            self.robots.clone()
+    pub(crate) fn kinds(&self) -> &[Kind] {
+        match self.robots.is_empty() {
+            true => self.collection.robots(),
+            false => &self.robots,
         }
     }
 
@@ -122,14 +121,10 @@ impl Design {
         let count = |share: f64| (share * self.cases as f64).round() as usize;
         let listed = self.listed();
         let families = self.collection.families();
-        let open: Vec<usize> = (0..families.len())
-            .filter(|row| families[*row].name == "unknown")
-            .collect();
-        let paired: Vec<usize> = listed
-            .iter()
-            .copied()
-            .filter(|row| families[*row].paired)
-            .collect();
+        let is_open = |row: &usize| families[*row].name == "unknown";
+        let open: Vec<usize> = (0..families.len()).filter(is_open).collect();
+        let is_paired = |row: &usize| families[*row].paired;
+        let paired: Vec<usize> = listed.iter().copied().filter(is_paired).collect();
         let mut out = vec![Content::Null; count(self.nulls).min(self.cases)];
         let room = |out: &Vec<Content>, wanted: usize| wanted.min(self.cases - out.len());
         for turn in 0..room(&out, count(self.open)) {

@@ -77,18 +77,13 @@ impl Site<'_> {
         let mut seen: Vec<Vec<Vec<f64>>> = vec![Vec::new(); effects.len()];
         let base = self.tracker.base();
         for (row, rest) in self.at_rest(effects).take(fit) {
-            let there = matrix::place(
-                &matrix::times(&rest.motion.tracker, &base),
-                rest.posture.tool,
-            );
+            let tool = rest.posture.tool;
+            let there = matrix::place(&matrix::times(&rest.motion.tracker, &base), tool);
             for (index, effect) in effects.iter().enumerate() {
                 if let Physical::Foreign(foreign) = effect {
                     let memory = row.memory.get(index).copied().unwrap_or(0.0);
-                    let point = if foreign.motion.is_sighted() {
-                        there
-                    } else {
-                        rest.posture.tool
-                    };
+                    let is_sighted = foreign.motion.is_sighted();
+                    let point = if is_sighted { there } else { tool };
                     seen[index].push(foreign.values(&row, memory, &rest.torque, point));
                 }
             }
@@ -99,12 +94,8 @@ impl Site<'_> {
         };
         let known: Vec<Physical> = effects.iter().zip(&seen).map(known).collect();
         let [all, known] = [effects, &known].map(|effects| self.displacement(effects));
-        let judged: Vec<f64> = all
-            .iter()
-            .zip(&known)
-            .skip(3 * fit)
-            .map(|(all, known)| all - known)
-            .collect();
+        let judged = all.iter().zip(&known).skip(3 * fit);
+        let judged: Column = judged.map(|(all, known)| all - known).collect();
         norm(&judged) / (judged.len().max(1) as f64).sqrt()
     }
 
@@ -118,13 +109,8 @@ impl Site<'_> {
                 self.bare(&truth, &tracker, &[])
             };
             let (above, below) = (at(1.0), at(-1.0));
-            out.push(
-                above
-                    .iter()
-                    .zip(&below)
-                    .map(|(a, b)| (a - b) / (2.0 * step))
-                    .collect(),
-            );
+            let sides = above.iter().zip(&below);
+            out.push(sides.map(|(a, b)| (a - b) / (2.0 * step)).collect());
         };
         // Steps of about 1e-5 rad or m: truncation and rounding are both about 1e-10 of the difference.
         for joint in 0..self.robot.joints.len() {
@@ -160,23 +146,17 @@ impl Site<'_> {
     /// Root mean square of a coordinate's noise: the tracker's, and the joints' from move to move (rad), m.
     pub(crate) fn noise(&self, play_rad: f64) -> f64 {
         let bare = self.bare(self.truth, self.tracker, &[]);
-        let beam: f64 = bare
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .map(|point| 3.0 * self.tracker.sigma(*point).powi(2))
-            .sum();
+        let (points, _) = bare.as_chunks::<3>();
+        let square = |point: &[f64; 3]| 3.0 * self.tracker.sigma(*point).powi(2);
+        let beam: f64 = points.iter().map(square).sum();
         let mut play = 0.0;
         if play_rad > 0.0 {
             for joint in 0..self.robot.joints.len() {
                 let mut truth = self.truth.clone();
                 truth.offset_deg[joint] += 1e-4f64.to_degrees();
                 let moved = self.bare(&truth, self.tracker, &[]);
-                play += moved
-                    .iter()
-                    .zip(&bare)
-                    .map(|(a, b)| ((a - b) / 1e-4 * play_rad).powi(2))
-                    .sum::<f64>();
+                let square = |(a, b): (&f64, &f64)| ((a - b) / 1e-4 * play_rad).powi(2);
+                play += moved.iter().zip(&bare).map(square).sum::<f64>();
             }
         }
         ((beam + play) / bare.len().max(1) as f64).sqrt()

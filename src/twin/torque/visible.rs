@@ -5,7 +5,7 @@ use super::draw::TorqueCase;
 use super::law::{Fall, Law, Moment};
 use super::record::{AR1_COEFFICIENT, TorqueRows};
 use crate::shadow::{Column, Shadow, norm};
-use crate::torque::law::Machine;
+use crate::torque::law::{Body, Machine};
 use std::f64::consts::FRAC_PI_2;
 
 /// Rows that are averaged into one: as a low-pass does.
@@ -111,11 +111,9 @@ impl<'a> Columns<'a> {
         let lasts = AR1_COEFFICIENT.powi(AVERAGED as i32);
         let lasting = (1.0 + lasts) / (1.0 - lasts);
         let weight = case.white.iter().zip(&case.lasting);
-        let weight = weight.map(|(white, own)| {
-            (white * white / AVERAGED as f64 + own * own * lasting)
-                .sqrt()
-                .recip()
-        });
+        let square =
+            |(white, slow): (&f64, &f64)| white * white / AVERAGED as f64 + slow * slow * lasting;
+        let weight = weight.map(square).map(|square| square.sqrt().recip());
         let fit = rows.to_fit();
         let stated = rows.state[..fit]
             .iter()
@@ -160,22 +158,30 @@ impl<'a> Columns<'a> {
         let (mass, centre, inertia) =
             tolerance.map_or((0.05, 0.01, 0.2), |one| (one.mass, one.centre, one.inertia));
         let mut columns = Vec::new();
-        for link in 0..self.case.stated.links.len() {
-            columns.push(self.of_machine(|machine| machine.links[link].mass *= 1.0 + mass));
-            columns.extend(
-                (0..3).map(|k| self.of_machine(|machine| machine.links[link].centre[k] += centre)),
-            );
-            for k in 0..6 {
-                let most = self.case.stated.links[link]
-                    .inertia
-                    .iter()
-                    .fold(0.0, |most: f64, x| most.max(x.abs()));
-                columns.push(
-                    self.of_machine(|machine| machine.links[link].inertia[k] += inertia * most),
-                );
-            }
+        for (link, body) in self.case.stated.links.iter().enumerate() {
+            columns.push(self.of_machine(|arm| arm.links[link].mass *= 1.0 + mass));
+            columns.extend(self.centre(link, centre));
+            let most = body
+                .inertia
+                .iter()
+                .fold(0.0, |most: f64, x| most.max(x.abs()));
+            columns.extend(self.inertia(link, inertia * most));
         }
         columns
+    }
+
+    /// The centre of a link moved along each axis, m.
+    fn centre(&self, link: usize, by: f64) -> Vec<Column> {
+        (0..3)
+            .map(|k| self.of_machine(|arm| arm.links[link].centre[k] += by))
+            .collect()
+    }
+
+    /// Each moment of a link changed, kg m2.
+    fn inertia(&self, link: usize, by: f64) -> Vec<Column> {
+        (0..6)
+            .map(|k| self.of_machine(|arm| arm.links[link].inertia[k] += by))
+            .collect()
     }
 
     /// Linear effects of unit size, by name and place.
@@ -191,38 +197,24 @@ impl<'a> Columns<'a> {
             for laws in waves(joint) {
                 add(&laws[0], laws.iter().map(|law| self.of_law(law)).collect());
             }
-            let law = Law::torque_constant(joint, 0.0, f64::INFINITY);
-            let own = self
-                .rows
-                .torque
-                .iter()
-                .enumerate()
-                .map(|(k, torque)| if k % n == joint { *torque } else { 0.0 });
             if !self.case.sensors {
-                add(&law, vec![self.of(own)]);
+                let torque = self.rows.torque.iter().enumerate();
+                let torque = torque.map(|(k, x)| if k % n == joint { *x } else { 0.0 });
+                let law = Law::torque_constant(joint, 0.0, f64::INFINITY);
+                add(&law, vec![self.of(torque)]);
             }
-            add(
-                &Law::link_mass(joint, 0.0, [0.0; 3]),
-                vec![self.of_machine(|machine| machine.links[joint].mass += 1.0)],
-            );
-            let centre =
-                (0..3).map(|k| self.of_machine(|machine| machine.links[joint].centre[k] += 0.01));
-            add(&Law::link_centre(joint, [0.0; 3]), centre.collect());
-            let inertia =
-                (0..6).map(|k| self.of_machine(|machine| machine.links[joint].inertia[k] += 0.1));
-            add(&Law::link_inertia(joint, 0.0), inertia.collect());
+            let mass = self.of_machine(|arm| arm.links[joint].mass += 1.0);
+            add(&Law::link_mass(joint, 0.0, [0.0; 3]), vec![mass]);
+            add(&Law::link_centre(joint, [0.0; 3]), self.centre(joint, 0.01));
+            add(&Law::link_inertia(joint, 0.0), self.inertia(joint, 0.1));
         }
-        let payload = |change: fn(&mut crate::torque::law::Body)| {
-            self.of_machine(|machine| machine.payload.iter_mut().for_each(change))
+        let payload = |change: &dyn Fn(&mut Body)| {
+            self.of_machine(|arm| arm.payload.iter_mut().for_each(change))
         };
-        let payload: Vec<Vec<f64>> = vec![
-            payload(|body| body.mass += 1.0),
-            payload(|body| body.centre[0] += 0.01),
-            payload(|body| body.centre[1] += 0.01),
-            payload(|body| body.centre[2] += 0.01),
-        ];
-        add(&Law::payload(0.0, [0.0; 3]), payload);
-        let tilt = [0, 1].map(|k| self.of_machine(|machine| machine.gravity[k] += 0.1));
+        let mut columns = vec![payload(&|body| body.mass += 1.0)];
+        columns.extend((0..3).map(|k| payload(&|body| body.centre[k] += 0.01)));
+        add(&Law::payload(0.0, [0.0; 3]), columns);
+        let tilt = [0, 1].map(|k| self.of_machine(|arm| arm.gravity[k] += 0.1));
         add(&Law::tilt([0.0; 2]), tilt.into());
         rivals
     }
@@ -269,15 +261,11 @@ fn per_joint(joint: usize) -> [Law; 11] {
 }
 
 /// Torques by a joint's angle whose phase is free: a balancer, which is a wave a turn, and ripples.
-fn waves(joint: usize) -> Vec<Vec<Law>> {
+fn waves(joint: usize) -> Vec<[Law; 2]> {
     let phases = [0.0, FRAC_PI_2];
-    let ripple = |order: usize| {
-        let law = |phase| Law::ripple(joint, 1.0, order as f64, phase, 0.0);
-        phases.map(law).to_vec()
-    };
-    let balancer = phases
-        .map(|zero| Law::spring(joint, 1.0, zero, 0.0))
-        .to_vec();
+    let ripple =
+        |order: usize| phases.map(|phase| Law::ripple(joint, 1.0, order as f64, phase, 0.0));
+    let balancer = phases.map(|zero| Law::spring(joint, 1.0, zero, 0.0));
     std::iter::once(balancer)
         .chain((1..=LARGEST_ORDER).map(ripple))
         .collect()
