@@ -1,12 +1,12 @@
 //! The twin: its own kinematics and statics against numbers worked out by hand, its noise, its seeds, and the stage.
 
-use crate::answer::{read, root};
+use crate::answer::{has, read, root};
 use crate::desk::Desk;
 use crate::fixture::robot_of;
 use calib::description::{JointDescription, JointKind, RobotDescription};
 use calib::error::Result;
 use calib::stage::{Context, Remainder, Simulate, SimulateReads, SimulateWrites, Stage};
-use calib::table::Robot;
+use calib::table::{Robot, Truth};
 use calib::twin::arm::{Arm, Motion, Row};
 use calib::twin::effect::{
     Backlash, BaseCompliance, GearCyclic, JointCompliance, LinkCompliance, Physical,
@@ -309,8 +309,31 @@ fn simulate(settings: &Simulate, seed: u64) -> Result<SimulateWrites> {
     )
 }
 
+/// What a simulation writes.
+fn made(settings: &Simulate, seed: u64) -> SimulateWrites {
+    simulate(settings, seed).unwrap()
+}
+
+/// What a simulation that must not run says.
+fn refused(settings: &Simulate) -> String {
+    let error = simulate(settings, 1).err().expect("must not run");
+    assert_eq!(error.exit_code(), 2);
+    error.to_string()
+}
+
+/// Where settings are wrong, whatever the robot.
+fn places(settings: &Simulate) -> Vec<String> {
+    let faults = settings.check().into_iter();
+    faults.map(|fault| fault.place).collect()
+}
+
+fn stated(text: &str) -> Simulate {
+    serde_saphyr::from_str(text).unwrap()
+}
+
 fn settings() -> Simulate {
-    let text = "
+    stated(
+        "
 truth: {ratio: [1, 1.0013, 1, 1, 1, 1], compliance_rad_a: [0, 1.89e-5, -2.49e-5, 0, 0, 0]}
 effects:
   - gear_cyclic: {joint: 3, order: 17, amplitude_arcsec: 12, phase_deg: 30}
@@ -318,8 +341,8 @@ effects:
 motors: {sign: [1, -1, 1, 1, 1, 1]}
 poses: {range_deg: [[-90, 90], [-40, 60], [-55, 55], [-120, 120], [-75, 75], [-160, 160]], floor_mm: 300, clearance_mm: 1000}
 blocks: [{usage: fit, points: 12}, {usage: check, points: 8, payload_kg: 210}]
-";
-    serde_saphyr::from_str(text).unwrap()
+",
+    )
 }
 
 #[test]
@@ -327,18 +350,12 @@ fn more_points_than_fit_into_memory_are_refused_with_their_place() {
     let mut all = settings();
     all.blocks[1].points = 1 << 32;
     all.poses.candidates = 1 << 32;
-    let places: Vec<String> = all.check().into_iter().map(|fault| fault.place).collect();
-    assert_eq!(places, ["poses.candidates", "blocks[1].points"]);
+    assert_eq!(places(&all), ["poses.candidates", "blocks[1].points"]);
 }
 
 #[test]
 fn a_seed_gives_one_recording_and_another_seed_another() {
-    let (first, again, other) = (
-        simulate(&settings(), 5),
-        simulate(&settings(), 5),
-        simulate(&settings(), 6),
-    );
-    let (first, again, other) = (first.unwrap(), again.unwrap(), other.unwrap());
+    let [first, again, other] = [5, 5, 6].map(|seed| made(&settings(), seed));
     assert_eq!(first.recording, again.recording);
     assert_eq!(first.truth, again.truth);
     assert_ne!(first.recording.q, other.recording.q);
@@ -354,48 +371,25 @@ fn without_its_remainder_a_twin_is_its_parameters() {
         effects: vec![],
         ..settings()
     };
-    let (all, without, bare) = (
-        simulate(&settings(), 5),
-        simulate(&without, 5),
-        simulate(&bare, 5),
-    );
-    let (all, without, bare) = (all.unwrap(), without.unwrap(), bare.unwrap());
+    let [all, without, bare] = [settings(), without, bare].map(|settings| made(&settings, 5));
     assert_eq!(without.recording, bare.recording);
     assert_eq!(
         all.recording.q, without.recording.q,
         "the plan does not depend on the effects"
     );
     assert_ne!(all.recording.position, without.recording.position);
-    let effects = |table: &calib::table::Truth| {
-        table
-            .0
-            .iter()
-            .map(|row| row.effect.clone())
-            .collect::<Vec<_>>()
-    };
-    assert!(
-        effects(&all.truth)
-            .iter()
-            .any(|effect| effect == "gear_cyclic")
-    );
-    assert!(
-        !effects(&without.truth)
-            .iter()
-            .any(|effect| effect == "gear_cyclic" || effect == "holding_friction")
-    );
-    let ratio = without
-        .truth
-        .0
-        .iter()
-        .find(|row| row.name == "reduction_ratio.j2")
-        .unwrap();
+    let acts = |table: &Truth, effect: &str| table.0.iter().any(|row| row.effect == effect);
+    assert!(acts(&all.truth, "gear_cyclic") && acts(&all.truth, "holding_friction"));
+    assert!(!acts(&without.truth, "gear_cyclic") && !acts(&without.truth, "holding_friction"));
+    let mut rows = without.truth.0.iter();
+    let ratio = rows.find(|row| row.name == "reduction_ratio.j2").unwrap();
     assert!((ratio.value - 0.0013).abs() < 1e-12);
 }
 
 #[test]
 fn a_plan_keeps_to_limits_floor_and_blocks() {
     let settings = settings();
-    let recording = simulate(&settings, 5).unwrap().recording;
+    let recording = made(&settings, 5).recording;
     assert_eq!(recording.rows(), 20);
     let robot = sr210d();
     for index in 0..recording.rows() {
@@ -404,10 +398,8 @@ fn a_plan_keeps_to_limits_floor_and_blocks() {
             assert!((range[0]..=range[1]).contains(&angle.to_degrees()));
         }
         let tool = tool_mm(&robot, &settings.truth, q);
-        assert!(
-            tool[2] >= 295.0 && tool[0].hypot(tool[1]) >= 995.0,
-            "{tool:?}"
-        );
+        let far = tool[0].hypot(tool[1]);
+        assert!(tool[2] >= 295.0 && far >= 995.0, "{tool:?}");
     }
     let payload = recording.payload.unwrap();
     assert_eq!((payload[11], payload[12]), (0.0, 210.0));
@@ -424,7 +416,7 @@ fn currents_carry_the_load_in_the_controllers_sign() {
         remainder: Remainder::None,
         ..settings()
     };
-    let recording = simulate(&settings, 5).unwrap().recording;
+    let recording = made(&settings, 5).recording;
     let current = recording.current.clone().unwrap();
     let robot = sr210d();
     let arm = Arm::new(&robot, &settings.truth);
@@ -439,11 +431,8 @@ fn currents_carry_the_load_in_the_controllers_sign() {
         row.drive = settings.truth.drive(&robot, q);
         let found = settle(&arm, &row, &[spring(2, 1.89e-5), spring(3, 2.49e-5)]);
         for (joint, factor) in [(1, 1.89e-5), (2, -2.49e-5)] {
-            let wind_up = found.motion.joint[joint];
-            assert!(
-                (factor * current[index * 6 + joint] - wind_up).abs() < 1e-12,
-                "row {index}"
-            );
+            let off = factor * current[index * 6 + joint] - found.motion.joint[joint];
+            assert!(off.abs() < 1e-12, "row {index}");
         }
     }
 }
@@ -456,33 +445,22 @@ effects: [{backlash: {joint: 7, gap_arcsec: 10}}]
 motors: {sign: [1, -1, 1, 1, 1, 1]}
 blocks: [{usage: fit, points: 5}]
 ";
-    let settings: Simulate = serde_saphyr::from_str(text).unwrap();
-    let Err(error) = simulate(&settings, 1) else {
-        panic!("must not run")
-    };
-    let message = error.to_string();
+    let message = refused(&stated(text));
     for place in [
         "truth.ratio",
         "truth.links[0].link",
         "truth.compliance_rad_a[1]",
         "effects[0]",
     ] {
-        assert!(
-            message.contains(&format!("simulate.with.{place}: ")),
-            "{place} is missing in\n{message}"
-        );
+        has(&message, &*format!("simulate.with.{place}: "));
     }
-    assert_eq!(error.exit_code(), 2);
 }
 
 #[test]
 fn a_workspace_without_a_pose_is_refused_with_what_to_widen() {
     let mut settings = settings();
     settings.poses.floor_mm = 9000.0;
-    let Err(error) = simulate(&settings, 1) else {
-        panic!("must not run")
-    };
-    assert!(error.to_string().contains("poses.floor_mm"), "{error}");
+    has(&refused(&settings), "poses.floor_mm");
 }
 
 /// Given poses come first and as they are, each from the side that is asked for; the load is the pose's or the block's.
@@ -503,37 +481,25 @@ blocks:
       - {joints_deg: [10, 0, 0, 0, 0, 0], direction: [-1, -1, 1, 0, 1, 1], payload_kg: 0}
       - {joints_deg: [20, -10, 0, 0, 0, 5]}
 ";
-    let settings: Simulate = serde_saphyr::from_str(text).unwrap();
-    assert!(settings.check().is_empty());
-    let recording = simulate(&settings, 3).unwrap().recording;
+    let settings = stated(text);
+    assert!(places(&settings).is_empty());
+    let recording = made(&settings, 3).recording;
     assert_eq!(recording.rows(), 5);
     let side = |row: usize| recording.direction.as_ref().unwrap()[6 * row..6 * row + 6].to_vec();
     assert_eq!(side(0), [-1.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
     assert_eq!(side(1), [-1.0, -1.0, 1.0, 0.0, 1.0, 1.0]);
     // Straight from the pose before.
     assert_eq!(side(2), [1.0, -1.0, 0.0, 0.0, 0.0, 1.0]);
-    assert_eq!(
-        recording.payload.as_ref().unwrap()[..4],
-        [210.0, 0.0, 210.0, 210.0]
-    );
-    assert!(
-        (recording.q(0)[0] - 10f64.to_radians()).abs() < 1e-15
-            && recording.point_id[2] == "fit-0003"
-    );
-    assert!(
-        recording
-            .time
-            .as_ref()
-            .unwrap()
-            .iter()
-            .all(|time| *time > 7200.0)
-    );
+    let payload = recording.payload.as_ref().unwrap();
+    assert_eq!(payload[..4], [210.0, 0.0, 210.0, 210.0]);
+    assert!((recording.q(0)[0] - 10f64.to_radians()).abs() < 1e-15);
+    assert_eq!(recording.point_id[2], "fit-0003");
+    let mut time = recording.time.as_ref().unwrap().iter();
+    assert!(time.all(|time| *time > 7200.0));
     // Joint 2 trails by 10 arcsec on either side; the tool is 1542 mm before its axis and 1340 mm above it.
     let [up, down] = [0, 1].map(|row| recording.position[row]);
-    let moved = (0..3)
-        .map(|axis| (up[axis] - down[axis]).powi(2))
-        .sum::<f64>()
-        .sqrt();
+    let square = |axis: usize| (up[axis] - down[axis]).powi(2);
+    let moved = (square(0) + square(1) + square(2)).sqrt();
     let expected = 20.0 * ARCSEC * 1.542f64.hypot(1.340);
     assert!(
         (moved / expected - 1.0).abs() < 1e-6,
@@ -553,12 +519,6 @@ blocks:
       - {joints_deg: []}
       - {joints_deg: [0, 0, 0, 0, 0, 0], direction: [2, 0, 0, 0, 0, 0], payload_kg: -1}
 ";
-    let settings: Simulate = serde_saphyr::from_str(text).unwrap();
-    let places: Vec<String> = settings
-        .check()
-        .into_iter()
-        .map(|fault| fault.place)
-        .collect();
     let at = |pose: usize, what: &str| format!("blocks[1].given[{pose}].{what}");
     let expected = [
         at(0, "joints_deg"),
@@ -567,18 +527,14 @@ blocks:
         "blocks[1].given".into(),
         "climate.begin_s".into(),
     ];
-    assert_eq!(places, expected);
+    assert_eq!(places(&stated(text)), expected);
     let text = "blocks: [{usage: fit, given: [{joints_deg: [0, 500, 0, 0, 0, 0], direction: [1]}, {joints_deg: [0, 0]}]}]";
-    let settings: Simulate = serde_saphyr::from_str(text).unwrap();
-    let Err(error) = simulate(&settings, 1) else {
-        panic!("must not run")
-    };
-    let message = error.to_string();
-    for said in [
-        "simulate.with.blocks[0].given[0].direction: has 1 numbers, the robot 6 joints",
-        "simulate.with.blocks[0].given[0].joints_deg: joint 2 is at 500 deg; allowed: ",
-        "simulate.with.blocks[0].given[1].joints_deg: has 2 numbers, the robot 6 joints",
+    let message = refused(&stated(text));
+    for part in [
+        "given[0].direction: has 1 numbers, the robot 6 joints",
+        "given[0].joints_deg: joint 2 is at 500 deg; allowed: ",
+        "given[1].joints_deg: has 2 numbers, the robot 6 joints",
     ] {
-        assert!(message.contains(said), "{said} is missing in\n{message}");
+        has(&message, &*format!("simulate.with.blocks[0].{part}"));
     }
 }
