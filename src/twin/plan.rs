@@ -268,7 +268,7 @@ pub(super) fn ranges(robot: &RobotDescription, poses: &Poses) -> Result<Vec<[f64
 }
 
 /// A position of a joint in deg or mm, in rad or m.
-fn si(value: f64, kind: JointKind) -> f64 {
+pub(super) fn si(value: f64, kind: JointKind) -> f64 {
     match kind {
         JointKind::Revolute => value.to_radians(),
         JointKind::Prismatic => 1e-3 * value,
@@ -338,31 +338,30 @@ impl GivenPose {
     }
 
     /// What cannot be, whatever the robot: place below the pose and message.
-    pub fn faults(&self) -> Vec<(&'static str, String)> {
-        let mut out = Vec::new();
-        if self.joints_deg.is_empty() || !self.joints_deg.iter().all(|value| value.is_finite()) {
-            out.push((
+    pub fn faults(&self) -> Vec<(&'static str, &'static str)> {
+        let mut joints = self.joints_deg.iter();
+        let finite = !self.joints_deg.is_empty() && joints.all(|value| value.is_finite());
+        let mut sides = self.direction.iter();
+        let mass = self.payload_kg.unwrap_or(0.0);
+        let rules = [
+            (
+                finite,
                 "joints_deg",
-                "expected a number for every joint, deg (mm for a prismatic joint)".to_string(),
-            ));
-        }
-        if !self
-            .direction
-            .iter()
-            .all(|side| [-1.0, 0.0, 1.0].contains(side))
-        {
-            out.push((
+                "expected a number for every joint, deg (mm for a prismatic joint)",
+            ),
+            (
+                sides.all(|side| [-1.0, 0.0, 1.0].contains(side)),
                 "direction",
-                "allowed: 1, -1 or 0 for every joint, or nothing".to_string(),
-            ));
-        }
-        if self
-            .payload_kg
-            .is_some_and(|mass| !(mass.is_finite() && mass >= 0.0))
-        {
-            out.push(("payload_kg", "expected a mass, 0 or more".to_string()));
-        }
-        out
+                "allowed: 1, -1 or 0 for every joint, or nothing",
+            ),
+            (
+                mass.is_finite() && mass >= 0.0,
+                "payload_kg",
+                "expected a mass, 0 or more",
+            ),
+        ];
+        let broken = rules.into_iter().filter(|(kept, ..)| !kept);
+        broken.map(|(_, key, message)| (key, message)).collect()
     }
 
     /// What this robot cannot do.

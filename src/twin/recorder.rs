@@ -140,18 +140,10 @@ impl Experiment<'_> {
         let later: f64 = scene.effects.iter().map(Physical::later).sum();
         let times = (0..rows).map(|row| row as f64 / way.rate_hz);
         let begin_s = self.climate.begin_s;
-        let clock = |since_s: f64| {
-            (
-                begin_s + since_s,
-                self.climate.temperature(begin_s + since_s),
-            )
-        };
+        let warmth = |since_s: f64| self.climate.temperature(begin_s + since_s);
         let course = times.map(|since_s| {
-            (
-                path.at(since_s + later).q,
-                clock(since_s).0,
-                clock(since_s).1,
-            )
+            let JointState { q, .. } = path.at(since_s + later);
+            (q, begin_s + since_s, warmth(since_s))
         });
         let mut memories = effect::recall(&scene.effects, &memory::along(course));
         let mut beam = Beam::new(self.seed);
@@ -161,17 +153,12 @@ impl Experiment<'_> {
         } else {
             0.0
         };
-        let mut astray: Vec<f64> = self
-            .repeatability_arcsec
-            .iter()
-            .map(|_| play.normal())
-            .collect();
+        let joints = self.repeatability_arcsec.iter();
+        let mut astray: Vec<f64> = joints.map(|_| play.normal()).collect();
         let mut direction = vec![0.0; scene.arm.links.len()];
-        let blocks = self
-            .blocks
-            .iter()
-            .enumerate()
-            .flat_map(|(number, block)| std::iter::repeat_n((number, block), block.points));
+        let blocks = self.blocks.iter().enumerate();
+        let blocks =
+            blocks.flat_map(|(number, block)| std::iter::repeat_n((number, block), block.points));
         let mut shots = Vec::with_capacity(rows);
         for (row, (block, load)) in blocks.enumerate() {
             let since_s = row as f64 / way.rate_hz;
@@ -186,26 +173,18 @@ impl Experiment<'_> {
                 *astray = lasts * *astray + (1.0 - lasts * lasts).sqrt() * play.normal();
             }
             self.scatter(&mut drive, &scene.arm, |joint| astray[joint]);
-            for (side, speed) in direction
-                .iter_mut()
-                .zip(&velocity)
-                .filter(|(_, speed)| **speed != 0.0)
-            {
-                *side = speed.signum();
+            for (side, speed) in direction.iter_mut().zip(&velocity) {
+                *side = if *speed == 0.0 { *side } else { speed.signum() };
             }
-            let (time_s, temperature_c) = clock(since_s);
-            let payload_kg = load.payload_kg;
-            let memory = std::mem::take(&mut memories[row]);
-            let direction = direction.clone();
             let row = Row {
                 command,
                 drive,
-                direction,
-                time_s,
-                temperature_c,
-                payload_kg,
+                direction: direction.clone(),
+                time_s: begin_s + since_s,
+                temperature_c: warmth(since_s),
+                payload_kg: load.payload_kg,
                 velocity,
-                memory,
+                memory: std::mem::take(&mut memories[row]),
             };
             let before = q.clone();
             let (shot, _) = scene.shot((block, row), q, &before, &mut beam);

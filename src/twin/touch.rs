@@ -81,39 +81,35 @@ const FAR: f64 = 0.4;
 impl Fixture {
     /// What is wrong with it: the place below it, and the message.
     pub fn faults(&self) -> Vec<(&'static str, &'static str)> {
-        let mut faults = Vec::new();
-        let plain = |part: &str| {
-            !part.is_empty()
-                && part
-                    .chars()
-                    .all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
-        };
-        if !self.name.split('/').all(plain) {
-            faults.push((
+        let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        let plain = |part: &str| !part.is_empty() && part.chars().all(is_word);
+        let normal = self.normal.is_some_and(|normal| matrix::norm(normal) > 0.0);
+        let radius = self.radius_mm.is_some_and(|radius| radius > 0.0);
+        let rules = [
+            (
+                self.name.split('/').all(plain),
                 "name",
                 "expected letters, digits, - and _, in parts with / between, e.g. front/0",
-            ));
-        }
-        if self.points == 0 {
-            faults.push(("points", "expected 1 or more"));
-        }
-        if !(self.sigma_um >= 0.0 && self.sigma_um.is_finite()) {
-            faults.push(("sigma_um", "expected 0 or more"));
-        }
-        let normal = self.normal.is_some_and(|normal| matrix::norm(normal) > 0.0);
-        if (self.kind == FixtureKind::Plane) != normal {
-            faults.push((
+            ),
+            (self.points > 0, "points", "expected 1 or more"),
+            (
+                self.sigma_um >= 0.0 && self.sigma_um.is_finite(),
+                "sigma_um",
+                "expected 0 or more",
+            ),
+            (
+                (self.kind == FixtureKind::Plane) == normal,
                 "normal",
                 "a plane has one, e.g. [0, 0, 1], and nothing else has",
-            ));
-        }
-        if (self.kind != FixtureKind::Socket) != self.radius_mm.is_some_and(|radius| radius > 0.0) {
-            faults.push((
+            ),
+            (
+                (self.kind != FixtureKind::Socket) == radius,
                 "radius_mm",
                 "planes and spheres have one above 0, sockets none",
-            ));
-        }
-        faults
+            ),
+        ];
+        let broken = rules.into_iter().filter(|(kept, ..)| !kept);
+        broken.map(|(_, key, message)| (key, message)).collect()
     }
 
     /// A point at which the ball may lie, m: drawn over what is touched, with the noise of coming back.

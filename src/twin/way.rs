@@ -3,7 +3,7 @@
 use super::arm::Arm;
 use super::noise::{Noise, Purpose};
 use super::plan::{self, Poses};
-use calib_foundation::description::{JointKind, RobotDescription};
+use calib_foundation::description::RobotDescription;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -104,37 +104,23 @@ impl Path {
     ) -> Result<Self, String> {
         let ranges = plan::ranges(robot, poses)?;
         let mut draw = Noise::new(seed, Purpose::Poses);
-        let speeds: Vec<f64> = robot
-            .joints
-            .iter()
-            .map(|joint| {
-                if joint.kind == JointKind::Revolute {
-                    way.speed_deg_s.to_radians()
-                } else {
-                    1e-3 * way.speed_deg_s
-                }
-            })
+        let joints = robot.joints.iter();
+        let speeds: Vec<f64> = joints
+            .map(|joint| plan::si(way.speed_deg_s, joint.kind))
             .collect();
         if way.shape == Shape::Waves {
             let joints = ranges.iter().zip(&speeds);
-            return Ok(Self::Waves(
-                joints
-                    .map(|(range, speed)| waves(*range, *speed, &mut draw))
-                    .collect(),
-                None,
-            ));
+            let waves = joints.map(|(range, speed)| waves(*range, *speed, &mut draw));
+            return Ok(Self::Waves(waves.collect(), None));
         }
         let mut moves: Vec<Move> = Vec::new();
         let (mut at, _) = plan::allowed(arm, poses, &ranges, &mut draw)?;
         let mut time = -MARGIN_S;
         while time < seconds + MARGIN_S {
             let (to, _) = plan::allowed(arm, poses, &ranges, &mut draw)?;
-            let longest = at
-                .iter()
-                .zip(&to)
-                .zip(&speeds)
-                .map(|((a, b), speed)| PEAK * (b - a).abs() / speed);
-            let duration_s = longest.fold(SHORTEST_S, f64::max);
+            let joints = at.iter().zip(&to).zip(&speeds);
+            let lasts = joints.map(|((a, b), speed)| PEAK * (b - a).abs() / speed);
+            let duration_s = lasts.fold(SHORTEST_S, f64::max);
             let from = std::mem::replace(&mut at, to.clone());
             moves.push(Move {
                 start_s: time,

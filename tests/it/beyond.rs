@@ -14,6 +14,7 @@ use calib::twin::equilibrium::{Equilibrium, settle, sighted};
 use calib::twin::matrix::IDENTITY;
 use calib::twin::memory::{Moment, past};
 use calib::twin::plan::Point;
+use calib::twin::recorder::Shot;
 use calib::twin::truth::TrueRobot;
 use std::f64::consts::PI;
 
@@ -246,18 +247,13 @@ fn beyond_the_library_arms_have_five_joints_too_and_come_from_near_by() {
     let case = Case::make(&design, 3, contents[3]).unwrap();
     assert_eq!(case.robot.joints.len(), 5);
     assert!(case.recording().is_ok() && case.climate.swing_k > 0.0);
-    let far = |pair: &[calib::twin::recorder::Shot]| {
-        pair[0]
-            .q
-            .iter()
-            .zip(&pair[1].q)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max)
-            .to_degrees()
+    let far = |pair: &[Shot]| -> f64 {
+        let joints = pair[0].q.iter().zip(&pair[1].q);
+        let far = joints.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        far.to_degrees()
     };
-    let near = case
-        .shots
-        .windows(2)
+    let pairs = case.shots.windows(2);
+    let near = pairs
         .filter(|pair| (1e-3..6.01).contains(&far(pair)))
         .count();
     assert!(
@@ -286,25 +282,18 @@ fn the_librarys_recordings_are_those_of_before() {
             .enumerate()
             .map(|(number, content)| Case::make(&design, number, *content).unwrap());
         let line = |case: Case| {
-            let causes = case.concealed.iter();
-            let causes: Vec<String> = causes
-                .map(|one| {
-                    format!(
-                        "{} at {}, {}, L {:.3}",
-                        one.cause.effect, one.cause.place, one.form, one.strength
-                    )
-                })
-                .collect();
+            let causes = case.concealed.iter().map(|one| {
+                let (effect, place) = (one.cause.effect, &one.cause.place);
+                format!("{effect} at {place}, {}, L {:.3}", one.form, one.strength)
+            });
+            let causes: Vec<String> = causes.collect();
+            let (kind, held_out) = (case.kind.name(), case.shots.len() - case.fit);
             let causes = if causes.is_empty() {
                 "nothing".into()
             } else {
                 causes.join(" + ")
             };
-            format!(
-                "{}, {} held out: {causes}",
-                case.kind.name(),
-                case.shots.len() - case.fit
-            )
+            format!("{kind}, {held_out} held out: {causes}")
         };
         cases.map(line).collect()
     };

@@ -72,17 +72,11 @@ impl ProveArguments {
             proof::conceal(folder, &design, self.conceal.threads())?;
         }
         // Before anything is diagnosed, and again before anything is revealed: a diagnosis must not have touched the truth.
-        let names: Vec<String> = Seal::check(folder)?
-            .iter()
-            .filter_map(|name| case(name))
-            .collect();
-        let store = |error: std::io::Error| {
-            Error::store(
-                folder.join(VERDICTS).display().to_string(),
-                error.to_string(),
-            )
-        };
+        let sealed = Seal::check(folder)?;
+        let names: Vec<String> = sealed.iter().filter_map(|name| case(name)).collect();
         let verdicts = folder.join(VERDICTS);
+        let store =
+            |error: std::io::Error| Error::store(verdicts.display().to_string(), error.to_string());
         std::fs::create_dir_all(&verdicts).map_err(store)?;
         let program = program().map_err(store)?;
         let blind = BlindDiagnosis {
@@ -90,31 +84,25 @@ impl ProveArguments {
             pipeline: &pipeline,
             folder,
         };
-        let diagnosed = in_order(
-            self.conceal.threads(),
-            names.len(),
-            |number| -> Result<()> {
-                let name = &names[number];
-                let tell = |said: &str| {
-                    if !self.quiet {
-                        let _ = writeln!(std::io::stderr(), "{name}: {said}");
-                    }
-                };
-                tell(&blind.diagnose(name, &verdicts, None)?);
-                let left_out = self.left_out.then(|| {
-                    proof::single_cause(&folder.join(SEALED).join(format!("{name}.json")))
-                });
-                if let Some(cause) = left_out.transpose()?.flatten() {
-                    let verdicts = verdicts.join(LEFT_OUT);
-                    std::fs::create_dir_all(&verdicts).map_err(store)?;
-                    tell(&format!(
-                        "without its cause: {}",
-                        blind.diagnose(name, &verdicts, Some(&cause))?
-                    ));
+        let diagnose = |number: usize| -> Result<()> {
+            let name = &names[number];
+            let tell = |said: &str| {
+                if !self.quiet {
+                    let _ = writeln!(std::io::stderr(), "{name}: {said}");
                 }
-                Ok(())
-            },
-        );
+            };
+            tell(&blind.diagnose(name, &verdicts, None)?);
+            let truth = folder.join(SEALED).join(format!("{name}.json"));
+            let cause = self.left_out.then(|| proof::single_cause(&truth));
+            if let Some(cause) = cause.transpose()?.flatten() {
+                let verdicts = verdicts.join(LEFT_OUT);
+                std::fs::create_dir_all(&verdicts).map_err(store)?;
+                let said = blind.diagnose(name, &verdicts, Some(&cause))?;
+                tell(&format!("without its cause: {said}"));
+            }
+            Ok(())
+        };
+        let diagnosed = in_order(self.conceal.threads(), names.len(), diagnose);
         diagnosed.into_iter().collect::<Result<()>>()?;
         let sealed = Seal::check(folder)?;
         let board = board(folder, &sealed, &verdicts)?;

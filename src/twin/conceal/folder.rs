@@ -8,6 +8,7 @@ use super::size::Concealed;
 use crate::effect::Physical;
 use crate::folder::{Decimals, File, Log, pretty, robot};
 use crate::recorder::Shot;
+use crate::true_value::TrueValue;
 use calib_foundation::description::RobotDescription;
 use serde_json::{Value, json};
 
@@ -33,11 +34,8 @@ impl Case {
     /// The robot as its file states it.
     fn stated(&self) -> RobotDescription {
         let mut stated = self.robot.clone();
-        if self.bare {
-            stated
-                .joints
-                .iter_mut()
-                .for_each(|joint| (joint.mass, joint.centre) = (None, None));
+        for joint in stated.joints.iter_mut().filter(|_| self.bare) {
+            (joint.mass, joint.centre) = (None, None);
         }
         stated
     }
@@ -93,20 +91,10 @@ impl Case {
     fn log(&self) -> Log {
         let shown = |column: Column| !self.hidden.contains(&column);
         let each = |value: fn(&Shot) -> f64| self.shots.iter().map(value).collect::<Vec<f64>>();
-        let joints = |value: fn(&Shot) -> &Vec<f64>| {
-            self.shots
-                .iter()
-                .flat_map(value)
-                .copied()
-                .collect::<Vec<f64>>()
+        let joints = |value: fn(&Shot) -> &Vec<f64>| -> Vec<f64> {
+            self.shots.iter().flat_map(value).copied().collect()
         };
-        let usage = |shot: &Shot| {
-            if shot.block == FIT {
-                "fit".to_string()
-            } else {
-                "validate".to_string()
-            }
-        };
+        let usage = |shot: &Shot| if shot.block == FIT { "fit" } else { "validate" }.to_string();
         Log {
             joints: self.robot.joints.len(),
             id: (0..self.shots.len()).map(id).collect(),
@@ -129,10 +117,13 @@ fn id(row: usize) -> String {
 }
 
 fn effect(one: &Concealed) -> Value {
-    let numbers =
-        one.cause.physical.iter().flat_map(Physical::truth).map(
-            |number| json!({ "name": number.name, "value": number.value, "unit": number.unit }),
-        );
+    let number = |one: TrueValue| json!({ "name": one.name, "value": one.value, "unit": one.unit });
+    let numbers = one
+        .cause
+        .physical
+        .iter()
+        .flat_map(Physical::truth)
+        .map(number);
     let mut out = json!({
         "effect": one.cause.effect,
         "where": one.cause.place,

@@ -134,7 +134,8 @@ pub(super) fn conceal(
             let mut taken = drafts.iter().flat_map(|other| &other.causes);
             let places = draft.causes.iter().map(|cause| &cause.place);
             let twice = taken.any(|cause| places.clone().any(|place| *place == cause.place));
-            (!twice && !(is_pair && draft.causes.len() > 1)).then_some(draft)
+            let is_several = is_pair && draft.causes.len() > 1;
+            (!twice && !is_several).then_some(draft)
         };
         let draft = (0..50).find_map(attempt);
         drafts.extend(draft);

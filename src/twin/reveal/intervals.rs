@@ -24,10 +24,19 @@ struct Expected {
     unsigned: bool,
 }
 
+type Counterpart = (
+    &'static str,
+    &'static str,
+    &'static [&'static str],
+    &'static str,
+    f64,
+    &'static str,
+);
+
 /// True numbers that have a counterpart: effect, the twin's word for the number, forms of which it holds (empty: all), the word of a
 /// diagnosis after the seat, its value per true one, and unit.
 #[rustfmt::skip]
-const COUNTERPARTS: [(&str, &str, &[&str], &str, f64, &str); 11] = [
+const COUNTERPARTS: [Counterpart; 11] = [
     ("joint_compliance", "", &[], "", 1.0, "rad/Nm"),
     ("link_compliance", "middle", &[], "", 1.0, "rad/Nm"),
     ("base_compliance", "x", &["isotropic"], "", 1.0, "rad/Nm"),

@@ -95,13 +95,9 @@ pub struct Case {
 impl Case {
     /// Every cause of at least this strength named exactly, and nothing said that is not there.
     pub(crate) fn right(&self, strength: f64) -> bool {
-        let due = |cause: &&Marked| cause.strength >= strength;
-        self.strays.is_empty()
-            && self
-                .causes
-                .iter()
-                .filter(due)
-                .all(|cause| cause.outcome == Outcome::Exact)
+        let is_missed =
+            |cause: &Marked| cause.strength >= strength && cause.outcome != Outcome::Exact;
+        self.strays.is_empty() && !self.causes.iter().any(is_missed)
     }
 }
 
@@ -136,36 +132,34 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
     let accepted_names: Vec<Atoms> = truth.accepted.iter().map(Name::atoms).collect();
     let stray = |finding: &&Finding| reach(finding).is_disjoint(&known);
     let strays: Vec<String> = answer.findings.iter().filter(stray).map(label_of).collect();
-    let causes = truth
-        .effects
-        .iter()
-        .filter(|cause| cause.wanted)
-        .map(|cause| {
-            let own = cause.atoms();
-            let same = all_atoms(&cause.same);
-            let outcome = if own.is_subset(&found) || !same.is_disjoint(&found) {
-                Outcome::Exact
-            } else if own.is_subset(&reached) || !accepted.is_disjoint(&found) {
-                Outcome::InSet
-            } else if strays.is_empty() {
-                Outcome::Silent
-            } else {
-                Outcome::Wrong
-            };
-            Marked {
-                effect: cause.effect.clone(),
-                place: cause.place.clone(),
-                form: cause.form.clone(),
-                strange: cause.strange,
-                strength: cause.strength,
-                outcome,
-                placed: placed(cause, truth, &answer.findings, &known),
-                label: (outcome == Outcome::Wrong)
-                    .then(|| strays.first().cloned())
-                    .flatten(),
-                probability: probability_of(&own, &answer.findings),
-            }
-        });
+    let wanted = truth.effects.iter().filter(|cause| cause.wanted);
+    let causes = wanted.map(|cause| {
+        let name = cause.atoms();
+        let same = all_atoms(&cause.same);
+        let outcome = if name.is_subset(&found) || !same.is_disjoint(&found) {
+            Outcome::Exact
+        } else if name.is_subset(&reached) || !accepted.is_disjoint(&found) {
+            Outcome::InSet
+        } else if strays.is_empty() {
+            Outcome::Silent
+        } else {
+            Outcome::Wrong
+        };
+        let stray = strays.first().filter(|_| outcome == Outcome::Wrong);
+        Marked {
+            effect: cause.effect.clone(),
+            place: cause.place.clone(),
+            form: cause.form.clone(),
+            strange: cause.strange,
+            strength: cause.strength,
+            outcome,
+            placed: placed(cause, truth, &answer.findings, &known),
+            label: stray.cloned(),
+            probability: probability_of(&name, &answer.findings),
+        }
+    });
+    let faults = truth.tampered.iter().map(|fault| &fault.effect);
+    let numbers = truth.effects.iter();
     let named = |name: &str| answer.findings.iter().any(|finding| finding.effect == name);
     Case {
         name: truth.case.clone(),
@@ -174,15 +168,9 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
         points: truth.points.fit,
         verdict: answer.verdict.clone(),
         causes: causes.collect(),
-        tampered: truth
-            .tampered
-            .iter()
-            .map(|fault| (fault.effect.clone(), named(&fault.effect)))
-            .collect(),
+        tampered: faults.map(|fault| (fault.clone(), named(fault))).collect(),
         held_out: held_out(truth, answer),
-        intervals: truth
-            .effects
-            .iter()
+        intervals: numbers
             .flat_map(|cause| intervals(cause, &answer.findings))
             .collect(),
         statements: statements(&answer.findings, &true_names, &accepted_names),

@@ -10,7 +10,7 @@ use crate::noise::{Noise, Purpose};
 use crate::torque::law::{Body, Machine};
 use crate::way::Path;
 use calib_foundation::description::{
-    DeclaredInertias, InertiaMoments, MassTolerance, RobotDescription,
+    DeclaredInertias, InertiaMoments, JointDescription, MassTolerance, RobotDescription,
 };
 
 impl Design {
@@ -93,10 +93,8 @@ const MOST_OFF: f64 = 2.0;
 impl TorqueCase {
     /// The case of this number.
     pub fn draw(design: &Design, number: usize) -> Self {
-        let seed = design
-            .seed
-            .wrapping_mul(1_000_003)
-            .wrapping_add(number as u64);
+        let seed = design.seed.wrapping_mul(1_000_003);
+        let seed = seed.wrapping_add(number as u64);
         let mut noise = Noise::new(seed, Purpose::Design);
         let kind = ALL_KINDS[noise.index(ALL_KINDS.len())];
         let robot = declared(kind, &mut noise);
@@ -126,11 +124,7 @@ impl TorqueCase {
             lasting: vec![0.0; n],
             per_unit: per_unit.collect(),
             resolution: if sensors { 0.01 } else { 0.002 },
-            encoder_deg: if kind == Kind::Sr210d {
-                360.0 / f64::from(1 << 20)
-            } else {
-                360.0 / f64::from(1 << 18)
-            },
+            encoder_deg: 360.0 / f64::from(1 << if kind == Kind::Sr210d { 20 } else { 18 }),
             sensors,
             robot,
         };
@@ -138,10 +132,8 @@ impl TorqueCase {
         let peak = peaks(&rows.rigid, n);
         let most = peak.iter().copied().fold(0.0, f64::max);
         let level = noise.uniform(0.7, 1.4);
-        case.white = peak
-            .iter()
-            .map(|peak| level * (0.01 * peak + 0.001 * most))
-            .collect();
+        let white = |peak: &f64| level * (0.01 * peak + 0.001 * most);
+        case.white = peak.iter().map(white).collect();
         case.lasting = case.white.iter().map(|white| 0.27 * white).collect();
         case.conceal(design, number, &peak, &mut noise);
         case
@@ -155,16 +147,10 @@ impl TorqueCase {
             for (joint, scale) in scale.iter().enumerate() {
                 let other = noise.chance(design.other_forms * 0.3);
                 let exponent = if other { noise.uniform(0.6, 0.8) } else { 1.0 };
-                self.laws.push(Law::viscous(
-                    joint,
-                    scale * noise.uniform(0.04, 0.12),
-                    exponent,
-                ));
-                self.laws.push(Law::coulomb(
-                    joint,
-                    scale * noise.uniform(0.05, 0.15),
-                    width,
-                ));
+                let viscous = scale * noise.uniform(0.04, 0.12);
+                self.laws.push(Law::viscous(joint, viscous, exponent));
+                let coulomb = scale * noise.uniform(0.05, 0.15);
+                self.laws.push(Law::coulomb(joint, coulomb, width));
             }
         }
         self.common = self.laws.len();
@@ -238,42 +224,25 @@ fn rod(mass: f64, span: Vector) -> InertiaMoments {
     let length = matrix::norm(span).max(0.08);
     let along = matrix::scale(span, 1.0 / matrix::norm(span).max(1e-9));
     let radius = 0.18 * length + 0.03;
-    let (axial, lateral) = (
-        0.5 * mass * radius * radius,
-        mass * (length * length / 12.0 + 0.25 * radius * radius),
-    );
-    let moment =
-        |i: usize, j: usize| f64::from(i == j) * lateral + (axial - lateral) * along[i] * along[j];
-    [
-        moment(0, 0),
-        moment(0, 1),
-        moment(0, 2),
-        moment(1, 1),
-        moment(1, 2),
-        moment(2, 2),
-    ]
+    let axial = 0.5 * mass * radius * radius;
+    let lateral = mass * (length * length / 12.0 + 0.25 * radius * radius);
+    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
+        .map(|(i, j)| f64::from(i == j) * lateral + (axial - lateral) * along[i] * along[j])
 }
 
 /// The bodies that a description declares.
 fn machine(robot: &RobotDescription) -> Machine {
-    let body = |(joint, moments): (
-        &calib_foundation::description::JointDescription,
-        &Option<InertiaMoments>,
-    )| Body {
+    let joints = robot.joints.iter().zip(&robot.inertias.links);
+    let links = joints.map(|(joint, moments)| Body {
         mass: joint.mass.unwrap_or(0.0),
         centre: joint.centre.unwrap_or(joint.point),
         inertia: moments.unwrap_or_default(),
-    };
+    });
     Machine {
         axes: robot.joints.iter().map(|joint| joint.axis).collect(),
         points: robot.joints.iter().map(|joint| joint.point).collect(),
         tool: robot.tool,
-        links: robot
-            .joints
-            .iter()
-            .zip(&robot.inertias.links)
-            .map(body)
-            .collect(),
+        links: links.collect(),
         payload: (robot.payload_mass > 0.0).then(|| Body {
             mass: robot.payload_mass,
             centre: robot.payload_centre,
@@ -303,15 +272,12 @@ pub(super) fn paths(
     seconds: f64,
     noise: &mut Noise,
 ) -> Vec<(f64, Path)> {
-    let ranges: Vec<[f64; 2]> = robot
-        .joints
-        .iter()
-        .map(|joint| {
-            let [lower, upper] = joint.limits.unwrap_or([-1.5, 1.5]);
-            let (middle, reach) = (0.5 * (lower + upper), (0.3 * (upper - lower)).min(1.2));
-            [middle - reach, middle + reach]
-        })
-        .collect();
+    let range = |joint: &JointDescription| {
+        let [lower, upper] = joint.limits.unwrap_or([-1.5, 1.5]);
+        let (middle, reach) = (0.5 * (lower + upper), (0.3 * (upper - lower)).min(1.2));
+        [middle - reach, middle + reach]
+    };
+    let ranges: Vec<[f64; 2]> = robot.joints.iter().map(range).collect();
     let paths = STRETCHES.iter().enumerate().map(|(k, share)| {
         let draw = if k % 2 == 0 { sines } else { moves };
         let duration = share * seconds;
@@ -322,12 +288,9 @@ pub(super) fn paths(
 
 /// Largest rigid torque of each joint, Nm.
 fn peaks(rigid: &[f64], joints: usize) -> Vec<f64> {
-    let of_joint = |joint: usize| {
-        rigid
-            .iter()
-            .skip(joint)
-            .step_by(joints)
-            .fold(0.0, |most: f64, x| most.max(x.abs()))
-    };
-    (0..joints).map(of_joint).collect()
+    let mut peaks = vec![0.0; joints];
+    for (k, torque) in rigid.iter().enumerate() {
+        peaks[k % joints] = torque.abs().max(peaks[k % joints]);
+    }
+    peaks
 }
