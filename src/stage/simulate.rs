@@ -16,6 +16,7 @@ use crate::twin::way::Way;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fmt::Display;
 
 /// Whether the effects listed in `effects` act.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -87,10 +88,7 @@ impl Stage for Simulate {
     fn faults(&self, at: &mut Place) {
         for (index, fixture) in self.fixtures.iter().enumerate() {
             let mut at = at.at(format!("fixtures[{index}]"));
-            fixture
-                .faults()
-                .into_iter()
-                .for_each(|(key, message)| at.at(key).fault(message));
+            all_faults(&mut at, fixture.faults());
             let mut others = self.fixtures[..index].iter();
             at.at("name").must(
                 others.all(|other| other.name != fixture.name),
@@ -111,10 +109,7 @@ impl Stage for Simulate {
             format!("expected {MOST} candidates at most"),
         );
         for (place, pose) in given(&self.blocks) {
-            let mut at = at.at(place);
-            pose.faults()
-                .into_iter()
-                .for_each(|(key, message)| at.at(key).fault(message));
+            all_faults(&mut at.at(place), pose.faults());
         }
         for (index, block) in self.blocks.iter().enumerate() {
             let mut at = at.at(format!("blocks[{index}]"));
@@ -137,30 +132,21 @@ impl Stage for Simulate {
             at.at(format!("poses.range_deg[{index}]"))
                 .must(possible, "expected [lower, upper], lower first");
         }
-        let Tracker {
-            noise_um,
-            noise_um_per_m,
-            coverage,
-            ..
-        } = self.tracker;
+        let tracker = &self.tracker;
+        let is_noise = tracker.noise_um >= 0.0 && tracker.noise_um_per_m >= 0.0;
         at.at("tracker").must(
-            coverage > 0.0 && noise_um >= 0.0 && noise_um_per_m >= 0.0,
+            tracker.coverage > 0.0 && is_noise,
             "expected noise_um and noise_um_per_m of 0 or more, and a coverage above 0, e.g. 2",
         );
-        let Climate {
-            pace_s: [shortest, longest],
-            begin_s,
-            warm_up_h,
-            swing_h,
-            ..
-        } = self.climate;
+        let climate = &self.climate;
         at.at("climate.begin_s").must(
-            begin_s >= 0.0 && begin_s.is_finite(),
+            climate.begin_s >= 0.0 && climate.begin_s.is_finite(),
             "expected a time of 0 or more, s",
         );
+        let [shortest, longest] = climate.pace_s;
         let paced = shortest > 0.0 && shortest <= longest && longest.is_finite();
         at.at("climate").must(
-            paced && warm_up_h > 0.0 && swing_h > 0.0,
+            paced && climate.warm_up_h > 0.0 && climate.swing_h > 0.0,
             "expected pace_s as [shortest, longest] above 0, and warm_up_h and swing_h above 0",
         );
         if let Some(way) = &self.motion {
@@ -234,6 +220,13 @@ impl Stage for Simulate {
     }
 }
 
+/// Faults of what stands at a place, each with its place below that.
+fn all_faults<K: Display, M: Into<String>>(at: &mut Place, faults: Vec<(K, M)>) {
+    for (key, message) in faults {
+        at.at(key).fault(message);
+    }
+}
+
 impl Simulate {
     /// The effects that act.
     fn acting(&self) -> &[Physical] {
@@ -246,21 +239,15 @@ impl Simulate {
     /// Settings that this robot cannot have.
     fn against(&self, robot: &RobotDescription, at: &mut Place) {
         let joints = robot.joints.len();
-        for (key, what) in self.truth.faults(robot) {
-            at.at("truth").at(key).fault(what);
-        }
+        all_faults(&mut at.at("truth"), self.truth.faults(robot));
         for (place, pose) in given(&self.blocks) {
-            let mut at = at.at(place);
-            pose.against(robot)
-                .into_iter()
-                .for_each(|(key, what)| at.at(key).fault(what));
+            all_faults(&mut at.at(place), pose.against(robot));
         }
         for (index, effect) in self.effects.iter().enumerate() {
             let mut at = at.at(format!("effects[{index}]"));
-            effect
-                .fault(joints)
-                .into_iter()
-                .for_each(|what| at.fault(what));
+            if let Some(what) = effect.fault(joints) {
+                at.fault(what);
+            }
             at.must(
                 self.motion.is_some() || !effect.moves_only(),
                 "shows on a moving arm only; say `motion`, e.g. motion: {rate_hz: 100}",
@@ -276,17 +263,11 @@ impl Simulate {
                 format!("has {numbers}, the robot {all}"),
             );
         }
-        for (joint, factor) in self
-            .truth
-            .compliance_rad_a
-            .iter()
-            .enumerate()
-            .filter(|(_, factor)| **factor != 0.0)
-        {
+        let factors = self.truth.compliance_rad_a.iter().enumerate();
+        for (joint, factor) in factors.filter(|(_, factor)| **factor != 0.0) {
             let mut at = at.at(format!("truth.compliance_rad_a[{joint}]"));
-            let known = robot
-                .joints
-                .get(joint)
+            let described = robot.joints.get(joint);
+            let known = described
                 .is_some_and(|j| j.reduction_ratio.is_some() && j.motor_constant.is_some());
             let sign = self.motors.sign.get(joint).copied().unwrap_or(1.0);
             at.must(
