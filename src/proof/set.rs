@@ -98,12 +98,9 @@ impl Seal {
     /// Writes a file of the set below `folder` and takes its hash in.
     fn write(&mut self, folder: &Path, name: String, text: &str) -> Result<()> {
         let path = folder.join(&name);
-        let fault =
-            |error: std::io::Error| Error::store(path.display().to_string(), error.to_string());
-        if let Some(parent) = path.parent() {
-            fs::create_dir_all(parent).map_err(fault)?;
-        }
-        fs::write(&path, text).map_err(fault)?;
+        let parent = path.parent().unwrap_or(folder);
+        let written = fs::create_dir_all(parent).and_then(|()| fs::write(&path, text));
+        written.map_err(|error| Error::store(path.display().to_string(), error.to_string()))?;
         self.files.insert(name, digest(text.as_bytes()));
         Ok(())
     }
@@ -134,11 +131,11 @@ impl Seal {
             let inside = Path::new(name)
                 .components()
                 .all(|part| matches!(part, Component::Normal(_)));
-            match if inside {
-                raw::bytes(&folder.join(name))
-            } else {
-                Err(ErrorKind::InvalidFilename.into())
-            } {
+            let bytes = match inside {
+                true => raw::bytes(&folder.join(name)),
+                false => Err(ErrorKind::InvalidFilename.into()),
+            };
+            match bytes {
                 Ok(bytes) if digest(&bytes) == *hash => (),
                 Ok(_) => faults.push(Fault::new(name, "was changed since it was sealed")),
                 Err(error) => faults.push(Fault::new(
@@ -154,8 +151,8 @@ impl Seal {
     /// Writes the seal itself.
     fn close(&self, folder: &Path) -> Result<()> {
         let path = folder.join(SEAL);
-        let text =
-            serde_json::to_string_pretty(self).map_err(|error| Error::Bug(error.to_string()))?;
+        let text = serde_json::to_string_pretty(self);
+        let text = text.map_err(|error| Error::Bug(error.to_string()))?;
         fs::write(&path, text + "\n")
             .map_err(|error| Error::store(path.display().to_string(), error.to_string()))
     }
@@ -216,15 +213,9 @@ fn touched(recording: &Recording) -> BTreeMap<String, String> {
     let mut files: BTreeMap<String, String> = BTreeMap::new();
     for row in 0..recording.rows() {
         if let Some(name) = recording.contact(row) {
-            let joints: Vec<String> = recording
-                .q(row)
-                .iter()
-                .map(|q| format!("{q:.12}"))
-                .collect();
-            files
-                .entry(format!("{name}.csv"))
-                .or_default()
-                .push_str(&(joints.join(",") + "\n"));
+            let joints = recording.q(row).iter().map(|q| format!("{q:.12}"));
+            let line = joints.collect::<Vec<String>>().join(",") + "\n";
+            *files.entry(format!("{name}.csv")).or_default() += &line;
         }
     }
     files
@@ -233,14 +224,11 @@ fn touched(recording: &Recording) -> BTreeMap<String, String> {
 /// The recording as a log; what is not known in a row of it is 0, which the twin never leaves unknown.
 fn log(recording: Recording, at_once: bool) -> Log {
     let rows = recording.rows();
+    let usage = recording.usage.into_iter().map(Option::unwrap_or_default);
     Log {
         joints: recording.joints,
         time_s: recording.time,
-        usage: recording
-            .usage
-            .into_iter()
-            .map(Option::unwrap_or_default)
-            .collect(),
+        usage: usage.collect(),
         payload_kg: recording.payload.unwrap_or_else(|| vec![0.0; rows]),
         q: recording.q,
         current: recording.current,

@@ -120,23 +120,17 @@ impl Fixture {
             FixtureKind::Socket => centre.map(|coordinate| coordinate + sigma * noise.normal()),
             FixtureKind::Sphere => {
                 let along = draw.vector(1.0, 1.0);
-                matrix::add(
-                    centre,
-                    matrix::scale(along, radius + sigma * noise.normal()),
-                )
+                let out = matrix::scale(along, radius + sigma * noise.normal());
+                matrix::add(centre, out)
             }
             FixtureKind::Plane => {
                 let normal = self.normal.unwrap_or([0.0, 0.0, 1.0]);
                 let normal = matrix::scale(normal, 1.0 / matrix::norm(normal));
                 let flat = matrix::cross(normal, draw.vector(1.0, 1.0));
-                let out = matrix::scale(
-                    flat,
-                    radius * draw.uniform(0.0, 1.0).sqrt() / matrix::norm(flat).max(1e-9),
-                );
-                matrix::add(
-                    matrix::add(centre, out),
-                    matrix::scale(normal, sigma * noise.normal()),
-                )
+                let far = radius * draw.uniform(0.0, 1.0).sqrt();
+                let out = matrix::scale(flat, far / matrix::norm(flat).max(1e-9));
+                let off = matrix::scale(normal, sigma * noise.normal());
+                matrix::add(matrix::add(centre, out), off)
             }
         }
     }

@@ -28,6 +28,9 @@ pub(crate) const KINDS: [Kind; 3] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r
 /// Joint by joint: axis, point on it (mm), mass (kg), its centre (mm), gear, Nm/A, range of measurement (deg).
 type Row = ([f64; 3], [f64; 3], f64, [f64; 3], f64, f64, [f64; 2]);
 
+/// Joints, tool (mm), payload (kg), its centre from the tool (mm), least height and distance of the tool (mm), reach (m).
+type Sheet = (&'static [Row], [f64; 3], f64, [f64; 3], [f64; 2], f64);
+
 const X: [f64; 3] = [1.0, 0.0, 0.0];
 const Y: [f64; 3] = [0.0, 1.0, 0.0];
 const Z: [f64; 3] = [0.0, 0.0, 1.0];
@@ -75,14 +78,19 @@ const FIVE5R: [Row; 5] = [
 ];
 
 impl Kind {
+    #[rustfmt::skip]
+    fn sheet(self) -> Sheet {
+        match self {
+            Kind::Sr210d => (&SR210D, [1854.0, 0.0, 1310.0], 210.0, [170.0, 35.0, 55.0], [-200.0, 500.0], 2.7),
+            Kind::Compact6 => (&COMPACT6, [1184.3, 256.0, 11.6], 10.0, [20.0, 55.0, -12.0], [20.0, 150.0], 1.3),
+            Kind::Seven7r => (&SEVEN7R, [0.0, 0.0, 1296.0], 12.0, [12.0, 10.0, 40.0], [50.0, 100.0], 0.95),
+            Kind::Five5r => (&FIVE5R, [1010.0, 0.0, 1130.0], 20.0, [45.0, 15.0, -20.0], [50.0, 200.0], 1.6),
+        }
+    }
+
     /// The nominal robot; `aside` moves the measured point off the last axis, mm.
     pub fn description(self, aside: [f64; 3]) -> RobotDescription {
-        let (rows, tool, payload, offset): (&[Row], [f64; 3], f64, [f64; 3]) = match self {
-            Kind::Sr210d => (&SR210D, [1854.0, 0.0, 1310.0], 210.0, [170.0, 35.0, 55.0]),
-            Kind::Compact6 => (&COMPACT6, [1184.3, 256.0, 11.6], 10.0, [20.0, 55.0, -12.0]),
-            Kind::Seven7r => (&SEVEN7R, [0.0, 0.0, 1296.0], 12.0, [12.0, 10.0, 40.0]),
-            Kind::Five5r => (&FIVE5R, [1010.0, 0.0, 1130.0], 20.0, [45.0, 15.0, -20.0]),
-        };
+        let (rows, tool, payload, offset, ..) = self.sheet();
         let metres = |v: [f64; 3]| v.map(|x| 1e-3 * x);
         let joints = rows.iter().enumerate().map(
             |(index, (axis, point, mass, centre, gear, constant, range))| JointDescription {
@@ -119,11 +127,11 @@ impl Kind {
 
     /// Lowest height of a joint and of the tool, and least distance of the tool from the first axis, mm.
     pub fn room_mm(self) -> [f64; 2] {
-        [[-200.0, 500.0], [20.0, 150.0], [50.0, 100.0], [50.0, 200.0]][self as usize]
+        self.sheet().4
     }
 
     /// How far the measured point gets from the first axis, about, m.
     pub fn reach_m(self) -> f64 {
-        [2.7, 1.3, 0.95, 1.6][self as usize]
+        self.sheet().5
     }
 }
