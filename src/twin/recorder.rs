@@ -89,8 +89,8 @@ impl Scene<'_> {
         before: &[f64],
         beam: &mut Beam,
     ) -> (Shot, Equilibrium) {
-        let rest = settle(&self.arm, &row, &self.effects);
-        let seen = sighted(&rest, &self.base, &row, &self.effects);
+        let settled = settle(&self.arm, &row, &self.effects);
+        let seen = sighted(&settled, &self.base, &row, &self.effects);
         for effect in &self.effects {
             effect.log(&mut q, before);
         }
@@ -106,7 +106,7 @@ impl Scene<'_> {
             sigma: self.tracker.sigma(seen),
             velocity: Vec::new(),
         };
-        (shot, rest)
+        (shot, settled)
     }
 }
 
@@ -207,8 +207,8 @@ impl Experiment<'_> {
             let mut drive = self.truth.drive(self.robot, &point.q);
             self.scatter(&mut drive, &scene.arm, |_| play.normal());
             let row = point.row(drive, memory);
-            let (shot, rest) = scene.shot((point.block, row), point.q, &point.before, &mut beam);
-            let current = self.currents(&scene.arm, &rest.torque, &rest.motion, &mut meter);
+            let (shot, settled) = scene.shot((point.block, row), point.q, &point.before, &mut beam);
+            let current = self.currents(&scene.arm, &settled.torque, &settled.motion, &mut meter);
             shots.push(Shot { current, ..shot });
             tick();
         }

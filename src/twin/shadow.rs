@@ -1,4 +1,4 @@
-//! What is left of an effect in data when other causes have absorbed what they can: columns less their shadow on the space of the others
+//! What remains of an effect in data when other causes have absorbed what they can: columns less their shadow on the space of the others
 //! (modified Gram-Schmidt, twice).
 
 /// An effect in all rows, a number each.

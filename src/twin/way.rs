@@ -63,7 +63,7 @@ pub struct JointState {
 /// A drawn way.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Path {
-    /// Middle, and amplitude, angular frequency, phase of each wave, of every joint; at rest at both ends where it lasts so many seconds.
+    /// Middle, and amplitude, angular frequency, phase of each wave, of every joint; at a standstill at both ends where it lasts so many seconds.
     Waves(Vec<(f64, Vec<[f64; 3]>)>, Option<f64>),
     /// From pose to pose, with rests between.
     Moves(Vec<Move>),
@@ -87,7 +87,7 @@ const FREQUENCIES: [f64; 3] = [1.0, 1.7, 2.9];
 const MARGIN_S: f64 = 2.0;
 /// The fastest moment of a move of fifth degree, in travel over duration.
 pub(crate) const PEAK: f64 = 1.875;
-/// Time in which waves that begin and end at rest come up, s.
+/// Time in which waves that begin and end at a standstill come up, s.
 const RAMP_S: f64 = 1.0;
 /// No move is shorter, s.
 const SHORTEST_S: f64 = 0.3;

@@ -68,7 +68,7 @@ fn lost_motion_of_dahl_fades_in_over_its_travel() {
     let z = remembered(friction.clone(), &moves(&[2.0, -0.5, 0.0]));
     let expected = [0.864_664_716_763, 0.130_976_320_801, 0.130_976_320_801];
     assert_near(&z, &expected, 1e-12);
-    let found = rest(vec![0.5], &[friction]).motion.joint;
+    let found = settled(vec![0.5], &[friction]).motion.joint;
     assert_near(&found, &[-15.0 * ARCSEC, 0.0, 0.0, 0.0, 0.0], 1e-15);
 }
 
@@ -81,7 +81,7 @@ fn maxwells_elements_slip_one_after_another() {
 }
 
 /// The arm of five joints at its zero pose under effects of this memory.
-fn rest(memory: Vec<f64>, effects: &[Physical]) -> Equilibrium {
+fn settled(memory: Vec<f64>, effects: &[Physical]) -> Equilibrium {
     let arm = Arm::new(&Kind::Five5r.description([0.0; 3]), &TrueRobot::default());
     settle(&arm, &row(&[0.0; 5], memory), effects)
 }
@@ -184,7 +184,7 @@ fn warm_air_stretches_ranges_after_the_arm_has_settled() {
     let air = TrackerRefraction::effect(1.0, 20.0, 0.0, 0.0, 1.0);
     let effects = [Presliding::effect(1, 0.0, 1.0, vec![]), air];
     let memory = recall(&effects, &moves(&[0.0; 5])).pop().unwrap();
-    let found = rest(memory.clone(), &effects);
+    let found = settled(memory.clone(), &effects);
     let seen = sighted(&found, &IDENTITY, &row(&[0.0; 5], memory), &effects);
     let expected = [1.010, 0.0, 1.130].map(|metres| metres * (1.0 + 5e-6));
     assert_near(&seen, &expected, 1e-12);
@@ -193,7 +193,7 @@ fn warm_air_stretches_ranges_after_the_arm_has_settled() {
 /// 100 arcsec/Nm times sin(90 deg) times the torque of the wrist's weight: the hand's centre lies 115 mm before joint 4 in x.
 #[test]
 fn a_gear_under_load_errs_with_what_it_carries() {
-    let found = rest(vec![], &[GearLoad::effect(4, 2.0, 100.0, 90.0, 0.0)]);
+    let found = settled(vec![], &[GearLoad::effect(4, 2.0, 100.0, 90.0, 0.0)]);
     // About +y the weight of 7.5 kg at 45 mm and of 2.1 kg at 115 mm turns downwards, positive.
     let torque = 9.81 * (7.5 * 0.045 + 2.1 * 0.115);
     let share = found.motion.joint[3] / (100.0 * ARCSEC * torque);

@@ -302,8 +302,8 @@ fn the_place_counts_apart_from_the_name_and_unknown_is_no_wrong_name() {
     assert_eq!(placed(&|_| elsewhere("unknown")), [Some(false); 3]);
     // Faults of points have no place.
     let fault = json!({ "effect": "outlier", "where": "recording" });
-    let said = placed(&|truth| [vec![fault.clone()], wanted(truth)].concat());
-    assert_eq!(said[..2], all_right[..2]);
+    let found = placed(&|truth| [vec![fault.clone()], wanted(truth)].concat());
+    assert_eq!(found[..2], all_right[..2]);
 }
 
 #[test]

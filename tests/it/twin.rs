@@ -65,7 +65,12 @@ fn row(q: &[f64], payload_kg: f64) -> Row {
     }
 }
 
-fn rest(robot: &RobotDescription, effects: &[Physical], q: &[f64], payload_kg: f64) -> Equilibrium {
+fn settled(
+    robot: &RobotDescription,
+    effects: &[Physical],
+    q: &[f64],
+    payload_kg: f64,
+) -> Equilibrium {
     settle(
         &Arm::new(robot, &TrueRobot::default()),
         &row(q, payload_kg),
@@ -167,7 +172,7 @@ fn errors_of_lengths_gears_and_couplings_move_the_tool_as_they_should() {
 #[test]
 fn a_mass_on_a_compliant_joint_sags_until_torque_and_wind_up_agree() {
     let spring = JointCompliance::effect(1, 1e-5);
-    let found = rest(&lever(), &[spring], &[0.0], 100.0);
+    let found = settled(&lever(), &[spring], &[0.0], 100.0);
     // 100 kg, 10 m/s2, 2 m: sag = 0.02 rad cos(sag); the first two terms of its series leave 2e-9.
     let mut sag: f64 = 0.0;
     for _ in 0..50 {
@@ -185,7 +190,7 @@ fn a_mass_on_a_compliant_joint_sags_until_torque_and_wind_up_agree() {
 #[test]
 fn a_beam_bends_by_the_cantilever_formula() {
     let beam = LinkCompliance::effect(1, 3e-7, 0.0);
-    let found = rest(&lever(), &[beam], &[0.0], 100.0);
+    let found = settled(&lever(), &[beam], &[0.0], 100.0);
     // F L^3 / (3 EI) with L/EI = 3e-7: 1000 N * 4 m2 * 3e-7 / 3.
     assert_near(found.posture.tool, [2.0, 0.0, -4e-4], 1e-9);
 }
@@ -193,7 +198,7 @@ fn a_beam_bends_by_the_cantilever_formula() {
 #[test]
 fn a_foundation_tilts_towards_the_load() {
     let base = BaseCompliance::effect([1e-8, 1e-8], [0.0, 0.0, -1000.0]);
-    let found = rest(&lever(), &[base], &[0.0], 100.0);
+    let found = settled(&lever(), &[base], &[0.0], 100.0);
     // 2000 Nm tilt by 2e-5 rad about 1 m below: the tool goes down by 2 m of it and forwards by 1 m of it.
     assert_near(found.posture.tool, [2.0 + 2e-5, 0.0, -4e-5], 1e-8);
 }
@@ -202,7 +207,7 @@ fn a_foundation_tilts_towards_the_load() {
 fn a_joint_trails_by_half_its_gap_and_more_under_load() {
     let turned = |arcsec_per_nm, closing_nm| {
         let gap = Backlash::effect(1, 20.0, arcsec_per_nm, closing_nm, 0.0);
-        rest(&lever(), &[gap], &[0.0], 100.0).motion.joint[0] / ARCSEC
+        settled(&lever(), &[gap], &[0.0], 100.0).motion.joint[0] / ARCSEC
     };
     assert!((turned(0.0, 0.0) + 10.0).abs() < 1e-9);
     assert!((turned(0.01, 0.0) + 20.0).abs() < 1e-6);
@@ -212,7 +217,7 @@ fn a_joint_trails_by_half_its_gap_and_more_under_load() {
 #[test]
 fn a_gear_ripple_follows_the_reported_angle() {
     let ripple = GearCyclic::effect(1, 3.0, 12.0, 0.0, 30.0);
-    let found = rest(&lever(), &[ripple], &[PI / 9.0], 0.0);
+    let found = settled(&lever(), &[ripple], &[PI / 9.0], 0.0);
     assert!(
         (found.motion.joint[0] - 12.0 * ARCSEC).abs() < 1e-15,
         "sin(3 * 20 deg + 30 deg) = 1"

@@ -86,9 +86,9 @@ impl ProveArguments {
         };
         let diagnose = |number: usize| -> Result<()> {
             let name = &names[number];
-            let tell = |said: &str| {
+            let tell = |line: &str| {
                 if !self.quiet {
-                    let _ = writeln!(std::io::stderr(), "{name}: {said}");
+                    let _ = writeln!(std::io::stderr(), "{name}: {line}");
                 }
             };
             tell(&blind.diagnose(name, &verdicts, None)?);
@@ -97,8 +97,8 @@ impl ProveArguments {
             if let Some(cause) = cause.transpose()?.flatten() {
                 let verdicts = verdicts.join(LEFT_OUT);
                 std::fs::create_dir_all(&verdicts).map_err(store)?;
-                let said = blind.diagnose(name, &verdicts, Some(&cause))?;
-                tell(&format!("without its cause: {said}"));
+                let verdict = blind.diagnose(name, &verdicts, Some(&cause))?;
+                tell(&format!("without its cause: {verdict}"));
             }
             Ok(())
         };

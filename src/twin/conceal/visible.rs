@@ -28,13 +28,16 @@ impl Site<'_> {
     /// What the tracker would see without effects and noise of the joints that are logged under `effects`.
     fn bare(&self, truth: &TrueRobot, tracker: &Tracker, effects: &[Physical]) -> Column {
         let arm = Arm::new(self.robot, truth);
-        let (rest, base) = (Motion::none(arm.links.len()), tracker.base());
+        let (still, base) = (Motion::none(arm.links.len()), tracker.base());
         let rows = self.points.iter().flat_map(|point| {
             let mut q = point.q.clone();
             effects
                 .iter()
                 .for_each(|effect| effect.log(&mut q, &point.before));
-            matrix::place(&base, arm.posture(&truth.drive(self.robot, &q), &rest).tool)
+            matrix::place(
+                &base,
+                arm.posture(&truth.drive(self.robot, &q), &still).tool,
+            )
         });
         rows.collect()
     }
@@ -52,8 +55,8 @@ impl Site<'_> {
             .zip(memories)
             .map(move |(point, memory)| {
                 let row = point.row(self.truth.drive(self.robot, &point.q), memory);
-                let rest = settle(&arm, &row, effects);
-                (row, rest)
+                let settled = settle(&arm, &row, effects);
+                (row, settled)
             })
     }
 
@@ -62,7 +65,7 @@ impl Site<'_> {
         let base = self.tracker.base();
         let seen = self
             .at_rest(effects)
-            .flat_map(|(row, rest)| sighted(&rest, &base, &row, effects));
+            .flat_map(|(row, settled)| sighted(&settled, &base, &row, effects));
         let bare = self.bare(self.truth, self.tracker, effects);
         seen.zip(bare).map(|(seen, bare)| seen - bare).collect()
     }
@@ -76,15 +79,15 @@ impl Site<'_> {
         }
         let mut seen: Vec<Vec<Vec<f64>>> = vec![Vec::new(); effects.len()];
         let base = self.tracker.base();
-        for (row, rest) in self.at_rest(effects).take(fit) {
-            let tool = rest.posture.tool;
-            let there = matrix::place(&matrix::times(&rest.motion.tracker, &base), tool);
+        for (row, settled) in self.at_rest(effects).take(fit) {
+            let tool = settled.posture.tool;
+            let there = matrix::place(&matrix::times(&settled.motion.tracker, &base), tool);
             for (index, effect) in effects.iter().enumerate() {
                 if let Physical::Foreign(foreign) = effect {
                     let memory = row.memory.get(index).copied().unwrap_or(0.0);
                     let is_sighted = foreign.motion.is_sighted();
                     let point = if is_sighted { there } else { tool };
-                    seen[index].push(foreign.values(&row, memory, &rest.torque, point));
+                    seen[index].push(foreign.values(&row, memory, &settled.torque, point));
                 }
             }
         }

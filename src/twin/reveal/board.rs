@@ -199,7 +199,7 @@ impl Board {
         due.filter(move |one| one.tells == tells)
     }
 
-    /// What was said where the causes were taken out of the list.
+    /// What was named where the causes were taken out of the list.
     fn left_out(&self) -> Value {
         let worlds = TELLS.map(|(which, tells)| {
             let share = |what: &str, holds: &dyn Fn(&LeftOut) -> bool| {
@@ -224,7 +224,7 @@ impl Board {
         let listed = self.cases.iter().filter(is_both);
         let listed: Vec<&Statement> = listed.flat_map(|case| &case.statements).collect();
         let without: Vec<&Statement> = due().flat_map(|one| &one.statements).collect();
-        let untold: Vec<&Statement> = self
+        let hidden: Vec<&Statement> = self
             .without(false)
             .flat_map(|one| &one.statements)
             .collect();
@@ -233,12 +233,12 @@ impl Board {
         json!({
             "recordings": self.left_out.len(),
             "worlds": worlds,
-            "reliability": reliability("names where the data cannot tell", &untold, Subject::Name),
+            "reliability": reliability("names where the data cannot tell", &hidden, Subject::Name),
             "both_worlds": UNLISTED.map(mixed),
         })
     }
 
-    /// Recordings that were not right: a due cause missed, or something said that is not there.
+    /// Recordings that were not right: a due cause missed, or something named that is not there.
     fn failures(&self) -> Vec<String> {
         let wrong = self.cases.iter().filter(|case| !case.right(DUE));
         wrong.map(failure).collect()

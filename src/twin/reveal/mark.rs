@@ -1,6 +1,6 @@
 //! One case: what was found of every concealed cause, and what was said that is not there.
 //!
-//! Whether a diagnosis looked in the right place, gave no wrong name, and named `unknown` where it knew no name; and what it said when
+//! Whether a diagnosis looked in the right place, gave no wrong name, and named `unknown` where it knew no name; and what it named when
 //! the causes of the recording were taken out of the list that it may name.
 
 use super::intervals::{Interval, intervals};
@@ -267,7 +267,7 @@ fn placed(cause: &Cause, truth: &Truth, findings: &[Finding], known: &Atoms) -> 
     }
 }
 
-/// A held-out error that exceeds the whole list's by this factor tells that something is left out.
+/// A held-out error that exceeds the whole list's by this factor tells that something is missing.
 const TELLS: f64 = 1.1;
 
 /// A recording that was diagnosed without its causes.
@@ -334,8 +334,8 @@ mod tests {
 
     fn answer(verdict: &str, rms: f64, name: [&str; 2], probability: f64) -> Answer {
         let finding = json!({ "effect": name[0], "where": name[1], "probability": probability });
-        let said = json!({ "verdict": verdict, "after": { "validate_rms_mm": rms }, "findings": [finding] });
-        serde_json::from_value(said).expect("an answer")
+        let document = json!({ "verdict": verdict, "after": { "validate_rms_mm": rms }, "findings": [finding] });
+        serde_json::from_value(document).expect("an answer")
     }
 
     fn truth(accepted: &Value, effects: &[[&str; 2]]) -> Truth {

@@ -1,4 +1,4 @@
-//! Counts as shares with their uncertainty, and stated probabilities against what was true: how often what is said with a probability is
+//! Counts as shares with their uncertainty, and stated probabilities against what was true: how often what is stated with a probability is
 //! right, and the mean squared error of it.
 
 use super::paper::{Atoms, Finding};
@@ -61,7 +61,7 @@ pub(crate) enum Subject {
     Place,
 }
 
-/// Something that was said with a probability.
+/// Something that was stated with a probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Statement {
     pub(crate) subject: Subject,
@@ -164,7 +164,7 @@ fn auc(all: &[&Statement]) -> Option<f64> {
 }
 
 /// Statements of names with the whole list and without the cause, the latter with the weight `unlisted`, by bins that hold any: what would
-/// be said where so many of all causes are in no list.
+/// be stated where so many of all causes are in no list.
 pub(super) fn mixed(listed: &[&Statement], without: &[&Statement], unlisted: f64) -> Vec<Value> {
     let [listed, without] = [listed, without].map(|all| bins(all, Subject::Name));
     let bin = |((from, to, listed), (_, _, without)): ((f64, f64, Vec<_>), (_, _, Vec<_>))| {
@@ -185,7 +185,7 @@ pub(super) fn mixed(listed: &[&Statement], without: &[&Statement], unlisted: f64
 mod tests {
     use super::*;
 
-    fn said(subject: Subject, probability: f64, right: bool) -> &'static Statement {
+    fn statement(subject: Subject, probability: f64, right: bool) -> &'static Statement {
         Box::leak(Box::new(Statement {
             subject,
             probability,
@@ -194,7 +194,7 @@ mod tests {
     }
 
     fn name(probability: f64, right: bool) -> &'static Statement {
-        said(Subject::Name, probability, right)
+        statement(Subject::Name, probability, right)
     }
 
     #[test]
@@ -226,7 +226,7 @@ mod tests {
 
     #[test]
     fn each_kind_of_recording_counts_by_its_share() {
-        let place = said(Subject::Place, 0.96, false);
+        let place = statement(Subject::Place, 0.96, false);
         let listed = [name(0.96, true), name(0.96, true), name(0.92, true), place];
         let bins = mixed(&listed, &[name(1.0, false), name(1.0, true)], 0.25);
         let figure = |bin: usize, what: &str| bins[bin][what].as_f64().expect("a figure");

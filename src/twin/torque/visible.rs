@@ -15,7 +15,7 @@ const SAME_SHARE: f64 = 0.02;
 const SAME: f64 = 12.0;
 /// Ripples of more a turn are like nothing else.
 const LARGEST_ORDER: usize = 3;
-/// A rival's column of which the others leave less than this share of it is none of its own.
+/// A rival's column of which the others leave less than this share of it counts as theirs.
 const COLLINEAR: f64 = 1e-3;
 
 /// An effect as data show it.

@@ -98,10 +98,10 @@ fn seat(bench: &Bench, motion: ForeignMotion, draw: &mut Noise) -> usize {
 fn direction(bench: &Bench, motion: ForeignMotion, seat: usize, draw: &mut Noise) -> Vector {
     let arrow = draw.vector(1.0, 1.0);
     let along = draw.chance(0.5);
-    let own = &bench.robot.joints[seat - 1];
+    let described = &bench.robot.joints[seat - 1];
     let (line, along) = match motion {
-        JointShift => (own.axis, along),
-        JointTilt => (own.axis, false),
+        JointShift => (described.axis, along),
+        JointTilt => (described.axis, false),
         LinkShift => (bench.line(seat - 1), along),
         LinkBend => (bench.line(seat - 1), false),
         _ => return arrow,
@@ -159,7 +159,7 @@ fn variable(
 ) -> (ForeignVariable, [f64; 2]) {
     let instrument = motion.is_sighted();
     let anywhere = instrument || matches!(motion, BaseShift | BaseTurn | ToolShift);
-    // Half of what sits on the chain depends on its own joint.
+    // Half of what sits on the chain depends on its described joint.
     let other = 1 + draw.index(bench.joints());
     let number = if !anywhere && draw.chance(0.5) {
         seat
