@@ -372,9 +372,17 @@ mod tests {
         let wrong = judge("explained", 0.3, ["zero_shift", "joint 2"], 0.6);
         assert_eq!(wrong.wrong, Some(("zero_shift at joint 2".into(), 0.6)));
         let back = judge("unexplained", 0.3, ["backlash", "joint 3"], 0.4);
-        assert_eq!(
-            [unknown, accepted, wrong, back].map(|one| one.came_back),
-            [false, false, false, true]
-        );
+        let board = crate::reveal::board::Board {
+            left_out: vec![unknown, accepted, wrong, back],
+            ..Default::default()
+        };
+        let worlds = &board.document()["left_out"]["worlds"];
+        let figure = |world: usize, share: usize, what: &str| {
+            worlds[world]["shares"][share]["share"][what].as_u64()
+        };
+        // A wrong name, a sure one, called explained, the name came back; where the data can tell, and where they cannot.
+        let counts = [0, 1, 2, 3].map(|share| figure(0, share, "count"));
+        assert_eq!(counts, [1, 0, 1, 1].map(Some));
+        assert_eq!([figure(0, 0, "of"), figure(1, 0, "of")], [Some(3), Some(1)]);
     }
 }
