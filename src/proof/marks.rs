@@ -5,10 +5,10 @@ use crate::error::{Error, Result};
 use crate::raw;
 use crate::table::{Scoreboard, ScoreboardRow, Table};
 use crate::twin::reveal::board::Board;
-use crate::twin::reveal::left_out::left_out;
-use crate::twin::reveal::mark::{Case, NAMELESS, mark};
+use crate::twin::reveal::mark::{Case, Marked, NAMELESS, left_out, mark};
 use crate::twin::reveal::paper::{Answer, Truth};
 use parquet::arrow::ArrowWriter;
+use std::fmt::Display;
 use std::path::Path;
 
 /// Folder, within that of the verdicts, of diagnoses without the causes of their recordings.
@@ -25,17 +25,12 @@ pub fn board(folder: &Path, files: &[String], verdicts: &Path) -> Result<Board> 
         let path = folder.join(name);
         let truth: Truth =
             read(&path).map_err(|why| Error::data(path.display().to_string(), why))?;
-        match read::<Answer>(&verdicts.join(path.file_name().unwrap_or_default())) {
+        let file = path.file_name().unwrap_or_default();
+        match read::<Answer>(&verdicts.join(file)) {
             Ok(answer) => {
-                let without = read::<Answer>(
-                    &verdicts
-                        .join(LEFT_OUT)
-                        .join(path.file_name().unwrap_or_default()),
-                )
-                .ok();
-                board
-                    .left_out
-                    .extend(without.and_then(|without| left_out(&truth, &answer, &without)));
+                let without = read::<Answer>(&verdicts.join(LEFT_OUT).join(file)).ok();
+                let without = without.and_then(|without| left_out(&truth, &answer, &without));
+                board.left_out.extend(without);
                 board.cases.push(mark(&truth, &answer));
             }
             Err(why) => board.missing.push((truth.case, why)),
@@ -47,13 +42,13 @@ pub fn board(folder: &Path, files: &[String], verdicts: &Path) -> Result<Board> 
 /// The cause to leave out of a recording whose truth lies at `path`; none where no single cause of the list is concealed.
 pub fn single_cause(path: &Path) -> Result<Option<String>> {
     let truth: Truth = read(path).map_err(|why| Error::data(path.display().to_string(), why))?;
-    let listed =
-        truth.content == "single" && truth.effects.iter().all(|cause| cause.effect != NAMELESS);
-    Ok(truth
+    let mut effects = truth.effects.iter();
+    let listed = truth.content == "single" && effects.all(|cause| cause.effect != NAMELESS);
+    let mut wanted = truth
         .effects
         .into_iter()
-        .find(|cause| cause.wanted && listed)
-        .map(|cause| cause.effect))
+        .filter(|cause| cause.wanted && listed);
+    Ok(wanted.next().map(|cause| cause.effect))
 }
 
 fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, String> {
@@ -86,38 +81,33 @@ fn rows(case: &Case) -> Vec<ScoreboardRow> {
     if case.causes.is_empty() {
         return vec![row(0, None)];
     }
-    let causes = case
-        .causes
-        .iter()
-        .enumerate()
-        .map(|(number, cause)| ScoreboardRow {
-            place: Some(cause.place.clone()),
-            form: Some(cause.form.clone()),
-            visibility: Some(cause.strength),
-            outcome: Some(cause.outcome.name().into()),
-            place_right: Some(cause.placed.place),
-            name_or_unknown: Some(cause.placed.name_or_unknown),
-            wrong_name: Some(cause.placed.wrong_name),
-            ..row(number, Some(cause.effect.clone()))
-        });
-    causes.collect()
+    let of_cause = |(number, cause): (usize, &Marked)| ScoreboardRow {
+        place: Some(cause.place.clone()),
+        form: Some(cause.form.clone()),
+        visibility: Some(cause.strength),
+        outcome: Some(cause.outcome.name().into()),
+        place_right: Some(cause.placed.place),
+        name_or_unknown: Some(cause.placed.name_or_unknown),
+        wrong_name: Some(cause.placed.wrong_name),
+        ..row(number, Some(cause.effect.clone()))
+    };
+    case.causes.iter().enumerate().map(of_cause).collect()
 }
 
 /// One row per concealed effect, as Parquet.
 pub fn write_scoreboard(path: &Path, board: &Board) -> Result<()> {
     let frame = Scoreboard(board.cases.iter().flat_map(rows).collect()).to_frame()?;
-    let fault = |error: String| {
+    let fault = |error: &dyn Display| {
         Error::store(
             path.display().to_string(),
             format!("cannot be written: {error}"),
         )
     };
-    let file = std::fs::File::create(path).map_err(|error| fault(error.to_string()))?;
-    let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), None)
-        .map_err(|error| fault(error.to_string()))?;
-    writer
-        .write(frame.batch())
-        .map_err(|error| fault(error.to_string()))?;
-    writer.close().map_err(|error| fault(error.to_string()))?;
-    Ok(())
+    let file = std::fs::File::create(path).map_err(|error| fault(&error))?;
+    let written =
+        ArrowWriter::try_new(file, frame.batch().schema(), None).and_then(|mut writer| {
+            writer.write(frame.batch())?;
+            writer.close()
+        });
+    written.map(drop).map_err(|error| fault(&error))
 }

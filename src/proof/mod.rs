@@ -4,4 +4,4 @@ mod marks;
 mod set;
 
 pub use marks::{LEFT_OUT, board, single_cause, write_scoreboard};
-pub use set::{ConcealedSet, RECORDINGS, SEAL, SEALED, Seal, conceal, recorded, vacant};
+pub use set::{RECORDINGS, SEAL, SEALED, Seal, conceal, recorded, vacant};

@@ -6,99 +6,45 @@ use crate::estimate::threads::in_order;
 use crate::raw;
 use crate::table::{Recording, Truth};
 use crate::twin::conceal::case::Case;
-use crate::twin::conceal::design::{Content, Design};
-use crate::twin::folder::{self, Decimals, Log};
-use crate::twin::torque::{TorqueCase, TorqueDesign};
+use crate::twin::conceal::design::Design;
+use crate::twin::folder::{self, Decimals, File, Log};
+use crate::twin::torque::TorqueCase;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::fmt::Debug;
 use std::fs;
 use std::io::ErrorKind;
-use std::path::{Component, Path, PathBuf};
-
-/// What a set is drawn from.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ConcealedSet {
-    /// Points that were measured.
-    Positions(Box<Design>),
-    /// Torques of an arm that moves.
-    Torques(TorqueDesign),
-}
-
-impl ConcealedSet {
-    /// Recordings in it.
-    pub(crate) fn cases(&self) -> usize {
-        match self {
-            Self::Positions(design) => design.cases,
-            Self::Torques(design) => design.cases,
-        }
-    }
-}
+use std::path::{Component, Path};
 
 /// Writes the recordings, their truths and the seal; gives the number of rows. No byte depends on the number of threads.
-pub fn conceal(folder: &Path, set: &ConcealedSet, threads: usize) -> Result<usize> {
-    let contents = match set {
-        ConcealedSet::Positions(design) => design.contents(),
-        ConcealedSet::Torques(_) => Vec::new(),
-    };
-    let made = in_order(threads, set.cases(), |number| match set {
-        ConcealedSet::Positions(design) => points(design, number, contents[number]),
-        ConcealedSet::Torques(design) => Ok(torques(design, number)),
+pub fn conceal(folder: &Path, design: &Design, threads: usize) -> Result<usize> {
+    let contents = design.contents();
+    let made = in_order(threads, design.cases, |number| -> Result<Written, String> {
+        if design.dynamics {
+            let case = TorqueCase::draw(design, number);
+            let files = case.recording().into();
+            return Ok((case.name.clone(), files, case.sealed()));
+        }
+        let case = Case::make(design, number, contents[number])?;
+        Ok((case.name.clone(), case.recording()?.into(), case.sealed()))
     });
-    let mut seal = Seal::new(set);
+    let mut seal = Seal::new(design);
     let mut rows = 0;
     for case in made {
-        let case = case.map_err(|message| Error::spec("conceal", message))?;
-        for (name, text) in &case.recording {
-            seal.write(folder, format!("{RECORDINGS}/{}/{name}", case.name), text)?;
+        let (name, files, sealed) = case.map_err(|message| Error::spec("conceal", message))?;
+        for (file, text) in &files {
+            seal.write(folder, format!("{RECORDINGS}/{name}/{file}"), text)?;
         }
-        seal.write(folder, format!("{SEALED}/{}.json", case.name), &case.sealed)?;
-        rows += case.rows;
+        // The last file has a line of titles.
+        rows += files.last().map_or(0, |(_, text)| text.lines().count() - 1);
+        seal.write(folder, format!("{SEALED}/{name}.json"), &sealed)?;
     }
     seal.close(folder)?;
     Ok(rows)
 }
 
-/// A case as it goes to the disk.
-struct Written {
-    name: String,
-    rows: usize,
-    recording: Vec<(&'static str, String)>,
-    sealed: String,
-}
-
-fn points(design: &Design, number: usize, content: Content) -> Result<Written, String> {
-    let case = Case::make(design, number, content)?;
-    Ok(Written {
-        recording: case.recording()?.into(),
-        sealed: case.sealed(),
-        rows: case.shots.len(),
-        name: case.name,
-    })
-}
-
-fn torques(design: &TorqueDesign, number: usize) -> Written {
-    let case = TorqueCase::draw(design, number);
-    let recording: Vec<(&'static str, String)> = case.recording().into();
-    // The header is a line of its own.
-    let rows = recording
-        .iter()
-        .map(|(name, text)| {
-            if name.ends_with(".csv") {
-                text.lines().count() - 1
-            } else {
-                0
-            }
-        })
-        .sum();
-    Written {
-        recording,
-        sealed: case.sealed(),
-        rows,
-        name: case.name,
-    }
-}
+/// A case as it goes to the disk: its name, the files of its recording, its truth.
+type Written = (String, Vec<File>, String);
 
 /// Nothing is overwritten: the folder is new or empty.
 pub fn vacant(folder: &Path) -> Result<()> {
@@ -135,7 +81,7 @@ pub struct Seal {
 }
 
 impl Seal {
-    pub(super) fn new(design: &impl Debug) -> Seal {
+    fn new(design: &Design) -> Seal {
         Seal {
             calib_seal: FORMAT,
             hash: HASH.into(),
@@ -145,19 +91,16 @@ impl Seal {
     }
 
     /// Whether the set was drawn from this design.
-    pub(crate) fn is_of(&self, design: &impl Debug) -> bool {
+    pub(crate) fn is_of(&self, design: &Design) -> bool {
         self.design == Seal::new(design).design
     }
 
     /// Writes a file of the set below `folder` and takes its hash in.
-    pub(super) fn write(&mut self, folder: &Path, name: String, text: &str) -> Result<()> {
+    fn write(&mut self, folder: &Path, name: String, text: &str) -> Result<()> {
         let path = folder.join(&name);
-        let fault =
-            |error: std::io::Error| Error::store(path.display().to_string(), error.to_string());
-        if let Some(parent) = path.parent() {
-            fs::create_dir_all(parent).map_err(fault)?;
-        }
-        fs::write(&path, text).map_err(fault)?;
+        let parent = path.parent().unwrap_or(folder);
+        let written = fs::create_dir_all(parent).and_then(|()| fs::write(&path, text));
+        written.map_err(|error| Error::store(path.display().to_string(), error.to_string()))?;
         self.files.insert(name, digest(text.as_bytes()));
         Ok(())
     }
@@ -188,11 +131,11 @@ impl Seal {
             let inside = Path::new(name)
                 .components()
                 .all(|part| matches!(part, Component::Normal(_)));
-            match if inside {
-                raw::bytes(&folder.join(name))
-            } else {
-                Err(ErrorKind::InvalidFilename.into())
-            } {
+            let bytes = match inside {
+                true => raw::bytes(&folder.join(name)),
+                false => Err(ErrorKind::InvalidFilename.into()),
+            };
+            match bytes {
                 Ok(bytes) if digest(&bytes) == *hash => (),
                 Ok(_) => faults.push(Fault::new(name, "was changed since it was sealed")),
                 Err(error) => faults.push(Fault::new(
@@ -206,13 +149,12 @@ impl Seal {
     }
 
     /// Writes the seal itself.
-    pub(super) fn close(&self, folder: &Path) -> Result<PathBuf> {
+    fn close(&self, folder: &Path) -> Result<()> {
         let path = folder.join(SEAL);
-        let text =
-            serde_json::to_string_pretty(self).map_err(|error| Error::Bug(error.to_string()))?;
+        let text = serde_json::to_string_pretty(self);
+        let text = text.map_err(|error| Error::Bug(error.to_string()))?;
         fs::write(&path, text + "\n")
-            .map_err(|error| Error::store(path.display().to_string(), error.to_string()))?;
-        Ok(path)
+            .map_err(|error| Error::store(path.display().to_string(), error.to_string()))
     }
 }
 
@@ -271,15 +213,9 @@ fn touched(recording: &Recording) -> BTreeMap<String, String> {
     let mut files: BTreeMap<String, String> = BTreeMap::new();
     for row in 0..recording.rows() {
         if let Some(name) = recording.contact(row) {
-            let joints: Vec<String> = recording
-                .q(row)
-                .iter()
-                .map(|q| format!("{q:.12}"))
-                .collect();
-            files
-                .entry(format!("{name}.csv"))
-                .or_default()
-                .push_str(&(joints.join(",") + "\n"));
+            let joints = recording.q(row).iter().map(|q| format!("{q:.12}"));
+            let line = joints.collect::<Vec<String>>().join(",") + "\n";
+            *files.entry(format!("{name}.csv")).or_default() += &line;
         }
     }
     files
@@ -288,14 +224,11 @@ fn touched(recording: &Recording) -> BTreeMap<String, String> {
 /// The recording as a log; what is not known in a row of it is 0, which the twin never leaves unknown.
 fn log(recording: Recording, at_once: bool) -> Log {
     let rows = recording.rows();
+    let usage = recording.usage.into_iter().map(Option::unwrap_or_default);
     Log {
         joints: recording.joints,
         time_s: recording.time,
-        usage: recording
-            .usage
-            .into_iter()
-            .map(Option::unwrap_or_default)
-            .collect(),
+        usage: usage.collect(),
         payload_kg: recording.payload.unwrap_or_else(|| vec![0.0; rows]),
         q: recording.q,
         current: recording.current,

@@ -16,6 +16,7 @@ use crate::twin::way::Way;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fmt::Display;
 
 /// Whether the effects listed in `effects` act.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -87,10 +88,7 @@ impl Stage for Simulate {
     fn faults(&self, at: &mut Place) {
         for (index, fixture) in self.fixtures.iter().enumerate() {
             let mut at = at.at(format!("fixtures[{index}]"));
-            fixture
-                .faults()
-                .into_iter()
-                .for_each(|(key, message)| at.at(key).fault(message));
+            all_faults(&mut at, fixture.faults());
             let mut others = self.fixtures[..index].iter();
             at.at("name").must(
                 others.all(|other| other.name != fixture.name),
@@ -111,10 +109,7 @@ impl Stage for Simulate {
             format!("expected {MOST} candidates at most"),
         );
         for (place, pose) in given(&self.blocks) {
-            let mut at = at.at(place);
-            pose.faults()
-                .into_iter()
-                .for_each(|(key, message)| at.at(key).fault(message));
+            all_faults(&mut at.at(place), pose.faults());
         }
         for (index, block) in self.blocks.iter().enumerate() {
             let mut at = at.at(format!("blocks[{index}]"));
@@ -137,30 +132,21 @@ impl Stage for Simulate {
             at.at(format!("poses.range_deg[{index}]"))
                 .must(possible, "expected [lower, upper], lower first");
         }
-        let Tracker {
-            noise_um,
-            noise_um_per_m,
-            coverage,
-            ..
-        } = self.tracker;
+        let tracker = &self.tracker;
+        let is_noise = tracker.noise_um >= 0.0 && tracker.noise_um_per_m >= 0.0;
         at.at("tracker").must(
-            coverage > 0.0 && noise_um >= 0.0 && noise_um_per_m >= 0.0,
+            tracker.coverage > 0.0 && is_noise,
             "expected noise_um and noise_um_per_m of 0 or more, and a coverage above 0, e.g. 2",
         );
-        let Climate {
-            pace_s: [shortest, longest],
-            begin_s,
-            warm_up_h,
-            swing_h,
-            ..
-        } = self.climate;
+        let climate = &self.climate;
         at.at("climate.begin_s").must(
-            begin_s >= 0.0 && begin_s.is_finite(),
+            climate.begin_s >= 0.0 && climate.begin_s.is_finite(),
             "expected a time of 0 or more, s",
         );
+        let [shortest, longest] = climate.pace_s;
         let paced = shortest > 0.0 && shortest <= longest && longest.is_finite();
         at.at("climate").must(
-            paced && warm_up_h > 0.0 && swing_h > 0.0,
+            paced && climate.warm_up_h > 0.0 && climate.swing_h > 0.0,
             "expected pace_s as [shortest, longest] above 0, and warm_up_h and swing_h above 0",
         );
         if let Some(way) = &self.motion {
@@ -234,6 +220,13 @@ impl Stage for Simulate {
     }
 }
 
+/// Faults of what stands at a place, each with its place below that.
+fn all_faults<K: Display, M: Into<String>>(at: &mut Place, faults: Vec<(K, M)>) {
+    for (key, message) in faults {
+        at.at(key).fault(message);
+    }
+}
+
 impl Simulate {
     /// The effects that act.
     fn acting(&self) -> &[Physical] {
@@ -246,21 +239,15 @@ impl Simulate {
     /// Settings that this robot cannot have.
     fn against(&self, robot: &RobotDescription, at: &mut Place) {
         let joints = robot.joints.len();
-        for (key, what) in self.truth.faults(robot) {
-            at.at("truth").at(key).fault(what);
-        }
+        all_faults(&mut at.at("truth"), self.truth.faults(robot));
         for (place, pose) in given(&self.blocks) {
-            let mut at = at.at(place);
-            pose.against(robot)
-                .into_iter()
-                .for_each(|(key, what)| at.at(key).fault(what));
+            all_faults(&mut at.at(place), pose.against(robot));
         }
         for (index, effect) in self.effects.iter().enumerate() {
             let mut at = at.at(format!("effects[{index}]"));
-            effect
-                .fault(joints)
-                .into_iter()
-                .for_each(|what| at.fault(what));
+            if let Some(what) = effect.fault(joints) {
+                at.fault(what);
+            }
             at.must(
                 self.motion.is_some() || !effect.moves_only(),
                 "shows on a moving arm only; say `motion`, e.g. motion: {rate_hz: 100}",
@@ -276,17 +263,11 @@ impl Simulate {
                 format!("has {numbers}, the robot {all}"),
             );
         }
-        for (joint, factor) in self
-            .truth
-            .compliance_rad_a
-            .iter()
-            .enumerate()
-            .filter(|(_, factor)| **factor != 0.0)
-        {
+        let factors = self.truth.compliance_rad_a.iter().enumerate();
+        for (joint, factor) in factors.filter(|(_, factor)| **factor != 0.0) {
             let mut at = at.at(format!("truth.compliance_rad_a[{joint}]"));
-            let known = robot
-                .joints
-                .get(joint)
+            let described = robot.joints.get(joint);
+            let known = described
                 .is_some_and(|j| j.reduction_ratio.is_some() && j.motor_constant.is_some());
             let sign = self.motors.sign.get(joint).copied().unwrap_or(1.0);
             at.must(
@@ -302,21 +283,14 @@ impl Simulate {
 
     /// What the tracker states of its noise; nothing where it has none, since no fit can weigh by zero.
     fn noise(&self) -> (Instrument, SigmaSource) {
-        let Tracker {
-            noise_um,
-            noise_um_per_m,
-            coverage,
-            ..
-        } = self.tracker;
         let stated = Instrument {
-            constant_um: noise_um,
-            per_metre_um: noise_um_per_m,
-            coverage,
+            constant_um: self.tracker.noise_um,
+            per_metre_um: self.tracker.noise_um_per_m,
+            coverage: self.tracker.coverage,
         };
-        if stated.fault().is_none() {
-            (stated, SigmaSource::Instrument)
-        } else {
-            (START, SigmaSource::Inferred)
+        match stated.fault() {
+            None => (stated, SigmaSource::Instrument),
+            Some(_) => (START, SigmaSource::Inferred),
         }
     }
 
@@ -330,58 +304,45 @@ impl Simulate {
             ids.push(format!("{usage}-{count:04}"));
         }
         let (figures, source) = self.noise();
+        let of_joints = |value: fn(&Shot) -> &Vec<f64>| -> Vec<f64> {
+            shots.iter().flat_map(value).copied().collect()
+        };
+        let of_rows = |value: fn(&Shot) -> f64| Some(shots.iter().map(value).collect());
+        let usage = |shot: &Shot| self.blocks[shot.block].usage.as_str();
+        let sigma = |shot: &Shot| [figures.sigma(&shot.position.into()); 3];
+        let logs_velocity = self.motion.as_ref().is_some_and(|way| way.log_velocity);
         Recording {
-            joints: robot.joints.len(),
-            prismatic: robot
-                .joints
-                .iter()
-                .map(|joint| joint.kind == JointKind::Prismatic)
-                .collect(),
-            sequence: (0..shots.len() as i64).collect(),
             point_id: ids,
-            usage: shots
-                .iter()
-                .map(|shot| Some(self.blocks[shot.block].usage.clone()))
-                .collect(),
-            q: shots
-                .iter()
-                .flat_map(|shot| shot.q.iter().copied())
-                .collect(),
+            q: of_joints(|shot| &shot.q),
             position: shots.iter().map(|shot| shot.position).collect(),
-            position_sigma: Some(
-                shots
-                    .iter()
-                    .map(|shot| [figures.sigma(&shot.position.into()); 3])
-                    .collect(),
-            ),
+            position_sigma: Some(shots.iter().map(sigma).collect()),
             sigma_source: Some(vec![source; shots.len()]),
-            time: Some(shots.iter().map(|shot| shot.time_s).collect()),
-            payload: Some(shots.iter().map(|shot| shot.payload_kg).collect()),
-            temperature: Some(shots.iter().map(|shot| shot.temperature_c).collect()),
-            current: self.motion.is_none().then(|| {
-                shots
-                    .iter()
-                    .flat_map(|shot| shot.current.iter().copied())
-                    .collect()
-            }),
-            velocity: self
+            time: of_rows(|shot| shot.time_s),
+            payload: of_rows(|shot| shot.payload_kg),
+            temperature: of_rows(|shot| shot.temperature_c),
+            current: self
                 .motion
-                .as_ref()
-                .is_some_and(|way| way.log_velocity)
-                .then(|| {
-                    shots
-                        .iter()
-                        .flat_map(|shot| shot.velocity.iter().copied())
-                        .collect()
-                }),
-            direction: Some(
-                shots
-                    .iter()
-                    .flat_map(|shot| shot.direction.iter().copied())
-                    .collect(),
-            ),
-            ..Recording::default()
+                .is_none()
+                .then(|| of_joints(|shot| &shot.current)),
+            velocity: logs_velocity.then(|| of_joints(|shot| &shot.velocity)),
+            direction: Some(of_joints(|shot| &shot.direction)),
+            ..blank(robot, shots.iter().map(usage))
         }
+    }
+}
+
+/// A recording of rows of this usage, of which nothing else is known yet.
+fn blank<'a>(robot: &RobotDescription, usage: impl Iterator<Item = &'a str>) -> Recording {
+    let joints = robot.joints.iter();
+    let usage: Vec<Option<String>> = usage.map(|usage| Some(usage.to_string())).collect();
+    Recording {
+        joints: robot.joints.len(),
+        prismatic: joints
+            .map(|joint| joint.kind == JointKind::Prismatic)
+            .collect(),
+        sequence: (0..usage.len() as i64).collect(),
+        usage,
+        ..Recording::default()
     }
 }
 
@@ -398,31 +359,19 @@ fn truth(
         .chain(tracker.values())
         .chain(effects.iter().flat_map(Physical::truth));
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
-    let rows = values.map(
-        |TrueValue {
-             name,
-             effect,
-             place,
-             unit,
-             value,
-         }| {
-            let count = seen.entry(name.clone()).or_default();
-            *count += 1;
-            let name = if *count == 1 {
-                name
-            } else {
-                format!("{name}#{count}")
-            };
-            TruthRow {
-                name,
-                effect: effect.into(),
-                place,
-                unit: unit.into(),
-                value,
-            }
-        },
-    );
-    let mut rows: Vec<TruthRow> = rows.collect();
+    let row = |one: TrueValue| {
+        let count = seen.entry(one.name.clone()).or_default();
+        *count += 1;
+        let ending = (*count > 1).then(|| format!("#{count}"));
+        TruthRow {
+            name: one.name + &ending.unwrap_or_default(),
+            effect: one.effect.into(),
+            place: one.place,
+            unit: one.unit.into(),
+            value: one.value,
+        }
+    };
+    let mut rows: Vec<TruthRow> = values.map(row).collect();
     rows.sort_by(|a, b| a.name.cmp(&b.name));
     Truth(rows)
 }
@@ -469,19 +418,9 @@ pub(super) fn contact_recording(
         counts[touch.fixture] += 1;
         format!("{}-{:04}", fixture_of(touch).name, counts[touch.fixture])
     };
+    let usage = touches.iter().map(|touch| fixture_of(touch).usage.as_str());
     Recording {
-        joints: robot.joints.len(),
-        prismatic: robot
-            .joints
-            .iter()
-            .map(|joint| joint.kind == JointKind::Prismatic)
-            .collect(),
-        sequence: (0..touches.len() as i64).collect(),
         point_id: touches.iter().map(&mut name).collect(),
-        usage: touches
-            .iter()
-            .map(|touch| Some(fixture_of(touch).usage.clone()))
-            .collect(),
         q: touches
             .iter()
             .flat_map(|touch| touch.q.iter().copied())
@@ -491,7 +430,7 @@ pub(super) fn contact_recording(
         temperature: Some(touches.iter().map(|touch| touch.temperature_c).collect()),
         readings,
         names,
-        ..Recording::default()
+        ..blank(robot, usage)
     }
 }
 
@@ -505,14 +444,10 @@ pub(super) fn fixture_truth(fixture: &Fixture) -> Vec<TruthRow> {
         value,
     };
     let [x, y, z] = fixture.centre_mm;
-    let centre = [row("x", x), row("y", y), row("z", z)];
-    let radius = fixture
-        .radius_mm
-        .filter(|_| fixture.kind == FixtureKind::Sphere)
-        .map(|radius| row("radius", radius));
-    centre
-        .into_iter()
-        .filter(|_| fixture.kind != FixtureKind::Plane)
-        .chain(radius)
-        .collect()
+    let radius = fixture.radius_mm.unwrap_or_default();
+    match fixture.kind {
+        FixtureKind::Plane => vec![],
+        FixtureKind::Socket => vec![row("x", x), row("y", y), row("z", z)],
+        FixtureKind::Sphere => vec![row("x", x), row("y", y), row("z", z), row("radius", radius)],
+    }
 }

@@ -25,7 +25,7 @@ pub use in_short::{
 };
 pub use limits::LimitsSummary;
 pub use rival_changes::{RivalChange, rival_changes};
-pub use run::{explanation, first_look, graph, run, stage, status};
+pub use run::{explanation, first_look, graph, run, scoreboard, stage, status};
 pub use run_diff::run_diff;
 pub use screen::{LABEL, folded, labelled};
 

@@ -49,6 +49,12 @@ pub(super) fn filled(template: &'static str, about: minijinja::Value) -> String 
         .expect("a template that names what it is given")
 }
 
+/// The scoreboard of a set of concealed recordings, from its document and from what only people read of it.
+pub fn scoreboard(document: &Value, details: &Value) -> String {
+    let about = context! { score => Serde(document), details => Serde(details) };
+    filled(include_str!("text/scoreboard.txt"), about)
+}
+
 /// A whole run.
 pub fn run(manifest: &Manifest) -> String {
     let ids = manifest.stages.iter().map(|stage| stage.id.len());

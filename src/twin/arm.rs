@@ -186,37 +186,18 @@ impl Motion {
 
     /// The largest difference of any number, rad, m or Nm; the motors' torque does not move the arm.
     pub(crate) fn distance(&self, other: &Motion) -> f64 {
-        let apart = |a: &Matrix, b: &Matrix| {
-            a.as_flattened()
-                .iter()
-                .zip(b.as_flattened())
-                .map(|(x, y)| (x - y).abs())
-                .fold(0.0, f64::max)
-        };
-        let joints = self
-            .joint
-            .iter()
-            .zip(&other.joint)
-            .map(|(a, b)| (a - b).abs());
-        let links = self
-            .link_end
-            .iter()
-            .zip(&other.link_end)
-            .map(|(a, b)| apart(a, b));
-        let loads = self
-            .load
-            .iter()
-            .zip(&other.load)
-            .map(|(a, b)| (a - b).abs());
-        let frames = [
-            apart(&self.base, &other.base),
-            apart(&self.tracker, &other.tracker),
-        ];
+        let tool = matrix::norm(matrix::minus(self.tool, other.tool));
+        let pairs = self.numbers().zip(other.numbers());
+        pairs.map(|(a, b)| (a - b).abs()).fold(tool, f64::max)
+    }
+
+    /// All numbers but those of the tool and of the motors.
+    fn numbers(&self) -> impl Iterator<Item = f64> {
+        let matrices = self.link_end.iter().chain([&self.base, &self.tracker]);
+        let joints = self.joint.iter().chain(&self.load);
         joints
-            .chain(links)
-            .chain(loads)
-            .chain(frames)
-            .fold(matrix::norm(matrix::minus(self.tool, other.tool)), f64::max)
+            .chain(matrices.flat_map(|matrix| matrix.as_flattened()))
+            .copied()
     }
 }
 
@@ -285,9 +266,7 @@ pub struct Row {
     pub drive: Vec<f64>,
     /// +1, -1 or 0: last move of each joint.
     pub direction: Vec<f64>,
-    /// s.
     pub time_s: f64,
-    /// C.
     pub temperature_c: f64,
     /// Declared, kg.
     pub payload_kg: f64,

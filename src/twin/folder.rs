@@ -1,9 +1,8 @@
 //! A recording as the files that a user has: robot.json, controller.csv, tracker.csv.
 
 use super::matrix::Vector;
-use calib_foundation::description::{JointKind, RobotDescription};
+use calib_foundation::description::{JointDescription, JointKind, RobotDescription};
 use serde_json::{Value, json};
-use std::fmt::Write;
 
 /// Time from the controller's stamp to the tracker's, s.
 const TRACKER_LATER_S: f64 = 1.5;
@@ -39,67 +38,98 @@ pub struct Log {
     pub velocity: Option<Vec<f64>>,
     /// Whether the tracker's stamps are the controller's: of standing points it looks some time after the arm has settled.
     pub at_once: bool,
-    /// C.
     pub temperature_c: Option<Vec<f64>>,
     /// Tracker frame, m.
     pub position: Vec<Vector>,
 }
 
-/// A column of every joint: its title, its values if they are known, and how they are written.
-type OfJoints<'a> = (&'a str, Option<&'a Vec<f64>>, &'a dyn Fn(f64) -> String);
+/// A file's name and its bytes.
+pub type File = (&'static str, String);
+
+/// A document as a file holds it.
+pub(crate) fn pretty(value: &Value) -> String {
+    format!("{value:#}\n")
+}
+
+/// A table as text: the title of every column, and its cell of a row.
+#[derive(Default)]
+pub(crate) struct Sheet<'a> {
+    titles: Vec<String>,
+    cells: Vec<Box<dyn Fn(usize) -> String + 'a>>,
+}
+
+impl<'a> Sheet<'a> {
+    pub(crate) fn add(&mut self, title: &str, cell: impl Fn(usize) -> String + 'a) {
+        self.titles.push(title.into());
+        self.cells.push(Box::new(cell));
+    }
+
+    /// A column of every joint, with its number in the title.
+    pub(crate) fn of_joints(
+        &mut self,
+        title: &str,
+        joints: usize,
+        values: &'a [f64],
+        write: impl Fn(f64) -> String + Copy + 'a,
+    ) {
+        for joint in 0..joints {
+            let title = title.replace("{}", &(joint + 1).to_string());
+            self.add(&title, move |row| write(values[row * joints + joint]));
+        }
+    }
+
+    pub(crate) fn text(&self, rows: usize) -> String {
+        let mut text = self.titles.join(",") + "\n";
+        for row in 0..rows {
+            let cells: Vec<String> = self.cells.iter().map(|cell| cell(row)).collect();
+            text.push_str(&cells.join(","));
+            text.push('\n');
+        }
+        text
+    }
+}
 
 impl Log {
     /// controller.csv.
     pub fn controller(&self, decimals: Decimals) -> String {
         let angle = |value: f64| fixed(value.to_degrees(), decimals.angle);
-        let of_joints: [OfJoints; 4] = [
-            ("q{}_deg", Some(&self.q), &angle),
-            ("i{}_a", self.current.as_ref(), &|value| fixed(value, 4)),
-            ("dir{}", self.direction.as_ref(), &|value| fixed(value, 0)),
-            ("dq{}_deg_s", self.velocity.as_ref(), &angle),
-        ];
-        let known = || {
-            let known = |(title, values, text)| Some((title, values?, text));
-            of_joints.into_iter().filter_map(known)
-        };
-        let mut titles = vec!["point_id".to_string()];
-        titles.extend(self.time_s.is_some().then(|| "time_s".into()));
-        titles.extend(["use".into(), "payload_kg".into()]);
-        for (title, ..) in known() {
-            titles.extend((1..=self.joints).map(|joint| title.replace("{}", &joint.to_string())));
+        let mut sheet = Sheet::default();
+        sheet.add("point_id", |row| word(&self.id[row]));
+        if let Some(time) = &self.time_s {
+            sheet.add("time_s", |row| fixed(time[row], decimals.time));
         }
-        titles.extend(self.temperature_c.is_some().then(|| "temp_c".into()));
-        let mut text = titles.join(",") + "\n";
-        for (row, id) in self.id.iter().enumerate() {
-            let mut cells = vec![word(id)];
-            let time = self.time_s.iter();
-            cells.extend(time.map(|time| fixed(time[row], decimals.time)));
-            cells.push(word(&self.usage[row]));
-            cells.push(fixed(self.payload_kg[row], 1));
-            for (_, values, write) in known() {
-                let values = &values[row * self.joints..(row + 1) * self.joints];
-                cells.extend(values.iter().map(|value| write(*value)));
-            }
-            let celsius = self.temperature_c.iter();
-            cells.extend(celsius.map(|celsius| fixed(celsius[row], 2)));
-            let _ = writeln!(text, "{}", cells.join(","));
+        sheet.add("use", |row| word(&self.usage[row]));
+        sheet.add("payload_kg", |row| fixed(self.payload_kg[row], 1));
+        sheet.of_joints("q{}_deg", self.joints, &self.q, angle);
+        if let Some(current) = &self.current {
+            sheet.of_joints("i{}_a", self.joints, current, |value| fixed(value, 4));
         }
-        text
+        if let Some(direction) = &self.direction {
+            sheet.of_joints("dir{}", self.joints, direction, |value| fixed(value, 0));
+        }
+        if let Some(velocity) = &self.velocity {
+            sheet.of_joints("dq{}_deg_s", self.joints, velocity, angle);
+        }
+        if let Some(celsius) = &self.temperature_c {
+            sheet.add("temp_c", |row| fixed(celsius[row], 2));
+        }
+        sheet.text(self.id.len())
     }
 
     /// tracker.csv.
     pub fn tracker(&self, decimals: Decimals) -> String {
-        let title = if self.time_s.is_some() { "time_s," } else { "" };
-        let mut text = format!("point_id,{title}x_mm,y_mm,z_mm\n");
         let later = if self.at_once { 0.0 } else { TRACKER_LATER_S };
-        for (row, (id, position)) in self.id.iter().zip(&self.position).enumerate() {
-            let time = self.time_s.as_ref().map_or_else(String::new, |time| {
-                fixed(time[row] + later, decimals.time) + ","
-            });
-            let [x, y, z] = position.map(|coordinate| fixed(1e3 * coordinate, decimals.length));
-            let _ = writeln!(text, "{},{time}{x},{y},{z}", word(id));
+        let mut sheet = Sheet::default();
+        sheet.add("point_id", |row| word(&self.id[row]));
+        if let Some(time) = &self.time_s {
+            sheet.add("time_s", move |row| fixed(time[row] + later, decimals.time));
         }
-        text
+        for (axis, title) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
+            sheet.add(title, move |row| {
+                fixed(1e3 * self.position[row][axis], decimals.length)
+            });
+        }
+        sheet.text(self.id.len())
     }
 }
 
@@ -127,7 +157,7 @@ fn fixed(value: f64, decimals: usize) -> String {
 
 /// robot.json: mm, kg, Nm/A, joints from 0. Fails with what of the robot this layout cannot state.
 pub fn robot(robot: &RobotDescription) -> Result<String, String> {
-    Ok(format!("{:#}\n", robot_json(robot)?))
+    robot_json(robot).map(|document| pretty(&document))
 }
 
 /// The same as a document, to which more may be added.
@@ -159,36 +189,16 @@ pub(crate) fn robot_json(robot: &RobotDescription) -> Result<Value, String> {
         "payload_com": mm(std::array::from_fn(|axis| robot.payload_centre[axis] - robot.tool[axis])),
         "coupling": robot.couplings.iter().map(|pair| [pair.moved, pair.by]).collect::<Vec<_>>(),
     });
-    // What is not known of every joint is left out.
-    let mut state = |key: &str, values: Option<Vec<Value>>| {
-        if let Some(values) = values {
+    // What is not known of every joint is not stated.
+    let mut state = |key: &str, value: &dyn Fn(&JointDescription) -> Option<Value>| {
+        if let Some(values) = joints.iter().map(value).collect::<Option<Vec<Value>>>() {
             out[key] = json!(values);
         }
     };
-    state(
-        "mass",
-        joints
-            .iter()
-            .map(|joint| joint.mass.map(|mass| json!(mass)))
-            .collect(),
-    );
-    state(
-        "com",
-        joints.iter().map(|joint| joint.centre.map(mm)).collect(),
-    );
-    state(
-        "ratio",
-        joints
-            .iter()
-            .map(|joint| joint.reduction_ratio.map(|ratio| json!(ratio)))
-            .collect(),
-    );
-    state(
-        "kt",
-        joints
-            .iter()
-            .map(|joint| joint.motor_constant.map(|constant| json!(constant)))
-            .collect(),
-    );
+    let number = |value: Option<f64>| value.map(|value| json!(value));
+    state("mass", &|joint| number(joint.mass));
+    state("com", &|joint| joint.centre.map(mm));
+    state("ratio", &|joint| number(joint.reduction_ratio));
+    state("kt", &|joint| number(joint.motor_constant));
     Ok(out)
 }

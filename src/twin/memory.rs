@@ -9,9 +9,7 @@ use super::plan::Point;
 pub struct Moment {
     /// Straight pieces of the way from the row before, in order: travel of each joint, rad or m.
     pub pieces: Vec<Vec<f64>>,
-    /// s.
     pub time_s: f64,
-    /// C.
     pub temperature_c: f64,
 }
 

@@ -66,6 +66,11 @@ impl Noise {
         if self.chance(0.5) { 1.0 } else { -1.0 }
     }
 
+    /// A phase in whole degrees.
+    pub(crate) fn phase(&mut self) -> f64 {
+        self.uniform(-180.0, 180.0).round()
+    }
+
     /// A size between two bounds above 0, evenly on a logarithmic scale.
     pub(crate) fn size(&mut self, lower: f64, upper: f64) -> f64 {
         (self.uniform(lower.ln(), upper.ln())).exp()

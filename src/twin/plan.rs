@@ -80,7 +80,7 @@ pub struct Climate {
     /// Shortest and longest time from one point to the next, s.
     pub pace_s: [f64; 2],
     /// The clock at the start, s: a later measurement of the same robot goes on with the time and the warmth of an earlier one.
-    #[serde(skip_serializing_if = "at_once")]
+    #[serde(skip_serializing_if = "is_none")]
     pub begin_s: f64,
     /// Temperature at the start, C.
     pub start_c: f64,
@@ -89,7 +89,7 @@ pub struct Climate {
     /// Time constant of the warm-up, h.
     pub warm_up_h: f64,
     /// A swing of the temperature on top, K, and its period, h: sun, doors, pauses.
-    #[serde(skip_serializing_if = "no_swing")]
+    #[serde(skip_serializing_if = "is_none")]
     pub swing_k: f64,
     /// Period of the swing, h.
     #[serde(skip_serializing_if = "usual_swing")]
@@ -99,13 +99,8 @@ pub struct Climate {
 const SWING_H: f64 = 1.0;
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
-fn no_swing(kelvin: &f64) -> bool {
-    *kelvin == 0.0
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
-fn at_once(seconds: &f64) -> bool {
-    *seconds == 0.0
+fn is_none(value: &f64) -> bool {
+    *value == 0.0
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
@@ -115,10 +110,9 @@ fn usual_swing(hours: &f64) -> bool {
 
 impl Default for Climate {
     fn default() -> Self {
-        let (pace_s, begin_s) = ([15.0, 25.0], 0.0);
         Self {
-            pace_s,
-            begin_s,
+            pace_s: [15.0, 25.0],
+            begin_s: 0.0,
             start_c: 20.0,
             rise_k: 0.0,
             warm_up_h: 1.5,
@@ -142,16 +136,11 @@ impl Climate {
 
 /// The side to which each joint moved last: +1, -1, or 0 where it stood still.
 pub fn direction(now: &[f64], before: &[f64]) -> Vec<f64> {
-    now.iter()
-        .zip(before)
-        .map(|(now, then)| {
-            if now == then {
-                0.0
-            } else {
-                (now - then).signum()
-            }
-        })
-        .collect()
+    let side = |(now, then): (&f64, &f64)| match now == then {
+        true => 0.0,
+        false => (now - then).signum(),
+    };
+    now.iter().zip(before).map(side).collect()
 }
 
 /// A planned point.
@@ -165,9 +154,7 @@ pub struct Point {
     pub before: Vec<f64>,
     /// Side from which each joint comes, +1 or -1.
     pub direction: Vec<f64>,
-    /// s.
     pub time_s: f64,
-    /// C.
     pub temperature_c: f64,
     /// Declared mass at the flange, kg.
     pub payload_kg: f64,
@@ -274,17 +261,18 @@ pub(super) fn ranges(robot: &RobotDescription, poses: &Poses) -> Result<Vec<[f64
             robot.joints.len()
         ));
     }
-    let si = |revolute: bool, x: f64| if revolute { x.to_radians() } else { 1e-3 * x };
-    let joints = robot
-        .joints
-        .iter()
-        .map(|joint| joint.kind == calib_foundation::description::JointKind::Revolute);
-    Ok(poses
-        .range_deg
-        .iter()
-        .zip(joints)
-        .map(|(range, revolute)| range.map(|x| si(revolute, x)))
+    let joints = poses.range_deg.iter().zip(&robot.joints);
+    Ok(joints
+        .map(|(range, joint)| range.map(|x| si(x, joint.kind)))
         .collect())
+}
+
+/// A position of a joint in deg or mm, in rad or m.
+pub(super) fn si(value: f64, kind: JointKind) -> f64 {
+    match kind {
+        JointKind::Revolute => value.to_radians(),
+        JointKind::Prismatic => 1e-3 * value,
+    }
 }
 
 /// A random pose within `ranges` (rad or m) and its tool point; fails with what to widen where none is allowed.
@@ -341,55 +329,39 @@ const SHORT: f64 = 5.0;
 impl GivenPose {
     /// The joints, rad or m, and where the arm stops before, if it does.
     pub(super) fn postures(&self, robot: &RobotDescription) -> (Vec<f64>, Option<Vec<f64>>) {
-        let si = |(value, kind): (f64, JointKind)| {
-            if kind == JointKind::Revolute {
-                value.to_radians()
-            } else {
-                1e-3 * value
-            }
-        };
-        let kinds = || robot.joints.iter().map(|joint| joint.kind);
-        let q = self
-            .joints_deg
-            .iter()
-            .copied()
-            .zip(kinds())
-            .map(si)
-            .collect();
-        let sides = self.joints_deg.iter().zip(&self.direction);
-        let short = sides
-            .map(|(value, side)| value - side * SHORT)
-            .zip(kinds())
-            .map(si);
-        (q, (!self.direction.is_empty()).then(|| short.collect()))
+        let joints = || self.joints_deg.iter().zip(&robot.joints);
+        let q = joints().map(|(value, joint)| si(*value, joint.kind));
+        let sides = joints().zip(&self.direction);
+        let short = sides.map(|((value, joint), side)| si(value - side * SHORT, joint.kind));
+        let stops = !self.direction.is_empty();
+        (q.collect(), stops.then(|| short.collect()))
     }
 
     /// What cannot be, whatever the robot: place below the pose and message.
-    pub fn faults(&self) -> Vec<(&'static str, String)> {
-        let mut out = Vec::new();
-        if self.joints_deg.is_empty() || !self.joints_deg.iter().all(|value| value.is_finite()) {
-            out.push((
+    pub fn faults(&self) -> Vec<(&'static str, &'static str)> {
+        let mut joints = self.joints_deg.iter();
+        let finite = !self.joints_deg.is_empty() && joints.all(|value| value.is_finite());
+        let mut sides = self.direction.iter();
+        let mass = self.payload_kg.unwrap_or(0.0);
+        let rules = [
+            (
+                finite,
                 "joints_deg",
-                "expected a number for every joint, deg (mm for a prismatic joint)".to_string(),
-            ));
-        }
-        if !self
-            .direction
-            .iter()
-            .all(|side| [-1.0, 0.0, 1.0].contains(side))
-        {
-            out.push((
+                "expected a number for every joint, deg (mm for a prismatic joint)",
+            ),
+            (
+                sides.all(|side| [-1.0, 0.0, 1.0].contains(side)),
                 "direction",
-                "allowed: 1, -1 or 0 for every joint, or nothing".to_string(),
-            ));
-        }
-        if self
-            .payload_kg
-            .is_some_and(|mass| !(mass.is_finite() && mass >= 0.0))
-        {
-            out.push(("payload_kg", "expected a mass, 0 or more".to_string()));
-        }
-        out
+                "allowed: 1, -1 or 0 for every joint, or nothing",
+            ),
+            (
+                mass.is_finite() && mass >= 0.0,
+                "payload_kg",
+                "expected a mass, 0 or more",
+            ),
+        ];
+        let broken = rules.into_iter().filter(|(kept, ..)| !kept);
+        broken.map(|(_, key, message)| (key, message)).collect()
     }
 
     /// What this robot cannot do.

@@ -10,7 +10,7 @@ use super::noise::{Noise, Purpose};
 use super::plan::{self, Block, Climate, Point, Poses};
 use super::tracker::{Beam, Tracker};
 use super::truth::{ARCSEC, TrueRobot};
-use super::way::{Path, Way};
+use super::way::{JointState, Path, Way};
 use crate::arm::{Motion, Row};
 use calib_foundation::description::RobotDescription;
 use schemars::JsonSchema;
@@ -58,9 +58,7 @@ pub struct Shot {
     pub q: Vec<f64>,
     /// Side from which each joint came, +1 or -1.
     pub direction: Vec<f64>,
-    /// s.
     pub time_s: f64,
-    /// C.
     pub temperature_c: f64,
     /// Declared mass at the flange, kg.
     pub payload_kg: f64,
@@ -74,10 +72,10 @@ pub struct Shot {
     pub velocity: Vec<f64>,
 }
 
-/// What is measured, and with which instrument.
-struct Scene<'a> {
-    arm: &'a Arm,
-    effects: &'a [Physical],
+/// What is measured, with all its effects, and with which instrument.
+pub(super) struct Scene<'a> {
+    pub(super) arm: Arm,
+    pub(super) effects: Vec<Physical>,
     tracker: &'a Tracker,
     base: Matrix,
 }
@@ -91,9 +89,9 @@ impl Scene<'_> {
         before: &[f64],
         beam: &mut Beam,
     ) -> (Shot, Equilibrium) {
-        let rest = settle(self.arm, &row, self.effects);
-        let seen = sighted(&rest, &self.base, &row, self.effects);
-        for effect in self.effects {
+        let settled = settle(&self.arm, &row, &self.effects);
+        let seen = sighted(&settled, &self.base, &row, &self.effects);
+        for effect in &self.effects {
             effect.log(&mut q, before);
         }
         let shot = Shot {
@@ -108,7 +106,7 @@ impl Scene<'_> {
             sigma: self.tracker.sigma(seen),
             velocity: Vec::new(),
         };
-        (shot, rest)
+        (shot, settled)
     }
 }
 
@@ -129,43 +127,25 @@ impl Experiment<'_> {
 
     /// The moving arm: rows of all blocks one after another along one way. No currents: the motors accelerate the arm, too.
     pub fn follow(&self, way: &Way, mut tick: impl FnMut()) -> Result<Vec<Shot>, String> {
-        let mut arm = Arm::new(self.robot, self.truth);
+        let scene = self.scene();
         let rows: usize = self.blocks.iter().map(|block| block.points).sum();
         let path = Path::draw(
             way,
             self.robot,
-            &arm,
+            &Arm::new(self.robot, self.truth),
             self.poses,
             rows as f64 / way.rate_hz,
             self.seed,
         )?;
-        let effects = self.all_effects(&arm);
-        for effect in &effects {
-            effect.shape(&mut arm);
-        }
-        let later: f64 = effects.iter().map(Physical::later).sum();
+        let later: f64 = scene.effects.iter().map(Physical::later).sum();
         let times = (0..rows).map(|row| row as f64 / way.rate_hz);
         let begin_s = self.climate.begin_s;
-        let clock = |since_s: f64| {
-            (
-                begin_s + since_s,
-                self.climate.temperature(begin_s + since_s),
-            )
-        };
+        let warmth = |since_s: f64| self.climate.temperature(begin_s + since_s);
         let course = times.map(|since_s| {
-            (
-                path.at(since_s + later).0,
-                clock(since_s).0,
-                clock(since_s).1,
-            )
+            let JointState { q, .. } = path.at(since_s + later);
+            (q, begin_s + since_s, warmth(since_s))
         });
-        let mut memories = effect::recall(&effects, &memory::along(course));
-        let scene = Scene {
-            arm: &arm,
-            effects: &effects,
-            tracker: self.tracker,
-            base: self.tracker.base(),
-        };
+        let mut memories = effect::recall(&scene.effects, &memory::along(course));
         let mut beam = Beam::new(self.seed);
         let mut play = Noise::new(self.seed, Purpose::Repeatability);
         let lasts = if way.wander_s > 0.0 {
@@ -173,52 +153,38 @@ impl Experiment<'_> {
         } else {
             0.0
         };
-        let mut astray: Vec<f64> = self
-            .repeatability_arcsec
-            .iter()
-            .map(|_| play.normal())
-            .collect();
-        let mut direction = vec![0.0; arm.links.len()];
-        let blocks = self
-            .blocks
-            .iter()
-            .enumerate()
-            .flat_map(|(number, block)| std::iter::repeat_n((number, block), block.points));
+        let joints = self.repeatability_arcsec.iter();
+        let mut astray: Vec<f64> = joints.map(|_| play.normal()).collect();
+        let mut direction = vec![0.0; scene.arm.links.len()];
+        let blocks = self.blocks.iter().enumerate();
+        let blocks =
+            blocks.flat_map(|(number, block)| std::iter::repeat_n((number, block), block.points));
         let mut shots = Vec::with_capacity(rows);
         for (row, (block, load)) in blocks.enumerate() {
             let since_s = row as f64 / way.rate_hz;
-            let (q, logged) = path.at(since_s);
-            let (command, velocity) = path.at(since_s + later);
+            let JointState { q, v: logged, .. } = path.at(since_s);
+            let JointState {
+                q: command,
+                v: velocity,
+                ..
+            } = path.at(since_s + later);
             let mut drive = self.truth.drive(self.robot, &command);
-            for (((position, astray), sigma), link) in drive
-                .iter_mut()
-                .zip(&mut astray)
-                .zip(self.repeatability_arcsec)
-                .zip(&arm.links)
-            {
+            for astray in &mut astray {
                 *astray = lasts * *astray + (1.0 - lasts * lasts).sqrt() * play.normal();
-                *position += sigma * if link.revolute { ARCSEC } else { 1e-6 } * *astray;
             }
-            for (side, speed) in direction
-                .iter_mut()
-                .zip(&velocity)
-                .filter(|(_, speed)| **speed != 0.0)
-            {
-                *side = speed.signum();
+            self.scatter(&mut drive, &scene.arm, |joint| astray[joint]);
+            for (side, speed) in direction.iter_mut().zip(&velocity) {
+                *side = if *speed == 0.0 { *side } else { speed.signum() };
             }
-            let (time_s, temperature_c) = clock(since_s);
-            let payload_kg = load.payload_kg;
-            let memory = std::mem::take(&mut memories[row]);
-            let direction = direction.clone();
             let row = Row {
                 command,
                 drive,
-                direction,
-                time_s,
-                temperature_c,
-                payload_kg,
+                direction: direction.clone(),
+                time_s: begin_s + since_s,
+                temperature_c: warmth(since_s),
+                payload_kg: load.payload_kg,
                 velocity,
-                memory,
+                memory: std::mem::take(&mut memories[row]),
             };
             let before = q.clone();
             let (shot, _) = scene.shot((block, row), q, &before, &mut beam);
@@ -231,52 +197,50 @@ impl Experiment<'_> {
 
     /// The given points in order.
     pub fn measure(&self, points: Vec<Point>, mut tick: impl FnMut()) -> Vec<Shot> {
-        let mut arm = Arm::new(self.robot, self.truth);
-        let effects = self.all_effects(&arm);
-        for effect in &effects {
-            effect.shape(&mut arm);
-        }
-        let scene = Scene {
-            arm: &arm,
-            effects: &effects,
-            tracker: self.tracker,
-            base: self.tracker.base(),
-        };
+        let scene = self.scene();
         let mut beam = Beam::new(self.seed);
         let mut meter = Noise::new(self.seed, Purpose::Current);
         let mut play = Noise::new(self.seed, Purpose::Repeatability);
-        let memories = effect::recall(&effects, &memory::past(&points));
+        let memories = effect::recall(&scene.effects, &memory::past(&points));
         let mut shots = Vec::with_capacity(points.len());
         for (point, memory) in points.into_iter().zip(memories) {
             let mut drive = self.truth.drive(self.robot, &point.q);
-            for ((position, sigma), link) in drive
-                .iter_mut()
-                .zip(self.repeatability_arcsec)
-                .zip(&arm.links)
-            {
-                *position += sigma * if link.revolute { ARCSEC } else { 1e-6 } * play.normal();
-            }
+            self.scatter(&mut drive, &scene.arm, |_| play.normal());
             let row = point.row(drive, memory);
-            let (shot, rest) = scene.shot((point.block, row), point.q, &point.before, &mut beam);
-            let current = self.currents(&arm, &rest.torque, &rest.motion, &mut meter);
+            let (shot, settled) = scene.shot((point.block, row), point.q, &point.before, &mut beam);
+            let current = self.currents(&scene.arm, &settled.torque, &settled.motion, &mut meter);
             shots.push(Shot { current, ..shot });
             tick();
         }
         shots
     }
 
-    /// The chosen effects and the true robot's linear wind-up.
-    pub(super) fn all_effects(&self, arm: &Arm) -> Vec<Physical> {
+    /// The arm as its effects shape it: the chosen ones, and the true robot's linear wind-up.
+    pub(super) fn scene(&self) -> Scene<'_> {
+        let mut arm = Arm::new(self.robot, self.truth);
         let wind_up = arm.links.iter().enumerate().map(|(joint, link)| {
-            let rad_per_nm = self
-                .truth
-                .compliance(joint, link.gear * link.motor_constant);
-            Physical::JointCompliance(JointCompliance {
-                joint: joint + 1,
-                rad_per_nm,
-            })
+            let per_ampere = link.gear * link.motor_constant;
+            JointCompliance::effect(joint + 1, self.truth.compliance(joint, per_ampere))
         });
-        wind_up.chain(self.effects.iter().cloned()).collect()
+        let effects: Vec<Physical> = wind_up.chain(self.effects.iter().cloned()).collect();
+        effects.iter().for_each(|effect| effect.shape(&mut arm));
+        Scene {
+            arm,
+            effects,
+            tracker: self.tracker,
+            base: self.tracker.base(),
+        }
+    }
+
+    /// Moves joints (rad or m) by their repeatability, so many standard deviations each.
+    fn scatter(&self, drive: &mut [f64], arm: &Arm, mut by: impl FnMut(usize) -> f64) {
+        let joints = drive
+            .iter_mut()
+            .zip(self.repeatability_arcsec)
+            .zip(&arm.links);
+        for (joint, ((position, sigma), link)) in joints.enumerate() {
+            *position += sigma * if link.revolute { ARCSEC } else { 1e-6 } * by(joint);
+        }
     }
 
     /// Holding currents: the motor carries what gravity and springs do to the joint, plus what friction adds.

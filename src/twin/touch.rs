@@ -4,12 +4,11 @@
 //! A posture is found by Newton's steps on the settled arm, by differences of its own tool point, from a random one.
 
 use super::arm::Arm;
-use super::effect::Physical;
 use super::equilibrium::settle;
 use super::matrix::{self, Vector};
 use super::noise::{Noise, Purpose};
 use super::plan::{self, Climate, Poses};
-use super::recorder::Experiment;
+use super::recorder::{Experiment, Scene};
 use crate::arm::Row;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -64,9 +63,7 @@ pub struct Touch {
     pub fixture: usize,
     /// Reported joint positions, rad or m.
     pub q: Vec<f64>,
-    /// s.
     pub time_s: f64,
-    /// C.
     pub temperature_c: f64,
 }
 
@@ -84,39 +81,35 @@ const FAR: f64 = 0.4;
 impl Fixture {
     /// What is wrong with it: the place below it, and the message.
     pub fn faults(&self) -> Vec<(&'static str, &'static str)> {
-        let mut faults = Vec::new();
-        let plain = |part: &str| {
-            !part.is_empty()
-                && part
-                    .chars()
-                    .all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
-        };
-        if !self.name.split('/').all(plain) {
-            faults.push((
+        let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        let plain = |part: &str| !part.is_empty() && part.chars().all(is_word);
+        let normal = self.normal.is_some_and(|normal| matrix::norm(normal) > 0.0);
+        let radius = self.radius_mm.is_some_and(|radius| radius > 0.0);
+        let rules = [
+            (
+                self.name.split('/').all(plain),
                 "name",
                 "expected letters, digits, - and _, in parts with / between, e.g. front/0",
-            ));
-        }
-        if self.points == 0 {
-            faults.push(("points", "expected 1 or more"));
-        }
-        if !(self.sigma_um >= 0.0 && self.sigma_um.is_finite()) {
-            faults.push(("sigma_um", "expected 0 or more"));
-        }
-        let normal = self.normal.is_some_and(|normal| matrix::norm(normal) > 0.0);
-        if (self.kind == FixtureKind::Plane) != normal {
-            faults.push((
+            ),
+            (self.points > 0, "points", "expected 1 or more"),
+            (
+                self.sigma_um >= 0.0 && self.sigma_um.is_finite(),
+                "sigma_um",
+                "expected 0 or more",
+            ),
+            (
+                (self.kind == FixtureKind::Plane) == normal,
                 "normal",
                 "a plane has one, e.g. [0, 0, 1], and nothing else has",
-            ));
-        }
-        if (self.kind != FixtureKind::Socket) != self.radius_mm.is_some_and(|radius| radius > 0.0) {
-            faults.push((
+            ),
+            (
+                (self.kind != FixtureKind::Socket) == radius,
                 "radius_mm",
                 "planes and spheres have one above 0, sockets none",
-            ));
-        }
-        faults
+            ),
+        ];
+        let broken = rules.into_iter().filter(|(kept, ..)| !kept);
+        broken.map(|(_, key, message)| (key, message)).collect()
     }
 
     /// A point at which the ball may lie, m: drawn over what is touched, with the noise of coming back.
@@ -127,23 +120,17 @@ impl Fixture {
             FixtureKind::Socket => centre.map(|coordinate| coordinate + sigma * noise.normal()),
             FixtureKind::Sphere => {
                 let along = draw.vector(1.0, 1.0);
-                matrix::add(
-                    centre,
-                    matrix::scale(along, radius + sigma * noise.normal()),
-                )
+                let out = matrix::scale(along, radius + sigma * noise.normal());
+                matrix::add(centre, out)
             }
             FixtureKind::Plane => {
                 let normal = self.normal.unwrap_or([0.0, 0.0, 1.0]);
                 let normal = matrix::scale(normal, 1.0 / matrix::norm(normal));
                 let flat = matrix::cross(normal, draw.vector(1.0, 1.0));
-                let out = matrix::scale(
-                    flat,
-                    radius * draw.uniform(0.0, 1.0).sqrt() / matrix::norm(flat).max(1e-9),
-                );
-                matrix::add(
-                    matrix::add(centre, out),
-                    matrix::scale(normal, sigma * noise.normal()),
-                )
+                let far = radius * draw.uniform(0.0, 1.0).sqrt();
+                let out = matrix::scale(flat, far / matrix::norm(flat).max(1e-9));
+                let off = matrix::scale(normal, sigma * noise.normal());
+                matrix::add(matrix::add(centre, out), off)
             }
         }
     }
@@ -152,9 +139,7 @@ impl Fixture {
 impl Experiment<'_> {
     /// Brings the ball to every fixture in turn, as often as it says. Fails with the name of what cannot be reached.
     pub fn touch(&self, fixtures: &[Fixture]) -> Result<Vec<Touch>, String> {
-        let mut arm = Arm::new(self.robot, self.truth);
-        let effects = self.all_effects(&arm);
-        effects.iter().for_each(|effect| effect.shape(&mut arm));
+        let scene = self.scene();
         let ranges = plan::ranges(self.robot, self.poses)?;
         let mut draw = Noise::new(self.seed, Purpose::Poses);
         let mut noise = Noise::new(self.seed, Purpose::Tracker);
@@ -170,8 +155,7 @@ impl Experiment<'_> {
                 let there = fixture.point(&mut draw, &mut noise);
                 let before = touches.last().map(|touch: &Touch| touch.q.clone());
                 let q = self.reach(
-                    &arm,
-                    &effects,
+                    &scene,
                     &ranges,
                     (there, before.as_deref()),
                     [time_s, temperature_c],
@@ -198,8 +182,7 @@ impl Experiment<'_> {
     /// Joints at which the settled arm holds the ball at a point, m, coming from joints `before`.
     fn reach(
         &self,
-        arm: &Arm,
-        effects: &[Physical],
+        Scene { arm, effects, .. }: &Scene,
         ranges: &[[f64; 2]],
         (there, before): (Vector, Option<&[f64]>),
         [time_s, temperature_c]: [f64; 2],
@@ -210,14 +193,15 @@ impl Experiment<'_> {
             let row = Row {
                 command: q.to_vec(),
                 drive: self.truth.drive(self.robot, q),
-                direction: match before {
-                    Some(before) => q
-                        .iter()
-                        .zip(before)
-                        .map(|(q, before)| (q - before).signum())
-                        .collect(),
-                    None => vec![0.0; joints],
-                },
+                direction: before.map_or_else(
+                    || vec![0.0; joints],
+                    |before| {
+                        q.iter()
+                            .zip(before)
+                            .map(|(q, before)| (q - before).signum())
+                            .collect()
+                    },
+                ),
                 time_s,
                 temperature_c,
                 payload_kg: 0.0,
@@ -237,7 +221,7 @@ impl Experiment<'_> {
                 let tool = ball(&q);
                 let left = matrix::minus(there, tool);
                 if matrix::norm(left) < THERE {
-                    if within(&q, ranges) && self.is_above_floor(arm, &q) {
+                    if within(&q, ranges, 0.0) && self.is_above_floor(arm, &q) {
                         return Some(q);
                     }
                     break;
@@ -256,7 +240,7 @@ impl Experiment<'_> {
                 q.iter_mut()
                     .zip(&step)
                     .for_each(|(q, turn)| *q += share * turn);
-                if !near(&q, ranges) {
+                if !within(&q, ranges, FAR) {
                     break;
                 }
             }
@@ -275,17 +259,10 @@ impl Experiment<'_> {
     }
 }
 
-fn within(q: &[f64], ranges: &[[f64; 2]]) -> bool {
-    q.iter()
-        .zip(ranges)
-        .all(|(q, [lower, upper])| q >= lower && q <= upper)
-}
-
-/// Not hopelessly out of the ranges: Newton's steps may come back.
-fn near(q: &[f64], ranges: &[[f64; 2]]) -> bool {
-    q.iter()
-        .zip(ranges)
-        .all(|(q, [lower, upper])| *q >= lower - FAR && *q <= upper + FAR)
+/// Whether joints are in their ranges, or out of them by no more than this: Newton's steps may come back.
+fn within(q: &[f64], ranges: &[[f64; 2]], beyond: f64) -> bool {
+    let mut joints = q.iter().zip(ranges);
+    joints.all(|(q, [lower, upper])| *q >= lower - beyond && *q <= upper + beyond)
 }
 
 /// The shortest step whose columns sum up to `left`; none near a singular posture.

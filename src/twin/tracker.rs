@@ -4,6 +4,7 @@
 
 use crate::matrix;
 use crate::matrix::{Matrix, Vector};
+use crate::names::named;
 use crate::noise::{Noise, Purpose};
 use crate::true_value::{TrueValue, true_value};
 use schemars::JsonSchema;
@@ -12,42 +13,24 @@ use serde::{Deserialize, Serialize};
 /// Standard deviation of the logarithm of a point's width: one point in six is wider than 1.6 times the median.
 const UNEVENNESS: f64 = 0.5;
 
-/// How the tracker's errors scatter; all have the stated standard deviation.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Scatter {
-    /// Normal.
-    #[default]
-    Gaussian,
-    /// Student's t with 3 degrees of freedom: now and then far out.
-    Student,
-    /// Gaussian, point by point wider or narrower, log-normally.
-    Uneven,
-    /// Gaussian, 0.9 of a point's error being that of the point before: air or a tripod that moves.
-    Wandering,
-    /// Gaussian, across the beam 2.5 times as large as along it.
-    Directional,
-}
-
-/// All of them.
-pub const SCATTERS: [Scatter; 5] = [
-    Scatter::Gaussian,
-    Scatter::Student,
-    Scatter::Uneven,
-    Scatter::Wandering,
-    Scatter::Directional,
-];
-
-impl Scatter {
-    /// As it is written.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Gaussian => "gaussian",
-            Self::Student => "student",
-            Self::Uneven => "uneven",
-            Self::Wandering => "wandering",
-            Self::Directional => "directional",
-        }
+named! {
+    /// How the tracker's errors scatter; all have the stated standard deviation.
+    #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+    #[serde(rename_all = "snake_case")]
+    Scatter,
+    /// All of them.
+    SCATTERS: 5 {
+        /// Normal.
+        #[default]
+        Gaussian "gaussian",
+        /// Student's t with 3 degrees of freedom: now and then far out.
+        Student "student",
+        /// Gaussian, point by point wider or narrower, log-normally.
+        Uneven "uneven",
+        /// Gaussian, 0.9 of a point's error being that of the point before: air or a tripod that moves.
+        Wandering "wandering",
+        /// Gaussian, across the beam 2.5 times as large as along it.
+        Directional "directional",
     }
 }
 

@@ -155,12 +155,8 @@ impl TrueRobot {
             for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
                 let (shift, tilt) = (1e3 * error.shift[axis], error.tilt[axis]);
                 if joint + 1 == robot.joints.len() {
-                    out.extend(true_values(
-                        "tool_offset",
-                        letter,
-                        "tool",
-                        [("", "mm", shift)],
-                    ));
+                    let numbers = [("", "mm", shift)];
+                    out.extend(true_values("tool_offset", letter, "tool", numbers));
                     continue;
                 }
                 let (tag, place) = (format!("l{}", joint + 1), format!("link {}", joint + 1));
@@ -173,14 +169,8 @@ impl TrueRobot {
             let tag = format!("j{}_j{}", wrong.by, wrong.moved);
             let place = format!("joint {}->{}", wrong.by, wrong.moved);
             let ratio = self.ratio.get(wrong.by - 1).copied().unwrap_or(1.0);
-            out.push(true_value(
-                "coupling_ratio",
-                &tag,
-                place,
-                "",
-                "1",
-                wrong.error * ratio,
-            ));
+            let numbers = [("", "1", wrong.error * ratio)];
+            out.extend(true_values("coupling_ratio", &tag, &place, numbers));
         }
         out
     }
@@ -188,6 +178,7 @@ impl TrueRobot {
     /// What cannot be true of a robot with this description: place below `truth` and message.
     pub fn faults(&self, robot: &RobotDescription) -> Vec<(String, String)> {
         let joints = robot.joints.len();
+        let is_one = |number: usize| (1..=joints).contains(&number);
         let mut out = Vec::new();
         for (name, list) in [
             ("offset_deg", &self.offset_deg),
@@ -195,34 +186,24 @@ impl TrueRobot {
             ("compliance_rad_a", &self.compliance_rad_a),
             ("compliance_rad_nm", &self.compliance_rad_nm),
         ] {
-            if !list.is_empty() && list.len() != joints {
-                out.push((
-                    name.into(),
-                    format!(
-                        "has {} numbers, the robot {joints} joints; give one a joint or none",
-                        list.len()
-                    ),
-                ));
+            let count = list.len();
+            if count != 0 && count != joints {
+                let message = format!(
+                    "has {count} numbers, the robot {joints} joints; give one a joint or none"
+                );
+                out.push((name.into(), message));
             }
         }
-        for (index, error) in self.links.iter().enumerate() {
-            if !(1..=joints).contains(&error.link) {
-                out.push((
-                    format!("links[{index}].link"),
-                    format!("is {}; allowed: 1 to {joints}", error.link),
-                ));
+        for (index, LinkError { link, .. }) in self.links.iter().enumerate() {
+            if !is_one(*link) {
+                let message = format!("is {link}; allowed: 1 to {joints}");
+                out.push((format!("links[{index}].link"), message));
             }
         }
-        for (index, error) in self.couplings.iter().enumerate() {
-            if ![error.moved, error.by]
-                .iter()
-                .all(|joint| (1..=joints).contains(joint))
-                || error.moved == error.by
-            {
-                out.push((
-                    format!("couplings[{index}]"),
-                    format!("needs two different joints out of 1 to {joints}"),
-                ));
+        for (index, CouplingError { moved, by, .. }) in self.couplings.iter().enumerate() {
+            if !is_one(*moved) || !is_one(*by) || moved == by {
+                let message = format!("needs two different joints out of 1 to {joints}");
+                out.push((format!("couplings[{index}]"), message));
             }
         }
         out

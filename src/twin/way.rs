@@ -3,7 +3,7 @@
 use super::arm::Arm;
 use super::noise::{Noise, Purpose};
 use super::plan::{self, Poses};
-use calib_foundation::description::{JointKind, RobotDescription};
+use calib_foundation::description::RobotDescription;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -49,20 +49,35 @@ pub(crate) enum Shape {
     Moves,
 }
 
+/// Where joints are and how they move: rad, rad/s, rad/s2; of prismatic joints m.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct JointState {
+    /// rad.
+    pub q: Vec<f64>,
+    /// rad/s.
+    pub v: Vec<f64>,
+    /// rad/s2.
+    pub a: Vec<f64>,
+}
+
 /// A drawn way.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Path {
-    /// Middle, and amplitude, angular frequency, phase of each wave, of every joint.
-    Waves(Vec<(f64, [[f64; 3]; 3])>),
+    /// Middle, and amplitude, angular frequency, phase of each wave, of every joint; at a standstill at both ends where it lasts so many seconds.
+    Waves(Vec<(f64, Vec<[f64; 3]>)>, Option<f64>),
     /// From pose to pose, with rests between.
     Moves(Vec<Move>),
+    /// States at even steps, s.
+    Given(f64, Vec<JointState>),
 }
 
 /// From a pose to the next.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Move {
-    start_s: f64,
-    duration_s: f64,
-    from: Vec<f64>,
-    to: Vec<f64>,
+    pub(crate) start_s: f64,
+    pub(crate) duration_s: f64,
+    pub(crate) from: Vec<f64>,
+    pub(crate) to: Vec<f64>,
 }
 
 /// Amplitudes of the three waves as shares of half the range, and their frequencies as multiples of the first.
@@ -71,7 +86,9 @@ const FREQUENCIES: [f64; 3] = [1.0, 1.7, 2.9];
 /// Time before the first row and after the last one, s: the arm moves already, and clocks may be apart.
 const MARGIN_S: f64 = 2.0;
 /// The fastest moment of a move of fifth degree, in travel over duration.
-const PEAK: f64 = 1.875;
+pub(crate) const PEAK: f64 = 1.875;
+/// Time in which waves that begin and end at a standstill come up, s.
+const RAMP_S: f64 = 1.0;
 /// No move is shorter, s.
 const SHORTEST_S: f64 = 0.3;
 
@@ -87,36 +104,23 @@ impl Path {
     ) -> Result<Self, String> {
         let ranges = plan::ranges(robot, poses)?;
         let mut draw = Noise::new(seed, Purpose::Poses);
-        let speeds: Vec<f64> = robot
-            .joints
-            .iter()
-            .map(|joint| {
-                if joint.kind == JointKind::Revolute {
-                    way.speed_deg_s.to_radians()
-                } else {
-                    1e-3 * way.speed_deg_s
-                }
-            })
+        let joints = robot.joints.iter();
+        let speeds: Vec<f64> = joints
+            .map(|joint| plan::si(way.speed_deg_s, joint.kind))
             .collect();
         if way.shape == Shape::Waves {
             let joints = ranges.iter().zip(&speeds);
-            return Ok(Self::Waves(
-                joints
-                    .map(|(range, speed)| waves(*range, *speed, &mut draw))
-                    .collect(),
-            ));
+            let waves = joints.map(|(range, speed)| waves(*range, *speed, &mut draw));
+            return Ok(Self::Waves(waves.collect(), None));
         }
         let mut moves: Vec<Move> = Vec::new();
         let (mut at, _) = plan::allowed(arm, poses, &ranges, &mut draw)?;
         let mut time = -MARGIN_S;
         while time < seconds + MARGIN_S {
             let (to, _) = plan::allowed(arm, poses, &ranges, &mut draw)?;
-            let longest = at
-                .iter()
-                .zip(&to)
-                .zip(&speeds)
-                .map(|((a, b), speed)| PEAK * (b - a).abs() / speed);
-            let duration_s = longest.fold(SHORTEST_S, f64::max);
+            let joints = at.iter().zip(&to).zip(&speeds);
+            let lasts = joints.map(|((a, b), speed)| PEAK * (b - a).abs() / speed);
+            let duration_s = lasts.fold(SHORTEST_S, f64::max);
             let from = std::mem::replace(&mut at, to.clone());
             moves.push(Move {
                 start_s: time,
@@ -129,40 +133,67 @@ impl Path {
         Ok(Self::Moves(moves))
     }
 
-    /// Joint positions and velocities at a time, rad or m, and a second.
-    pub(crate) fn at(&self, time: f64) -> (Vec<f64>, Vec<f64>) {
+    /// The joints at a time, s.
+    pub(crate) fn at(&self, time: f64) -> JointState {
+        let mut state = JointState::default();
         match self {
-            Self::Waves(joints) => {
-                let sum = |of: &dyn Fn(&[f64; 3]) -> f64, waves: &[[f64; 3]; 3]| {
-                    waves.iter().map(of).sum::<f64>()
-                };
-                let place = |[size, pace, phase]: &[f64; 3]| size * (pace * time + phase).sin();
-                let speed =
-                    |[size, pace, phase]: &[f64; 3]| size * pace * (pace * time + phase).cos();
-                joints
-                    .iter()
-                    .map(|(middle, waves)| (middle + sum(&place, waves), sum(&speed, waves)))
-                    .unzip()
+            Self::Waves(joints, lasts) => {
+                let [gate, rate, bend] = lasts.map_or([1.0, 0.0, 0.0], |lasts| gate(time, lasts));
+                for (middle, waves) in joints {
+                    let [mut x, mut dx, mut ddx] = [0.0; 3];
+                    for [size, w, phase] in waves {
+                        let (sine, cosine) = (w * time + phase).sin_cos();
+                        x += size * sine;
+                        dx += size * w * cosine;
+                        ddx -= size * w * w * sine;
+                    }
+                    state.q.push(middle + gate * x);
+                    state.v.push(gate * dx + rate * x);
+                    state.a.push(gate * ddx + 2.0 * rate * dx + bend * x);
+                }
             }
             Self::Moves(moves) => {
                 let next = moves.partition_point(|one| one.start_s <= time).max(1) - 1;
-                let Some(one) = moves.get(next) else {
-                    return (Vec::new(), Vec::new());
-                };
-                let u = ((time - one.start_s) / one.duration_s).clamp(0.0, 1.0);
-                let share = u * u * u * (10.0 - u * (15.0 - 6.0 * u));
-                let rate = 30.0 * u * u * (1.0 - u) * (1.0 - u) / one.duration_s;
-                one.from
-                    .iter()
-                    .zip(&one.to)
-                    .map(|(from, to)| (from + share * (to - from), rate * (to - from)))
-                    .unzip()
+                if let Some(one) = moves.get(next) {
+                    let lasts = one.duration_s;
+                    let [s, ds, dds] = smooth((time - one.start_s) / lasts);
+                    for (from, to) in one.from.iter().zip(&one.to) {
+                        state.q.push(from + s * (to - from));
+                        state.v.push(ds / lasts * (to - from));
+                        state.a.push(dds * (to - from) / (lasts * lasts));
+                    }
+                }
+            }
+            Self::Given(step, states) => {
+                let row = (time / step).round() as usize;
+                return states[row.min(states.len() - 1)].clone();
             }
         }
+        state
     }
 }
 
-fn waves([low, high]: [f64; 2], speed: f64, draw: &mut Noise) -> (f64, [[f64; 3]; 3]) {
+/// 0 at both ends of a way that lasts so long, s, 1 between, with its derivatives.
+fn gate(time: f64, lasts: f64) -> [f64; 3] {
+    let (near, sign) = if time < 0.5 * lasts {
+        (time, 1.0)
+    } else {
+        (lasts - time, -1.0)
+    };
+    let [s, ds, dds] = smooth(near / RAMP_S);
+    [s, sign * ds / RAMP_S, dds / (RAMP_S * RAMP_S)]
+}
+
+/// From 0 to 1 with velocity and acceleration 0 at both ends, and its derivatives.
+fn smooth(u: f64) -> [f64; 3] {
+    let u = u.clamp(0.0, 1.0);
+    let s = u * u * u * (10.0 - u * (15.0 - 6.0 * u));
+    let ds = 30.0 * u * u * (1.0 - u) * (1.0 - u);
+    let dds = 60.0 * u * (u * (2.0 * u - 3.0) + 1.0);
+    [s, ds, dds]
+}
+
+fn waves([low, high]: [f64; 2], speed: f64, draw: &mut Noise) -> (f64, Vec<[f64; 3]>) {
     let half = 0.5 * (high - low);
     let sizes = SHARES.map(|share| half * share * draw.uniform(0.7, 1.0));
     let paces = FREQUENCIES.map(|times| times * draw.uniform(0.9, 1.1));
@@ -176,6 +207,6 @@ fn waves([low, high]: [f64; 2], speed: f64, draw: &mut Noise) -> (f64, [[f64; 3]
     let wave = |k: usize, draw: &mut Noise| [sizes[k], first * paces[k], draw.uniform(0.0, TAU)];
     (
         0.5 * (low + high),
-        [wave(0, draw), wave(1, draw), wave(2, draw)],
+        vec![wave(0, draw), wave(1, draw), wave(2, draw)],
     )
 }

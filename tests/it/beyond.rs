@@ -1,8 +1,7 @@
 //! The twin beyond the library: instruments, memory and interactions against numbers worked out by hand, the set that is drawn from them,
 //! and the library's set, which stays as it was.
 
-use calib::twin::arm::Arm;
-use calib::twin::arm::Row;
+use calib::twin::arm::{Arm, Row};
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
 use calib::twin::conceal::family::{BEYOND, Collection};
@@ -15,6 +14,7 @@ use calib::twin::equilibrium::{Equilibrium, settle, sighted};
 use calib::twin::matrix::IDENTITY;
 use calib::twin::memory::{Moment, past};
 use calib::twin::plan::Point;
+use calib::twin::recorder::Shot;
 use calib::twin::truth::TrueRobot;
 use std::f64::consts::PI;
 
@@ -64,95 +64,54 @@ fn assert_near(found: &[f64], expected: &[f64], within: f64) {
 /// Two travels up leave 1 - exp(-2); half a travel back brings -1 + (1 + that) exp(-1/2); a joint that stays keeps what it had.
 #[test]
 fn lost_motion_of_dahl_fades_in_over_its_travel() {
-    let friction = Presliding {
-        joint: 1,
-        amplitude_arcsec: 30.0,
-        dahl_deg: 1.0,
-        slip_deg: Vec::new(),
-    };
-    let z = remembered(
-        Physical::Presliding(friction.clone()),
-        &moves(&[2.0, -0.5, 0.0]),
-    );
-    assert_near(
-        &z,
-        &[0.864_664_716_763, 0.130_976_320_801, 0.130_976_320_801],
-        1e-12,
-    );
-
-    let robot = Kind::Five5r.description([0.0; 3]);
-    let rest = |memory| {
-        settle(
-            &Arm::new(&robot, &TrueRobot::default()),
-            &row(&[0.0; 5], vec![memory]),
-            &[Physical::Presliding(friction.clone())],
-        )
-    };
-    assert_near(
-        &rest(0.5).motion.joint,
-        &[-15.0 * ARCSEC, 0.0, 0.0, 0.0, 0.0],
-        1e-15,
-    );
+    let friction = Presliding::effect(1, 30.0, 1.0, vec![]);
+    let z = remembered(friction.clone(), &moves(&[2.0, -0.5, 0.0]));
+    let expected = [0.864_664_716_763, 0.130_976_320_801, 0.130_976_320_801];
+    assert_near(&z, &expected, 1e-12);
+    let found = settled(vec![0.5], &[friction]).motion.joint;
+    assert_near(&found, &[-15.0 * ARCSEC, 0.0, 0.0, 0.0, 0.0], 1e-15);
 }
 
 /// Elements that slip at 1 and 3 deg: after 2 deg up one slides and one is stretched by 2/3; 1.5 deg back leave -1/2 and 1/6.
 #[test]
 fn maxwells_elements_slip_one_after_another() {
-    let friction = Presliding {
-        joint: 1,
-        amplitude_arcsec: 30.0,
-        dahl_deg: 0.0,
-        slip_deg: vec![1.0, 3.0],
-    };
-    let z = remembered(Physical::Presliding(friction), &moves(&[2.0, -1.5]));
+    let friction = Presliding::effect(1, 30.0, 0.0, vec![1.0, 3.0]);
+    let z = remembered(friction, &moves(&[2.0, -1.5]));
     assert_near(&z, &[5.0 / 6.0, -1.0 / 6.0], 1e-12);
 }
 
-fn warming(heat: Heat, time_s: f64) -> JointWarming {
-    JointWarming {
-        joint: 1,
-        heat,
-        time_s,
-        oil_s: 0.0,
-        full: 0.0,
-        reference_c: 20.0,
-        zero_arcsec: 1.0,
-        ratio_arcsec_per_rad: 0.0,
-        softening_rad_per_nm: 0.0,
-    }
+/// The arm of five joints at its zero pose under effects of this memory.
+fn settled(memory: Vec<f64>, effects: &[Physical]) -> Equilibrium {
+    let arm = Arm::new(&Kind::Five5r.description([0.0; 3]), &TrueRobot::default());
+    settle(&arm, &row(&[0.0; 5], memory), effects)
+}
+
+/// An arcsec of zero per unit of warmth, which saturates at `full`.
+fn warming(heat: Heat, time_s: f64, full: f64) -> Physical {
+    JointWarming::effect(1, heat, time_s, 0.0, full, 20.0, 1.0, 0.0, 0.0)
 }
 
 /// Half a radian, of which exp(-1) is left 100 s later when 0.2 come on top.
 #[test]
 fn a_joint_warms_by_its_own_work_and_cools_off() {
     let worked = moves(&[0.5f64.to_degrees(), -0.2f64.to_degrees()]);
-    let warm = remembered(Physical::JointWarming(warming(Heat::Work, 100.0)), &worked);
+    let warm = remembered(warming(Heat::Work, 100.0, 0.0), &worked);
     assert_near(&warm, &[0.5, 0.383_939_720_586], 1e-12);
 }
 
 /// Behind a ramp of 0.01 K/s a body with 100 s ends up 1 K behind: after 1000 s it is 10 - 1 + exp(-10) K warmer.
 #[test]
 fn metal_trails_a_ramp_by_slope_times_its_time() {
-    let warm = remembered(
-        Physical::JointWarming(warming(Heat::Temperature, 100.0)),
-        &moves(&[0.0; 10]),
-    );
-    assert!((warm[9] - 9.000_045_399_930).abs() < 1e-11, "{warm:?}");
-    let at_once = remembered(
-        Physical::JointWarming(warming(Heat::Temperature, 0.0)),
-        &moves(&[0.0; 3]),
-    );
-    assert_near(&at_once, &[1.0, 2.0, 3.0], 1e-12);
-    // Saturating at 2 K, the first kelvin is 2 tanh(1/2).
-    let joint = JointWarming {
-        full: 2.0,
-        ..warming(Heat::Temperature, 0.0)
+    let warm = |time_s, full, rows| {
+        remembered(
+            warming(Heat::Temperature, time_s, full),
+            &moves(&vec![0.0; rows]),
+        )
     };
-    assert_near(
-        &remembered(Physical::JointWarming(joint), &moves(&[0.0])),
-        &[2.0 * 0.5f64.tanh()],
-        1e-12,
-    );
+    assert_near(&warm(100.0, 0.0, 10)[9..], &[9.000_045_399_930], 1e-11);
+    assert_near(&warm(0.0, 0.0, 3), &[1.0, 2.0, 3.0], 1e-12);
+    // Saturating at 2 K, the first kelvin is 2 tanh(1/2).
+    assert_near(&warm(0.0, 2.0, 1), &[2.0 * 0.5f64.tanh()], 1e-12);
 }
 
 /// A repeat is reached as before: back to where the arm came from, and again.
@@ -179,141 +138,66 @@ fn a_repeated_row_went_away_and_came_back() {
     assert_eq!(travels, [vec![0.3], vec![-0.3, 0.3], vec![0.2]]);
 }
 
-fn read(effect: Physical, memory: f64, point: [f64; 3]) -> [f64; 3] {
-    effect.sight(&row(&[0.0], vec![memory]), memory, point)
-}
-
 /// At azimuth 90 deg and 3 m from the standing axis 10 arcsec are 3 m times 10 arcsec against x; at 45 deg of elevation a tangent is 1.
 #[test]
 fn an_instrument_errs_in_range_azimuth_and_elevation_about_its_own_origin() {
-    let circle = |circle, phase_deg| {
-        Physical::TrackerCircle(TrackerCircle {
-            circle,
-            amplitude_arcsec: 10.0,
-            phase_deg,
-        })
-    };
-    let turned = [-30.0 * ARCSEC, 3.0, 4.0];
-    assert_near(
-        &read(circle(Circle::Eccentric, 0.0), 0.0, [0.0, 3.0, 4.0]),
-        &turned,
-        1e-8,
-    );
-    assert_near(
-        &read(circle(Circle::OffCentre, 0.0), 0.0, [0.0, 3.0, 4.0]),
-        &turned,
-        1e-8,
-    );
-    // Along x only the cosine shows: sin(0 + 90 deg).
-    assert_near(
-        &read(circle(Circle::OffCentre, 90.0), 0.0, [3.0, 0.0, 4.0]),
-        &[3.0, 30.0 * ARCSEC, 4.0],
-        1e-8,
-    );
-    assert_near(
-        &read(circle(Circle::Elliptic, 0.0), 0.0, [0.0, 3.0, 4.0]),
-        &[0.0, 3.0, 4.0],
-        1e-12,
-    );
-
-    let head = TrackerElevation {
-        index_arcsec: 4.0,
-        sag_arcsec: 6.0,
-        ..TrackerElevation::default()
-    };
-    assert_near(
-        &read(Physical::TrackerElevation(head), 0.0, [3.0, 0.0, 0.0]),
-        &[3.0, 0.0, 30.0 * ARCSEC],
-        1e-8,
-    );
-    let transit = TrackerElevation {
-        transit_arcsec: 10.0,
-        ..TrackerElevation::default()
-    };
-    assert_near(
-        &read(Physical::TrackerElevation(transit), 0.0, [3.0, 0.0, 3.0]),
-        &[3.0, 30.0 * ARCSEC, 3.0],
-        1e-8,
-    );
-
-    let ranges = TrackerOffset {
-        constant_um: 75.0,
-        um_per_m2: 1.0,
-        ..TrackerOffset::default()
-    };
-    assert_near(
-        &read(Physical::TrackerOffset(ranges), 0.0, [3.0, 0.0, 4.0]),
-        &[3.000_06, 0.0, 4.000_08],
-        1e-12,
-    );
-    let quarter = TrackerOffset {
-        cyclic_um: 100.0,
-        wave_mm: 20_000.0,
-        ..TrackerOffset::default()
-    };
-    assert_near(
-        &read(Physical::TrackerOffset(quarter), 0.0, [3.0, 0.0, 4.0]),
-        &[3.000_06, 0.0, 4.000_08],
-        1e-12,
-    );
+    let circle = |circle, phase_deg| TrackerCircle::effect(circle, 10.0, phase_deg);
+    let head = |index, sag, transit| TrackerElevation::effect(index, sag, 0.0, 0.0, transit);
+    let ranges =
+        |constant, cyclic, square| TrackerOffset::effect(constant, cyclic, 20_000.0, 0.0, square);
+    let (high, turned) = ([0.0, 3.0, 4.0], [-30.0 * ARCSEC, 3.0, 4.0]);
+    let (along, farther) = ([3.0, 0.0, 4.0], [3.000_06, 0.0, 4.000_08]);
+    for (effect, point, expected, within) in [
+        (circle(Circle::Eccentric, 0.0), high, turned, 1e-8),
+        (circle(Circle::OffCentre, 0.0), high, turned, 1e-8),
+        // Along x only the cosine shows: sin(0 + 90 deg).
+        (
+            circle(Circle::OffCentre, 90.0),
+            along,
+            [3.0, 30.0 * ARCSEC, 4.0],
+            1e-8,
+        ),
+        (circle(Circle::Elliptic, 0.0), high, high, 1e-12),
+        (
+            head(4.0, 6.0, 0.0),
+            [3.0, 0.0, 0.0],
+            [3.0, 0.0, 30.0 * ARCSEC],
+            1e-8,
+        ),
+        (
+            head(0.0, 0.0, 10.0),
+            [3.0, 0.0, 3.0],
+            [3.0, 30.0 * ARCSEC, 3.0],
+            1e-8,
+        ),
+        (ranges(75.0, 0.0, 1.0), along, farther, 1e-12),
+        (ranges(0.0, 100.0, 0.0), along, farther, 1e-12),
+    ] {
+        let found = effect.sight(&row(&[0.0], vec![0.0]), 0.0, point);
+        assert_near(&found, &expected, within);
+    }
 }
 
 /// 1 um/m/K, 5 K, 5 m: 25 um of range; the chain of the recording takes the memory of the right effect.
 #[test]
 fn warm_air_stretches_ranges_after_the_arm_has_settled() {
-    let air = TrackerRefraction {
-        um_per_m_k: 1.0,
-        reference_c: 20.0,
-        lag_s: 0.0,
-        own_rise_k: 0.0,
-        warm_up_h: 1.0,
-    };
-    let robot = Kind::Five5r.description([0.0; 3]);
-    let arm = Arm::new(&robot, &TrueRobot::default());
-    let effects = [
-        Physical::Presliding(Presliding {
-            joint: 1,
-            amplitude_arcsec: 0.0,
-            dahl_deg: 1.0,
-            slip_deg: vec![],
-        }),
-        Physical::TrackerRefraction(air),
-    ];
-    let warm = moves(&[0.0; 5]);
-    let memory = recall(&effects, &warm).pop().unwrap();
-    let row = row(&[0.0; 5], memory);
-    let rest: Equilibrium = settle(&arm, &row, &effects);
-    let seen = sighted(&rest, &IDENTITY, &row, &effects);
-    assert_near(
-        &seen,
-        &[1.010 * (1.0 + 5e-6), 0.0, 1.130 * (1.0 + 5e-6)],
-        1e-12,
-    );
+    let air = TrackerRefraction::effect(1.0, 20.0, 0.0, 0.0, 1.0);
+    let effects = [Presliding::effect(1, 0.0, 1.0, vec![]), air];
+    let memory = recall(&effects, &moves(&[0.0; 5])).pop().unwrap();
+    let found = settled(memory.clone(), &effects);
+    let seen = sighted(&found, &IDENTITY, &row(&[0.0; 5], memory), &effects);
+    let expected = [1.010, 0.0, 1.130].map(|metres| metres * (1.0 + 5e-6));
+    assert_near(&seen, &expected, 1e-12);
 }
 
 /// 100 arcsec/Nm times sin(90 deg) times the torque of the wrist's weight: the hand's centre lies 115 mm before joint 4 in x.
 #[test]
 fn a_gear_under_load_errs_with_what_it_carries() {
-    let robot = Kind::Five5r.description([0.0; 3]);
-    let gear = GearLoad {
-        joint: 4,
-        order: 2.0,
-        arcsec_per_nm: 100.0,
-        phase_deg: 90.0,
-        full_nm: 0.0,
-    };
-    let rest = settle(
-        &Arm::new(&robot, &TrueRobot::default()),
-        &row(&[0.0; 5], Vec::new()),
-        &[Physical::GearLoad(gear)],
-    );
+    let found = settled(vec![], &[GearLoad::effect(4, 2.0, 100.0, 90.0, 0.0)]);
     // About +y the weight of 7.5 kg at 45 mm and of 2.1 kg at 115 mm turns downwards, positive.
     let torque = 9.81 * (7.5 * 0.045 + 2.1 * 0.115);
-    assert!(
-        (rest.motion.joint[3] / (100.0 * ARCSEC * torque) - 1.0).abs() < 1e-2,
-        "{:?}",
-        rest.motion.joint
-    );
+    let share = found.motion.joint[3] / (100.0 * ARCSEC * torque);
+    assert!((share - 1.0).abs() < 1e-2, "{:?}", found.motion.joint);
 }
 
 #[test]
@@ -363,18 +247,13 @@ fn beyond_the_library_arms_have_five_joints_too_and_come_from_near_by() {
     let case = Case::make(&design, 3, contents[3]).unwrap();
     assert_eq!(case.robot.joints.len(), 5);
     assert!(case.recording().is_ok() && case.climate.swing_k > 0.0);
-    let far = |pair: &[calib::twin::recorder::Shot]| {
-        pair[0]
-            .q
-            .iter()
-            .zip(&pair[1].q)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max)
-            .to_degrees()
+    let far = |pair: &[Shot]| -> f64 {
+        let joints = pair[0].q.iter().zip(&pair[1].q);
+        let far = joints.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        far.to_degrees()
     };
-    let near = case
-        .shots
-        .windows(2)
+    let pairs = case.shots.windows(2);
+    let near = pairs
         .filter(|pair| (1e-3..6.01).contains(&far(pair)))
         .count();
     assert!(
@@ -403,25 +282,18 @@ fn the_librarys_recordings_are_those_of_before() {
             .enumerate()
             .map(|(number, content)| Case::make(&design, number, *content).unwrap());
         let line = |case: Case| {
-            let causes = case.concealed.iter();
-            let causes: Vec<String> = causes
-                .map(|one| {
-                    format!(
-                        "{} at {}, {}, L {:.3}",
-                        one.cause.effect, one.cause.place, one.form, one.strength
-                    )
-                })
-                .collect();
+            let causes = case.concealed.iter().map(|one| {
+                let (effect, place) = (one.cause.effect, &one.cause.place);
+                format!("{effect} at {place}, {}, L {:.3}", one.form, one.strength)
+            });
+            let causes: Vec<String> = causes.collect();
+            let (kind, held_out) = (case.kind.name(), case.shots.len() - case.fit);
             let causes = if causes.is_empty() {
                 "nothing".into()
             } else {
                 causes.join(" + ")
             };
-            format!(
-                "{}, {} held out: {causes}",
-                case.kind.name(),
-                case.shots.len() - case.fit
-            )
+            format!("{kind}, {held_out} held out: {causes}")
         };
         cases.map(line).collect()
     };

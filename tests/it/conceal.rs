@@ -1,36 +1,14 @@
 //! Concealed recordings: what they hide is there, nulls hide nothing, and a seed gives the same bytes whoever works on it.
 
 use crate::answer::{calib, has, put, read};
+use calib::effect::CAUSES;
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
 use calib::twin::conceal::family::FAMILIES;
+use calib::twin::conceal::points::Layout;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-
-/// Names of the list of effects that a diagnosis may use.
-const NAMES: [&str; 20] = [
-    "joint_compliance",
-    "joint_hardening",
-    "link_compliance",
-    "base_compliance",
-    "gear_cyclic",
-    "gear_motor_cyclic",
-    "backlash",
-    "thermal_growth",
-    "counterbalance",
-    "link_mass",
-    "payload_error",
-    "cable_drag",
-    "axis_wobble",
-    "zero_shift",
-    "tool_shift",
-    "base_shift",
-    "tracker_drift",
-    "tracker_scale",
-    "joint_log_lag",
-    "unknown",
-];
 
 fn is_a_place(place: &str) -> bool {
     let number = |text: &str| {
@@ -47,29 +25,36 @@ fn is_a_place(place: &str) -> bool {
     }
 }
 
+/// Recordings of so many points without faults.
+fn sound(seed: u64, points: usize) -> Design {
+    Design {
+        seed,
+        points: Some(points),
+        faulty: 0.0,
+        ..Design::default()
+    }
+}
+
+/// One effect of this name.
+fn single(name: &str) -> Content {
+    let row = FAMILIES.iter().position(|family| family.name == name);
+    Content::Single(row.unwrap())
+}
+
 #[test]
 fn every_family_moves_the_tool_and_is_wanted_by_a_canonical_name() {
     for (row, family) in FAMILIES.iter().enumerate() {
         for other_forms in [0.0, 1.0] {
             let design = Design {
-                seed: 5,
-                cases: 1,
-                points: Some(40),
                 other_forms,
-                faulty: 0.0,
-                ..Design::default()
+                ..sound(5, 40)
             };
             let case = Case::make(&design, row, Content::Single(row)).unwrap();
-            let name = format!(
-                "{} ({})",
-                family.name,
-                case.concealed.first().map_or("", |one| one.form)
-            );
-            assert!(!case.concealed.is_empty(), "{name} hides nothing");
+            let form = case.concealed.first().map_or("", |one| one.form);
+            let name = format!("{} ({form})", family.name);
+            let mut effects = case.concealed.iter().map(|one| one.cause.effect);
             assert!(
-                case.concealed
-                    .iter()
-                    .any(|one| one.cause.effect == family.name),
+                effects.any(|effect| effect == family.name),
                 "{name} hides something else"
             );
             for one in &case.concealed {
@@ -78,17 +63,12 @@ fn every_family_moves_the_tool_and_is_wanted_by_a_canonical_name() {
                     "{name} moves the tool by {} mm",
                     one.raw_mm
                 );
-                assert!(
-                    one.visible_mm <= one.raw_mm
-                        && one.strength <= one.strength_alone * (1.0 + 1e-9),
-                    "{name}"
-                );
+                let is_less = one.strength <= one.strength_alone * (1.0 + 1e-9);
+                assert!(is_less && one.visible_mm <= one.raw_mm, "{name}");
             }
             for (effect, place) in case.want() {
-                assert!(
-                    NAMES.contains(&effect) && is_a_place(&place),
-                    "{effect} at {place}"
-                );
+                let is_known = effect == "unknown" || CAUSES.iter().any(|one| one.name == effect);
+                assert!(is_known && is_a_place(&place), "{effect} at {place}");
             }
         }
     }
@@ -97,68 +77,40 @@ fn every_family_moves_the_tool_and_is_wanted_by_a_canonical_name() {
 /// Of single effects that are sized, most are as visible as drawn: the strength is that of the differences between two recordings.
 #[test]
 fn an_effect_is_as_visible_as_the_seal_says() {
-    let row = FAMILIES
-        .iter()
-        .position(|family| family.name == "gear_cyclic")
-        .unwrap();
     let design = Design {
-        seed: 3,
-        points: Some(120),
         natural: 0.0,
-        faulty: 0.0,
         other_forms: 0.0,
-        ..Design::default()
+        ..sound(3, 120)
     };
-    let case = Case::make(&design, 0, Content::Single(row)).unwrap();
+    let case = Case::make(&design, 0, single("gear_cyclic")).unwrap();
     let one = &case.concealed[0];
     let from_sizes = 3.0 * 120.0 * (one.visible_mm / case.noise_mm[0]).powi(2);
+    let strength = one.strength;
     assert!(
-        (one.strength / from_sizes - 1.0).abs() < 1e-9,
-        "{} against {from_sizes}",
-        one.strength
+        (strength / from_sizes - 1.0).abs() < 1e-9,
+        "{strength} against {from_sizes}"
     );
-    assert!((0.9..=5100.0).contains(&one.strength), "{}", one.strength);
+    assert!((0.9..=5100.0).contains(&strength), "{strength}");
     // 6 joints with 4 numbers each and 3 of the tool, ratios, one coupling on the big robot; the rank does not hang on rounding.
     let joints = case.robot.joints.len();
-    assert_eq!(
-        case.geometry_rank,
-        4 * joints + 3 + joints + case.robot.couplings.len()
-    );
+    let rank = 4 * joints + 3 + joints + case.robot.couplings.len();
+    assert_eq!(case.geometry_rank, rank);
 }
 
 /// All that a wrong metre does is what a larger robot does.
 #[test]
 fn a_wrong_metre_is_there_and_cannot_be_seen() {
-    let row = FAMILIES
-        .iter()
-        .position(|family| family.name == "tracker_scale")
-        .unwrap();
     for number in 0..3 {
-        let design = Design {
-            seed: 6,
-            points: Some(60),
-            faulty: 0.0,
-            ..Design::default()
-        };
-        let case = Case::make(&design, number, Content::Single(row)).unwrap();
-        assert!(
-            case.concealed[0].raw_mm > 1e-3 && case.concealed[0].strength < 0.01,
-            "{:?}",
-            case.concealed[0]
-        );
+        let case = Case::make(&sound(6, 60), number, single("tracker_scale")).unwrap();
+        let one = &case.concealed[0];
+        assert!(one.raw_mm > 1e-3 && one.strength < 0.01, "{one:?}");
     }
 }
 
 #[test]
 fn a_null_hides_nothing_and_wants_nothing() {
-    let design = Design {
-        seed: 2,
-        points: Some(40),
-        faulty: 0.0,
-        ..Design::default()
-    };
     for number in 0..4 {
-        let case = Case::make(&design, number, Content::Null).unwrap();
+        let case = Case::make(&sound(2, 40), number, Content::Null).unwrap();
         assert!(case.concealed.is_empty() && case.want().is_empty() && case.tampered.is_empty());
     }
 }
@@ -175,68 +127,49 @@ fn shares_are_kept_and_pairs_sit_in_two_places() {
         ..Design::default()
     };
     let contents = design.contents();
-    let count =
-        |what: fn(&Content) -> bool| contents.iter().filter(|content| what(content)).count();
-    assert_eq!(count(|content| matches!(content, Content::Null)), 10);
-    assert_eq!(count(|content| matches!(content, Content::Pair(..))), 8);
-    let open = count(
-        |content| matches!(content, Content::Single(row) if FAMILIES[*row].name == "unknown"),
-    );
-    assert_eq!(open, 4);
-    for (number, content) in contents
-        .iter()
-        .enumerate()
-        .filter(|(_, content)| matches!(content, Content::Pair(..)))
-    {
+    let count = |what: fn(&&Content) -> bool| contents.iter().filter(what).count();
+    let open = |content: &&Content| matches!(content, Content::Single(row) if FAMILIES[*row].name == "unknown");
+    let pair = |content: &&Content| matches!(content, Content::Pair(..));
+    let null = |content: &&Content| **content == Content::Null;
+    assert_eq!([count(null), count(pair), count(open)], [10, 8, 4]);
+    let contents = contents.iter().enumerate();
+    for (number, content) in contents.filter(|(_, content)| pair(content)) {
         let case = Case::make(&design, number, *content).unwrap();
-        let places: Vec<&str> = case
-            .concealed
-            .iter()
-            .map(|one| one.cause.place.as_str())
-            .collect();
+        let places = case.concealed.iter().map(|one| one.cause.place.as_str());
+        let places: Vec<&str> = places.collect();
         assert!(places.len() == 2 && places[0] != places[1], "{places:?}");
     }
 }
 
-fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
-    let mut out = Vec::new();
-    let mut folders = vec![folder.to_path_buf()];
-    while let Some(next) = folders.pop() {
-        for entry in std::fs::read_dir(next).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let name = path
-                    .strip_prefix(folder)
-                    .unwrap()
-                    .to_string_lossy()
-                    .into_owned();
-                out.push((name, std::fs::read(&path).unwrap()));
-            }
-        }
-    }
-    out.sort();
-    out
-}
-
+/// The hash of every file is in the seal.
 #[test]
 fn a_seed_gives_the_same_bytes_on_one_and_two_threads() {
     let root = tempfile::tempdir().unwrap();
-    let made: Vec<Vec<(String, Vec<u8>)>> = ["1", "2"]
-        .map(|jobs| {
-            let out = root.path().join(jobs);
-            let text = out.to_string_lossy().into_owned();
-            calib(
-                ".",
-                &format!("simulate conceal --out {text} --cases 4 --points 30 --jobs {jobs}"),
-            )
-            .code(0);
-            files(&out)
-        })
-        .into();
-    assert_eq!(made[0].len(), 4 * 4 + 1);
-    assert_eq!(made[0], made[1]);
+    for (kind, files, options) in [
+        ("points", 4 * 4, "--cases 4 --points 30"),
+        (
+            "torques",
+            3 * 3,
+            "--dynamics --cases 3 --seconds 16 --rate 20 --open 0.4",
+        ),
+    ] {
+        let seals = ["1", "2"].map(|jobs| {
+            let out = root.path().join(format!("{kind}{jobs}"));
+            let words = format!(
+                "simulate conceal --out {} {options} --jobs {jobs}",
+                out.display()
+            );
+            calib(".", &words).code(0);
+            read(out.join("seal.json"))
+        });
+        let seal: Value = serde_json::from_str(&seals[0]).unwrap();
+        assert_eq!(
+            seal["files"].as_object().map(|all| all.len()),
+            Some(files),
+            "{kind}"
+        );
+        assert_eq!(seals[0], seals[1], "{kind}");
+    }
 }
 
 /// Recordings with single effects, pairs, open ones and nulls, and verdicts that say what `say` makes of each truth.
@@ -270,17 +203,17 @@ fn wanted(truth: &Value) -> Vec<Value> {
     truth["want"].as_array().unwrap().clone()
 }
 
+/// The scoreboard as JSON, and as a table with a row for each effect, and for each of three nulls.
 fn score(set: &Path, verdicts: &Path) -> Value {
-    let done = calib(
-        ".",
-        &format!(
-            "simulate reveal {} --verdicts {} --json",
-            set.display(),
-            verdicts.display()
-        ),
-    )
-    .code(0);
-    done.json()
+    let out = set.with_extension("parquet");
+    let (set, verdicts, table) = (set.display(), verdicts.display(), out.display());
+    let words = format!("simulate reveal {set} --verdicts {verdicts} --out {table} --json");
+    let board = calib(".", &words).code(0).json();
+    let file = std::fs::File::open(&out).unwrap();
+    let rows = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
+    let rows = rows.build().unwrap().map(|batch| batch.unwrap().num_rows());
+    assert_eq!(rows.sum::<usize>() as u64, total(&board, "n") + 3);
+    board
 }
 
 fn total(board: &Value, outcome: &str) -> u64 {
@@ -291,113 +224,86 @@ fn total(board: &Value, outcome: &str) -> u64 {
         .sum()
 }
 
-#[test]
-fn who_says_the_truth_gets_full_marks_and_who_says_nothing_none() {
+/// The scoreboard of who says what `say` makes of each truth.
+fn score_of(say: impl Fn(&Value) -> Vec<Value>) -> Value {
     let root = tempfile::tempdir().unwrap();
-    let (set, verdicts) = judged(root.path(), wanted);
-    let board = score(&set, &verdicts);
-    assert_eq!(board["recordings"], 12);
-    assert_eq!(board["failures"], json!([]));
-    assert!(total(&board, "exact") >= 9 && total(&board, "exact") == total(&board, "n"));
+    let (set, verdicts) = judged(root.path(), say);
+    score(&set, &verdicts)
+}
 
-    let silent = tempfile::tempdir().unwrap();
-    let (set, verdicts) = judged(silent.path(), |_| vec![]);
-    let board = score(&set, &verdicts);
-    assert_eq!(total(&board, "silent"), total(&board, "n"));
-    assert_eq!(board["shares"][0]["share"]["count"], 0, "no false alarm");
+/// Something that no recording conceals.
+fn false_name() -> Value {
+    json!({ "effect": "joint_table", "where": "joint 9" })
+}
+
+/// What is wanted, under another name with the true one for a rival.
+fn renamed(effect: &str, place: Option<&str>, truth: &Value) -> Vec<Value> {
+    let renamed = |name: &Value| {
+        let place = place.or(name["where"].as_str());
+        json!({ "effect": effect, "where": place, "rivals": [name] })
+    };
+    wanted(truth).iter().map(renamed).collect()
 }
 
 #[test]
-fn a_false_name_is_wrong_and_in_a_null_a_false_alarm() {
-    let root = tempfile::tempdir().unwrap();
-    let (set, verdicts) = judged(root.path(), |_| {
-        vec![json!({ "effect": "joint_table", "where": "joint 9" })]
-    });
-    let board = score(&set, &verdicts);
-    assert_eq!(total(&board, "wrong"), total(&board, "n"));
+fn outcomes_are_those_of_what_is_said() {
+    let of_all = |board: &Value, outcome| {
+        assert_eq!(total(board, outcome), total(board, "n"), "{outcome}");
+        [0, 1].map(|share| board["shares"][share]["share"]["count"].as_u64().unwrap())
+    };
+    let board = score_of(wanted);
+    of_all(&board, "exact");
     assert_eq!(
-        board["shares"][0]["share"],
-        json!({ "count": 3, "of": 3, "wilson_95": board["shares"][0]["share"]["wilson_95"] })
+        (&board["recordings"], &board["failures"]),
+        (&json!(12), &json!([]))
     );
-    // Said beside the truth it leaves the outcomes alone, but no recording is right.
-    let both = tempfile::tempdir().unwrap();
-    let (set, verdicts) = judged(both.path(), |truth| {
-        let mut findings = wanted(truth);
-        findings.push(json!({ "effect": "joint_table", "where": "joint 9" }));
-        findings
-    });
-    let board = score(&set, &verdicts);
-    assert_eq!(
-        (
-            total(&board, "exact"),
-            board["failures"].as_array().map(Vec::len)
-        ),
-        (total(&board, "n"), Some(12))
-    );
-}
-
-#[test]
-fn a_rival_and_a_run_of_links_count_as_the_set() {
-    let root = tempfile::tempdir().unwrap();
-    let (set, verdicts) = judged(root.path(), |truth| {
-        let as_rival =
-            |name: &Value| json!({ "effect": "joint_table", "where": "joint 9", "rivals": [name] });
-        wanted(truth).iter().map(as_rival).collect()
-    });
-    let board = score(&set, &verdicts);
-    assert_eq!(total(&board, "in_set"), total(&board, "n"));
-    assert_eq!(
-        board["shares"][1]["share"]["count"], 0,
-        "what has the truth for a rival is no stray"
-    );
-}
-
-/// The share of due effects of which this holds, as count and of how many.
-fn placed(board: &Value, what: &str) -> (u64, u64) {
-    let share = &board["places"]["all"][what];
-    (
-        share["count"].as_u64().unwrap(),
-        share["of"].as_u64().unwrap(),
-    )
+    assert!(total(&board, "exact") >= 9);
+    let [alarms, _] = of_all(&score_of(|_| vec![]), "silent");
+    assert_eq!(alarms, 0, "no false alarm");
+    let [alarms, _] = of_all(&score_of(|_| vec![false_name()]), "wrong");
+    assert_eq!(alarms, 3, "one in each null");
+    // Said along with the truth it changes no outcome, but no recording is right.
+    let board = score_of(|truth| [wanted(truth), vec![false_name()]].concat());
+    of_all(&board, "exact");
+    assert_eq!(board["failures"].as_array().map(Vec::len), Some(12));
+    let rivals = score_of(|truth| renamed("joint_table", Some("joint 9"), truth));
+    let [_, strays] = of_all(&rivals, "in_set");
+    assert_eq!(strays, 0, "what has the truth for a rival is no stray");
 }
 
 #[test]
 fn the_place_counts_apart_from_the_name_and_unknown_is_no_wrong_name() {
-    let score_of = |say: &dyn Fn(&Value) -> Vec<Value>| {
-        let root = tempfile::tempdir().unwrap();
-        let (set, verdicts) = judged(root.path(), say);
-        let board = score(&set, &verdicts);
-        let [place, name, wrong] =
-            ["place", "name_or_unknown", "wrong_name"].map(|what| placed(&board, what));
-        assert!(
-            place.1 >= 4 && place.1 == name.1 && place.1 == wrong.1,
-            "{place:?}"
-        );
-        ([place.0, name.0, wrong.0], place.1)
+    let placed = |say: &dyn Fn(&Value) -> Vec<Value>| {
+        let board = score_of(say);
+        let [place, name, wrong] = ["place", "name_or_unknown", "wrong_name"].map(|what| {
+            let share = &board["places"]["all"][what];
+            let all = share["of"].as_u64().unwrap();
+            assert!(all >= 4, "{share}");
+            // All of them, or none.
+            match share["count"].as_u64().unwrap() {
+                count if count == all => Some(true),
+                0 => Some(false),
+                _ => None,
+            }
+        });
+        [place, name, wrong]
     };
-    let at_its_place = |effect: &str, truth: &Value| -> Vec<Value> {
-        let renamed =
-            |name: &Value| json!({ "effect": effect, "where": name["where"], "rivals": [name] });
-        wanted(truth).iter().map(renamed).collect()
-    };
-    let (said, all) = score_of(&wanted);
-    assert_eq!(said, [all, all, 0]);
-    let (said, all) = score_of(&|truth| at_its_place("unknown", truth));
-    assert_eq!(said, [all, all, 0]);
+    let elsewhere = |effect: &str| vec![json!({ "effect": effect, "where": "joint 9" })];
+    let all_right = [true, true, false].map(Some);
+    assert_eq!(placed(&wanted), all_right);
+    assert_eq!(placed(&|truth| renamed("unknown", None, truth)), all_right);
     // The true name for a rival saves the place and not the name.
-    let (said, all) = score_of(&|truth| at_its_place("no_such_effect", truth));
-    assert_eq!(said, [all, 0, all]);
-    let (said, all) =
-        score_of(&|_| vec![json!({ "effect": "no_such_effect", "where": "joint 9" })]);
-    assert_eq!(said, [0, 0, all]);
-    let (said, _) = score_of(&|_| vec![json!({ "effect": "unknown", "where": "joint 9" })]);
-    assert_eq!(said, [0, 0, 0]);
+    let named = placed(&|truth| renamed("no_such_effect", None, truth));
+    assert_eq!(named, [true, false, true].map(Some));
+    assert_eq!(
+        placed(&|_| elsewhere("no_such_effect")),
+        [false, false, true].map(Some)
+    );
+    assert_eq!(placed(&|_| elsewhere("unknown")), [Some(false); 3]);
     // Faults of points have no place.
-    let (said, all) = score_of(&|truth| {
-        let fault = json!({ "effect": "outlier", "where": "recording" });
-        [fault].into_iter().chain(wanted(truth)).collect()
-    });
-    assert_eq!(said[..2], [all, all]);
+    let fault = json!({ "effect": "outlier", "where": "recording" });
+    let found = placed(&|truth| [vec![fault.clone()], wanted(truth)].concat());
+    assert_eq!(found[..2], all_right[..2]);
 }
 
 #[test]
@@ -431,36 +337,6 @@ fn one_changed_byte_breaks_the_seal() {
     assert!(
         done.err
             .contains("recordings/c0001/robot.json: was sealed, but cannot be read")
-    );
-}
-
-#[test]
-fn the_scoreboard_is_a_table_with_a_row_for_each_effect() {
-    let root = tempfile::tempdir().unwrap();
-    let (set, verdicts) = judged(root.path(), wanted);
-    let out = root.path().join("scoreboard.parquet");
-    let text = out.to_string_lossy();
-    calib(
-        ".",
-        &format!(
-            "simulate reveal {} --verdicts {} --out {text}",
-            set.display(),
-            verdicts.display()
-        ),
-    )
-    .code(0);
-    let reader =
-        ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(&out).unwrap()).unwrap();
-    let rows: usize = reader
-        .build()
-        .unwrap()
-        .map(|batch| batch.unwrap().num_rows())
-        .sum();
-    let board = score(&set, &verdicts);
-    assert_eq!(
-        rows as u64,
-        total(&board, "n") + 3,
-        "three nulls have a row, too"
     );
 }
 
@@ -555,15 +431,10 @@ fn a_stated_twin_is_written_as_a_case_folder_that_the_estimator_reads() {
 
 #[test]
 fn a_path_and_its_shuffled_rows_have_the_same_poses_and_only_the_path_is_smooth() {
-    use calib::twin::conceal::layout::Layout;
     let poses = |layout| {
         let design = Design {
-            seed: 31,
-            cases: 1,
-            points: Some(120),
-            faulty: 0.0,
             layout,
-            ..Design::default()
+            ..sound(31, 120)
         };
         let case = Case::make(&design, 0, Content::Null).unwrap();
         case.shots

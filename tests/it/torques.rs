@@ -15,7 +15,9 @@ use crate::desk::shared;
 use calib::dynamics::{
     DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow,
 };
-use calib::twin::torque::{TorqueCase, TorqueDesign, TorqueFile};
+use calib::twin::conceal::design::Design;
+use calib::twin::folder::File;
+use calib::twin::torque::TorqueCase;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -23,16 +25,15 @@ use std::path::{Path, PathBuf};
 type Named = (String, String);
 
 /// Recordings without an effect.
-fn nothing(seed: u64) -> TorqueDesign {
-    TorqueDesign {
+fn nothing(seed: u64) -> Design {
+    Design {
         seed,
         cases: 20,
         nulls: 1.0,
-        pairs: 0.0,
-        open: 0.0,
         other_forms: 0.0,
         seconds: 32.0,
         rate: 50.0,
+        ..Design::default()
     }
 }
 
@@ -101,7 +102,7 @@ fn mark(want: &Value, told: &Value) -> Marks {
     marks
 }
 
-fn write(folder: &Path, files: &[TorqueFile]) {
+fn write(folder: &Path, files: &[File]) {
     std::fs::create_dir_all(folder).unwrap();
     files
         .iter()
@@ -197,7 +198,7 @@ fn the_example_of_torques_is_solved_and_reported() {
 /// Two mathematics that share nothing: sums over the bodies beyond each joint, and the estimator's recursion.
 #[test]
 fn torques_of_the_twin_are_those_of_the_estimators_inverse_dynamics() {
-    let design = TorqueDesign {
+    let design = Design {
         seconds: 16.0,
         rate: 20.0,
         ..nothing(3)

@@ -3,12 +3,11 @@
 use super::super::surroundings::cores;
 use super::super::{emit, emit_json};
 use crate::error::{Error, Fault, Result, counted, nearest};
-use crate::proof::{ConcealedSet, RECORDINGS, SEAL, conceal, vacant};
+use crate::proof::{RECORDINGS, SEAL, conceal, vacant};
 use crate::twin::conceal::design::Design;
 use crate::twin::conceal::family::Collection;
-use crate::twin::conceal::layout::LAYOUTS;
-use crate::twin::conceal::robots::ALL_KINDS;
-use crate::twin::torque::TorqueDesign;
+use crate::twin::conceal::points::LAYOUTS;
+use crate::twin::conceal::robots::{ALL_KINDS, Kind};
 use crate::twin::tracker::SCATTERS;
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -131,9 +130,7 @@ impl ConcealArguments {
     pub(super) fn threads(&self) -> usize {
         self.jobs.map_or_else(cores, usize::from)
     }
-}
 
-impl ConcealArguments {
     pub fn run(&self) -> Result<()> {
         let design = design(self)?;
         vacant(&self.out)?;
@@ -142,12 +139,12 @@ impl ConcealArguments {
         let (recordings, seal) = (self.out.join(RECORDINGS), self.out.join(SEAL));
         if self.json {
             return emit_json(
-                &json!({ "cases": design.cases(), (format!("{row}s")): rows, "recordings": recordings, "seal": seal }),
+                &json!({ "cases": design.cases, (format!("{row}s")): rows, "recordings": recordings, "seal": seal }),
             );
         }
         emit(&format!(
             "{}, {}: {}\nseal: {}\n",
-            counted(design.cases(), "recording"),
+            counted(design.cases, "recording"),
             counted(rows, row),
             recordings.display(),
             seal.display()
@@ -156,17 +153,16 @@ impl ConcealArguments {
 }
 
 /// The design that the options state; fails with every fault of them.
-pub(super) fn design(arguments: &ConcealArguments) -> Result<ConcealedSet> {
-    if arguments.dynamics {
-        torques(arguments)
-    } else {
-        points(arguments)
-    }
-}
-
-/// Faults of the shares that both kinds of recordings have.
-fn shares(arguments: &ConcealArguments) -> Vec<Fault> {
-    let shares = [
+pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
+    let mut faults = Vec::new();
+    let mut within =
+        |option: &str, value: f64, [least, most]: [f64; 2], [what, unit]: [&str; 2]| {
+            if !(least..=most).contains(&value) {
+                let message = format!("{value}{what}; allowed: {least} to {most}{unit}");
+                faults.push(Fault::new(option, message));
+            }
+        };
+    for (option, share) in [
         ("--nulls", arguments.nulls),
         ("--pairs", arguments.pairs),
         ("--open", arguments.open),
@@ -174,131 +170,75 @@ fn shares(arguments: &ConcealArguments) -> Vec<Fault> {
         ("--other-forms", arguments.other_forms),
         ("--natural", arguments.natural),
         ("--faulty", arguments.faulty),
-    ];
-    let wrong = shares
-        .into_iter()
-        .filter(|(_, share)| !(0.0..=1.0).contains(share));
-    let mut faults: Vec<Fault> = wrong
-        .map(|(option, share)| Fault::new(option, format!("{share} is no share; allowed: 0 to 1")))
-        .collect();
-    if arguments.nulls + arguments.pairs + arguments.open + arguments.foreign > 1.0 + 1e-9 {
-        faults.push(Fault::new(
-            "--nulls, --pairs, --open, --foreign",
-            "add up to more than 1",
-        ));
-    }
-    faults
-}
-
-fn torques(arguments: &ConcealArguments) -> Result<ConcealedSet> {
-    let mut faults = shares(arguments);
-    for (option, value, [least, most]) in [
-        ("--seconds", arguments.seconds, [16.0, 3600.0]),
-        ("--rate", arguments.rate, [20.0, 5000.0]),
     ] {
-        if !(least..=most).contains(&value) {
-            faults.push(Fault::new(
-                option,
-                format!("{value}; allowed: {least} to {most}"),
-            ));
-        }
+        within(option, share, [0.0, 1.0], [" is no share", ""]);
     }
-    if arguments.foreign > 0.0 {
-        faults.push(Fault::new(
-            "--foreign",
-            "foreign effects move points; torques have none",
-        ));
-    }
-    if !faults.is_empty() {
-        return Err(Error::Spec(faults));
-    }
-    Ok(ConcealedSet::Torques(TorqueDesign {
-        seed: arguments.seed,
-        cases: arguments.cases as usize,
-        nulls: arguments.nulls,
-        pairs: arguments.pairs,
-        open: arguments.open,
-        other_forms: arguments.other_forms,
-        seconds: arguments.seconds,
-        rate: arguments.rate,
-    }))
-}
-
-fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
-    let mut faults = shares(arguments);
+    within("--seconds", arguments.seconds, [16.0, 3600.0], ["", ""]);
+    within("--rate", arguments.rate, [20.0, 5000.0], ["", ""]);
+    within(
+        "--tool-mass",
+        arguments.tool_mass,
+        [0.0, 500.0],
+        [" is no mass of a tool", " kg"],
+    );
+    within(
+        "--log-step",
+        arguments.log_step,
+        [0.0, 1.0],
+        [" is no step of a log", " deg"],
+    );
+    let singled = arguments.pairs + arguments.open + arguments.foreign;
     let collection = match arguments.families {
         Families::Library => Collection::Library,
         Families::Beyond => Collection::Beyond,
     };
-    if collection == Collection::Beyond
-        && arguments.pairs + arguments.open + arguments.foreign > 0.0
-    {
-        faults.push(Fault::new(
+    for (wrong, options, message) in [
+        (
+            arguments.nulls + singled > 1.0 + 1e-9,
+            "--nulls, --pairs, --open, --foreign",
+            "add up to more than 1",
+        ),
+        (
+            arguments.dynamics && arguments.foreign > 0.0,
+            "--foreign",
+            "foreign effects move points; torques have none",
+        ),
+        (
+            collection == Collection::Beyond && singled > 0.0,
             "--pairs, --open, --foreign",
             "need `--families library`; with `--families beyond` every recording has one cause",
-        ));
-    }
-    let mut allowed: Vec<&str> = Vec::new();
-    for family in collection.families() {
-        if !allowed.contains(&family.name) {
-            allowed.push(family.name);
+        ),
+    ] {
+        if wrong {
+            faults.push(Fault::new(options, message));
         }
     }
-    let kinds: Vec<&str> = ALL_KINDS.iter().map(|kind| kind.name()).collect();
-    for (option, names, allowed) in [
-        ("--family", &arguments.family, &allowed),
-        ("--robot", &arguments.robot, &kinds),
-    ] {
-        let wrong = names
-            .iter()
-            .filter(|name| !allowed.contains(&name.as_str()));
-        faults.extend(wrong.map(|name| unknown(option, name, allowed)));
+    let mut names: Vec<(&str, ())> = Vec::new();
+    for family in collection.families() {
+        if !names.contains(&(family.name, ())) {
+            names.push((family.name, ()));
+        }
     }
+    for name in &arguments.family {
+        named("--family", name, &names, &mut faults);
+    }
+    let kinds = ALL_KINDS.map(|kind| (kind.name(), kind));
+    for name in &arguments.robot {
+        named("--robot", name, &kinds, &mut faults);
+    }
+    let scatters = SCATTERS.map(|one| (one.name(), one));
     let scatter = arguments.scatter.as_deref();
-    let scatter = scatter.and_then(|name| {
-        named(
-            "--scatter",
-            name,
-            SCATTERS.map(|one| (one.name(), one)),
-            &mut faults,
-        )
-    });
-    if !(0.0..=500.0).contains(&arguments.tool_mass) {
-        faults.push(Fault::new(
-            "--tool-mass",
-            format!(
-                "{} is no mass of a tool; allowed: 0 to 500 kg",
-                arguments.tool_mass
-            ),
-        ));
-    }
-    let layout = named(
-        "--layout",
-        &arguments.layout,
-        LAYOUTS.map(|one| (one.name(), one)),
-        &mut faults,
-    );
-    if !(0.0..=1.0).contains(&arguments.log_step) {
-        faults.push(Fault::new(
-            "--log-step",
-            format!(
-                "{} is no step of a log; allowed: 0 to 1 deg",
-                arguments.log_step
-            ),
-        ));
-    }
-    if !faults.is_empty() {
-        return Err(Error::Spec(faults));
-    }
-    Ok(ConcealedSet::Positions(Box::new(Design {
+    let scatter = scatter.and_then(|name| named("--scatter", name, &scatters, &mut faults));
+    let layouts = LAYOUTS.map(|one| (one.name(), one));
+    let layout = named("--layout", &arguments.layout, &layouts, &mut faults);
+    Error::if_spec(faults)?;
+    let is_chosen = |kind: &Kind| arguments.robot.iter().any(|name| name == kind.name());
+    Ok(Design {
         seed: arguments.seed,
         cases: arguments.cases as usize,
         collection,
         families: arguments.family.clone(),
-        robots: ALL_KINDS
-            .into_iter()
-            .filter(|kind| arguments.robot.iter().any(|name| name == kind.name()))
-            .collect(),
+        robots: ALL_KINDS.into_iter().filter(is_chosen).collect(),
         points: arguments.points.map(|points| points as usize),
         nulls: arguments.nulls,
         pairs: arguments.pairs,
@@ -312,32 +252,27 @@ fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
         log_step_deg: arguments.log_step,
         layout: layout.unwrap_or_default(),
         tool_mass_kg: arguments.tool_mass,
-    })))
+        dynamics: arguments.dynamics,
+        seconds: arguments.seconds,
+        rate: arguments.rate,
+    })
 }
 
 /// The one of this name; a fault where there is none.
-fn named<T: Copy, const N: usize>(
+fn named<T: Copy>(
     option: &str,
     name: &str,
-    all: [(&str, T); N],
+    all: &[(&str, T)],
     faults: &mut Vec<Fault>,
 ) -> Option<T> {
     let found = all.iter().find(|(known, _)| *known == name);
     if found.is_none() {
-        faults.push(unknown(option, name, &all.map(|(known, _)| known)));
+        let allowed: Vec<&str> = all.iter().map(|(known, _)| *known).collect();
+        let hint =
+            nearest(name, allowed.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+        let hint = hint.unwrap_or_else(|| ".".into());
+        let message = format!("no `{name}`{hint} Allowed: {}", allowed.join(", "));
+        faults.push(Fault::new(option, message));
     }
     found.map(|(_, one)| *one)
-}
-
-fn unknown(option: &str, name: &str, allowed: &[&str]) -> Fault {
-    let hint =
-        nearest(name, allowed.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
-    Fault::new(
-        option,
-        format!(
-            "no `{name}`{} Allowed: {}",
-            hint.unwrap_or_else(|| ".".into()),
-            allowed.join(", ")
-        ),
-    )
 }

@@ -7,9 +7,9 @@ use super::super::{emit, emit_json};
 use super::conceal::{self, ConcealArguments};
 use crate::error::{Error, Result, counted};
 use crate::estimate::threads::in_order;
-use crate::proof::{
-    self, ConcealedSet, LEFT_OUT, RECORDINGS, SEAL, SEALED, Seal, board, write_scoreboard,
-};
+use crate::proof::{self, LEFT_OUT, RECORDINGS, SEAL, SEALED, Seal, board, write_scoreboard};
+use crate::summary::scoreboard;
+use crate::twin::reveal::board::Board;
 use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -46,19 +46,14 @@ pub(super) struct ProveArguments {
 
 const VERDICTS: &str = "verdicts";
 
-/// Where a set's recordings are read and diagnosed.
-fn pipeline(arguments: &ProveArguments, set: &ConcealedSet) -> PathBuf {
-    let usual = match set {
-        ConcealedSet::Positions(_) => "pipelines/case/pipeline.yaml",
-        ConcealedSet::Torques(_) => "pipelines/dynamics/pipeline.yaml",
-    };
-    arguments.pipeline.clone().unwrap_or_else(|| usual.into())
-}
-
 impl ProveArguments {
     pub fn run(&self) -> Result<()> {
         let (design, folder) = (conceal::design(&self.conceal)?, &self.conceal.out);
-        let pipeline = pipeline(self, &design);
+        let usual = match design.dynamics {
+            false => "pipelines/case/pipeline.yaml",
+            true => "pipelines/dynamics/pipeline.yaml",
+        };
+        let pipeline = self.pipeline.clone().unwrap_or_else(|| usual.into());
         if !pipeline.is_file() {
             return Err(Error::spec(
                 "--pipeline",
@@ -77,17 +72,11 @@ impl ProveArguments {
             proof::conceal(folder, &design, self.conceal.threads())?;
         }
         // Before anything is diagnosed, and again before anything is revealed: a diagnosis must not have touched the truth.
-        let names: Vec<String> = Seal::check(folder)?
-            .iter()
-            .filter_map(|name| case(name))
-            .collect();
-        let store = |error: std::io::Error| {
-            Error::store(
-                folder.join(VERDICTS).display().to_string(),
-                error.to_string(),
-            )
-        };
+        let sealed = Seal::check(folder)?;
+        let names: Vec<String> = sealed.iter().filter_map(|name| case(name)).collect();
         let verdicts = folder.join(VERDICTS);
+        let store =
+            |error: std::io::Error| Error::store(verdicts.display().to_string(), error.to_string());
         std::fs::create_dir_all(&verdicts).map_err(store)?;
         let program = program().map_err(store)?;
         let blind = BlindDiagnosis {
@@ -95,43 +84,43 @@ impl ProveArguments {
             pipeline: &pipeline,
             folder,
         };
-        let diagnosed = in_order(
-            self.conceal.threads(),
-            names.len(),
-            |number| -> Result<()> {
-                let name = &names[number];
-                let tell = |said: &str| {
-                    if !self.quiet {
-                        let _ = writeln!(std::io::stderr(), "{name}: {said}");
-                    }
-                };
-                tell(&blind.diagnose(name, &verdicts, None)?);
-                let left_out = self.left_out.then(|| {
-                    proof::single_cause(&folder.join(SEALED).join(format!("{name}.json")))
-                });
-                if let Some(cause) = left_out.transpose()?.flatten() {
-                    let verdicts = verdicts.join(LEFT_OUT);
-                    std::fs::create_dir_all(&verdicts).map_err(store)?;
-                    tell(&format!(
-                        "without its cause: {}",
-                        blind.diagnose(name, &verdicts, Some(&cause))?
-                    ));
+        let diagnose = |number: usize| -> Result<()> {
+            let name = &names[number];
+            let tell = |line: &str| {
+                if !self.quiet {
+                    let _ = writeln!(std::io::stderr(), "{name}: {line}");
                 }
-                Ok(())
-            },
-        );
+            };
+            tell(&blind.diagnose(name, &verdicts, None)?);
+            let truth = folder.join(SEALED).join(format!("{name}.json"));
+            let cause = self.left_out.then(|| proof::single_cause(&truth));
+            if let Some(cause) = cause.transpose()?.flatten() {
+                let verdicts = verdicts.join(LEFT_OUT);
+                std::fs::create_dir_all(&verdicts).map_err(store)?;
+                let verdict = blind.diagnose(name, &verdicts, Some(&cause))?;
+                tell(&format!("without its cause: {verdict}"));
+            }
+            Ok(())
+        };
+        let diagnosed = in_order(self.conceal.threads(), names.len(), diagnose);
         diagnosed.into_iter().collect::<Result<()>>()?;
         let sealed = Seal::check(folder)?;
-        let board = proof::board(folder, &sealed, &verdicts)?;
-        if self.conceal.json {
-            return emit_json(&board.document());
-        }
-        emit(&format!(
-            "the seal holds: {}, all as they were\n{}",
-            counted(sealed.len(), "file"),
-            board.text()
-        ))
+        let board = board(folder, &sealed, &verdicts)?;
+        show(&board, sealed.len(), self.conceal.json)
     }
+}
+
+/// Prints a scoreboard after a seal of so many files held.
+fn show(board: &Board, sealed: usize, json: bool) -> Result<()> {
+    let document = board.document();
+    if json {
+        return emit_json(&document);
+    }
+    emit(&format!(
+        "the seal holds: {}, all as they were\n{}",
+        counted(sealed, "file"),
+        scoreboard(&document, &board.details())
+    ))
 }
 
 /// The case that a sealed truth is of.
@@ -231,13 +220,6 @@ impl RevealArguments {
         if let Some(path) = &self.out {
             write_scoreboard(path, &board)?;
         }
-        if self.json {
-            return emit_json(&board.document());
-        }
-        emit(&format!(
-            "the seal holds: {}, all as they were\n{}",
-            counted(sealed.len(), "file"),
-            board.text()
-        ))
+        show(&board, sealed.len(), self.json)
     }
 }

@@ -4,7 +4,7 @@ use super::design::{Content, Design};
 use super::family::{Bench, Collection, Column, Draft};
 use super::points::{self, Amount, FIT};
 use super::robots::Kind;
-use super::size::{Concealed, Sight, beyond, drafts, drawn, size};
+use super::size::{Concealed, Sight, conceal};
 use super::visible::Site;
 use crate::effect::{HoldingFriction, Physical};
 use crate::noise::{Noise, Purpose};
@@ -12,7 +12,7 @@ use crate::plan::{Climate, Point, Poses};
 use crate::recorder::{Experiment, Motors, Shot};
 use crate::tracker::{SCATTERS, Scatter, Tracker};
 use crate::truth::{ARCSEC, CouplingError, LinkError, TrueRobot};
-use calib_foundation::description::{JointKind, RobotDescription};
+use calib_foundation::description::{Coupling, RobotDescription};
 use std::collections::BTreeSet;
 
 /// A recording that was tampered with.
@@ -63,7 +63,6 @@ pub struct Case {
     pub shots: Vec<Shot>,
     /// Declared payload of every shot, kg, and what the arm's thermometer says, C.
     pub payload_kg: Vec<f64>,
-    /// C.
     pub thermometer_c: Vec<f64>,
     /// How many of the points, from the first, are to be fitted.
     pub fit: usize,
@@ -88,43 +87,37 @@ impl Case {
         let (kind, robot) = arm(design, &mut draw);
         let truth = errors(&robot, &mut draw);
         let beyond_list = design.collection == Collection::Beyond;
-        let tracker = instrument(design, kind, content, &mut draw);
-        let (play_rad, repeated) = if draw.chance(0.5) {
-            (1e-6 * draw.uniform(4.0, 16.0), 0.1)
-        } else {
-            (0.0, 0.0)
+        let tracker = tracker(design, kind, content, &mut draw);
+        let (play_rad, repeated) = match draw.chance(0.5) {
+            true => (1e-6 * draw.uniform(4.0, 16.0), 0.1),
+            false => (0.0, 0.0),
         };
-        let fit = design
-            .points
-            .unwrap_or_else(|| draw.size(50.0, 400.0).round() as usize);
+        let points = design.points;
+        let fit = points.unwrap_or_else(|| draw.size(50.0, 400.0).round() as usize);
         let validate = (draw.uniform(0.25, 0.5) * fit as f64).round().max(1.0) as usize;
         let climate = weather((fit + validate) as f64 * 19.0, beyond_list, &mut draw);
-        let ranges: Vec<[f64; 2]> = robot
+        let limits = robot
             .joints
             .iter()
-            .map(|joint| narrowed(joint.limits.unwrap_or_default(), &mut draw))
-            .collect();
-        let near = if beyond_list { NEAR } else { 0.0 };
+            .map(|joint| joint.limits.unwrap_or_default());
+        let ranges: Vec<[f64; 2]> = limits.map(|limits| narrowed(limits, &mut draw)).collect();
         let amount = Amount {
             fit,
             validate,
             repeated,
-            near,
+            near: if beyond_list { NEAR } else { 0.0 },
             loaded: !design.bare,
             layout: design.layout,
         };
         let points = points::plan(kind, &ranges, amount, &climate, seed)?;
-        let to_fit = &points[..fit.min(points.len())];
-        let site = Site {
+        let (to_fit, held_out) = points.split_at(fit);
+        let at = |points| Site {
             robot: &robot,
             truth: &truth,
             tracker: &tracker,
-            points: to_fit,
+            points,
         };
-        let held_out = Site {
-            points: &points[fit.min(points.len())..],
-            ..site
-        };
+        let (site, held_out) = (at(to_fit), at(held_out));
         let noise_mm = [&site, &held_out].map(|site| 1e3 * site.noise(play_rad));
         let shadow = site.shadow();
         let bench = Bench::new(&robot, &ranges, to_fit);
@@ -133,29 +126,16 @@ impl Case {
             shadow: &shadow,
             noise: 1e-3 * noise_mm[0],
         };
-        let (drafts, concealed) = concealing(design, content, &bench, &sight, &mut draw);
+        let (drafts, concealed) = conceal(design, content, &bench, &sight, &mut draw);
         let mut hidden = hidden(&drafts, &mut draw);
         hidden.extend(design.bare.then_some(Column::Current));
-        let (payload_kg, warmth): (Vec<f64>, Vec<f64>) = points
-            .iter()
-            .map(|point| (point.payload_kg, point.temperature_c))
-            .unzip();
+        let payload_kg = points.iter().map(|point| point.payload_kg).collect();
         let (friction, motors) = drives(&robot, &bench, &mut draw);
-        let effects: Vec<Physical> = concealed
-            .iter()
-            .flat_map(|one| one.cause.physical.clone())
-            .chain(friction.iter().cloned())
-            .collect();
-        let unseen_mm = 1e3
-            * Site {
-                points: &points,
-                ..site
-            }
-            .unseen(fit, &effects);
-        let (play, poses) = (
-            vec![play_rad / ARCSEC; robot.joints.len()],
-            Poses::default(),
-        );
+        let causes = concealed.iter().flat_map(|one| &one.cause.physical);
+        let effects: Vec<Physical> = causes.chain(&friction).cloned().collect();
+        let unseen_mm = 1e3 * at(&points).unseen(fit, &effects);
+        let play = vec![play_rad / ARCSEC; robot.joints.len()];
+        let poses = Poses::default();
         let experiment = Experiment {
             robot: &robot,
             truth: &truth,
@@ -174,26 +154,23 @@ impl Case {
         });
         let mut shots = experiment.measure(carried.collect(), || ());
         let mut faults = Noise::new(seed, Purpose::Faults);
-        let thermometer_c = warmth
-            .iter()
-            .map(|celsius| celsius + THERMOMETER_K * faults.normal())
-            .collect();
+        let mut shown = |shot: &Shot| shot.temperature_c + THERMOMETER_K * faults.normal();
+        let thermometer_c = shots.iter().map(&mut shown).collect();
         let tampered = tamper(design, &mut shots, fit, &mut faults);
         if design.log_step_deg > 0.0 {
-            shots
-                .iter_mut()
-                .for_each(|shot| round(&mut shot.q, &robot, design.log_step_deg));
+            // As a controller's log does; all joints turn.
+            let step = design.log_step_deg.to_radians();
+            let angles = shots.iter_mut().flat_map(|shot| &mut shot.q);
+            angles.for_each(|angle| *angle = (*angle / step).round() * step);
         }
+        let accepted = drafts.into_iter().flat_map(|draft| draft.accepted);
         Ok(Case {
             name: format!("c{:04}", number + 1),
             content,
             collection: design.collection,
             seed,
             kind,
-            accepted: drafts
-                .iter()
-                .flat_map(|draft| draft.accepted.clone())
-                .collect(),
+            accepted: accepted.collect(),
             geometry_rank: shadow.rank(),
             robot,
             bare: design.bare,
@@ -228,16 +205,12 @@ impl Case {
     fn names(&self, which: fn(&Concealed) -> bool) -> Vec<(&'static str, String)> {
         let mut causes: Vec<&Concealed> = self.concealed.iter().filter(|one| which(one)).collect();
         causes.sort_by(|a, b| b.strength.total_cmp(&a.strength));
-        let named = causes
-            .into_iter()
-            .map(|one| (one.cause.effect, one.cause.place.clone()));
-        named
-            .chain(
-                self.tampered
-                    .iter()
-                    .map(|one| (one.effect, "recording".to_string())),
-            )
-            .collect()
+        let named = |one: &Concealed| (one.cause.effect, one.cause.place.clone());
+        let tampered = self
+            .tampered
+            .iter()
+            .map(|one| (one.effect, "recording".to_string()));
+        causes.into_iter().map(named).chain(tampered).collect()
     }
 }
 
@@ -251,25 +224,6 @@ fn arm(design: &Design, draw: &mut Noise) -> (Kind, RobotDescription) {
         [0.0; 3]
     };
     (kind, kind.description(aside))
-}
-
-/// What the case conceals, each effect as visible as drawn.
-fn concealing(
-    design: &Design,
-    content: Content,
-    bench: &Bench,
-    sight: &Sight,
-    draw: &mut Noise,
-) -> (Vec<Draft>, Vec<Concealed>) {
-    if content == Content::Foreign {
-        return drawn(bench, sight, draw);
-    }
-    if design.collection == Collection::Beyond {
-        return beyond(design, content, bench, sight, draw);
-    }
-    let drafts = drafts(design, content, bench, draw);
-    let concealed = size(design, &drafts, sight, draw);
-    (drafts, concealed)
 }
 
 /// Clock and temperature of a recording that lasts so many seconds: two time constants, more or less.
@@ -290,19 +244,6 @@ fn weather(lasts_s: f64, swings: bool, draw: &mut Noise) -> Climate {
         swing_k: draw.uniform(2.0, 4.0),
         swing_h: lasts_s / draw.uniform(2.0, 5.0) / 3600.0,
         ..climate
-    }
-}
-
-/// The tracker, with the scatter that the design asks for.
-fn instrument(design: &Design, kind: Kind, content: Content, draw: &mut Noise) -> Tracker {
-    let tracker = tracker(kind, content == Content::Null, draw);
-    let beyond_list = design.collection == Collection::Beyond;
-    let scatter = design
-        .scatter
-        .or_else(|| beyond_list.then(|| scatter(draw)));
-    Tracker {
-        scatter: scatter.unwrap_or(tracker.scatter),
-        ..tracker
     }
 }
 
@@ -336,83 +277,60 @@ fn errors(robot: &RobotDescription, draw: &mut Noise) -> TrueRobot {
     } else {
         1e-4
     };
+    let offset_deg = (0..joints)
+        .map(|_| (5e-4 * draw.normal()).to_degrees())
+        .collect();
+    let ratio = (0..joints).map(|_| 1.0 + gear * draw.normal()).collect();
+    let mut links = Vec::new();
+    for link in 1..=joints {
+        let shift_mm = [(); 3].map(|()| 0.4 * draw.normal());
+        let tilt_arcsec = match link == joints {
+            true => [0.0; 3],
+            false => [(); 3].map(|()| 3e-4 / ARCSEC * draw.normal()),
+        };
+        links.push(LinkError {
+            link,
+            shift_mm,
+            tilt_arcsec,
+        });
+    }
+    let coupling = |pair: &Coupling| CouplingError {
+        moved: pair.moved + 1,
+        by: pair.by + 1,
+        error: 3e-4 * draw.normal(),
+    };
     TrueRobot {
-        offset_deg: (0..joints)
-            .map(|_| (5e-4 * draw.normal()).to_degrees())
-            .collect(),
-        ratio: (0..joints).map(|_| 1.0 + gear * draw.normal()).collect(),
-        links: (1..=joints)
-            .map(|link| LinkError {
-                link,
-                shift_mm: std::array::from_fn(|_| 0.4 * draw.normal()),
-                tilt_arcsec: std::array::from_fn(|_| {
-                    if link == joints {
-                        0.0
-                    } else {
-                        3e-4 / ARCSEC * draw.normal()
-                    }
-                }),
-            })
-            .collect(),
-        couplings: robot
-            .couplings
-            .iter()
-            .map(|pair| CouplingError {
-                moved: pair.moved + 1,
-                by: pair.by + 1,
-                error: 3e-4 * draw.normal(),
-            })
-            .collect(),
+        offset_deg,
+        ratio,
+        links,
+        couplings: robot.couplings.iter().map(coupling).collect(),
         ..TrueRobot::default()
     }
 }
 
-/// A tracker somewhere around the robot, turned anyhow; nulls see other scatter, too.
-fn tracker(kind: Kind, null: bool, draw: &mut Noise) -> Tracker {
-    let (far, angle) = (
-        kind.reach_m() * draw.uniform(1.2, 2.0),
-        draw.uniform(-180.0, 180.0f64),
-    );
-    let (sine, cosine) = angle.to_radians().sin_cos();
+/// A tracker somewhere around the robot, turned anyhow, with the scatter that the design asks for. Unasked nulls of the library see other
+/// scatter than the Gaussian one, and beyond the library now and then everything does.
+fn tracker(design: &Design, kind: Kind, content: Content, draw: &mut Noise) -> Tracker {
+    let far = kind.reach_m() * draw.uniform(1.2, 2.0);
+    let (sine, cosine) = draw.uniform(-180.0, 180.0f64).to_radians().sin_cos();
+    let high = draw.uniform(0.0, 1.5);
+    let position_mm = [1e3 * far * cosine, 1e3 * far * sine, 1e3 * high].map(f64::round);
+    let roll_pitch_yaw_deg = [10.0, 10.0, 180.0].map(|most| draw.uniform(-most, most));
+    let mut scatter = match (content == Content::Null, draw.index(3)) {
+        (true, 1) => Scatter::Student,
+        (true, 2) => Scatter::Uneven,
+        _ => Scatter::Gaussian,
+    };
+    if design.collection == Collection::Beyond && design.scatter.is_none() {
+        let (plain, other) = (draw.chance(0.6), draw.index(SCATTERS.len() - 1));
+        scatter = SCATTERS[if plain { 0 } else { 1 + other }];
+    }
     Tracker {
-        position_mm: [
-            1e3 * far * cosine,
-            1e3 * far * sine,
-            1e3 * draw.uniform(0.0, 1.5),
-        ]
-        .map(f64::round),
-        roll_pitch_yaw_deg: [
-            draw.uniform(-10.0, 10.0),
-            draw.uniform(-10.0, 10.0),
-            draw.uniform(-180.0, 180.0),
-        ],
-        scatter: match (null, draw.index(3)) {
-            (true, 1) => Scatter::Student,
-            (true, 2) => Scatter::Uneven,
-            _ => Scatter::Gaussian,
-        },
+        position_mm,
+        roll_pitch_yaw_deg,
+        scatter: design.scatter.unwrap_or(scatter),
         ..Tracker::default()
     }
-}
-
-/// Mostly Gaussian, else one of the other kinds.
-fn scatter(draw: &mut Noise) -> Scatter {
-    let (plain, other) = (draw.chance(0.6), draw.index(SCATTERS.len() - 1));
-    if plain {
-        Scatter::Gaussian
-    } else {
-        SCATTERS[1 + other]
-    }
-}
-
-/// Rounds angles (rad) of revolute joints to whole steps, as a controller's log does.
-fn round(q: &mut [f64], robot: &RobotDescription, step_deg: f64) {
-    let step = step_deg.to_radians();
-    let angles = q
-        .iter_mut()
-        .zip(&robot.joints)
-        .filter(|(_, joint)| joint.kind == JointKind::Revolute);
-    angles.for_each(|(angle, _)| *angle = (*angle / step).round() * step);
 }
 
 /// A part of a joint's range that a cell may leave free, deg.
@@ -427,7 +345,7 @@ fn narrowed(limits: [f64; 2], draw: &mut Noise) -> [f64; 2] {
 fn hidden(drafts: &[Draft], draw: &mut Noise) -> BTreeSet<Column> {
     let mut out: BTreeSet<Column> = drafts
         .iter()
-        .flat_map(|draft| draft.hides.iter().copied())
+        .flat_map(|draft| draft.hides.clone())
         .collect();
     for (column, share) in [
         (Column::Temperature, 0.15),

@@ -1,8 +1,9 @@
 //! What a set of concealed recordings is drawn from, and which kind each of its cases is.
 
-use super::family::{Collection, Family};
-use super::layout::Layout;
+use super::family::{Collection, DrawEffect};
+use super::points::Layout;
 use super::robots::Kind;
+use crate::families::Family;
 use crate::noise::{Noise, Purpose};
 use crate::tracker::Scatter;
 
@@ -43,6 +44,13 @@ pub struct Design {
     pub layout: Layout,
     /// Mass (kg) on the flange that neither the robot file nor the payload column states.
     pub tool_mass_kg: f64,
+    /// Torques of an arm that moves instead of points: of what is above, seed, cases, shares (nulls have friction of all joints in half of
+    /// them, the others in most) and forms count.
+    pub dynamics: bool,
+    /// Seconds of a recording of torques: two stretches to fit, two that judge.
+    pub seconds: f64,
+    /// Rows a second of it.
+    pub rate: f64,
 }
 
 impl Default for Design {
@@ -66,6 +74,9 @@ impl Default for Design {
             log_step_deg: 0.0,
             layout: Layout::default(),
             tool_mass_kg: 0.0,
+            dynamics: false,
+            seconds: 48.0,
+            rate: 100.0,
         }
     }
 }
@@ -86,7 +97,7 @@ pub enum Content {
 impl Design {
     /// Rows of the families that single effects are drawn from.
     fn listed(&self) -> Vec<usize> {
-        let chosen = |family: &Family| match self.families.is_empty() {
+        let chosen = |family: &Family<DrawEffect>| match self.families.is_empty() {
             true => self.collection == Collection::Beyond || family.name != "unknown",
             false => self.families.iter().any(|name| name == family.name),
         };
@@ -97,11 +108,10 @@ impl Design {
     }
 
     /// Robots to draw from.
-    pub(crate) fn kinds(&self) -> Vec<Kind> {
-        if self.robots.is_empty() {
-            self.collection.robots().to_vec()
-        } else {
-            self.robots.clone()
+    pub(crate) fn kinds(&self) -> &[Kind] {
+        match self.robots.is_empty() {
+            true => self.collection.robots(),
+            false => &self.robots,
         }
     }
 
@@ -111,14 +121,10 @@ impl Design {
         let count = |share: f64| (share * self.cases as f64).round() as usize;
         let listed = self.listed();
         let families = self.collection.families();
-        let open: Vec<usize> = (0..families.len())
-            .filter(|row| families[*row].name == "unknown")
-            .collect();
-        let paired: Vec<usize> = listed
-            .iter()
-            .copied()
-            .filter(|row| families[*row].paired)
-            .collect();
+        let is_open = |row: &usize| families[*row].name == "unknown";
+        let open: Vec<usize> = (0..families.len()).filter(is_open).collect();
+        let is_paired = |row: &usize| families[*row].paired;
+        let paired: Vec<usize> = listed.iter().copied().filter(is_paired).collect();
         let mut out = vec![Content::Null; count(self.nulls).min(self.cases)];
         let room = |out: &Vec<Content>, wanted: usize| wanted.min(self.cases - out.len());
         for turn in 0..room(&out, count(self.open)) {

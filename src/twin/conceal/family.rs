@@ -4,32 +4,37 @@
 //! they are. Names and places are the canonical ones.
 
 pub(super) mod foreign;
-mod gears;
-mod instruments;
-mod interactions;
-mod loads;
+mod table;
+
+pub use table::{BEYOND, FAMILIES};
 
 use super::robots::{ALL_KINDS, KINDS, Kind};
 use crate::arm::Arm;
-use crate::effect::Physical;
+use crate::effect::{JointCompliance, Physical};
 use crate::equilibrium::settle;
+use crate::families::{Family, families};
 use crate::matrix::{self, Vector};
+use crate::names::named;
 use crate::noise::Noise;
 use crate::plan::Point;
 use crate::truth::ARCSEC;
 use calib_foundation::description::RobotDescription;
 
-/// A column of the recording that may be missing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Column {
-    /// The clock.
-    Time,
-    /// The temperature.
-    Temperature,
-    /// Motor currents.
-    Current,
-    /// Sides of approach.
-    Direction,
+named! {
+    /// A column of the recording that may be missing.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    Column,
+    /// All of them.
+    COLUMNS: 4 {
+        /// The clock.
+        Time "time_s",
+        /// The temperature.
+        Temperature "temp_c",
+        /// Motor currents.
+        Current "current",
+        /// Sides of approach.
+        Direction "direction",
+    }
 }
 
 /// One concealed cause: what a diagnosis should name, and what the twin does for it.
@@ -46,8 +51,8 @@ pub struct Cause {
 }
 
 /// What a family has drawn.
-#[derive(Debug, Clone)]
-pub(crate) struct Draft {
+#[derive(Debug, Clone, Default)]
+pub struct Draft {
     /// The form, in a few words.
     pub(crate) form: &'static str,
     /// More than one where they act together.
@@ -65,9 +70,7 @@ impl Draft {
         Draft {
             form,
             causes,
-            accepted: Vec::new(),
-            needs: Vec::new(),
-            hides: Vec::new(),
+            ..Draft::default()
         }
     }
     /// A draft of one cause whose size may be changed.
@@ -75,9 +78,35 @@ impl Draft {
         form: &'static str,
         effect: &'static str,
         place: impl Into<String>,
-        physical: Vec<Physical>,
+        physical: impl Into<Vec<Physical>>,
     ) -> Draft {
-        Draft::new(form, vec![sized(effect, place.into(), physical)])
+        let cause = Cause {
+            sized: true,
+            ..fixed(effect, place.into(), physical)
+        };
+        Draft::new(form, vec![cause])
+    }
+    /// A cause of the size that it was drawn with, which shows through the springs of all loaded joints.
+    fn on_springs(
+        form: &'static str,
+        effect: &'static str,
+        place: impl Into<String>,
+        physical: Physical,
+        on: &Bench,
+        draw: &mut Noise,
+    ) -> Draft {
+        let mut causes = vec![fixed(effect, place.into(), [physical])];
+        causes.extend(springs(on, draw));
+        Draft::new(form, causes)
+    }
+    /// With the linear spring of its joint, of a size between two bounds: it may be named, or counted to what is concealed.
+    fn over_spring(mut self, on: &Bench, number: usize, sizes: [f64; 2], draw: &mut Noise) -> Self {
+        let linear = [spring(on, number, draw.size(sizes[0], sizes[1]))];
+        self.causes.push(Cause {
+            wanted: false,
+            ..fixed("joint_compliance", joint(number), linear)
+        });
+        self
     }
     fn accepting(mut self, effect: &'static str, place: String) -> Draft {
         self.accepted.push((effect, place));
@@ -87,29 +116,34 @@ impl Draft {
         self.needs.extend(columns);
         self
     }
-    fn hiding(mut self, column: Column) -> Draft {
-        self.hides.push(column);
-        self
-    }
 }
 
-/// A cause whose size may be changed.
-fn sized(effect: &'static str, place: String, physical: Vec<Physical>) -> Cause {
+/// A cause of the size that it was drawn with.
+fn fixed(effect: &'static str, place: String, physical: impl Into<Vec<Physical>>) -> Cause {
     Cause {
         effect,
         place,
-        physical,
-        sized: true,
+        physical: physical.into(),
+        sized: false,
         wanted: true,
     }
 }
 
-/// A cause of the size that it was drawn with.
-fn fixed(effect: &'static str, place: String, physical: Vec<Physical>) -> Cause {
-    Cause {
-        sized: false,
-        ..sized(effect, place, physical)
-    }
+/// The linear spring of a joint that turns by so many arcsec under its largest torque.
+fn spring(on: &Bench, number: usize, arcsec: f64) -> Physical {
+    JointCompliance::effect(number, on.softness(number, arcsec))
+}
+
+/// The springs of all loaded joints, of their natural size.
+fn springs(on: &Bench, draw: &mut Noise) -> Vec<Cause> {
+    let spring = |number| {
+        fixed(
+            "joint_compliance",
+            joint(number),
+            [spring(on, number, draw.size(60.0, 250.0))],
+        )
+    };
+    on.loaded().into_iter().map(spring).collect()
 }
 
 fn joint(number: usize) -> String {
@@ -120,18 +154,9 @@ fn link(number: usize) -> String {
     format!("link {number}")
 }
 
-/// Whether a form is the one that a library would hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Form {
-    /// As a library would hold it.
-    Obvious,
-    /// Otherwise.
-    Other,
-}
-
 /// What a family may look at: the robot, the plan, and the loads of the undeflected arm.
 #[derive(Debug)]
-pub(crate) struct Bench<'a> {
+pub struct Bench<'a> {
     /// As its owner believes it to be.
     pub(crate) robot: &'a RobotDescription,
     /// Ranges of every joint, deg.
@@ -142,7 +167,6 @@ pub(crate) struct Bench<'a> {
     pub(crate) overturning: f64,
     /// When the last point to fit is measured, and when the load changes, s.
     pub(crate) end_s: f64,
-    /// s.
     pub(crate) change_s: f64,
 }
 
@@ -184,10 +208,14 @@ impl<'a> Bench<'a> {
 
     /// Joints (from 1) that gravity loads, but for the last, whose turn moves the tool little.
     fn loaded(&self) -> Vec<usize> {
+        self.carrying(0.02)
+    }
+
+    /// Those of them that carry more than a share of what the most loaded one does.
+    fn carrying(&self, share: f64) -> Vec<usize> {
         let most = self.peak.iter().copied().fold(0.0, f64::max);
-        (1..self.joints())
-            .filter(|number| self.peak[number - 1] > 0.02 * most)
-            .collect()
+        let carries = |number: &usize| self.peak[number - 1] > share * most;
+        (1..self.joints()).filter(carries).collect()
     }
 
     /// A joint that turns the tool: any but the last.
@@ -197,18 +225,9 @@ impl<'a> Bench<'a> {
 
     /// One of the loaded joints, mostly one of the heavily loaded.
     fn bearing(&self, draw: &mut Noise) -> Option<usize> {
-        let loaded = self.loaded();
-        let most = self.peak.iter().copied().fold(0.0, f64::max);
-        let heavy: Vec<usize> = loaded
-            .iter()
-            .copied()
-            .filter(|number| self.peak[number - 1] > 0.2 * most)
-            .collect();
-        let list = if draw.chance(0.7) && !heavy.is_empty() {
-            heavy
-        } else {
-            loaded
-        };
+        let heavy = self.carrying(0.2);
+        let is_heavy = draw.chance(0.7) && !heavy.is_empty();
+        let list = if is_heavy { heavy } else { self.loaded() };
         list.get(draw.index(list.len())).copied()
     }
 
@@ -256,81 +275,8 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Draws an effect; none where this robot cannot have it.
-type Draw = fn(&Bench, Form, &mut Noise) -> Option<Draft>;
-
-/// A family of effects.
-pub struct Family {
-    /// The canonical name of the effect; `unknown` for what is in no list.
-    pub name: &'static str,
-    /// Draws one.
-    pub(crate) draw: Draw,
-    /// May stand beside another one.
-    pub(crate) paired: bool,
-}
-
-const fn alone(name: &'static str, draw: Draw) -> Family {
-    Family {
-        name,
-        draw,
-        paired: false,
-    }
-}
-
-const fn paired(name: &'static str, draw: Draw) -> Family {
-    Family {
-        paired: true,
-        ..alone(name, draw)
-    }
-}
-
-/// Families in canonical names; several rows of one name are different causes.
-pub const FAMILIES: &[Family] = &[
-    paired("joint_compliance", gears::joint_compliance),
-    alone("joint_hardening", gears::joint_hardening),
-    paired("gear_cyclic", gears::gear_cyclic),
-    paired("gear_motor_cyclic", gears::gear_motor_cyclic),
-    paired("backlash", gears::backlash),
-    paired("axis_wobble", gears::axis_wobble),
-    paired("zero_shift", gears::zero_shift),
-    alone("cable_drag", gears::cable_drag),
-    paired("link_compliance", loads::link_compliance),
-    paired("base_compliance", loads::base_compliance),
-    alone("counterbalance", loads::counterbalance),
-    alone("link_mass", loads::link_mass),
-    alone("payload_error", loads::payload_error),
-    paired("thermal_growth", loads::thermal_growth),
-    paired("tool_shift", loads::tool_shift),
-    paired("base_shift", loads::base_shift),
-    paired("tracker_drift", loads::tracker_drift),
-    alone("joint_log_lag", loads::joint_log_lag),
-    alone("tracker_scale", loads::tracker_scale),
-    alone("unknown", foreign::bump),
-    alone("unknown", foreign::hinge),
-    alone("unknown", foreign::product),
-    alone("unknown", foreign::sway),
-];
-
-/// Families of physics that no list of effects holds yet: instruments, memory, interactions.
-pub const BEYOND: &[Family] = &[
-    alone("tracker_circle", instruments::circle),
-    alone("tracker_elevation", instruments::elevation),
-    alone("tracker_offset", instruments::offset),
-    alone("tracker_refraction", instruments::refraction),
-    alone("unknown", instruments::swing),
-    alone("base_shift", instruments::knock),
-    alone("presliding", interactions::presliding),
-    alone("joint_warming", interactions::own_heat),
-    alone("joint_warming", interactions::late_heat),
-    alone("thermal_growth", interactions::lagging_link),
-    alone("gear_load", interactions::gear_load),
-    alone("gear_flank", interactions::gear_flank),
-    alone("joint_warming", interactions::warm_ratio),
-    alone("joint_warming", interactions::warm_spring),
-    alone("backlash", interactions::spring_by_direction),
-    alone("backlash", interactions::growing_gap),
-    alone("unknown", interactions::bent_link),
-];
+/// Draws an effect, in another form than the obvious one if that is asked for; none where this robot cannot have it.
+pub type DrawEffect = fn(&Bench, bool, &mut Noise) -> Option<Draft>;
 
 /// What a set of recordings is drawn from.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -344,7 +290,7 @@ pub enum Collection {
 
 impl Collection {
     /// Kinds of effects that are drawn.
-    pub fn families(self) -> &'static [Family] {
+    pub fn families(self) -> &'static [Family<DrawEffect>] {
         match self {
             Self::Library => FAMILIES,
             Self::Beyond => BEYOND,

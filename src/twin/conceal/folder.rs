@@ -6,13 +6,11 @@ use super::family::Column;
 use super::points::FIT;
 use super::size::Concealed;
 use crate::effect::Physical;
-use crate::folder::{Decimals, Log, robot};
+use crate::folder::{Decimals, File, Log, pretty, robot};
 use crate::recorder::Shot;
+use crate::true_value::TrueValue;
 use calib_foundation::description::RobotDescription;
 use serde_json::{Value, json};
-
-/// A file's name and its bytes.
-pub(crate) type File = (&'static str, String);
 
 /// A controller's display and a tracker's.
 const DECIMALS: Decimals = Decimals {
@@ -36,11 +34,8 @@ impl Case {
     /// The robot as its file states it.
     fn stated(&self) -> RobotDescription {
         let mut stated = self.robot.clone();
-        if self.bare {
-            stated
-                .joints
-                .iter_mut()
-                .for_each(|joint| (joint.mass, joint.centre) = (None, None));
+        for joint in stated.joints.iter_mut().filter(|_| self.bare) {
+            (joint.mass, joint.centre) = (None, None);
         }
         stated
     }
@@ -49,7 +44,7 @@ impl Case {
     pub fn sealed(&self) -> String {
         let pair =
             |(effect, place): &(&'static str, String)| json!({ "effect": effect, "where": place });
-        let hidden: Vec<&str> = self.hidden.iter().map(|column| title(*column)).collect();
+        let hidden: Vec<&str> = self.hidden.iter().map(|column| column.name()).collect();
         let tampered = self.tampered.iter().map(|one| {
             let points: Vec<String> = one.rows.iter().map(|row| id(*row)).collect();
             json!({ "effect": one.effect, "where": "recording", "points": points })
@@ -96,20 +91,10 @@ impl Case {
     fn log(&self) -> Log {
         let shown = |column: Column| !self.hidden.contains(&column);
         let each = |value: fn(&Shot) -> f64| self.shots.iter().map(value).collect::<Vec<f64>>();
-        let joints = |value: fn(&Shot) -> &Vec<f64>| {
-            self.shots
-                .iter()
-                .flat_map(value)
-                .copied()
-                .collect::<Vec<f64>>()
+        let joints = |value: fn(&Shot) -> &Vec<f64>| -> Vec<f64> {
+            self.shots.iter().flat_map(value).copied().collect()
         };
-        let usage = |shot: &Shot| {
-            if shot.block == FIT {
-                "fit".to_string()
-            } else {
-                "validate".to_string()
-            }
-        };
+        let usage = |shot: &Shot| if shot.block == FIT { "fit" } else { "validate" }.to_string();
         Log {
             joints: self.robot.joints.len(),
             id: (0..self.shots.len()).map(id).collect(),
@@ -131,24 +116,14 @@ fn id(row: usize) -> String {
     format!("P{:04}", row + 1)
 }
 
-fn title(column: Column) -> &'static str {
-    match column {
-        Column::Time => "time_s",
-        Column::Temperature => "temp_c",
-        Column::Current => "current",
-        Column::Direction => "direction",
-    }
-}
-
-fn pretty(value: &Value) -> String {
-    format!("{value:#}\n")
-}
-
 fn effect(one: &Concealed) -> Value {
-    let numbers =
-        one.cause.physical.iter().flat_map(Physical::truth).map(
-            |number| json!({ "name": number.name, "value": number.value, "unit": number.unit }),
-        );
+    let number = |one: TrueValue| json!({ "name": one.name, "value": one.value, "unit": one.unit });
+    let numbers = one
+        .cause
+        .physical
+        .iter()
+        .flat_map(Physical::truth)
+        .map(number);
     let mut out = json!({
         "effect": one.cause.effect,
         "where": one.cause.place,

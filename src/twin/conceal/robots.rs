@@ -1,29 +1,35 @@
 //! The robots of concealed recordings: nominal descriptions typed from data sheets, with plausible masses and motors.
 
+use crate::names::named;
 use calib_foundation::description::{
     Coupling, DeclaredInertias, JointDescription, JointKind, RobotDescription,
 };
 
-/// A robot that recordings are made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
-    /// 210 kg, 6R, spherical wrist, joints 5 and 6 coupled.
-    Sr210d,
-    /// 10 kg, desktop 6R, wrist of three offset axes.
-    Compact6,
-    /// 12 kg, 7R, alternating axes.
-    Seven7r,
-    /// 20 kg, 5R: base, shoulder, elbow, pitch and roll of the hand.
-    Five5r,
+named! {
+    /// A robot that recordings are made of.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    Kind,
+    /// All of them.
+    ALL_KINDS: 4 {
+        /// 210 kg, 6R, spherical wrist, joints 5 and 6 coupled.
+        Sr210d "sr210d",
+        /// 10 kg, desktop 6R, wrist of three offset axes.
+        Compact6 "compact6",
+        /// 12 kg, 7R, alternating axes.
+        Seven7r "seven7r",
+        /// 20 kg, 5R: base, shoulder, elbow, pitch and roll of the hand.
+        Five5r "five5r",
+    }
 }
 
 /// Those that recordings with effects of the library are made of.
 pub(crate) const KINDS: [Kind; 3] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r];
-/// All of them.
-pub const ALL_KINDS: [Kind; 4] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r, Kind::Five5r];
 
 /// Joint by joint: axis, point on it (mm), mass (kg), its centre (mm), gear, Nm/A, range of measurement (deg).
 type Row = ([f64; 3], [f64; 3], f64, [f64; 3], f64, f64, [f64; 2]);
+
+/// Joints, tool (mm), payload (kg), its centre from the tool (mm), least height and distance of the tool (mm), reach (m).
+type Sheet = (&'static [Row], [f64; 3], f64, [f64; 3], [f64; 2], f64);
 
 const X: [f64; 3] = [1.0, 0.0, 0.0];
 const Y: [f64; 3] = [0.0, 1.0, 0.0];
@@ -72,24 +78,19 @@ const FIVE5R: [Row; 5] = [
 ];
 
 impl Kind {
-    /// As the command line names it.
-    pub fn name(self) -> &'static str {
+    #[rustfmt::skip]
+    fn sheet(self) -> Sheet {
         match self {
-            Kind::Sr210d => "sr210d",
-            Kind::Compact6 => "compact6",
-            Kind::Seven7r => "seven7r",
-            Kind::Five5r => "five5r",
+            Kind::Sr210d => (&SR210D, [1854.0, 0.0, 1310.0], 210.0, [170.0, 35.0, 55.0], [-200.0, 500.0], 2.7),
+            Kind::Compact6 => (&COMPACT6, [1184.3, 256.0, 11.6], 10.0, [20.0, 55.0, -12.0], [20.0, 150.0], 1.3),
+            Kind::Seven7r => (&SEVEN7R, [0.0, 0.0, 1296.0], 12.0, [12.0, 10.0, 40.0], [50.0, 100.0], 0.95),
+            Kind::Five5r => (&FIVE5R, [1010.0, 0.0, 1130.0], 20.0, [45.0, 15.0, -20.0], [50.0, 200.0], 1.6),
         }
     }
 
     /// The nominal robot; `aside` moves the measured point off the last axis, mm.
     pub fn description(self, aside: [f64; 3]) -> RobotDescription {
-        let (rows, tool, payload, offset): (&[Row], [f64; 3], f64, [f64; 3]) = match self {
-            Kind::Sr210d => (&SR210D, [1854.0, 0.0, 1310.0], 210.0, [170.0, 35.0, 55.0]),
-            Kind::Compact6 => (&COMPACT6, [1184.3, 256.0, 11.6], 10.0, [20.0, 55.0, -12.0]),
-            Kind::Seven7r => (&SEVEN7R, [0.0, 0.0, 1296.0], 12.0, [12.0, 10.0, 40.0]),
-            Kind::Five5r => (&FIVE5R, [1010.0, 0.0, 1130.0], 20.0, [45.0, 15.0, -20.0]),
-        };
+        let (rows, tool, payload, offset, ..) = self.sheet();
         let metres = |v: [f64; 3]| v.map(|x| 1e-3 * x);
         let joints = rows.iter().enumerate().map(
             |(index, (axis, point, mass, centre, gear, constant, range))| JointDescription {
@@ -126,21 +127,11 @@ impl Kind {
 
     /// Lowest height of a joint and of the tool, and least distance of the tool from the first axis, mm.
     pub fn room_mm(self) -> [f64; 2] {
-        match self {
-            Kind::Sr210d => [-200.0, 500.0],
-            Kind::Compact6 => [20.0, 150.0],
-            Kind::Seven7r => [50.0, 100.0],
-            Kind::Five5r => [50.0, 200.0],
-        }
+        self.sheet().4
     }
 
     /// How far the measured point gets from the first axis, about, m.
     pub fn reach_m(self) -> f64 {
-        match self {
-            Kind::Sr210d => 2.7,
-            Kind::Compact6 => 1.3,
-            Kind::Seven7r => 0.95,
-            Kind::Five5r => 1.6,
-        }
+        self.sheet().5
     }
 }

@@ -1,10 +1,11 @@
 //! How large concealed effects are: each is scaled until it is as visible as drawn, when geometry has absorbed what it can.
 
 use super::design::{Content, Design};
-use super::family::{Bench, Cause, Draft, Form, foreign::foreign};
-use super::visible::{Shadow, Site, norm};
+use super::family::{Bench, Cause, Collection, Draft, foreign::foreign};
+use super::visible::Site;
 use crate::effect::Physical;
 use crate::noise::Noise;
+use crate::shadow::{Column, Shadow, norm};
 
 /// A cause with how visible it is at the points to fit.
 #[derive(Debug, Clone)]
@@ -49,49 +50,12 @@ impl Cause {
     }
 }
 
-fn causes(drafts: &[Draft]) -> Vec<(Cause, &'static str)> {
-    drafts
-        .iter()
-        .flat_map(|draft| draft.causes.iter().map(|cause| (cause.clone(), draft.form)))
-        .collect()
-}
+/// A cause in the form of its draft.
+type Formed = (Cause, &'static str);
 
-/// Draws the families of a case; a pair does not sit twice in one place.
-pub(super) fn drafts(
-    design: &Design,
-    content: Content,
-    bench: &Bench,
-    draw: &mut Noise,
-) -> Vec<Draft> {
-    let rows = match content {
-        Content::Null | Content::Foreign => vec![],
-        Content::Single(row) => vec![row],
-        Content::Pair(first, second) => vec![first, second],
-    };
-    let mut out: Vec<Draft> = Vec::new();
-    for row in rows {
-        for _ in 0..50 {
-            let form = if draw.chance(design.other_forms) {
-                Form::Other
-            } else {
-                Form::Obvious
-            };
-            let Some(draft) = (design.collection.families()[row].draw)(bench, form, draw) else {
-                continue;
-            };
-            let taken = |place: &str| {
-                out.iter()
-                    .flat_map(|other| &other.causes)
-                    .any(|cause| cause.place == place)
-            };
-            let several = matches!(content, Content::Pair(..)) && draft.causes.len() > 1;
-            if !several && !draft.causes.iter().any(|cause| taken(&cause.place)) {
-                out.push(draft);
-                break;
-            }
-        }
-    }
-    out
+fn causes(draft: &Draft) -> Vec<Formed> {
+    let causes = draft.causes.iter();
+    causes.map(|cause| (cause.clone(), draft.form)).collect()
 }
 
 /// A visibility to aim at: mostly 50 to 1000, some hardly there, some plain.
@@ -109,162 +73,157 @@ const PLAINEST: f64 = 5000.0;
 /// Bounds of the factor on a natural size.
 const SMALLEST: f64 = 2e-3;
 const LARGEST: f64 = 4.0;
+/// Visibility of what lies beyond the library.
+const PLAIN: [f64; 2] = [50.0, 200.0];
+/// Root mean square per axis of an effect drawn at random, in standard deviations of a coordinate.
+const FOREIGN: [f64; 2] = [2.0, 20.0];
+/// Effects that may be drawn until one can be seen.
+const DRAWS: usize = 40;
 
-/// Gives the causes their size and says how visible they are then.
-pub(super) fn size(
+/// What a case conceals: the drafts, and their causes, each as visible as drawn.
+pub(super) fn conceal(
     design: &Design,
-    drafts: &[Draft],
+    content: Content,
+    on: &Bench,
     sight: &Sight,
     draw: &mut Noise,
-) -> Vec<Concealed> {
-    let mut causes = causes(drafts);
-    let Sight { site, shadow, .. } = *sight;
-    let strength = |column: &[f64]| sight.strength(column);
+) -> (Vec<Draft>, Vec<Concealed>) {
+    let families = design.collection.families();
+    let rows = match content {
+        Content::Null => vec![],
+        Content::Foreign => {
+            return until_plain(sight, true, |_| {
+                let draft = foreign(on, draw);
+                let ratio = draw.size(FOREIGN[0], FOREIGN[1]);
+                let mut causes = causes(&draft);
+                // The whole displacement counts. Twice: what hangs on the load is not quite proportional.
+                for _ in 0..2 {
+                    let whole = alone(&causes, 0, sight.site);
+                    let found = norm(&whole) / (whole.len().max(1) as f64).sqrt() / sight.noise;
+                    causes[0].0.scale(ratio / found.max(1e-6));
+                }
+                Some((draft, causes))
+            });
+        }
+        Content::Single(row) if design.collection == Collection::Beyond => {
+            let other = draw.chance(design.other_forms);
+            return until_plain(sight, other, |is_last| {
+                let draft = (families[row].draw)(on, other, draw)?;
+                let wanted = draw.size(PLAIN[0], PLAIN[1]);
+                let largest = if is_last { f64::INFINITY } else { LARGEST };
+                let mut causes = causes(&draft);
+                for index in (0..causes.len()).filter(|index| draft.causes[*index].sized) {
+                    // The others absorb what they can, as geometry does.
+                    let found = seen(causes.clone(), sight)[index].strength.max(1e-9);
+                    let factor = (wanted / found).sqrt().clamp(SMALLEST, largest);
+                    causes[index].0.scale(factor);
+                }
+                Some((draft, causes))
+            });
+        }
+        Content::Single(row) => vec![row],
+        Content::Pair(first, second) => vec![first, second],
+    };
+    let mut drafts: Vec<Draft> = Vec::new();
+    let is_pair = rows.len() > 1;
+    for row in rows {
+        // A pair does not sit twice in one place.
+        let attempt = |_| {
+            let other = draw.chance(design.other_forms);
+            let draft = (families[row].draw)(on, other, draw)?;
+            let mut taken = drafts.iter().flat_map(|other| &other.causes);
+            let places = draft.causes.iter().map(|cause| &cause.place);
+            let twice = taken.any(|cause| places.clone().any(|place| *place == cause.place));
+            let is_several = is_pair && draft.causes.len() > 1;
+            (!twice && !is_several).then_some(draft)
+        };
+        let draft = (0..50).find_map(attempt);
+        drafts.extend(draft);
+    }
+    let mut causes: Vec<Formed> = drafts.iter().flat_map(causes).collect();
     for index in 0..causes.len() {
         let natural = draw.chance(design.natural);
         let wanted = aim(draw);
         if !causes[index].0.sized {
             continue;
         }
-        let found = strength(&shadow.outside(alone(&causes, index, site))).max(1e-9);
+        let column = sight.shadow.outside(alone(&causes, index, sight.site));
+        let found = sight.strength(&column).max(1e-9);
         // What is of natural size stays so, but where it would be too plain to test anything.
         let wanted = if natural { found.min(PLAINEST) } else { wanted };
-        let factor = (wanted / found).sqrt().clamp(SMALLEST, LARGEST);
-        causes[index].0.scale(factor);
+        causes[index]
+            .0
+            .scale((wanted / found).sqrt().clamp(SMALLEST, LARGEST));
     }
-    seen(causes, sight)
+    (drafts, seen(causes, sight))
+}
+
+/// Draws effects until one is plain to see, so many at most; `attempt` draws one in its size, and hears whether it is the last.
+fn until_plain(
+    sight: &Sight,
+    strange: bool,
+    mut attempt: impl FnMut(bool) -> Option<(Draft, Vec<Formed>)>,
+) -> (Vec<Draft>, Vec<Concealed>) {
+    let mut out = (Vec::new(), Vec::new());
+    for number in 1..=DRAWS {
+        let Some((draft, causes)) = attempt(number == DRAWS) else {
+            continue;
+        };
+        let mut concealed = seen(causes, sight);
+        concealed.iter_mut().for_each(|one| one.strange = strange);
+        let is_plain = |one: &Concealed| !one.cause.sized || one.strength >= PLAIN[0];
+        let is_plain = concealed.iter().all(is_plain);
+        out = (vec![draft], concealed);
+        if is_plain {
+            break;
+        }
+    }
+    out
 }
 
 /// How visible causes of this size are.
-fn seen(causes: Vec<(Cause, &'static str)>, sight: &Sight) -> Vec<Concealed> {
+fn seen(causes: Vec<Formed>, sight: &Sight) -> Vec<Concealed> {
     let Sight { site, shadow, .. } = *sight;
-    let columns: Vec<Vec<f64>> = (0..causes.len())
+    let columns: Vec<Column> = (0..causes.len())
         .map(|index| alone(&causes, index, site))
         .collect();
     let rms = |column: &[f64]| 1e3 * norm(column) / (column.len().max(1) as f64).sqrt();
-    (causes.into_iter().enumerate())
-        .map(|(index, (cause, form))| {
-            let mut beside = shadow.clone();
-            columns
-                .iter()
-                .enumerate()
-                .filter(|(other, _)| *other != index)
-                .for_each(|(_, column)| beside.add(column.clone()));
-            let left = beside.outside(columns[index].clone());
-            Concealed {
-                cause,
-                form,
-                strange: false,
-                raw_mm: rms(&columns[index]),
-                visible_mm: rms(&left),
-                strength: sight.strength(&left),
-                strength_alone: sight.strength(&shadow.outside(columns[index].clone())),
-            }
-        })
-        .collect()
+    let seen = |(index, (cause, form)): (usize, Formed)| {
+        let mut others = shadow.clone();
+        let columns_of_others = columns
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| *other != index);
+        columns_of_others.for_each(|(_, column)| others.add(column.clone()));
+        let visible = others.outside(columns[index].clone());
+        Concealed {
+            cause,
+            form,
+            strange: false,
+            raw_mm: rms(&columns[index]),
+            visible_mm: rms(&visible),
+            strength: sight.strength(&visible),
+            strength_alone: sight.strength(&shadow.outside(columns[index].clone())),
+        }
+    };
+    causes.into_iter().enumerate().map(seen).collect()
 }
 
-/// What one cause does beside all others: the displacement with all of them less that without it, m.
-fn alone(causes: &[(Cause, &'static str)], index: usize, site: &Site) -> Vec<f64> {
-    let effects = |skipped: Option<usize>| -> Vec<Physical> {
+/// What one cause does in company of all others: the displacement with all of them less that without it, m.
+fn alone(causes: &[Formed], index: usize, site: &Site) -> Column {
+    let displacement = |skipped: Option<usize>| {
         let kept = causes
             .iter()
             .enumerate()
             .filter(|(other, _)| Some(*other) != skipped);
-        kept.flat_map(|(_, (cause, _))| cause.physical.clone())
-            .collect()
+        let effects: Vec<Physical> = kept
+            .flat_map(|(_, (cause, _))| cause.physical.clone())
+            .collect();
+        site.displacement(&effects)
     };
-    let (with, without) = (
-        site.displacement(&effects(None)),
-        site.displacement(&effects(Some(index))),
-    );
+    let (with, without) = (displacement(None), displacement(Some(index)));
     with.iter()
         .zip(&without)
         .map(|(with, without)| with - without)
         .collect()
-}
-
-/// Visibility of what lies beyond the library.
-const PLAIN: [f64; 2] = [50.0, 200.0];
-/// Effects that may be drawn until one can be seen.
-const DRAWS: usize = 40;
-
-/// Draws an effect of a case beyond the library until one can be as visible as it should, at most `LARGEST` times its natural size;
-/// where none can, the last is made larger.
-pub(super) fn beyond(
-    design: &Design,
-    content: Content,
-    bench: &Bench,
-    sight: &Sight,
-    draw: &mut Noise,
-) -> (Vec<Draft>, Vec<Concealed>) {
-    let Content::Single(row) = content else {
-        return (Vec::new(), Vec::new());
-    };
-    let form = if draw.chance(design.other_forms) {
-        Form::Other
-    } else {
-        Form::Obvious
-    };
-    let mut out = (Vec::new(), Vec::new());
-    for left in (0..DRAWS).rev() {
-        let Some(draft) = (design.collection.families()[row].draw)(bench, form, draw) else {
-            continue;
-        };
-        let wanted = draw.size(PLAIN[0], PLAIN[1]);
-        let largest = if left == 0 { f64::INFINITY } else { LARGEST };
-        let drafts = vec![draft];
-        let mut causes = causes(&drafts);
-        for index in (0..causes.len()).filter(|index| drafts[0].causes[*index].sized) {
-            // The others absorb what they can, as geometry does.
-            let found = seen(causes.clone(), sight)[index].strength.max(1e-9);
-            let factor = (wanted / found).sqrt().clamp(SMALLEST, largest);
-            causes[index].0.scale(factor);
-        }
-        let mut concealed = seen(causes, sight);
-        concealed
-            .iter_mut()
-            .for_each(|one| one.strange = form == Form::Other);
-        let plain = concealed
-            .iter()
-            .filter(|one| one.cause.sized)
-            .all(|one| one.strength >= PLAIN[0]);
-        out = (drafts, concealed);
-        if plain {
-            break;
-        }
-    }
-    out
-}
-
-/// Root mean square per axis of an effect drawn at random, in standard deviations of a coordinate.
-const FOREIGN: [f64; 2] = [2.0, 20.0];
-
-/// Draws an effect at random until geometry leaves enough of it to be seen; its whole displacement is made `FOREIGN` times the noise.
-pub(super) fn drawn(
-    bench: &Bench,
-    sight: &Sight,
-    draw: &mut Noise,
-) -> (Vec<Draft>, Vec<Concealed>) {
-    let mut out = (Vec::new(), Vec::new());
-    for _ in 0..DRAWS {
-        let draft = foreign(bench, draw);
-        let ratio = draw.size(FOREIGN[0], FOREIGN[1]);
-        let drafts = vec![draft];
-        let mut causes = causes(&drafts);
-        // Twice: what hangs on the load is not quite proportional.
-        for _ in 0..2 {
-            let whole = alone(&causes, 0, sight.site);
-            let found = norm(&whole) / (whole.len().max(1) as f64).sqrt() / sight.noise;
-            causes[0].0.scale(ratio / found.max(1e-6));
-        }
-        let mut concealed = seen(causes, sight);
-        concealed.iter_mut().for_each(|one| one.strange = true);
-        let plain = concealed.iter().all(|one| one.strength >= PLAIN[0]);
-        out = (drafts, concealed);
-        if plain {
-            break;
-        }
-    }
-    out
 }

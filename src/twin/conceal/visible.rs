@@ -1,10 +1,11 @@
 //! What is left of an effect when geometry, ratios and couplings have absorbed what they can: differences of the twin by its own
-//! true numbers, orthogonalised (modified Gram-Schmidt, twice), and the effect's displacement less its shadow on them.
+//! true numbers, and the effect's displacement less its shadow on them. Columns are coordinates of all points, tracker frame, m.
 
 use crate::arm::{Arm, Motion, Row};
 use crate::effect::{self, Physical};
 use crate::equilibrium::{Equilibrium, settle, sighted};
 use crate::plan::Point;
+use crate::shadow::{Column, Shadow, norm};
 use crate::tracker::Tracker;
 use crate::truth::TrueRobot;
 use crate::{matrix, memory};
@@ -23,20 +24,20 @@ pub(crate) struct Site<'a> {
     pub(crate) points: &'a [Point],
 }
 
-/// Coordinates of all points after each other, tracker frame, m.
-type Column = Vec<f64>;
-
 impl Site<'_> {
     /// What the tracker would see without effects and noise of the joints that are logged under `effects`.
     fn bare(&self, truth: &TrueRobot, tracker: &Tracker, effects: &[Physical]) -> Column {
         let arm = Arm::new(self.robot, truth);
-        let (rest, base) = (Motion::none(arm.links.len()), tracker.base());
+        let (still, base) = (Motion::none(arm.links.len()), tracker.base());
         let rows = self.points.iter().flat_map(|point| {
             let mut q = point.q.clone();
             effects
                 .iter()
                 .for_each(|effect| effect.log(&mut q, &point.before));
-            matrix::place(&base, arm.posture(&truth.drive(self.robot, &q), &rest).tool)
+            matrix::place(
+                &base,
+                arm.posture(&truth.drive(self.robot, &q), &still).tool,
+            )
         });
         rows.collect()
     }
@@ -54,8 +55,8 @@ impl Site<'_> {
             .zip(memories)
             .map(move |(point, memory)| {
                 let row = point.row(self.truth.drive(self.robot, &point.q), memory);
-                let rest = settle(&arm, &row, effects);
-                (row, rest)
+                let settled = settle(&arm, &row, effects);
+                (row, settled)
             })
     }
 
@@ -64,7 +65,7 @@ impl Site<'_> {
         let base = self.tracker.base();
         let seen = self
             .at_rest(effects)
-            .flat_map(|(row, rest)| sighted(&rest, &base, &row, effects));
+            .flat_map(|(row, settled)| sighted(&settled, &base, &row, effects));
         let bare = self.bare(self.truth, self.tracker, effects);
         seen.zip(bare).map(|(seen, bare)| seen - bare).collect()
     }
@@ -78,20 +79,15 @@ impl Site<'_> {
         }
         let mut seen: Vec<Vec<Vec<f64>>> = vec![Vec::new(); effects.len()];
         let base = self.tracker.base();
-        for (row, rest) in self.at_rest(effects).take(fit) {
-            let there = matrix::place(
-                &matrix::times(&rest.motion.tracker, &base),
-                rest.posture.tool,
-            );
+        for (row, settled) in self.at_rest(effects).take(fit) {
+            let tool = settled.posture.tool;
+            let there = matrix::place(&matrix::times(&settled.motion.tracker, &base), tool);
             for (index, effect) in effects.iter().enumerate() {
                 if let Physical::Foreign(foreign) = effect {
                     let memory = row.memory.get(index).copied().unwrap_or(0.0);
-                    let point = if foreign.motion.is_sighted() {
-                        there
-                    } else {
-                        rest.posture.tool
-                    };
-                    seen[index].push(foreign.values(&row, memory, &rest.torque, point));
+                    let is_sighted = foreign.motion.is_sighted();
+                    let point = if is_sighted { there } else { tool };
+                    seen[index].push(foreign.values(&row, memory, &settled.torque, point));
                 }
             }
         }
@@ -101,12 +97,8 @@ impl Site<'_> {
         };
         let known: Vec<Physical> = effects.iter().zip(&seen).map(known).collect();
         let [all, known] = [effects, &known].map(|effects| self.displacement(effects));
-        let judged: Vec<f64> = all
-            .iter()
-            .zip(&known)
-            .skip(3 * fit)
-            .map(|(all, known)| all - known)
-            .collect();
+        let judged = all.iter().zip(&known).skip(3 * fit);
+        let judged: Column = judged.map(|(all, known)| all - known).collect();
         norm(&judged) / (judged.len().max(1) as f64).sqrt()
     }
 
@@ -120,13 +112,8 @@ impl Site<'_> {
                 self.bare(&truth, &tracker, &[])
             };
             let (above, below) = (at(1.0), at(-1.0));
-            out.push(
-                above
-                    .iter()
-                    .zip(&below)
-                    .map(|(a, b)| (a - b) / (2.0 * step))
-                    .collect(),
-            );
+            let sides = above.iter().zip(&below);
+            out.push(sides.map(|(a, b)| (a - b) / (2.0 * step)).collect());
         };
         // Steps of about 1e-5 rad or m: truncation and rounding are both about 1e-10 of the difference.
         for joint in 0..self.robot.joints.len() {
@@ -162,23 +149,17 @@ impl Site<'_> {
     /// Root mean square of a coordinate's noise: the tracker's, and the joints' from move to move (rad), m.
     pub(crate) fn noise(&self, play_rad: f64) -> f64 {
         let bare = self.bare(self.truth, self.tracker, &[]);
-        let beam: f64 = bare
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .map(|point| 3.0 * self.tracker.sigma(*point).powi(2))
-            .sum();
+        let (points, _) = bare.as_chunks::<3>();
+        let square = |point: &[f64; 3]| 3.0 * self.tracker.sigma(*point).powi(2);
+        let beam: f64 = points.iter().map(square).sum();
         let mut play = 0.0;
         if play_rad > 0.0 {
             for joint in 0..self.robot.joints.len() {
                 let mut truth = self.truth.clone();
                 truth.offset_deg[joint] += 1e-4f64.to_degrees();
                 let moved = self.bare(&truth, self.tracker, &[]);
-                play += moved
-                    .iter()
-                    .zip(&bare)
-                    .map(|(a, b)| ((a - b) / 1e-4 * play_rad).powi(2))
-                    .sum::<f64>();
+                let square = |(a, b): (&f64, &f64)| ((a - b) / 1e-4 * play_rad).powi(2);
+                play += moved.iter().zip(&bare).map(square).sum::<f64>();
             }
         }
         ((beam + play) / bare.len().max(1) as f64).sqrt()
@@ -186,76 +167,6 @@ impl Site<'_> {
 
     /// The space of everything that geometry can do.
     pub(crate) fn shadow(&self) -> Shadow {
-        let mut shadow = Shadow { basis: Vec::new() };
-        let mut left: Vec<Column> = self.geometry().into_iter().filter_map(unit).collect();
-        // The column with most of its own comes first, so that what hardly differs from the others cannot pass on its rounding.
-        while let Some(most) =
-            (0..left.len()).max_by(|a, b| norm(&left[*a]).total_cmp(&norm(&left[*b])))
-        {
-            let column = left.swap_remove(most);
-            if norm(&column) < OWN {
-                break;
-            }
-            shadow.add(column);
-            if let Some(direction) = shadow.basis.last() {
-                left.iter_mut().for_each(|other| take_out(other, direction));
-            }
-        }
-        shadow
+        Shadow::of(self.geometry())
     }
-}
-
-/// An orthonormal basis.
-#[derive(Debug, Clone)]
-pub(crate) struct Shadow {
-    basis: Vec<Column>,
-}
-
-/// What is left of a column below this share of it is rounding, not a direction of its own.
-const OWN: f64 = 1e-6;
-
-impl Shadow {
-    /// Dimension of the space.
-    pub(crate) fn rank(&self) -> usize {
-        self.basis.len()
-    }
-
-    /// Takes a direction in; none where the space holds it already.
-    pub(crate) fn add(&mut self, column: Column) {
-        let size = norm(&column);
-        let left = self.outside(column);
-        if norm(&left) > OWN * size {
-            self.basis.extend(unit(left));
-        }
-    }
-
-    /// What of a column lies outside of the space.
-    pub(crate) fn outside(&self, mut column: Column) -> Column {
-        for _ in 0..2 {
-            self.basis
-                .iter()
-                .for_each(|direction| take_out(&mut column, direction));
-        }
-        column
-    }
-}
-
-/// Length of a column.
-pub(crate) fn norm(column: &[f64]) -> f64 {
-    column.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-/// Takes what lies along a unit direction out of a column.
-fn take_out(column: &mut [f64], direction: &[f64]) {
-    let along: f64 = direction.iter().zip(&*column).map(|(a, b)| a * b).sum();
-    column
-        .iter_mut()
-        .zip(direction)
-        .for_each(|(x, d)| *x -= along * d);
-}
-
-/// The column at length 1; none for one of no length.
-fn unit(column: Column) -> Option<Column> {
-    let length = norm(&column);
-    (length > 0.0).then(|| column.into_iter().map(|x| x / length).collect())
 }

@@ -42,6 +42,27 @@ impl ForeignMotion {
     pub(crate) fn is_sighted(self) -> bool {
         matches!(self, Self::Range | Self::Azimuth | Self::Elevation)
     }
+
+    /// Whether it is a turn, arcsec; else it is a shift, um.
+    fn is_turn(self) -> bool {
+        use ForeignMotion::*;
+        matches!(
+            self,
+            JointTurn | JointTilt | LinkBend | BaseTurn | Azimuth | Elevation
+        )
+    }
+
+    /// Where it acts: on a joint or link of this number, or on what has none.
+    pub(crate) fn place(self, seat: usize) -> String {
+        use ForeignMotion::*;
+        match self {
+            JointTurn | JointShift | JointTilt => format!("joint {seat}"),
+            LinkShift | LinkBend => format!("link {seat}"),
+            BaseShift | BaseTurn => "base".into(),
+            ToolShift => "tool".into(),
+            Range | Azimuth | Elevation => "tracker".into(),
+        }
+    }
 }
 
 /// `size * shape(variable)`, or the product of two shapes.
@@ -83,10 +104,8 @@ impl ForeignCourse {
 
     /// The same as straight lines between its values at some of its variable, with the edge value beyond them.
     fn known_at(&self, values: impl Iterator<Item = f64>) -> Self {
-        let mut points: Vec<[f64; 2]> = values
-            .map(|value| self.way(value))
-            .map(|way| [way, self.shape.value(way)])
-            .collect();
+        let ways = values.map(|value| self.way(value));
+        let mut points: Vec<[f64; 2]> = ways.map(|way| [way, self.shape.value(way)]).collect();
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));
         Self {
             over: self.over.clone(),
@@ -109,10 +128,8 @@ impl Foreign {
             torque,
             point,
         };
-        self.courses
-            .iter()
-            .map(|course| course.over.value(&seen))
-            .collect()
+        let values = self.courses.iter().map(|course| course.over.value(&seen));
+        values.collect()
     }
 
     /// The same as far as rows show it at which the variables of its courses have these values: straight lines between them.
@@ -127,29 +144,32 @@ impl Foreign {
 
     /// Product of the shapes in what is seen.
     fn share(&self, seen: &Seen) -> f64 {
-        self.courses
-            .iter()
+        let courses = self.courses.iter();
+        courses
             .map(|course| course.shape.value(course.way(course.over.value(seen))))
             .product()
     }
 
-    fn shift(&self, share: f64) -> Vector {
-        matrix::scale(self.direction, 1e-6 * self.size * share)
+    /// The motion, m or rad along its direction.
+    fn along(&self, share: f64) -> Vector {
+        let unit = if self.motion.is_turn() { ARCSEC } else { 1e-6 };
+        matrix::scale(self.direction, unit * self.size * share)
     }
 
     /// The step of a body, whichever of the two it is.
     fn step(&self, share: f64) -> Matrix {
-        match self.motion {
-            ForeignMotion::JointTilt | ForeignMotion::LinkBend | ForeignMotion::BaseTurn => {
-                matrix::turn_by(matrix::scale(self.direction, ARCSEC * self.size * share))
-            }
-            _ => matrix::shift(self.shift(share)),
+        let along = self.along(share);
+        if self.motion.is_turn() {
+            matrix::turn_by(along)
+        } else {
+            matrix::shift(along)
         }
     }
 }
 
 impl Act for Foreign {
     fn act(&self, state: &State, motion: &mut Motion) {
+        use ForeignMotion::*;
         let seen = Seen {
             row: state.row,
             memory: state.memory,
@@ -159,18 +179,14 @@ impl Act for Foreign {
         let share = self.share(&seen);
         let index = self.seat - 1;
         match self.motion {
-            ForeignMotion::JointTurn => motion.joint[index] += ARCSEC * self.size * share,
-            ForeignMotion::JointShift | ForeignMotion::JointTilt => {
+            JointTurn => motion.joint[index] += ARCSEC * self.size * share,
+            JointShift | JointTilt => {
                 motion.move_axis(state.arm.foot, index, &self.step(share));
             }
-            ForeignMotion::LinkShift | ForeignMotion::LinkBend => {
-                motion.move_end(index, &self.step(share));
-            }
-            ForeignMotion::BaseShift | ForeignMotion::BaseTurn => {
-                motion.base = matrix::times(&self.step(share), &motion.base);
-            }
-            ForeignMotion::ToolShift => motion.tool = matrix::add(motion.tool, self.shift(share)),
-            ForeignMotion::Range | ForeignMotion::Azimuth | ForeignMotion::Elevation => {}
+            LinkShift | LinkBend => motion.move_end(index, &self.step(share)),
+            BaseShift | BaseTurn => motion.base = matrix::times(&self.step(share), &motion.base),
+            ToolShift => motion.tool = matrix::add(motion.tool, self.along(share)),
+            Range | Azimuth | Elevation => {}
         }
     }
     fn remember(&self, past: &[Moment]) -> Vec<f64> {
@@ -209,18 +225,12 @@ impl Stated for Foreign {
         self.size *= by;
     }
     fn truth(&self) -> Vec<TrueValue> {
-        use ForeignMotion::*;
-        let (place, unit) = match self.motion {
-            JointTurn | JointTilt => (format!("joint {}", self.seat), "arcsec"),
-            JointShift => (format!("joint {}", self.seat), "um"),
-            LinkShift => (format!("link {}", self.seat), "um"),
-            LinkBend => (format!("link {}", self.seat), "arcsec"),
-            BaseShift => ("base".into(), "um"),
-            BaseTurn => ("base".into(), "arcsec"),
-            ToolShift => ("tool".into(), "um"),
-            Range => ("tracker".into(), "um"),
-            Azimuth | Elevation => ("tracker".into(), "arcsec"),
+        let unit = if self.motion.is_turn() {
+            "arcsec"
+        } else {
+            "um"
         };
+        let place = self.motion.place(self.seat);
         vec![true_value(
             "unknown", "foreign", place, "size", unit, self.size,
         )]
@@ -281,10 +291,10 @@ impl ForeignVariable {
     /// Its value row by row where it depends on the rows before; else nothing.
     fn remember(&self, past: &[Moment]) -> Vec<f64> {
         match *self {
-            Self::LastMove(joint) => past
-                .iter()
-                .map(|moment| moment.travels(joint).last().unwrap_or(0.0))
-                .collect(),
+            Self::LastMove(joint) => {
+                let last = |moment: &Moment| moment.travels(joint).last().unwrap_or(0.0);
+                past.iter().map(last).collect()
+            }
             Self::Relaxing(joint, time_s) => {
                 let (mut then, mut left) = (0.0, 0.0);
                 let live = |moment: &Moment| {
@@ -342,14 +352,9 @@ impl ForeignShape {
                 .map(|[amplitude, rate, phase]| amplitude * (rate * x + phase).cos())
                 .sum(),
             Self::Corners(points) => {
-                let after = points
-                    .iter()
-                    .position(|[at, _]| *at > x)
-                    .unwrap_or(points.len());
-                match (
-                    after.checked_sub(1).and_then(|before| points.get(before)),
-                    points.get(after),
-                ) {
+                let after = points.iter().position(|[at, _]| *at > x);
+                let (before, after) = points.split_at(after.unwrap_or(points.len()));
+                match (before.last(), after.first()) {
                     (Some([from, low]), Some([to, high])) => {
                         low + (high - low) * (x - from) / (to - from)
                     }
@@ -357,11 +362,10 @@ impl ForeignShape {
                     (None, None) => 0.0,
                 }
             }
-            Self::Jumps(steps) => steps
-                .iter()
-                .rev()
-                .find(|[at, _]| *at <= x)
-                .map_or(0.0, |[_, value]| *value),
+            Self::Jumps(steps) => {
+                let last = steps.iter().rev().find(|[at, _]| *at <= x);
+                last.map_or(0.0, |[_, value]| *value)
+            }
         }
     }
 }
@@ -380,20 +384,12 @@ mod tests {
         };
         let known = course.known_at([18.0, 11.0, 13.0].into_iter());
         let at = |value: f64| known.shape.value(known.way(value));
-        let wanted = [
-            (5.0, 0.0),
-            (11.0, 0.0),
-            (12.0, 0.5),
-            (13.0, 1.0),
-            (18.0, -1.0),
-            (30.0, -1.0),
-        ];
-        for (value, wanted) in wanted {
-            assert!(
-                (at(value) - wanted).abs() < 1e-12,
-                "at {value}: {}",
-                at(value)
-            );
-        }
+        let values = [5.0, 11.0, 12.0, 13.0, 18.0, 30.0];
+        let off = values
+            .map(at)
+            .into_iter()
+            .zip([0.0, 0.0, 0.5, 1.0, -1.0, -1.0]);
+        let off = off.map(|(found, wanted)| (found - wanted).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-12, "{:?}", values.map(at));
     }
 }

@@ -137,26 +137,24 @@ macro_rules! effect {
         }
     };
     (@seat $(#[$meta:meta])* $name:ident $effect:literal $seat:ident $($end:literal)? { $($fields:tt)* }
-     scaled by $($size:ident)+; truth |$me:ident| $numbers:expr; $($law:tt)*) => {
+     scaled by $($size:ident)+; truth |$me:ident| $($more:tt)+) => {
         $crate::effect::effect! { @type $(#[$meta])* $name { $($fields)* } }
-        impl $crate::effect::Stated for $name {
-            fn seat(&self) -> Option<usize> {
-                Some(self.$seat)
-            }
-            fn scale(&mut self, by: f64) {
-                $( $crate::effect::Size::scale(&mut self.$size, by); )+
-            }
-            fn truth(&$me) -> Vec<$crate::true_value::TrueValue> {
-                let tag = format!(concat!("{}{}", $($end)?), &stringify!($seat)[..1], $me.$seat);
-                $crate::true_value::true_values($effect, &tag, &format!("{} {}", stringify!($seat), $me.$seat), $numbers)
-            }
+        $crate::effect::effect! {
+            @stated $name $effect |$me| Some($me.$seat); &format!(concat!("{}{}", $($end)?), &stringify!($seat)[..1], $me.$seat);
+            &format!("{} {}", stringify!($seat), $me.$seat); scaled by $($size)+; $($more)+
         }
-        $crate::effect::effect! { @act $name $($law)* }
     };
     ($(#[$meta:meta])* $name:ident $effect:literal of $tag:literal $place:literal { $($fields:tt)* }
-     scaled by $($size:ident)+; truth |$me:ident| $numbers:expr; $($law:tt)*) => {
+     scaled by $($size:ident)+; truth |$me:ident| $($more:tt)+) => {
         $crate::effect::effect! { @type $(#[$meta])* $name { $($fields)* } }
+        $crate::effect::effect! { @stated $name $effect |$me| None; $tag; $place; scaled by $($size)+; $($more)+ }
+    };
+    (@stated $name:ident $effect:literal |$me:ident| $seat:expr; $tag:expr; $place:expr;
+     scaled by $($size:ident)+; $numbers:expr; $($law:tt)*) => {
         impl $crate::effect::Stated for $name {
+            fn seat(&$me) -> Option<usize> {
+                $seat
+            }
             fn scale(&mut self, by: f64) {
                 $( $crate::effect::Size::scale(&mut self.$size, by); )+
             }

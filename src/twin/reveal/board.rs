@@ -1,65 +1,36 @@
 //! The scoreboard: outcomes by visibility, by family and by what was said instead, false alarms, held-out errors, intervals.
 
-use super::left_out::LeftOut;
-use super::mark::{Case, DUE, HeldOut, Marked, Outcome};
-use super::reliability::{Reliability, Subject, reliability};
-use super::share::Share;
-use crate::reveal::mark::Places;
-use serde::{Serialize, Serializer};
-use serde_json::json;
+use super::mark::{Case, DUE, GIVEN, HeldOut, LeftOut, Marked, OUTCOMES, Outcome};
+use super::stated::{Share, Statement, Subject, mixed, reliability};
+use calib_foundation::statistics::quantile;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// Lower ends of the bins of visibility L.
-pub(crate) const BINS: [f64; 5] = [0.0, 5.0, 15.0, 50.0, 200.0];
+const BINS: [f64; 5] = [0.0, 5.0, 15.0, 50.0, 200.0];
 /// A held-out error that is no larger over its bound is as good as can be expected.
-pub(crate) const NEAR_BOUND: f64 = 1.15;
+const NEAR_BOUND: f64 = 1.15;
+/// Shares of recordings whose cause nobody listed.
+const UNLISTED: [f64; 2] = [0.3, 0.5];
+/// Verdicts by which nothing is missing.
+const CONTENT: [&str; 2] = ["explained", "nothing_missing"];
 
-/// Outcomes of causes.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Counts {
-    /// Named, at their places.
-    pub(crate) exact: usize,
-    /// Among the rivals.
-    pub(crate) in_set: usize,
-    /// Not named, and something else was.
-    pub(crate) wrong: usize,
-    /// Not named, and nothing else was.
-    pub(crate) silent: usize,
-}
+/// Forms of the twin whose formula the library does not have: it approximates them. Every other form, of what is in no list too, is one that
+/// the library's laws can take.
+const TWINS_FORMS: [&str; 6] = [
+    "eccentric wheel",
+    "at the middle",
+    "cantilever",
+    "gas strut",
+    "hung over two joints",
+    "bent by two joints",
+];
 
-impl Counts {
-    fn of<'a>(causes: impl Iterator<Item = &'a Marked>) -> Counts {
-        let mut out = Counts::default();
-        for cause in causes {
-            match cause.outcome {
-                Outcome::Exact => out.exact += 1,
-                Outcome::InSet => out.in_set += 1,
-                Outcome::Wrong => out.wrong += 1,
-                Outcome::Silent => out.silent += 1,
-            }
-        }
-        out
-    }
-    /// All of them.
-    pub(crate) fn all(&self) -> usize {
-        self.exact + self.in_set + self.wrong + self.silent
-    }
-    /// Those that were named.
-    pub(crate) fn exactly(&self) -> Share {
-        Share {
-            count: self.exact,
-            of: self.all(),
-        }
-    }
-}
-
-impl Serialize for Counts {
-    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        json!({ "n": self.all(), "exact": self.exact, "in_set": self.in_set, "wrong": self.wrong,
-            "silent": self.silent, "exact_wilson_95": self.exactly().limits() })
-        .serialize(to)
-    }
-}
+/// Whether the held-out error tells that a cause is out of the list.
+const TELLS: [(&str, bool); 2] = [
+    ("where the data can tell", true),
+    ("where it cannot", false),
+];
 
 /// All marked cases.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -71,99 +42,76 @@ pub struct Board {
     pub left_out: Vec<LeftOut>,
 }
 
-/// Forms of the twin whose formula the library does not have: it approximates them. Every other form, of what is in no list too, is one that
-/// the library's laws can take.
-const OWN_FORMS: [&str; 6] = [
-    "eccentric wheel",
-    "at the middle",
-    "cantilever",
-    "gas strut",
-    "hung over two joints",
-    "bent by two joints",
-];
+/// Outcomes of causes.
+fn outcomes<'a>(causes: impl IntoIterator<Item = &'a Marked>) -> Value {
+    let all: Vec<Outcome> = causes.into_iter().map(|cause| cause.outcome).collect();
+    let count = |outcome: &Outcome| all.iter().filter(|one| *one == outcome).count();
+    let exact = Share::of(all.iter().map(|one| *one == Outcome::Exact));
+    let mut out = json!({ "n": exact.of, "exact_wilson_95": exact.limits() });
+    for outcome in &OUTCOMES {
+        out[outcome.name()] = json!(count(outcome));
+    }
+    out
+}
 
-/// What a set of effects is counted over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Company {
-    /// The only cause of its recording.
-    Alone,
-    /// One of several.
-    Beside,
+/// Whether places and names of causes are right.
+fn places(causes: &[&Marked]) -> Value {
+    let share = |holds: fn(&Marked) -> bool| Share::of(causes.iter().map(|cause| holds(cause)));
+    json!({
+        "place": share(|cause| cause.placed.place),
+        "name_or_unknown": share(|cause| cause.placed.name_or_unknown),
+        "wrong_name": share(|cause| cause.placed.wrong_name),
+        "wrong_name_0.5": share(|cause| cause.placed.wrong_given),
+    })
+}
+
+fn spread(mut all: Vec<f64>) -> Value {
+    all.sort_by(f64::total_cmp);
+    json!({ "n": all.len(), "median": quantile(&all, 0.5), "p90": quantile(&all, 0.9) })
 }
 
 impl Board {
     fn causes(&self) -> impl Iterator<Item = (&Case, &Marked)> {
-        self.cases
-            .iter()
-            .flat_map(|case| case.causes.iter().map(move |cause| (case, cause)))
-    }
-
-    /// Outcomes by bin of visibility.
-    pub(crate) fn by_strength(&self, company: Company) -> Vec<Counts> {
-        let upper = |bin: usize| BINS.get(bin + 1).copied().unwrap_or(f64::INFINITY);
-        let alone = |case: &Case| (case.causes.len() == 1) == (company == Company::Alone);
-        (0..BINS.len())
-            .map(|bin| {
-                let within = |cause: &Marked| (BINS[bin]..upper(bin)).contains(&cause.strength);
-                Counts::of(
-                    self.causes()
-                        .filter(|(case, cause)| alone(case) && within(cause))
-                        .map(|(_, cause)| cause),
-                )
-            })
-            .collect()
+        let cases = self.cases.iter();
+        cases.flat_map(|case| case.causes.iter().map(move |cause| (case, cause)))
     }
 
     /// Causes that should be named.
-    fn due(&self) -> impl Iterator<Item = &Marked> {
+    fn due(&self) -> Vec<&Marked> {
         let causes = self.causes().map(|(_, cause)| cause);
-        causes.filter(|cause| cause.strength >= DUE)
+        causes.filter(|cause| cause.strength >= DUE).collect()
     }
 
-    fn due_by_effect(&self) -> BTreeMap<&str, Vec<&Marked>> {
-        let mut out: BTreeMap<&str, Vec<&Marked>> = BTreeMap::new();
-        for cause in self.due() {
-            out.entry(&cause.effect).or_default().push(cause);
-        }
-        out
-    }
-
-    /// Outcomes of due causes by effect.
-    pub(crate) fn by_effect(&self) -> BTreeMap<&str, Counts> {
-        let due = self.due_by_effect().into_iter();
-        due.map(|(name, causes)| (name, Counts::of(causes.into_iter())))
-            .collect()
-    }
-
-    /// Places and names of due causes: of all, and by effect.
-    pub(crate) fn places(&self) -> (Places, BTreeMap<&str, Places>) {
-        let by_effect = self.due_by_effect().into_iter().map(|(name, causes)| {
-            let placed = causes.into_iter().map(|cause| cause.placed);
-            (name, Places::of(placed))
-        });
-        let all = Places::of(self.due().map(|cause| cause.placed));
-        (all, by_effect.collect())
-    }
-
-    /// Recordings with a due effect whose held-out error is near its bound.
-    pub(crate) fn near_bound(&self) -> Share {
-        let [due, _] = self.ratios();
-        Share::of(due.iter().map(|ratio| *ratio <= NEAR_BOUND))
+    /// Outcomes by bin of visibility, of what is alone in its recording, or not.
+    fn by_strength(&self, alone: bool) -> Vec<Value> {
+        let bin = |(bin, from): (usize, &f64)| {
+            let to = BINS.get(bin + 1);
+            let title = to.map_or_else(|| format!("> {from}"), |to| format!("{from}-{to}"));
+            let range = *from..to.copied().unwrap_or(f64::INFINITY);
+            let within = self.causes().filter(|(case, cause)| {
+                (case.causes.len() == 1) == alone && range.contains(&cause.strength)
+            });
+            json!({ "L": title, "outcomes": outcomes(within.map(|(_, cause)| cause)) })
+        };
+        BINS.iter().enumerate().map(bin).collect()
     }
 
     /// Due causes whose formula the library has, or has not: outcomes, and the mean probability that the true name was given.
-    pub(crate) fn by_formula(&self, shared: bool) -> (Counts, Option<f64>) {
-        let own: Vec<&Marked> = self
-            .due()
-            .filter(|cause| (cause.strange || OWN_FORMS.contains(&cause.form.as_str())) != shared)
+    fn by_formula(&self, shared: bool) -> Value {
+        let is_twins = |cause: &&Marked| cause.strange || TWINS_FORMS.contains(&&*cause.form);
+        let causes: Vec<&Marked> = (self.due().into_iter())
+            .filter(|cause| is_twins(cause) != shared)
             .collect();
-        let stated: Vec<f64> = own.iter().filter_map(|cause| cause.probability).collect();
+        let stated: Vec<f64> = causes
+            .iter()
+            .filter_map(|cause| cause.probability)
+            .collect();
         let mean = (!stated.is_empty()).then(|| stated.iter().sum::<f64>() / stated.len() as f64);
-        (Counts::of(own.into_iter()), mean)
+        json!({ "shared": shared, "outcomes": outcomes(causes), "mean_probability": mean })
     }
 
     /// Due causes: effect -> what it was called (`=`: rightly; `-`: nothing) -> how often.
-    pub(crate) fn confusion(&self) -> BTreeMap<&str, BTreeMap<String, usize>> {
+    fn confusion(&self) -> BTreeMap<&str, BTreeMap<String, usize>> {
         let mut out: BTreeMap<&str, BTreeMap<String, usize>> = BTreeMap::new();
         for cause in self.due() {
             let called = match (cause.outcome, &cause.label) {
@@ -176,141 +124,224 @@ impl Board {
                 },
                 (Outcome::Wrong | Outcome::Silent, _) => "-".to_string(),
             };
-            *out.entry(&cause.effect)
-                .or_default()
-                .entry(called)
-                .or_default() += 1;
+            let calls = out.entry(&cause.effect).or_default();
+            *calls.entry(called).or_default() += 1;
         }
         out
     }
 
-    /// Recordings without an effect in which one was declared.
-    pub(crate) fn alarms(&self) -> Share {
-        self.named_besides(true)
-    }
-
-    /// Recordings with effects in which something was named that is not there.
-    pub(crate) fn strays(&self) -> Share {
-        self.named_besides(false)
-    }
-
+    /// Recordings without an effect in which one was declared, or those with effects in which something was named that is not there.
     fn named_besides(&self, null: bool) -> Share {
         let cases = self.cases.iter();
         let cases = cases.filter(|case| case.causes.is_empty() == null);
         Share::of(cases.map(|case| !case.strays.is_empty()))
     }
 
-    /// Recordings whose causes are all due: all named and nothing else; and the strongest named.
-    pub(crate) fn whole(&self, content: &str) -> [Share; 2] {
-        let due = |case: &&Case| {
-            case.content == content && case.causes.iter().all(|cause| cause.strength >= DUE)
+    /// Shares of recordings, each with what it is of.
+    fn shares(&self) -> Vec<Value> {
+        // Recordings of two causes that are both due: all named and nothing else; and the strongest named.
+        let is_due = |case: &&Case| {
+            case.content == "pair" && case.causes.iter().all(|cause| cause.strength >= DUE)
         };
+        let pairs = || self.cases.iter().filter(is_due);
         let strongest = |case: &Case| {
-            let most = case
-                .causes
-                .iter()
-                .max_by(|a, b| a.strength.total_cmp(&b.strength));
+            let by_strength = |a: &&Marked, b: &&Marked| a.strength.total_cmp(&b.strength);
+            let most = case.causes.iter().max_by(by_strength);
             most.is_none_or(|cause| cause.outcome == Outcome::Exact)
         };
-        [
-            Share::of(self.cases.iter().filter(due).map(|case| case.right(DUE))),
-            Share::of(self.cases.iter().filter(due).map(strongest)),
-        ]
-    }
-
-    /// Faults of the recording by kind: how many were named.
-    pub(crate) fn tampered(&self) -> BTreeMap<&str, Share> {
+        let both = format!("two effects of L {DUE} or more, both named and nothing else");
         let faults = self.cases.iter().flat_map(|case| &case.tampered);
-        Share::by_kind(faults.map(|(kind, named)| (kind.as_str(), *named)))
+        let faults = Share::by_kind(faults.map(|(kind, named)| (kind.as_str(), *named)));
+        let shares = [
+            (
+                "false alarms in recordings without an effect",
+                self.named_besides(true),
+            ),
+            (
+                "recordings with effects in which something was named that is not there",
+                self.named_besides(false),
+            ),
+            (
+                both.as_str(),
+                Share::of(pairs().map(|case| case.right(DUE))),
+            ),
+            ("the stronger one named", Share::of(pairs().map(strongest))),
+        ];
+        let named = |(what, share): (&str, Share)| json!({ "what": what, "share": share });
+        let faults = faults
+            .into_iter()
+            .map(|(kind, share)| (format!("{kind} named"), share));
+        let faults = faults.map(|(what, share)| named((&what, share)));
+        shares.into_iter().map(named).chain(faults).collect()
     }
 
-    /// Held-out errors of recordings with a due effect.
-    fn held_out_of_due(&self) -> impl Iterator<Item = HeldOut> {
-        let due = self
-            .cases
-            .iter()
-            .filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
-        due.filter_map(|case| case.held_out)
-    }
-
-    /// Held-out errors over their bounds, ascending, where an effect is due, and in recordings without one.
-    pub(crate) fn ratios(&self) -> [Vec<f64>; 2] {
-        let nulls = self
-            .cases
-            .iter()
-            .filter(|case| case.causes.is_empty())
-            .filter_map(|case| case.held_out);
-        let sorted = |all: Vec<HeldOut>| {
-            let mut out: Vec<f64> = all.iter().map(HeldOut::ratio).collect();
-            out.sort_by(f64::total_cmp);
-            out
+    /// Held-out errors of recordings with a due effect, or of those without any.
+    fn held_out(&self, due: bool) -> Vec<HeldOut> {
+        let counts = |case: &&Case| match due {
+            true => case.causes.iter().any(|cause| cause.strength >= DUE),
+            false => case.causes.is_empty(),
         };
-        [
-            sorted(self.held_out_of_due().collect()),
-            sorted(nulls.collect()),
-        ]
-    }
-
-    /// Recordings with a due effect whose held-out error is larger with the findings than before.
-    pub(crate) fn worse(&self) -> Share {
-        Share::of(
-            self.held_out_of_due()
-                .map(|held_out| held_out.after > held_out.before),
-        )
-    }
-
-    /// Recordings with a due effect whose held-out error is larger with the findings than before, and than its bound.
-    pub(crate) fn worse_than_bound(&self) -> Share {
-        Share::of(
-            self.held_out_of_due()
-                .map(|held_out| held_out.after > held_out.before.max(held_out.bound)),
-        )
-    }
-
-    /// Explained shares of held-out errors where an effect is due, ascending.
-    pub(crate) fn explained(&self) -> Vec<f64> {
-        let mut out: Vec<f64> = self
-            .held_out_of_due()
-            .filter_map(|held_out| held_out.explained())
-            .collect();
-        out.sort_by(f64::total_cmp);
-        out
+        let cases = self.cases.iter().filter(counts);
+        cases.filter_map(|case| case.held_out).collect()
     }
 
     /// Stated 95 % intervals that hold the true number, by effect; of recordings in which all due causes were named and nothing
     /// else: the numbers of a wrong model are not those of the truth.
-    pub(crate) fn intervals(&self) -> BTreeMap<&str, Share> {
+    fn intervals(&self) -> BTreeMap<&str, Share> {
         let right = self.cases.iter().filter(|case| case.right(DUE));
         let all = right.flat_map(|case| &case.intervals);
         Share::by_kind(all.map(|interval| (interval.effect.as_str(), interval.holds)))
     }
 
-    /// Stated probabilities against what was true.
-    pub(crate) fn reliability(&self, subject: Subject) -> Reliability {
-        reliability(self.cases.iter().flat_map(|case| &case.statements), subject)
+    /// Recordings without their due causes, in which the data can tell, or cannot.
+    fn without(&self, tells: bool) -> impl Iterator<Item = &LeftOut> + Clone {
+        let due = self.left_out.iter().filter(|one| one.strength >= DUE);
+        due.filter(move |one| one.tells == tells)
     }
 
-    /// Stated probabilities of recordings without their causes in which the data cannot tell that something is left out.
-    pub(crate) fn untold_reliability(&self) -> Reliability {
-        let untold = self
-            .left_out
+    /// What was named where the causes were taken out of the list.
+    fn left_out(&self) -> Value {
+        let worlds = TELLS.map(|(which, tells)| {
+            let share = |what: &str, holds: &dyn Fn(&LeftOut) -> bool| {
+                json!({ "what": what, "share": Share::of(self.without(tells).map(holds)) })
+            };
+            let wrong = |one: &LeftOut, least: f64| {
+                let wrong = one.wrong.as_ref();
+                wrong.is_some_and(|(_, probability)| *probability >= least)
+            };
+            let shares = [
+                share("a wrong name with 0.5 or more", &|one| wrong(one, GIVEN)),
+                share("a wrong name with 0.9 or more", &|one| wrong(one, 0.9)),
+                share("called explained, or nothing missing", &|one| {
+                    CONTENT.contains(&one.verdict.as_str())
+                }),
+                share("the name that was left out was given", &|one| one.came_back),
+            ];
+            json!({ "which": which, "shares": shares })
+        });
+        let due = || self.left_out.iter().filter(|one| one.strength >= DUE);
+        let is_both = |case: &&Case| due().any(|one| one.name == case.name);
+        let listed = self.cases.iter().filter(is_both);
+        let listed: Vec<&Statement> = listed.flat_map(|case| &case.statements).collect();
+        let without: Vec<&Statement> = due().flat_map(|one| &one.statements).collect();
+        let hidden: Vec<&Statement> = self
+            .without(false)
+            .flat_map(|one| &one.statements)
+            .collect();
+        let mixed =
+            |unlisted| json!({ "unlisted": unlisted, "bins": mixed(&listed, &without, unlisted) });
+        json!({
+            "recordings": self.left_out.len(),
+            "worlds": worlds,
+            "reliability": reliability("names where the data cannot tell", &hidden, Subject::Name),
+            "both_worlds": UNLISTED.map(mixed),
+        })
+    }
+
+    /// Recordings that were not right: a due cause missed, or something named that is not there.
+    fn failures(&self) -> Vec<String> {
+        let wrong = self.cases.iter().filter(|case| !case.right(DUE));
+        wrong.map(failure).collect()
+    }
+
+    /// The scoreboard as JSON.
+    pub fn document(&self) -> Value {
+        let due = self.due();
+        let mut by_effect: BTreeMap<&str, Vec<&Marked>> = BTreeMap::new();
+        (due.iter()).for_each(|cause| by_effect.entry(&cause.effect).or_default().push(cause));
+        let of_effects = |figures: fn(&[&Marked]) -> Value| -> BTreeMap<&str, Value> {
+            by_effect
+                .iter()
+                .map(|(name, causes)| (*name, figures(causes)))
+                .collect()
+        };
+        let statements: Vec<&Statement> = self
+            .cases
             .iter()
-            .filter(|one| one.strength >= DUE && !one.tells);
-        reliability(untold.flat_map(|one| &one.statements), Subject::Name)
+            .flat_map(|case| &case.statements)
+            .collect();
+        let by_formula = [true, false].map(|shared| self.by_formula(shared));
+        let missing = self.missing.iter();
+        let [held_out, null] = [true, false].map(|due| self.held_out(due));
+        let ratios = |all: &[HeldOut]| spread(all.iter().map(HeldOut::ratio).collect());
+        let share = |holds: fn(&HeldOut) -> bool| Share::of(held_out.iter().map(holds));
+        json!({
+            "recordings": self.cases.len(),
+            "without_verdict": missing.map(|(case, why)| json!({ "case": case, "why": why })).collect::<Vec<_>>(),
+            "alone": self.by_strength(true),
+            "beside": self.by_strength(false),
+            "by_effect": of_effects(|causes| outcomes(causes.iter().copied())),
+            "by_formula": by_formula,
+            "places": { "all": places(&due), "by_effect": of_effects(places) },
+            "confusion": self.confusion(),
+            "reliability": [reliability("names", &statements, Subject::Name), reliability("places", &statements, Subject::Place)],
+            "shares": self.shares(),
+            "intervals": self.intervals(),
+            "held_out_over_bound": { "due": ratios(&held_out), "null": ratios(&null),
+                "due_within_1.15": share(|one| one.ratio() <= NEAR_BOUND),
+                "due_worse": share(|one| one.after > one.before),
+                "due_worse_than_bound": share(|one| one.after > one.before.max(one.bound)) },
+            "left_out": self.left_out(),
+            "explained_share": spread(held_out.iter().filter_map(HeldOut::explained).collect()),
+            "failures": self.failures(),
+        })
     }
 
-    /// Verdicts by content.
-    pub(crate) fn verdicts(&self) -> BTreeMap<(&str, &str), usize> {
-        let mut out = BTreeMap::new();
+    /// What people read in addition to the document: held-out errors within 1.1 of their bounds, wrong names where the causes were taken
+    /// out of the list, verdicts by content.
+    pub fn details(&self) -> Value {
+        let within = [true, false]
+            .map(|due| Share::of(self.held_out(due).iter().map(|one| one.ratio() <= 1.1)));
+        let called = |one: &LeftOut| {
+            let (name, probability) = one.wrong.as_ref().filter(|(_, p)| *p >= GIVEN)?;
+            let (case, effect) = (&one.name, &one.effect);
+            Some(format!(
+                "{case}: {effect} is called {name} with {probability:.2}"
+            ))
+        };
+        let called = [true, false].map(|tells| {
+            self.without(tells)
+                .filter_map(called)
+                .collect::<Vec<String>>()
+        });
+        let mut verdicts: BTreeMap<(&str, &str), usize> = BTreeMap::new();
         for case in &self.cases {
-            *out.entry((case.content.as_str(), case.verdict.as_str()))
-                .or_default() += 1;
+            *verdicts.entry((&case.content, &case.verdict)).or_default() += 1;
         }
-        out
+        let verdicts: Vec<String> = verdicts
+            .into_iter()
+            .map(|((content, verdict), count)| format!("{content}: {verdict} {count}"))
+            .collect();
+        json!({ "within": within, "called": called, "verdicts": verdicts })
     }
+}
 
-    /// Recordings that were not right: a due cause missed, or something said that is not there.
-    pub(crate) fn failures(&self) -> impl Iterator<Item = &Case> {
-        self.cases.iter().filter(|case| !case.right(DUE))
-    }
+fn failure(case: &Case) -> String {
+    let cause = |cause: &Marked| {
+        let Marked {
+            effect,
+            place,
+            form,
+            strength,
+            outcome,
+            ..
+        } = cause;
+        format!(
+            "{effect} at {place} [{form}, L {strength:.0}: {}]",
+            outcome.name()
+        )
+    };
+    let or = |all: Vec<String>, nothing: &str| match all.is_empty() {
+        true => nothing.to_string(),
+        false => all.join(", "),
+    };
+    let wanted = or(case.causes.iter().map(cause).collect(), "nothing");
+    let strays = or(case.strays.clone(), "nothing else");
+    let Case {
+        name,
+        robot,
+        points,
+        ..
+    } = case;
+    format!("  {name} ({robot}, {points} points): {wanted}; said besides: {strays}")
 }

@@ -1,45 +1,31 @@
 //! One case: what was found of every concealed cause, and what was said that is not there.
 //!
-//! Stated 95 % intervals against true numbers: the twin's numbers in the words and units of a diagnosis.
-//!
-//! Only numbers that mean the same in both are compared; a curve of another form has no true slope.
-//!
-//! Whether a diagnosis looked in the right place, gave no wrong name, and named `unknown` where it knew no name.
+//! Whether a diagnosis looked in the right place, gave no wrong name, and named `unknown` where it knew no name; and what it named when
+//! the causes of the recording were taken out of the list that it may name.
 
-use crate::reveal::paper::{
-    Answer, Atoms, Cause, Finding, Name, Number, Rival, Truth, all_atoms, atoms,
-};
-use crate::reveal::reliability::{Statement, statements};
-use crate::reveal::share::Share;
-use calib_foundation::units::Unit;
-use serde::Serialize;
+use super::intervals::{Interval, intervals};
+use super::paper::{Answer, Atoms, Cause, Finding, Name, Truth, all_atoms, atoms};
+use super::stated::{Statement, statements};
+use crate::names::named;
 use std::collections::BTreeSet;
 
 /// From this visibility on an effect should be named.
 pub(crate) const DUE: f64 = 50.0;
 
-/// How a cause was named.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Outcome {
-    /// Named, at its place, as the first choice; by a name and place that data cannot separate from it, too.
-    Exact,
-    /// Among the explanations that the data cannot separate, or by a name that is accepted for it.
-    InSet,
-    /// Not named, and something else was.
-    Wrong,
-    /// Not named, and nothing else was.
-    Silent,
-}
-
-impl Outcome {
-    /// As tables hold it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Outcome::Exact => "exact",
-            Outcome::InSet => "in_set",
-            Outcome::Wrong => "wrong",
-            Outcome::Silent => "silent",
-        }
+named! {
+    /// How a cause was named.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    Outcome,
+    /// All of them.
+    OUTCOMES: 4 {
+        /// Named, at its place, as the first choice; by a name and place that data cannot separate from it, too.
+        Exact "exact",
+        /// Among the explanations that the data cannot separate, or by a name that is accepted for it.
+        InSet "in_set",
+        /// Not named, and something else was.
+        Wrong "wrong",
+        /// Not named, and nothing else was.
+        Silent "silent",
     }
 }
 
@@ -91,7 +77,6 @@ pub struct Case {
     pub name: String,
     /// What it conceals: null, single, pair or open.
     pub content: String,
-    pub(crate) family: String,
     pub robot: String,
     pub points: usize,
     pub verdict: String,
@@ -110,13 +95,9 @@ pub struct Case {
 impl Case {
     /// Every cause of at least this strength named exactly, and nothing said that is not there.
     pub(crate) fn right(&self, strength: f64) -> bool {
-        let due = |cause: &&Marked| cause.strength >= strength;
-        self.strays.is_empty()
-            && self
-                .causes
-                .iter()
-                .filter(due)
-                .all(|cause| cause.outcome == Outcome::Exact)
+        let is_missed =
+            |cause: &Marked| cause.strength >= strength && cause.outcome != Outcome::Exact;
+        self.strays.is_empty() && !self.causes.iter().any(is_missed)
     }
 }
 
@@ -128,10 +109,9 @@ fn label_of(finding: &Finding) -> String {
         .collect()
 }
 
-/// Everything that a finding may mean: itself and its rivals.
+/// Everything that a finding may mean.
 fn reach(finding: &Finding) -> Atoms {
-    let rivals = finding.rivals.iter().flat_map(Rival::atoms);
-    finding.atoms().into_iter().chain(rivals).collect()
+    finding.names().flat_map(|(_, names)| names).collect()
 }
 
 /// Marks a diagnosis of a case.
@@ -152,54 +132,45 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
     let accepted_names: Vec<Atoms> = truth.accepted.iter().map(Name::atoms).collect();
     let stray = |finding: &&Finding| reach(finding).is_disjoint(&known);
     let strays: Vec<String> = answer.findings.iter().filter(stray).map(label_of).collect();
-    let causes = truth
-        .effects
-        .iter()
-        .filter(|cause| cause.wanted)
-        .map(|cause| {
-            let own = cause.atoms();
-            let same = all_atoms(&cause.same);
-            let outcome = if own.is_subset(&found) || !same.is_disjoint(&found) {
-                Outcome::Exact
-            } else if own.is_subset(&reached) || !accepted.is_disjoint(&found) {
-                Outcome::InSet
-            } else if strays.is_empty() {
-                Outcome::Silent
-            } else {
-                Outcome::Wrong
-            };
-            Marked {
-                effect: cause.effect.clone(),
-                place: cause.place.clone(),
-                form: cause.form.clone(),
-                strange: cause.strange,
-                strength: cause.strength,
-                outcome,
-                placed: placed(cause, truth, &answer.findings, &known, reach),
-                label: (outcome == Outcome::Wrong)
-                    .then(|| strays.first().cloned())
-                    .flatten(),
-                probability: probability_of(&own, &answer.findings),
-            }
-        });
+    let wanted = truth.effects.iter().filter(|cause| cause.wanted);
+    let causes = wanted.map(|cause| {
+        let name = cause.atoms();
+        let same = all_atoms(&cause.same);
+        let outcome = if name.is_subset(&found) || !same.is_disjoint(&found) {
+            Outcome::Exact
+        } else if name.is_subset(&reached) || !accepted.is_disjoint(&found) {
+            Outcome::InSet
+        } else if strays.is_empty() {
+            Outcome::Silent
+        } else {
+            Outcome::Wrong
+        };
+        let stray = strays.first().filter(|_| outcome == Outcome::Wrong);
+        Marked {
+            effect: cause.effect.clone(),
+            place: cause.place.clone(),
+            form: cause.form.clone(),
+            strange: cause.strange,
+            strength: cause.strength,
+            outcome,
+            placed: placed(cause, truth, &answer.findings, &known),
+            label: stray.cloned(),
+            probability: probability_of(&name, &answer.findings),
+        }
+    });
+    let faults = truth.tampered.iter().map(|fault| &fault.effect);
+    let numbers = truth.effects.iter();
     let named = |name: &str| answer.findings.iter().any(|finding| finding.effect == name);
     Case {
         name: truth.case.clone(),
         content: truth.content.clone(),
-        family: truth.family.clone(),
         robot: truth.robot.clone(),
         points: truth.points.fit,
         verdict: answer.verdict.clone(),
         causes: causes.collect(),
-        tampered: truth
-            .tampered
-            .iter()
-            .map(|fault| (fault.effect.clone(), named(&fault.effect)))
-            .collect(),
+        tampered: faults.map(|fault| (fault.clone(), named(fault))).collect(),
         held_out: held_out(truth, answer),
-        intervals: truth
-            .effects
-            .iter()
+        intervals: numbers
             .flat_map(|cause| intervals(cause, &answer.findings))
             .collect(),
         statements: statements(&answer.findings, &true_names, &accepted_names),
@@ -209,35 +180,18 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
 
 /// The largest probability that a finding or a rival of this name was given.
 fn probability_of(name: &Atoms, findings: &[Finding]) -> Option<f64> {
-    let own = findings
-        .iter()
-        .map(|finding| (&finding.effect, &finding.place, finding.probability));
-    let rivals = findings.iter().flat_map(|finding| &finding.rivals);
-    let rivals = rivals.map(|rival| (&rival.effect, &rival.place, rival.probability));
-    let stated: Vec<(bool, f64)> = own
-        .chain(rivals)
-        .filter_map(|(effect, place, p)| Some((atoms(effect, place) == *name, p?)))
-        .collect();
-    let of_it = stated
-        .iter()
-        .filter(|(same, _)| *same)
-        .map(|(_, p)| *p)
-        .fold(0.0, f64::max);
-    (!stated.is_empty()).then_some(of_it)
+    let stated = findings.iter().flat_map(Finding::names);
+    let stated = stated.filter_map(|(probability, stated)| Some((stated == *name, probability?)));
+    let of_it = stated.map(|(same, probability)| if same { probability } else { 0.0 });
+    of_it.reduce(f64::max)
 }
 
 fn held_out(truth: &Truth, answer: &Answer) -> Option<HeldOut> {
     let before = answer.before.as_ref()?.validate_rms_mm?;
     let after = answer.after.as_ref()?.validate_rms_mm?;
-    let found: usize = answer
-        .findings
-        .iter()
-        .map(|finding| finding.parameters.len())
-        .sum();
-    let (p, n) = (
-        (truth.geometry_rank + found) as f64,
-        3.0 * truth.points.fit as f64,
-    );
+    let numbers = answer.findings.iter().map(|one| one.parameters.len());
+    let p = (truth.geometry_rank + numbers.sum::<usize>()) as f64;
+    let n = 3.0 * truth.points.fit as f64;
     let noise = truth.noise.as_ref()?;
     let square = noise.validate_rms_per_axis_mm.powi(2) * (1.0 + p / (n - p - 1.0).max(1.0));
     let bound = (3.0 * (square + noise.unseen_rms_per_axis_mm.powi(2))).sqrt();
@@ -248,132 +202,10 @@ fn held_out(truth: &Truth, answer: &Answer) -> Option<HeldOut> {
     })
 }
 
-/// Whether a stated 95 % interval holds the true number.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Interval {
-    pub(crate) effect: String,
-    pub(crate) name: String,
-    /// Whether it holds the truth.
-    pub(crate) holds: bool,
-}
-
-/// Two-sided 95 % of a normal distribution.
-const NINETY_FIVE: f64 = 1.959_964;
-
-/// A true number as a diagnosis would state it.
-struct Expected {
-    name: String,
-    value: f64,
-    unit: &'static str,
-    /// The sign is a convention: sizes are compared.
-    unsigned: bool,
-}
-
-/// Intervals of what was found of a cause.
-pub(super) fn intervals(cause: &Cause, findings: &[Finding]) -> Vec<Interval> {
-    let same = findings
-        .iter()
-        .filter(|finding| finding.effect == cause.effect && finding.place == cause.place);
-    let stated: Vec<&Number> = same.flat_map(|finding| &finding.parameters).collect();
-    let judge = |truth: Expected| {
-        let full = format!("{}.{}", cause.effect, truth.name);
-        let number = stated
-            .iter()
-            .find(|number| number.name == truth.name || number.name == full)?;
-        let sigma = number.sigma.filter(|sigma| *sigma > 0.0)?;
-        let expected = convert(truth.value, truth.unit, &number.unit)?;
-        let off = if truth.unsigned {
-            number.value.abs() - expected.abs()
-        } else {
-            number.value - expected
-        };
-        Some(Interval {
-            effect: cause.effect.clone(),
-            name: truth.name,
-            holds: off.abs() <= NINETY_FIVE * sigma,
-        })
-    };
-    cause
-        .parameters
-        .iter()
-        .filter_map(|number| expected(cause, number))
-        .filter_map(judge)
-        .collect()
-}
-
-/// The true number `effect.seat.what` in the words of a diagnosis; none where it has no counterpart.
-fn expected(cause: &Cause, number: &Number) -> Option<Expected> {
-    let rest = number.name.strip_prefix(&cause.effect)?.strip_prefix('.')?;
-    let (seat, what) = rest.split_once('.').unwrap_or((rest, ""));
-    let signed = |name: String, value: f64, unit: &'static str| {
-        Some(Expected {
-            name,
-            value,
-            unit,
-            unsigned: false,
-        })
-    };
-    let value = number.value;
-    match (cause.effect.as_str(), what) {
-        ("joint_compliance", "") => signed(seat.into(), value, "rad/Nm"),
-        ("link_compliance", "middle") => signed(seat.into(), value, "rad/Nm"),
-        ("base_compliance", "x") if cause.form == "isotropic" => {
-            signed(seat.into(), value, "rad/Nm")
-        }
-        ("gear_cyclic" | "gear_motor_cyclic", ripple) => {
-            let kind = ["sin", "cos"]
-                .into_iter()
-                .find(|kind| ripple.starts_with(kind))?;
-            let order: f64 = ripple.strip_prefix(kind)?.parse().ok()?;
-            signed(format!("{seat}.order{order}.{kind}"), value, "arcsec")
-        }
-        ("backlash", "gap")
-            if ["by direction", "by sign of load"].contains(&cause.form.as_str()) =>
-        {
-            Some(Expected {
-                name: format!("{seat}.half_gap"),
-                value: 0.5 * value,
-                unit: "arcsec",
-                unsigned: true,
-            })
-        }
-        ("zero_shift", "step") => signed(format!("{seat}.step"), value, "arcsec"),
-        // A run of links grows as one.
-        ("thermal_growth", "expansion") => {
-            let run = cause.place.strip_prefix("link ")?.replace('-', "_");
-            let first = run.split('_').next() == seat.strip_prefix('l');
-            first.then(|| Expected {
-                name: format!("l{run}.per_kelvin"),
-                value: 1e-6 * value,
-                unit: "1",
-                unsigned: false,
-            })
-        }
-        ("tool_shift", shift) => signed(
-            format!("{seat}.{}", shift.strip_prefix("shift_")?),
-            1e-3 * value,
-            "mm",
-        ),
-        ("joint_log_lag", "share") => signed(format!("{seat}.share"), value, "1"),
-        ("payload_error", "mass") if value != 0.0 => signed(format!("{seat}.mass"), value, "1"),
-        ("link_mass", "mass") if value != 0.0 => signed(format!("{seat}.mass"), value, "1"),
-        _ => None,
-    }
-}
-
-/// A value in another unit; none where the units do not convert.
-fn convert(value: f64, from: &str, to: &str) -> Option<f64> {
-    if from == to {
-        return Some(value);
-    }
-    let (from, to) = (Unit::parse(from)?, Unit::parse(to)?);
-    (from.quantity() == to.quantity()).then(|| to.from_si(from.to_si(value)))
-}
-
 /// Faults of single points: they say nothing about where a cause sits.
-pub(super) const POINT_FAULTS: [&str; 2] = ["outlier", "mislabelled_point"];
+const POINT_FAULTS: [&str; 2] = ["outlier", "mislabelled_point"];
 /// A name that is stated with this probability or more is given.
-pub(crate) const GIVEN: f64 = 0.5;
+pub(super) const GIVEN: f64 = 0.5;
 /// What has a place and no name.
 pub const NAMELESS: &str = "unknown";
 
@@ -395,14 +227,8 @@ fn places(names: &Atoms) -> BTreeSet<&str> {
     names.iter().map(|(_, place)| place.as_str()).collect()
 }
 
-/// Judges what was named of `cause`; `known` are all names that are there or accepted, `reach` all that a finding may mean.
-pub(super) fn placed(
-    cause: &Cause,
-    truth: &Truth,
-    findings: &[Finding],
-    known: &Atoms,
-    reach: impl Fn(&Finding) -> Atoms,
-) -> Placed {
+/// Judges what was named of `cause`; `known` are all names that are there or accepted.
+fn placed(cause: &Cause, truth: &Truth, findings: &[Finding], known: &Atoms) -> Placed {
     let own = cause.atoms();
     let accepted = all_atoms(&truth.accepted);
     let right: BTreeSet<&str> = places(&own).union(&places(&accepted)).copied().collect();
@@ -441,39 +267,122 @@ pub(super) fn placed(
     }
 }
 
-/// Shares of causes.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub(crate) struct Places {
-    pub(crate) place: Share,
-    /// Right names, or `unknown` at the right place.
-    pub(crate) name_or_unknown: Share,
-    pub(crate) wrong_name: Share,
-    /// Wrong names with a probability of [`GIVEN`] or more.
-    #[serde(rename = "wrong_name_0.5")]
-    pub(crate) wrong_given: Share,
+/// A held-out error that exceeds the whole list's by this factor tells that something is missing.
+const TELLS: f64 = 1.1;
+
+/// A recording that was diagnosed without its causes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeftOut {
+    pub(crate) name: String,
+    /// What was taken out of the list.
+    pub effect: String,
+    /// L of it.
+    pub(crate) strength: f64,
+    /// Whether the data can tell: the held-out error is above [`TELLS`] times that of a diagnosis with the whole list.
+    pub(crate) tells: bool,
+    /// The wrong name with the highest probability, `effect at place`.
+    pub(crate) wrong: Option<(String, f64)>,
+    pub(crate) verdict: String,
+    /// A finding has the name that was taken out.
+    pub(crate) came_back: bool,
+    pub(crate) statements: Vec<Statement>,
 }
 
-impl Places {
-    /// Each with a title.
-    pub(super) fn titled(&self) -> [(&'static str, Share); 4] {
-        [
-            ("place right", self.place),
-            (
-                "name right, or unknown at the right place",
-                self.name_or_unknown,
-            ),
-            ("a wrong name at all", self.wrong_name),
-            ("a wrong name with 0.5 or more", self.wrong_given),
-        ]
+/// Marks a diagnosis `without` the causes of the recording against one with the `whole` list; none where no single cause of the list was
+/// concealed, or where no points were held out.
+pub fn left_out(truth: &Truth, whole: &Answer, without: &Answer) -> Option<LeftOut> {
+    let cause = truth.effects.iter().find(|cause| cause.wanted)?;
+    let held_out = |answer: &Answer| answer.after.as_ref()?.validate_rms_mm;
+    // The place is right by `unknown`, a name that data cannot separate from what is out of the list is no wrong one.
+    let same = || truth.accepted.iter().chain(&cause.same);
+    let accepted = same().filter(|name| name.effect != cause.effect);
+    let mut known: Atoms = accepted.flat_map(Name::atoms).collect();
+    let places = same().map(|name| &name.place).chain([&cause.place]);
+    known.extend(places.flat_map(|place| atoms(NAMELESS, place)));
+    known.extend(all_atoms(&truth.tampered));
+    // What else is concealed is no wrong name, wanted or not.
+    let others = truth
+        .effects
+        .iter()
+        .filter(|other| other.effect != cause.effect);
+    known.extend(others.flat_map(Cause::atoms));
+    let right: Vec<Atoms> = known
+        .iter()
+        .map(|name| Atoms::from([name.clone()]))
+        .collect();
+    let is_wrong =
+        |finding: &&Finding| finding.effect != NAMELESS && finding.atoms().is_disjoint(&known);
+    let wrong = without.findings.iter().filter(is_wrong);
+    let wrong = wrong.map(|finding| (label_of(finding), finding.probability.unwrap_or(1.0)));
+    let mut names = without.findings.iter().map(|finding| &finding.effect);
+    Some(LeftOut {
+        name: truth.case.clone(),
+        effect: cause.effect.clone(),
+        strength: cause.strength,
+        tells: held_out(without)? > TELLS * held_out(whole)?,
+        wrong: wrong.max_by(|a, b| a.1.total_cmp(&b.1)),
+        verdict: without.verdict.clone(),
+        came_back: names.any(|name| *name == cause.effect),
+        statements: statements(&without.findings, &right, &right),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    fn answer(verdict: &str, rms: f64, name: [&str; 2], probability: f64) -> Answer {
+        let finding = json!({ "effect": name[0], "where": name[1], "probability": probability });
+        let document = json!({ "verdict": verdict, "after": { "validate_rms_mm": rms }, "findings": [finding] });
+        serde_json::from_value(document).expect("an answer")
     }
-    pub(super) fn of(causes: impl Iterator<Item = Placed>) -> Places {
-        let all: Vec<Placed> = causes.collect();
-        let share = |holds: fn(&Placed) -> bool| Share::of(all.iter().map(holds));
-        Places {
-            place: share(|one| one.place),
-            name_or_unknown: share(|one| one.name_or_unknown),
-            wrong_name: share(|one| one.wrong_name),
-            wrong_given: share(|one| one.wrong_given),
-        }
+
+    fn truth(accepted: &Value, effects: &[[&str; 2]]) -> Truth {
+        let cause = |[effect, place]: &[&str; 2]| json!({ "effect": effect, "where": place, "form": "plain", "L": 80.0, "parameters": [] });
+        let effects: Vec<Value> = effects.iter().map(cause).collect();
+        let points = json!({ "fit": 50, "validate": 20 });
+        let truth = json!({ "case": "c", "content": "single", "family": "f", "robot": "r", "tampered": [], "points": points,
+            "accepted": accepted, "effects": effects });
+        serde_json::from_value(truth).expect("a truth")
+    }
+
+    #[test]
+    fn a_recording_without_its_cause_is_wrong_by_another_name_and_right_by_unknown_at_its_place() {
+        let hardening = json!([{ "effect": "joint_hardening", "where": "joint 2" }]);
+        let backlash = truth(&hardening, &[["backlash", "joint 2"]]);
+        let whole = answer("explained", 0.1, ["backlash", "joint 2"], 0.9);
+        let judge = |verdict, rms, name, probability| {
+            let without = answer(verdict, rms, name, probability);
+            left_out(&backlash, &whole, &without).expect("a mark")
+        };
+        let spring = ["joint_compliance", "joint 2"];
+        let both = truth(&json!([]), &[["payload_error", "tool"], spring]);
+        let mark = left_out(&both, &whole, &answer("unexplained", 0.3, spring, 0.9));
+        let mark = mark.expect("a mark");
+        assert!(
+            mark.effect == "payload_error" && mark.wrong.is_none(),
+            "what is there is no wrong name"
+        );
+        let unknown = judge("unexplained", 0.12, ["unknown", "joint 2"], 0.8);
+        let right = unknown.statements.iter().all(|one| one.right);
+        assert!(unknown.tells && unknown.wrong.is_none() && right);
+        let accepted = judge("explained", 0.1, ["joint_hardening", "joint 2"], 0.95);
+        assert!(!accepted.tells && accepted.wrong.is_none());
+        let wrong = judge("explained", 0.3, ["zero_shift", "joint 2"], 0.6);
+        assert_eq!(wrong.wrong, Some(("zero_shift at joint 2".into(), 0.6)));
+        let back = judge("unexplained", 0.3, ["backlash", "joint 3"], 0.4);
+        let board = crate::reveal::board::Board {
+            left_out: vec![unknown, accepted, wrong, back],
+            ..Default::default()
+        };
+        let worlds = &board.document()["left_out"]["worlds"];
+        let figure = |world: usize, share: usize, what: &str| {
+            worlds[world]["shares"][share]["share"][what].as_u64()
+        };
+        // A wrong name, a sure one, called explained, the name came back; where the data can tell, and where they cannot.
+        let counts = [0, 1, 2, 3].map(|share| figure(0, share, "count"));
+        assert_eq!(counts, [1, 0, 1, 1].map(Some));
+        assert_eq!([figure(0, 0, "of"), figure(1, 0, "of")], [Some(3), Some(1)]);
     }
 }

@@ -49,18 +49,15 @@ fn yes() -> bool {
     true
 }
 
-/// How many points.
+/// How many points are to be fitted.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub(crate) struct Points {
     pub(crate) fit: usize,
-    pub(crate) validate: usize,
 }
 
 /// Noise as it fell out, mm.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub(crate) struct NoiseSize {
-    /// At the points to fit.
-    pub(crate) fit_rms_per_axis_mm: f64,
     /// At the points to judge by.
     pub(crate) validate_rms_per_axis_mm: f64,
     /// What foreign effects do there beyond what the points to fit show of them.
@@ -74,7 +71,6 @@ pub struct Truth {
     pub case: String,
     /// `null`, `single`, `pair`, `open`.
     pub content: String,
-    pub(crate) family: String,
     pub(crate) robot: String,
     /// Names that are right too.
     pub(crate) accepted: Vec<Name>,
@@ -97,7 +93,7 @@ pub(crate) struct Errors {
     pub(crate) validate_rms_mm: Option<f64>,
 }
 
-/// A finding as the diagnosis states it.
+/// A finding as the diagnosis states it, or a rival of one.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub(crate) struct Finding {
     pub effect: String,
@@ -107,22 +103,12 @@ pub(crate) struct Finding {
     pub parameters: Vec<Number>,
     /// Explanations that were not excluded.
     #[serde(default)]
-    pub rivals: Vec<Rival>,
+    pub rivals: Vec<Finding>,
     /// That it is this effect at this place, and that it acts at this place.
     #[serde(default)]
     pub(crate) probability: Option<f64>,
     #[serde(default)]
     pub(crate) place_probability: Option<f64>,
-}
-
-/// Another explanation of a finding.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub(crate) struct Rival {
-    pub(crate) effect: String,
-    #[serde(rename = "where")]
-    pub(crate) place: String,
-    #[serde(default)]
-    pub(crate) probability: Option<f64>,
 }
 
 /// What a diagnosis said.
@@ -164,7 +150,15 @@ macro_rules! named {
         } )+
     };
 }
-named! { Name Cause Finding Rival }
+named! { Name Cause Finding }
+
+impl Finding {
+    /// What it may mean with which probability: itself and its rivals.
+    pub(super) fn names(&self) -> impl Iterator<Item = (Option<f64>, Atoms)> {
+        let all = std::iter::once(self).chain(&self.rivals);
+        all.map(|one| (one.probability, one.atoms()))
+    }
+}
 
 /// Those of several.
 pub(super) fn all_atoms<'a>(names: impl IntoIterator<Item = &'a Name>) -> Atoms {

@@ -1,89 +1,49 @@
 //! A case of a seed: which arm, which masses within their tolerance, which effects in which sizes and forms.
 
-use super::family::{FAMILIES, OPEN, Pool};
+use super::family::{OPEN, Pool, TORQUES};
 use super::law::Law;
-use super::path::Path;
-use crate::conceal::robots::Kind;
+use super::path::{moves, sines};
+use crate::conceal::design::Design;
+use crate::conceal::robots::{ALL_KINDS, Kind};
 use crate::matrix::{self, Vector};
 use crate::noise::{Noise, Purpose};
 use crate::torque::law::{Body, Machine};
+use crate::way::Path;
 use calib_foundation::description::{
-    DeclaredInertias, InertiaMoments, MassTolerance, RobotDescription,
+    DeclaredInertias, InertiaMoments, JointDescription, MassTolerance, RobotDescription,
 };
 
-/// What a set of recordings is drawn from.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TorqueDesign {
-    /// The same seed gives the same recordings.
-    pub seed: u64,
-    pub cases: usize,
-    /// Shares of recordings without any effect but, in half of them, friction of all joints; with two effects beside that friction; with
-    /// one that is in no list. The rest has one.
-    pub nulls: f64,
-    pub pairs: f64,
-    /// With an effect that is in no list.
-    pub open: f64,
-    /// Share of effects in a form that is not the usual formula.
-    pub other_forms: f64,
-    /// Seconds of the recording: two stretches to fit, two that judge.
-    pub seconds: f64,
-    /// Rows a second.
-    pub rate: f64,
-}
-
-/// How much a recording conceals, the friction of all joints apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum TorqueContent {
-    /// Nothing.
-    Null,
-    /// An effect of the list.
-    Single,
-    /// Two of them.
-    Pair,
-    /// One that is in no list.
-    Open,
-}
-
-impl TorqueContent {
-    /// As a truth has it.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Null => "null",
-            Self::Single => "single",
-            Self::Pair => "pair",
-            Self::Open => "open",
-        }
-    }
-}
-
-impl TorqueDesign {
-    /// The content of the recording of this number: shares are kept by multiples of the golden ratio, whose order says nothing.
-    fn content(&self, number: usize) -> TorqueContent {
+impl Design {
+    /// What the recording of this number conceals, the friction of all joints apart: `null`, `single`, `pair`, or `open` for one effect that is
+    /// in no list. Shares are kept by multiples of the golden ratio, whose order says nothing.
+    fn torque_content(&self, number: usize) -> &'static str {
         let begin = Noise::new(self.seed, Purpose::Design).uniform(0.0, 1.0);
         let at = (begin + number as f64 * 0.618_033_988_749_895).fract();
         let shares = [
-            (TorqueContent::Null, self.nulls),
-            (TorqueContent::Pair, self.pairs),
-            (TorqueContent::Open, self.open),
+            ("null", self.nulls),
+            ("pair", self.pairs),
+            ("open", self.open),
         ];
         let mut end = 0.0;
-        for (content, share) in shares {
+        let mut within = |(_, share): &(&str, f64)| {
             end += share;
-            if at < end {
-                return content;
-            }
-        }
-        TorqueContent::Single
+            at < end
+        };
+        let content = shares.into_iter().find(&mut within);
+        content.map_or("single", |(content, _)| content)
     }
 
     /// Families in an order of the seed: in turn, all are drawn.
-    fn family(&self, number: usize) -> usize {
+    fn torque_family(&self, number: usize) -> usize {
         let mut draw = Noise::new(self.seed, Purpose::Faults);
-        let mut order: Vec<usize> = (0..FAMILIES).collect();
+        let mut order: Vec<usize> = (0..LISTED).collect();
         draw.shuffle(&mut order);
-        order[number % FAMILIES]
+        order[number % LISTED]
     }
 }
+
+/// Families that are in the list.
+const LISTED: usize = TORQUES.len() - OPEN;
 
 /// A recording to be made.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,7 +53,7 @@ pub struct TorqueCase {
     pub(crate) seed: u64,
     /// The arm as its user believes it to be.
     pub robot: RobotDescription,
-    pub(super) content: TorqueContent,
+    pub(super) content: &'static str,
     /// What is concealed, friction of all joints first; joints from 0.
     pub(super) laws: Vec<Law>,
     /// How many laws are friction of all joints.
@@ -102,7 +62,8 @@ pub struct TorqueCase {
     pub(super) scattered: Machine,
     /// Hz of the rows.
     pub(super) rate: f64,
-    pub(super) paths: Vec<Path>,
+    /// How long each lasts, s, and the way.
+    pub(super) paths: Vec<(f64, Path)>,
     /// Paths to fit; the others judge.
     pub(super) fitted: usize,
     /// Nm, by joint: white noise, and noise that lasts.
@@ -116,13 +77,11 @@ pub struct TorqueCase {
     pub(super) sensors: bool,
 }
 
-/// Arms that torques are recorded of.
-const ARMS: [Kind; 4] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r, Kind::Five5r];
 /// Payload that is carried, least and most, as a share of the rated one.
 const CARRIED: [f64; 2] = [0.2, 0.6];
 /// Shares of the recording of each stretch: sines and moves to fit, sines and moves that judge.
 const STRETCHES: [f64; 4] = [0.3, 0.25, 0.25, 0.2];
-const FITTED: usize = 2;
+pub(super) const FITTED: usize = 2;
 const TOLERANCE: MassTolerance = MassTolerance {
     mass: 0.01,
     centre: 0.004,
@@ -133,23 +92,17 @@ const MOST_OFF: f64 = 2.0;
 
 impl TorqueCase {
     /// The case of this number.
-    pub fn draw(design: &TorqueDesign, number: usize) -> Self {
-        let seed = design
-            .seed
-            .wrapping_mul(1_000_003)
-            .wrapping_add(number as u64);
+    pub fn draw(design: &Design, number: usize) -> Self {
+        let seed = design.seed.wrapping_mul(1_000_003);
+        let seed = seed.wrapping_add(number as u64);
         let mut noise = Noise::new(seed, Purpose::Design);
-        let kind = ARMS[noise.index(ARMS.len())];
+        let kind = ALL_KINDS[noise.index(ALL_KINDS.len())];
         let robot = declared(kind, &mut noise);
         let stated = machine(&robot);
         let scattered = scattered(&stated, &mut noise);
         let speed = noise.uniform(0.8, 1.5) * if kind == Kind::Sr210d { 0.9 } else { 1.2 };
-        let (paths, fitted) = paths(
-            &robot,
-            speed,
-            design.seconds,
-            &mut Noise::new(seed, Purpose::Poses),
-        );
+        let mut way = Noise::new(seed, Purpose::Poses);
+        let paths = paths(&robot, speed, design.seconds, &mut way);
         let sensors = kind == Kind::Seven7r;
         let n = robot.joints.len();
         let per_unit = robot.joints.iter().map(|joint| match sensors {
@@ -159,23 +112,19 @@ impl TorqueCase {
         let mut case = Self {
             name: format!("torque_{number:03}"),
             seed,
-            content: design.content(number),
+            content: design.torque_content(number),
             laws: Vec::new(),
             common: 0,
             stated,
             scattered,
             rate: design.rate,
             paths,
-            fitted,
+            fitted: FITTED,
             white: vec![0.0; n],
             lasting: vec![0.0; n],
             per_unit: per_unit.collect(),
             resolution: if sensors { 0.01 } else { 0.002 },
-            encoder_deg: if kind == Kind::Sr210d {
-                360.0 / f64::from(1 << 20)
-            } else {
-                360.0 / f64::from(1 << 18)
-            },
+            encoder_deg: 360.0 / f64::from(1 << if kind == Kind::Sr210d { 20 } else { 18 }),
             sensors,
             robot,
         };
@@ -183,67 +132,58 @@ impl TorqueCase {
         let peak = peaks(&rows.rigid, n);
         let most = peak.iter().copied().fold(0.0, f64::max);
         let level = noise.uniform(0.7, 1.4);
-        case.white = peak
-            .iter()
-            .map(|peak| level * (0.01 * peak + 0.001 * most))
-            .collect();
+        let white = |peak: &f64| level * (0.01 * peak + 0.001 * most);
+        case.white = peak.iter().map(white).collect();
         case.lasting = case.white.iter().map(|white| 0.27 * white).collect();
         case.conceal(design, number, &peak, &mut noise);
         case
     }
 
-    fn conceal(&mut self, design: &TorqueDesign, number: usize, peak: &[f64], noise: &mut Noise) {
+    fn conceal(&mut self, design: &Design, number: usize, peak: &[f64], noise: &mut Noise) {
         let floor = peak.iter().copied().fold(0.0, f64::max) * 0.01;
         let scale: Vec<f64> = peak.iter().map(|peak| peak.max(floor)).collect();
         let width = noise.uniform(0.004, 0.012);
-        let null = self.content == TorqueContent::Null;
-        if noise.chance(if null { 0.5 } else { COMMON }) {
+        if noise.chance(if self.content == "null" { 0.5 } else { COMMON }) {
             for (joint, scale) in scale.iter().enumerate() {
                 let other = noise.chance(design.other_forms * 0.3);
                 let exponent = if other { noise.uniform(0.6, 0.8) } else { 1.0 };
-                self.laws.push(Law::viscous(
-                    joint,
-                    scale * noise.uniform(0.04, 0.12),
-                    exponent,
-                ));
-                self.laws.push(Law::coulomb(
-                    joint,
-                    scale * noise.uniform(0.05, 0.15),
-                    width,
-                ));
+                let viscous = scale * noise.uniform(0.04, 0.12);
+                self.laws.push(Law::viscous(joint, viscous, exponent));
+                let coulomb = scale * noise.uniform(0.05, 0.15);
+                self.laws.push(Law::coulomb(joint, coulomb, width));
             }
         }
         self.common = self.laws.len();
-        let pool = Pool {
-            width,
-            common: self.common > 0,
-            sensors: self.sensors,
-            scale: &scale,
-            machine: &self.stated,
-            touched: self.paths[0].duration,
-        };
         let wanted = match self.content {
-            TorqueContent::Null => 0,
-            TorqueContent::Single | TorqueContent::Open => 1,
-            TorqueContent::Pair => 2,
+            "null" => 0,
+            "pair" => 2,
+            _ => 1,
         };
         let mut drawn: Vec<(usize, Law)> = Vec::new();
         let mut family = match self.content {
-            TorqueContent::Open => FAMILIES + noise.index(OPEN),
-            _ => design.family(number),
+            "open" => LISTED + noise.index(OPEN),
+            _ => design.torque_family(number),
         };
         while drawn.len() < wanted {
             let other = noise.chance(design.other_forms);
-            let law = pool.law(family, noise, other);
+            let pool = Pool {
+                joint: noise.index(scale.len()),
+                width,
+                common: self.common > 0,
+                sensors: self.sensors,
+                scale: &scale,
+                machine: &self.stated,
+                touched: self.paths[0].0,
+            };
+            let law = (TORQUES[family].draw)(&pool, other, noise);
             // One of a kind, and one a joint: two hide each other.
             let apart = |law: &Law| {
                 drawn.iter().all(|(known, one)| {
                     *known != family && (one.joint().is_none() || one.joint() != law.joint())
                 })
             };
-            let law = law.filter(apart);
-            drawn.extend(law.map(|law| (family, law)));
-            family = noise.index(FAMILIES);
+            drawn.extend(law.filter(apart).map(|law| (family, law)));
+            family = noise.index(LISTED);
         }
         self.laws.extend(drawn.into_iter().map(|(_, law)| law));
     }
@@ -284,42 +224,25 @@ fn rod(mass: f64, span: Vector) -> InertiaMoments {
     let length = matrix::norm(span).max(0.08);
     let along = matrix::scale(span, 1.0 / matrix::norm(span).max(1e-9));
     let radius = 0.18 * length + 0.03;
-    let (axial, lateral) = (
-        0.5 * mass * radius * radius,
-        mass * (length * length / 12.0 + 0.25 * radius * radius),
-    );
-    let moment =
-        |i: usize, j: usize| f64::from(i == j) * lateral + (axial - lateral) * along[i] * along[j];
-    [
-        moment(0, 0),
-        moment(0, 1),
-        moment(0, 2),
-        moment(1, 1),
-        moment(1, 2),
-        moment(2, 2),
-    ]
+    let axial = 0.5 * mass * radius * radius;
+    let lateral = mass * (length * length / 12.0 + 0.25 * radius * radius);
+    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
+        .map(|(i, j)| f64::from(i == j) * lateral + (axial - lateral) * along[i] * along[j])
 }
 
 /// The bodies that a description declares.
 fn machine(robot: &RobotDescription) -> Machine {
-    let body = |(joint, moments): (
-        &calib_foundation::description::JointDescription,
-        &Option<InertiaMoments>,
-    )| Body {
+    let joints = robot.joints.iter().zip(&robot.inertias.links);
+    let links = joints.map(|(joint, moments)| Body {
         mass: joint.mass.unwrap_or(0.0),
         centre: joint.centre.unwrap_or(joint.point),
         inertia: moments.unwrap_or_default(),
-    };
+    });
     Machine {
         axes: robot.joints.iter().map(|joint| joint.axis).collect(),
         points: robot.joints.iter().map(|joint| joint.point).collect(),
         tool: robot.tool,
-        links: robot
-            .joints
-            .iter()
-            .zip(&robot.inertias.links)
-            .map(body)
-            .collect(),
+        links: links.collect(),
         payload: (robot.payload_mass > 0.0).then(|| Body {
             mass: robot.payload_mass,
             centre: robot.payload_centre,
@@ -348,31 +271,26 @@ pub(super) fn paths(
     speed: f64,
     seconds: f64,
     noise: &mut Noise,
-) -> (Vec<Path>, usize) {
-    let ranges: Vec<[f64; 2]> = robot
-        .joints
-        .iter()
-        .map(|joint| {
-            let [lower, upper] = joint.limits.unwrap_or([-1.5, 1.5]);
-            let (middle, reach) = (0.5 * (lower + upper), (0.3 * (upper - lower)).min(1.2));
-            [middle - reach, middle + reach]
-        })
-        .collect();
-    let paths = STRETCHES.iter().enumerate().map(|(k, share)| match k % 2 {
-        0 => Path::sines(noise, &ranges, speed, share * seconds),
-        _ => Path::moves(noise, &ranges, speed, share * seconds),
+) -> Vec<(f64, Path)> {
+    let range = |joint: &JointDescription| {
+        let [lower, upper] = joint.limits.unwrap_or([-1.5, 1.5]);
+        let (middle, reach) = (0.5 * (lower + upper), (0.3 * (upper - lower)).min(1.2));
+        [middle - reach, middle + reach]
+    };
+    let ranges: Vec<[f64; 2]> = robot.joints.iter().map(range).collect();
+    let paths = STRETCHES.iter().enumerate().map(|(k, share)| {
+        let draw = if k % 2 == 0 { sines } else { moves };
+        let duration = share * seconds;
+        (duration, draw(noise, &ranges, speed, duration))
     });
-    (paths.collect(), FITTED)
+    paths.collect()
 }
 
 /// Largest rigid torque of each joint, Nm.
 fn peaks(rigid: &[f64], joints: usize) -> Vec<f64> {
-    let of_joint = |joint: usize| {
-        rigid
-            .iter()
-            .skip(joint)
-            .step_by(joints)
-            .fold(0.0, |most: f64, x| most.max(x.abs()))
-    };
-    (0..joints).map(of_joint).collect()
+    let mut peaks = vec![0.0; joints];
+    for (k, torque) in rigid.iter().enumerate() {
+        peaks[k % joints] = torque.abs().max(peaks[k % joints]);
+    }
+    peaks
 }

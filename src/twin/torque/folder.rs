@@ -2,21 +2,17 @@
 //!
 //! A case once more: the same arm with further physics, on other paths or on a motion that is given, and its truth in numbers.
 
-use crate::folder::robot_json;
+use crate::folder::{File, Sheet, pretty, robot_json};
 use crate::noise::{Noise, Purpose};
-use crate::torque::draw::{TorqueCase, paths};
-use crate::torque::law::{Body, Fall, JointState, Law};
-use crate::torque::path::Path;
+use crate::torque::draw::{FITTED, TorqueCase, paths};
+use crate::torque::law::{Body, Fall, Law};
 use crate::torque::record::TorqueRows;
+use crate::way::{JointState, Path};
 use serde_json::{Value, json};
-use std::fmt::Write;
-
-/// A file's name and its bytes.
-pub type TorqueFile = (&'static str, String);
 
 impl TorqueCase {
     /// robot.json and recording.csv.
-    pub fn recording(&self) -> [TorqueFile; 2] {
+    pub fn recording(&self) -> [File; 2] {
         let rows = self.true_rows();
         [
             ("robot.json", pretty(&self.robot_json())),
@@ -50,7 +46,7 @@ impl TorqueCase {
         let names: Vec<&str> = self.laws[self.common..].iter().map(Law::name).collect();
         let to_fit = rows.to_fit();
         pretty(&json!({
-            "case": self.name, "content": self.content.name(), "family": names.join("+"), "robot": self.robot.name,
+            "case": self.name, "content": self.content, "family": names.join("+"), "robot": self.robot.name,
             "seed": self.seed, "accepted": accepted, "effects": effects, "tampered": [],
             "points": { "fit": to_fit, "validate": rows.validate.len() - to_fit },
             "noise_nm": { "white": self.white, "lasting": self.lasting },
@@ -60,42 +56,23 @@ impl TorqueCase {
     fn csv(&self, rows: &TorqueRows) -> String {
         let n = self.stated.axes.len();
         let (angles, signal) = self.measured(rows);
-        let names = |name: &str| {
-            (1..=n)
-                .map(|j| name.replace("{j}", &j.to_string()))
-                .collect::<Vec<_>>()
-                .join(",")
-        };
-        let (signal_name, decimals) = if self.sensors {
-            ("tau{j}_nm", 2)
-        } else {
-            ("i{j}_a", 3)
-        };
-        let mut text = format!(
-            "time_s,traj,use,{},{}\n",
-            names("q{j}_deg"),
-            names(signal_name)
-        );
-        for row in 0..rows.time.len() {
-            let usage = if rows.validate[row] {
+        let mut sheet = Sheet::default();
+        sheet.add("time_s", |row| format!("{:.3}", rows.time[row]));
+        sheet.add("traj", |row| rows.trajectory[row].to_string());
+        let usage = |row: usize| {
+            if rows.validate[row] {
                 "validate"
             } else {
                 "fit"
-            };
-            let _ = write!(
-                text,
-                "{:.3},{},{usage}",
-                rows.time[row], rows.trajectory[row]
-            );
-            angles[row * n..(row + 1) * n].iter().for_each(|angle| {
-                let _ = write!(text, ",{angle:.5}");
-            });
-            signal[row * n..(row + 1) * n].iter().for_each(|value| {
-                let _ = write!(text, ",{value:.decimals$}");
-            });
-            text.push('\n');
+            }
+        };
+        sheet.add("use", move |row| usage(row).into());
+        sheet.of_joints("q{}_deg", n, &angles, |angle| format!("{angle:.5}"));
+        match self.sensors {
+            true => sheet.of_joints("tau{}_nm", n, &signal, |torque| format!("{torque:.2}")),
+            false => sheet.of_joints("i{}_a", n, &signal, |current| format!("{current:.3}")),
         }
-        text
+        sheet.text(rows.time.len())
     }
 
     /// What the robot file of points states, and what moving bodies take.
@@ -110,10 +87,6 @@ impl TorqueCase {
         }));
         out
     }
-}
-
-fn pretty(value: &Value) -> String {
-    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
 }
 
 impl TorqueCase {
@@ -139,19 +112,17 @@ impl TorqueCase {
 
     /// The same arm and physics on other paths, with other noise.
     pub fn on_other_paths(mut self, seed: u64, seconds: f64) -> Self {
-        let speed = 1.0;
         let mut noise = Noise::new(seed, Purpose::Poses);
-        (self.paths, self.fitted) = paths(&self.robot, speed, seconds, &mut noise);
-        self.seed = seed;
+        self.paths = paths(&self.robot, 1.0, seconds, &mut noise);
+        (self.fitted, self.seed) = (FITTED, seed);
         self
     }
 
     /// The same arm and physics on a motion that is given in even steps (s), to fit, and on its own paths that judge.
     pub fn on_motion(mut self, step: f64, states: Vec<JointState>) -> Self {
         let judging = self.paths.split_off(self.fitted);
-        self.paths = std::iter::once(Path::given(step, states))
-            .chain(judging)
-            .collect();
+        let given = (step * states.len() as f64, Path::Given(step, states));
+        self.paths = std::iter::once(given).chain(judging).collect();
         self.fitted = 1;
         self
     }
@@ -164,13 +135,11 @@ impl TorqueCase {
     /// Torques of rows with the noise of the recording, Nm, row-major.
     pub fn noisy(&self, rows: &TorqueRows) -> Vec<f64> {
         let (_, signal) = self.measured(rows);
+        let units = self.per_unit.iter().cycle();
         signal
-            .chunks_exact(self.per_unit.len())
-            .flat_map(|row| {
-                row.iter()
-                    .zip(&self.per_unit)
-                    .map(|(value, unit)| value * unit)
-            })
+            .iter()
+            .zip(units)
+            .map(|(value, unit)| value * unit)
             .collect()
     }
 
@@ -181,22 +150,16 @@ impl TorqueCase {
 
     /// Viscous (Nm s/rad) and Coulomb friction (Nm) by joint; none where it is not concealed.
     pub fn plain_friction(&self) -> Vec<[Option<f64>; 2]> {
-        let of = |joint: usize| {
-            let viscous = self.laws.iter().find_map(|law| match law {
-                Law::Viscous {
-                    joint: at, size, ..
-                } if *at == joint => Some(*size),
-                _ => None,
-            });
-            let coulomb = self.laws.iter().find_map(|law| match law {
-                Law::Coulomb {
-                    joint: at, size, ..
-                } if *at == joint => Some(*size),
-                _ => None,
-            });
-            [viscous, coulomb]
-        };
-        (0..self.stated.axes.len()).map(of).collect()
+        let mut friction = vec![[None; 2]; self.stated.axes.len()];
+        for law in &self.laws {
+            let (joint, kind, size) = match law {
+                Law::Viscous { joint, size, .. } => (joint, 0, size),
+                Law::Coulomb { joint, size, .. } => (joint, 1, size),
+                _ => continue,
+            };
+            friction[*joint][kind].get_or_insert(*size);
+        }
+        friction
     }
 
     /// The last link and what it carries as they are.

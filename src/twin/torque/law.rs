@@ -5,6 +5,7 @@
 
 use crate::matrix;
 use crate::matrix::{Matrix, Vector, add, cross, dot, minus, scale};
+use crate::way::JointState;
 
 /// How friction at creeping speed falls with speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -222,11 +223,8 @@ impl Past {
     /// What a knock of unit height after each reversal is at present.
     fn knock(&mut self, v: f64, time: f64, wave: bool, step: f64) -> f64 {
         if v.abs() > 0.01 && v.signum() != self.direction {
-            self.since = if self.direction == 0.0 {
-                f64::INFINITY
-            } else {
-                0.0
-            };
+            let is_first = self.direction == 0.0;
+            self.since = if is_first { f64::INFINITY } else { 0.0 };
             self.direction = v.signum();
         }
         let since = self.since / time;
@@ -234,12 +232,11 @@ impl Past {
             return 0.0;
         }
         self.since += step;
-        self.direction
-            * if wave {
-                (0.25 * std::f64::consts::PI * since.min(4.0)).sin()
-            } else {
-                since * (1.0 - since).exp()
-            }
+        let course = match wave {
+            true => (0.25 * std::f64::consts::PI * since.min(4.0)).sin(),
+            false => since * (1.0 - since).exp(),
+        };
+        self.direction * course
     }
 }
 
@@ -345,15 +342,11 @@ impl Law {
 
     /// Begins at rest: a swinging gear hangs at its load.
     pub(super) fn begin(&self, rigid: &[f64]) -> Past {
-        let swing = if let Self::Elasticity { joint, .. } = self {
-            [rigid[*joint], 0.0]
-        } else {
-            [0.0; 2]
-        };
-        Past {
-            swing,
-            ..Past::default()
+        let mut past = Past::default();
+        if let Self::Elasticity { joint, .. } = self {
+            past.swing[0] = rigid[*joint];
         }
+        past
     }
 }
 
@@ -385,17 +378,6 @@ pub struct Machine {
     pub gravity: Vector,
 }
 
-/// Where joints are and how they move: rad, rad/s, rad/s2.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct JointState {
-    /// rad.
-    pub q: Vec<f64>,
-    /// rad/s.
-    pub v: Vec<f64>,
-    /// rad/s2.
-    pub a: Vec<f64>,
-}
-
 /// What a body takes: force at its centre and moment about it.
 struct Load {
     centre: Vector,
@@ -422,10 +404,8 @@ impl Machine {
             pose.axes.push(matrix::direct(&at, *axis));
             pose.points.push(matrix::place(&at, *point));
             let about = matrix::times(&matrix::shift(*point), &matrix::turn(*axis, *angle));
-            at = matrix::times(
-                &at,
-                &matrix::times(&about, &matrix::shift(scale(*point, -1.0))),
-            );
+            let about = matrix::times(&about, &matrix::shift(scale(*point, -1.0)));
+            at = matrix::times(&at, &about);
             pose.frames.push(at);
         }
         pose
@@ -443,33 +423,22 @@ impl Machine {
             push = add(push, add(cross(turn, arm), cross(spin, cross(spin, arm))));
             before = pose.points[j];
             let rate = scale(pose.axes[j], state.v[j]);
-            turn = add(
-                turn,
-                add(scale(pose.axes[j], state.a[j]), cross(spin, rate)),
-            );
+            let gain = add(scale(pose.axes[j], state.a[j]), cross(spin, rate));
+            turn = add(turn, gain);
             spin = add(spin, rate);
-            let last = (j + 1 == n).then_some(self.payload.as_ref()).flatten();
+            let last = self.payload.as_ref().filter(|_| j + 1 == n);
             for body in std::iter::once(&self.links[j]).chain(last) {
-                loads.push((
-                    j,
-                    self.load(body, &pose.frames[j], pose.points[j], [spin, turn, push]),
-                ));
+                let load = self.load(body, &pose.frames[j], pose.points[j], [spin, turn, push]);
+                loads.push((j, load));
             }
         }
-        let about = |j: usize| {
-            let beyond = loads
-                .iter()
-                .filter(|(link, _)| *link >= j)
-                .map(|(_, load)| {
-                    dot(
-                        pose.axes[j],
-                        add(
-                            load.moment,
-                            cross(minus(load.centre, pose.points[j]), load.force),
-                        ),
-                    )
-                });
-            beyond.sum::<f64>()
+        let about = |j: usize| -> f64 {
+            let moment = |load: &Load| {
+                let arm = minus(load.centre, pose.points[j]);
+                dot(pose.axes[j], add(load.moment, cross(arm, load.force)))
+            };
+            let beyond = loads.iter().filter(|(link, _)| *link >= j);
+            beyond.map(|(_, load)| moment(load)).sum()
         };
         (0..n).map(about).collect()
     }
@@ -498,10 +467,8 @@ impl Machine {
     /// Nm at each joint that hold against a force at the tool (N, base frame).
     pub(crate) fn against(&self, q: &[f64], force: Vector) -> Vec<f64> {
         let pose = self.pose(q);
-        let tool = pose
-            .frames
-            .last()
-            .map_or(self.tool, |frame| matrix::place(frame, self.tool));
+        let last = pose.frames.last();
+        let tool = last.map_or(self.tool, |frame| matrix::place(frame, self.tool));
         let own = pose.axes.iter().zip(&pose.points);
         own.map(|(axis, point)| -dot(*axis, cross(minus(tool, *point), force)))
             .collect()

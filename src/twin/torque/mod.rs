@@ -12,7 +12,7 @@ mod path;
 mod record;
 mod visible;
 
-pub use draw::{TorqueCase, TorqueDesign};
-pub use folder::TorqueFile;
-pub use law::{Body, JointState, Machine};
+pub use crate::way::JointState;
+pub use draw::TorqueCase;
+pub use law::{Body, Machine};
 pub use record::TorqueRows;

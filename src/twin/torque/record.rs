@@ -2,8 +2,10 @@
 
 use super::draw::TorqueCase;
 use super::law::{Law, Moment};
+use crate::matrix;
 use crate::noise::{Noise, Purpose};
-use crate::torque::law::{JointState, Machine};
+use crate::torque::law::Machine;
+use crate::way::JointState;
 
 /// Hz of the simulation, at least.
 const FINE: f64 = 500.0;
@@ -54,23 +56,20 @@ impl TorqueCase {
         let n = machine.axes.len();
         let fine_steps = (FINE / self.rate).ceil().max(1.0) as usize;
         let step = 1.0 / (self.rate * fine_steps as f64);
-        let behind = |filtered: bool| {
-            let time = |law: &&Law| {
-                if let Law::Latency { time, filter } = law {
-                    (*filter == filtered).then_some(*time)
-                } else {
-                    None
-                }
+        let behind = |filtered: bool| -> f64 {
+            let time = |law: &&Law| match law {
+                Law::Latency { time, filter } if *filter == filtered => *time,
+                _ => 0.0,
             };
-            laws.iter().filter_map(time).sum::<f64>()
+            laws.iter().map(time).sum()
         };
         let (late, filter) = (behind(false), behind(true));
         let mut rows = TorqueRows::default();
         let mut begin = 0.0;
-        for (number, path) in self.paths.iter().enumerate() {
+        for (number, (duration, path)) in self.paths.iter().enumerate() {
             let mut past: Vec<_> = Vec::new();
             let mut fine: Vec<Vec<f64>> = Vec::new();
-            for k in 0..(path.duration * self.rate) as usize * fine_steps {
+            for k in 0..(duration * self.rate) as usize * fine_steps {
                 let time = k as f64 * step;
                 let state = path.at(time);
                 let rigid = machine.torque(&state);
@@ -105,10 +104,8 @@ impl TorqueCase {
                             let push =
                                 force.map(|f| f * if *held { (3.0 * wave).min(1.0) } else { wave });
                             let against = machine.against(&state.q, push);
-                            torque
-                                .iter_mut()
-                                .zip(against)
-                                .for_each(|(torque, against)| *torque += against);
+                            let joints = torque.iter_mut().zip(against);
+                            joints.for_each(|(torque, against)| *torque += against);
                         }
                         Law::TorqueConstant { joint, share, half } => {
                             torque[*joint] *= 1.0 + share / (1.0 + torque[*joint].abs() / half);
@@ -136,7 +133,7 @@ impl TorqueCase {
                 rows.torque
                     .extend((0..n).map(|j| fine[low][j] * (1.0 - part) + fine[high][j] * part));
             }
-            begin += path.duration + PAUSE;
+            begin += duration + PAUSE;
         }
         rows
     }
@@ -157,17 +154,11 @@ impl TorqueCase {
         let mut lasting = vec![0.0; n];
         let (mut angles, mut signal) = (Vec::new(), Vec::new());
         for (state, torque) in rows.state.iter().zip(rows.torque.chunks_exact(n)) {
-            angles.extend(
-                state
-                    .q
-                    .iter()
-                    .map(|q| (q.to_degrees() / self.encoder_deg).round() * self.encoder_deg),
-            );
+            let shown = |q: &f64| (q.to_degrees() / self.encoder_deg).round() * self.encoder_deg;
+            angles.extend(state.q.iter().map(shown));
             for j in 0..n {
-                lasting[j] = AR1_COEFFICIENT * lasting[j]
-                    + (1.0 - AR1_COEFFICIENT * AR1_COEFFICIENT).sqrt()
-                        * self.lasting[j]
-                        * noise.normal();
+                let fresh = (1.0 - AR1_COEFFICIENT * AR1_COEFFICIENT).sqrt() * self.lasting[j];
+                lasting[j] = AR1_COEFFICIENT * lasting[j] + fresh * noise.normal();
                 let stated =
                     (torque[j] + lasting[j] + self.white[j] * noise.normal()) / self.per_unit[j];
                 signal.push((stated / self.resolution).round() * self.resolution);
@@ -199,18 +190,18 @@ impl Law {
                     let share = 1.0 + mass / payload.mass;
                     payload.mass += mass;
                     payload.inertia = payload.inertia.map(|moment| moment * share);
-                    payload.centre = std::array::from_fn(|i| payload.centre[i] + centre[i]);
+                    payload.centre = matrix::add(payload.centre, *centre);
                 }
             }
             Self::LinkMass { link, share, away } => {
                 let body = &mut machine.links[*link];
                 body.mass *= 1.0 + share;
-                body.centre =
-                    std::array::from_fn(|i| body.centre[i] + share / (1.0 + share) * away[i]);
+                let moved = matrix::scale(*away, share / (1.0 + share));
+                body.centre = matrix::add(body.centre, moved);
             }
             Self::LinkCentre { link, shift } => {
                 let body = &mut machine.links[*link];
-                body.centre = std::array::from_fn(|i| body.centre[i] + shift[i]);
+                body.centre = matrix::add(body.centre, *shift);
             }
             Self::LinkInertia { link, share } => {
                 let body = &mut machine.links[*link];
@@ -219,8 +210,8 @@ impl Law {
             Self::Tilt {
                 by: [about_x, about_y],
             } => {
-                let turned = crate::matrix::turn_by([*about_x, *about_y, 0.0]);
-                machine.gravity = crate::matrix::see(&turned, machine.gravity);
+                let turned = matrix::turn_by([*about_x, *about_y, 0.0]);
+                machine.gravity = matrix::see(&turned, machine.gravity);
             }
             _ => {}
         }

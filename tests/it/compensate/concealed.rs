@@ -19,7 +19,7 @@ use calib::twin::arm::Arm;
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
 use calib::twin::conceal::family::Column;
-use calib::twin::conceal::layout::Layout;
+use calib::twin::conceal::points::Layout;
 use calib::twin::conceal::points::{Amount, FIT, plan};
 use calib::twin::conceal::robots::Kind;
 use calib::twin::effect::{GearCyclic, JointCompliance, Physical};

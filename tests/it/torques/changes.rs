@@ -7,7 +7,8 @@ use calib::audit::QueryTables;
 use calib::pipeline::{Manifest, find_run};
 use calib::store::Store;
 use calib::table::{Table, TorqueChangeRow, TorqueChangeTable};
-use calib::twin::torque::{TorqueCase, TorqueDesign};
+use calib::twin::conceal::design::Design;
+use calib::twin::torque::TorqueCase;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -141,15 +142,13 @@ fn the_example_of_a_pair_shows_the_tool_that_was_added() {
     let example = pair().join("example");
     let (mass, shift) = (1.2, [0.0, 0.0, -0.02]);
     if std::env::var_os("CALIB_UPDATE").is_some() {
-        let design = TorqueDesign {
+        let design = Design {
             seed: 11,
             cases: 1,
-            nulls: 0.0,
-            pairs: 0.0,
-            open: 0.0,
             other_forms: 0.0,
             seconds: 24.0,
             rate: 50.0,
+            ..Design::default()
         };
         let before = TorqueCase::draw(&design, 0);
         let declared = before.last_bodies().1.unwrap();

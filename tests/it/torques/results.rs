@@ -2,7 +2,9 @@
 
 use super::write;
 use crate::answer::{self, Answer, has, root};
-use calib::twin::torque::{TorqueCase, TorqueDesign, TorqueFile, TorqueRows};
+use calib::twin::conceal::design::Design;
+use calib::twin::folder::File;
+use calib::twin::torque::{TorqueCase, TorqueRows};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -36,7 +38,7 @@ pub(super) fn solve(case: TorqueCase) -> Solved {
 }
 
 /// Diagnoses files of a case.
-pub(super) fn solve_files(case: TorqueCase, files: &[TorqueFile]) -> Solved {
+pub(super) fn solve_files(case: TorqueCase, files: &[File]) -> Solved {
     let folder = tempfile::tempdir().unwrap();
     write(&folder.path().join("case"), files);
     let pipeline = root("pipelines/dynamics/pipeline.yaml")
@@ -52,16 +54,15 @@ pub(super) fn solve_files(case: TorqueCase, files: &[TorqueFile]) -> Solved {
 }
 
 /// Friction and nothing else concealed.
-fn design() -> TorqueDesign {
-    TorqueDesign {
+fn design() -> Design {
+    Design {
         seed: 21,
         cases: 60,
         nulls: 1.0,
-        pairs: 0.0,
-        open: 0.0,
         other_forms: 0.0,
         seconds: 48.0,
         rate: 100.0,
+        ..Design::default()
     }
 }
 

@@ -2,29 +2,19 @@
 //!
 //! Effects that are in no list: a diagnosis should say where they sit and what they look like, and give them no name.
 
-use crate::conceal::family::{Bench, Column, Draft, Form, joint, link, sized};
+use super::{Bench, Column, Draft, joint, link};
 use crate::effect::{
-    BaseSway, Foreign, ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable, JointBump,
-    JointHinge, JointProduct, Physical,
+    Foreign, ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable, Physical,
 };
 use crate::matrix::{self, Vector};
 use crate::noise::Noise;
+use ForeignMotion::*;
 use std::f64::consts::TAU;
 
 /// Motions, evenly drawn: a joint's shift is along its axis or across it.
+#[rustfmt::skip]
 const MOTIONS: [ForeignMotion; 12] = [
-    ForeignMotion::JointTurn,
-    ForeignMotion::JointTurn,
-    ForeignMotion::JointShift,
-    ForeignMotion::JointTilt,
-    ForeignMotion::LinkShift,
-    ForeignMotion::LinkBend,
-    ForeignMotion::BaseShift,
-    ForeignMotion::BaseTurn,
-    ForeignMotion::ToolShift,
-    ForeignMotion::Range,
-    ForeignMotion::Azimuth,
-    ForeignMotion::Elevation,
+    JointTurn, JointTurn, JointShift, JointTilt, LinkShift, LinkBend, BaseShift, BaseTurn, ToolShift, Range, Azimuth, Elevation,
 ];
 
 /// Waves of a smooth shape.
@@ -43,9 +33,7 @@ pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
     let mut courses = vec![course(bench, motion, seat, &[], draw)];
     let alone = match &courses[0].over {
         // Those alone are a gap and a payload: names of the list.
-        ForeignVariable::Approach(number) => {
-            !(motion == ForeignMotion::JointTurn && *number == seat)
-        }
+        ForeignVariable::Approach(number) => motion != JointTurn || *number != seat,
         ForeignVariable::Payload => false,
         _ => true,
     };
@@ -55,20 +43,20 @@ pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
     }
     let direction = direction(bench, motion, seat, draw);
     let size = draw.sign() * draw.size(40.0, 200.0);
-    let columns: Vec<Column> = courses
-        .iter()
+    let columns: Vec<Column> = (courses.iter())
         .filter_map(|course| column(&course.over))
         .collect();
     let form = form(&courses);
     // Time only goes on, and so does the temperature of these recordings: what jumps with them does so once and for good.
-    let passes = |course: &ForeignCourse| {
-        matches!(
-            course.over,
-            ForeignVariable::Time | ForeignVariable::Temperature
-        )
+    let is_step = match &courses[..] {
+        [one] => {
+            matches!(
+                one.over,
+                ForeignVariable::Time | ForeignVariable::Temperature
+            ) && matches!(one.shape, ForeignShape::Jumps(_))
+        }
+        _ => false,
     };
-    let is_step =
-        matches!(&courses[..], [one] if passes(one) && matches!(one.shape, ForeignShape::Jumps(_)));
     let effect = Physical::Foreign(Foreign {
         motion,
         seat,
@@ -76,20 +64,16 @@ pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
         size,
         courses,
     });
-    let (place, same) = places(bench, motion, seat);
-    let all: Vec<String> = std::iter::once(place.clone()).chain(same.clone()).collect();
-    let draft = Draft::new(form, vec![sized("unknown", place, vec![effect])]).needing(&columns);
-    let draft = same
-        .into_iter()
-        .fold(draft, |draft, place| draft.accepting("unknown", place));
-    let names = is_step.then(|| {
-        all.into_iter()
-            .filter_map(|place| Some((step(motion, &place)?, place)))
-    });
-    names
-        .into_iter()
-        .flatten()
-        .fold(draft, |draft, (name, place)| draft.accepting(name, place))
+    let mut draft = Draft::one(form, "unknown", motion.place(seat), [effect]).needing(&columns);
+    let same = same_places(bench, motion, seat);
+    let names = same.iter().map(|place| ("unknown", place.clone()));
+    draft.accepted.extend(names);
+    if is_step {
+        let places = [motion.place(seat)].into_iter().chain(same);
+        let names = places.filter_map(|place| Some((step(motion, &place)?, place)));
+        draft.accepted.extend(names);
+    }
+    draft
 }
 
 /// The name of what moves at a place so, once and for good, if there is one.
@@ -97,17 +81,15 @@ fn step(motion: ForeignMotion, place: &str) -> Option<&'static str> {
     match place {
         "base" => Some("base_shift"),
         "tool" => Some("tool_shift"),
-        _ => (motion == ForeignMotion::JointTurn).then_some("zero_shift"),
+        _ => (motion == JointTurn).then_some("zero_shift"),
     }
 }
 
 /// The joint or link that moves: not the last joint's turn, which hardly moves the tool, and links with a length.
 fn seat(bench: &Bench, motion: ForeignMotion, draw: &mut Noise) -> usize {
     match motion {
-        ForeignMotion::JointTurn | ForeignMotion::JointShift | ForeignMotion::JointTilt => {
-            bench.turning(draw)
-        }
-        ForeignMotion::LinkShift | ForeignMotion::LinkBend => bench.long_link(draw).unwrap_or(1),
+        JointTurn | JointShift | JointTilt => bench.turning(draw),
+        LinkShift | LinkBend => bench.long_link(draw).unwrap_or(1),
         _ => 1,
     }
 }
@@ -116,12 +98,12 @@ fn seat(bench: &Bench, motion: ForeignMotion, draw: &mut Noise) -> usize {
 fn direction(bench: &Bench, motion: ForeignMotion, seat: usize, draw: &mut Noise) -> Vector {
     let arrow = draw.vector(1.0, 1.0);
     let along = draw.chance(0.5);
-    let own = &bench.robot.joints[seat - 1];
+    let described = &bench.robot.joints[seat - 1];
     let (line, along) = match motion {
-        ForeignMotion::JointShift => (own.axis, along),
-        ForeignMotion::JointTilt => (own.axis, false),
-        ForeignMotion::LinkShift => (bench.line(seat - 1), along),
-        ForeignMotion::LinkBend => (bench.line(seat - 1), false),
+        JointShift => (described.axis, along),
+        JointTilt => (described.axis, false),
+        LinkShift => (bench.line(seat - 1), along),
+        LinkBend => (bench.line(seat - 1), false),
         _ => return arrow,
     };
     let line = matrix::scale(line, 1.0 / matrix::norm(line).max(1e-9));
@@ -176,12 +158,8 @@ fn variable(
     draw: &mut Noise,
 ) -> (ForeignVariable, [f64; 2]) {
     let instrument = motion.is_sighted();
-    let anywhere = instrument
-        || matches!(
-            motion,
-            ForeignMotion::BaseShift | ForeignMotion::BaseTurn | ForeignMotion::ToolShift
-        );
-    // Half of what sits on the chain depends on its own joint.
+    let anywhere = instrument || matches!(motion, BaseShift | BaseTurn | ToolShift);
+    // Half of what sits on the chain depends on its described joint.
     let other = 1 + draw.index(bench.joints());
     let number = if !anywhere && draw.chance(0.5) {
         seat
@@ -290,94 +268,20 @@ fn form(courses: &[ForeignCourse]) -> &'static str {
     }
 }
 
-/// Its place, and those where the same motion of the chain may be put as well.
-fn places(bench: &Bench, motion: ForeignMotion, seat: usize) -> (String, Vec<String>) {
-    let carrier = if seat == 1 {
-        "base".to_string()
-    } else {
-        link(seat - 1)
-    };
-    let (base, tracker) = ("base".to_string(), "tracker".to_string());
+/// Where the same motion of the chain may be put as well.
+fn same_places(bench: &Bench, motion: ForeignMotion, seat: usize) -> Vec<String> {
+    let (base, tool, tracker): (String, String, String) =
+        ("base".into(), "tool".into(), "tracker".into());
+    let last = bench.joints();
     match motion {
-        ForeignMotion::JointTurn if seat == 1 => (joint(1), vec![base]),
-        ForeignMotion::JointTurn => (joint(seat), vec![]),
-        ForeignMotion::JointShift | ForeignMotion::JointTilt => (joint(seat), vec![carrier]),
-        ForeignMotion::LinkShift | ForeignMotion::LinkBend if seat < bench.joints() => {
-            (link(seat), vec![joint(seat + 1)])
-        }
-        ForeignMotion::LinkShift | ForeignMotion::LinkBend => (link(seat), vec!["tool".into()]),
-        ForeignMotion::BaseShift | ForeignMotion::BaseTurn => (base, vec![tracker, joint(1)]),
-        ForeignMotion::ToolShift => (
-            "tool".into(),
-            vec![link(bench.joints()), joint(bench.joints())],
-        ),
+        JointTurn if seat > 1 => vec![],
+        JointTurn => vec![base],
+        JointShift | JointTilt => vec![if seat > 1 { link(seat - 1) } else { base }],
+        LinkShift | LinkBend => vec![if seat < last { joint(seat + 1) } else { tool }],
+        BaseShift | BaseTurn => vec![tracker, joint(1)],
+        ToolShift => vec![link(last), joint(last)],
         // The turn of the whole instrument about its standing axis.
-        ForeignMotion::Azimuth => (tracker, vec![base]),
-        ForeignMotion::Range | ForeignMotion::Elevation => (tracker, vec![]),
+        Azimuth => vec![base],
+        Range | Elevation => vec![],
     }
-}
-
-fn unknown(form: &'static str, number: usize, effect: Physical) -> Option<Draft> {
-    Some(Draft::new(
-        form,
-        vec![sized("unknown", joint(number), vec![effect])],
-    ))
-}
-
-pub(super) fn bump(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft> {
-    let number = bench.turning(draw);
-    let [lower, upper] = bench.ranges_deg[number - 1];
-    let (centre_deg, width_deg) = (
-        bench.angle(number, draw),
-        draw.uniform(0.06, 0.16) * (upper - lower),
-    );
-    let amplitude_arcsec = draw.sign() * draw.size(40.0, 200.0);
-    let bump = JointBump::effect(
-        number,
-        amplitude_arcsec,
-        centre_deg.round(),
-        width_deg.round(),
-    );
-    // A bump is a table of no formula, too.
-    unknown("bump", number, bump).map(|draft| draft.accepting("joint_table", joint(number)))
-}
-
-pub(super) fn hinge(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft> {
-    let number = bench.turning(draw);
-    let from_deg = bench.angle(number, draw).round();
-    let hinge = JointHinge::effect(number, from_deg, draw.sign() * draw.size(30.0, 150.0));
-    unknown("hinge", number, hinge).map(|draft| draft.accepting("joint_table", joint(number)))
-}
-
-pub(super) fn product(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft> {
-    let number = 2 + draw.index(bench.joints() - 2);
-    let other = 1 + draw.index(bench.joints());
-    if other == number {
-        return None;
-    }
-    let product =
-        JointProduct::effect(number, [number, other], draw.sign() * draw.size(10.0, 60.0));
-    unknown("product of two angles", number, product)
-        .map(|draft| draft.accepting("cable_drag", joint(number)))
-}
-
-pub(super) fn sway(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft> {
-    let period_s = (bench.end_s / draw.uniform(2.0, 6.0)).round();
-    let (shift_um, turn_arcsec) = match draw.chance(0.5) {
-        true => (draw.vector(30.0, 150.0).map(f64::round), [0.0; 3]),
-        false => ([0.0; 3], draw.vector(3.0, 20.0)),
-    };
-    let sway = BaseSway::effect(
-        shift_um,
-        turn_arcsec,
-        period_s,
-        draw.uniform(-180.0, 180.0).round(),
-    );
-    let cause = sized("unknown", "base".into(), vec![sway]);
-    // The tracker's stand may swing as well as the base.
-    Some(
-        Draft::new("slow swing", vec![cause])
-            .needing(&[Column::Time])
-            .accepting("unknown", "tracker".into()),
-    )
 }
