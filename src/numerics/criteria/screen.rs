@@ -14,6 +14,8 @@ criteria! {
     FAR: f64 = 3.0, "ratio", "count: with normal noise 9.4 standard deviations", "changes nothing on 2";
     /// Rows that are wrong in any recording; beyond these, the share above the bulk.
     MISTAKES: usize = 3, "rows", "judgement: single slips happen in any recording", "";
+    /// By how much the other rows may be off more where causes are found that explain the rows that stand out.
+    NO_WORSE: f64 = 2.0, "ratio", "judgement: rows at the edge of what moves few of them are off, too", "";
     /// With more than this share of unexplained rows, beyond what chance adds, the model is wrong and not the rows.
     CROWD: f64 = 0.125, "share", "judgement: an eighth", "changes nothing on 2";
     /// Among a crowd, only rows this many times the limit away are mistakes all the same.

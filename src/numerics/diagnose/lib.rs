@@ -46,7 +46,7 @@ pub use types::{
 pub use verdict::other_means;
 
 use crate::criteria::cells::SETTLED;
-use crate::criteria::screen::MISTAKES;
+use crate::criteria::screen::{MISTAKES, NO_WORSE};
 use crate::criteria::search::FEWEST;
 use round::{FitState, Fitter, RoundView, correlation_left_by};
 use table::{Answer, FoundCell, Rounds, answers, given_causes};
@@ -69,7 +69,9 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
     tell(words::of_all_rows(first.set_aside()));
     let explains = |second: &Attempt| {
         let aside = second.set_aside();
-        2 * aside <= first.set_aside() && first.set_aside() - aside > *MISTAKES
+        2 * aside <= first.set_aside()
+            && first.set_aside() - aside > *MISTAKES
+            && second.leftover() <= *NO_WORSE * first.leftover()
     };
     match Attempt::new(question, true, &mut tell) {
         Ok(second) if explains(&second) => second.conclude(),
@@ -151,6 +153,11 @@ impl<'a> Attempt<'a> {
             if rounds.again_without(&empty(&next, &answer)) {
                 continue;
             }
+            if rounds.exchange() {
+                now = next;
+                fitter.follow(&now);
+                continue;
+            }
             tell(words::of_the_conclusions(&next));
             return Ok(Self {
                 fitter,
@@ -165,6 +172,17 @@ impl<'a> Attempt<'a> {
     /// Rows to fit that are set aside.
     fn set_aside(&self) -> usize {
         self.fitter.question.fit.len() - self.next.screening.kept.len()
+    }
+
+    /// Rms of what is left of the rows that are not.
+    fn leftover(&self) -> f64 {
+        let fitter = &self.fitter;
+        let model = &self.next.model;
+        let sizes = model.error_sizes(&fitter.data, fitter.scale.dimension());
+        let kept = &self.next.screening.kept;
+        let squares = kept.iter().filter_map(|row| sizes[*row]);
+        let sum: f64 = squares.map(|size| size * size).sum();
+        (sum / kept.len().max(1) as f64).sqrt()
     }
 
     fn conclude(self) -> Diagnosis {

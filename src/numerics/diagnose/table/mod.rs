@@ -64,6 +64,8 @@ pub(crate) struct Rounds {
     empty: BTreeSet<String>,
     /// Keys of the cells of sets that were answered, or that an answer led to.
     exchanged: BTreeSet<Vec<String>>,
+    /// What the last answer led to: components with the keys of their cells, and the products among them.
+    better: Option<(Vec<(String, Component)>, Vec<(FreeShape, f64)>)>,
 }
 
 /// What a round found.
@@ -104,6 +106,20 @@ impl Rounds {
             self.again();
         }
         !causes.is_empty()
+    }
+
+    /// Goes on with what the last answer led to; false where it led to nothing, or to what was left before.
+    pub(crate) fn exchange(&mut self) -> bool {
+        let Some((components, products)) = self.better.take() else {
+            return false;
+        };
+        let mut keys: Vec<String> = components.iter().map(|(key, _)| key.clone()).collect();
+        keys.sort();
+        let is_new = self.exchanged.insert(keys);
+        if is_new {
+            (self.components, self.products) = (components, products);
+        }
+        is_new
     }
 
     /// Searches around a fitted model.
@@ -173,7 +189,7 @@ impl Rounds {
             let key = |component: &Component| table.cells[component.cell].key.clone();
             components.iter().map(key).collect()
         };
-        let mut keys = keys_of(&table, &components);
+        let keys = keys_of(&table, &components);
         let sorted = |keys: &[String]| {
             let mut keys = keys.to_vec();
             keys.sort();
@@ -215,30 +231,34 @@ impl Rounds {
                 self.pairs = Some(seen);
             }
         }
-        let mut answer = is_last.then(|| {
+        let answer = is_last.then(|| {
             table.add_siblings(&components, &self.empty);
             table.answer(&components, self.first.clone().unwrap_or_default())
         });
-        // A closer look may find something more probable in the stead of a finding; what it led away from is not taken up again.
-        self.exchanged.insert(sorted(&keys));
-        if let Some((members, component)) = answer.as_ref().and_then(|answer| answer.better.clone())
-        {
+        // A closer look may find something more probable in the stead of a finding.
+        let better = answer.as_ref().and_then(|answer| answer.better.clone());
+        let better = better.and_then(|(members, component)| {
             let mut next = search::without(&components, &members);
             next.push(component);
             let next = table.backfit(next, 1);
-            let next_keys = keys_of(&table, &next);
-            if self.exchanged.insert(sorted(&next_keys)) {
-                (components, keys, answer) = (next, next_keys, None);
-            }
-        }
-        let mut causes = estimated(&table, &components);
-        by_currents(&mut causes, view);
-        let cells = table.cells.len();
+            table.is_better(&next, &components).then_some(next)
+        });
         let product = |component: &Component| match table.cells[component.cell].shapes {
             cell::Shapes::Free(free) => matches!(free.over, cell::Over::Product(_))
                 .then_some((free, table.cells[component.cell].log_prior)),
             cell::Shapes::Listed(_) => None,
         };
+        self.exchanged.insert(sorted(&keys));
+        self.better = better.map(|next| {
+            let products = next.iter().filter_map(product).collect();
+            (
+                keys_of(&table, &next).into_iter().zip(next).collect(),
+                products,
+            )
+        });
+        let mut causes = estimated(&table, &components);
+        by_currents(&mut causes, view);
+        let cells = table.cells.len();
         self.products = components.iter().filter_map(product).collect();
         self.components = keys.into_iter().zip(components).collect();
         self.shown = shown;

@@ -323,13 +323,18 @@ impl CauseTable<'_, '_> {
         let others = self.grow(named);
         let others = self.swap(others);
         let others = self.grow(others);
-        let noise = self.noise(&components).min(self.noise(&others));
-        if self.total(&others, noise) > self.total(&components, noise) {
+        if self.is_better(&others, &components) {
             others
         } else {
             self.know(&components);
             components
         }
+    }
+
+    /// Whether some components are more probable than others, at the less noise of both.
+    pub(super) fn is_better(&self, some: &[Component], others: &[Component]) -> bool {
+        let noise = self.noise(some).min(self.noise(others));
+        self.total(some, noise) > self.total(others, noise)
     }
 
     /// ln of the posterior of a set of components, up to a constant, at a noise.
