@@ -17,21 +17,21 @@ use std::collections::BTreeSet;
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiagnoseTorques {
-    /// Labels of the recording's `usage` to fit; all other rows are predicted in the end and choose nothing.
+    /// Labels of the recording's `usage` to fit; all other rows judge.
     #[serde(default = "fit")]
     pub(crate) on: Vec<String>,
-    /// Rows that are held out instead of those that `usage` labels otherwise. Where neither says anything, the last 30 %.
+    /// Rows that are held out instead of those that `usage` labels otherwise; by default the last 30 %.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) hold_out: Option<HoldOut>,
     /// Whether masses are free within their tolerance, or identified without regard to what is declared.
     #[serde(default)]
     pub(crate) inertials: InertialSetting,
-    /// Whether it is reported that no body has a link's inertial numbers, or enforced that one has: the numbers move to the nearest of bodies
-    /// in the metric of their covariance, and what that costs is said. Enforcing needs declared masses.
+    /// Whether it is reported that no body has a link's inertial numbers, or the nearest of bodies are taken (in the metric of their
+    /// covariance), which needs declared masses.
     #[serde(default)]
     pub(crate) consistency: ConsistencySetting,
-    /// Hz, of the low-pass that measured and simulated torque have in common; without it, chosen from how fast the joints come and go,
-    /// from 10 Hz to a tenth of the rate.
+    /// Hz, of the low-pass that measured and simulated torque have in common; by default from 10 Hz to a tenth of the rate, by how fast the
+    /// joints come and go.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) cutoff_hz: Option<f64>,
     /// Causes that are not tried and never named.

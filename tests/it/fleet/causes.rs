@@ -5,7 +5,8 @@ use crate::answer::{has, read, root};
 use crate::fixture::spread;
 use calib::report::fleet_causes::html;
 use calib::table::{FleetCellRow, FleetCells, FleetFindingRow, FleetFindings, FleetOutliers};
-use calib::twin::torque::{TorqueCase, TorqueDesign};
+use calib::twin::conceal::design::Design;
+use calib::twin::torque::TorqueCase;
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -220,15 +221,14 @@ fn a_fleet_without_a_common_cause_names_none_and_a_robot_alone_is_reported() {
 fn arms_of_a_model_have_their_friction_and_a_ripple_of_a_gear_in_common() {
     let folder = tempfile::tempdir().unwrap();
     let (folder, store) = (folder.path(), folder.path().join("store"));
-    let design = TorqueDesign {
+    let design = Design {
         seed: 3,
         cases: 8,
         nulls: 1.0,
-        pairs: 0.0,
-        open: 0.0,
         other_forms: 0.0,
         seconds: 20.0,
         rate: 50.0,
+        ..Design::default()
     };
     let has_sensors = |case: &TorqueCase| case.recording()[1].1.contains("tau1_nm");
     let mut cases = (0..8).map(|number| TorqueCase::draw(&design, number));

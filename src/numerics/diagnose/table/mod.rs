@@ -64,8 +64,16 @@ pub(crate) struct Rounds {
     empty: BTreeSet<String>,
     /// Keys of the cells of sets that were answered, or that an answer led to.
     exchanged: BTreeSet<Vec<String>>,
-    /// What the last answer led to: components with the keys of their cells, and the products among them.
-    better: Option<(Vec<(String, Component)>, Vec<(FreeShape, f64)>)>,
+    /// What the last answer led to.
+    better: Option<KnownComponents>,
+}
+
+/// Components from round to round.
+struct KnownComponents {
+    /// With the keys of their cells.
+    components: Vec<(String, Component)>,
+    /// Products among them, with ln of their prior odds.
+    products: Vec<(FreeShape, f64)>,
 }
 
 /// What a round found.
@@ -110,7 +118,11 @@ impl Rounds {
 
     /// Goes on with what the last answer led to; false where it led to nothing, or to what was left before.
     pub(crate) fn exchange(&mut self) -> bool {
-        let Some((components, products)) = self.better.take() else {
+        let Some(KnownComponents {
+            components,
+            products,
+        }) = self.better.take()
+        else {
             return false;
         };
         let mut keys: Vec<String> = components.iter().map(|(key, _)| key.clone()).collect();
@@ -249,12 +261,9 @@ impl Rounds {
             cell::Shapes::Listed(_) => None,
         };
         self.exchanged.insert(sorted(&keys));
-        self.better = better.map(|next| {
-            let products = next.iter().filter_map(product).collect();
-            (
-                keys_of(&table, &next).into_iter().zip(next).collect(),
-                products,
-            )
+        self.better = better.map(|next| KnownComponents {
+            products: next.iter().filter_map(product).collect(),
+            components: keys_of(&table, &next).into_iter().zip(next).collect(),
         });
         let mut causes = estimated(&table, &components);
         by_currents(&mut causes, view);
