@@ -61,10 +61,15 @@ const TRIALS: &[(&str, &str, &str)] = &[
     (
         "cell_evidence",
         "points",
-        "{diagnose: {on: [fit]}, given: [{cell: \"joint_compliance@joint 2\", size_mm: 0.1}]}",
+        "{diagnose: {on: [fit]}, given: [{cell: \"joint_compliance@joint 2\", size: 0.1}]}",
     ),
     ("ingest_torques", "torques", ""),
     ("diagnose_torques", "torques", "{}"),
+    (
+        "torque_evidence",
+        "torques",
+        "{diagnose: {}, given: [{cell: \"viscous_friction@joint 2\", size: 1}]}",
+    ),
     ("masses", "torques", "{}"),
     ("compare_torques", "torques", "{}"),
     ("report_torques", "torques", "{}"),

@@ -17,6 +17,8 @@ criteria! {
     FAULT: f64 = 0.98, "probability", "count: wrong points among those said, concealed recordings", "";
     /// Standard errors by which a number must be beyond what is possible.
     FIRM: f64 = 2.0, "standard errors", "literature: 95 % of a normal law", "";
+    /// Groups of rows of like loads, in which a curve of the load is looked at.
+    LOADS: usize = 12, "groups", "judgement: some rows each, and a curve that turns back shows", "";
     /// Joints move the point by less than this (m/rad): no effect of theirs can be seen.
     STILL: f64 = 1e-3, "m/rad", "physics: a thousandth of a radian moves it by a micrometre", "";
     /// Standard deviations from which on a cause is found.

@@ -7,6 +7,7 @@ use super::screen::{self, NextStep, declared_in_yaml};
 use super::short_finding::{Found, ShortFinding, words};
 use super::{labelled, robot_of};
 use crate::diagnose::VerdictKind;
+use crate::effect::names;
 use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
 use crate::report::diagnosed_page;
@@ -166,7 +167,12 @@ impl DiagnosisSummary {
         let findings = findings.filter(|finding| is_separable_by_poses(&finding.effect));
         let rivals = findings.flat_map(|finding| {
             let rivals = finding.rivals.iter();
-            let rivals = rivals.filter(|rival| is_separable_by_poses(&rival.effect));
+            // Without a name and without a difference: another place of the same motion.
+            let is_one_motion = |rival: &&RivalRow| {
+                [&*finding.effect, &*rival.effect] == [names::UNKNOWN; 2] && rival.delta_bic == 0.0
+            };
+            let rivals = rivals
+                .filter(|rival| is_separable_by_poses(&rival.effect) && !is_one_motion(rival));
             let mut rivals: Vec<&RivalRow> = rivals.collect();
             rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
             rivals

@@ -337,6 +337,7 @@ pub(super) fn share_with_identities(
         if let Some(known) = known {
             if is_motion {
                 known.probability += share * left;
+                known.delta_bic = 0.0;
                 left *= 1.0 - share;
             }
         } else {

@@ -9,7 +9,7 @@ use crate::error::counted;
 use crate::estimate::{Screening, Suspect, SuspectKind};
 use crate::observation::{Dimension, noise, only_contacts};
 use crate::robot::Measurements;
-use crate::types::{Finding, Probabilities};
+use crate::types::{Finding, Probabilities, RivalCause};
 use crate::verdict::findings::LastRound;
 use crate::words::small;
 
@@ -128,6 +128,14 @@ fn masses(survey: &Survey) -> Option<String> {
 /// Where nothing else is needed.
 const POSES: &str = "more poses, chosen to separate them (`calib poses --run`)";
 
+/// Where no poses tell.
+const ONE_MOTION: &str = "both are one motion, which no poses tell apart: look at both";
+
+/// Whether a rival is another place of a finding's motion.
+fn is_one_motion(finding: &Finding, rival: &RivalCause) -> bool {
+    [finding.effect, rival.effect] == [names::UNKNOWN; 2] && rival.delta_bic == 0.0
+}
+
 /// What would tell findings from their rivals, a sentence each.
 pub(super) fn next(findings: &[Finding], own: &[&'static DeclaredCause]) -> Vec<String> {
     let mut out = Vec::new();
@@ -144,7 +152,11 @@ pub(super) fn next(findings: &[Finding], own: &[&'static DeclaredCause]) -> Vec<
                         )
                     }),
             );
-            let how = how.unwrap_or(POSES);
+            let how = if is_one_motion(finding, rival) {
+                ONE_MOTION
+            } else {
+                how.unwrap_or(POSES)
+            };
             out.push(format!(
                 "{} at {} or {} at {}: {how}",
                 finding.effect, finding.place, rival.effect, rival.place

@@ -1,13 +1,10 @@
 //! Whether a free curve of a joint over its own load can be its wind-up: the more a joint is loaded, the more it turns that way.
 
 use super::findings::LastRound;
-use crate::criteria::words::{FIRM, NAMELESS};
+use crate::criteria::words::{FIRM, LOADS, NAMELESS};
 use crate::diagnose::table::FoundCell;
 use crate::effect::{Deflection, Direction, Place, names};
 use nalgebra::DVector;
-
-/// Groups of rows of like loads.
-const GROUPS: usize = 12;
 
 /// Rows of like loads.
 struct LoadGroup {
@@ -101,7 +98,7 @@ fn groups(last: &LastRound, found: &FoundCell, joint: usize, count: usize) -> Ve
                 * share,
         }
     };
-    rows.chunks(rows.len().div_ceil(GROUPS).max(1))
+    rows.chunks(rows.len().div_ceil(*LOADS).max(1))
         .map(mean)
         .collect()
 }
