@@ -24,6 +24,8 @@ criteria! {
     PRODUCT: f64 = 0.0007, "odds", "judgement: less than a rare cause", "";
     /// Prior odds of a product without a name of which neither variable shows by itself.
     PAIR: f64 = 1e-5, "odds", "count: the odds of a place over its thousand pairs", "";
+    /// Cosine of the angle between two directions in space above which they are one variable.
+    ONE_DIRECTION: f64 = 0.95, "cosine", "judgement: less than a third of the angle between those that are asked", "";
     /// Ratio of what a search leaves to the stated noise above which all pairs of variables are looked at.
     UNEXPLAINED: f64 = 1.25, "ratio", "judgement: no stated noise is off by more as a rule", "";
     /// Products, of all pairs of variables, that become cells.

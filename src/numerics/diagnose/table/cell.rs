@@ -1,6 +1,8 @@
 //! Cells: a cause at a place in every shape that it may have, or a motion of a place over a variable that no cause of the list has.
 
-use crate::criteria::cells::{BENDING, BENT, EACH, FEW, LENGTHS, MARGIN, ROUGHLY, STEPS};
+use crate::criteria::cells::{
+    BENDING, BENT, EACH, FEW, LENGTHS, MARGIN, ONE_DIRECTION, ROUGHLY, STEPS,
+};
 use crate::effect::{
     Basis, Form, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names,
 };
@@ -139,7 +141,13 @@ impl FreeShape {
                 over: Over::Product(other),
                 ..*self
             }))
+            .filter(|one| !one.is_square())
             .collect()
+    }
+
+    /// Whether it is a product of one variable with itself.
+    pub(super) fn is_square(&self) -> bool {
+        matches!(self.over, Over::Product(other) if is_square(self.of, other))
     }
 
     /// Its curves at all correlation lengths.
@@ -317,6 +325,17 @@ impl FreeShape {
                 }]
             }
         }
+    }
+}
+
+/// Whether a product of both is one of a variable with itself; two directions in space are two variables where they differ.
+pub(super) fn is_square(a: Variable, b: Variable) -> bool {
+    match (a, b) {
+        (Variable::Position { along: a }, Variable::Position { along: b })
+        | (Variable::Sighted { along: a }, Variable::Sighted { along: b }) => {
+            Vector3::from(a).dot(&Vector3::from(b)).abs() > *ONE_DIRECTION
+        }
+        _ => a == b || a.is_alike(b),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The cells without a name: every motion of every place over every variable of the recording, less what a named cell is; and products of
 //! two variables where one of them shows. What is left out here would take the name of a neighbour.
 
-use super::cell::{CauseCell, FreeShape, Over, Shapes};
+use super::cell::{CauseCell, FreeShape, Over, Shapes, is_square};
 use super::frame::SearchRows;
 use crate::criteria::cells::{FADING, LIMITS, PAIR, PRODUCT};
 use crate::diagnose::types::Question;
@@ -113,15 +113,15 @@ pub(super) fn products(
         frame.prepare(&[], &others);
         let mut seen: Vec<Variable> = Vec::new();
         for other in others {
-            if seen.contains(&other) || is_square(*of, other) {
-                continue;
-            }
-            seen.push(other);
             let free = FreeShape {
                 motion: *motion,
                 of: *of,
                 over: Over::Product(other),
             };
+            if seen.contains(&other) || free.is_square() {
+                continue;
+            }
+            seen.push(other);
             let cell = cell(free, PRODUCT.ln(), survey);
             if !out.iter().any(|known| known.key == cell.key) {
                 out.push(cell);
@@ -209,12 +209,6 @@ pub(super) fn are_near(a: Place, b: Place, steps: usize, survey: &Survey) -> boo
     };
     let both = along(a).zip(along(b));
     both.is_some_and(|(a, b)| a.abs_diff(b) <= steps)
-}
-
-/// Whether a product of both is one of a variable with itself: two directions in space are two variables.
-fn is_square(a: Variable, b: Variable) -> bool {
-    let space = matches!(a, Variable::Position { .. } | Variable::Sighted { .. });
-    a == b || !space && a.is_alike(b)
 }
 
 pub(super) fn cell(free: FreeShape, log_prior: f64, survey: &Survey) -> CauseCell {
