@@ -88,6 +88,13 @@ impl Fleet {
             );
             Error::spec("prior.fleet", message)
         })?;
+        if let Some(row) = findings.0.iter().find(|row| row.unit != "mm") {
+            let message = format!(
+                "fleet `{}` was diagnosed by torques (sizes in {}); allowed: a fleet that was diagnosed by positions",
+                wanted.fleet, row.unit
+            );
+            return Err(Error::spec("prior.fleet", message));
+        }
         let mut causes: Vec<(&FleetFindingRow, Vec<FleetCellRow>)> = Vec::new();
         for row in findings.0.iter().filter(|row| row.robot.is_empty()) {
             let of_row = |cell: &&FleetCellRow| cell.cell == row.cell && cell.group == row.group;

@@ -175,7 +175,7 @@ pub(super) fn joints(
     found
 }
 
-/// Columns that are numbered through from 0 or 1, by what they are called.
+/// Columns whose headers are numbered from 0 or 1.
 pub(super) fn numbered(
     parts: impl Iterator<Item = (usize, (String, usize))>,
 ) -> Vec<(String, Vec<usize>)> {

@@ -154,7 +154,7 @@ impl Experiment<'_> {
             0.0
         };
         let joints = self.repeatability_arcsec.iter();
-        let mut astray: Vec<f64> = joints.map(|_| play.normal()).collect();
+        let mut deviations: Vec<f64> = joints.map(|_| play.normal()).collect();
         let mut direction = vec![0.0; scene.arm.links.len()];
         let blocks = self.blocks.iter().enumerate();
         let blocks =
@@ -169,10 +169,10 @@ impl Experiment<'_> {
                 ..
             } = path.at(since_s + later);
             let mut drive = self.truth.drive(self.robot, &command);
-            for astray in &mut astray {
-                *astray = lasts * *astray + (1.0 - lasts * lasts).sqrt() * play.normal();
+            for deviation in &mut deviations {
+                *deviation = lasts * *deviation + (1.0 - lasts * lasts).sqrt() * play.normal();
             }
-            self.scatter(&mut drive, &scene.arm, |joint| astray[joint]);
+            self.scatter(&mut drive, &scene.arm, |joint| deviations[joint]);
             for (side, speed) in direction.iter_mut().zip(&velocity) {
                 *side = if *speed == 0.0 { *side } else { speed.signum() };
             }

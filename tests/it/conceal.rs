@@ -262,7 +262,7 @@ fn outcomes_are_those_of_what_is_said() {
     assert_eq!(alarms, 0, "no false alarm");
     let [alarms, _] = of_all(&score_of(|_| vec![false_name()]), "wrong");
     assert_eq!(alarms, 3, "one in each null");
-    // Said along with the truth it changes no outcome, but no recording is right.
+    // Named with the truth it changes no outcome, but no recording is right.
     let board = score_of(|truth| [wanted(truth), vec![false_name()]].concat());
     of_all(&board, "exact");
     assert_eq!(board["failures"].as_array().map(Vec::len), Some(12));

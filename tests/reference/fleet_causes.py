@@ -272,7 +272,7 @@ def main():
     parser.add_argument("--torques", default=None)
     parser.add_argument("--short", type=int, default=0)
     parser.add_argument("--size", type=int, default=0)
-    parser.add_argument("--strength", type=float, default=None, help="of the cause of a large fleet, without a search for it")
+    parser.add_argument("--strength", type=float, default=None, help="of the cause (torques: Nm), without a search for it")
     args = parser.parse_args()
     args.calib = os.path.abspath(args.calib)
     seed = args.seed if args.seed is not None else random.SystemRandom().randrange(1 << 31)
@@ -291,7 +291,7 @@ def main():
         j = r.choice([2, 3] if effect == "joint_compliance" and args.mujoco else [2, 3, 4])
         place = f"{kind} {j}"
         store = os.path.join(args.out, "store")
-        strength = scaled(args.out, world, cause, j, args, r)
+        strength = args.strength or scaled(args.out, world, cause, j, args, r)
         lacking = r.randrange(args.robots)
         effects = [[] if k == lacking else [make(j, strength * r.gauss(1, 0.1), r)] for k in range(args.robots)]
         begun = time.time()

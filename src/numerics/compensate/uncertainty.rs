@@ -184,7 +184,7 @@ pub struct CorrectionUncertainty {
     pub(crate) u95: f64,
     /// The effect and place that most of it comes from, where one stands out.
     pub(crate) finding: Option<String>,
-    /// Findings that are used beyond what was fitted and may be off there by more than the instrument leaves open, and over what.
+    /// Findings that are extrapolated and may be off there by more than the uncertainty of the instrument, each with its variable.
     pub(crate) beyond: Vec<(String, String)>,
     /// m, 95 %: what is usual at the recorded poses; 0 where they are not known.
     pub(crate) usual: f64,

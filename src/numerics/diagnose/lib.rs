@@ -82,7 +82,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
 /// A search until nothing changes.
 struct Attempt<'a> {
     fitter: Fitter<'a>,
-    /// What the base model leaves of every row.
+    /// Errors of all rows by the base model.
     before: Vec<Option<f64>>,
     /// The model around which the last round searched, and the one that it led to.
     now: FitState,
@@ -123,8 +123,8 @@ impl<'a> Attempt<'a> {
                 fitter.follow(&now);
                 continue;
             };
-            // What lasts from row to row of standing points is noise where no cause is left that would explain it, or where a cause that
-            // follows time may be that noise.
+            // A residual that lasts from row to row of standing points is noise where no further cause would explain it, or where a cause
+            // that follows time may be that noise.
             let settled = answer.nothing_last > *SETTLED;
             let asked =
                 settled || fitter.data.in_motion(&next.screening.kept) || next.follows_time();
@@ -139,7 +139,7 @@ impl<'a> Attempt<'a> {
                 rounds.again();
                 continue;
             }
-            // What is left and nothing explains may be a noise that is misjudged.
+            // A residual that nothing explains may be a noise that is misjudged.
             let quiet = settled || answer.found.is_empty();
             if let Some(sigma) = quiet.then(|| fitter.noise_left_by(&next)).flatten() {
                 fitter.learn(sigma);
@@ -174,7 +174,7 @@ impl<'a> Attempt<'a> {
         self.fitter.question.fit.len() - self.next.screening.kept.len()
     }
 
-    /// Rms of what is left of the rows that are not.
+    /// Rms error of the fitted rows.
     fn leftover(&self) -> f64 {
         let fitter = &self.fitter;
         let model = &self.next.model;

@@ -357,7 +357,7 @@ pub struct TorqueGate {
     pub model: Vec<String>,
 }
 
-/// What is to be said of a row. Joints count from 0.
+/// Remarks on a row. Joints count from 0.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TorqueRemark {
     /// A joint where, or faster than, or under more load than it was recorded, in words.
@@ -440,7 +440,7 @@ impl fmt::Display for JudgedRow {
 }
 
 impl TorqueModel {
-    /// What is to be said of each row of a motion, and which are refused.
+    /// Remarks on each row of a motion, and which rows are refused.
     pub fn judged(
         &self,
         motion: &PlannedMotion,

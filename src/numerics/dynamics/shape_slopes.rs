@@ -326,7 +326,7 @@ impl JointFit {
         }
     }
 
-    /// What the columns leave of a course.
+    /// Residual of a course after a fit of the columns.
     fn apart(&self, course: &DVector<f64>) -> DVector<f64> {
         match &self.factor {
             Some(factor) => course - &self.columns * factor.solve(&self.columns.tr_mul(course)),

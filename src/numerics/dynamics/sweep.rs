@@ -374,7 +374,7 @@ impl StackedColumns {
         }
     }
 
-    /// What a fit leaves of the second recording, Nm rms per joint.
+    /// Residual of the second recording after a fit, Nm rms per joint.
     pub(crate) fn residual_rms(&self, fit: &SweptColumns) -> Vec<f64> {
         let mut left = self.measured.clone();
         for (number, value) in fit.solution() {

@@ -221,9 +221,9 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// How many rows before a row remembers, at most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum NoiseMemory {
-    /// What a rich model leaves: slow noise went with what is slow in that model.
+    /// By the residual of a rich model, which absorbs slow noise.
     Short = 0,
-    /// What a set leaves: slow noise is all there.
+    /// By the residual of a set of causes, with all of the slow noise.
     Long = 1,
 }
 

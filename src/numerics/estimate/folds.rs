@@ -248,7 +248,7 @@ pub fn gather(
     rows.iter().map(|row| all[*row]).collect()
 }
 
-/// Least share of what is known in any direction that must be left without a part: with less, other parameters may be seen.
+/// Least share of the information in any direction that remains without a fold: with less, other parameters may be seen.
 const LEFT: f64 = 0.02;
 /// Departure from a straight line (of the part's errors) up to which a step is small.
 const STRAIGHT: f64 = 0.01;

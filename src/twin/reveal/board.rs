@@ -343,5 +343,5 @@ fn failure(case: &Case) -> String {
         points,
         ..
     } = case;
-    format!("  {name} ({robot}, {points} points): {wanted}; said besides: {strays}")
+    format!("  {name} ({robot}, {points} points): {wanted}; also named: {strays}")
 }

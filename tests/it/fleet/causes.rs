@@ -262,6 +262,13 @@ fn arms_of_a_model_have_their_friction_and_a_ripple_of_a_gear_in_common() {
     // 0.5 Nm is 0.35 Nm rms.
     let size = ripple["size"].as_f64().unwrap();
     assert!((size - 0.35).abs() < 0.08, "{size}");
+    // Its sizes are no lengths.
+    let next = text.replace("name: arms", "name: next")
+        + "prior: {fleet: arms, stage: diagnose_torques, by: causes}\n";
+    let next = write(folder.join("next.yaml"), &next);
+    let (result, message) = output(fleet("run", &next, &store).arg("--quiet"));
+    assert_eq!(result.status.code(), Some(2), "{message}");
+    has(&message, "was diagnosed by torques (sizes in Nm)");
 }
 
 /// Rows of a recording with a torque at joint 4 that comes back three times a turn.

@@ -379,7 +379,7 @@ pub(super) fn mm(metres: f64) -> String {
     }
 }
 
-/// A set-up error that explains what the nominal robot leaves.
+/// A set-up error that explains the residual of the nominal robot.
 pub(super) fn explained(
     question: &Question,
     stated: &AsStated,
@@ -477,7 +477,7 @@ pub(super) fn implausible(question: &Question, numbers: &[String]) -> Diagnosis 
     wrong(question, vec![finding(format!("{text}."))])
 }
 
-/// Nothing of the list explains what the nominal robot leaves.
+/// Nothing of the list explains the residual of the nominal robot.
 pub(super) fn unexplained(question: &Question, stated: &AsStated) -> Diagnosis {
     let statement = format!(
         "the set-up is wrong: with base and tool fitted the nominal robot is {} off the points (median), {:.1} % of its reach, and \

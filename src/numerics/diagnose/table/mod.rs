@@ -116,7 +116,7 @@ impl Rounds {
         !causes.is_empty()
     }
 
-    /// Goes on with what the last answer led to; false where it led to nothing, or to what was left before.
+    /// Goes on with the components that the last answer found to be more probable; false where there are none, or where they were had before.
     pub(crate) fn exchange(&mut self) -> bool {
         let Some(KnownComponents {
             components,

@@ -199,13 +199,13 @@ pub(super) fn stand_out_in_number(screening: &Screening, rows: usize) -> bool {
     many as f64 > (1.0 - *BULK) * rows as f64
 }
 
-/// Whether nothing but the model speaks against a row that is set aside.
+/// Whether a row is set aside by the model alone.
 fn is_by_the_model_alone(suspect: &Suspect) -> bool {
     suspect.kind == SuspectKind::Outlier && !suspect.corroborated
 }
 
-/// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell. Where physics is
-/// left, a row that only the model speaks against may be where that shows most.
+/// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot predict. Where physics is
+/// missing, a row that is set aside by the model alone may be where that shows most.
 pub(super) fn faults(
     last: &LastRound,
     unknown: Option<usize>,
