@@ -94,6 +94,10 @@ criteria! {
     TURNED: f64 = 0.1, "ln of evidence", "judgement: no odds that matter change by it", "";
     /// Functions of the curve of a product that stays free in the end.
     JUMPING: usize = 40, "functions", "count: a jump within a fortieth of the range", "";
+    /// Cosines of a curve that is looked at once more.
+    FINELY: usize = 24, "cosines", "count: bends over a twenty-fourth of the range", "";
+    /// Values of a variable at which a curve is asked for a step.
+    THRESHOLDS: usize = 48, "values", "judgement: bounds time; a step is met to a fiftieth of the rows", "";
     /// Cosines of what is not straight in a law that is nearly a line.
     BENDING: usize = 12, "cosines", "count: bends over a twelfth of the range", "";
     /// Steps in time of a motion without a name that are asked at first.

@@ -72,6 +72,13 @@ pub enum Basis {
         /// Where it steps.
         at: f64,
     },
+    /// 1 above each of the first `count` of these, else 0: what jumps between levels.
+    Steps {
+        /// Where it steps.
+        at: [f64; Self::STEPS],
+        /// How many steps.
+        count: usize,
+    },
     /// -1 or 1.
     Sign,
     /// The power of the share of the way from `start` to `end`, odd about `start`.
@@ -107,6 +114,8 @@ const CREEPING: f64 = 2.0;
 impl Basis {
     /// How many functions make up a [`Basis::Curve`].
     pub const CURVE: usize = 16;
+    /// How many steps a [`Basis::Steps`] has at most.
+    pub const STEPS: usize = 6;
 
     /// The variable itself.
     pub const PROPORTIONAL: Self = Self::Linear {
@@ -120,7 +129,9 @@ impl Basis {
             Self::Straight { .. } => 2,
             Self::Wave { overtone, .. } => 2 + 2 * usize::from(*overtone),
             Self::Sway { .. } => 2,
-            Self::Cosines { count, .. } | Self::Series { count, .. } => *count,
+            Self::Cosines { count, .. }
+            | Self::Series { count, .. }
+            | Self::Steps { count, .. } => *count,
             _ => 1,
         }
     }
@@ -129,7 +140,7 @@ impl Basis {
     pub(crate) fn is_curve(&self) -> bool {
         matches!(
             self,
-            Self::Cosines { .. } | Self::Series { .. } | Self::Curve { .. }
+            Self::Cosines { .. } | Self::Series { .. } | Self::Curve { .. } | Self::Steps { .. }
         )
     }
 
@@ -190,6 +201,11 @@ impl Basis {
             }
             Self::Rise { centre, width } => each(0, libm::tanh((u - centre) / width)),
             Self::After { at } => each(0, f64::from(u > at)),
+            Self::Steps { at, count } => at
+                .iter()
+                .take(count)
+                .enumerate()
+                .for_each(|(k, at)| each(k, f64::from(u > *at))),
             Self::Sign => each(0, u.signum()),
             Self::Power {
                 start,

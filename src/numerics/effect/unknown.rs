@@ -1,7 +1,7 @@
 //! `unknown`: laws without a name, for what no cause of the list explains: placed and described, never christened.
 
 use super::{
-    Axes, AxisPoint, Basis, Cause, Clock, Motion, NumberSpec, Place, Polar, Summary, Term,
+    Axes, AxisPoint, Basis, Cause, Clock, Factor, Motion, NumberSpec, Place, Polar, Summary, Term,
     Variable, names,
 };
 use crate::robot::RobotModel;
@@ -92,7 +92,10 @@ pub(super) fn variant(term: &Term) -> String {
         of => of.to_string().replace(' ', "_"),
     };
     let names: Vec<String> = term.law().variables().iter().map(label).collect();
+    let steps = |factor: &Factor| matches!(factor.basis, Basis::Steps { .. });
+    let jumps = term.law().factors().any(steps);
     let shape = match term.basis() {
+        _ if jumps => "_steps".into(),
         Basis::Linear { .. } => "_line".into(),
         Basis::After { at } => format!("_after_{at:.0}"),
         _ => String::new(),
@@ -116,6 +119,7 @@ pub(super) fn variant(term: &Term) -> String {
         return format!("{moves}{}{shape}", names.join("_"));
     }
     match (term.basis(), term.law().first.of) {
+        _ if jumps => format!("{}{shape}", names.join("_")),
         (_, Variable::Gravity { .. }) if curve => names.join("_"),
         (_, Variable::Gravity { .. }) => "sag".into(),
         (Basis::After { at }, Variable::Time) => format!("after_{at:.0}"),

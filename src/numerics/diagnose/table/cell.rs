@@ -164,7 +164,7 @@ impl FreeShape {
         };
         vec![ShapeGroup {
             forms: vec![self.term(Law::new(self.of, self.cosines([low, high], count)))],
-            shapes: self.matern(count, lengths).into_iter().map(shape).collect(),
+            shapes: self.smooth(count, lengths).into_iter().map(shape).collect(),
             positive: false,
             largest: f64::INFINITY,
         }]
@@ -181,17 +181,24 @@ impl FreeShape {
         )
     }
 
+    /// The same, or a curve of one of two variables, which is multiplied.
+    fn curves_have_mean(&self) -> bool {
+        self.has_mean() || matches!(self.over, Over::Product(_))
+    }
+
     /// A line over values of its variable.
-    fn line(&self, values: &[f64]) -> Option<Basis> {
+    pub(super) fn line(&self, values: &[f64]) -> Option<Basis> {
         match line(values)? {
-            Basis::Linear { zero, per } if self.has_mean() => Some(Basis::Straight { zero, per }),
+            Basis::Linear { zero, per } if self.curves_have_mean() => {
+                Some(Basis::Straight { zero, per })
+            }
             line => Some(line),
         }
     }
 
     /// So many cosines over a range of its variable.
-    fn cosines(&self, [low, high]: [f64; 2], count: usize) -> Basis {
-        if self.has_mean() {
+    pub(super) fn cosines(&self, [low, high]: [f64; 2], count: usize) -> Basis {
+        if self.curves_have_mean() {
             let count = count + 1;
             Basis::Series { low, high, count }
         } else {
@@ -199,19 +206,29 @@ impl FreeShape {
         }
     }
 
-    /// Shares of its cosines, half of all for the mean where it has one.
-    fn with_mean(&self, shares: Vec<f64>) -> Vec<f64> {
-        if !self.has_mean() {
-            return shares;
-        }
-        let others = shares.into_iter().map(|share| 0.5 * share);
-        std::iter::once(0.5).chain(others).collect()
+    /// Shares of its cosines, half of all for the mean where it has one, for every direction of its motion alike.
+    fn shares(&self, cosines: Vec<f64>) -> Vec<f64> {
+        let functions = if self.curves_have_mean() {
+            let others = cosines.into_iter().map(|share| 0.5 * share);
+            std::iter::once(0.5).chain(others).collect()
+        } else {
+            cosines
+        };
+        over_fields(functions, self.motion, fields(self.motion))
     }
 
     /// Shares of a smooth curve, one list a correlation length.
-    fn matern(&self, count: usize, lengths: usize) -> Vec<Vec<f64>> {
-        let all = matern(count, lengths, self.motion).into_iter();
-        all.map(|shares| self.with_mean(shares)).collect()
+    pub(super) fn smooth(&self, count: usize, lengths: usize) -> Vec<Vec<f64>> {
+        let of = |length: &f64| self.shares(density(count, *length));
+        LENGTHS[..lengths.min(LENGTHS.len())]
+            .iter()
+            .map(of)
+            .collect()
+    }
+
+    /// Shares of a curve with corners.
+    pub(super) fn rough(&self, count: usize) -> Vec<f64> {
+        self.shares(cornered(count))
     }
 
     pub(crate) fn groups(
@@ -261,11 +278,10 @@ impl FreeShape {
                 let [low, high] = support(&values);
                 let curve = self.term(Law::new(self.of, self.cosines([low, high], count)));
                 let lengths = if closely { lengths } else { lengths.min(2) };
-                let rough = (closely && lengths > 3)
-                    .then(|| self.with_mean(over_fields(cornered(count), self.motion, fields)));
+                let rough = (closely && lengths > 3).then(|| self.rough(count));
                 vec![ShapeGroup {
                     forms: vec![line, curve],
-                    shapes: line_and_curve(straight, &self.matern(count, lengths), rough),
+                    shapes: line_and_curve(straight, &self.smooth(count, lengths), rough),
                     positive: false,
                     largest: f64::INFINITY,
                 }]
@@ -443,7 +459,8 @@ pub(super) fn not_quite_straight(
     );
     let fields = fields(motion);
     let mut shapes = Vec::new();
-    for curve in matern(*BENDING, 3, motion) {
+    for length in &LENGTHS[..3] {
+        let curve = over_fields(density(*BENDING, *length), motion, fields);
         for share in *BENT {
             let all = 1.0 + share * share;
             let line = std::iter::repeat_n(1.0 / (fields as f64 * all), fields);
@@ -466,7 +483,11 @@ pub(super) fn not_quite_straight(
 }
 
 /// A line of so many columns, curves of some correlation lengths, lines that are not quite straight, and a curve with corners.
-fn line_and_curve(line: usize, lengths: &[Vec<f64>], rough: Option<Vec<f64>>) -> Vec<CellShape> {
+pub(super) fn line_and_curve(
+    line: usize,
+    lengths: &[Vec<f64>],
+    rough: Option<Vec<f64>>,
+) -> Vec<CellShape> {
     let curve = lengths[0].len();
     let half = 0.5_f64.ln();
     let straight = std::iter::repeat_n(1.0 / line as f64, line)
@@ -547,15 +568,6 @@ pub(super) fn over_fields(shares: Vec<f64>, motion: Motion, fields: usize) -> Ve
             .flat_map(|_| shares.iter().map(scaled))
             .collect()
     }
-}
-
-/// Shares of cosines of a smooth curve, one list a correlation length, for every direction of a motion alike.
-fn matern(count: usize, lengths: usize, motion: Motion) -> Vec<Vec<f64>> {
-    let of = |length: &f64| over_fields(density(count, *length), motion, fields(motion));
-    LENGTHS[..lengths.min(LENGTHS.len())]
-        .iter()
-        .map(of)
-        .collect()
 }
 
 /// Shares of cosines: the spectral density of a Matern kernel with smoothness 3/2 (Rasmussen and Williams, 2006, ch. 4).

@@ -21,6 +21,7 @@ mod scan;
 mod search;
 mod separable;
 mod state;
+mod stepped;
 
 pub(crate) use answer::{Answer, FoundCell};
 pub use evidence::{AMPLITUDES, EvidenceRows, GroupEvidence, evidence, log_sum};

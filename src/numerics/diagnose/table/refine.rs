@@ -5,7 +5,7 @@ use super::cell::{FreeShape, Over, ShapeGroup, Shapes, fields};
 use super::component::{Component, form_keys};
 use super::scan::{CellEvidence, CellScan, Refined};
 use super::state::KnownState;
-use crate::criteria::cells::{BENDS, LEVELS, SEPARATED, STICKS};
+use crate::criteria::cells::{BENDS, CLOSELY, LEVELS, SEPARATED, STICKS};
 use crate::effect::{Basis, Form, Variable};
 use rayon::prelude::*;
 
@@ -57,7 +57,8 @@ impl CauseTable<'_, '_> {
         }
     }
 
-    /// Gives the best cell of a scan and products near it the shape of one curve times another where that says more.
+    /// Gives the best cell of a scan and those near it finer shapes where those say more: a product that of one curve times another, a curve
+    /// steps.
     pub(crate) fn separate(
         &self,
         scan: &mut CellScan,
@@ -66,19 +67,29 @@ impl CauseTable<'_, '_> {
     ) {
         let Some(best) = scan.best() else { return };
         let least = 0.8 * scan.log_odds[best];
-        let mut products: Vec<usize> = scan.closely.keys().copied().collect();
-        products.retain(|cell| self.is_product(*cell) && scan.log_odds[*cell] >= least);
-        products.sort_by(|a, b| {
+        let mut near: Vec<usize> = scan.closely.keys().copied().collect();
+        near.retain(|cell| scan.log_odds[*cell] >= least);
+        near.sort_by(|a, b| {
             scan.log_odds[*b]
                 .total_cmp(&scan.log_odds[*a])
                 .then(a.cmp(b))
         });
-        products.truncate(*SEPARATED);
-        let separated: Vec<(usize, Refined)> = products
+        let products = near.iter().filter(|cell| self.is_product(**cell));
+        let curves = near.iter().filter(|cell| !self.is_product(**cell));
+        let some: Vec<usize> = products
+            .take(*SEPARATED)
+            .chain(curves.take(*CLOSELY))
+            .copied()
+            .collect();
+        let separated: Vec<(usize, Refined)> = some
             .into_par_iter()
             .filter_map(|cell| {
                 let found = &scan.closely[&cell];
-                let separated = self.separable(cell, found, state, components)?;
+                let separated = if self.is_product(cell) {
+                    self.separable(cell, found, state, components)?
+                } else {
+                    self.stepped(cell, found, state, components, cell == best)?
+                };
                 (separated.log > found.log).then_some((cell, separated))
             })
             .collect();

@@ -3,7 +3,7 @@
 use super::cause_table::CauseTable;
 use super::cell::{CellShape, FreeShape, Over, ShapeGroup, Shapes};
 use super::component::{CellColumns, Component, form_keys, shape_keys};
-use super::evidence::log_sum;
+use super::evidence::{GroupEvidence, log_sum};
 use super::frame::UnitColumns;
 use super::state::KnownState;
 use crate::criteria::cells::{BENDS, FAR_BELOW, JOINS, PAIR, PAIRS, SEPARATED, UNLIKELY};
@@ -23,6 +23,8 @@ pub(super) struct CellEvidence {
     /// Group and shape.
     pub(crate) shape: (usize, usize),
     pub(crate) amplitude: f64,
+    /// What it explains of the squared residual.
+    pub(crate) fit: f64,
     /// The shape with its numbers where they say most, with ln of its evidence and its amplitude.
     pub(crate) refined: Option<Refined>,
 }
@@ -97,7 +99,7 @@ impl CauseTable<'_, '_> {
     ) -> Option<CellEvidence> {
         let block = self.fine(cell);
         let across = self.across_block(block, state, components);
-        let mut all: Vec<(f64, usize, usize, f64)> = Vec::new();
+        let mut all: Vec<(f64, usize, usize, GroupEvidence)> = Vec::new();
         let keys = form_keys(components);
         let is_there = |group: usize| {
             block.groups[group]
@@ -118,7 +120,7 @@ impl CauseTable<'_, '_> {
             .collect();
         state.shapes(block, &across, 0, |group, shape, found| {
             if !there[group] {
-                all.push((found.log, group, shape, found.amplitude));
+                all.push((found.log, group, shape, found));
             }
         });
         // A shape of further numbers only where it is clearly better.
@@ -129,7 +131,7 @@ impl CauseTable<'_, '_> {
                 0.0
             }
         };
-        let paid = |one: &&(f64, usize, usize, f64)| one.0 - price(one.1, one.2);
+        let paid = |one: &&(f64, usize, usize, GroupEvidence)| one.0 - price(one.1, one.2);
         let best = all.iter().max_by(|a, b| paid(a).total_cmp(&paid(b)))?;
         let log = log_sum(&all.iter().map(|one| one.0).collect::<Vec<_>>());
         let bent = log_sum(
@@ -142,7 +144,8 @@ impl CauseTable<'_, '_> {
             log,
             bent,
             shape: (best.1, best.2),
-            amplitude: best.3,
+            amplitude: best.3.amplitude,
+            fit: best.3.fit,
             refined: None,
         })
     }

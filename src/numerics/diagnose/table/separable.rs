@@ -22,6 +22,8 @@ struct Half {
     weights: Weights,
     /// ln of the evidence over that of the likeliest curve: what its numbers cost.
     cost: f64,
+    /// What it explains of the squared residual.
+    fit: f64,
 }
 
 impl CauseTable<'_, '_> {
@@ -53,7 +55,7 @@ impl CauseTable<'_, '_> {
         };
         let supports = [first, second];
         let mut curves = [(self.first_curve(free, supports, state, others)?, 0.0); 2];
-        let mut best: Option<Refined> = None;
+        let mut best: Option<Half> = None;
         let mut last = f64::NEG_INFINITY;
         for turn in 0..*TURNS {
             let given = turn % 2;
@@ -69,8 +71,8 @@ impl CauseTable<'_, '_> {
                 continue;
             }
             let log = half.refined.log;
-            if best.as_ref().is_none_or(|best| log > best.log) {
-                best = Some(half.refined);
+            if best.as_ref().is_none_or(|best| log > best.refined.log) {
+                best = Some(half);
             }
             if log < last + *TURNED {
                 break;
@@ -79,14 +81,44 @@ impl CauseTable<'_, '_> {
         }
         for (given, curve) in curves.into_iter().enumerate() {
             let half = self.half(free, (supports, *JUMPING), (given, curve), state, others);
-            let half = half.map(|half| half.refined);
             best = best
                 .into_iter()
                 .chain(half)
-                .max_by(|a, b| a.log.total_cmp(&b.log));
+                .max_by(|a, b| a.refined.log.total_cmp(&b.refined.log));
+        }
+        let Half {
+            refined: mut best,
+            fit,
+            ..
+        } = best?;
+        // Where that is not all, the free one of the two curves may jump.
+        if state.leaves_more_than_noise(fit) {
+            for (given, (weights, cost)) in curves.into_iter().enumerate() {
+                let [low, high] = supports[given];
+                let curve = Basis::Curve { low, high, weights };
+                let form = |basis| {
+                    let bases = if given == 0 {
+                        [curve, basis]
+                    } else {
+                        [basis, curve]
+                    };
+                    free.term(Law::new(free.of, bases[0]).times(other, bases[1]))
+                };
+                let of = [other, free.of][given];
+                if let Some(mut stepped) = self.with_steps(free, of, &form, state, others)
+                    && stepped.log + cost > best.log
+                {
+                    stepped.log += cost;
+                    if let Some(shape) = &mut stepped.shape {
+                        shape.log_weight += cost;
+                    }
+                    best = stepped;
+                }
+            }
         }
         let keys = form_keys(others);
-        best.filter(|best| best.forms.iter().all(|form| !keys.contains(&form.key())))
+        let is_new = best.forms.iter().all(|form| !keys.contains(&form.key()));
+        is_new.then_some(best)
     }
 
     /// A curve of the first variable from the likeliest product of few functions of each.
@@ -203,6 +235,7 @@ impl CauseTable<'_, '_> {
             },
             weights,
             cost: log - cost - gain,
+            fit: evidence.fit,
         })
     }
 }

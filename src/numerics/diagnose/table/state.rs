@@ -6,7 +6,7 @@
 use super::component::{CellColumns, Component, PartProducts, SeenGroup};
 use super::evidence::{EvidenceRows, GroupEvidence, evidence_between};
 use super::frame::SearchRows;
-use crate::criteria::cells::NU;
+use crate::criteria::cells::{NU, UNEXPLAINED};
 use crate::regression::dot;
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
@@ -135,6 +135,12 @@ impl KnownState {
         Some(weights)
     }
 
+    /// Whether what explains so much of the squared residual leaves more than noise.
+    pub(super) fn leaves_more_than_noise(&self, fit: f64) -> bool {
+        let left = (self.rows.square - fit).max(0.0) / self.rows.freedom.max(1.0);
+        self.kappa * left.sqrt() > *UNEXPLAINED
+    }
+
     /// Half of ln of the determinant of the covariance over that of the noise.
     pub fn log_determinant(&self) -> f64 {
         let count = self.along.len() as f64;
@@ -151,7 +157,7 @@ impl KnownState {
     }
 
     /// Gram matrix and gradient of a group seen through the covariance; `across` is L^-1 Z'X of its block from column `first` on.
-    fn seen(
+    pub(super) fn seen(
         &self,
         group: &SeenGroup,
         across: &DMatrix<f64>,
