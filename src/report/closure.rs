@@ -3,7 +3,7 @@
 use super::Tables;
 use super::language::{Locale, say};
 use super::svg::{Area, Scale, Svg, baseline, name_x};
-use crate::table::{Prediction, PredictionRow};
+use crate::table::{Labelled, Prediction, PredictionRow};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -27,7 +27,7 @@ const MOST: usize = 40;
 /// Nothing where no row is a contact, or nothing was predicted.
 pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
     let all = closings(tables)?;
-    let name = |table: Option<&Prediction>| {
+    let name = |table: Option<&Labelled<Prediction>>| {
         table
             .and_then(|table| table.0.first())
             .map(|row| row.step.clone())
@@ -42,8 +42,8 @@ pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
     }))
 }
 
-fn standing(tables: &Tables) -> Option<&Prediction> {
-    let named = |table: &&Prediction| {
+fn standing(tables: &Tables) -> Option<&Labelled<Prediction>> {
+    let named = |table: &&Labelled<Prediction>| {
         table.0.first().map(|row| row.step.as_str()) == tables.standing.as_deref()
     };
     tables

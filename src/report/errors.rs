@@ -6,7 +6,7 @@ use super::language::{Locale, say};
 use super::number::count;
 use super::workspace::{Colours, StepErrors, VIEWS, cumulative, histogram, scatter};
 use crate::error::{Error, Result};
-use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED};
+use crate::table::{Labelled, Prediction, Statistics, StatisticsRow, UNFOLDED};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -204,12 +204,12 @@ fn picture(locale: &Locale, tables: &Tables, set: &StatisticsRow, steps: &Steps)
 /// Nothing where nothing was predicted.
 pub(super) fn workspace_section(
     locale: &Locale,
-    prediction: &[Prediction],
+    prediction: &[Labelled<Prediction>],
     standing: Option<&str>,
 ) -> Option<Value> {
     let mut filled = prediction.iter().filter(|table| !table.0.is_empty());
     let first = filled.next()?;
-    let is = |table: &&Prediction| {
+    let is = |table: &&Labelled<Prediction>| {
         table
             .0
             .first()

@@ -115,7 +115,7 @@ pub(crate) fn yes() -> bool {
     true
 }
 
-crate::stage::writes! {
+crate::table::writes! {
     /// Output ports of `identify`, `stiffness` and `transfer`.
     pub struct Identified {
         parameters: Parameters,

@@ -17,7 +17,6 @@ mod known_cell;
 pub(crate) mod learn;
 mod masses;
 mod optimise;
-mod ports;
 mod registry;
 mod remarks;
 mod report;
@@ -30,6 +29,7 @@ mod stiffness;
 mod transfer;
 mod validate;
 
+pub use crate::report::{Accepted, Report, ReportReads, ReportTorquesReads};
 pub use cell_evidence::{
     CellEvidence, CellEvidenceWrites, Given, TorqueEvidence, TorqueEvidenceWrites,
 };
@@ -46,15 +46,9 @@ pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
 pub use masses::{Masses, MassesReads, MassesWrites};
 pub use optimise::{BenchmarkProblem, Optimise, OptimiseReads};
-pub use ports::{
-    Arity, Chunks, InputTable, Labelled, Output, Port, PortValue, Produced, Reads, Sink,
-    StoredTable, Streamed, StreamedTable, Writes,
-};
-pub(crate) use ports::{reads, stage, writes};
+pub(crate) use registry::stage;
 pub use registry::{ErasedStage, StageEntry};
-pub use report::{
-    Accepted, Report, ReportReads, ReportTorques, ReportTorquesReads, ReportTorquesWrites,
-};
+pub use report::{ReportTorques, ReportTorquesWrites};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use settings::FoldSetting;
 pub(crate) use settings::matches;
@@ -65,6 +59,10 @@ pub use validate::{Validate, ValidateReads};
 
 use crate::error::{Error, Fault, Place, Result};
 use crate::raw::InputSource;
+pub use crate::table::ports::{
+    Arity, Chunks, InputTable, Labelled, Output, Port, PortValue, Produced, Reads, Sink,
+    StoredTable, Streamed, StreamedTable, Writes,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::io::Read;

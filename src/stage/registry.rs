@@ -99,3 +99,27 @@ impl StageEntry {
         }
     }
 }
+
+/// Declares a stage with its ports: `stage! { Identify, "identify", 18, "identifies geometry", IdentifyReads { robot: Robot, } -> Identified }`. A
+/// struct of ports without fields is declared elsewhere.
+macro_rules! stage {
+    ($stage:ty, $name:literal, $implementation:literal, $summary:literal,
+     $reads:ident $({ $($read:tt)* })? -> $writes:ident $({ $($written:tt)* })?) => {
+        $(crate::table::reads! {
+            #[doc = concat!("Input ports of `", $name, "`.")]
+            pub struct $reads { $($read)* }
+        })?
+        $(crate::table::writes! {
+            #[doc = concat!("Output ports of `", $name, "`.")]
+            pub struct $writes { $($written)* }
+        })?
+        impl crate::stage::DeclaredStage for $stage {
+            const NAME: &'static str = $name;
+            const SUMMARY: &'static str = $summary;
+            const IMPLEMENTATION: u32 = $implementation;
+            type Reads = $reads;
+            type Writes = $writes;
+        }
+    };
+}
+pub(crate) use stage;

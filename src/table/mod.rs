@@ -12,6 +12,8 @@ pub use findings::{formula_in_words, is_separable_by_poses};
 pub use motion::{ArmMotion, TorqueCourse};
 pub use observability::{FitContext, UNFOLDED};
 pub use parameters::Corrected;
+pub use ports::Labelled;
+pub(crate) use ports::{reads, writes};
 pub use recording::{
     Recording, SOURCE as SIGMA_SOURCE, columns as recording_columns, frame as recording_frame,
 };
@@ -119,6 +121,7 @@ mod motion;
 mod network;
 mod observability;
 mod parameters;
+pub mod ports;
 mod prediction;
 mod recording;
 mod robot;
