@@ -122,7 +122,6 @@ impl Stage for Compare {
                 rank: change.rank.map(|rank| rank as i64),
             });
         }
-        rows.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(CompareWrites {
             changes: Changes(rows),
         })

@@ -44,7 +44,7 @@ use joined::Measurement;
 use crate::error::{Error, Place, Result};
 use crate::robot::{CountedCoupling, JointConvention};
 use crate::stage::{Context, RawFile, Stage, StreamedTable};
-use crate::table::{Intake, IntakeRow, JointConventions, Recording, Rejected, Robot};
+use crate::table::{Intake, JointConventions, Recording, Rejected, Robot};
 use crate::units::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -226,7 +226,5 @@ fn intake(read: &[Measurement], names: &[String], context: &Context) -> Intake {
         let counts = [rows.count() as u64, rows.count_used()];
         reading::intake(name, rows.lines, counts, context)
     };
-    let mut rows: Vec<IntakeRow> = files.map(row).collect();
-    rows.sort_by(|a, b| a.file.cmp(&b.file));
-    Intake(rows)
+    Intake(files.map(row).collect())
 }

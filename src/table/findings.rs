@@ -87,9 +87,7 @@ macro_rules! beside_findings {
                         })
                     },
                 );
-                let mut rows: Vec<$number_row> = rows.collect();
-                rows.sort_by(|a, b| (a.rank, &a.name).cmp(&(b.rank, &b.name)));
-                Self(rows)
+                Self(rows.collect())
             }
         }
 
@@ -211,9 +209,7 @@ impl Shares {
                     effect: share.effect.into(),
                 })
             });
-        let mut rows: Vec<ShareRow> = rows.collect();
-        rows.sort_by(|a, b| (&a.moment, &a.by, &a.name).cmp(&(&b.moment, &b.by, &b.name)));
-        Self(rows)
+        Self(rows.collect())
     }
 }
 
@@ -233,11 +229,7 @@ impl Cells {
                     effect: cell.effect.into(),
                 })
             });
-        let mut rows: Vec<CellRow> = rows.collect();
-        rows.sort_by(|a, b| {
-            (&a.moment, &a.place, &a.follows).cmp(&(&b.moment, &b.place, &b.follows))
-        });
-        Self(rows)
+        Self(rows.collect())
     }
 }
 
@@ -288,7 +280,6 @@ impl Forms {
                 declaration: declaration.clone(),
             }));
         }
-        rows.sort_by(|a, b| (a.rank, a.form, &a.number).cmp(&(b.rank, b.form, &b.number)));
         Self(rows)
     }
 

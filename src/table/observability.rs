@@ -158,7 +158,6 @@ impl Observability {
                 "of the whitened Jacobian, columns scaled to unit prior sigma",
             );
         }
-        rows.sort_by(|a, b| (&a.quantity, a.index).cmp(&(&b.quantity, b.index)));
         Self(rows)
     }
 }

@@ -143,7 +143,6 @@ impl Stage for IngestTorques {
         for (layout, name) in self.files.iter().zip(&names) {
             intake.push(rows.file(layout, name, &mut rejected, context)?);
         }
-        intake.sort_by(|a: &IntakeRow, b| a.file.cmp(&b.file));
         Ok(IngestTorquesWrites {
             motion: rows.finish(context)?,
             rejected: rejected.finish()?,
