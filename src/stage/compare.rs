@@ -4,7 +4,7 @@ use crate::effect::{Load, names};
 use crate::error::{Place, Result};
 use crate::estimate::{FitOptions, Prior, align, changes};
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
-use crate::stage::screened::{FittedRows, fit_rows};
+use crate::stage::doubtful::{FittedRows, fit_rows};
 use crate::stage::settings::Repeatability;
 use crate::stage::{Context, RawFile, Stage};
 use crate::table::{ChangeRow, Changes, Parameters, Recording, Robot, Split, Table, from_parquet};

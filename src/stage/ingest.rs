@@ -6,18 +6,14 @@
 mod arm;
 mod bind;
 mod check;
-mod clock;
 mod columns;
 mod external;
-mod joined;
 mod later;
-mod layout;
 mod mapped;
 mod motion;
 mod noise;
 mod pair;
 mod reading;
-mod refusal;
 mod row;
 mod rows;
 mod stretch;
@@ -25,10 +21,9 @@ mod torques;
 mod verdict;
 mod write;
 
-pub use clock::is_clock_time;
 pub use columns::Columns;
 pub use later::LaterFiles;
-pub use layout::{Axis, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
+pub use mapped::{Axis, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
 pub use mapped::{
     ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, NameMatch,
     ScalarColumn, TextColumn, UncertaintyColumn, last_number,
@@ -37,9 +32,10 @@ pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
 pub(crate) use reading::FileKind;
 pub use reading::{TableLayout, records};
+pub use stretch::is_clock_time;
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 
-use joined::Measurement;
+use pair::Measurement;
 
 use crate::error::{Error, Place, Result};
 use crate::robot::{CountedCoupling, JointConvention};

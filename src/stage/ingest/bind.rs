@@ -1,10 +1,10 @@
 //! From the columns that the settings name to the columns that a file has.
 
 use super::arm::{KindSlots, RobotJoints};
-use super::clock::CLOCK;
 use super::columns::Columns;
-use super::layout::{FileLayout, WideTargets};
 use super::mapped::{ColumnRef, JointColumns, ScalarColumn, TextColumn};
+use super::mapped::{FileLayout, WideTargets};
+use super::stretch::CLOCK;
 use crate::error::{Error, Fault, Result, counted, did_you_mean, first_of};
 use crate::observation::{Convention, DeclaredColumn};
 use crate::table::recording_columns;

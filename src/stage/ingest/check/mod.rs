@@ -2,10 +2,10 @@
 
 mod files;
 
-use super::clock::CLOCK;
 use super::columns::Columns;
-use super::layout::{FileLayout, HELD, SIMULATED, WideTargets};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn, TextColumn};
+use super::mapped::{FileLayout, HELD, SIMULATED, WideTargets};
+use super::stretch::CLOCK;
 use super::{Ingest, later, noise};
 use crate::error::{Place, counted, did_you_mean};
 use crate::observation::{Conventions, DeclaredColumn, KINDS, MeasurementKind, Part};
