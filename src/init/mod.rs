@@ -5,15 +5,12 @@ mod arm;
 mod columns;
 mod names;
 mod pipeline;
-mod points;
 mod quantities;
-mod reading;
-mod robots;
 mod sheet;
 mod together;
 
+pub use arm::{KINDS, RobotFileKind};
 pub use pipeline::{MarkedLines, marked};
-pub use robots::{KINDS, RobotFileKind};
 
 use crate::error::{Error, Result};
 use arm::StartingArm;

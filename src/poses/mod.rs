@@ -4,7 +4,6 @@
 mod apart;
 mod drive;
 mod proposal;
-mod show;
 mod site;
 mod sockets;
 

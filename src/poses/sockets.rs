@@ -1,6 +1,6 @@
 //! Postures for a ball that is brought to sockets, no instrument at hand: `calib poses ROBOT --sockets`.
 
-use super::show::closing;
+use super::proposal::closing;
 use super::site::site;
 use super::{Drive, PoseAnswer, PoseRequest, drive};
 use crate::description::RobotDescription;

@@ -3,7 +3,6 @@
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
 
 mod certificate;
-mod closure;
 mod data;
 mod errors;
 mod findings;
@@ -172,7 +171,7 @@ pub(crate) fn pages(tables: &Tables, asked: &Report) -> Result<Pages> {
         "hashes": &tables.hashes,
         "diagnosis": findings::section(locale, tables),
         "errors": errors::errors_section(locale, tables, &steps, set)?,
-        "closure": closure::section(locale, tables),
+        "closure": errors::closure_section(locale, tables),
         "workspace": errors::workspace_section(locale, &tables.prediction, tables.standing.as_deref()),
         "parameters": parameters::section(locale, &tables.parameters, tables.counting.as_deref()),
         "fits": fits::section(locale, tables, &steps),

@@ -8,6 +8,7 @@ pub use crate::store::Loose;
 use crate::store::frame::{Cell, FrameBuilder};
 pub use crate::store::frame::{Frame, TextCells};
 pub use cause_grid::{CauseGrid, CauseGridCell};
+pub use findings::VerdictTopic;
 pub use findings::{formula_in_words, is_separable_by_poses};
 pub use motion::{ArmMotion, TorqueCourse};
 pub use observability::{FitContext, UNFOLDED};
@@ -19,7 +20,6 @@ pub use recording::{
 };
 pub use standing::{Contradicted, Standing, Step, Unseen, Withdrawn, standing};
 use std::path::Path;
-pub use verdict::VerdictTopic;
 
 /// A table kind: Rust values that go to and from checked columns.
 pub trait Table: Sized + Send + Sync + 'static {
@@ -126,10 +126,8 @@ mod prediction;
 mod recording;
 mod robot;
 mod standing;
-mod statistics;
 mod torque_findings;
 mod torque_parameters;
-mod verdict;
 
 pub(crate) use prediction::slip;
 

@@ -4,7 +4,7 @@
 
 use super::super::surroundings::{cores, surroundings};
 use super::super::{emit, emit_json};
-use super::cluster::{ClusterArguments, on_slurm};
+use super::{ClusterArguments, on_slurm};
 use super::{FleetLocation, records, verdict, workshop};
 use crate::error::{Error, Result, counted, visible};
 use crate::fleet::ledger::{Member, RunNote};

@@ -4,7 +4,7 @@
 
 use super::super::surroundings::program;
 use super::super::{emit, emit_json};
-use super::conceal::{self, ConcealArguments};
+use super::{ConcealArguments, design};
 use crate::error::{Error, Result, counted};
 use crate::estimate::threads::in_order;
 use crate::proof::{self, LEFT_OUT, RECORDINGS, SEAL, SEALED, Seal, board, write_scoreboard};
@@ -48,7 +48,7 @@ const VERDICTS: &str = "verdicts";
 
 impl ProveArguments {
     pub fn run(&self) -> Result<()> {
-        let (design, folder) = (conceal::design(&self.conceal)?, &self.conceal.out);
+        let (design, folder) = (design(&self.conceal)?, &self.conceal.out);
         let usual = match design.dynamics {
             false => "pipelines/case/pipeline.yaml",
             true => "pipelines/dynamics/pipeline.yaml",

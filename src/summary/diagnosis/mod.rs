@@ -1,7 +1,6 @@
 //! A diagnosis of positions or torques from its tables, as text and as JSON.
 
 mod positions;
-mod torques;
 
 use super::screen::{self, NextStep, declared_in_yaml};
 use super::short_finding::{Found, ShortFinding, words};
@@ -20,8 +19,8 @@ use crate::table::{
     VerdictSentences, VerdictTopic, is_separable_by_poses, of_kind,
 };
 use positions::Positions;
+use positions::Torques;
 use serde_json::{Value, json};
-use torques::Torques;
 
 /// A diagnosis by its tables.
 pub struct DiagnosisSummary {
@@ -248,7 +247,7 @@ impl DiagnosisSummary {
             Kind::Positions(diagnosis) => {
                 found.details(&diagnosis.formulas(found.rank), RivalRow::is_inseparable)
             }
-            Kind::Torques(_) => found.details(&torques::numbers(found), |_| true),
+            Kind::Torques(_) => found.details(&positions::numbers(found), |_| true),
         }));
         let lines = |label: &str, lines: &[&str]| -> String {
             lines
