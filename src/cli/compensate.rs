@@ -163,7 +163,7 @@ const EXAMPLES: &str = "Examples:
   calib compensate parameters.parquet --robot robot.yaml --angle deg < program.csv";
 
 impl CompensateArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         check(self)?;
         let identified = self.model.load(Purpose::Compensate, command_line)?;
         identified.spare(self.out.as_deref())?;

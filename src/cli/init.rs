@@ -2,7 +2,7 @@
 
 use super::emit;
 use crate::error::{Error, Result};
-use crate::init::{InitRequest, KINDS, RobotFileKind, StarterFiles, start};
+use crate::init::{InitRequest, RobotFileKind, StarterFiles, TYPICAL, start};
 use crate::robot::LIBRARY;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -43,9 +43,9 @@ const EXAMPLES: &str = "Examples:
 
 /// Typical robots as values of an option, each with its line of help; arms of the library are taken by name and listed by `calib robots`.
 fn kinds() -> impl TypedValueParser<Value = RobotFileKind> {
-    let typical = KINDS
+    let typical = TYPICAL
         .iter()
-        .map(|kind| PossibleValue::new(kind.name()).help(kind.help()));
+        .map(|arm| PossibleValue::new(arm.name).help(arm.help));
     let arms = LIBRARY
         .iter()
         .map(|arm| PossibleValue::new(arm.name).hide(true));
@@ -55,7 +55,7 @@ fn kinds() -> impl TypedValueParser<Value = RobotFileKind> {
 
 impl InitArguments {
     /// Gives the exit code: 1 where nothing was understood of the recordings.
-    pub fn run(&self) -> Result<u8> {
+    pub(crate) fn run(&self) -> Result<u8> {
         let start = execute(self)?;
         if !start.understood_nothing() {
             return Ok(0);

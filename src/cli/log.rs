@@ -48,7 +48,7 @@ pub(super) struct LogArguments {
 }
 
 impl LogArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let store = open_store(self.store.as_deref())?;
         let tags = store.tags()?;
         // Where there is none, or a manifest is damaged, the list says so in its lines.
@@ -165,7 +165,7 @@ pub(super) struct ShowArguments {
 }
 
 impl ShowArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let store = open_store(self.store.as_deref())?;
         let (run, stage) = match self.run.split_once('/') {
             Some((run, stage)) => (run, Some(stage)),
@@ -220,7 +220,7 @@ pub(super) struct LineageArguments {
 }
 
 impl LineageArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let store = open_store(self.store.as_deref())?;
         let node = lineage(&store, &hash(&store, &self.table)?)?;
         if self.json {
@@ -316,7 +316,7 @@ pub(super) struct ExplainArguments {
 }
 
 impl ExplainArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let store = open_store(self.store.as_deref())?;
         let explanation = explain(&store, &find_run(&store, &self.run)?, &self.stage)?;
         if self.json {
@@ -352,7 +352,7 @@ pub(super) struct GcArguments {
 }
 
 impl GcArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let store = open_store(self.store.as_deref())?;
         let keep = kept_actions(
             &store,
@@ -408,7 +408,7 @@ pub(super) struct TagArguments {
 }
 
 impl TagArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let store = open_store(self.store.as_deref())?;
         if let Some(name) = &self.delete {
             return match store.tags()?.contains_key(name) {
@@ -449,7 +449,7 @@ pub(super) struct VerifyArguments {
 }
 
 impl VerifyArguments {
-    pub fn run(&self) -> Result<u8> {
+    pub(crate) fn run(&self) -> Result<u8> {
         let root = self.store.clone().unwrap_or_else(default_store);
         if bucket(&root).is_none() && !root.is_dir() {
             return Err(Error::spec(

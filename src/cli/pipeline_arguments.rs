@@ -80,7 +80,7 @@ impl PipelineArguments {
     }
 
     /// Runs the selected stages with progress, and with `details` all that stages note.
-    pub fn run(
+    pub(crate) fn run(
         &self,
         plan: &Plan,
         store: &Store,
@@ -181,7 +181,7 @@ impl ExecutionArguments {
     }
 
     /// Runs the selected stages; with as much progress as is to be shown.
-    pub fn run(
+    pub(crate) fn run(
         &self,
         plan: &Plan,
         store: &Store,

@@ -104,7 +104,7 @@ const EXAMPLES: &str = "Examples:
   calib poses robot.json --limits -170:170,-60:75,-80:75,-180:180,-120:120,-180:180 --json";
 
 impl PosesArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let request = request(self);
         let pair = self.separate.as_deref().unwrap_or_default();
         check(self, &request, pair)?;
@@ -303,7 +303,7 @@ const EXCITE_EXAMPLES: &str = "Examples:
   calib excite robot.yaml --limits -90:90,-60:60,-60:60,-90:90,-90:90,-90:90 --json";
 
 impl ExciteArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         if !(0.0..=45.0).contains(&self.margin) {
             let message = format!("expected 0 to 45 percent, found {}", self.margin);
             return Err(Error::Spec(vec![Fault::new("--margin", message)]));

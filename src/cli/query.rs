@@ -60,7 +60,7 @@ pub(super) struct QueryArguments {
 }
 
 impl QueryArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         reported_as(self.json, execute(self))
     }
 }
@@ -161,7 +161,7 @@ enum SchemaVerb {
 }
 
 impl SchemaArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         match &self.verb {
             SchemaVerb::List => emit(&list()),
             SchemaVerb::Show { kind } => emit(&show(find(kind)?)),
@@ -268,7 +268,7 @@ pub(super) struct EffectsArguments {
 }
 
 impl EffectsArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let chosen: Vec<&Cause> = match &self.name {
             None => CAUSES.to_vec(),
             Some(name) => vec![cause(name).ok_or_else(|| unknown(name))?],
@@ -312,7 +312,7 @@ pub(super) struct RobotsArguments {
 }
 
 impl RobotsArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let Some(name) = &self.name else {
             return emit(&library()?);
         };

@@ -67,7 +67,7 @@ const EXAMPLES: &str = "Examples:
   calib run pipeline.yaml --json --quiet > result.json";
 
 impl RunArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<u8> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<u8> {
         self.shared.reported(execute(self, command_line))
     }
 }
@@ -267,7 +267,7 @@ pub(super) struct CheckArguments {
 }
 
 impl CheckArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let plan = match self.means.plan(&self.pipeline) {
             Ok(plan) => plan,
             Err(error) => {

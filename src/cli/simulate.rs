@@ -41,7 +41,7 @@ enum SimulateVerb {
 }
 
 impl SimulateArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         match &self.verb {
             SimulateVerb::Record(verb) => verb.run(command_line),
             SimulateVerb::Conceal(verb) => verb.run(),
@@ -82,7 +82,7 @@ pub(crate) struct RecordArguments {
 }
 
 impl RecordArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let place = self.pipeline.display().to_string();
         let plan = Plan::load(&self.pipeline, &self.set, STAGES)?;
         let stage = plan
@@ -274,7 +274,7 @@ impl ConcealArguments {
         self.jobs.map_or_else(cores, usize::from)
     }
 
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let design = design(self)?;
         vacant(&self.out)?;
         let rows = conceal(&self.out, &design, self.threads())?;

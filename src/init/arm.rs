@@ -34,13 +34,15 @@ pub(super) struct StartingArm {
 
 impl StartingArm {
     /// Fails where a file cannot be read, or is there and another arm is asked for.
-    pub fn of(request: &InitRequest) -> Result<Self> {
+    pub(crate) fn of(request: &InitRequest) -> Result<Self> {
         let file = request.folder.join("robot.yaml");
         if file.exists() {
             return Self::there(request, &file);
         }
         let Some(urdf) = request.urdf else {
-            return Self::to_start_from(request.robot.unwrap_or(KINDS[0]));
+            return Self::to_start_from(
+                request.robot.unwrap_or(RobotFileKind::Typical(&TYPICAL[0])),
+            );
         };
         let (label, text) = read(urdf)?;
         let UrdfOutline {
@@ -118,7 +120,7 @@ impl StartingArm {
     fn to_start_from(kind: RobotFileKind) -> Result<Self> {
         let (joints, name) = (kind.joints()?, kind.name());
         Ok(Self {
-            text: Some(kind.text()),
+            text: Some(kind.text().into()),
             joints,
             sliding: Vec::new(),
             counting: kind.counting()?,
@@ -278,151 +280,87 @@ impl ExaminedFile {
     }
 }
 
-/// Kinds of arms that a robot file starts from.
+/// What a robot file starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RobotFileKind {
-    Spherical6,
-    Offset6,
-    Seven,
-    Dh6,
+pub(crate) enum RobotFileKind {
+    /// A typical arm, whose numbers are to be replaced.
+    Typical(&'static TypicalArm),
+    /// An arm of the library, as it is.
     Arm(&'static LibraryArm),
 }
 
-/// Typical arms, in the order of the help.
-pub const KINDS: [RobotFileKind; 4] = [
-    RobotFileKind::Spherical6,
-    RobotFileKind::Offset6,
-    RobotFileKind::Seven,
-    RobotFileKind::Dh6,
+/// A robot file with the numbers of a typical arm.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct TypicalArm {
+    pub(crate) name: &'static str,
+    pub(crate) help: &'static str,
+    pub(crate) text: &'static str,
+}
+
+/// The first is that of `calib init` without `--robot`.
+pub(crate) const TYPICAL: &[TypicalArm] = &[
+    TypicalArm {
+        name: "spherical6",
+        help: "Six joints, the last three axes meet in a point (most industrial arms)",
+        text: include_str!("robots/spherical6.yaml"),
+    },
+    TypicalArm {
+        name: "offset6",
+        help: "Six joints, offset wrist (most cobots)",
+        text: include_str!("robots/offset6.yaml"),
+    },
+    TypicalArm {
+        name: "seven",
+        help: "Seven joints, alternating axes",
+        text: include_str!("robots/seven.yaml"),
+    },
+    TypicalArm {
+        name: "dh6",
+        help: "Six joints as a table of DH parameters",
+        text: include_str!("robots/dh6.yaml"),
+    },
 ];
 
 impl RobotFileKind {
-    /// The typical arm or the arm of the library that is called so.
+    /// By its name on the command line.
     pub(crate) fn find(name: &str) -> Option<Self> {
-        let typical = KINDS.into_iter().find(|kind| kind.name() == name);
-        typical.or_else(|| LibraryArm::find(name).map(Self::Arm))
+        let typical = TYPICAL.iter().find(|arm| arm.name == name);
+        let library = || LibraryArm::find(name).map(Self::Arm);
+        typical.map(Self::Typical).or_else(library)
     }
 
-    pub(crate) fn name(self) -> &'static str {
+    fn name(self) -> &'static str {
         match self {
-            Self::Spherical6 => "spherical6",
-            Self::Offset6 => "offset6",
-            Self::Seven => "seven",
-            Self::Dh6 => "dh6",
+            Self::Typical(arm) => arm.name,
             Self::Arm(arm) => arm.name,
         }
     }
 
-    pub(crate) fn help(self) -> &'static str {
+    fn text(self) -> &'static str {
         match self {
-            Self::Spherical6 => {
-                "Six joints, the last three axes meet in a point (most industrial arms)"
-            }
-            Self::Offset6 => "Six joints, offset wrist (most cobots)",
-            Self::Seven => "Seven joints, alternating axes",
-            Self::Dh6 => "Six joints as a table of DH parameters",
-            Self::Arm(_) => "A common arm, as its maker and public models describe it",
+            Self::Typical(arm) => arm.text,
+            Self::Arm(arm) => arm.text,
         }
     }
 
-    /// How many. Fails with the faults of a file of the library, which would be a fault of calib.
-    pub(crate) fn joints(self) -> Result<usize> {
+    fn joints(self) -> Result<usize> {
         match self {
+            Self::Typical(arm) => Ok(arm.text.matches("\n  - {name: ").count()),
             Self::Arm(arm) => Ok(arm.read()?.robot.joints.len()),
-            Self::Seven => Ok(7),
-            _ => Ok(6),
         }
     }
 
-    /// What `ingest` must be told of how the arm's controller counts joints, as settings of `q`.
-    pub(super) fn counting(self) -> Result<Option<String>> {
+    /// How the arm's controller counts its joints, as settings of `q`, where it differs from the robot file.
+    fn counting(self) -> Result<Option<String>> {
         match self {
+            Self::Typical(_) => Ok(None),
             Self::Arm(arm) => Ok(arm.read()?.about.counting()),
-            _ => Ok(None),
         }
-    }
-
-    pub(super) fn text(self) -> String {
-        let (kinematics, tool) = match self {
-            Self::Arm(arm) => return arm.text.to_string(),
-            Self::Spherical6 => (SPHERICAL6, "{point: [1854, 50, 1340]}"),
-            Self::Offset6 => (OFFSET6, "{point: [-1184.3, -300, 11.6]}"),
-            Self::Seven => (SEVEN, "{point: [60, 30, 1300]}"),
-            Self::Dh6 => (DH6, "{point: [60, 0, 30]}"),
-        };
-        let where_given = if self == Self::Dh6 {
-            "in the last frame"
-        } else {
-            "at the zero pose, base frame"
-        };
-        let mut out = format!(
-            "{HEAD}{kinematics}tool: {tool}       # REPLACE: the measured point, {where_given}; off the last axis, else that joint cannot be seen\njoints:                           # REPLACE limits; reduction_ratio (motor turns per turn) only if known\n"
-        );
-        for joint in 1..=if self == Self::Seven { 7 } else { 6 } {
-            out.push_str(&format!("  - {{name: A{joint}, limits: [-170, 170]}}\n"));
-        }
-        out + LINKS + PAYLOAD
     }
 }
 
-/// The robot file beside a URDF.
-pub(super) fn of_urdf(base: &str, tip: &str) -> String {
-    format!(
-        "{HEAD}  urdf: {{base: {}, tip: {}}}     # CHECK: first and last link of the chain\ntool: {{point: [0, 0, 0]}}           # REPLACE: the measured point in the tip link's frame\n{URDF_LINKS}{PAYLOAD}",
-        quoted(base),
-        quoted(tip)
-    )
+/// A robot file on a URDF.
+fn of_urdf(base: &str, tip: &str) -> String {
+    let text = include_str!("robots/urdf.yaml").replace("$base", &quoted(base));
+    text.replace("$tip", &quoted(tip))
 }
-
-const HEAD: &str =
-    "# The robot as its data sheet describes it; calib identifies how the real one differs.
-calib_robot: 1
-name: my robot                    # REPLACE
-units: {length: mm, angle: deg}   # of this file
-kinematics:
-";
-
-const SPHERICAL6: &str =
-    "  screws:                         # REPLACE: axis and a point on it, zero pose (all joints at 0), base frame
-    - {axis: [0, 0, 1], point: [0, 0, 0]}
-    - {axis: [0, -1, 0], point: [312, 0, 0]}
-    - {axis: [0, -1, 0], point: [312, 0, 1075]}
-    - {axis: [1, 0, 0], point: [0, 0, 1310]}
-    - {axis: [0, -1, 0], point: [1594, 0, 1310]}
-    - {axis: [1, 0, 0], point: [0, 0, 1310]}
-";
-const OFFSET6: &str =
-    "  screws:                         # REPLACE: axis and a point on it, zero pose (all joints at 0), base frame
-    - {axis: [0, 0, 1], point: [0, 0, 0]}
-    - {axis: [0, -1, 0], point: [0, 0, 127.3]}
-    - {axis: [0, -1, 0], point: [-612, 0, 127.3]}
-    - {axis: [0, -1, 0], point: [-1184.3, 0, 127.3]}
-    - {axis: [0, 0, -1], point: [-1184.3, -163.9, 127.3]}
-    - {axis: [0, -1, 0], point: [-1184.3, -163.9, 11.6]}
-";
-const SEVEN: &str = "  screws:                         # REPLACE: axis and a point on it, zero pose (all joints at 0), base frame
-    - {axis: [0, 0, 1], point: [0, 0, 0]}
-    - {axis: [0, 1, 0], point: [0, 0, 340]}
-    - {axis: [0, 0, 1], point: [0, 0, 540]}
-    - {axis: [0, -1, 0], point: [0, 0, 740]}
-    - {axis: [0, 0, 1], point: [0, 0, 940]}
-    - {axis: [0, 1, 0], point: [0, 0, 1140]}
-    - {axis: [0, 0, 1], point: [0, 0, 1266]}
-";
-const DH6: &str = "  dh:                             # REPLACE: Rz(theta) Tz(d) Tx(a) Rx(alpha); `mdh` takes Craig's table
-    - {theta: 0, d: 0, a: 312, alpha: 90}
-    - {theta: 90, d: 0, a: 1075, alpha: 0}
-    - {theta: 0, d: 0, a: 235, alpha: 90}
-    - {theta: 0, d: 1282, a: 0, alpha: -90}
-    - {theta: 0, d: 0, a: 0, alpha: 90}
-    - {theta: 0, d: 260, a: 0, alpha: 0}
-";
-
-const URDF_LINKS: &str = "links:                            # CHECK: masses and centres are those of the URDF's <inertial>; where it has none, a line for each joint
-#   - {mass: 340, centre: [150, 0, -120]}   # without them what weight does (wind-up, bending) is not in the model
-";
-const LINKS: &str = "links:                            # REPLACE: a line for each joint, kg and centre of the body that it moves, as below; null where not known
-#   - {mass: 340, centre: [150, 0, -120]}   # without them what weight does (wind-up, bending) is not in the model
-";
-const PAYLOAD: &str = "# payload: {mass: 210, offset: [140, -30, 10]}     # rated, kg; from the tool point to its centre
-";

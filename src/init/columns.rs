@@ -32,7 +32,7 @@ pub(super) struct Choice {
 }
 
 impl Choice {
-    pub fn of(lines: Vec<String>, columns: Vec<usize>) -> Self {
+    pub(crate) fn of(lines: Vec<String>, columns: Vec<usize>) -> Self {
         let targets = None;
         Self {
             lines,
@@ -216,7 +216,7 @@ impl ExaminedFile {
         }
     }
 
-    pub fn shown(&self, columns: &[usize]) -> String {
+    pub(crate) fn shown(&self, columns: &[usize]) -> String {
         columns
             .iter()
             .map(|column| self.sheet.names[*column].as_str())

@@ -9,8 +9,8 @@ mod quantities;
 mod sheet;
 mod together;
 
-pub use arm::{KINDS, RobotFileKind};
-pub use pipeline::{MarkedLines, marked};
+pub(crate) use arm::{RobotFileKind, TYPICAL};
+pub(crate) use pipeline::{MarkedLines, marked};
 
 use crate::error::{Error, Result};
 use arm::StartingArm;

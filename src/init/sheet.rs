@@ -98,7 +98,7 @@ impl Sheet {
         }
     }
 
-    pub fn of(lines: &[String]) -> Self {
+    pub(crate) fn of(lines: &[String]) -> Self {
         Self::delimited(lines, None)
     }
 

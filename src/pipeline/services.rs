@@ -3,7 +3,6 @@
 //! A stage on tables in memory: as in a pipeline, without a store and without a file.
 
 use crate::error::{Error, Fault, Result, nearest};
-use crate::pipeline::run_state::seed;
 use crate::pipeline::spec::InputFile;
 use crate::raw;
 use crate::stage::{
@@ -275,4 +274,10 @@ pub fn run_in_memory(
         notes: lines.notes,
         warnings: lines.warnings,
     })
+}
+
+/// The seed of a stage: its own, so that stages do not share random numbers.
+pub(super) fn seed(pipeline: u64, id: &str) -> u64 {
+    let hash = blake3::hash(format!("{pipeline} {id}").as_bytes());
+    u64::from_le_bytes(*hash.as_bytes().first_chunk().expect("a hash has 32 bytes"))
 }

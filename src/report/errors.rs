@@ -253,7 +253,7 @@ const CLOSURE_WIDTH: f64 = 640.0;
 const LEFT: f64 = 150.0;
 /// Height of a fixture's two bars.
 const ROW: f64 = 20.0;
-/// Fixtures in the closure_picture; the table has all.
+/// Fixtures in the picture; the table has all.
 const MOST: usize = 40;
 
 /// Nothing where no row is a contact, or nothing was predicted.
@@ -267,9 +267,9 @@ pub(super) fn closure_section(locale: &Locale, tables: &Tables) -> Option<Value>
     Some(json!({
         "before": name(tables.prediction.first())?,
         "after": name(standing_prediction(tables))?,
-        "closure_picture": closure_picture(locale, &all[..all.len().min(MOST)]),
+        "picture": closure_picture(locale, &all[..all.len().min(MOST)]),
         "rows": &all,
-        // Fixtures beyond those of the closure_picture.
+        // Fixtures beyond those of the picture.
         "more": all.len().saturating_sub(MOST),
     }))
 }

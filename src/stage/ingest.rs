@@ -14,6 +14,7 @@ mod motion;
 mod noise;
 mod pair;
 mod reading;
+mod refusal;
 mod row;
 mod rows;
 mod stretch;
@@ -22,8 +23,8 @@ mod verdict;
 mod write;
 
 pub use columns::Columns;
+pub use columns::{Axis, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
 pub use later::LaterFiles;
-pub use mapped::{Axis, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
 pub use mapped::{
     ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, NameMatch,
     ScalarColumn, TextColumn, UncertaintyColumn, last_number,

@@ -24,6 +24,7 @@ mod identify;
 pub mod ingest;
 mod known_cell;
 pub(crate) mod learn;
+mod masses;
 mod optimise;
 mod remarks;
 mod report;
@@ -43,11 +44,11 @@ pub use diagnose_torques::{
     ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut,
     InertialSetting,
 };
-pub use dynamic_arm::{Masses, MassesReads, MassesWrites};
 pub(crate) use dynamic_arm::{dynamic_arm, must_be_bodies, torque_per_ampere};
 pub use identify::{Identify, IdentifyReads};
 pub use identify::{Stiffness, StiffnessReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
+pub use masses::{Masses, MassesReads, MassesWrites};
 pub use optimise::{BenchmarkProblem, Optimise, OptimiseReads};
 pub use report::{ReportTorques, ReportTorquesWrites};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};

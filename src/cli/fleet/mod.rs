@@ -66,7 +66,7 @@ fn folder(store: &Path) -> Result<Store> {
 }
 
 impl FleetArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         match &self.verb {
             FleetVerb::Run(verb) => verb.run(command_line),
             FleetVerb::Diagnose(verb) => verb.run(command_line),

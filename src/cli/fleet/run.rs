@@ -82,7 +82,7 @@ const EXAMPLES: &str = "Examples:
   calib fleet run FLEET.yaml --engine slurm --partition main --robots-per-task 4 --store /shared/store";
 
 impl FleetRunArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let store = self.place.store()?;
         let fleet = Fleet::load(&self.place.fleet, &store)?;
         run(&fleet, &store, &self.place, &self.how, command_line)
@@ -334,7 +334,7 @@ pub(super) struct ExecArguments {
 }
 
 impl ExecArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let store = super::folder(&self.store)?;
         let ledger = ledger(&store, &self.fleet);
         let note = ledger.run(Some(&self.run))?;

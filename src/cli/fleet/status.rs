@@ -43,7 +43,7 @@ pub(super) struct CancelArguments {
 }
 
 impl StatusArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let store = self.place.store()?;
         let fleet = Fleet::load(&self.place.fleet, &store)?;
         let fresh = || surroundings(command_line);
@@ -226,7 +226,7 @@ enum Scheduler {
 }
 
 impl RenderArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let store = self.place.store()?;
         let fleet = Fleet::load(&self.place.fleet, &store)?;
         let fresh = || surroundings(command_line);
@@ -311,7 +311,7 @@ const EXAMPLES: &str = "Examples:
 const ROUNDS: usize = 40;
 
 impl FleetDiagnoseArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let begun = Instant::now();
         let store = self.place.store()?;
         let fleet = Fleet::load(&self.place.fleet, &store)?;

@@ -47,7 +47,7 @@ pub(super) struct ProveArguments {
 const VERDICTS: &str = "verdicts";
 
 impl ProveArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let (design, folder) = (design(&self.conceal)?, &self.conceal.out);
         let usual = match design.dynamics {
             false => "pipelines/case/pipeline.yaml",
@@ -214,7 +214,7 @@ pub(super) struct RevealArguments {
 }
 
 impl RevealArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let sealed = Seal::check(&self.folder)?;
         let board = board(&self.folder, &sealed, &self.verdicts)?;
         if let Some(path) = &self.out {

@@ -2,8 +2,8 @@
 
 use super::arm::{KindSlots, RobotJoints};
 use super::columns::Columns;
+use super::columns::{FileLayout, WideTargets};
 use super::mapped::{ColumnRef, JointColumns, ScalarColumn, TextColumn};
-use super::mapped::{FileLayout, WideTargets};
 use super::stretch::CLOCK;
 use crate::error::{Error, Fault, Result, counted, did_you_mean, first_of};
 use crate::observation::{Convention, DeclaredColumn};

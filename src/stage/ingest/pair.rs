@@ -5,8 +5,9 @@
 use crate::observation::{KINDS, Part};
 use crate::stage::ingest::Ingest;
 use crate::stage::ingest::arm::RobotJoints;
-use crate::stage::ingest::mapped::{Duplicates, Join};
-use crate::stage::ingest::rows::{FileRows, GivenUp, Reason, RowRefusal};
+use crate::stage::ingest::columns::{Duplicates, Join};
+use crate::stage::ingest::refusal::{Reason, RowRefusal};
+use crate::stage::ingest::rows::{FileRows, GivenUp};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 

@@ -10,10 +10,10 @@ use crate::raw::{
 };
 use crate::stage::ingest::arm::RobotJoints;
 use crate::stage::ingest::bind::{Binding, FileHeader, bind};
+use crate::stage::ingest::columns::{FileLayout, LimitPolicy};
 use crate::stage::ingest::external::ExternalAxes;
-use crate::stage::ingest::mapped::{FileLayout, LimitPolicy};
+use crate::stage::ingest::refusal::RowRefusal;
 use crate::stage::ingest::row::{RecordedRow, RowReader};
-use crate::stage::ingest::rows::RowRefusal;
 use crate::stage::{Context, OpenedInput};
 use crate::table::{IntakeRow, Robot};
 use std::io::{BufRead, BufReader, Cursor, Read};

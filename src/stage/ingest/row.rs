@@ -2,8 +2,8 @@
 
 use super::arm::{KindSlots, RobotJoints};
 use super::bind::{Binding, NumberBinding, TextBinding};
-use super::mapped::LimitPolicy;
-use super::rows::{Reason, RowRefusal, refuse};
+use super::columns::LimitPolicy;
+use super::refusal::{Reason, RowRefusal, refuse};
 use super::stretch::{ALLOWED, CLOCK, ClockColumn, ClockTime};
 use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
 use crate::robot::ONE_AND_A_HALF_TURNS;

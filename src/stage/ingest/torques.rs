@@ -6,10 +6,12 @@
 
 use crate::error::{Error, Fault, Place, Result, counted};
 use crate::stage::ingest::arm::RobotJoints;
-use crate::stage::ingest::mapped::{FileLayout, LimitPolicy};
+use crate::stage::ingest::columns::{FileLayout, LimitPolicy};
 use crate::stage::ingest::reading::{OpenedFile, STRIDE};
+use crate::stage::ingest::refusal::{
+    Reason, RefusalCounts, Rejections, RowRefusal, beginning, tally,
+};
 use crate::stage::ingest::row::RecordedRow;
-use crate::stage::ingest::rows::{Reason, RefusalCounts, Rejections, RowRefusal, beginning, tally};
 use crate::stage::ingest::stretch::Stretches;
 use crate::stage::ingest::{check, reading};
 use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable};

@@ -2,10 +2,10 @@
 
 use super::arm::RobotJoints;
 use super::columns::Columns;
-use super::mapped::{Join, LimitPolicy};
+use super::columns::{Join, LimitPolicy};
 use super::pair::Measurement;
+use super::refusal::{Reason, RefusalCount, RefusalCounts, tally};
 use super::rows::{FileRows, GivenUp};
-use super::rows::{Reason, RefusalCount, RefusalCounts, tally};
 use crate::error::{Error, Fault, Result, counted};
 use crate::robot::too_far;
 use crate::stage::Context;

@@ -3,8 +3,8 @@
 mod files;
 
 use super::columns::Columns;
+use super::columns::{FileLayout, HELD, SIMULATED, WideTargets};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn, TextColumn};
-use super::mapped::{FileLayout, HELD, SIMULATED, WideTargets};
 use super::stretch::CLOCK;
 use super::{Ingest, later, noise};
 use crate::error::{Place, counted, did_you_mean};
