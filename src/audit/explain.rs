@@ -13,7 +13,6 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Why a stage ran, or did not.
 #[derive(Debug, Clone, Serialize)]
 pub struct Explanation {
-    /// Its id.
     pub(crate) run: String,
     /// What the manifest says of the stage.
     pub(crate) stage: StageReport,
@@ -168,7 +167,6 @@ pub fn the_stage<'a, T: Copy>(
 /// A table with the action that made it.
 #[derive(Debug, Clone, Serialize)]
 pub struct LineageNode {
-    /// Hash of its content.
     pub(crate) table_hash: TableHash,
     /// Nothing where the store has no record of who made it.
     pub(crate) made: Option<Provenance>,
@@ -177,17 +175,13 @@ pub struct LineageNode {
 /// What made a table.
 #[derive(Debug, Clone, Serialize)]
 pub struct Provenance {
-    /// Id of the stage.
     pub(crate) stage: String,
-    /// Its kind.
     pub(crate) uses: String,
-    /// Version of its algorithm.
     pub(crate) implementation: u32,
     /// On which it was written.
     pub(crate) port: String,
     /// `name/version`.
     pub(crate) schema: String,
-    /// How many.
     pub(crate) rows: u64,
     /// Id of the action record.
     pub(crate) action: String,
@@ -195,7 +189,6 @@ pub struct Provenance {
     pub(crate) run: String,
     /// RFC 3339, UTC.
     pub(crate) when: String,
-    /// With defaults filled in.
     pub(crate) settings: serde_json::Value,
     /// The seed of the stage.
     pub(crate) seed: u64,

@@ -16,9 +16,7 @@ use std::path::{Path, PathBuf};
 /// Two runs compared.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunDiff {
-    /// The earlier.
     pub(crate) a: RunSummary,
-    /// The later.
     pub(crate) b: RunSummary,
     /// What was put in: settings, files, seeds, implementations. What follows from these is no cause.
     pub(crate) causes: Vec<SettingChange>,
@@ -29,20 +27,16 @@ pub struct RunDiff {
 /// A run in a line.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunSummary {
-    /// Its id.
     pub(crate) run: String,
-    /// Its name.
     pub(crate) pipeline: String,
     /// RFC 3339, UTC.
     pub(crate) started: String,
-    /// The version of calib.
     pub(crate) version: String,
 }
 
 /// A setting that differs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SettingChange {
-    /// Id of the stage.
     pub(crate) stage: String,
     /// Before and now.
     #[serde(flatten)]
@@ -293,14 +287,12 @@ pub struct QueryTable {
 /// A column that can be asked, as the table's file has it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct QueryColumn {
-    /// As SQL knows it.
     pub(crate) name: String,
     /// As the schema states it.
     #[serde(rename = "type")]
     pub(crate) column_type: String,
     /// Unit of its numbers, where the schema states one.
     pub(crate) unit: Option<String>,
-    /// What it means.
     pub(crate) description: String,
 }
 

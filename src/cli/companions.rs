@@ -38,7 +38,6 @@ impl Companions {
         paths.into_iter().map(read).collect::<Result<_>>().map(Self)
     }
 
-    /// As programs take them.
     pub(crate) fn files(&self) -> Vec<Companion<'_>> {
         self.0
             .iter()

@@ -320,7 +320,6 @@ impl RobotsArguments {
     }
 }
 
-/// One line an arm.
 fn library() -> Result<String> {
     let mut out = format!(
         "{:<16} {:<40} {:>6} {:>9}  {}\n",

@@ -151,7 +151,6 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     Ok(code)
 }
 
-/// What was done.
 fn closing(outcome: &CompletedRun, seconds: f64) -> String {
     let stages = &outcome.manifest.stages;
     let count = |status| stages.iter().filter(|stage| stage.status == status).count();

@@ -16,9 +16,7 @@ pub(super) const MOST_NAMED: usize = 200;
 pub(super) struct Mapping {
     pub(crate) quantity: &'static str,
     pub(crate) choices: Vec<Choice>,
-    /// What to look at.
     pub(crate) check: Option<String>,
-    /// For the terminal.
     pub(crate) account: String,
 }
 
@@ -45,7 +43,6 @@ impl Choice {
 /// A file, as far as it was understood.
 pub(super) struct ExaminedFile {
     pub(crate) path: PathBuf,
-    /// As messages name it.
     pub(crate) name: String,
     pub(crate) sheet: Sheet,
     pub(crate) said: Vec<Name>,

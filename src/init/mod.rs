@@ -38,7 +38,6 @@ pub(crate) struct StarterFiles {
     pub(crate) pipeline: String,
     /// What was found in each recording, and which.
     pub(crate) accounts: Vec<(PathBuf, String)>,
-    /// What no recording has.
     pub(crate) missing: Vec<&'static str>,
     /// What a person should know of the robot, a sentence each.
     pub(crate) notes: Vec<String>,

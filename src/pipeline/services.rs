@@ -186,7 +186,6 @@ pub struct StageCall<'a> {
     pub(crate) uses: &'a str,
     /// Its settings, as `with:` of a pipeline.
     pub(crate) with: &'a serde_json::Value,
-    /// That of the pipeline.
     pub(crate) seed: u64,
 }
 

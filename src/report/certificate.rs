@@ -85,7 +85,6 @@ fn kind(
 pub(super) struct Judgement<'a> {
     /// What is wrong with the set-up, where something is.
     wrong: Option<String>,
-    /// What is judged.
     row: Option<&'a StatisticsRow>,
     /// Limits as they were set; none where a wrong set-up alone is not accepted.
     pub(crate) limits: Vec<AcceptanceRow>,
@@ -197,7 +196,6 @@ impl<'a> Judgement<'a> {
 
 /// What the page shows; lengths in mm.
 pub struct AchievedTables<'a> {
-    /// Heading.
     pub(crate) title: &'a str,
     /// Where the model is from.
     pub(crate) model: &'a str,

@@ -116,13 +116,11 @@ impl Deref for Tables {
 }
 
 impl Tables {
-    /// Numbers of a finding.
     fn numbers(&self, rank: i64) -> impl Iterator<Item = &FindingNumberRow> {
         let all = self.finding_numbers.iter().flat_map(|table| &table.0);
         all.filter(move |number| number.rank == rank)
     }
 
-    /// Rivals of a finding.
     fn rivals(&self, rank: i64) -> impl Iterator<Item = &RivalRow> {
         let all = self.rivals.iter().flat_map(|table| &table.0);
         all.filter(move |rival| rival.rank == rank)
@@ -141,7 +139,6 @@ impl Tables {
 pub(crate) struct Pages {
     /// One file that needs no other.
     pub(crate) html: String,
-    /// The same for programs.
     pub(crate) json: String,
     /// The user's limits and what was found.
     pub(crate) acceptance: Acceptance,

@@ -199,7 +199,6 @@ struct MotionLabels {
     labelled: bool,
     /// Labels of what rows are for.
     usages: Vec<String>,
-    /// Stretches of the recording.
     stretches: BTreeSet<i64>,
 }
 
@@ -414,7 +413,6 @@ fn sentence(change: &TorqueChange) -> String {
 }
 
 impl Contacts {
-    /// Pushes as events.
     fn events(&self) -> Vec<ContactEvent> {
         let event = |row: &crate::table::ContactRow| ContactEvent {
             start: row.start_s,

@@ -179,7 +179,6 @@ pub struct FittedRows {
 }
 
 impl FittedRows {
-    /// With the recording.
     pub(crate) fn session<'a>(&'a self, data: &'a Measurements) -> Session<'a> {
         Session {
             data,

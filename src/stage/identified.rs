@@ -156,7 +156,6 @@ pub struct Fitting<'a> {
     pub(crate) fit: &'a FittedRows,
     /// Parameters that the user holds.
     pub(crate) held: &'a [usize],
-    /// Parts of a cross-validation.
     pub(crate) folds: FoldSetting,
     pub(crate) earlier: Option<&'a Parameters>,
     /// Covariance of the earlier parameters.

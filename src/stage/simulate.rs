@@ -227,7 +227,6 @@ fn all_faults<K: Display, M: Into<String>>(at: &mut Place, faults: Vec<(K, M)>) 
 }
 
 impl Simulate {
-    /// The effects that act.
     fn acting(&self) -> &[Physical] {
         match self.remainder {
             Remainder::All => &self.effects,

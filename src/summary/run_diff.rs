@@ -157,9 +157,7 @@ const OPEN: f64 = 0.05;
 /// A finding of one of two runs and an explanation that one of them could not exclude.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RivalChange {
-    /// The diagnosis.
     pub(crate) stage: String,
-    /// What was found.
     pub(crate) finding: CauseAtPlace,
     /// What fitted as well, in one of the runs.
     pub(crate) rival: CauseAtPlace,
@@ -189,9 +187,7 @@ pub(crate) enum RivalOutcome {
     Reversed,
     /// One of the two is found, and the other is not excluded.
     Open,
-    /// Both are findings.
     Both,
-    /// Neither is a finding.
     Neither,
     /// A finding of run B has a rival that run A excluded.
     New,

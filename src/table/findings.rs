@@ -44,7 +44,6 @@ impl RivalRow {
 }
 
 impl FindingNumbers {
-    /// Those of a finding.
     pub(crate) fn of_finding(&self, rank: i64) -> Vec<FindingNumberRow> {
         let own = self.0.iter().filter(|row| row.rank == rank);
         own.cloned().collect()
@@ -52,7 +51,6 @@ impl FindingNumbers {
 }
 
 impl Rivals {
-    /// Those of a finding.
     pub(crate) fn of_finding(&self, rank: i64) -> Vec<RivalRow> {
         let own = self.0.iter().filter(|row| row.rank == rank);
         own.cloned().collect()
@@ -67,7 +65,6 @@ pub fn is_separable_by_poses(effect: &str) -> bool {
     cause(effect).is_none_or(|cause| cause.separable_by_poses)
 }
 
-/// Findings with their ranks.
 pub(super) fn ranked<F>(findings: &[F]) -> impl Iterator<Item = (i64, &F)> {
     (1..).zip(findings)
 }
@@ -336,7 +333,6 @@ pub fn formula_in_words(rows: &[FormRow]) -> String {
     )
 }
 
-/// Three digits.
 fn brief(value: f64) -> String {
     let power = if value == 0.0 {
         0.0

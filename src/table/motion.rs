@@ -12,9 +12,7 @@ use std::collections::BTreeMap;
 /// Rows in the order of time; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ArmMotion {
-    /// Joints of the arm.
     pub(crate) joints: usize,
-    /// Which joints are prismatic.
     pub(crate) prismatic: Vec<bool>,
     /// From 1.
     pub(crate) sequence: Vec<i64>,
@@ -39,7 +37,6 @@ pub struct ArmMotion {
 }
 
 impl ArmMotion {
-    /// How many rows.
     pub(crate) fn rows(&self) -> usize {
         self.sequence.len()
     }
@@ -110,9 +107,7 @@ impl Table for ArmMotion {
 /// The judged rows; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TorqueCourse {
-    /// Joints of the arm.
     pub(crate) joints: usize,
-    /// Row of the recording.
     pub(crate) sequence: Vec<i64>,
     /// s.
     pub(crate) time: Vec<f64>,
@@ -120,7 +115,6 @@ pub struct TorqueCourse {
     pub(crate) held_out: Vec<bool>,
     /// Whether something pushed on the arm.
     pub(crate) in_event: Vec<bool>,
-    /// Whether the joint rests.
     pub(crate) rest: Vec<bool>,
     /// rad/s.
     pub(crate) velocity: Vec<f64>,

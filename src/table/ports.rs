@@ -239,7 +239,6 @@ pub type InputTable = Box<dyn StoredTable>;
 pub struct Chunks<T>(InputTable, PhantomData<fn() -> T>);
 
 impl<T: Table> Chunks<T> {
-    /// How many rows.
     pub(crate) fn rows(&self) -> usize {
         self.0.rows()
     }

@@ -339,7 +339,6 @@ fn first(text: &str) -> String {
     text.split("\n\n").next().unwrap_or(text).trim().to_string()
 }
 
-/// What polars is asked.
 pub(crate) struct Statement<'t> {
     /// With `stage.port` written as one name.
     pub(crate) text: String,

@@ -220,7 +220,6 @@ impl ClusterArguments {
         })
     }
 
-    /// Robots by task.
     pub(crate) fn tasks(&self, robots: &[usize]) -> Vec<Vec<usize>> {
         robots
             .chunks(self.robots_per_task as usize)

@@ -18,7 +18,6 @@ const SHOWN: usize = 60;
 /// Where a file's quantities stand, resolved against its header.
 #[derive(Default)]
 pub(super) struct Binding {
-    /// Fields of a row.
     pub(crate) width: usize,
     pub(crate) id: Option<TextBinding>,
     /// In the order of the row's texts.

@@ -313,7 +313,6 @@ pub(super) struct ListedRows {
     rows: Vec<(u64, Vec<String>)>,
     /// How many poses were left out.
     poses: usize,
-    /// Rows handed out.
     next: usize,
 }
 

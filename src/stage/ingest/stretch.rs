@@ -38,7 +38,6 @@ impl Stretches {
         (self.name, self.last, self.step) = (None, None, None);
     }
 
-    /// How many there are.
     pub(super) fn count(&self) -> i64 {
         self.number
     }
@@ -171,7 +170,6 @@ impl ClockColumn {
 /// A clock time, s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum ClockTime {
-    /// Since midnight.
     OfDay(f64),
     /// Since 1970; without a zone as if it were UTC.
     Dated(f64),

@@ -30,9 +30,7 @@ pub struct DiagnosisSummary {
     /// As the table has them.
     found: Vec<Found>,
     kind: Kind,
-    /// Its name.
     robot: Option<String>,
-    /// Rows of the recording.
     rows: u64,
 }
 
