@@ -9,15 +9,18 @@
 //! What keeps a store in order: `calib tag` names runs, `calib verify` hashes everything again (exit code 1 where something is not what
 //! was written), `calib gc` takes away tables that no kept run needs.
 
-use crate::audit::{LineageNode, explain, kept_actions, lineage};
+use crate::audit::{explain, kept_actions, lineage};
 use crate::cli::surroundings::{bucket, default_store, now, open_store};
 use crate::cli::{emit, emit_json};
 use crate::diff::table_hash;
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result};
 use crate::pipeline::{Manifest, RunStatus, StageStatus, find_run};
 use crate::store::{Store, Verification};
 use crate::summary::{self, status};
+use crate::text::filled;
 use clap::Args;
+use minijinja::context;
+use minijinja::value::Serde;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -226,9 +229,10 @@ impl LineageArguments {
         if self.json {
             return emit_json(&node);
         }
-        let mut text = String::new();
-        lines(&node, "", 0, &mut text);
-        emit(&text)
+        emit(&filled(
+            include_str!("lineage.txt"),
+            context! { of => Serde(node) },
+        ))
     }
 }
 
@@ -255,42 +259,6 @@ fn hash(store: &Store, table: &str) -> Result<String> {
                 manifest.run_id
             ),
         )),
-    }
-}
-
-fn lines(node: &LineageNode, port: &str, depth: usize, text: &mut String) {
-    let indent = "  ".repeat(depth);
-    let port = if port.is_empty() {
-        String::new()
-    } else {
-        format!("{port} <- ")
-    };
-    let hash: String = node.table_hash.as_str().chars().take(12).collect();
-    let Some(made) = &node.made else {
-        text.push_str(&format!(
-            "{indent}{port}{hash}: the store has no record of who made it\n"
-        ));
-        return;
-    };
-    text.push_str(&format!(
-        "{indent}{port}{}.{}  {hash}  {}",
-        made.stage,
-        made.port,
-        counted(made.rows, "row")
-    ));
-    if made.shown_before {
-        text.push_str("  (as above)\n");
-        return;
-    }
-    text.push_str(&format!(
-        "  by {} {} in run {}, {:.16}\n",
-        made.uses, made.implementation, made.run, made.when
-    ));
-    for (name, hash) in &made.files {
-        text.push_str(&format!("{indent}  file {name}  {hash:.12}\n"));
-    }
-    for (port, node) in &made.reads {
-        lines(node, port, depth + 1, text);
     }
 }
 
@@ -364,26 +332,9 @@ impl GcArguments {
         if self.json {
             return emit_json(&sweep);
         }
-        let verb = if self.dry_run {
-            "would remove"
-        } else {
-            "removed"
-        };
-        let mut text = format!(
-            "{verb} {} and {}, {:.1} MB; kept: {}\n",
-            counted(sweep.objects, "table"),
-            counted(sweep.actions, "action record"),
-            sweep.bytes as f64 / 1e6,
-            counted(sweep.kept_objects, "table")
-        );
-        if sweep.young > 0 {
-            text.push_str(&format!(
-                "kept only because younger than {}: {}\n",
-                counted(self.grace_hours, "hour"),
-                counted(sweep.young, "file")
-            ));
-        }
-        emit(&text)
+        let about =
+            context! { of => Serde(sweep), dry_run => self.dry_run, hours => self.grace_hours };
+        emit(&filled(include_str!("sweep.txt"), about))
     }
 }
 
@@ -469,35 +420,11 @@ impl VerifyArguments {
         if self.json {
             emit_json(&found)?;
         } else {
-            emit(&text(&found))?;
+            emit(&filled(
+                include_str!("verification.txt"),
+                context! { of => Serde(&found) },
+            ))?;
         }
         Ok(u8::from(!found.faults.is_empty()))
     }
-}
-
-fn text(found: &Verification) -> String {
-    const SHOWN: usize = 50; // a store that is damaged all over need not be listed
-    let mut text: String = found
-        .faults
-        .iter()
-        .take(SHOWN)
-        .map(|fault| format!("{fault}\n"))
-        .collect();
-    if found.faults.len() > SHOWN {
-        text.push_str(&format!("and {} more\n", found.faults.len() - SHOWN));
-    }
-    text.push_str(&format!(
-        "{} ({:.1} MB), {}, {}, {}, {} for people: ",
-        counted(found.objects, "table"),
-        found.bytes as f64 / 1e6,
-        counted(found.actions, "action record"),
-        counted(found.runs, "run"),
-        counted(found.tags, "tag"),
-        counted(found.copies, "copy")
-    ));
-    text.push_str(&match found.faults.len() {
-        0 => "all as they were written\n".to_string(),
-        faults => format!("{}\n", counted(faults, "fault")),
-    });
-    text
 }

@@ -18,6 +18,9 @@ use crate::poses::{Drive, PoseAnswer, PoseRequest, drive, wish};
 use crate::robot::{JointConvention, Measurements, RobotModel};
 use crate::store::{Store, TableRef};
 use crate::table::{FindingRow, Findings, Parameters, Prediction, Recording, Rivals, Robot, Table};
+use crate::text::filled;
+use minijinja::context;
+use minijinja::value::Serde;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
@@ -486,16 +489,6 @@ impl PoseAnswer for Apart<'_> {
     }
 
     fn text(&self) -> String {
-        let names = self.names();
-        let mut text = format!(
-            "finding {}: {}\nrival: {}\n",
-            self.finding.rank, self.finding.statement, names[1]
-        );
-        text.push_str(&format!(
-            "\nexpected separation L: squared residual over noise variance when the other is fitted in its place; below {MIN_SEPARATION_L} they\n\
-             cannot be separated. Points good to {:.3} mm per axis\n",
-            self.sigma
-        ));
         let count = self
             .told
             .proposed
@@ -512,43 +505,14 @@ impl PoseAnswer for Apart<'_> {
             ));
             rows.push((format!("and the {count} proposed"), proposed.after));
         }
-        let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-        let heads = names.map(|name| format!("if {name}"));
-        text.push_str(&format!("  {:width$}  {}  {}\n", "", heads[0], heads[1]));
-        for (name, l) in rows {
-            text.push_str(&format!(
-                "  {name:width$}  {:>2$.1}  {:>3$.1}\n",
-                l[0],
-                l[1],
-                heads[0].len(),
-                heads[1].len()
-            ));
-        }
-        text.push('\n');
-        self.conclusion()
-            .iter()
-            .for_each(|line| text.push_str(&format!("{line}\n")));
-        if self.told.proposed.is_some() {
-            text.push_str("measure in the same set-up, with tracker and target left in place");
-            if let Some(temperature) = self.circumstances.temperature {
-                text.push_str(&format!(", the arm at {temperature:.1} C"));
-            }
-            text.push_str(
-                "; append the files under `later` of the stage `ingest` and diagnose again;\n",
-            );
-            text.push_str(&format!(
-                "to see what that decided: calib diff {} NEW_RUN\n",
-                self.run
-            ));
-            if !self.convention.is_of_the_robot_file() {
-                let counting = drive::counting(&self.convention, &self.robot);
-                text.push_str(&format!(
-                    "joints and directions of the poses are counted as at the {counting}\n"
-                ));
-            }
-            text.push_str(&closing(self.request));
-        }
-        text
+        let names = self.names();
+        let about = context! {
+            of => Serde(self.document()), statement => &self.finding.statement, rival => &names[1],
+            least => MIN_SEPARATION_L.to_string(), width => rows.iter().map(|(name, _)| name.len()).max(),
+            rows => Serde(rows), heads => names.map(|name| format!("if {name}")),
+            counts_otherwise => !self.convention.is_of_the_robot_file(), closing => closing(self.request),
+        };
+        filled(include_str!("apart.txt"), about)
     }
 
     fn document(&self) -> Value {

@@ -4,14 +4,17 @@
 
 use crate::description::RobotDescription;
 use crate::effect::{EffectContext, EffectStack, Load, arm_effect, identified};
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result};
 use crate::estimate::Model;
 use crate::estimate::choose::{Aim, Proposal, Score, Site, median, propose};
 use crate::poses::site::{self, site};
 use crate::poses::{Drive, PoseAnswer, PoseRequest, drive, wish};
 use crate::robot::{JointConvention, Measurements, PointReadings, RobotModel};
 use crate::spatial::Pose;
+use crate::text::filled;
 use crate::units::Unit;
+use minijinja::context;
+use minijinja::value::Serde;
 use nalgebra::Vector3;
 use serde_json::json;
 use std::path::Path;
@@ -220,52 +223,21 @@ fn relative(score: &Score, to: &Score) -> f64 {
 }
 
 fn text(work: &PoseProposal) -> String {
-    let proposal = &work.proposal;
-    let asked = work.parameters.len();
-    let mut text = format!(
-        "{} for {} of {} that position data can determine ({})\n",
-        counted(proposal.poses.rows(), "pose"),
-        proposal.jacobian.free().len(),
-        counted(asked, "parameter"),
-        work.effects.join(", ")
-    );
-    for (effect, reason) in &work.left_out {
-        text.push_str(&format!("{effect} is left out: {reason}\n"));
-    }
     let sets = sets(work);
-    let width = sets.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-    text.push_str(&format!(
-        "\npredicted, for points good to {} mm per axis\n  {:width$}  {:>6}  {:>9}  {:>9}  {:>24}\n",
-        work.sigma, "", "", "", "sigma of", "sigma of position, mm"
-    ));
-    text.push_str(&format!(
-        "  {:width$}  {:>6}  {:>9}  {:>9}  {:>10}  {:>12}\n",
-        "poses", "points", "O1", "parameters", "p95", "max"
-    ));
-    for (name, score) in &sets {
-        let sigma = sets.get(1).map_or(1.0, |(_, usual)| relative(score, usual));
-        text.push_str(&format!(
-            "  {name:width$}  {:>6}  {:>9.3}  {:>9.3}x  {:>10.4}  {:>12.4}\n",
-            score.points,
-            score.o1,
-            sigma,
-            score.p95 * 1e3,
-            score.max * 1e3
-        ));
-    }
-    for (name, score) in sets.iter().skip(1) {
-        text.push_str(&format!(
-            "O1 {:.2} x that of {name}\n",
-            proposal.score.o1 / score.o1
-        ));
-    }
-    text.push_str(&separation(work));
-    text.push_str(&format!(
-        "\nof an error by direction of approach, at least {:.0} % of every joint's stays observable with the directions given\n",
-        1e2 * proposal.approach_seen
-    ));
-    text.push_str(&closing(work.request));
-    text
+    let usual = sets.get(1).map(|(_, usual)| usual);
+    let rows = sets.iter().map(|(name, score)| {
+        let relative = usual.map_or(1.0, |usual| relative(score, usual));
+        let [p95, max] = [score.p95, score.max].map(|sigma| sigma * 1e3);
+        (name, score.points, score.o1, relative, p95, max)
+    });
+    let others = sets.iter().skip(1);
+    let ratios = others.map(|(name, score)| (name, work.proposal.score.o1 / score.o1));
+    let about = context! {
+        of => Serde(document(work)), asked => work.parameters.len(), sigma => work.sigma.to_string(),
+        width => sets.iter().map(|(name, _)| name.len()).max(), sets => Serde(rows.collect::<Vec<_>>()),
+        ratios => Serde(ratios.collect::<Vec<_>>()), closing => closing(work.request),
+    };
+    filled(include_str!("proposal.txt"), about)
 }
 
 /// What every proposal ends with.
@@ -275,32 +247,6 @@ pub(super) fn closing(request: &PoseRequest) -> String {
         Some(path) => format!("{text}poses: {}\n", path.display()),
         None => format!("{text}no file was written: give --out poses.csv (or .parquet)\n"),
     }
-}
-
-fn separation(work: &PoseProposal) -> String {
-    let mut text = String::new();
-    for part in &work.proposal.separation {
-        text.push_str(&format!(
-            "\n{} beside {}: non-centrality {:.2} x the median random set's; visible (3 sigma) from\n",
-            part.effect, part.rival, part.gain
-        ));
-        for (parameter, sigma, random) in &part.sigma {
-            let (name, unit) = &work.parameters[*parameter];
-            let size = |sigma: f64| unit.from_si(3.0 * sigma);
-            text.push_str(&format!(
-                "  {name:28}  {:>9.2e} {unit}  (random {:.2e})\n",
-                size(*sigma),
-                size(*random)
-            ));
-        }
-        for parameter in &part.imitated {
-            text.push_str(&format!(
-                "  {:28}  at no size: others have the same effect at every pose\n",
-                work.parameters[*parameter].0
-            ));
-        }
-    }
-    text
 }
 
 fn document(work: &PoseProposal) -> serde_json::Value {

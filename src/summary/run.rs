@@ -18,42 +18,13 @@ use crate::summary::{labelled, tables};
 use crate::table::{
     Acceptance, AcceptanceRow, Parameters, Prediction, Recording, Rejected, Robot, Table, picked_of,
 };
+use crate::text::filled;
 use crate::units::Unit;
-use minijinja::syntax::SyntaxConfig;
+use minijinja::context;
 use minijinja::value::Serde;
-use minijinja::{Environment, UndefinedBehavior, context};
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
-
-/// A template of this folder, filled.
-pub(super) fn filled(template: &'static str, about: minijinja::Value) -> String {
-    let mut environment = Environment::new();
-    // Lines of tags alone leave no line.
-    let syntax = SyntaxConfig::builder()
-        .trim_blocks(true)
-        .lstrip_blocks(true)
-        .keep_trailing_newline(true)
-        .build();
-    environment.set_syntax(syntax.expect("the usual delimiters"));
-    environment.set_undefined_behavior(UndefinedBehavior::Strict);
-    environment.add_filter("counted", |count: u64, what: &str| counted(count, what));
-    environment.add_filter("words", |name: &str| name.replace('_', " "));
-    environment.add_filter("fixed", |value: f64, decimals: usize| {
-        format!("{value:.decimals$}")
-    });
-    environment.add_filter("figure", |value: Option<f64>| {
-        value.map_or_else(|| "-".into(), |value| format!("{value:.3}"))
-    });
-    environment.add_filter("left", |text: &str, width: usize| format!("{text:width$}"));
-    environment.add_filter("right", |value: minijinja::Value, width: usize| {
-        format!("{:>width$}", value.to_string())
-    });
-    environment.add_filter("brief", brief);
-    environment
-        .render_str(template, about)
-        .expect("a template that names what it is given")
-}
 
 /// The scoreboard of a set of concealed recordings, from its document and from what only people read of it.
 pub fn scoreboard(document: &Value, details: &Value) -> String {
@@ -94,17 +65,6 @@ pub fn status(manifest: &Manifest) -> &'static str {
 pub fn explanation(explanation: &Explanation) -> String {
     let about = context! { of => Serde(explanation) };
     filled(include_str!("text/explanation.txt"), about)
-}
-
-fn brief(value: &str) -> String {
-    let cut: String = value.chars().take(60).collect();
-    // Of hashes the beginning says enough.
-    let is_hash = value.len() == 64 && value.chars().all(|c| c.is_ascii_hexdigit());
-    match () {
-        () if is_hash => value[..12].into(),
-        () if cut.len() < value.len() => format!("{cut}…"),
-        () => cut,
-    }
 }
 
 /// Stages with their tables and files, as `calib check` prints them.

@@ -6,7 +6,6 @@ use crate::diagnose::VerdictKind;
 use crate::effect::{figure, names};
 use crate::error::{Error, Result, counted};
 use crate::summary::estimate::{angle, length};
-use crate::summary::run::filled;
 use crate::summary::short_finding::Found;
 use crate::summary::{labelled, screen};
 use crate::table::{
@@ -15,6 +14,7 @@ use crate::table::{
     SuspectsRow, TablesByKind, TorqueFindingRow, TorqueFindings, TorqueVerdict, TorqueVerdictRow,
     Verdict, VerdictRow, formula_in_words, of_kind, picked, picked_of,
 };
+use crate::text::filled;
 use crate::units::Unit;
 use minijinja::context;
 use minijinja::value::Serde;
