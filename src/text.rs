@@ -1,6 +1,6 @@
 //! Lines for a terminal as templates, filled with what `--json` prints.
 
-use crate::error::counted;
+use crate::error::{counted, visible};
 use minijinja::syntax::SyntaxConfig;
 use minijinja::{Environment, UndefinedBehavior};
 
@@ -29,10 +29,11 @@ pub(crate) fn filled(template: &'static str, about: minijinja::Value) -> String 
         format!("{:>width$}", value.to_string())
     });
     environment.add_filter("brief", brief);
+    environment.add_filter("visible", |text: &str| visible(text));
     environment.add_filter("scientific", |value: Option<f64>| {
         format!("{:.2e}", value.unwrap_or(f64::INFINITY))
     });
-    environment.add_filter("visible", |sigma: Option<f64>| {
+    environment.add_filter("visible_from", |sigma: Option<f64>| {
         format!("{:.2e}", 3.0 * sigma.unwrap_or(f64::INFINITY))
     });
     environment

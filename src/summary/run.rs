@@ -10,7 +10,7 @@
 //! What the reports of a run say of the limits that the user set: a line each, and whether all are kept.
 
 use crate::audit::Explanation;
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result};
 use crate::pipeline::{CompletedRun, Manifest, Plan, RunStatus, StageReport};
 use crate::stage::{DeclaredStage, Report};
 use crate::store::Store;
@@ -69,62 +69,29 @@ pub fn explanation(explanation: &Explanation) -> String {
 
 /// Stages with their tables and files, as `calib check` prints them.
 pub fn graph(plan: &Plan) -> String {
-    let mut text = format!(
-        "pipeline {}, seed {}, {}\n",
-        plan.name,
-        plan.seed,
-        counted(plan.stages.len(), "stage")
-    );
-    for stage in &plan.stages {
-        let uses = if stage.id == stage.entry.name {
-            String::new()
-        } else {
-            format!(" (uses {})", stage.entry.name)
-        };
-        text.push_str(&format!("\n{}{uses}: {}\n", stage.id, stage.entry.summary));
-        let width = stage
-            .inputs
-            .iter()
-            .map(|input| input.port.name.len())
-            .max()
-            .unwrap_or(0);
-        for input in &stage.inputs {
+    let stages = plan.stages.iter().map(|stage| {
+        let widths = stage.inputs.iter().map(|input| input.port.name.len());
+        let reads = stage.inputs.iter().map(|input| {
             let from = input.from.iter().map(|origin| {
                 let writer = &plan.stages[origin.stage];
                 format!("{}.{}", writer.id, writer.outputs[origin.port].name)
             });
-            let from: Vec<String> = from.collect();
-            let from = if from.is_empty() {
-                "(none)".into()
-            } else {
-                from.join(", ")
-            };
-            text.push_str(&format!(
-                "  reads   {:width$}  <- {from}\n",
-                input.port.name
-            ));
-        }
-        for file in &stage.files {
-            text.push_str(&format!(
-                "  file    {} = {}\n",
-                file.place,
-                file.path.display()
-            ));
-        }
-        let outputs: Vec<String> = stage
-            .outputs
-            .iter()
-            .map(|port| {
-                if port.name == port.kind {
-                    port.name.into()
-                } else {
-                    format!("{} ({})", port.name, port.kind)
-                }
-            })
-            .collect();
-        text.push_str(&format!("  writes  {}\n", outputs.join(", ")));
-    }
-    text
+            (input.port.name, from.collect::<Vec<_>>())
+        });
+        let files = stage.files.iter();
+        let files = files.map(|file| (&file.place, file.path.display().to_string()));
+        let writes = stage.outputs.iter().map(|port| match port.name == port.kind {
+            true => port.name.to_string(),
+            false => format!("{} ({})", port.name, port.kind),
+        });
+        json!({
+            "id": stage.id, "uses": stage.entry.name, "summary": stage.entry.summary, "width": widths.max(),
+            "reads": reads.collect::<Vec<_>>(), "files": files.collect::<Vec<_>>(), "writes": writes.collect::<Vec<_>>(),
+        })
+    });
+    let stages = Serde(stages.collect::<Vec<_>>());
+    let about = context! { name => &plan.name, seed => plan.seed, stages };
+    filled(include_str!("text/graph.txt"), about)
 }
 
 /// Lines of a run up to its first fits. Fails where a table has left the store.

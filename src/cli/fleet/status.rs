@@ -14,7 +14,10 @@ use crate::fleet::causes::{self, CauseSearch, Published};
 use crate::fleet::round::GroupColumn;
 use crate::fleet::{Ending, Fleet, FleetFile, RobotRecord, cluster, local, slurm};
 use crate::progress::{FleetProgress, Verbosity};
+use crate::text::filled;
 use clap::{Args, ValueEnum};
+use minijinja::context;
+use minijinja::value::Serde;
 use serde_json::json;
 use std::ffi::OsString;
 use std::time::Instant;
@@ -111,63 +114,30 @@ fn first_line(record: &RobotRecord) -> String {
 }
 
 fn detail(record: &RobotRecord, store: &crate::store::Store, fleet: &str) -> String {
-    let mut text = format!("{}: {}\n", visible(&record.robot), record.ending.name());
-    for line in record.reason.iter().flat_map(|reason| reason.lines()) {
-        text.push_str(&format!("  {}\n", visible(line)));
-    }
-    text.push_str(&format!(
-        "  by {}, {:.1} s, ended {}\n",
-        record.worker, record.wall_seconds, record.ended
-    ));
-    if let Some(log) = &record.log {
-        text.push_str(&format!(
-            "  task's log: {}\n",
-            crate::fleet::cluster::logs(store.root(), fleet)
-                .join(log)
-                .display()
-        ));
-    }
-    if let Some(run) = &record.run {
-        text.push_str(&format!(
-            "  log: {}\n",
-            store
-                .root()
-                .join("runs")
-                .join(run)
-                .join("manifest.json")
-                .display()
-        ));
-        for stage in store
-            .manifest(run)
-            .ok()
-            .iter()
-            .filter_map(|manifest| manifest["stages"].as_array())
-            .flatten()
-        {
-            for warning in stage["warnings"]
-                .as_array()
-                .into_iter()
-                .flatten()
-                .filter_map(|line| line.as_str())
-            {
-                text.push_str(&format!(
-                    "  {}: warning: {}\n",
-                    stage["id"].as_str().unwrap_or_default(),
-                    visible(warning)
-                ));
-            }
-        }
-    }
-    for made in &record.tables {
-        text.push_str(&format!(
-            "  {}.{}: {}, {}\n",
-            made.stage,
-            made.port,
-            counted(made.table.rows, "row"),
-            store.object_path(&made.table).display()
-        ));
-    }
-    text
+    let logs = || crate::fleet::cluster::logs(store.root(), fleet);
+    let log = record
+        .log
+        .as_ref()
+        .map(|log| logs().join(log).display().to_string());
+    let runs = store.root().join("runs");
+    let run = record.run.as_ref();
+    let manifest = run.map(|run| runs.join(run).join("manifest.json").display().to_string());
+    let written = run.and_then(|run| store.manifest(run).ok());
+    let stages = written.as_ref().map(|manifest| &manifest["stages"]);
+    let tables = record.tables.iter().map(|made| {
+        let name = format!("{}.{}", made.stage, made.port);
+        (
+            name,
+            made.table.rows,
+            store.object_path(&made.table).display().to_string(),
+        )
+    });
+    let about = context! {
+        of => Serde(record), ending => record.ending.name(), log, manifest,
+        reason => Serde(record.reason.iter().flat_map(|reason| reason.lines()).collect::<Vec<_>>()),
+        stages => Serde(stages), tables => Serde(tables.collect::<Vec<_>>()),
+    };
+    filled(include_str!("robot.txt"), about)
 }
 
 pub(super) fn cancel(arguments: &CancelArguments) -> Result<()> {
@@ -401,51 +371,14 @@ impl FleetDiagnoseArguments {
 const SHOWN: usize = 20;
 
 fn text(made: &Published, robots: usize, rounds: usize, computed: usize, seconds: f64) -> String {
-    let mut text = String::new();
-    let shared: Vec<_> = made
-        .answers
-        .findings
-        .0
-        .iter()
-        .filter(|row| row.robot.is_empty())
-        .collect();
-    if shared.is_empty() {
-        text.push_str("no cause that robots have in common\n");
-    }
-    for row in shared {
-        let group = if row.group.is_empty() {
-            String::new()
-        } else {
-            format!("{}: ", visible(&row.group))
-        };
-        let rival = row
-            .rival
-            .as_ref()
-            .map(|rival| format!("; or {rival}"))
-            .unwrap_or_default();
-        text.push_str(&format!(
-            "{group}{} (probability {:.2}{rival})\n",
-            visible(&row.statement),
-            row.probability
-        ));
-    }
+    let findings = made.answers.findings.0.iter();
+    let shared: Vec<_> = findings.filter(|row| row.robot.is_empty()).collect();
     let outliers = &made.answers.outliers.0;
-    for row in outliers.iter().take(SHOWN) {
-        text.push_str(&format!("  {}\n", visible(&row.statement)));
-    }
-    if outliers.len() > SHOWN {
-        text.push_str(&format!(
-            "  and {} more in fleet_outliers\n",
-            outliers.len() - SHOWN
-        ));
-    }
-    for path in &made.tables {
-        text.push_str(&format!("table: {}\n", path.display()));
-    }
-    text + &format!(
-        "page: {}\n{} in {}; {computed} computed now ({seconds:.1} s)\n",
-        made.page.display(),
-        counted(robots, "robot"),
-        counted(rounds, "round")
-    )
+    let about = context! {
+        shared => Serde(shared), outliers => Serde(&outliers[..outliers.len().min(SHOWN)]),
+        more => outliers.len().saturating_sub(SHOWN), page => made.page.display().to_string(),
+        tables => made.tables.iter().map(|path| path.display().to_string()).collect::<Vec<_>>(),
+        robots, rounds, computed, seconds,
+    };
+    filled(include_str!("causes.txt"), about)
 }
