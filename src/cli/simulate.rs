@@ -4,11 +4,11 @@
 //!
 //! `calib simulate conceal`: case folders with hidden effects, and their truth sealed apart.
 
-use crate::cli::surroundings::{cores, open_store, surroundings};
+use crate::cli::pipeline_arguments::{CommandTask, ExecutionArguments, shown};
+use crate::cli::surroundings::cores;
 use crate::cli::{emit, emit_json};
 use crate::error::{Error, Fault, Result, counted, nearest};
-use crate::pipeline::{CompletedRun, Override, Plan, Purpose, RunOptions, Selection, run};
-use crate::progress::{Progress, Verbosity};
+use crate::pipeline::{CompletedRun, Override, Plan, Purpose, Selection};
 use crate::proof::{RECORDINGS, SEAL, conceal, recorded, vacant};
 use crate::stage::{DeclaredStage, STAGES, Simulate};
 use crate::store::Store;
@@ -98,27 +98,14 @@ impl RecordArguments {
             .stages
             .last()
             .is_some_and(|stage| stage.stage.settings().get("motion").is_some());
-        let store = open_store(self.store.as_deref())?;
-        let verbosity = if self.quiet {
-            Verbosity::Quiet
-        } else {
-            Verbosity::Normal
-        };
-        let progress = Progress::new(verbosity, plan.width_of_ids());
-        let options = RunOptions {
-            selection: Selection::default(),
-            jobs: cores(),
+        let means = ExecutionArguments::of(&self.set, self.store.as_deref());
+        let store = means.store()?;
+        let task = CommandTask {
             purpose: Purpose::Simulate,
+            selection: Selection::default(),
+            shown: shown(self.quiet, false),
         };
-        let result = run(
-            &plan,
-            &store,
-            &options,
-            &surroundings(command_line),
-            &progress,
-        );
-        progress.finish();
-        let outcome = result?;
+        let outcome = means.run(&plan, &store, task, command_line)?;
         let robot = table::<Robot>(&outcome, &store)?.to_description()?;
         let (recording, truth): (Recording, Truth) =
             (table(&outcome, &store)?, table(&outcome, &store)?);

@@ -6,8 +6,7 @@ use crate::estimate::{CONFLICT, Covariance, ParameterStatus, Session};
 use crate::observation::noise;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::Context;
-use crate::stage::doubtful::{self, FittedRows};
-use crate::stage::doubtful::{KnownModel, advice, suspicion};
+use crate::stage::doubtful::{self, FittedRows, KnownModel, advice, suspicion};
 use crate::stage::settings::{FoldSetting, note_repeats};
 use crate::table::{
     CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split,

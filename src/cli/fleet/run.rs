@@ -4,8 +4,7 @@
 
 use super::super::surroundings::{cores, surroundings};
 use super::super::{emit, emit_json};
-use super::{ClusterArguments, on_slurm};
-use super::{FleetLocation, records, verdict, workshop};
+use super::{ClusterArguments, FleetLocation, on_slurm, records, verdict, workshop};
 use crate::error::{Error, Result, counted, visible};
 use crate::fleet::ledger::{Member, RunNote};
 use crate::fleet::{Ending, Fleet, Ledger, RobotRecord, Workshop, local, tables};

@@ -5,8 +5,7 @@
 //! `calib fleet diagnose`: causes that the robots of a model have in common.
 
 use crate::cli::fleet::run::{self, Engine, count, ledger, note, sound};
-use crate::cli::fleet::{ClusterArguments, on_slurm};
-use crate::cli::fleet::{FleetLocation, records, workshop};
+use crate::cli::fleet::{ClusterArguments, FleetLocation, on_slurm, records, workshop};
 use crate::cli::surroundings::{cores, surroundings};
 use crate::cli::{emit, emit_json};
 use crate::error::{Error, Result, counted, visible};

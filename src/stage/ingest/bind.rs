@@ -1,8 +1,7 @@
 //! From the columns that the settings name to the columns that a file has.
 
 use super::arm::{KindSlots, RobotJoints};
-use super::columns::Columns;
-use super::columns::{FileLayout, WideTargets};
+use super::columns::{Columns, FileLayout, WideTargets};
 use super::mapped::{ColumnRef, JointColumns, ScalarColumn, TextColumn};
 use super::stretch::CLOCK;
 use crate::error::{Error, Fault, Result, counted, did_you_mean, first_of};

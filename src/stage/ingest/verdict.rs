@@ -1,8 +1,7 @@
 //! What is wrong with a file as a whole, or with several files as copies of each other: errors for the owner of the measurements, before any table is written.
 
 use super::arm::RobotJoints;
-use super::columns::Columns;
-use super::columns::{Join, LimitPolicy};
+use super::columns::{Columns, Join, LimitPolicy};
 use super::pair::Measurement;
 use super::refusal::{Reason, RefusalCount, RefusalCounts, tally};
 use super::rows::{FileRows, GivenUp};

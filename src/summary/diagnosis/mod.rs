@@ -18,8 +18,7 @@ use crate::table::{
     FindingNumbers, RivalRow, Rivals, Table, TablesByKind, TorqueNumbers, TorqueRivals, VerdictRow,
     VerdictSentences, VerdictTopic, is_separable_by_poses, of_kind,
 };
-use positions::Positions;
-use positions::Torques;
+use positions::{Positions, Torques};
 use serde_json::{Value, json};
 
 /// A diagnosis by its tables.

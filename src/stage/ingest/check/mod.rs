@@ -2,8 +2,7 @@
 
 mod files;
 
-use super::columns::Columns;
-use super::columns::{FileLayout, HELD, SIMULATED, WideTargets};
+use super::columns::{Columns, FileLayout, HELD, SIMULATED, WideTargets};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn, TextColumn};
 use super::stretch::CLOCK;
 use super::{Ingest, later, noise};
