@@ -13,6 +13,7 @@
 //! | [`error`], [`units`], [`statistics`] | errors by reader, units of stored columns, quantiles; all may use them | - |
 //! | [`description`] | the robot as plain data | - |
 //! | `shell` | words for a shell, in scripts and in commands that are proposed | - |
+//! | `text` | lines for a terminal as templates | - |
 //! | [`raw`] | the files of others: regular ones alone, decoded without a panic; tables of any kind (text, workbook, Parquet, Feather, arrays, bags of ROS 2) as records of cells, numbers in cells | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`criteria`] | numbers by which something is decided: meaning, unit, source | - |
@@ -40,8 +41,8 @@
 //! | [`fleet`] | many robots: roster, records, workers, cluster, causes, tables | criteria, effect, estimate, pipeline, raw, report, shell, stage, store, table, yaml |
 //! | [`audit`] | runs shown, explained, compared, asked, traced, swept | diff, pipeline, raw, shell, stage, store |
 //! | `proof` | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
-//! | [`poses`] | which poses to measure, for a robot file or for a finding of a run | audit, identified, numerics, pipeline, raw, store, table |
-//! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diagnose, diff, effect, pipeline, report, shell, stage, store, table |
+//! | [`poses`] | which poses to measure, for a robot file or for a finding of a run | audit, identified, numerics, pipeline, raw, store, table, text |
+//! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diagnose, diff, effect, pipeline, report, shell, stage, store, table, text |
 //! | [`api`] | calib from arrays: a robot and a recording, and what the stages make of them in memory | audit, compensate, identified, pipeline, poses, raw, stage, store, summary, table, numerics |
 //! | [`cli`], `progress` | the only places that print, and the only ones that know a terminal | all |
 //!
@@ -160,6 +161,7 @@ pub use calib_twin as twin;
 pub mod program;
 pub mod raw;
 pub(crate) mod shell;
+pub(crate) mod text;
 
 pub mod targets;
 

@@ -16,7 +16,7 @@ pub(super) struct Companions(Vec<(String, Vec<u8>)>);
 
 impl Companions {
     /// The files beside a program: those of its name with other endings of its language, the system's data, and those that are named.
-    pub fn of(program: &Path, language: Language, named: &[PathBuf]) -> Result<Self> {
+    pub(crate) fn of(program: &Path, language: Language, named: &[PathBuf]) -> Result<Self> {
         let mut paths = if language == Language::Krl {
             found(program)
         } else {
@@ -38,7 +38,6 @@ impl Companions {
         paths.into_iter().map(read).collect::<Result<_>>().map(Self)
     }
 
-    /// As programs take them.
     pub(crate) fn files(&self) -> Vec<Companion<'_>> {
         self.0
             .iter()

@@ -2,7 +2,7 @@
 
 use super::companions::Companions;
 use super::feed_forward::{FeedForward, feed_forward};
-use super::pipeline_arguments::ModelArguments;
+use super::pipeline_arguments::{ModelArguments, must_be_positive};
 use crate::compensate::{CorrectionOptions, Corrector, Gate, GateLimits, IdentifiedArm, Stated};
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
@@ -163,7 +163,7 @@ const EXAMPLES: &str = "Examples:
   calib compensate parameters.parquet --robot robot.yaml --angle deg < program.csv";
 
 impl CompensateArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         check(self)?;
         let identified = self.model.load(Purpose::Compensate, command_line)?;
         identified.spare(self.out.as_deref())?;
@@ -252,85 +252,60 @@ impl CompensateArguments {
 }
 
 fn check(arguments: &CompensateArguments) -> Result<()> {
-    let mut faults = Vec::new();
-    for (option, given, quantity) in [
+    let units = [
         ("--angle", &arguments.angle, Quantity::Angle),
         ("--length", &arguments.length, Quantity::Length),
-    ] {
-        if let Some(given) = given
-            .as_deref()
-            .filter(|given| Unit::parse(given).is_none_or(|unit| unit.quantity() != quantity))
-        {
-            faults.push(Fault::new(
+    ];
+    let units = units.into_iter().filter_map(|(option, given, quantity)| {
+        let given = given.as_deref()?;
+        let known = Unit::parse(given).is_some_and(|unit| unit.quantity() == quantity);
+        let allowed = || Unit::symbols(quantity).join(", ");
+        (!known).then(|| {
+            Fault::new(
                 option,
-                format!(
-                    "unknown unit `{given}`; allowed: {}",
-                    Unit::symbols(quantity).join(", ")
-                ),
-            ));
-        }
-    }
-    let payload = arguments
-        .payload
-        .and_then(|payload| Stated::Payload.fault(payload));
-    faults.extend(payload.map(|message| Fault::new("--payload", message)));
-    if let Some(since) = arguments
-        .since_start
-        .filter(|since| !(since.is_finite() && *since >= 0.0))
-    {
-        faults.push(Fault::new(
+                format!("unknown unit `{given}`; allowed: {}", allowed()),
+            )
+        })
+    });
+    let stated = [
+        ("--payload", Stated::Payload, arguments.payload),
+        ("--temperature", Stated::Temperature, arguments.temperature),
+    ]
+    .map(|(option, what, value)| Some(Fault::new(option, value.and_then(|v| what.fault(v))?)));
+    let [payload, temperature] = stated;
+    let since = arguments.since_start;
+    let since = since.filter(|since| !(since.is_finite() && *since >= 0.0));
+    let since = since.map(|since| {
+        Fault::new(
             "--since-start",
             format!("expected 0 or more, s, found {since}"),
-        ));
-    }
+        )
+    });
     let limits = [
-        ("--max-correction", arguments.max_correction),
-        ("--max-turn", arguments.max_turn),
+        ("--max-correction", Some(arguments.max_correction)),
+        ("--max-turn", Some(arguments.max_turn)),
+        ("--max-uncertainty", arguments.max_uncertainty),
     ];
-    for (option, given) in limits.into_iter().chain(
-        arguments
-            .max_uncertainty
-            .map(|most| ("--max-uncertainty", most)),
-    ) {
-        if !(given.is_finite() && given > 0.0) {
-            faults.push(Fault::new(
-                option,
-                format!("expected a number above 0, found {given}"),
-            ));
-        }
-    }
-    let temperature = arguments
-        .temperature
-        .and_then(|temperature| Stated::Temperature.fault(temperature));
-    faults.extend(temperature.map(|message| Fault::new("--temperature", message)));
-    if let Some(direction) = arguments
-        .direction
-        .filter(|direction| direction.abs() != 1.0)
-    {
-        faults.push(Fault::new(
-            "--direction",
-            format!("expected 1 or -1, found {direction}"),
-        ));
-    }
-    let tool = arguments
-        .tool
-        .as_deref()
-        .and_then(|tool| RobotTool::parse(tool).err());
-    faults.extend(tool.map(|message| Fault::new("--tool", message)));
-    if arguments.targets.as_os_str() != "-" {
-        faults.extend(open(&arguments.targets).err());
-    }
-    faults.extend(
-        arguments
-            .out
-            .as_deref()
-            .and_then(|out| misplaced(out, &arguments.targets)),
-    );
-    if faults.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::Spec(faults))
-    }
+    let direction = arguments.direction.filter(|sense| sense.abs() != 1.0);
+    let direction = direction
+        .map(|sense| Fault::new("--direction", format!("expected 1 or -1, found {sense}")));
+    let tool = arguments.tool.as_deref();
+    let tool = tool.and_then(|tool| RobotTool::parse(tool).err());
+    let is_file = arguments.targets.as_os_str() != "-";
+    let unread = is_file.then(|| open(&arguments.targets).err()).flatten();
+    let out = arguments.out.as_deref();
+    Error::if_spec(
+        units
+            .chain(payload)
+            .chain(since)
+            .chain(must_be_positive(limits))
+            .chain(temperature)
+            .chain(direction)
+            .chain(tool.map(|message| Fault::new("--tool", message)))
+            .chain(unread)
+            .chain(out.and_then(|out| misplaced(out, &arguments.targets)))
+            .collect(),
+    )
 }
 
 /// Opens targets; what is wrong is known before a pipeline is run for them.

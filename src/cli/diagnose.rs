@@ -62,7 +62,7 @@ const EXAMPLES: &str = "Examples:
 
 impl DiagnoseArguments {
     /// Gives the exit code: 10 where the set-up is wrong, whatever else was asked for.
-    pub fn run(&self, command_line: &[OsString]) -> Result<u8> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<u8> {
         reported_as(self.json, execute(self, command_line))
     }
 }

@@ -81,7 +81,7 @@ const EXAMPLES: &str = "Examples:
 Exit codes: 0 same; 1 different beyond tolerance; 2 could not compare, or keys that occur twice.";
 
 impl DiffArguments {
-    pub fn run(&self) -> Result<u8> {
+    pub(crate) fn run(&self) -> Result<u8> {
         match execute(self) {
             Err(error) if !matches!(error, Error::Bug(_)) => {
                 complain(&error);

@@ -58,7 +58,7 @@ const EXAMPLES: &str = "Examples:
   calib export parameters.parquet --robot robot.yaml --format controller";
 
 impl ExportArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let identified = self.model.load(Purpose::Export, command_line)?;
         identified.spare(self.out.as_deref())?;
         if identified.is_of_torques_alone() && self.format.0.carries == CarriedTorques::Nothing {
@@ -116,7 +116,7 @@ const CHECK_EXAMPLES: &str = "Examples:
 Exit codes: 0 it is; 1 it is that of another robot or model, or was edited; 10 it is no export.";
 
 impl CheckExportArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<u8> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<u8> {
         let label = self.file.display().to_string();
         let text = raw::text(&self.file).map_err(|error| Error::unreadable(&label, &error))?;
         let identified = self.model.load(Purpose::Export, command_line)?;

@@ -12,7 +12,6 @@ use std::path::Path;
 /// Faults of rows named of one file.
 const MOST: usize = 20;
 
-/// What is asked.
 pub(super) struct FeedForward<'a> {
     /// `-`: stdin.
     pub(crate) motion: &'a Path,

@@ -90,7 +90,7 @@ pub(super) struct ManArguments {
 }
 
 impl CompletionsArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut Arguments::command(), "calib", &mut text);
         emit(&String::from_utf8_lossy(&text))
@@ -98,7 +98,7 @@ impl CompletionsArguments {
 }
 
 impl ManArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let mut whole = Arguments::command();
         whole.build();
         let page = match &self.verb {

@@ -2,10 +2,12 @@
 
 use super::emit;
 use crate::error::{Error, Result};
-use crate::init::{InitRequest, KINDS, RobotFileKind, StarterFiles, start};
+use crate::init::{InitRequest, RobotFileKind, StarterFiles, TYPICAL, start};
 use crate::robot::LIBRARY;
+use crate::text::filled;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use minijinja::context;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -43,9 +45,9 @@ const EXAMPLES: &str = "Examples:
 
 /// Typical robots as values of an option, each with its line of help; arms of the library are taken by name and listed by `calib robots`.
 fn kinds() -> impl TypedValueParser<Value = RobotFileKind> {
-    let typical = KINDS
+    let typical = TYPICAL
         .iter()
-        .map(|kind| PossibleValue::new(kind.name()).help(kind.help()));
+        .map(|arm| PossibleValue::new(arm.name).help(arm.help));
     let arms = LIBRARY
         .iter()
         .map(|arm| PossibleValue::new(arm.name).hide(true));
@@ -55,7 +57,7 @@ fn kinds() -> impl TypedValueParser<Value = RobotFileKind> {
 
 impl InitArguments {
     /// Gives the exit code: 1 where nothing was understood of the recordings.
-    pub fn run(&self) -> Result<u8> {
+    pub(crate) fn run(&self) -> Result<u8> {
         let start = execute(self)?;
         if !start.understood_nothing() {
             return Ok(0);
@@ -119,47 +121,20 @@ fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
 }
 
 fn closing(arguments: &InitArguments, start: &StarterFiles, files: &[PathBuf; 2]) -> String {
-    let mut text = String::new();
-    for (path, account) in &start.accounts {
-        text.push_str(&format!("{}: {account}\n", path.display()));
-    }
-    let [robot, pipeline] = files.each_ref().map(|path| path.display());
-    match &start.robot {
-        Some(_) => text.push_str(&format!("wrote {robot} and {pipeline}\n\nnext:\n")),
-        None => text.push_str(&format!(
-            "wrote {pipeline} beside {robot}, which is used as it is\n\nnext:\n"
-        )),
-    }
-    if start.robot.is_none() {
-        text.push_str(&format!(
-            "  1. {robot}: see that it is the robot of these recordings\n"
-        ));
-    } else if let Some(RobotFileKind::Arm(_)) = arguments.robot {
-        text.push_str(&format!(
-            "  1. {robot}: the arm's own numbers; put the measured point where it says REPLACE\n"
-        ));
-    } else if arguments.urdf.is_none() {
-        text.push_str(&format!(
-            "  1. {robot}: put your robot's numbers where it says REPLACE\n"
-        ));
-    } else {
-        text.push_str(&format!(
-            "  1. {robot}: say where the measured point sits on the tool\n"
-        ));
-    }
-    let name = if start.missing.is_empty() {
-        String::new()
-    } else {
-        format!(
-            "; name {} where it says REPLACE: they were not recognised",
-            start.missing.join(" and ")
-        )
+    let [robot, pipeline] = files.each_ref().map(|path| path.display().to_string());
+    let account =
+        |(path, account): &(PathBuf, String)| (path.display().to_string(), account.clone());
+    let first = match (&start.robot, arguments.robot, &arguments.urdf) {
+        (None, ..) => "see that it is the robot of these recordings",
+        (_, Some(RobotFileKind::Arm(_)), _) => {
+            "the arm's own numbers; put the measured point where it says REPLACE"
+        }
+        (.., None) => "put your robot's numbers where it says REPLACE",
+        (.., Some(_)) => "say where the measured point sits on the tool",
     };
-    text.push_str(&format!(
-        "  2. {pipeline}: look at the lines marked CHECK{name}\n"
-    ));
-    text.push_str(&format!(
-        "  3. calib check {pipeline}\n  4. calib run {pipeline}\n"
-    ));
-    text
+    let about = context! {
+        robot, pipeline, first, is_new => start.robot.is_some(), missing => &start.missing,
+        accounts => start.accounts.iter().map(account).collect::<Vec<_>>(),
+    };
+    filled(include_str!("init.txt"), about)
 }

@@ -4,21 +4,16 @@ mod companions;
 mod compensate;
 mod diagnose;
 mod diff;
-mod excite;
 mod export;
 mod feed_forward;
 mod fleet;
 mod help;
 mod init;
-mod keep;
-mod lineage;
 mod log;
-mod paint;
 mod pipeline_arguments;
 mod poses;
 mod query;
 mod run;
-mod schema;
 mod serve_model;
 mod simulate;
 mod surroundings;
@@ -56,19 +51,19 @@ enum Verb {
     Show(log::ShowArguments),
     Log(log::LogArguments),
     Diff(diff::DiffArguments),
-    Explain(lineage::ExplainArguments),
+    Explain(log::ExplainArguments),
     Query(query::QueryArguments),
-    Lineage(lineage::LineageArguments),
-    Schema(schema::SchemaArguments),
+    Lineage(log::LineageArguments),
+    Schema(query::SchemaArguments),
     Poses(poses::PosesArguments),
-    Excite(excite::ExciteArguments),
+    Excite(poses::ExciteArguments),
     Fleet(fleet::FleetArguments),
-    Tag(keep::TagArguments),
-    Verify(keep::VerifyArguments),
-    Gc(keep::GcArguments),
+    Tag(log::TagArguments),
+    Verify(log::VerifyArguments),
+    Gc(log::GcArguments),
     Simulate(simulate::SimulateArguments),
-    Effects(schema::EffectsArguments),
-    Robots(schema::RobotsArguments),
+    Effects(query::EffectsArguments),
+    Robots(query::RobotsArguments),
     Completions(help::CompletionsArguments),
     Man(help::ManArguments),
 }
@@ -202,7 +197,7 @@ fn emit_lines(text: &str) -> Result<()> {
     };
     let text = crate::summary::folded(text, columns);
     emit(&if surroundings::colours() {
-        paint::painted(&text)
+        surroundings::painted(&text)
     } else {
         text
     })

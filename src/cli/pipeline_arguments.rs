@@ -80,7 +80,7 @@ impl PipelineArguments {
     }
 
     /// Runs the selected stages with progress, and with `details` all that stages note.
-    pub fn run(
+    pub(crate) fn run(
         &self,
         plan: &Plan,
         store: &Store,
@@ -150,6 +150,13 @@ pub(super) fn shown(quiet: bool, details: bool) -> Verbosity {
 }
 
 impl ExecutionArguments {
+    /// With all processors.
+    pub(crate) fn of(set: &[Override], store: Option<&Path>) -> Self {
+        let (set, store) = (set.to_vec(), store.map(Path::to_path_buf));
+        let jobs = None;
+        Self { set, store, jobs }
+    }
+
     /// Reads a pipeline. Fails with every fault of its YAML and of the robot file at once.
     pub(crate) fn plan(&self, pipeline: &Path) -> Result<Plan> {
         self.plan_with(pipeline, &[])
@@ -181,7 +188,7 @@ impl ExecutionArguments {
     }
 
     /// Runs the selected stages; with as much progress as is to be shown.
-    pub fn run(
+    pub(crate) fn run(
         &self,
         plan: &Plan,
         store: &Store,
@@ -257,19 +264,11 @@ impl ModelArguments {
         purpose: Purpose,
         command_line: &[OsString],
     ) -> Result<IdentifiedModel> {
-        let wrong = [
-            ("--max-shift", self.max_shift),
-            ("--max-tilt", self.max_tilt),
-        ]
-        .into_iter()
-        .filter(|(_, given)| !(given.is_finite() && *given > 0.0))
-        .map(|(option, given)| {
-            Fault::new(option, format!("expected a number above 0, found {given}"))
-        });
-        let wrong: Vec<Fault> = wrong.collect();
-        if !wrong.is_empty() {
-            return Err(Error::Spec(wrong));
-        }
+        let limits = [
+            ("--max-shift", Some(self.max_shift)),
+            ("--max-tilt", Some(self.max_tilt)),
+        ];
+        Error::if_spec(must_be_positive(limits).collect())?;
         let identified = self.identified(purpose, command_line)?;
         for warning in &identified.warnings {
             let _ = writeln!(std::io::stderr(), "warning: {warning}");
@@ -365,4 +364,15 @@ impl ModelArguments {
             other => other,
         })
     }
+}
+
+/// Faults of options that must be above 0 where they are given.
+pub(super) fn must_be_positive<const N: usize>(
+    options: [(&'static str, Option<f64>); N],
+) -> impl Iterator<Item = Fault> {
+    options.into_iter().filter_map(|(option, given)| {
+        let given = given.filter(|given| !(given.is_finite() && *given > 0.0))?;
+        let message = format!("expected a number above 0, found {given}");
+        Some(Fault::new(option, message))
+    })
 }

@@ -1,15 +1,27 @@
 //! `calib query`: the tables of a run asked in SQL.
+//!
+//! `calib schema`: the tables with their columns and units, and the JSON Schema of the pipeline's YAML.
+//!
+//! `calib effects`: the library of effects, in words.
+//!
+//! `calib robots`: the library of common arms.
 
-use super::pipeline_arguments::reported_as;
-use super::surroundings::open_store;
-use super::{emit, emit_json};
 use crate::audit::{QueryTable, QueryTables};
-use crate::error::{Error, Result};
+use crate::cli::pipeline_arguments::reported_as;
+use crate::cli::surroundings::open_store;
+use crate::cli::{emit, emit_json};
+use crate::effect::{CAUSES, Cause, cause};
+use crate::error::{Error, Result, counted, nearest};
 use crate::pipeline::{Manifest, find_run};
-use crate::store::Store;
-use crate::summary;
-use clap::Args;
-use std::path::PathBuf;
+use crate::robot::{LIBRARY, LibraryArm};
+use crate::stage::STAGES;
+use crate::store::schema::{self, TableSchema};
+use crate::store::{Loose, Store, read_table};
+use crate::summary::effects_json;
+use crate::units::Unit;
+use crate::{pipeline, summary};
+use clap::{Args, Subcommand};
+use std::path::{Path, PathBuf};
 
 /// Ask the tables of a run in SQL; without SQL, list them with their columns.
 ///
@@ -48,7 +60,7 @@ pub(super) struct QueryArguments {
 }
 
 impl QueryArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         reported_as(self.json, execute(self))
     }
 }
@@ -110,4 +122,233 @@ fn columns(store: &Store, tables: &[&QueryTable], json: bool) -> Result<()> {
     } else {
         emit(&summary::columns(store, tables)?)
     }
+}
+
+/// Show what tables hold, and the schema of the pipeline's YAML.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib schema list
+  calib schema show prediction
+  calib schema check .calib/tables/sr210d/joint.prediction.parquet
+  calib schema pipeline > schemas/pipeline.v1.schema.json
+  calib schema fleet > schemas/fleet.v1.schema.json")]
+pub(super) struct SchemaArguments {
+    #[command(subcommand)]
+    verb: SchemaVerb,
+}
+
+#[derive(Subcommand)]
+enum SchemaVerb {
+    /// All tables, one a line
+    List,
+    /// The columns of a table with type, unit and meaning
+    Show {
+        /// The table's kind, e.g. `recording`
+        kind: String,
+    },
+    /// Checks a table's file: columns, types, units' columns, ranges, key, no NaN
+    Check {
+        /// A Parquet file
+        file: PathBuf,
+        /// The table that it is, where it does not say so itself
+        #[arg(long = "as", value_name = "KIND")]
+        kind: Option<String>,
+    },
+    /// The JSON Schema of the pipeline's YAML, for editors
+    Pipeline,
+    /// The JSON Schema of FLEET.yaml, for editors
+    Fleet,
+}
+
+impl SchemaArguments {
+    pub(crate) fn run(&self) -> Result<()> {
+        match &self.verb {
+            SchemaVerb::List => emit(&list()),
+            SchemaVerb::Show { kind } => emit(&show(find(kind)?)),
+            SchemaVerb::Fleet => emit(&crate::fleet::file::json_schema()),
+            SchemaVerb::Check { file, kind } => check(file, kind.as_deref()),
+            SchemaVerb::Pipeline => emit(&pipeline::json_schema(STAGES)),
+        }
+    }
+}
+
+fn check(file: &Path, kind: Option<&str>) -> Result<()> {
+    let kind = kind
+        .map(find)
+        .transpose()?
+        .map(|schema| schema.name.as_str());
+    let Loose { table, vouched } = read_table(file, kind)?;
+    let hash = if vouched {
+        ""
+    } else {
+        " (the file carries no content hash: its content cannot be verified)"
+    };
+    emit(&format!(
+        "{}: sound, {}, {}{hash}\n",
+        table.schema().id(),
+        counted(table.rows(), "row"),
+        table.table_hash()
+    ))
+}
+
+fn list() -> String {
+    let width = schema::all()
+        .map(|schema| schema.name.len())
+        .max()
+        .unwrap_or(0);
+    schema::all()
+        .map(|schema| {
+            format!(
+                "{:width$}  {}  {}\n",
+                schema.name, schema.version, schema.description
+            )
+        })
+        .collect()
+}
+
+fn find(kind: &str) -> Result<&'static TableSchema> {
+    schema::all()
+        .find(|schema| schema.name == kind)
+        .ok_or_else(|| {
+            let kinds: Vec<&str> = schema::all().map(|schema| schema.name.as_str()).collect();
+            let hint = nearest(kind, kinds.iter().copied())
+                .map(|near| format!("; did you mean `{near}`?"));
+            Error::spec(
+                "KIND",
+                format!(
+                    "no table `{kind}`{} Allowed: {}",
+                    hint.unwrap_or_else(|| ".".into()),
+                    kinds.join(", ")
+                ),
+            )
+        })
+}
+
+fn show(schema: &TableSchema) -> String {
+    let mut text = format!(
+        "{} {}: {}\n",
+        schema.name, schema.version, schema.description
+    );
+    text.push_str(&format!(
+        "key: {}; sorted by: {}\n\n",
+        schema.primary_key.join(", "),
+        schema.sort.join(", ")
+    ));
+    let width = schema
+        .fields
+        .iter()
+        .map(|field| field.name.len())
+        .max()
+        .unwrap_or(0);
+    for field in &schema.fields {
+        let kind = format!("{:?}", field.column_type).to_lowercase();
+        let null = if field.nullable { "or null" } else { "" };
+        let unit = field.unit.as_deref().unwrap_or("");
+        text.push_str(&format!(
+            "{:width$}  {kind:7} {null:7}  {unit:6}  {}\n",
+            field.name, field.description
+        ));
+    }
+    text
+}
+
+/// List the effects that calib knows: formula, usual size, what each is confounded with, and what a recording needs to show it.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib effects
+  calib effects backlash
+  calib effects --json")]
+pub(super) struct EffectsArguments {
+    /// One effect by its name
+    #[arg(value_name = "EFFECT")]
+    name: Option<String>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+impl EffectsArguments {
+    pub(crate) fn run(&self) -> Result<()> {
+        let chosen: Vec<&Cause> = match &self.name {
+            None => CAUSES.to_vec(),
+            Some(name) => vec![cause(name).ok_or_else(|| unknown(name))?],
+        };
+        if self.json {
+            return emit_json(&effects_json(&chosen));
+        }
+        let text: Vec<String> = chosen.iter().map(|about| entry(about)).collect();
+        emit(&text.join("\n"))
+    }
+}
+
+fn entry(about: &Cause) -> String {
+    let measure = about.measure.map_or_else(String::new, |measure| {
+        format!("  measure     {}\n", measure.advice)
+    });
+    format!(
+        "{} ({})\n  formula     {}\n  usual size  {}\n  confounded  {}\n  needs       {}\n{measure}",
+        about.name, about.place, about.formula, about.size, about.confounded, about.needs
+    )
+}
+
+fn unknown(name: &str) -> Error {
+    let names: Vec<&str> = CAUSES.iter().map(|cause| cause.name()).collect();
+    Error::spec(
+        "EFFECT",
+        format!("no effect `{name}`; allowed: {}", names.join(", ")),
+    )
+}
+
+/// List the arms that `calib init` starts from, or print the robot file of one.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib robots
+  calib robots ur10e
+  calib init cell7 --data measurements.csv --robot ur10e")]
+pub(super) struct RobotsArguments {
+    /// One arm by its name: its robot file, with sources
+    #[arg(value_name = "NAME")]
+    name: Option<String>,
+}
+
+impl RobotsArguments {
+    pub(crate) fn run(&self) -> Result<()> {
+        let Some(name) = &self.name else {
+            return emit(&library()?);
+        };
+        emit(LibraryArm::named(name)?.text)
+    }
+}
+
+fn library() -> Result<String> {
+    let mut out = format!(
+        "{:<16} {:<40} {:>6} {:>9}  {}\n",
+        "name", "arm", "joints", "reach mm", "in the file"
+    );
+    for arm in LIBRARY {
+        let read = arm.read()?;
+        let reach = read.about.reach.map_or_else(
+            || "-".into(),
+            |reach| Unit::Millimetre.from_si(reach).round().to_string(),
+        );
+        let mut holds = Vec::new();
+        if read.robot.joints.iter().any(|joint| joint.mass.is_some()) {
+            holds.push("masses");
+        }
+        if read.about.counting().is_some() {
+            holds.push("coupled counting");
+        }
+        let joints = read.robot.joints.len();
+        out.push_str(
+            format!(
+                "{:<16} {:<40} {joints:>6} {reach:>9}  {}",
+                arm.name,
+                read.robot.name,
+                holds.join(", ")
+            )
+            .trim_end(),
+        );
+        out.push('\n');
+    }
+    Ok(out)
 }

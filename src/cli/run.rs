@@ -67,7 +67,7 @@ const EXAMPLES: &str = "Examples:
   calib run pipeline.yaml --json --quiet > result.json";
 
 impl RunArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<u8> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<u8> {
         self.shared.reported(execute(self, command_line))
     }
 }
@@ -151,7 +151,6 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     Ok(code)
 }
 
-/// What was done.
 fn closing(outcome: &CompletedRun, seconds: f64) -> String {
     let stages = &outcome.manifest.stages;
     let count = |status| stages.iter().filter(|stage| stage.status == status).count();
@@ -267,7 +266,7 @@ pub(super) struct CheckArguments {
 }
 
 impl CheckArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let plan = match self.means.plan(&self.pipeline) {
             Ok(plan) => plan,
             Err(error) => {

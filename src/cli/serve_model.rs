@@ -59,7 +59,7 @@ struct Asked {
 }
 
 impl ServeModelArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let payload = self.payload;
         if let Some(message) = payload.and_then(|payload| Stated::Payload.fault(payload)) {
             return Err(Error::spec("--payload", message));

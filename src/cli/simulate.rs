@@ -1,22 +1,28 @@
 //! `calib simulate`: recordings of a robot whose truth is known.
 //!
 //! `calib simulate record`: a pipeline's twin as the files that a user has.
+//!
+//! `calib simulate conceal`: case folders with hidden effects, and their truth sealed apart.
 
-use crate::cli::surroundings::{cores, open_store, surroundings};
+use crate::cli::pipeline_arguments::{CommandTask, ExecutionArguments, shown};
+use crate::cli::surroundings::cores;
 use crate::cli::{emit, emit_json};
-use crate::error::{Error, Result, counted};
-use crate::pipeline::{CompletedRun, Override, Plan, Purpose, RunOptions, Selection, run};
-use crate::progress::{Progress, Verbosity};
-use crate::proof::{recorded, vacant};
+use crate::error::{Error, Fault, Result, counted, nearest};
+use crate::pipeline::{CompletedRun, Override, Plan, Purpose, Selection};
+use crate::proof::{RECORDINGS, SEAL, conceal, recorded, vacant};
 use crate::stage::{DeclaredStage, STAGES, Simulate};
 use crate::store::Store;
 use crate::table::{Recording, Robot, Table, Truth};
-use clap::{Args, Subcommand};
+use crate::twin::conceal::design::Design;
+use crate::twin::conceal::family::Collection;
+use crate::twin::conceal::points::LAYOUTS;
+use crate::twin::conceal::robots::{ALL_KINDS, Kind};
+use crate::twin::tracker::SCATTERS;
+use clap::{Args, Subcommand, ValueEnum};
 use serde_json::json;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-mod conceal;
 mod prove;
 
 /// Make recordings of a simulated robot: with stated or hidden effects; and mark what a diagnosis made of them.
@@ -29,13 +35,13 @@ pub(super) struct SimulateArguments {
 #[derive(Subcommand)]
 enum SimulateVerb {
     Record(RecordArguments),
-    Conceal(conceal::ConcealArguments),
+    Conceal(ConcealArguments),
     Reveal(prove::RevealArguments),
     Prove(prove::ProveArguments),
 }
 
 impl SimulateArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         match &self.verb {
             SimulateVerb::Record(verb) => verb.run(command_line),
             SimulateVerb::Conceal(verb) => verb.run(),
@@ -76,7 +82,7 @@ pub(crate) struct RecordArguments {
 }
 
 impl RecordArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let place = self.pipeline.display().to_string();
         let plan = Plan::load(&self.pipeline, &self.set, STAGES)?;
         let stage = plan
@@ -92,27 +98,14 @@ impl RecordArguments {
             .stages
             .last()
             .is_some_and(|stage| stage.stage.settings().get("motion").is_some());
-        let store = open_store(self.store.as_deref())?;
-        let verbosity = if self.quiet {
-            Verbosity::Quiet
-        } else {
-            Verbosity::Normal
-        };
-        let progress = Progress::new(verbosity, plan.width_of_ids());
-        let options = RunOptions {
-            selection: Selection::default(),
-            jobs: cores(),
+        let means = ExecutionArguments::of(&self.set, self.store.as_deref());
+        let store = means.store()?;
+        let task = CommandTask {
             purpose: Purpose::Simulate,
+            selection: Selection::default(),
+            shown: shown(self.quiet, false),
         };
-        let result = run(
-            &plan,
-            &store,
-            &options,
-            &surroundings(command_line),
-            &progress,
-        );
-        progress.finish();
-        let outcome = result?;
+        let outcome = means.run(&plan, &store, task, command_line)?;
         let robot = table::<Robot>(&outcome, &store)?.to_description()?;
         let (recording, truth): (Recording, Truth) =
             (table(&outcome, &store)?, table(&outcome, &store)?);
@@ -148,4 +141,268 @@ fn table<T: Table>(outcome: &CompletedRun, store: &Store) -> Result<T> {
     let output =
         last.ok_or_else(|| Error::Bug(format!("a simulation without a table {}", T::KIND)))?;
     T::from_frame(&store.load(&output.table)?)
+}
+
+/// Make recordings in which effects are hidden, and seal the truth.
+///
+/// DIR/recordings/CASE holds what a user has: robot.json, controller.csv, tracker.csv. DIR/sealed/CASE.json holds the truth, and
+/// DIR/seal.json the SHA-256 of every file. The same seed gives the same bytes. Effects are made by other mathematics than those
+/// that `diagnose` knows, many in other forms, and sized so that they range from hardly visible to plain.
+///
+/// With --dynamics recordings are torques or motor currents of an arm that moves (robot.json, recording.csv), for
+/// `calib diagnose pipelines/dynamics/pipeline.yaml`; most joints have friction beside what is concealed.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib simulate conceal --out blind --seed 7 --cases 40 --nulls 0.25
+  calib simulate conceal --out gears --cases 20 --family gear_cyclic,backlash --robot sr210d --points 200
+  calib simulate conceal --out pairs --seed 3 --cases 30 --pairs 1
+  calib simulate conceal --out strange --cases 30 --open 1
+  calib simulate conceal --out further --cases 30 --families beyond
+  calib simulate conceal --out moving --cases 30 --dynamics --nulls 0.2 --pairs 0.2")]
+pub(crate) struct ConcealArguments {
+    /// The folder to make; it must not exist, or be empty
+    #[arg(long, short, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// The same seed gives the same recordings
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Recordings to make
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=9999))]
+    cases: u32,
+    /// Torques of an arm that moves instead of points
+    #[arg(long, conflicts_with_all = OF_POINTS)]
+    dynamics: bool,
+    /// Seconds of a recording of torques: 55 % are to fit, the rest judges
+    #[arg(long, value_name = "S", default_value_t = 48.0, requires = "dynamics")]
+    seconds: f64,
+    /// Rows a second of a recording of torques
+    #[arg(
+        long,
+        value_name = "HZ",
+        default_value_t = 100.0,
+        requires = "dynamics"
+    )]
+    rate: f64,
+    /// The list that effects are drawn from
+    #[arg(long, value_enum, value_name = "LIST", default_value_t = Families::Library)]
+    families: Families,
+    /// Effects to draw from, by canonical name [default: all]
+    #[arg(long, value_name = "EFFECT,..", value_delimiter = ',')]
+    family: Vec<String>,
+    /// Robots to draw from: sr210d, compact6, seven7r, five5r [default: the first three; beyond the library all]
+    #[arg(long, value_name = "ROBOT,..", value_delimiter = ',')]
+    robot: Vec<String>,
+    /// Points to fit; 25 to 50 % of them are added to validate [default: 50 to 400]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(20..=20_000))]
+    points: Option<u32>,
+    /// Share of recordings without any effect
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    nulls: f64,
+    /// Share of recordings with two effects
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    pairs: f64,
+    /// Share of recordings with an effect that is in no list
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    open: f64,
+    /// Share of recordings with a foreign effect: drawn at random, any motion over any variable
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    foreign: f64,
+    /// Share of effects in another form than the obvious one
+    #[arg(long, value_name = "SHARE", default_value_t = 0.5)]
+    other_forms: f64,
+    /// Share of effects of natural size; others are sized to a drawn visibility
+    #[arg(long, value_name = "SHARE", default_value_t = 0.2)]
+    natural: f64,
+    /// Share of recordings with gross errors or exchanged points
+    #[arg(long, value_name = "SHARE", default_value_t = 0.08)]
+    faulty: f64,
+    /// How trackers scatter: gaussian, student (heavy tails), uneven, wandering (0.9 from point to point), directional (2.5 to 1)
+    /// [default: gaussian, of nulls also student and uneven; beyond the library mostly gaussian]
+    #[arg(long, value_name = "FORM")]
+    scatter: Option<String>,
+    /// As most cells have it: robot files without masses, nothing on the tool, no motor currents
+    #[arg(long)]
+    bare: bool,
+    /// Rounds the logged joints to steps of this size, deg
+    #[arg(long, value_name = "DEG", default_value_t = 0.0)]
+    log_step: f64,
+    /// How poses follow each other: random, path (one after the other along lines and curves), shuffled (those of the same paths in random
+    /// order)
+    #[arg(long, value_name = "FORM", default_value = "random")]
+    layout: String,
+    /// A mass on the flange, kg, that neither the robot file nor the payload column states
+    #[arg(long, value_name = "KG", default_value_t = 0.0)]
+    tool_mass: f64,
+    /// Worker threads; no result depends on it [default: all cores]
+    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Options that only recordings of points have.
+const OF_POINTS: [&str; 10] = [
+    "families", "family", "robot", "points", "natural", "faulty", "scatter", "bare", "log_step",
+    "layout",
+];
+
+/// The lists of effects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Families {
+    /// Effects of the library, from hardly visible to plain
+    Library,
+    /// Instruments, memory and interactions: one cause a recording, L of 50 to 200
+    Beyond,
+}
+
+impl ConcealArguments {
+    pub(crate) fn threads(&self) -> usize {
+        self.jobs.map_or_else(cores, usize::from)
+    }
+
+    pub(crate) fn run(&self) -> Result<()> {
+        let design = design(self)?;
+        vacant(&self.out)?;
+        let rows = conceal(&self.out, &design, self.threads())?;
+        let row = if self.dynamics { "row" } else { "point" };
+        let (recordings, seal) = (self.out.join(RECORDINGS), self.out.join(SEAL));
+        if self.json {
+            return emit_json(
+                &json!({ "cases": design.cases, (format!("{row}s")): rows, "recordings": recordings, "seal": seal }),
+            );
+        }
+        emit(&format!(
+            "{}, {}: {}\nseal: {}\n",
+            counted(design.cases, "recording"),
+            counted(rows, row),
+            recordings.display(),
+            seal.display()
+        ))
+    }
+}
+
+/// The design that the options state; fails with every fault of them.
+pub(crate) fn design(arguments: &ConcealArguments) -> Result<Design> {
+    let mut faults = Vec::new();
+    let mut within =
+        |option: &str, value: f64, [least, most]: [f64; 2], [what, unit]: [&str; 2]| {
+            if !(least..=most).contains(&value) {
+                let message = format!("{value}{what}; allowed: {least} to {most}{unit}");
+                faults.push(Fault::new(option, message));
+            }
+        };
+    for (option, share) in [
+        ("--nulls", arguments.nulls),
+        ("--pairs", arguments.pairs),
+        ("--open", arguments.open),
+        ("--foreign", arguments.foreign),
+        ("--other-forms", arguments.other_forms),
+        ("--natural", arguments.natural),
+        ("--faulty", arguments.faulty),
+    ] {
+        within(option, share, [0.0, 1.0], [" is no share", ""]);
+    }
+    within("--seconds", arguments.seconds, [16.0, 3600.0], ["", ""]);
+    within("--rate", arguments.rate, [20.0, 5000.0], ["", ""]);
+    within(
+        "--tool-mass",
+        arguments.tool_mass,
+        [0.0, 500.0],
+        [" is no mass of a tool", " kg"],
+    );
+    within(
+        "--log-step",
+        arguments.log_step,
+        [0.0, 1.0],
+        [" is no step of a log", " deg"],
+    );
+    let singled = arguments.pairs + arguments.open + arguments.foreign;
+    let collection = match arguments.families {
+        Families::Library => Collection::Library,
+        Families::Beyond => Collection::Beyond,
+    };
+    for (wrong, options, message) in [
+        (
+            arguments.nulls + singled > 1.0 + 1e-9,
+            "--nulls, --pairs, --open, --foreign",
+            "add up to more than 1",
+        ),
+        (
+            arguments.dynamics && arguments.foreign > 0.0,
+            "--foreign",
+            "foreign effects move points; torques have none",
+        ),
+        (
+            collection == Collection::Beyond && singled > 0.0,
+            "--pairs, --open, --foreign",
+            "need `--families library`; with `--families beyond` every recording has one cause",
+        ),
+    ] {
+        if wrong {
+            faults.push(Fault::new(options, message));
+        }
+    }
+    let mut names: Vec<(&str, ())> = Vec::new();
+    for family in collection.families() {
+        if !names.contains(&(family.name, ())) {
+            names.push((family.name, ()));
+        }
+    }
+    for name in &arguments.family {
+        named("--family", name, &names, &mut faults);
+    }
+    let kinds = ALL_KINDS.map(|kind| (kind.name(), kind));
+    for name in &arguments.robot {
+        named("--robot", name, &kinds, &mut faults);
+    }
+    let scatters = SCATTERS.map(|one| (one.name(), one));
+    let scatter = arguments.scatter.as_deref();
+    let scatter = scatter.and_then(|name| named("--scatter", name, &scatters, &mut faults));
+    let layouts = LAYOUTS.map(|one| (one.name(), one));
+    let layout = named("--layout", &arguments.layout, &layouts, &mut faults);
+    Error::if_spec(faults)?;
+    let is_chosen = |kind: &Kind| arguments.robot.iter().any(|name| name == kind.name());
+    Ok(Design {
+        seed: arguments.seed,
+        cases: arguments.cases as usize,
+        collection,
+        families: arguments.family.clone(),
+        robots: ALL_KINDS.into_iter().filter(is_chosen).collect(),
+        points: arguments.points.map(|points| points as usize),
+        nulls: arguments.nulls,
+        pairs: arguments.pairs,
+        open: arguments.open,
+        foreign: arguments.foreign,
+        other_forms: arguments.other_forms,
+        natural: arguments.natural,
+        faulty: arguments.faulty,
+        scatter,
+        bare: arguments.bare,
+        log_step_deg: arguments.log_step,
+        layout: layout.unwrap_or_default(),
+        tool_mass_kg: arguments.tool_mass,
+        dynamics: arguments.dynamics,
+        seconds: arguments.seconds,
+        rate: arguments.rate,
+    })
+}
+
+/// The one of this name; a fault where there is none.
+fn named<T: Copy>(
+    option: &str,
+    name: &str,
+    all: &[(&str, T)],
+    faults: &mut Vec<Fault>,
+) -> Option<T> {
+    let found = all.iter().find(|(known, _)| *known == name);
+    if found.is_none() {
+        let allowed: Vec<&str> = all.iter().map(|(known, _)| *known).collect();
+        let hint =
+            nearest(name, allowed.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+        let hint = hint.unwrap_or_else(|| ".".into());
+        let message = format!("no `{name}`{hint} Allowed: {}", allowed.join(", "));
+        faults.push(Fault::new(option, message));
+    }
+    found.map(|(_, one)| *one)
 }

@@ -48,7 +48,7 @@ pub(super) struct VerifyRobotArguments {
 }
 
 impl VerifyRobotArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let place = self.second.display().to_string();
         let text = raw::text(&self.second)
             .map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;

@@ -1,17 +1,20 @@
 //! The arm that a recording is of: a file that is there already, a URDF, or a kind to start from.
 //!
 //! What drives say of joints while the arm moves: torques or motor currents, velocities; and whether recordings are of them.
+//!
+//! Robot files to start from: typical arms, every number of which the user replaces.
 
-use super::columns::{Choice, ExaminedFile};
-use super::names::{
-    CURRENTS, NAMED_JOINTS, TORQUES, TRAJECTORIES, VELOCITIES, WANTED, lists, numbered,
-};
-use super::robots::{self, RobotFileKind};
-use super::{InitRequest, KINDS};
 use crate::description::JointKind;
 use crate::error::{Error, Result, counted};
+use crate::init::InitRequest;
+use crate::init::columns::{Choice, ExaminedFile};
+use crate::init::names::{
+    CURRENTS, NAMED_JOINTS, TORQUES, TRAJECTORIES, VELOCITIES, WANTED, lists, numbered,
+};
 use crate::raw;
+use crate::robot::LibraryArm;
 use crate::robot::import::{RobotFileText, UrdfOutline, read_calib, urdf_outline};
+use crate::yaml::quoted;
 use std::path::Path;
 
 /// What recordings and pipeline must know of the arm.
@@ -31,13 +34,15 @@ pub(super) struct StartingArm {
 
 impl StartingArm {
     /// Fails where a file cannot be read, or is there and another arm is asked for.
-    pub fn of(request: &InitRequest) -> Result<Self> {
+    pub(crate) fn of(request: &InitRequest) -> Result<Self> {
         let file = request.folder.join("robot.yaml");
         if file.exists() {
             return Self::there(request, &file);
         }
         let Some(urdf) = request.urdf else {
-            return Self::to_start_from(request.robot.unwrap_or(KINDS[0]));
+            return Self::to_start_from(
+                request.robot.unwrap_or(RobotFileKind::Typical(&TYPICAL[0])),
+            );
         };
         let (label, text) = read(urdf)?;
         let UrdfOutline {
@@ -57,7 +62,7 @@ impl StartingArm {
             counted(sliding.len(), "joint")
         );
         Ok(Self {
-            text: Some(robots::of_urdf(&base, request.tip)),
+            text: Some(of_urdf(&base, request.tip)),
             joints: sliding.len(),
             sliding,
             counting: None,
@@ -115,7 +120,7 @@ impl StartingArm {
     fn to_start_from(kind: RobotFileKind) -> Result<Self> {
         let (joints, name) = (kind.joints()?, kind.name());
         Ok(Self {
-            text: Some(kind.text()),
+            text: Some(kind.text().into()),
             joints,
             sliding: Vec::new(),
             counting: kind.counting()?,
@@ -273,4 +278,89 @@ impl ExaminedFile {
         let checks = check.into_iter().map(String::from);
         self.propose_joints(quantity, rows, Some(unit), checks, quantity);
     }
+}
+
+/// What a robot file starts from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RobotFileKind {
+    /// A typical arm, whose numbers are to be replaced.
+    Typical(&'static TypicalArm),
+    /// An arm of the library, as it is.
+    Arm(&'static LibraryArm),
+}
+
+/// A robot file with the numbers of a typical arm.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct TypicalArm {
+    pub(crate) name: &'static str,
+    pub(crate) help: &'static str,
+    pub(crate) text: &'static str,
+}
+
+/// The first is that of `calib init` without `--robot`.
+pub(crate) const TYPICAL: &[TypicalArm] = &[
+    TypicalArm {
+        name: "spherical6",
+        help: "Six joints, the last three axes meet in a point (most industrial arms)",
+        text: include_str!("robots/spherical6.yaml"),
+    },
+    TypicalArm {
+        name: "offset6",
+        help: "Six joints, offset wrist (most cobots)",
+        text: include_str!("robots/offset6.yaml"),
+    },
+    TypicalArm {
+        name: "seven",
+        help: "Seven joints, alternating axes",
+        text: include_str!("robots/seven.yaml"),
+    },
+    TypicalArm {
+        name: "dh6",
+        help: "Six joints as a table of DH parameters",
+        text: include_str!("robots/dh6.yaml"),
+    },
+];
+
+impl RobotFileKind {
+    /// By its name on the command line.
+    pub(crate) fn find(name: &str) -> Option<Self> {
+        let typical = TYPICAL.iter().find(|arm| arm.name == name);
+        let library = || LibraryArm::find(name).map(Self::Arm);
+        typical.map(Self::Typical).or_else(library)
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Typical(arm) => arm.name,
+            Self::Arm(arm) => arm.name,
+        }
+    }
+
+    fn text(self) -> &'static str {
+        match self {
+            Self::Typical(arm) => arm.text,
+            Self::Arm(arm) => arm.text,
+        }
+    }
+
+    fn joints(self) -> Result<usize> {
+        match self {
+            Self::Typical(arm) => Ok(arm.text.matches("\n  - {name: ").count()),
+            Self::Arm(arm) => Ok(arm.read()?.robot.joints.len()),
+        }
+    }
+
+    /// How the arm's controller counts its joints, as settings of `q`, where it differs from the robot file.
+    fn counting(self) -> Result<Option<String>> {
+        match self {
+            Self::Typical(_) => Ok(None),
+            Self::Arm(arm) => Ok(arm.read()?.about.counting()),
+        }
+    }
+}
+
+/// A robot file on a URDF.
+fn of_urdf(base: &str, tip: &str) -> String {
+    let text = include_str!("robots/urdf.yaml").replace("$base", &quoted(base));
+    text.replace("$tip", &quoted(tip))
 }

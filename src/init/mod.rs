@@ -5,15 +5,12 @@ mod arm;
 mod columns;
 mod names;
 mod pipeline;
-mod points;
 mod quantities;
-mod reading;
-mod robots;
 mod sheet;
 mod together;
 
-pub use pipeline::{MarkedLines, marked};
-pub use robots::{KINDS, RobotFileKind};
+pub(crate) use arm::{RobotFileKind, TYPICAL};
+pub(crate) use pipeline::{MarkedLines, marked};
 
 use crate::error::{Error, Result};
 use arm::StartingArm;
@@ -41,7 +38,6 @@ pub(crate) struct StarterFiles {
     pub(crate) pipeline: String,
     /// What was found in each recording, and which.
     pub(crate) accounts: Vec<(PathBuf, String)>,
-    /// What no recording has.
     pub(crate) missing: Vec<&'static str>,
     /// What a person should know of the robot, a sentence each.
     pub(crate) notes: Vec<String>,

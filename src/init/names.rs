@@ -17,7 +17,7 @@ pub(super) struct Name {
 }
 
 impl Name {
-    pub fn of(text: &str) -> Self {
+    pub(crate) fn of(text: &str) -> Self {
         let lower = text.trim().to_lowercase();
         let Header { stem, unit, ending } = Header::of(&lower);
         let words = stem

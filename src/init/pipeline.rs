@@ -368,57 +368,15 @@ fn lacking(file: &ExaminedFile, lacks: &Lacks, put: &mut impl FnMut(&str)) {
     }
 }
 
-const OF_TORQUES: &str = "
-  # What the torques of the rigid arm lack, by the masses of the robot file; where it has none they are identified.
-  - uses: diagnose_torques
+const OF_TORQUES: &str = include_str!("of_torques.yaml");
 
-  - uses: report_torques
-";
+const EMPTY: &str = include_str!("no_recording.yaml");
 
-const EMPTY: &str = "        - file: measurements.csv        # REPLACE
-          columns:
-            point_id: {column: name}      # REPLACE each column by yours
-            q: {column: \"q{j}\", unit: deg}
-            x: {column: x, unit: mm}
-            y: {column: y, unit: mm}
-            z: {column: z, unit: mm}
-";
+const EVERY: &str = include_str!("every.yaml");
 
-const EVERY: &str = "
-  # A quarter of the points is never fitted to: they say how accurate the robot is at new poses.
-  - uses: split
-    with: {by: every, n: 4}
-";
+const BY_USAGE: &str = include_str!("by_usage.yaml");
 
-const BY_USAGE: &str = "
-  # The recording says itself what each row is for; rows of the set `fit` are fitted to, all others judge.
-  - uses: split
-    with: {by: usage, blank: fit}
-";
-
-const STAGES: &str = "
-  # Where the robot stands in the tracker's frame: the error before calibration.
-  - id: nominal
-    uses: identify
-    with: {effects: [base_frame]}
-
-  # Lengths, twists, zeros and reduction ratios.
-  - id: geometry
-    uses: identify
-    with: {effects: [base_frame, tool_offset, joint_offset, link_geometry, reduction_ratio, coupling_ratio]}
-
-  # What else is wrong with the robot, and the model with it.
-  - uses: diagnose
-
-  - uses: validate
-
-  - uses: report
-    with:
-      # limits: {mean_mm: 0.3, max_mm: 0.8}      # what you accept; the report says whether it is met
-      # identity: {operator: REPLACE, robot serial: REPLACE, tracker: REPLACE, date: REPLACE}     # stands on the report as given
-      # language: de                             # of the report: en or de
-      title: null                              # the heading; null: the robot's name
-";
+const STAGES: &str = include_str!("stages.yaml");
 
 /// What `calib init` writes behind lines to look at, the label of such lines, and what is to be done there.
 const MARKS: [(&str, &str, &str); 2] = [
@@ -435,7 +393,7 @@ const MARKS: [(&str, &str, &str); 2] = [
 ];
 
 /// Lines that are left as `calib init` marked them.
-pub struct MarkedLines {
+pub(crate) struct MarkedLines {
     pub(crate) label: &'static str,
     pub(crate) what: &'static str,
     /// File, number of the line and its text.
@@ -443,7 +401,7 @@ pub struct MarkedLines {
 }
 
 /// The lines of files that `calib init` marked, those to fill in before those to look at. A line that is a comment all over sets nothing.
-pub fn marked(paths: &[&Path]) -> Vec<MarkedLines> {
+pub(crate) fn marked(paths: &[&Path]) -> Vec<MarkedLines> {
     let of_mark = |(mark, label, what)| {
         let has_mark = |line: &str| {
             line.split(|c: char| !c.is_ascii_alphanumeric() && c != '_')

@@ -1,11 +1,9 @@
 //! What a recording's columns seem to hold, by their names and values: a proposal that a person checks.
 
-use super::columns::{Choice, ExaminedFile};
+use super::columns::{Choice, ExaminedFile, PointColumns, Points, points};
 use super::names;
 use super::names::{LENGTHS, joints};
-use super::points::{PointColumns, Points, points};
-use super::reading::tables;
-use super::sheet::number;
+use super::sheet::{number, tables};
 use crate::error::Result;
 use crate::stage::ingest::is_clock_time;
 use crate::yaml::quoted;

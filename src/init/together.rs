@@ -393,7 +393,6 @@ fn label(one: &mut ExaminedFile, two: &mut ExaminedFile) {
     }
 }
 
-/// What two clocks say.
 struct Timing {
     /// Half of the rows of the file with fewer have one of the other nearer than this, s.
     near: f64,

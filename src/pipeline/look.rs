@@ -205,9 +205,7 @@ pub enum Prospect {
 /// What a run would do with a stage.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Forecast {
-    /// In the pipeline.
     pub(crate) id: String,
-    /// Its kind.
     pub(crate) uses: String,
     /// Whether it would run.
     #[serde(flatten)]

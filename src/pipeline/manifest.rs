@@ -17,9 +17,7 @@ const MANIFEST_FORMAT: u32 = 1;
 /// What the engine cannot know by itself: who runs it, where and when.
 #[derive(Debug, Clone)]
 pub struct Surroundings {
-    /// Which calib.
     pub(crate) tool: Tool,
-    /// Which machine.
     pub(crate) host: Host,
     /// Who ran it, where that is known and wanted.
     pub(crate) user: Option<String>,
@@ -27,7 +25,6 @@ pub struct Surroundings {
     pub(crate) environment: BTreeMap<String, String>,
     /// As it was typed, word by word.
     pub(crate) command_line: Vec<String>,
-    /// The clock.
     pub(crate) now: fn() -> std::time::SystemTime,
     /// Bytes that this process had in use at most, where that is known.
     pub(crate) peak_memory: fn() -> Option<u64>,
@@ -40,9 +37,7 @@ pub struct Surroundings {
 pub struct Tool {
     /// `calib`.
     pub(crate) name: String,
-    /// Version of the package.
     pub(crate) version: String,
-    /// Architecture and operating system.
     pub(crate) target: String,
     /// Revision of the sources; it and `rustc` are known where whoever built it said so (`CALIB_REVISION`, `CALIB_RUSTC`).
     #[serde(default)]
@@ -55,11 +50,8 @@ pub struct Tool {
 /// The machine that ran.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Host {
-    /// Name of the machine.
     pub(crate) name: String,
-    /// Operating system.
     pub(crate) os: String,
-    /// Architecture of the processor.
     pub(crate) architecture: String,
     /// That the process may use.
     pub(crate) cores: usize,
@@ -80,13 +72,10 @@ pub struct Manifest {
     pub(crate) status: RunStatus,
     /// What went wrong, where the status says so.
     pub(crate) error: Option<String>,
-    /// What was run.
     pub(crate) pipeline: PipelineRecord,
     /// Given on the command line.
     pub(crate) overrides: Vec<Override>,
-    /// Which calib.
     pub(crate) tool: Tool,
-    /// Which machine.
     pub(crate) host: Host,
     /// Who, where that is known.
     pub(crate) user: Option<String>,
@@ -96,13 +85,11 @@ pub struct Manifest {
     pub(crate) command_line: Vec<String>,
     /// The seed of the pipeline.
     pub(crate) seed: u64,
-    /// Worker threads.
     pub(crate) jobs: usize,
     /// RFC 3339, UTC.
     pub(crate) started: String,
     /// RFC 3339, UTC.
     pub(crate) ended: Option<String>,
-    /// From start to end.
     pub(crate) wall_seconds: Option<f64>,
     /// The most memory that the whole process had in use up to the end of this run.
     #[serde(default)]
@@ -151,29 +138,21 @@ pub enum StageStatus {
 /// One stage's report: its state, keys and tables.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct StageReport {
-    /// In the pipeline.
     pub(crate) id: String,
-    /// Its kind.
     pub(crate) uses: String,
-    /// Version of its algorithm.
     pub(crate) implementation: u32,
-    /// How it stands.
     pub(crate) status: StageStatus,
-    /// Why it was executed.
     pub(crate) reason: Option<String>,
     /// The key of its record.
     pub(crate) action: Option<ActionId>,
     /// The components of `action`.
     pub(crate) key: Option<StageKey>,
-    /// Tables that it read.
     pub(crate) inputs: Vec<InputRecord>,
     /// Raw files that it read.
     pub(crate) files: Vec<FileRecord>,
     /// Tables that it wrote.
     pub outputs: Vec<OutputRecord>,
-    /// What it told.
     pub(crate) notes: Vec<String>,
-    /// What it warned of.
     pub(crate) warnings: Vec<String>,
     /// Duration of the execution, also where it was an earlier run's.
     pub(crate) wall_seconds: Option<f64>,
@@ -418,10 +397,8 @@ pub enum Purpose {
 /// How to run a plan.
 #[derive(Debug, Clone)]
 pub struct RunOptions {
-    /// Which stages.
     pub(crate) selection: Selection,
     /// Worker threads; no result depends on it.
     pub(crate) jobs: usize,
-    /// For the log.
     pub(crate) purpose: Purpose,
 }

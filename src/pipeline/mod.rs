@@ -1,7 +1,6 @@
 //! The YAML, the plan, the run: `spec` reads and types, `wiring` and `plan` connect, `run` does what is not already done.
 
 mod globs;
-mod in_memory;
 mod look;
 mod manifest;
 mod overrides;
@@ -16,7 +15,6 @@ mod spec;
 #[cfg(test)]
 mod tests;
 
-pub use in_memory::{StageCall, StageTables, run_in_memory};
 pub use look::{Forecast, Prospect, checked_plan, look, preview};
 pub use manifest::{
     Host, Manifest, OutputRecord, Purpose, RunOptions, RunStatus, StageReport, StageStatus,
@@ -28,4 +26,5 @@ pub use reason::{KeyChange, changes_of};
 pub use run::{CompletedRun, run};
 pub use schema::json_schema;
 pub use services::{Interrupted, Observer, Unwatched};
+pub use services::{StageCall, StageTables, run_in_memory};
 pub(crate) use spec::misnamed;

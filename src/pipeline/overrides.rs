@@ -9,7 +9,6 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Override {
     /// A variable, `seed` or `STAGE.path.of.setting`.
     pub(crate) target: String,
-    /// YAML.
     pub(crate) value: String,
 }
 

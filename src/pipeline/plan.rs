@@ -37,9 +37,7 @@ pub struct Plan {
 
 /// A stage that is checked and wired.
 pub struct PlannedStage {
-    /// In the pipeline.
     pub(crate) id: String,
-    /// Its kind.
     pub(crate) entry: &'static StageEntry,
     /// With its settings.
     pub stage: Box<dyn ErasedStage>,
@@ -47,7 +45,6 @@ pub struct PlannedStage {
     pub files: Vec<InputFile>,
     /// Where its tables come from.
     pub(crate) inputs: Vec<Input>,
-    /// Tables that it writes.
     pub(crate) outputs: Vec<Port>,
 }
 
@@ -196,11 +193,9 @@ impl Plan {
 /// What the person asked for.
 #[derive(Debug, Clone, Default)]
 pub struct Selection {
-    /// This stage alone.
     pub(crate) only: Option<String>,
     /// This stage and those after it.
     pub(crate) from: Option<String>,
-    /// Up to this stage.
     pub(crate) until: Option<String>,
     /// Run again though cached: all selected stages, or those named.
     pub(crate) force: Option<Vec<String>>,
@@ -260,16 +255,13 @@ impl Selected {
 /// An output port of an earlier stage, both counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Origin {
-    /// Position in the plan.
     pub(crate) stage: usize,
-    /// Position among its outputs.
     pub(crate) port: usize,
 }
 
 /// An input port with the tables that feed it, in pipeline order.
 #[derive(Debug, Clone)]
 pub struct Input {
-    /// What is read.
     pub(crate) port: Port,
     /// Who writes it; several where every one is read.
     pub(crate) from: Vec<Origin>,

@@ -66,9 +66,7 @@ pub struct KeyChange {
     pub(crate) what: &'static str,
     /// The setting, port or file.
     pub(crate) name: String,
-    /// In the earlier key.
     pub(crate) before: String,
-    /// In this key.
     pub(crate) now: String,
 }
 

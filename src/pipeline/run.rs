@@ -35,7 +35,6 @@ const GROUP: f64 = 1.0;
 
 /// A run that went through.
 pub struct CompletedRun {
-    /// As it was written.
     pub(crate) manifest: Manifest,
     /// Reports and other documents, where people find them.
     pub(crate) documents: Vec<PathBuf>,

@@ -3,7 +3,7 @@
 //! One advisory lock per action, so that two runs share work instead of doing it twice. Correctness does not depend on it.
 
 use super::plan::{Plan, PlannedStage};
-use super::services::label;
+use super::services::{label, seed};
 use crate::error::{Error, Result};
 use crate::raw;
 use crate::stage::Arity;
@@ -170,12 +170,6 @@ impl<'a> RunState<'a> {
         }
         Ok(())
     }
-}
-
-/// The seed of a stage: its own, so that stages do not share random numbers.
-pub(super) fn seed(pipeline: u64, id: &str) -> u64 {
-    let hash = blake3::hash(format!("{pipeline} {id}").as_bytes());
-    u64::from_le_bytes(*hash.as_bytes().first_chunk().expect("a hash has 32 bytes"))
 }
 
 /// The table of an output port, which the record of a stage must have.

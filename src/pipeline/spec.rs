@@ -61,7 +61,6 @@ pub(super) struct NamedSet {
 pub struct InputFile {
     /// Where it stands below `with`.
     pub(crate) place: String,
-    /// From the working directory.
     pub(crate) path: PathBuf,
     /// As the YAML, or `--set`, names it.
     pub named: PathBuf,

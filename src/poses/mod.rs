@@ -4,7 +4,6 @@
 mod apart;
 mod drive;
 mod proposal;
-mod show;
 mod site;
 mod sockets;
 
@@ -24,7 +23,6 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PoseRequest {
-    /// How many poses.
     pub(crate) count: usize,
     /// Random poses to choose from.
     pub(crate) candidates: usize,
@@ -138,9 +136,7 @@ impl PoseRequest {
 pub(crate) trait PoseAnswer {
     /// None where no pose helps.
     fn drive(&self) -> Option<Drive<'_>>;
-    /// For a person.
     fn text(&self) -> String;
-    /// For a program.
     fn document(&self) -> serde_json::Value;
     /// What a person must not overlook, a sentence each.
     fn warnings(&self) -> &[String] {

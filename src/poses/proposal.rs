@@ -1,16 +1,22 @@
 //! Poses for a robot file: the best for all parameters together, or for telling two effects apart whatever their sizes.
+//!
+//! What the proposed poses promise, as a short table and as JSON.
 
-use super::site::{self, site};
-use super::{PoseRequest, wish};
 use crate::description::RobotDescription;
 use crate::effect::{EffectContext, EffectStack, Load, arm_effect, identified};
 use crate::error::{Error, Result};
 use crate::estimate::Model;
-use crate::estimate::choose::{Aim, Proposal, Score, Site, propose};
+use crate::estimate::choose::{Aim, Proposal, Score, Site, median, propose};
+use crate::poses::site::{self, site};
+use crate::poses::{Drive, PoseAnswer, PoseRequest, drive, wish};
 use crate::robot::{JointConvention, Measurements, PointReadings, RobotModel};
 use crate::spatial::Pose;
+use crate::text::filled;
 use crate::units::Unit;
+use minijinja::context;
+use minijinja::value::Serde;
 use nalgebra::Vector3;
+use serde_json::json;
 use std::path::Path;
 
 /// What was proposed and what for; made once, shown as text, JSON or file.
@@ -149,4 +155,142 @@ fn model(robot: &RobotModel, effects: &[&str]) -> Model {
         .filter_map(|name| arm_effect(name, &setting))
         .collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, made))
+}
+
+impl PoseAnswer for PoseProposal<'_> {
+    fn drive(&self) -> Option<Drive<'_>> {
+        let Proposal {
+            poses, direction, ..
+        } = &self.proposal;
+        Some(Drive {
+            robot: &self.robot,
+            ranges: &self.ranges,
+            poses,
+            direction,
+            convention: &self.convention,
+        })
+    }
+
+    fn text(&self) -> String {
+        text(self)
+    }
+
+    fn document(&self) -> serde_json::Value {
+        document(self)
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+}
+
+/// Proposed poses, the median random set, the recording.
+fn sets(work: &PoseProposal) -> Vec<(String, Score)> {
+    let random = &work.proposal.random;
+    let middle = |value: &dyn Fn(&Score) -> f64| median(random.iter().map(value).collect());
+    let usual = Score {
+        points: work.proposal.score.points,
+        o1: middle(&|score| score.o1),
+        sigma: (0..work.proposal.jacobian.free().len())
+            .map(|k| middle(&|score| score.sigma[k]))
+            .collect(),
+        median: middle(&|score| score.median),
+        p95: middle(&|score| score.p95),
+        max: middle(&|score| score.max),
+    };
+    let mut out = vec![
+        ("proposed".into(), work.proposal.score.clone()),
+        (format!("random, median of {}", random.len()), usual),
+    ];
+    out.extend(
+        work.recorded
+            .iter()
+            .map(|score| ("recorded".to_string(), score.clone())),
+    );
+    out
+}
+
+/// Median over the parameters of a set's sigma relative to another's.
+fn relative(score: &Score, to: &Score) -> f64 {
+    median(
+        score
+            .sigma
+            .iter()
+            .zip(&to.sigma)
+            .map(|(a, b)| a / b)
+            .collect(),
+    )
+}
+
+fn text(work: &PoseProposal) -> String {
+    let sets = sets(work);
+    let usual = sets.get(1).map(|(_, usual)| usual);
+    let rows = sets.iter().map(|(name, score)| {
+        let relative = usual.map_or(1.0, |usual| relative(score, usual));
+        let [p95, max] = [score.p95, score.max].map(|sigma| sigma * 1e3);
+        (name, score.points, score.o1, relative, p95, max)
+    });
+    let others = sets.iter().skip(1);
+    let ratios = others.map(|(name, score)| (name, work.proposal.score.o1 / score.o1));
+    let about = context! {
+        of => Serde(document(work)), asked => work.parameters.len(), sigma => work.sigma.to_string(),
+        width => sets.iter().map(|(name, _)| name.len()).max(), sets => Serde(rows.collect::<Vec<_>>()),
+        ratios => Serde(ratios.collect::<Vec<_>>()), closing => closing(work.request),
+    };
+    filled(include_str!("proposal.txt"), about)
+}
+
+/// What every proposal ends with.
+pub(super) fn closing(request: &PoseRequest) -> String {
+    let text = "self-collision and collision with the cell are not checked: drive the poses slowly first\n";
+    match &request.out {
+        Some(path) => format!("{text}poses: {}\n", path.display()),
+        None => format!("{text}no file was written: give --out poses.csv (or .parquet)\n"),
+    }
+}
+
+fn document(work: &PoseProposal) -> serde_json::Value {
+    let proposal = &work.proposal;
+    let sets = sets(work);
+    let name = |parameter: usize| &work.parameters[parameter].0;
+    let set = |(name, score): &(String, Score)| {
+        json!({
+            "set": name, "points": score.points, "o1": score.o1,
+            "position_sigma_median_mm": score.median * 1e3, "position_sigma_p95_mm": score.p95 * 1e3,
+            "position_sigma_max_mm": score.max * 1e3,
+        })
+    };
+    let parameters = proposal.jacobian.free().iter().enumerate().map(|(k, parameter)| {
+        let (name, unit) = &work.parameters[*parameter];
+        let sigma = |index: usize| sets.get(index).map(|(_, score)| unit.from_si(score.sigma[k]));
+        json!({ "name": name, "unit": unit.symbol(), "sigma": sigma(0), "sigma_random": sigma(1), "sigma_recorded": sigma(2) })
+    });
+    let separation = proposal.separation.iter().map(|part| {
+        let told = part.sigma.iter().map(|(parameter, sigma, random)| {
+            let unit = work.parameters[*parameter].1;
+            json!({
+                "name": name(*parameter), "unit": unit.symbol(), "sigma": unit.from_si(*sigma), "sigma_random": unit.from_si(*random),
+            })
+        });
+        json!({
+            "effect": part.effect, "rival": part.rival, "noncentrality_over_random": part.gain,
+            "told": told.collect::<Vec<_>>(),
+            "imitated": part.imitated.iter().map(|parameter| name(*parameter)).collect::<Vec<_>>(),
+        })
+    });
+    json!({
+        "robot": work.robot.name,
+        "seed": work.request.seed,
+        "effects": work.effects,
+        "left_out": work.left_out.iter().map(|(effect, reason)| json!({"effect": effect, "reason": reason})).collect::<Vec<_>>(),
+        "sigma_mm": work.sigma,
+        "sets": sets.iter().map(set).collect::<Vec<_>>(),
+        "parameters": parameters.collect::<Vec<_>>(),
+        "separation": separation.collect::<Vec<_>>(),
+        "approach_visible_share": proposal.approach_seen,
+        "self_collision_checked": false,
+        "counting": drive::counting(&work.convention, &work.robot),
+        "out": work.request.out.as_ref().map(|out| out.to_string_lossy()),
+        "poses": work.drive().map_or_else(Vec::new, |poses| drive::objects(&poses)),
+    })
 }

@@ -1,13 +1,16 @@
 //! Postures for a ball that is brought to sockets, no instrument at hand: `calib poses ROBOT --sockets`.
 
-use super::show::closing;
+use super::proposal::closing;
 use super::site::site;
 use super::{Drive, PoseAnswer, PoseRequest, drive};
 use crate::description::RobotDescription;
-use crate::error::{Error, Fault, Result, counted};
+use crate::error::{Error, Fault, Result};
 use crate::estimate::choose::{ContactProposal, ContactRequest, PriorSigma, propose_contacts};
 use crate::robot::{JointConvention, RobotModel};
+use crate::text::filled;
 use crate::units::Unit;
+use minijinja::context;
+use minijinja::value::Serde;
 use nalgebra::Vector3;
 use serde_json::json;
 
@@ -140,86 +143,16 @@ impl PoseAnswer for SocketProposal<'_> {
     }
 
     fn text(&self) -> String {
-        let ContactProposal {
-            poses,
-            sigma,
-            sets,
-            without,
-            offsets,
-            ..
-        } = &self.proposal;
-        let mut text = format!(
-            "{} in {}, for a ball that comes back to {} mm per axis\n\n  {:32}  {:>8}  {:>24}\n",
-            counted(poses.rows(), "posture"),
-            counted(self.places.len(), "socket"),
-            self.sigma,
-            "socket, m",
-            "postures",
-            "without it sigmas are"
-        );
-        for ([x, y, z], own) in self.places.iter().zip(without) {
-            text.push_str(&format!(
-                "  {:32}  {:>8}  {:>22.2} x\n",
-                format!("[{x}, {y}, {z}]"),
-                own.count,
-                own.growth
-            ));
-        }
-        text.push_str(&format!(
-            "\nwhat is known of the arm, one sigma\n  {:28}  {:>10}  {:>10}  {:>24}\n",
-            "",
-            "before",
-            "after",
-            format!("random, median of {sets}")
-        ));
-        for (k, before, after, random) in sigma
-            .iter()
-            .filter(|(k, ..)| !self.name(*k).0.starts_with("link_geometry"))
-        {
-            let (name, unit) = self.name(*k);
-            let [before, after, random] =
-                [*before, *after, *random].map(|sigma| unit.from_si(sigma));
-            text.push_str(&format!(
-                "  {name:28}  {before:>10.2e}  {after:>10.2e}  {random:>24.2e}  {unit}\n"
-            ));
-        }
-        let links = || {
-            sigma
-                .iter()
-                .filter(|(k, ..)| self.name(*k).0.starts_with("link_geometry"))
+        let links = self.proposal.sigma.iter();
+        let links = links.filter(|(k, ..)| self.name(*k).0.starts_with("link_geometry"));
+        let better = |(_, before, after, _): &&(usize, f64, f64, f64)| 2.0 * after < *before;
+        let place = |[x, y, z]: &[f64; 3]| format!("[{x}, {y}, {z}]");
+        let about = context! {
+            of => Serde(self.document()), sigma => self.sigma.to_string(), sets => self.proposal.sets,
+            places => self.places.iter().map(place).collect::<Vec<_>>(), better => links.clone().filter(better).count(),
+            links => links.count(), joints => self.robot.joints.len(), closing => closing(self.request),
         };
-        let shown = links()
-            .filter(|(_, before, after, _)| 2.0 * after < *before)
-            .count();
-        text.push_str(&format!(
-            "  links: {shown} of {} are known twice as well as by their maker\n",
-            counted(links().count(), "parameter")
-        ));
-        text.push_str(&format!(
-            "\nby the postures alone, with the ball off the axis of joint {}\n  {:>8}  {:>28}  {:>24}\n",
-            self.robot.joints.len(),
-            "mm",
-            "directions to 1 mm or mrad",
-            "the weakest, mm or mrad"
-        ));
-        for offset in offsets {
-            let of = format!("{} of {}", offset.known, offset.directions);
-            let weakest = if offset.weakest.is_finite() {
-                format!("{:.1}", 1e3 * offset.weakest)
-            } else {
-                "not seen".into()
-            };
-            text.push_str(&format!(
-                "  {:>8.1}  {of:>28}  {weakest:>24}\n",
-                1e3 * offset.off
-            ));
-        }
-        if let Some(advice) = self.advice() {
-            text.push_str(&format!("{advice}\n"));
-        }
-        text.push('\n');
-        text.push_str(&closing(self.request));
-        text
+        filled(include_str!("sockets.txt"), about)
     }
 
     fn document(&self) -> serde_json::Value {

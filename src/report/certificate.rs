@@ -5,12 +5,12 @@
 //! The page of a verification: errors before, predicted and achieved, and the poses that were repeated often enough for ISO 9283.
 
 use crate::error::Result;
-use crate::report::Tables;
 use crate::report::errors::{Steps, before};
 use crate::report::findings::wrong_setup;
 use crate::report::language::{Locale, say};
 use crate::report::number::{count, render};
 use crate::report::workspace::{StepErrors, histogram};
+use crate::report::{Accepted, Tables};
 use crate::table::{AcceptanceRow, StatisticsRow, VerdictRow, VerdictTopic};
 use crate::units::Unit;
 use serde_json::{Value, json};
@@ -81,22 +81,10 @@ fn kind(
     }
 }
 
-/// What the user accepts, mm; of held-out points of the diagnosed model, without a diagnosis after the last step.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct AcceptanceLimits {
-    /// Largest mean error of the held-out points.
-    pub(crate) mean_mm: Option<f64>,
-    /// Largest 95th percentile of the errors of the held-out points.
-    pub(crate) p95_mm: Option<f64>,
-    /// Largest error of any held-out point.
-    pub(crate) max_mm: Option<f64>,
-}
-
 #[derive(Debug)]
 pub(super) struct Judgement<'a> {
     /// What is wrong with the set-up, where something is.
     wrong: Option<String>,
-    /// What is judged.
     row: Option<&'a StatisticsRow>,
     /// Limits as they were set; none where a wrong set-up alone is not accepted.
     pub(crate) limits: Vec<AcceptanceRow>,
@@ -117,11 +105,7 @@ pub(super) fn judged<'a>(tables: &'a Tables, set: Option<&str>) -> Option<&'a St
 
 impl<'a> Judgement<'a> {
     /// None where there are no limits and the set-up is right.
-    pub(crate) fn new(
-        tables: &'a Tables,
-        limits: &AcceptanceLimits,
-        set: Option<&str>,
-    ) -> Option<Self> {
+    pub(crate) fn new(tables: &'a Tables, limits: &Accepted, set: Option<&str>) -> Option<Self> {
         let figures = [
             ("mean", limits.mean_mm),
             ("95 % of the points", limits.p95_mm),
@@ -212,7 +196,6 @@ impl<'a> Judgement<'a> {
 
 /// What the page shows; lengths in mm.
 pub struct AchievedTables<'a> {
-    /// Heading.
     pub(crate) title: &'a str,
     /// Where the model is from.
     pub(crate) model: &'a str,

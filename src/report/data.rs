@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::report::certificate::Judgement;
 use crate::report::language::{Locale, say};
 use crate::report::number::count;
-use crate::report::{ReportOptions, Tables};
+use crate::report::{Report, Tables};
 use crate::table::{RejectedRow, Robot, RobotRow, VerdictTopic, picked, picked_of};
 use crate::units::Unit;
 use serde_json::{Value, json};
@@ -161,7 +161,7 @@ fn kinds(locale: &Locale, tables: &Tables) -> Vec<(&'static str, String)> {
 /// The document; `judgement` is that of the page.
 pub(super) fn document(
     tables: &Tables,
-    options: &ReportOptions,
+    asked: &Report,
     (robot, title): (String, String),
     judgement: Option<&Judgement>,
 ) -> Result<String> {
@@ -208,7 +208,7 @@ pub(super) fn document(
         "title": title,
         "robot": robot,
         "calib": env!("CARGO_PKG_VERSION"),
-        "identity": options.identity,
+        "identity": asked.identity,
         "standing": tables.standing,
         "withdrawn": tables.withdrawn,
         "limits": limits,
@@ -226,7 +226,7 @@ pub(super) fn document(
         "parameters": picked_of(&tables.parameters.0, "name where=place unit nominal value sigma status"),
         "rejected_rows": tables.rejected.iter().map(|table| table.0.len()).sum::<usize>(),
         "suspects": tables.suspects.iter().map(|table| table.0.len()).sum::<usize>(),
-        "tables": options.hashes.iter().map(|(kind, hash)| json!({ "table": kind, "content": hash })).collect::<Vec<_>>(),
+        "tables": tables.hashes.iter().map(|(kind, hash)| json!({ "table": kind, "content": hash })).collect::<Vec<_>>(),
     });
     Ok(format!("{document:#}\n"))
 }

@@ -88,7 +88,6 @@ fn short(size: f64, unit: &str) -> String {
     }
 }
 
-/// Places down the chain.
 fn along(place: &str) -> (usize, String) {
     let number = |rest: &str| {
         let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();

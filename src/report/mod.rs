@@ -3,7 +3,6 @@
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
 
 mod certificate;
-mod closure;
 mod data;
 mod errors;
 mod findings;
@@ -17,81 +16,111 @@ mod svg;
 mod torques;
 mod workspace;
 
-pub use certificate::{AcceptanceLimits, AchievedTables, achieved_page};
+pub use certificate::{AchievedTables, achieved_page};
 pub use findings::diagnosed_page;
 pub use language::PageLanguage;
 use language::{Locale, say};
-pub use torques::{TorqueTables, torque_page};
+pub use torques::{ReportTorquesReads, torque_page};
 
 use crate::error::Result;
 use crate::table::{
     Acceptance, Cells, Corrections, Curves, FindingNumberRow, FindingNumbers, Findings, Fit, Forms,
-    Intake, Observability, Parameters, Prediction, Recording, Rejected, RivalRow, Rivals, Robot,
-    Split, Statistics, Suspects, Training, Verdict, VerdictSentences, VerdictTopic, Withdrawn,
+    Intake, JointConventions, Labelled, Observability, Parameters, Prediction, Recording, Rejected,
+    RivalRow, Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, VerdictSentences,
+    VerdictTopic, Withdrawn,
 };
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::collections::BTreeMap;
+use std::ops::Deref;
 
-/// What a report is made of; lists are in pipeline order and may be empty.
+/// Writes `report.html`.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Report {
+    /// Heading of the report; without it, the robot's name.
+    pub title: Option<String>,
+    /// The held-out set that the first sentence speaks of; without it, the one with most points after the step that stands for the run.
+    pub set: Option<String>,
+    /// PageLanguage of the page with its certificate: `en` or `de`.
+    pub language: PageLanguage,
+    /// What is accepted: of the held-out points of the diagnosed model, without a diagnosis after the last step. Beyond it `calib run` says
+    /// so and ends with code 1.
+    pub limits: Accepted,
+    /// Who, with what, where and when, e.g. {operator: A. Meier, tracker: AT960 no. 123, date: 2026-11-21}; shown as given.
+    pub identity: BTreeMap<String, String>,
+}
+
+/// Largest errors that are accepted, mm; each may be left out.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Accepted {
+    /// Arithmetic mean.
+    pub mean_mm: Option<f64>,
+    /// 95 % of the points.
+    pub p95_mm: Option<f64>,
+    /// Error of the worst point.
+    pub max_mm: Option<f64>,
+}
+
+crate::table::reads! {
+    /// What a report is made of; lists are in pipeline order and may be empty.
+    pub struct ReportReads {
+        statistics: Statistics,
+        prediction: Vec<Labelled<Prediction>>,
+        parameters: Parameters,
+        robot: Robot,
+        recording: Recording,
+        convention: Vec<Labelled<JointConventions>>,
+        split: Split,
+        intake: Vec<Labelled<Intake>>,
+        rejected: Vec<Labelled<Rejected>>,
+        fit: Vec<Labelled<Fit>>,
+        observability: Vec<Labelled<Observability>>,
+        training: Vec<Labelled<Training>>,
+        corrections: Vec<Labelled<Corrections>>,
+        models: Vec<Labelled<Parameters>>,
+        verdict: Vec<Labelled<Verdict>>,
+        sentences: Vec<Labelled<VerdictSentences>>,
+        findings: Vec<Labelled<Findings>>,
+        finding_numbers: Vec<Labelled<FindingNumbers>>,
+        rivals: Vec<Labelled<Rivals>>,
+        forms: Vec<Labelled<Forms>>,
+        cells: Vec<Labelled<Cells>>,
+        suspects: Vec<Labelled<Suspects>>,
+    }
+}
+
+/// The same with what follows from it.
 pub(crate) struct Tables {
-    /// Errors of every step and set.
-    pub(crate) statistics: Statistics,
-    /// Predictions of every step that predicts.
-    pub(crate) prediction: Vec<Prediction>,
-    /// Parameters of the last identified model.
-    pub(crate) parameters: Parameters,
-    /// The nominal arm.
-    pub(crate) robot: Robot,
+    /// As the ports gave it; parameters are of the model that stands.
+    pub(crate) reads: ReportReads,
     /// What the controller counts otherwise than the robot file, where it does.
     pub(crate) counting: Option<String>,
-    /// What was measured.
-    pub(crate) recording: Recording,
-    /// Who is fitted, who judges.
-    pub(crate) split: Split,
-    /// What was read from each file.
-    pub(crate) intake: Vec<Intake>,
-    /// Rows that could not be used.
-    pub(crate) rejected: Vec<Rejected>,
-    /// Course of every fit.
-    pub(crate) fit: Vec<Fit>,
-    /// What the data determine.
-    pub(crate) observability: Vec<Observability>,
-    /// Course of every training.
-    pub(crate) training: Vec<Training>,
-    /// Rivals of learned corrections.
-    pub(crate) corrections: Vec<Corrections>,
-    /// The verdict of every diagnosis.
-    pub(crate) verdict: Vec<Verdict>,
-    /// Sentences of the verdict of every diagnosis.
-    pub(crate) sentences: Vec<VerdictSentences>,
-    /// Findings of every diagnosis.
-    pub(crate) findings: Vec<Findings>,
-    /// Numbers of the findings of every diagnosis.
-    pub(crate) finding_numbers: Vec<FindingNumbers>,
-    /// Rivals of the findings of every diagnosis.
-    pub(crate) rivals: Vec<Rivals>,
-    /// Formulas of findings without a name.
-    pub(crate) forms: Vec<Forms>,
-    /// The table of causes of every diagnosis.
-    pub(crate) cells: Vec<Cells>,
-    /// Rows that were set aside.
-    pub(crate) suspects: Vec<Suspects>,
     /// Findings over what reveals them.
     pub(crate) curves: Curves,
     /// The step that the report speaks of; without one, the last.
     pub(crate) standing: Option<String>,
     /// Later steps that are worse on the same held-out points.
     pub(crate) withdrawn: Vec<Withdrawn>,
+    /// Content hashes of the tables that the report rests on.
+    pub(crate) hashes: Vec<(String, String)>,
+}
+
+impl Deref for Tables {
+    type Target = ReportReads;
+    fn deref(&self) -> &ReportReads {
+        &self.reads
+    }
 }
 
 impl Tables {
-    /// Numbers of a finding.
     fn numbers(&self, rank: i64) -> impl Iterator<Item = &FindingNumberRow> {
         let all = self.finding_numbers.iter().flat_map(|table| &table.0);
         all.filter(move |number| number.rank == rank)
     }
 
-    /// Rivals of a finding.
     fn rivals(&self, rank: i64) -> impl Iterator<Item = &RivalRow> {
         let all = self.rivals.iter().flat_map(|table| &table.0);
         all.filter(move |rival| rival.rank == rank)
@@ -106,27 +135,10 @@ impl Tables {
     }
 }
 
-/// What the person who asked for the report chose.
-pub(crate) struct ReportOptions<'a> {
-    /// Head of the page.
-    pub(crate) title: Option<&'a str>,
-    /// The held-out set of the first sentence; else the one with most points.
-    pub(crate) set: Option<&'a str>,
-    /// What the user calls good enough.
-    pub(crate) limits: AcceptanceLimits,
-    /// Language of the page; its JSON is English.
-    pub(crate) language: PageLanguage,
-    /// Who, with what, where and when: shown as it was given.
-    pub(crate) identity: &'a BTreeMap<String, String>,
-    /// Content hashes of the tables that the report rests on.
-    pub(crate) hashes: Vec<(String, String)>,
-}
-
 /// The report as HTML and as JSON.
 pub(crate) struct Pages {
     /// One file that needs no other.
     pub(crate) html: String,
-    /// The same for programs.
     pub(crate) json: String,
     /// The user's limits and what was found.
     pub(crate) acceptance: Acceptance,
@@ -134,33 +146,29 @@ pub(crate) struct Pages {
     pub(crate) missing: Vec<String>,
 }
 
-/// The report; fails where `options.set` is no held-out set.
-pub(crate) fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
+/// The report; fails where `asked.set` is no held-out set.
+pub(crate) fn pages(tables: &Tables, asked: &Report) -> Result<Pages> {
+    let set = asked.set.as_deref();
     let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref());
-    let judgement = certificate::Judgement::new(tables, &options.limits, options.set);
+    let judgement = certificate::Judgement::new(tables, &asked.limits, set);
     let head = |locale: &Locale| {
         let robot = data::robot_name(locale, &tables.robot);
-        let title = options.title.map(str::to_owned);
+        let title = asked.title.clone();
         let title = title.unwrap_or_else(|| say!(locale, "Calibration of {robot}", robot));
         (robot, title)
     };
-    let json = data::document(
-        tables,
-        options,
-        head(&Locale::default()),
-        judgement.as_ref(),
-    )?;
-    let locale = &Locale::new(options.language);
+    let json = data::document(tables, asked, head(&Locale::default()), judgement.as_ref())?;
+    let locale = &Locale::new(asked.language);
     let (robot, title) = head(locale);
-    let choices = [("title", options.title), ("set", options.set)];
+    let choices = [("title", asked.title.as_deref()), ("set", set)];
     let page = json!({
         "title": title,
-        "certificate": certificate::certificate(locale, tables, judgement.as_ref(), options.set),
-        "identity": options.identity,
-        "hashes": &options.hashes,
+        "certificate": certificate::certificate(locale, tables, judgement.as_ref(), set),
+        "identity": &asked.identity,
+        "hashes": &tables.hashes,
         "diagnosis": findings::section(locale, tables),
-        "errors": errors::errors_section(locale, tables, &steps, options.set)?,
-        "closure": closure::section(locale, tables),
+        "errors": errors::errors_section(locale, tables, &steps, set)?,
+        "closure": errors::closure_section(locale, tables),
         "workspace": errors::workspace_section(locale, &tables.prediction, tables.standing.as_deref()),
         "parameters": parameters::section(locale, &tables.parameters, tables.counting.as_deref()),
         "fits": fits::section(locale, tables, &steps),

@@ -6,50 +6,46 @@ use super::number::render;
 use super::svg::{Area, Scale, Svg, baseline, name_x, name_y};
 use crate::error::{Error, Result};
 use crate::table::{
-    BodyConsistencies, Contacts, FrictionCurveRow, FrictionCurves, Inertials, JointTorques, Robot,
-    TorqueCourse, TorqueFindingRow, TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict,
-    VerdictSentences, VerdictTopic,
+    BodyConsistencies, Contacts, FrictionCurveRow, FrictionCurves, Inertials, JointTorques,
+    Labelled, Robot, TorqueCourse, TorqueFindingRow, TorqueFindings, TorqueNumbers, TorqueRivals,
+    TorqueVerdict, VerdictSentences, VerdictTopic,
 };
 use serde_json::{Value, json};
 
-/// What the page is made of.
-pub struct TorqueTables {
-    /// The arm.
-    pub(crate) robot: Robot,
-    /// The verdict.
-    pub(crate) verdict: TorqueVerdict,
-    /// What the diagnosis says beside it.
-    pub(crate) sentences: VerdictSentences,
-    /// Strongest first.
-    pub(crate) findings: TorqueFindings,
-    /// Their numbers.
-    pub(crate) numbers: TorqueNumbers,
-    /// What would explain the data as well.
-    pub(crate) rivals: TorqueRivals,
-    /// Errors and noise.
-    pub(crate) joints: JointTorques,
-    /// Torques over time.
-    pub(crate) course: TorqueCourse,
-    /// Friction over velocity.
-    pub(crate) friction: FrictionCurves,
-    /// Masses as the torques show them.
-    pub(crate) inertials: Inertials,
-    /// Pushes on the arm.
-    pub(crate) contacts: Contacts,
-    /// Whether the inertials are those of bodies.
-    pub(crate) consistency: BodyConsistencies,
-    /// Content hashes of the tables that the page rests on.
-    pub(crate) hashes: Vec<(String, String)>,
+crate::table::reads! {
+    /// What the page is made of; sentences are of every diagnosis, each asked for by its step.
+    pub struct ReportTorquesReads {
+        robot: Robot,
+        verdict: TorqueVerdict,
+        sentences: Vec<Labelled<VerdictSentences>>,
+        findings: TorqueFindings,
+        numbers: TorqueNumbers,
+        rivals: TorqueRivals,
+        joints: JointTorques,
+        course: TorqueCourse,
+        friction: FrictionCurves,
+        inertials: Inertials,
+        contacts: Contacts,
+        consistency: BodyConsistencies,
+    }
 }
 
 /// The page; fails where the verdict is missing.
-pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String> {
+pub fn torque_page(
+    tables: &ReportTorquesReads,
+    title: Option<&str>,
+    hashes: &[(String, String)],
+) -> Result<String> {
     let verdict = tables.verdict.0.first();
     let verdict =
         verdict.ok_or_else(|| Error::Bug("a diagnosis of torques without a verdict".into()))?;
     let locale = Locale::default();
     let robot = data::robot_name(&locale, &tables.robot);
-    let said = |topic| tables.sentences.about(&verdict.step, topic);
+    let said = |topic| -> Vec<&str> {
+        let all = tables.sentences.iter();
+        all.flat_map(|table| table.about(&verdict.step, topic))
+            .collect()
+    };
     let page = json!({
         "title": title.map_or_else(|| format!("Torques of {robot}"), str::to_owned),
         "robot": robot,
@@ -64,13 +60,13 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
         "bodies": &tables.consistency.0,
         "not_observable": said(VerdictTopic::NotObservable),
         "remarks": said(VerdictTopic::Remark),
-        "hashes": &tables.hashes,
+        "hashes": hashes,
     });
     render(&locale, "torques.html", include_str!("torques.html"), page)
 }
 
 /// A finding with its numbers and its rivals.
-fn finding(row: &TorqueFindingRow, tables: &TorqueTables) -> Value {
+fn finding(row: &TorqueFindingRow, tables: &ReportTorquesReads) -> Value {
     let numbers = tables
         .numbers
         .0
@@ -87,7 +83,7 @@ fn finding(row: &TorqueFindingRow, tables: &TorqueTables) -> Value {
     finding
 }
 
-fn pictures(locale: &Locale, tables: &TorqueTables, joint: usize) -> Value {
+fn pictures(locale: &Locale, tables: &ReportTorquesReads, joint: usize) -> Value {
     let course = &tables.course;
     let of = |all: &[f64]| course.of_joint(all, joint).collect::<Vec<f64>>();
     let (measured, simulated, corrected) = (

@@ -197,7 +197,6 @@ pub(super) struct StepErrors {
     pub(crate) colour: String,
     /// Ascending, mm; not empty.
     pub(crate) sorted_mm: Vec<f64>,
-    /// From the statistics.
     pub(crate) mean_mm: f64,
 }
 

@@ -4,7 +4,7 @@ use crate::effect::{Load, names};
 use crate::error::{Place, Result};
 use crate::estimate::{FitOptions, Prior, align, changes};
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
-use crate::stage::screened::{FittedRows, fit_rows};
+use crate::stage::doubtful::{FittedRows, fit_rows};
 use crate::stage::settings::Repeatability;
 use crate::stage::{Context, RawFile, Stage};
 use crate::table::{ChangeRow, Changes, Parameters, Recording, Robot, Split, Table, from_parquet};
@@ -122,7 +122,6 @@ impl Stage for Compare {
                 rank: change.rank.map(|rank| rank as i64),
             });
         }
-        rows.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(CompareWrites {
             changes: Changes(rows),
         })

@@ -220,7 +220,6 @@ fn run_text(run: &[Far], recording: &Recording) -> String {
     format!("{who} up to {most:.2} mm{why}")
 }
 
-/// Points that anchors are.
 fn places(model: &Model) -> Vec<(String, Vector3<f64>)> {
     let setup = model.robot.setup();
     let first = model

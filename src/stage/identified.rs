@@ -6,8 +6,7 @@ use crate::estimate::{CONFLICT, Covariance, ParameterStatus, Session};
 use crate::observation::noise;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::Context;
-use crate::stage::doubtful::{KnownModel, advice, suspicion};
-use crate::stage::screened::{self, FittedRows};
+use crate::stage::doubtful::{self, FittedRows, KnownModel, advice, suspicion};
 use crate::stage::settings::{FoldSetting, note_repeats};
 use crate::table::{
     CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split,
@@ -92,11 +91,11 @@ macro_rules! identification {
                 candidates: &[usize],
                 asked: &mut crate::stage::identified::RowsToFit,
                 context: &crate::stage::Context,
-            ) -> crate::stage::screened::FittedRows {
+            ) -> crate::stage::doubtful::FittedRows {
                 let crate::stage::identified::RowsToFit { data, rows, .. } = asked;
                 asked.repeatability = self.repeatability.apply(model, data, rows, context);
                 let options = crate::estimate::FitOptions { rows, candidates };
-                crate::stage::screened::fit_rows(model, data, &options, asked.split, self.screen)
+                crate::stage::doubtful::fit_rows(model, data, &options, asked.split, self.screen)
             }
 
             /// Faults of the settings that all identifications share; `example` names a set.
@@ -115,7 +114,7 @@ pub(crate) fn yes() -> bool {
     true
 }
 
-crate::stage::writes! {
+crate::table::writes! {
     /// Output ports of `identify`, `stiffness` and `transfer`.
     pub struct Identified {
         parameters: Parameters,
@@ -156,7 +155,6 @@ pub struct Fitting<'a> {
     pub(crate) fit: &'a FittedRows,
     /// Parameters that the user holds.
     pub(crate) held: &'a [usize],
-    /// Parts of a cross-validation.
     pub(crate) folds: FoldSetting,
     pub(crate) earlier: Option<&'a Parameters>,
     /// Covariance of the earlier parameters.
@@ -234,7 +232,7 @@ impl Identified {
         if let Some(repeated) = &fitted.repeated {
             note_repeats(context, repeated);
         }
-        screened::note(context, screening, recording);
+        doubtful::note_screened(context, screening, recording);
         let (folds, dropped) = fitting.folds.folds(&session, context);
         let errors = folds.iter().flat_map(|folds| {
             let errors = rows.iter().zip(folds.random.iter().zip(&folds.blocks));

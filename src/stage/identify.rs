@@ -1,6 +1,8 @@
 //! Identification from the nominal robot: base, tool, geometry, transmission and, if wanted, compliance in one estimation.
 //!
 //! Sec. 3 of the paper, iterated to convergence on the full model (Eqs. 14-23 with errata).
+//!
+//! Joint stiffness on top of an identified geometry, which is kept: the second step of the paper's sequence (Sec. 4, Eqs. 24-30).
 
 use crate::diagnose::{Question, wrong_setup};
 use crate::effect::{Effect, EffectContext, EffectStack, arm_effect, identified, names};
@@ -12,12 +14,12 @@ use crate::estimate::{
 use crate::observation;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
+use crate::stage::doubtful::numbered;
 use crate::stage::identified::{Fitting, Identified, LoadSetting, RowsToFit};
 use crate::stage::known_cell::{self, KnownCell, KnownDistance, KnownPoint, KnownSphere};
 use crate::stage::remarks::{must_move, unmoved_remark, weightless_links};
-use crate::stage::screened::numbered;
 use crate::stage::{Context, Stage, contact};
-use crate::table::{Recording, Robot, Split};
+use crate::table::{CovarianceTable, Parameters, Prediction, Recording, Robot, Split};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -388,4 +390,91 @@ fn evidence(fitted: &Fitted, data: &Measurements, rows: &[usize]) -> f64 {
     let values = 3.0 * count;
     values * (noise + fitted.excess_sigma * fitted.excess_sigma).ln()
         + fitted.singular.len() as f64 * values.ln()
+}
+
+crate::stage::identified::identification! {
+    /// Settings of `stiffness`.
+    pub struct Stiffness {
+        /// Sets of the split to fit: loaded poses.
+        pub(crate) on: Vec<String>,
+        /// Joints to estimate, from 1; all that the data see if empty.
+        #[serde(default)]
+        pub(crate) joints: Vec<usize>,
+    }
+}
+
+crate::stage::stage! {
+    Stiffness, "stiffness", 17, "identifies joint compliance from loaded poses; everything identified before is kept",
+        StiffnessReads {
+            robot: Robot,
+            recording: Recording,
+            split: Split,
+            parameters: Parameters,
+            covariance: Option<CovarianceTable>,
+            prediction: Prediction,
+        } -> Identified
+}
+
+impl Stage for Stiffness {
+    fn faults(&self, at: &mut Place) {
+        self.shared_faults("loaded", at);
+    }
+
+    fn sets_named(&self) -> Vec<(String, String)> {
+        crate::stage::on(&self.on)
+    }
+
+    fn run(&self, reads: StiffnessReads, context: &Context) -> Result<Identified> {
+        let robot = RobotModel::new(reads.robot.to_description()?);
+        let mut asked = RowsToFit::of(&reads.recording, &reads.split, &self.on)?;
+        let mut model =
+            reads
+                .parameters
+                .model(robot, &[names::JOINT_COMPLIANCE], self.load.into())?;
+        let compliance = model
+            .stack
+            .effects()
+            .find(|(effect, _)| effect.name() == names::JOINT_COMPLIANCE);
+        if let Some(reason) =
+            compliance.and_then(|(effect, _)| effect.missing(&model.robot, &asked.data))
+        {
+            return Err(Error::data(
+                "with.load",
+                format!("no joint load is known: {reason}"),
+            ));
+        }
+        let wanted: Vec<String> = self
+            .joints
+            .iter()
+            .map(|joint| format!("{}.j{joint}", names::JOINT_COMPLIANCE))
+            .collect();
+        let specs = model.stack.specs();
+        if let Some(unknown) = wanted
+            .iter()
+            .find(|name| !specs.iter().any(|spec| spec.name == **name))
+        {
+            return Err(Error::spec(
+                "with.joints",
+                format!("this robot has no `{unknown}`: allowed are its revolute joints, from 1"),
+            ));
+        }
+        let chosen = |k: &usize| wanted.is_empty() || wanted.contains(&specs[*k].name);
+        let all: Vec<usize> = model.stack.parameters_of(names::JOINT_COMPLIANCE).collect();
+        let open: Vec<usize> = all.iter().copied().filter(chosen).collect();
+        let (candidates, _) = self.parameter_set().apply(&mut model, &open, context);
+        let fit = self.fit(&model, &candidates, &mut asked, context);
+        let held: Vec<usize> = all
+            .into_iter()
+            .filter(|k| !candidates.contains(k))
+            .collect();
+        let seen_before: Vec<bool> = reads.prediction.0.iter().map(|row| !row.held_out).collect();
+        let mut fitting = Fitting {
+            earlier: Some(&reads.parameters),
+            earlier_covariance: reads.covariance.as_ref(),
+            ..Fitting::of(&asked, &fit, &held, self.folds)
+        };
+        fitting.doubtful.retain(|row| !seen_before[*row]);
+        fitting.seen_before = seen_before;
+        Ok(Identified::of(context, &fitting))
+    }
 }

@@ -6,12 +6,9 @@
 mod arm;
 mod bind;
 mod check;
-mod clock;
 mod columns;
 mod external;
-mod joined;
 mod later;
-mod layout;
 mod mapped;
 mod motion;
 mod noise;
@@ -25,10 +22,9 @@ mod torques;
 mod verdict;
 mod write;
 
-pub use clock::is_clock_time;
 pub use columns::Columns;
+pub use columns::{Axis, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
 pub use later::LaterFiles;
-pub use layout::{Axis, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
 pub use mapped::{
     ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, NameMatch,
     ScalarColumn, TextColumn, UncertaintyColumn, last_number,
@@ -37,14 +33,15 @@ pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
 pub(crate) use reading::FileKind;
 pub use reading::{TableLayout, records};
+pub use stretch::is_clock_time;
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 
-use joined::Measurement;
+use pair::Measurement;
 
 use crate::error::{Error, Place, Result};
 use crate::robot::{CountedCoupling, JointConvention};
 use crate::stage::{Context, RawFile, Stage, StreamedTable};
-use crate::table::{Intake, IntakeRow, JointConventions, Recording, Rejected, Robot};
+use crate::table::{Intake, JointConventions, Recording, Rejected, Robot};
 use crate::units::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -226,7 +223,5 @@ fn intake(read: &[Measurement], names: &[String], context: &Context) -> Intake {
         let counts = [rows.count() as u64, rows.count_used()];
         reading::intake(name, rows.lines, counts, context)
     };
-    let mut rows: Vec<IntakeRow> = files.map(row).collect();
-    rows.sort_by(|a, b| a.file.cmp(&b.file));
-    Intake(rows)
+    Intake(files.map(row).collect())
 }

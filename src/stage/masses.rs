@@ -72,7 +72,6 @@ impl Stage for Masses {
     }
 }
 
-/// Friction of the joints.
 fn friction_text(friction: &[Option<f64>]) -> String {
     let shown = |friction: &Option<f64>| {
         friction.map_or_else(

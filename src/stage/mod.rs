@@ -1,8 +1,17 @@
 //! Stages: pure functions from tables to tables. One file each, one line each in [`STAGES`].
+//!
+//! Stages without their types, so that a pipeline can hold any of them.
 
-mod cell_evidence;
+use crate::error::{Error, Fault, Place, Result};
+use crate::raw::InputSource;
+use crate::yaml::{Node, Trouble, typed};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::io::Read;
+use std::path::PathBuf;
+
 mod compare;
-mod compare_torques;
 mod contact;
 mod curves;
 mod declared_effects;
@@ -17,58 +26,42 @@ mod known_cell;
 pub(crate) mod learn;
 mod masses;
 mod optimise;
-mod ports;
-mod registry;
 mod remarks;
 mod report;
 mod robot;
-mod screened;
 mod settings;
 mod simulate;
 pub mod split;
-mod stiffness;
 mod transfer;
 mod validate;
 
-pub use cell_evidence::{
-    CellEvidence, CellEvidenceWrites, Given, TorqueEvidence, TorqueEvidenceWrites,
-};
+pub use crate::report::{Accepted, Report, ReportReads, ReportTorquesReads};
 pub use compare::{Compare, CompareReads};
-pub use compare_torques::{CompareTorques, CompareTorquesReads};
-use diagnose::AskedRows;
+pub use diagnose::{CellEvidence, CellEvidenceWrites, Given, TorqueEvidence, TorqueEvidenceWrites};
 pub use diagnose::{CellPrior, Diagnose, DiagnoseReads};
+pub use diagnose_torques::{CompareTorques, CompareTorquesReads};
 pub use diagnose_torques::{
     ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut,
     InertialSetting,
 };
 pub(crate) use dynamic_arm::{dynamic_arm, must_be_bodies, torque_per_ampere};
 pub use identify::{Identify, IdentifyReads};
+pub use identify::{Stiffness, StiffnessReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
 pub use masses::{Masses, MassesReads, MassesWrites};
 pub use optimise::{BenchmarkProblem, Optimise, OptimiseReads};
-pub use ports::{
-    Arity, Chunks, InputTable, Labelled, Output, Port, PortValue, Produced, Reads, Sink,
-    StoredTable, Streamed, StreamedTable, Writes,
-};
-pub(crate) use ports::{reads, stage, writes};
-pub use registry::{ErasedStage, StageEntry};
-pub use report::{
-    Accepted, Report, ReportReads, ReportTorques, ReportTorquesReads, ReportTorquesWrites,
-};
+pub use report::{ReportTorques, ReportTorquesWrites};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use settings::FoldSetting;
 pub(crate) use settings::matches;
 pub use simulate::{Remainder, Simulate, SimulateReads, SimulateWrites};
-pub use stiffness::{Stiffness, StiffnessReads};
 pub use transfer::{Transfer, TransferReads};
 pub use validate::{Validate, ValidateReads};
 
-use crate::error::{Error, Fault, Place, Result};
-use crate::raw::InputSource;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use std::io::Read;
-use std::path::PathBuf;
+pub use crate::table::ports::{
+    Arity, Chunks, InputTable, Labelled, Output, Port, PortValue, Produced, Reads, Sink,
+    StoredTable, Streamed, StreamedTable, Writes,
+};
 
 /// An input file named in the settings. Its content, not its path, is part of the stage's key.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -249,3 +242,122 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<Validate>(),
     StageEntry::of::<Report>(),
 ];
+
+/// A stage with its settings, its type erased.
+pub trait ErasedStage: Send + Sync {
+    /// As [`Stage::check`].
+    fn check(&self) -> Vec<Fault>;
+    /// As [`Stage::files`].
+    fn files(&self) -> Vec<(String, RawFile)>;
+    /// As [`Stage::sets_named`].
+    fn sets_named(&self) -> Vec<(String, String)>;
+    /// As [`Stage::sets_dealt`].
+    fn sets_dealt(&self) -> Option<Vec<String>>;
+    /// The settings with defaults filled in; part of the stage's key.
+    fn settings(&self) -> serde_json::Value;
+    /// As [`Stage::look`], with the tables of each input port where all are known.
+    fn look(
+        &self,
+        inputs: Option<Vec<Vec<(String, InputTable)>>>,
+        context: &Context,
+    ) -> Result<Option<Vec<Output>>>;
+    /// Takes the tables of each input port with the ids of the stages that wrote them.
+    fn run(&self, inputs: Vec<Vec<(String, InputTable)>>, context: &Context)
+    -> Result<Vec<Output>>;
+}
+
+impl<T: Stage> ErasedStage for T {
+    fn check(&self) -> Vec<Fault> {
+        Stage::check(self)
+    }
+    fn files(&self) -> Vec<(String, RawFile)> {
+        Stage::files(self)
+    }
+    fn sets_named(&self) -> Vec<(String, String)> {
+        Stage::sets_named(self)
+    }
+    fn sets_dealt(&self) -> Option<Vec<String>> {
+        Stage::sets_dealt(self)
+    }
+    fn settings(&self) -> serde_json::Value {
+        serde_json::to_value(self).expect("settings are plain data")
+    }
+    fn look(
+        &self,
+        inputs: Option<Vec<Vec<(String, InputTable)>>>,
+        context: &Context,
+    ) -> Result<Option<Vec<Output>>> {
+        let reads = inputs.map(T::Reads::take).transpose()?;
+        Stage::look(self, reads, context)?
+            .map(Writes::give)
+            .transpose()
+    }
+    fn run(
+        &self,
+        inputs: Vec<Vec<(String, InputTable)>>,
+        context: &Context,
+    ) -> Result<Vec<Output>> {
+        Stage::run(self, T::Reads::take(inputs)?, context)?.give()
+    }
+}
+
+/// A stage whose settings are typed, or all their faults.
+pub(crate) type ParsedStage = Result<Box<dyn ErasedStage>, Vec<Trouble>>;
+
+/// One kind of stage, as the pipeline's YAML names it.
+#[derive(Debug, Clone, Copy)]
+pub struct StageEntry {
+    /// In `uses:` of the YAML.
+    pub name: &'static str,
+    /// What it does, in one line.
+    pub summary: &'static str,
+    /// Version of its algorithm.
+    pub implementation: u32,
+    /// Its input ports.
+    pub reads: fn() -> Vec<Port>,
+    /// Its output ports.
+    pub writes: fn() -> Vec<Port>,
+    /// Types the settings; all their faults, with paths below `with`.
+    pub parse: fn(&Node) -> ParsedStage,
+    /// The JSON Schema of its settings.
+    pub(crate) schema: fn(&mut SchemaGenerator) -> Schema,
+}
+
+impl StageEntry {
+    /// The entry of a stage.
+    pub(crate) const fn of<T: Stage>() -> Self {
+        Self {
+            name: T::NAME,
+            summary: T::SUMMARY,
+            implementation: T::IMPLEMENTATION,
+            reads: T::Reads::ports,
+            writes: T::Writes::ports,
+            parse: |settings| Ok(Box::new(typed::<T>(settings)?)),
+            schema: |generator| generator.subschema_for::<T>(),
+        }
+    }
+}
+
+/// Declares a stage with its ports: `stage! { Identify, "identify", 18, "identifies geometry", IdentifyReads { robot: Robot, } -> Identified }`. A
+/// struct of ports without fields is declared elsewhere.
+macro_rules! stage {
+    ($stage:ty, $name:literal, $implementation:literal, $summary:literal,
+     $reads:ident $({ $($read:tt)* })? -> $writes:ident $({ $($written:tt)* })?) => {
+        $(crate::table::reads! {
+            #[doc = concat!("Input ports of `", $name, "`.")]
+            pub struct $reads { $($read)* }
+        })?
+        $(crate::table::writes! {
+            #[doc = concat!("Output ports of `", $name, "`.")]
+            pub struct $writes { $($written)* }
+        })?
+        impl crate::stage::DeclaredStage for $stage {
+            const NAME: &'static str = $name;
+            const SUMMARY: &'static str = $summary;
+            const IMPLEMENTATION: u32 = $implementation;
+            type Reads = $reads;
+            type Writes = $writes;
+        }
+    };
+}
+pub(crate) use stage;

@@ -192,7 +192,6 @@ impl Stage for Simulate {
             context.note(format!("{rows} of joints at {things} of a twin"));
             let mut truth = truth(&robot, &self.truth, &self.tracker, effects);
             truth.0.extend(self.fixtures.iter().flat_map(fixture_truth));
-            truth.0.sort_by(|a, b| a.name.cmp(&b.name));
             return Ok(SimulateWrites {
                 recording: contact_recording(&robot, &self.fixtures, &touches),
                 truth,
@@ -228,7 +227,6 @@ fn all_faults<K: Display, M: Into<String>>(at: &mut Place, faults: Vec<(K, M)>) 
 }
 
 impl Simulate {
-    /// The effects that act.
     fn acting(&self) -> &[Physical] {
         match self.remainder {
             Remainder::All => &self.effects,
@@ -371,9 +369,7 @@ fn truth(
             value: one.value,
         }
     };
-    let mut rows: Vec<TruthRow> = values.map(row).collect();
-    rows.sort_by(|a, b| a.name.cmp(&b.name));
-    Truth(rows)
+    Truth(values.map(row).collect())
 }
 
 /// m; what is stated where the ball comes back exactly: no fit can weigh by zero.

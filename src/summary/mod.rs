@@ -6,8 +6,6 @@ mod estimate;
 #[cfg(feature = "query")]
 mod grid;
 mod in_short;
-mod limits;
-mod rival_changes;
 mod run;
 mod run_diff;
 mod screen;
@@ -23,10 +21,10 @@ pub use in_short::{
     ResultScreen, corrections, corrections_rows, in_short, rejected, rejected_rows, searches,
     searches_rows, statistics, statistics_rows,
 };
-pub use limits::LimitsSummary;
-pub use rival_changes::{RivalChange, rival_changes};
+pub use run::LimitsSummary;
 pub use run::{explanation, first_look, graph, run, scoreboard, stage, status};
 pub use run_diff::run_diff;
+pub use run_diff::{RivalChange, rival_changes};
 pub use screen::{LABEL, folded, labelled};
 
 use crate::error::Result;

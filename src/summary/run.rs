@@ -6,48 +6,25 @@
 //!
 //! What a fit of base and geometry says of a recording before anything is run in earnest: rows that are used and not, ranges, what is warned
 //! of, what will be observable.
+//!
+//! What the reports of a run say of the limits that the user set: a line each, and whether all are kept.
 
 use crate::audit::Explanation;
-use crate::error::{Result, counted};
-use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
+use crate::error::{Error, Result};
+use crate::pipeline::{CompletedRun, Manifest, Plan, RunStatus, StageReport};
+use crate::stage::{DeclaredStage, Report};
 use crate::store::Store;
-use crate::summary::tables;
-use crate::table::{Parameters, Prediction, Recording, Rejected, Robot};
+use crate::summary::{labelled, tables};
+use crate::table::{
+    Acceptance, AcceptanceRow, Parameters, Prediction, Recording, Rejected, Robot, Table, picked_of,
+};
+use crate::text::filled;
 use crate::units::Unit;
-use minijinja::syntax::SyntaxConfig;
+use minijinja::context;
 use minijinja::value::Serde;
-use minijinja::{Environment, UndefinedBehavior, context};
+use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
-
-/// A template of this folder, filled.
-pub(super) fn filled(template: &'static str, about: minijinja::Value) -> String {
-    let mut environment = Environment::new();
-    // Lines of tags alone leave no line.
-    let syntax = SyntaxConfig::builder()
-        .trim_blocks(true)
-        .lstrip_blocks(true)
-        .keep_trailing_newline(true)
-        .build();
-    environment.set_syntax(syntax.expect("the usual delimiters"));
-    environment.set_undefined_behavior(UndefinedBehavior::Strict);
-    environment.add_filter("counted", |count: u64, what: &str| counted(count, what));
-    environment.add_filter("words", |name: &str| name.replace('_', " "));
-    environment.add_filter("fixed", |value: f64, decimals: usize| {
-        format!("{value:.decimals$}")
-    });
-    environment.add_filter("figure", |value: Option<f64>| {
-        value.map_or_else(|| "-".into(), |value| format!("{value:.3}"))
-    });
-    environment.add_filter("left", |text: &str, width: usize| format!("{text:width$}"));
-    environment.add_filter("right", |value: minijinja::Value, width: usize| {
-        format!("{:>width$}", value.to_string())
-    });
-    environment.add_filter("brief", brief);
-    environment
-        .render_str(template, about)
-        .expect("a template that names what it is given")
-}
 
 /// The scoreboard of a set of concealed recordings, from its document and from what only people read of it.
 pub fn scoreboard(document: &Value, details: &Value) -> String {
@@ -90,75 +67,31 @@ pub fn explanation(explanation: &Explanation) -> String {
     filled(include_str!("text/explanation.txt"), about)
 }
 
-fn brief(value: &str) -> String {
-    let cut: String = value.chars().take(60).collect();
-    // Of hashes the beginning says enough.
-    let is_hash = value.len() == 64 && value.chars().all(|c| c.is_ascii_hexdigit());
-    match () {
-        () if is_hash => value[..12].into(),
-        () if cut.len() < value.len() => format!("{cut}…"),
-        () => cut,
-    }
-}
-
 /// Stages with their tables and files, as `calib check` prints them.
 pub fn graph(plan: &Plan) -> String {
-    let mut text = format!(
-        "pipeline {}, seed {}, {}\n",
-        plan.name,
-        plan.seed,
-        counted(plan.stages.len(), "stage")
-    );
-    for stage in &plan.stages {
-        let uses = if stage.id == stage.entry.name {
-            String::new()
-        } else {
-            format!(" (uses {})", stage.entry.name)
-        };
-        text.push_str(&format!("\n{}{uses}: {}\n", stage.id, stage.entry.summary));
-        let width = stage
-            .inputs
-            .iter()
-            .map(|input| input.port.name.len())
-            .max()
-            .unwrap_or(0);
-        for input in &stage.inputs {
+    let stages = plan.stages.iter().map(|stage| {
+        let widths = stage.inputs.iter().map(|input| input.port.name.len());
+        let reads = stage.inputs.iter().map(|input| {
             let from = input.from.iter().map(|origin| {
                 let writer = &plan.stages[origin.stage];
                 format!("{}.{}", writer.id, writer.outputs[origin.port].name)
             });
-            let from: Vec<String> = from.collect();
-            let from = if from.is_empty() {
-                "(none)".into()
-            } else {
-                from.join(", ")
-            };
-            text.push_str(&format!(
-                "  reads   {:width$}  <- {from}\n",
-                input.port.name
-            ));
-        }
-        for file in &stage.files {
-            text.push_str(&format!(
-                "  file    {} = {}\n",
-                file.place,
-                file.path.display()
-            ));
-        }
-        let outputs: Vec<String> = stage
-            .outputs
-            .iter()
-            .map(|port| {
-                if port.name == port.kind {
-                    port.name.into()
-                } else {
-                    format!("{} ({})", port.name, port.kind)
-                }
-            })
-            .collect();
-        text.push_str(&format!("  writes  {}\n", outputs.join(", ")));
-    }
-    text
+            (input.port.name, from.collect::<Vec<_>>())
+        });
+        let files = stage.files.iter();
+        let files = files.map(|file| (&file.place, file.path.display().to_string()));
+        let writes = stage.outputs.iter().map(|port| match port.name == port.kind {
+            true => port.name.to_string(),
+            false => format!("{} ({})", port.name, port.kind),
+        });
+        json!({
+            "id": stage.id, "uses": stage.entry.name, "summary": stage.entry.summary, "width": widths.max(),
+            "reads": reads.collect::<Vec<_>>(), "files": files.collect::<Vec<_>>(), "writes": writes.collect::<Vec<_>>(),
+        })
+    });
+    let stages = Serde(stages.collect::<Vec<_>>());
+    let about = context! { name => &plan.name, seed => plan.seed, stages };
+    filled(include_str!("text/graph.txt"), about)
 }
 
 /// Lines of a run up to its first fits. Fails where a table has left the store.
@@ -229,4 +162,154 @@ fn errors(prediction: &Prediction) -> Vec<(&str, f64, f64, usize)> {
         (step, mean, largest, errors.len())
     };
     steps.into_iter().map(one).collect()
+}
+
+/// The judgements of a run's reports, those alone that have limits.
+#[derive(Serialize)]
+pub struct LimitsSummary(Vec<Judged>);
+
+/// A judgement and the report's stage.
+#[derive(Serialize)]
+struct Judged {
+    stage: String,
+    kept: bool,
+    sentence: String,
+    /// Those for which something was found.
+    #[serde(serialize_with = "figures")]
+    figures: Vec<AcceptanceRow>,
+}
+
+fn figures<S: Serializer>(rows: &[AcceptanceRow], serializer: S) -> Result<S::Ok, S::Error> {
+    picked_of(rows, "figure found_mm limit_mm kept").serialize(serializer)
+}
+
+impl LimitsSummary {
+    /// The judgements of all reports of a run. Fails where a table has left the store, or a report is older than the table.
+    pub fn read(outcome: &CompletedRun, store: &Store) -> crate::error::Result<Self> {
+        Self::of(&outcome.manifest, store)
+    }
+
+    /// The judgements of all reports of the record of a run.
+    pub fn of(manifest: &Manifest, store: &Store) -> crate::error::Result<Self> {
+        let mut all = Vec::new();
+        for stage in manifest
+            .stages
+            .iter()
+            .filter(|stage| stage.uses == Report::NAME && !stage.outputs.is_empty())
+        {
+            let Some(own) = stage
+                .outputs
+                .iter()
+                .find(|output| output.kind == Acceptance::KIND)
+            else {
+                let message = "its report was made by an earlier calib, which kept limits elsewhere; run the pipeline again";
+                return Err(Error::data(&manifest.run_id, message));
+            };
+            all.extend(judged(
+                &stage.id,
+                Acceptance::from_frame(&store.load(&own.table)?)?,
+            ));
+        }
+        Ok(Self(all))
+    }
+
+    /// Whether all limits are kept; none where there are none.
+    pub(crate) fn accepted(&self) -> Option<bool> {
+        (!self.0.is_empty()).then(|| self.0.iter().all(|judged| judged.kept))
+    }
+
+    /// What is not accepted, a sentence a report.
+    pub(crate) fn exceeded(&self) -> Vec<String> {
+        self.0
+            .iter()
+            .filter(|judged| !judged.kept)
+            .map(Judged::words)
+            .collect()
+    }
+
+    /// A line for each report with limits.
+    pub fn text(&self) -> String {
+        self.0
+            .iter()
+            .map(|judged| labelled("limits", &judged.words()))
+            .collect()
+    }
+}
+
+/// What a report says of its limits; none where it has none.
+fn judged(stage: &str, Acceptance(rows): Acceptance) -> Option<Judged> {
+    let first = rows.first()?;
+    Some(Judged {
+        stage: stage.into(),
+        kept: first.accepted,
+        sentence: first.sentence.clone(),
+        figures: rows
+            .into_iter()
+            .filter(|row| row.found_mm.is_some())
+            .collect(),
+    })
+}
+
+impl Judged {
+    /// The judgement, then the figures that are beyond, or all where none is.
+    fn words(&self) -> String {
+        let limits = self
+            .figures
+            .iter()
+            .filter(|figure| figure.kept == self.kept);
+        let limits = limits.filter_map(|one| {
+            let (figure, found, limit) = (&one.figure, one.found_mm?, one.limit_mm);
+            Some(format!(
+                "{figure} {found:.4} mm, at most {limit} mm allowed"
+            ))
+        });
+        let limits: Vec<String> = limits.collect();
+        let mut letters = self.sentence.trim_end_matches('.').chars();
+        let first = letters
+            .next()
+            .map(|letter| letter.to_lowercase().to_string())
+            .unwrap_or_default();
+        let sentence = format!("{first}{}", letters.as_str());
+        if limits.is_empty() {
+            sentence
+        } else {
+            format!("{sentence}: {}", limits.join("; "))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::judged;
+    use crate::table::{Acceptance, AcceptanceRow};
+
+    #[test]
+    fn a_line_names_what_is_beyond_and_a_report_without_limits_has_none() {
+        let row = |figure: &str, found_mm, limit_mm, kept| AcceptanceRow {
+            order: 1,
+            figure: figure.into(),
+            found_mm,
+            limit_mm,
+            kept,
+            accepted: false,
+            sentence: "Not accepted: beyond the limits.".into(),
+        };
+        let words = |rows| judged("report", Acceptance(rows)).map(|judged| judged.words());
+        let found = vec![
+            row("mean", Some(0.0421), 0.03, false),
+            row("largest", Some(0.1), 0.5, true),
+        ];
+        assert_eq!(
+            words(found).as_deref(),
+            Some("not accepted: beyond the limits: mean 0.0421 mm, at most 0.03 mm allowed")
+        );
+        assert_eq!(
+            words(vec![row("mean", None, 0.03, false)]).as_deref(),
+            Some("not accepted: beyond the limits")
+        );
+        assert!(
+            words(Vec::new()).is_none(),
+            "a wrong set-up is judged unasked"
+        );
+    }
 }

@@ -1,12 +1,18 @@
 //! The difference of two runs as a short text: what was put in differently, and what came out of it, table by table.
+//!
+//! What two runs say about the rivals of their findings: which of them later measurements decided, and how.
 
-use super::rival_changes::{RivalChange, rival_words};
-use super::run::filled;
-use crate::audit::{RunDiff, TableChange};
+use crate::audit::{RunAddress, RunDiff, TableChange};
 use crate::diff::{ColumnDiff, TableDiff, headline, short};
-use crate::error::counted;
+use crate::error::{Result, counted};
+use crate::pipeline::{Manifest, StageReport};
+use crate::stage::{DeclaredStage, Diagnose};
+use crate::store::Store;
+use crate::table::{FindingRow, Findings, Rivals, Table};
+use crate::text::filled;
 use minijinja::context;
 use minijinja::value::Serde;
+use serde::Serialize;
 
 /// Tables that are told one by one.
 const TABLES: usize = 6;
@@ -142,5 +148,278 @@ fn measure(diff: &TableDiff) -> String {
         }
         (_, Some((key, cell))) => format!("; {key}: {cell}"),
         _ => String::new(),
+    }
+}
+
+/// Less probable than this, a rival is excluded.
+const OPEN: f64 = 0.05;
+
+/// A finding of one of two runs and an explanation that one of them could not exclude.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RivalChange {
+    pub(crate) stage: String,
+    pub(crate) finding: CauseAtPlace,
+    /// What fitted as well, in one of the runs.
+    pub(crate) rival: CauseAtPlace,
+    /// What the later run makes of both.
+    pub(crate) outcome: RivalOutcome,
+    /// Probability of the rival, or of the finding where the rival took its place; null where it is not among the rivals.
+    pub(crate) before: Option<f64>,
+    /// The same in the later run; `None` where it is gone.
+    pub(crate) now: Option<f64>,
+}
+
+/// An effect at a place, as tables have them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub(crate) struct CauseAtPlace {
+    pub(crate) effect: String,
+    #[serde(rename = "where")]
+    pub(crate) place: String,
+}
+
+/// What run B says of a finding and its rival in run A.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum RivalOutcome {
+    /// The finding stays, the rival is excluded.
+    Confirmed,
+    /// The rival is the finding now, and what was found before is excluded.
+    Reversed,
+    /// One of the two is found, and the other is not excluded.
+    Open,
+    Both,
+    Neither,
+    /// A finding of run B has a rival that run A excluded.
+    New,
+}
+
+/// The findings of a diagnosis, and the rivals of each with their probabilities.
+struct DiagnosedCauses(Vec<(CauseAtPlace, Vec<Listed>)>);
+
+/// A rival and its probability.
+type Listed = (CauseAtPlace, Option<f64>);
+
+impl DiagnosedCauses {
+    /// None where a table was not written or has left the store.
+    fn read(stage: &StageReport, store: &Store) -> Result<Option<Self>> {
+        let (findings, rivals): (Option<Findings>, Option<Rivals>) =
+            (table(stage, store)?, table(stage, store)?);
+        let (Some(findings), Some(rivals)) = (findings, rivals) else {
+            return Ok(None);
+        };
+        let finding = |row: &FindingRow| {
+            let own = rivals.0.iter().filter(|rival| rival.rank == row.rank);
+            let own = own.map(|rival| (cause(&rival.effect, &rival.place), rival.probability));
+            (cause(&row.effect, &row.place), own.collect())
+        };
+        Ok(Some(Self(findings.0.iter().map(finding).collect())))
+    }
+
+    fn finds(&self, cause: &CauseAtPlace) -> bool {
+        self.0.iter().any(|(finding, _)| finding == cause)
+    }
+
+    /// Findings with the rivals that are not excluded, and their probabilities.
+    fn open(&self) -> impl Iterator<Item = (&CauseAtPlace, &CauseAtPlace, Option<f64>)> {
+        let pairs = self.0.iter().flat_map(|(finding, own)| {
+            own.iter()
+                .map(move |(rival, value)| (finding, rival, *value))
+        });
+        pairs.filter(|(_, _, value)| is_open(*value))
+    }
+
+    /// A rival of a finding, if it is listed.
+    fn rival(&self, finding: &CauseAtPlace, rival: &CauseAtPlace) -> Option<&Listed> {
+        let own = self
+            .0
+            .iter()
+            .filter(|(cause, _)| cause == finding)
+            .flat_map(|(_, own)| own);
+        own.into_iter().find(|(cause, _)| cause == rival)
+    }
+}
+
+/// A rival that is listed without a probability is not excluded.
+fn is_open(probability: Option<f64>) -> bool {
+    probability.is_none_or(|value| value >= OPEN)
+}
+
+fn cause(effect: &str, place: &str) -> CauseAtPlace {
+    CauseAtPlace {
+        effect: effect.into(),
+        place: place.into(),
+    }
+}
+
+/// A table of a stage; none where it was not written or has left the store.
+fn table<T: Table>(stage: &StageReport, store: &Store) -> Result<Option<T>> {
+    let Some(own) = stage.outputs.iter().find(|output| output.kind == T::KIND) else {
+        return Ok(None);
+    };
+    if !store.object(&own.table)?.exists() {
+        return Ok(None);
+    }
+    T::from_frame(&store.load(&own.table)?).map(Some)
+}
+
+fn compare(stage: &str, a: &DiagnosedCauses, b: &DiagnosedCauses) -> Vec<RivalChange> {
+    let change = |finding: &CauseAtPlace, rival: &CauseAtPlace, outcome, before, now| {
+        let (stage, finding, rival) = (stage.to_string(), finding.clone(), rival.clone());
+        RivalChange {
+            stage,
+            finding,
+            rival,
+            outcome,
+            before,
+            now,
+        }
+    };
+    let mut out: Vec<RivalChange> = Vec::new();
+    for (finding, rival, before) in a.open() {
+        let (stays, comes) = (b.finds(finding), b.finds(rival));
+        let listed = if stays {
+            b.rival(finding, rival)
+        } else {
+            b.rival(rival, finding)
+        };
+        let outcome = match (stays, comes) {
+            (true, true) => RivalOutcome::Both,
+            (false, false) => RivalOutcome::Neither,
+            _ if listed.is_some_and(|(_, value)| is_open(*value)) => RivalOutcome::Open,
+            (true, false) => RivalOutcome::Confirmed,
+            (false, true) => RivalOutcome::Reversed,
+        };
+        out.push(change(
+            finding,
+            rival,
+            outcome,
+            before,
+            listed.and_then(|(_, value)| *value),
+        ));
+    }
+    for (finding, rival, now) in b.open() {
+        let known = |one: &RivalChange| {
+            [(&one.finding, &one.rival), (&one.rival, &one.finding)].contains(&(finding, rival))
+        };
+        if !out.iter().any(known) {
+            out.push(change(
+                finding,
+                rival,
+                RivalOutcome::New,
+                a.rival(finding, rival).and_then(|(_, value)| *value),
+                now,
+            ));
+        }
+    }
+    out
+}
+
+/// What the diagnoses of two compared runs say about rivals, stage by stage.
+pub fn rival_changes(
+    store: &Store,
+    diff: &RunDiff,
+    of: [&RunAddress; 2],
+) -> Result<Vec<RivalChange>> {
+    let (a, b) = (
+        Manifest::of(store, &diff.a.run)?,
+        Manifest::of(store, &diff.b.run)?,
+    );
+    let asked = |id: &String| {
+        of.iter().all(|place| {
+            place.port.is_none() && place.stage.as_ref().is_none_or(|stage| stage == id)
+        })
+    };
+    let mut out = Vec::new();
+    for now in b
+        .stages
+        .iter()
+        .filter(|stage| stage.uses == Diagnose::NAME && asked(&stage.id))
+    {
+        let Some(before) = a
+            .stage(&now.id)
+            .filter(|stage| stage.uses == Diagnose::NAME)
+        else {
+            continue;
+        };
+        if let (Some(before), Some(after)) = (
+            DiagnosedCauses::read(before, store)?,
+            DiagnosedCauses::read(now, store)?,
+        ) {
+            out.extend(compare(&now.id, &before, &after));
+        }
+    }
+    Ok(out)
+}
+
+/// A line each.
+pub(crate) fn rival_words(changes: &[RivalChange]) -> String {
+    let about = context! { changes => Serde(changes) };
+    filled(include_str!("text/rivals.txt"), about)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn diagnosed(findings: &[(&str, &[(&str, f64)])]) -> DiagnosedCauses {
+        let named = |text: &str| {
+            text.split_once('@')
+                .map(|(effect, place)| cause(effect, place))
+                .expect("EFFECT@PLACE")
+        };
+        let rivals = |own: &[(&str, f64)]| {
+            own.iter()
+                .map(|(name, value)| (named(name), Some(*value)))
+                .collect()
+        };
+        DiagnosedCauses(
+            findings
+                .iter()
+                .map(|(name, own)| (named(name), rivals(own)))
+                .collect(),
+        )
+    }
+
+    #[test]
+    fn every_rival_that_was_open_is_confirmed_reversed_or_still_open() {
+        let before = diagnosed(&[
+            (
+                "joint_compliance@joint 2",
+                &[
+                    ("joint_hardening@joint 2", 0.31),
+                    ("link_mass@link 2", 0.02),
+                ],
+            ),
+            ("backlash@joint 3", &[("joint_log_lag@joint 3", 0.2)]),
+            ("gear_cyclic@joint 1", &[("cable_drag@joint 1", 0.4)]),
+            ("link_mass@link 4", &[("link_mass@link 5", 0.3)]),
+            ("tool_shift@tool", &[("base_shift@base", 0.1)]),
+        ]);
+        let now = diagnosed(&[
+            (
+                "joint_compliance@joint 2",
+                &[
+                    ("joint_hardening@joint 2", 0.01),
+                    ("link_mass@link 2", 0.06),
+                ],
+            ),
+            ("joint_log_lag@joint 3", &[]),
+            ("gear_cyclic@joint 1", &[("cable_drag@joint 1", 0.07)]),
+            ("link_mass@link 4", &[]),
+            ("link_mass@link 5", &[]),
+        ]);
+        let found = compare("diagnose", &before, &now);
+        use RivalOutcome::{Both, Confirmed, Neither, New, Open, Reversed};
+        let outcomes: Vec<RivalOutcome> = found.iter().map(|change| change.outcome).collect();
+        assert_eq!(outcomes, [Confirmed, Reversed, Open, Both, Neither, New]);
+        let text = rival_words(&found);
+        for line in [
+            "diagnose: decided: joint_compliance at joint 2, not joint_hardening at joint 2 (its probability 0.31 -> 0.01)",
+            "diagnose: decided: joint_log_lag at joint 3, not backlash at joint 3 as in A (the rival's probability was 0.20 there)",
+            "diagnose: still open: gear_cyclic at joint 1 or cable_drag at joint 1 (probability of the less probable one 0.40 -> 0.07)",
+            "diagnose: new rival: joint_compliance at joint 2 or link_mass at link 2 (probability 0.02 -> 0.06)",
+        ] {
+            assert!(text.contains(line), "{line} is missing in\n{text}");
+        }
     }
 }

@@ -91,7 +91,6 @@ pub(super) fn withdrawn(count: usize) -> String {
 
 /// One thing to do next.
 pub(crate) struct NextStep {
-    /// In a few words.
     pub(crate) what: String,
     /// What to type for it.
     pub(crate) command: Option<String>,

@@ -117,7 +117,6 @@ pub(super) struct ShortFinding {
 #[derive(Clone, Copy)]
 enum NumberShown {
     No,
-    /// The largest.
     Largest,
     /// The same without its sign.
     Size,

@@ -8,16 +8,18 @@ pub use crate::store::Loose;
 use crate::store::frame::{Cell, FrameBuilder};
 pub use crate::store::frame::{Frame, TextCells};
 pub use cause_grid::{CauseGrid, CauseGridCell};
+pub use findings::VerdictTopic;
 pub use findings::{formula_in_words, is_separable_by_poses};
 pub use motion::{ArmMotion, TorqueCourse};
 pub use observability::{FitContext, UNFOLDED};
 pub use parameters::Corrected;
+pub use ports::Labelled;
+pub(crate) use ports::{reads, writes};
 pub use recording::{
     Recording, SOURCE as SIGMA_SOURCE, columns as recording_columns, frame as recording_frame,
 };
 pub use standing::{Contradicted, Standing, Step, Unseen, Withdrawn, standing};
 use std::path::Path;
-pub use verdict::VerdictTopic;
 
 /// A table kind: Rust values that go to and from checked columns.
 pub trait Table: Sized + Send + Sync + 'static {
@@ -119,14 +121,13 @@ mod motion;
 mod network;
 mod observability;
 mod parameters;
+pub mod ports;
 mod prediction;
 mod recording;
 mod robot;
 mod standing;
-mod statistics;
 mod torque_findings;
 mod torque_parameters;
-mod verdict;
 
 pub(crate) use prediction::slip;
 

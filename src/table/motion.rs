@@ -6,15 +6,13 @@ use crate::dynamics::TorqueDiagnosis;
 use crate::error::Result;
 use crate::store::frame::{Cell, Frame, FrameBuilder};
 use crate::table::Table;
-use crate::units::Unit;
+use crate::table::recording::{declared, interleaved, numbers, prismatic, push_numbers};
 use std::collections::BTreeMap;
 
 /// Rows in the order of time; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ArmMotion {
-    /// Joints of the arm.
     pub(crate) joints: usize,
-    /// Which joints are prismatic.
     pub(crate) prismatic: Vec<bool>,
     /// From 1.
     pub(crate) sequence: Vec<i64>,
@@ -38,82 +36,7 @@ pub struct ArmMotion {
     pub(crate) temperature: Option<Vec<f64>>,
 }
 
-/// Stored names of a per-joint quantity and their units; `sliding` is that of prismatic joints.
-#[derive(Clone, Copy)]
-struct PerJoint {
-    turning: (&'static str, Unit),
-    sliding: (&'static str, Unit),
-}
-
-const Q: PerJoint = PerJoint {
-    turning: ("q{j}_rad", Unit::Radian),
-    sliding: ("q{j}_mm", Unit::Millimetre),
-};
-const VELOCITY: PerJoint = PerJoint {
-    turning: ("dq{j}_rad_s", Unit::RadianPerSecond),
-    sliding: ("dq{j}_mm_s", Unit::MillimetrePerSecond),
-};
-const CURRENT: PerJoint = PerJoint {
-    turning: ("i{j}_a", Unit::Ampere),
-    sliding: ("i{j}_a", Unit::Ampere),
-};
-const TORQUE: PerJoint = PerJoint {
-    turning: ("tau{j}_nm", Unit::NewtonMetre),
-    sliding: ("tau{j}_nm", Unit::NewtonMetre),
-};
-
-impl PerJoint {
-    fn column(self, joint: usize, prismatic: bool) -> (String, Unit) {
-        let (name, unit) = if prismatic {
-            self.sliding
-        } else {
-            self.turning
-        };
-        (name.replace("{j}", &(joint + 1).to_string()), unit)
-    }
-
-    fn push(self, frame: &mut FrameBuilder, prismatic: &[bool], all: &[f64]) {
-        for (joint, slides) in prismatic.iter().enumerate() {
-            let (name, unit) = self.column(joint, *slides);
-            let values = all.iter().skip(joint).step_by(prismatic.len());
-            frame.push(
-                name,
-                Cell::to_array(
-                    values
-                        .map(|value| unit.from_si(*value))
-                        .collect::<Vec<f64>>(),
-                ),
-            );
-        }
-    }
-
-    /// Row-major, SI; none where the table has no such columns.
-    fn read(self, frame: &Frame, prismatic: &[bool]) -> Result<Option<Vec<f64>>> {
-        let named: Vec<(String, Unit)> = prismatic
-            .iter()
-            .enumerate()
-            .map(|(joint, slides)| self.column(joint, *slides))
-            .collect();
-        if named
-            .first()
-            .is_none_or(|(name, _)| frame.column(name).is_none())
-        {
-            return Ok(None);
-        }
-        let mut columns = Vec::with_capacity(named.len());
-        for (name, unit) in &named {
-            let mut values = frame.read::<f64>(name)?;
-            values
-                .iter_mut()
-                .for_each(|value| *value = unit.to_si(*value));
-            columns.push(values);
-        }
-        Ok(Some(interleaved(&columns)))
-    }
-}
-
 impl ArmMotion {
-    /// How many rows.
     pub(crate) fn rows(&self) -> usize {
         self.sequence.len()
     }
@@ -133,37 +56,28 @@ impl Table for ArmMotion {
             "usage",
             Cell::to_array(self.usage.iter().map(name).collect::<Vec<Option<String>>>()),
         );
-        frame.push("time_s", Cell::to_array(self.time.clone()));
-        Q.push(&mut frame, &self.prismatic, &self.q);
-        for (quantity, all) in [
-            (VELOCITY, &self.velocity),
-            (CURRENT, &self.current),
-            (TORQUE, &self.torque),
+        for (setting, values) in [
+            ("time", Some(&self.time)),
+            ("q", Some(&self.q)),
+            ("velocity", self.velocity.as_ref()),
+            ("current", self.current.as_ref()),
+            ("torque", self.torque.as_ref()),
+            ("temperature", self.temperature.as_ref()),
         ] {
-            all.iter()
-                .for_each(|all| quantity.push(&mut frame, &self.prismatic, all));
-        }
-        if let Some(all) = &self.temperature {
-            let stored = all.iter().map(|value| (!value.is_nan()).then_some(*value));
-            frame.push(
-                "temp_c",
-                Cell::to_array(stored.collect::<Vec<Option<f64>>>()),
-            );
+            if let Some(values) = values {
+                push_numbers(&mut frame, declared(setting), &self.prismatic, values);
+            }
         }
         frame.finish()
     }
 
     fn from_frame(frame: &Frame) -> Result<Self> {
-        let has = |name: String| frame.column(&name).is_some();
-        let prismatic: Vec<bool> = (1..)
-            .map(|joint| (has(format!("q{joint}_rad")), has(format!("q{joint}_mm"))))
-            .take_while(|(turns, slides)| *turns || *slides)
-            .map(|(_, slides)| slides)
-            .collect();
-        let (mut usages, mut numbers) = (Vec::new(), BTreeMap::new());
+        let prismatic = prismatic(frame);
+        let numbers_of = |setting| numbers(frame, declared(setting), &prismatic);
+        let (mut usages, mut places) = (Vec::new(), BTreeMap::new());
         let mut number = |name: Option<String>| {
             let name = name?;
-            Some(*numbers.entry(name).or_insert_with_key(|name| {
+            Some(*places.entry(name).or_insert_with_key(|name| {
                 usages.push(name.clone());
                 (usages.len() - 1) as u16
             }))
@@ -173,29 +87,18 @@ impl Table for ArmMotion {
             .into_iter()
             .map(&mut number)
             .collect();
-        let temperature = match frame.column("temp_c") {
-            Some(_) => {
-                let all = frame.read::<Option<f64>>("temp_c")?;
-                Some(
-                    all.into_iter()
-                        .map(|value| value.unwrap_or(f64::NAN))
-                        .collect(),
-                )
-            }
-            None => None,
-        };
         Ok(Self {
             joints: prismatic.len(),
             sequence: frame.read("sequence")?,
             trajectory: frame.read("trajectory")?,
             usage,
             usages,
-            time: frame.read("time_s")?,
-            q: Q.read(frame, &prismatic)?.unwrap_or_default(),
-            velocity: VELOCITY.read(frame, &prismatic)?,
-            current: CURRENT.read(frame, &prismatic)?,
-            torque: TORQUE.read(frame, &prismatic)?,
-            temperature,
+            time: numbers_of("time")?.unwrap_or_default(),
+            q: numbers_of("q")?.unwrap_or_default(),
+            velocity: numbers_of("velocity")?,
+            current: numbers_of("current")?,
+            torque: numbers_of("torque")?,
+            temperature: numbers_of("temperature")?,
             prismatic,
         })
     }
@@ -204,9 +107,7 @@ impl Table for ArmMotion {
 /// The judged rows; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TorqueCourse {
-    /// Joints of the arm.
     pub(crate) joints: usize,
-    /// Row of the recording.
     pub(crate) sequence: Vec<i64>,
     /// s.
     pub(crate) time: Vec<f64>,
@@ -214,7 +115,6 @@ pub struct TorqueCourse {
     pub(crate) held_out: Vec<bool>,
     /// Whether something pushed on the arm.
     pub(crate) in_event: Vec<bool>,
-    /// Whether the joint rests.
     pub(crate) rest: Vec<bool>,
     /// rad/s.
     pub(crate) velocity: Vec<f64>,
@@ -291,22 +191,14 @@ impl Table for TorqueCourse {
         let joints = (1..)
             .take_while(|joint| frame.column(&format!("rest{joint}")).is_some())
             .count();
-        let all = |name: &str| -> Result<Vec<f64>> {
-            let read = |joint: usize| frame.read::<f64>(&name.replace("{j}", &joint.to_string()));
-            Ok(interleaved(
-                &(1..=joints).map(read).collect::<Result<Vec<_>>>()?,
-            ))
-        };
-        let rest = (1..=joints)
-            .map(|joint| frame.read::<bool>(&format!("rest{joint}")))
-            .collect::<Result<Vec<_>>>()?;
+        let all = |name: &str| of_joints::<f64>(frame, name, joints);
         Ok(Self {
             joints,
             sequence: frame.read("sequence")?,
             time: frame.read("time_s")?,
             held_out: frame.read("held_out")?,
             in_event: frame.read("in_event")?,
-            rest: interleaved(&rest),
+            rest: of_joints(frame, "rest{j}", joints)?,
             velocity: all("dq{j}_rad_s")?,
             measured: all("measured{j}_nm")?,
             simulated: all("simulated{j}_nm")?,
@@ -323,10 +215,10 @@ fn kept<T: Copy>(values: &[T], width: usize, rows: &[usize]) -> Vec<T> {
         .collect()
 }
 
-/// Columns of equal length -> row-major.
-pub(super) fn interleaved<T: Copy>(columns: &[Vec<T>]) -> Vec<T> {
-    let rows = columns.first().map_or(0, Vec::len);
-    (0..rows)
-        .flat_map(|row| columns.iter().map(move |column| column[row]))
-        .collect()
+/// The columns of all joints, row-major.
+fn of_joints<C: Cell + Copy>(frame: &Frame, name: &str, joints: usize) -> Result<Vec<C>> {
+    let read = |joint: usize| frame.read::<C>(&name.replace("{j}", &joint.to_string()));
+    Ok(interleaved(
+        &(1..=joints).map(read).collect::<Result<Vec<_>>>()?,
+    ))
 }

@@ -15,7 +15,6 @@ pub struct FitContext {
     pub(crate) geometry: Option<(usize, usize)>,
     /// Standard deviation of the joints that rows are weighted by, rad.
     pub(crate) repeatability: Option<f64>,
-    /// Parts of the cross-validation.
     pub(crate) folds: Option<usize>,
     /// Poses that were too few, or too many, for the cross-validation that was asked for.
     pub(crate) unfolded: Option<usize>,
@@ -158,7 +157,6 @@ impl Observability {
                 "of the whitened Jacobian, columns scaled to unit prior sigma",
             );
         }
-        rows.sort_by(|a, b| (&a.quantity, a.index).cmp(&(&b.quantity, b.index)));
         Self(rows)
     }
 }

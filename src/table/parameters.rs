@@ -137,7 +137,6 @@ impl Parameters {
                 });
             }
         }
-        rows.sort_by(|a, b| a.name.cmp(&b.name));
         Self(rows).of_robot(model.robot.description())
     }
 
@@ -427,7 +426,6 @@ impl CovarianceTable {
                 .filter(|row| kept(&row.parameter) && kept(&row.other))
                 .cloned(),
         );
-        rows.sort_by(|a, b| (&a.parameter, &a.other).cmp(&(&b.parameter, &b.other)));
         Self(rows)
     }
 

@@ -199,28 +199,11 @@ impl Table for Recording {
 
     fn from_frame(frame: &Frame) -> Result<Self> {
         let has = |name: &str| frame.column(name).is_some();
-        let prismatic: Vec<bool> = (1..)
-            .map(|joint| (has(&format!("q{joint}_rad")), has(&format!("q{joint}_mm"))))
-            .take_while(|(turns, slides)| *turns || *slides)
-            .map(|(_, slides)| slides)
-            .collect();
+        let prismatic = prismatic(frame);
         let mut numbers: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
         for column in columns() {
-            let stored = column.columns(&prismatic);
-            if stored.first().is_some_and(|(name, _)| has(name)) {
-                let read = |(name, unit): &(String, Unit)| -> Result<Vec<f64>> {
-                    // Null -> NaN.
-                    let values = frame.read::<Option<f64>>(name)?;
-                    Ok(values
-                        .into_iter()
-                        .map(|value| value.map_or(f64::NAN, |value| unit.to_si(value)))
-                        .collect())
-                };
-                numbers.insert(
-                    column.setting,
-                    interleave(&stored.iter().map(read).collect::<Result<Vec<_>>>()?),
-                );
-            }
+            let values = self::numbers(frame, column, &prismatic)?;
+            numbers.extend(values.map(|values| (column.setting, values)));
         }
         let mut texts: BTreeMap<&'static str, Vec<Option<String>>> = BTreeMap::new();
         for column in columns().filter(|column| column.is_text() && has(column.setting)) {
@@ -331,8 +314,60 @@ pub fn frame<N: Iterator<Item = f64>>(
     frame.finish()
 }
 
+/// What a recording declares by the name of its setting.
+pub(super) fn declared(setting: &str) -> &'static DeclaredColumn {
+    let mut columns = columns();
+    let found = columns.find(|column| column.setting == setting);
+    found.expect("a declared circumstance")
+}
+
+/// Which joints of a table are prismatic.
+pub(super) fn prismatic(frame: &Frame) -> Vec<bool> {
+    let has = |name: String| frame.column(&name).is_some();
+    (1..)
+        .map(|joint| (has(format!("q{joint}_rad")), has(format!("q{joint}_mm"))))
+        .take_while(|(turns, slides)| *turns || *slides)
+        .map(|(_, slides)| slides)
+        .collect()
+}
+
+/// The numbers of a declared column, row-major, SI, NaN for null; none where the table lacks it.
+pub(super) fn numbers(
+    frame: &Frame,
+    column: &DeclaredColumn,
+    prismatic: &[bool],
+) -> Result<Option<Vec<f64>>> {
+    let stored = column.columns(prismatic);
+    let there = |(name, _): &(String, Unit)| frame.column(name).is_some();
+    if !stored.first().is_some_and(there) {
+        return Ok(None);
+    }
+    let read = |(name, unit): &(String, Unit)| -> Result<Vec<f64>> {
+        let values = frame.read::<Option<f64>>(name)?.into_iter();
+        Ok(values
+            .map(|value| value.map_or(f64::NAN, |value| unit.to_si(value)))
+            .collect())
+    };
+    let columns = stored.iter().map(read).collect::<Result<Vec<_>>>()?;
+    Ok(Some(interleaved(&columns)))
+}
+
+/// Adds a declared column from its numbers, row-major, SI, NaN for null.
+pub(super) fn push_numbers(
+    frame: &mut FrameBuilder,
+    column: &DeclaredColumn,
+    prismatic: &[bool],
+    values: &[f64],
+) {
+    let stored = column.columns(prismatic);
+    for (k, (name, unit)) in stored.iter().enumerate() {
+        let values = values.iter().skip(k).step_by(stored.len());
+        frame.push_numbers(name.clone(), values.map(|value| unit.from_si(*value)));
+    }
+}
+
 /// Columns of equal length -> row-major.
-fn interleave(columns: &[Vec<f64>]) -> Vec<f64> {
+pub(super) fn interleaved<T: Copy>(columns: &[Vec<T>]) -> Vec<T> {
     let rows = columns.first().map_or(0, Vec::len);
     (0..rows)
         .flat_map(|row| columns.iter().map(move |column| column[row]))

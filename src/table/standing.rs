@@ -35,7 +35,6 @@ pub struct Unseen {
 
 /// A step that predicts.
 pub struct Step {
-    /// Id of its stage.
     pub(crate) id: String,
     /// Whether it has a model of its own; else it learned on the step before it that has.
     pub(crate) own: bool,
@@ -67,7 +66,6 @@ pub struct Withdrawn {
     pub(crate) than: String,
     /// The rms of that one at the same points.
     pub(crate) than_rms_mm: f64,
-    /// How many these are.
     pub(crate) points: usize,
 }
 

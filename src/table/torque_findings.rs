@@ -142,9 +142,7 @@ impl Inertials {
             declared: found.declared,
             sigma: found.sigma,
         });
-        let mut rows: Vec<InertialRow> = rows.collect();
-        rows.sort_by(|a, b| (a.link, &a.quantity).cmp(&(b.link, &b.quantity)));
-        Self(rows)
+        Self(rows.collect())
     }
 }
 

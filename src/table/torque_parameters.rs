@@ -122,7 +122,6 @@ impl TorqueParameters {
                 .filter(|row| row.name == name)
                 .for_each(|row| row.sigma = sigma);
         }
-        rows.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(Self(rows))
     }
 
@@ -359,7 +358,6 @@ impl TorqueCovariance {
                 });
             }
         }
-        rows.sort_by(|a, b| (&a.parameter, &a.other).cmp(&(&b.parameter, &b.other)));
         Ok(Self(rows))
     }
 

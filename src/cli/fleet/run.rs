@@ -4,8 +4,7 @@
 
 use super::super::surroundings::{cores, surroundings};
 use super::super::{emit, emit_json};
-use super::cluster::{ClusterArguments, on_slurm};
-use super::{FleetLocation, records, verdict, workshop};
+use super::{ClusterArguments, FleetLocation, on_slurm, records, verdict, workshop};
 use crate::error::{Error, Result, counted, visible};
 use crate::fleet::ledger::{Member, RunNote};
 use crate::fleet::{Ending, Fleet, Ledger, RobotRecord, Workshop, local, tables};
@@ -82,7 +81,7 @@ const EXAMPLES: &str = "Examples:
   calib fleet run FLEET.yaml --engine slurm --partition main --robots-per-task 4 --store /shared/store";
 
 impl FleetRunArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let store = self.place.store()?;
         let fleet = Fleet::load(&self.place.fleet, &store)?;
         run(&fleet, &store, &self.place, &self.how, command_line)
@@ -334,7 +333,7 @@ pub(super) struct ExecArguments {
 }
 
 impl ExecArguments {
-    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+    pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let store = super::folder(&self.store)?;
         let ledger = ledger(&store, &self.fleet);
         let note = ledger.run(Some(&self.run))?;

@@ -4,7 +4,7 @@
 
 use super::super::surroundings::program;
 use super::super::{emit, emit_json};
-use super::conceal::{self, ConcealArguments};
+use super::{ConcealArguments, design};
 use crate::error::{Error, Result, counted};
 use crate::estimate::threads::in_order;
 use crate::proof::{self, LEFT_OUT, RECORDINGS, SEAL, SEALED, Seal, board, write_scoreboard};
@@ -47,8 +47,8 @@ pub(super) struct ProveArguments {
 const VERDICTS: &str = "verdicts";
 
 impl ProveArguments {
-    pub fn run(&self) -> Result<()> {
-        let (design, folder) = (conceal::design(&self.conceal)?, &self.conceal.out);
+    pub(crate) fn run(&self) -> Result<()> {
+        let (design, folder) = (design(&self.conceal)?, &self.conceal.out);
         let usual = match design.dynamics {
             false => "pipelines/case/pipeline.yaml",
             true => "pipelines/dynamics/pipeline.yaml",
@@ -214,7 +214,7 @@ pub(super) struct RevealArguments {
 }
 
 impl RevealArguments {
-    pub fn run(&self) -> Result<()> {
+    pub(crate) fn run(&self) -> Result<()> {
         let sealed = Seal::check(&self.folder)?;
         let board = board(&self.folder, &sealed, &self.verdicts)?;
         if let Some(path) = &self.out {

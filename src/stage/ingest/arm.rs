@@ -90,7 +90,6 @@ impl RobotJoints {
 pub(super) struct Slots {
     columns: Vec<(&'static DeclaredColumn, Range<usize>)>,
     texts: Vec<&'static str>,
-    /// Numbers in a row.
     pub(crate) count: usize,
     pub(crate) time: usize,
     pub(crate) q: Range<usize>,

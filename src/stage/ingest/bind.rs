@@ -1,10 +1,9 @@
 //! From the columns that the settings name to the columns that a file has.
 
 use super::arm::{KindSlots, RobotJoints};
-use super::clock::CLOCK;
-use super::columns::Columns;
-use super::layout::{FileLayout, WideTargets};
+use super::columns::{Columns, FileLayout, WideTargets};
 use super::mapped::{ColumnRef, JointColumns, ScalarColumn, TextColumn};
+use super::stretch::CLOCK;
 use crate::error::{Error, Fault, Result, counted, did_you_mean, first_of};
 use crate::observation::{Convention, DeclaredColumn};
 use crate::table::recording_columns;
@@ -18,7 +17,6 @@ const SHOWN: usize = 60;
 /// Where a file's quantities stand, resolved against its header.
 #[derive(Default)]
 pub(super) struct Binding {
-    /// Fields of a row.
     pub(crate) width: usize,
     pub(crate) id: Option<TextBinding>,
     /// In the order of the row's texts.

@@ -1,7 +1,7 @@
 //! Files of later measurements: of the same layout, joined among themselves, behind all rows before.
 
 use super::Ingest;
-use super::layout::FileLayout;
+use super::columns::FileLayout;
 use crate::error::{Place, counted};
 use crate::stage::RawFile;
 use schemars::JsonSchema;

@@ -2,7 +2,7 @@
 
 use super::Ingest;
 use super::arm::Slots;
-use super::layout::Join;
+use super::columns::Join;
 use crate::error::{Place, did_you_mean};
 use crate::observation::Part;
 use crate::robot::{INSTRUMENTS, Instrument, START, SigmaSource};

@@ -10,8 +10,8 @@ use crate::raw::{
 };
 use crate::stage::ingest::arm::RobotJoints;
 use crate::stage::ingest::bind::{Binding, FileHeader, bind};
+use crate::stage::ingest::columns::{FileLayout, LimitPolicy};
 use crate::stage::ingest::external::ExternalAxes;
-use crate::stage::ingest::layout::{FileLayout, LimitPolicy};
 use crate::stage::ingest::refusal::RowRefusal;
 use crate::stage::ingest::row::{RecordedRow, RowReader};
 use crate::stage::{Context, OpenedInput};
@@ -313,7 +313,6 @@ pub(super) struct ListedRows {
     rows: Vec<(u64, Vec<String>)>,
     /// How many poses were left out.
     poses: usize,
-    /// Rows handed out.
     next: usize,
 }
 

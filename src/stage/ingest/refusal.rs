@@ -98,7 +98,6 @@ pub(super) struct RefusalCount {
 
 pub(super) type RefusalCounts = BTreeMap<Reason, RefusalCount>;
 
-/// Counts one refusal.
 pub(super) fn tally(counts: &mut RefusalCounts, line: u64, refusal: &RowRefusal) {
     let new = || RefusalCount {
         rows: 0,

@@ -2,9 +2,9 @@
 
 use super::arm::{KindSlots, RobotJoints};
 use super::bind::{Binding, NumberBinding, TextBinding};
-use super::clock::{ALLOWED, CLOCK, ClockColumn, ClockTime};
-use super::layout::LimitPolicy;
+use super::columns::LimitPolicy;
 use super::refusal::{Reason, RowRefusal, refuse};
+use super::stretch::{ALLOWED, CLOCK, ClockColumn, ClockTime};
 use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
 use crate::robot::ONE_AND_A_HALF_TURNS;
 

@@ -4,7 +4,7 @@
 
 use super::Ingest;
 use super::arm::{RobotJoints, Slots};
-use super::layout::{Duplicates, FileLayout};
+use super::columns::{Duplicates, FileLayout};
 use super::motion::{JointSamples, Track};
 use super::reading::{OpenedFile, STRIDE};
 use super::refusal::{Refusals, beginning};
@@ -65,14 +65,12 @@ pub(super) enum GivenUp {
 #[derive(Default)]
 pub(super) struct FileRows {
     pub(crate) label: String,
-    /// Lines of the file.
     pub(crate) lines: u64,
     /// Rows up to the last that is not blank all over, as a spreadsheet leaves them at the end.
     pub(crate) filled: u64,
     /// Places of a row's numbers that the file fills, ascending; those of them that it has columns or values for.
     places: Vec<usize>,
     pub(crate) slots: Vec<usize>,
-    /// Row by row.
     values: Vec<f64>,
     /// The points of wide rows, of so many targets each.
     points: Vec<[f64; 3]>,

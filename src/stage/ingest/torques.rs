@@ -6,7 +6,7 @@
 
 use crate::error::{Error, Fault, Place, Result, counted};
 use crate::stage::ingest::arm::RobotJoints;
-use crate::stage::ingest::layout::{FileLayout, LimitPolicy};
+use crate::stage::ingest::columns::{FileLayout, LimitPolicy};
 use crate::stage::ingest::reading::{OpenedFile, STRIDE};
 use crate::stage::ingest::refusal::{
     Reason, RefusalCounts, Rejections, RowRefusal, beginning, tally,
@@ -143,7 +143,6 @@ impl Stage for IngestTorques {
         for (layout, name) in self.files.iter().zip(&names) {
             intake.push(rows.file(layout, name, &mut rejected, context)?);
         }
-        intake.sort_by(|a: &IntakeRow, b| a.file.cmp(&b.file));
         Ok(IngestTorquesWrites {
             motion: rows.finish(context)?,
             rejected: rejected.finish()?,

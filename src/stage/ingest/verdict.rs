@@ -1,9 +1,8 @@
 //! What is wrong with a file as a whole, or with several files as copies of each other: errors for the owner of the measurements, before any table is written.
 
 use super::arm::RobotJoints;
-use super::columns::Columns;
-use super::joined::Measurement;
-use super::layout::{Join, LimitPolicy};
+use super::columns::{Columns, Join, LimitPolicy};
+use super::pair::Measurement;
 use super::refusal::{Reason, RefusalCount, RefusalCounts, tally};
 use super::rows::{FileRows, GivenUp};
 use crate::error::{Error, Fault, Result, counted};

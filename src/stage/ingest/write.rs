@@ -1,8 +1,8 @@
 //! The recording in chunks, and every row that is not part of it with its reason.
 
-use super::joined::{JoinedRow, Measurement};
 use super::later::Continuation;
 use super::noise::NoiseSlots;
+use super::pair::{JoinedRow, Measurement};
 use super::reading::STRIDE;
 use super::refusal::Rejections;
 use super::rows::FileRows;

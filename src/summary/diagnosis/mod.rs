@@ -1,7 +1,6 @@
 //! A diagnosis of positions or torques from its tables, as text and as JSON.
 
 mod positions;
-mod torques;
 
 use super::screen::{self, NextStep, declared_in_yaml};
 use super::short_finding::{Found, ShortFinding, words};
@@ -19,9 +18,8 @@ use crate::table::{
     FindingNumbers, RivalRow, Rivals, Table, TablesByKind, TorqueNumbers, TorqueRivals, VerdictRow,
     VerdictSentences, VerdictTopic, is_separable_by_poses, of_kind,
 };
-use positions::Positions;
+use positions::{Positions, Torques};
 use serde_json::{Value, json};
-use torques::Torques;
 
 /// A diagnosis by its tables.
 pub struct DiagnosisSummary {
@@ -31,9 +29,7 @@ pub struct DiagnosisSummary {
     /// As the table has them.
     found: Vec<Found>,
     kind: Kind,
-    /// Its name.
     robot: Option<String>,
-    /// Rows of the recording.
     rows: u64,
 }
 
@@ -248,7 +244,7 @@ impl DiagnosisSummary {
             Kind::Positions(diagnosis) => {
                 found.details(&diagnosis.formulas(found.rank), RivalRow::is_inseparable)
             }
-            Kind::Torques(_) => found.details(&torques::numbers(found), |_| true),
+            Kind::Torques(_) => found.details(&positions::numbers(found), |_| true),
         }));
         let lines = |label: &str, lines: &[&str]| -> String {
             lines

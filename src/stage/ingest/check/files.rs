@@ -3,8 +3,7 @@
 use crate::error::Place;
 use crate::observation::{KINDS, MeasurementKind, Part};
 use crate::stage::ingest::Ingest;
-use crate::stage::ingest::columns::Columns;
-use crate::stage::ingest::layout::{Duplicates, FileLayout, Join};
+use crate::stage::ingest::columns::{Columns, Duplicates, FileLayout, Join};
 
 pub(super) fn faults(settings: &Ingest, at: &mut Place) {
     axes(settings, at);

@@ -2,10 +2,9 @@
 
 mod files;
 
-use super::clock::CLOCK;
-use super::columns::Columns;
-use super::layout::{FileLayout, HELD, SIMULATED, WideTargets};
+use super::columns::{Columns, FileLayout, HELD, SIMULATED, WideTargets};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn, TextColumn};
+use super::stretch::CLOCK;
 use super::{Ingest, later, noise};
 use crate::error::{Place, counted, did_you_mean};
 use crate::observation::{Conventions, DeclaredColumn, KINDS, MeasurementKind, Part};

@@ -1,8 +1,9 @@
 //! The ports of stages: which tables a stage reads and writes, whole, or chunk by chunk where they may be longer than memory.
 
+use super::{Frame, Table};
 use crate::error::Result;
-use crate::table::{Frame, Table};
 use std::marker::PhantomData;
+use std::ops::Deref;
 
 /// How many upstream tables a port takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,6 +48,13 @@ pub struct Labelled<T> {
     pub stage: String,
     /// What it wrote.
     pub table: T,
+}
+
+impl<T> Deref for Labelled<T> {
+    type Target = T;
+    fn deref(&self) -> &T {
+        &self.table
+    }
 }
 
 impl<T: Table> PortValue for T {
@@ -104,7 +112,7 @@ pub trait Writes: Sized {
     fn give(self) -> Result<Vec<Output>>;
 }
 
-/// What a stage hands back on one port: columns in memory, or a table already streamed through [`Services::sink`](super::Services::sink).
+/// What a stage hands back on one port: columns in memory, or a table already streamed through `Services::sink`.
 pub enum Output {
     /// Columns in memory.
     Frame(Frame),
@@ -120,14 +128,14 @@ macro_rules! reads {
             #[doc = concat!("The port `", stringify!($field), "`.")]
             pub $field: $ty,
         )* }
-        impl crate::stage::Reads for $name {
-            fn ports() -> Vec<crate::stage::Port> {
-                vec![ $( crate::stage::Port { name: stringify!($field), kind: <$ty as crate::stage::PortValue>::KIND, arity: <$ty as crate::stage::PortValue>::ARITY, chunked: <$ty as crate::stage::PortValue>::CHUNKED } ),* ]
+        impl crate::table::ports::Reads for $name {
+            fn ports() -> Vec<crate::table::ports::Port> {
+                vec![ $( crate::table::ports::Port { name: stringify!($field), kind: <$ty as crate::table::ports::PortValue>::KIND, arity: <$ty as crate::table::ports::PortValue>::ARITY, chunked: <$ty as crate::table::ports::PortValue>::CHUNKED } ),* ]
             }
             #[allow(unused_mut, unused_variables)]
-            fn take(inputs: Vec<Vec<(String, crate::stage::InputTable)>>) -> crate::error::Result<Self> {
+            fn take(inputs: Vec<Vec<(String, crate::table::ports::InputTable)>>) -> crate::error::Result<Self> {
                 let mut inputs = inputs.into_iter();
-                Ok(Self { $( $field: <$ty as crate::stage::PortValue>::take(inputs.next().expect("one entry per port"))?, )* })
+                Ok(Self { $( $field: <$ty as crate::table::ports::PortValue>::take(inputs.next().expect("one entry per port"))?, )* })
             }
         }
     };
@@ -155,39 +163,18 @@ macro_rules! writes {
             #[doc = concat!("The port `", stringify!($field), "`.")]
             pub $field: $ty,
         )* }
-        impl crate::stage::Writes for $name {
-            fn ports() -> Vec<crate::stage::Port> {
-                vec![ $( crate::stage::Port { name: stringify!($field), kind: <$ty as crate::stage::Produced>::KIND, arity: crate::stage::Arity::One, chunked: false } ),* ]
+        impl crate::table::ports::Writes for $name {
+            fn ports() -> Vec<crate::table::ports::Port> {
+                vec![ $( crate::table::ports::Port { name: stringify!($field), kind: <$ty as crate::table::ports::Produced>::KIND, arity: crate::table::ports::Arity::One, chunked: false } ),* ]
             }
-            fn give(self) -> crate::error::Result<Vec<crate::stage::Output>> {
-                Ok(vec![ $( crate::stage::Produced::give(self.$field)? ),* ])
+            fn give(self) -> crate::error::Result<Vec<crate::table::ports::Output>> {
+                Ok(vec![ $( crate::table::ports::Produced::give(self.$field)? ),* ])
             }
         }
     };
 }
-/// Declares a stage with its ports: `stage! { Identify, "identify", 18, "identifies geometry", IdentifyReads { robot: Robot, } -> Identified }`. A
-/// struct of ports without fields is declared elsewhere.
-macro_rules! stage {
-    ($stage:ty, $name:literal, $implementation:literal, $summary:literal,
-     $reads:ident $({ $($read:tt)* })? -> $writes:ident $({ $($written:tt)* })?) => {
-        $(crate::stage::reads! {
-            #[doc = concat!("Input ports of `", $name, "`.")]
-            pub struct $reads { $($read)* }
-        })?
-        $(crate::stage::writes! {
-            #[doc = concat!("Output ports of `", $name, "`.")]
-            pub struct $writes { $($written)* }
-        })?
-        impl crate::stage::DeclaredStage for $stage {
-            const NAME: &'static str = $name;
-            const SUMMARY: &'static str = $summary;
-            const IMPLEMENTATION: u32 = $implementation;
-            type Reads = $reads;
-            type Writes = $writes;
-        }
-    };
-}
-pub(crate) use {reads, stage, writes};
+
+pub(crate) use {reads, writes};
 
 /// A table written chunk by chunk, for what does not fit into memory.
 pub struct Streamed {
@@ -252,7 +239,6 @@ pub type InputTable = Box<dyn StoredTable>;
 pub struct Chunks<T>(InputTable, PhantomData<fn() -> T>);
 
 impl<T: Table> Chunks<T> {
-    /// How many rows.
     pub(crate) fn rows(&self) -> usize {
         self.0.rows()
     }
