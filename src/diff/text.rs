@@ -1,9 +1,10 @@
 //! A comparison as a short text: counts, columns that differ, the worst rows; never a dump.
 
-use super::{ColumnDiff, TableDiff, WorstCell};
+use super::{ColumnDiff, Equal, TableDiff, WorstCell};
 use crate::error::{Error, Result, counted};
+use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
-use minijinja::{AutoEscape, Environment, context};
+use minijinja::{AutoEscape, Environment, Value, context};
 
 /// How much a text shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,75 +17,38 @@ pub enum Detail {
 
 /// A comparison as text.
 pub fn text(diff: &TableDiff, detail: Detail) -> String {
-    let rows = &diff.rows;
-    if let Some(equal) = diff.equal {
-        return format!("same: {}, {}\n", counted(rows.same, "row"), equal.says());
-    }
-    let mut text = format!(
-        "A  {}  {}\nB  {}  {}\n",
-        diff.a.path,
-        counted(diff.a.rows, "row"),
-        diff.b.path,
-        counted(diff.b.rows, "row")
-    );
-    for finding in &diff.findings {
-        let column = if finding.column.is_empty() {
-            String::new()
-        } else {
-            format!(" {}", finding.column)
-        };
-        text.push_str(&format!("{}{column}: {}\n", finding.what, finding.says));
-    }
-    text.push_str(&format!(
-        "rows by {}: {} same, {} within tolerance, {} changed",
-        diff.key.join(", "),
-        rows.same,
-        rows.within_tolerance,
-        rows.changed
-    ));
-    text.push_str(&format!(
-        ", {} only in A, {} only in B\n",
-        rows.only_a, rows.only_b
-    ));
-    if diff.duplicates() > 0 {
-        text.push_str(&format!(
-            "duplicate keys: {}, {} of A, {} of B, not compared; --occurrence pairs them in their order\n",
-            counted(rows.duplicate_keys, "key"),
-            counted(rows.duplicate_a, "row"),
-            rows.duplicate_b
-        ));
-    }
-    text.push_str(&columns(&diff.columns));
-    if detail == Detail::Stat {
-        return text;
-    }
-    if !diff.worst.is_empty() {
-        text.push_str(&format!(
-            "worst {} of {}\n",
-            diff.worst.len(),
-            counted(rows.changed, "changed row")
-        ));
-    }
-    for row in &diff.worst {
-        const SHOWN: usize = 3; // more do not fit on a line
-        let cells: Vec<String> = row.cells.iter().take(SHOWN).map(cell).collect();
-        let more = if row.cells.len() > SHOWN {
-            format!("; {}", counted(row.cells.len() - SHOWN, "more column"))
-        } else {
-            String::new()
-        };
-        text.push_str(&format!("  {}: {}{more}\n", row.key, cells.join("; ")));
-    }
-    for (keys, what) in [
-        (&diff.examples.only_a, "only in A"),
-        (&diff.examples.only_b, "only in B"),
-        (&diff.examples.duplicate, "duplicate"),
-    ] {
-        if !keys.is_empty() {
-            text.push_str(&format!("{what}, e.g. {}\n", keys.join(" | ")));
-        }
-    }
-    text
+    let differs = |column: &&ColumnDiff| column.changed + column.within > 0;
+    let differing: Vec<&ColumnDiff> = diff.columns.iter().filter(differs).collect();
+    let names = differing.iter().map(|column| column.name.chars().count());
+    let width = names.max().unwrap_or(0).max("column".len());
+    let about = context! {
+        diff => Serde(diff), equal => diff.equal.map(Equal::says), differing => Serde(&differing), width,
+        full => detail == Detail::Full, cells => cells(diff),
+    };
+    // Lines of tags alone leave no line.
+    let syntax = SyntaxConfig::builder()
+        .trim_blocks(true)
+        .lstrip_blocks(true)
+        .keep_trailing_newline(true)
+        .build();
+    let mut environment = Environment::new();
+    environment.set_syntax(syntax.expect("the usual delimiters"));
+    environment.add_filter("short", short);
+    environment.add_filter("counted", |count: u64, what: &str| counted(count, what));
+    environment.add_filter("left", |text: &str, width: usize| format!("{text:width$}"));
+    environment.add_filter("right", |value: Value, width: usize| {
+        format!("{:>width$}", value.to_string())
+    });
+    environment
+        .render_str(include_str!("text.txt"), about)
+        .expect("a template that names what it is given")
+}
+
+/// The cells that differ of each of the worst rows.
+fn cells(diff: &TableDiff) -> Vec<Vec<String>> {
+    let rows = diff.worst.iter();
+    rows.map(|row| row.cells.iter().map(cell).collect())
+        .collect()
 }
 
 /// The cell of a row that changed most; one that has a number before one that appeared or vanished.
@@ -135,52 +99,6 @@ fn cell(cell: &WorstCell) -> String {
     )
 }
 
-fn columns(columns: &[ColumnDiff]) -> String {
-    let differing: Vec<&ColumnDiff> = columns
-        .iter()
-        .filter(|column| column.changed + column.within > 0)
-        .collect();
-    let equal = columns.len() - differing.len();
-    if differing.is_empty() {
-        return format!("columns: all {equal} equal\n");
-    }
-    let name = differing
-        .iter()
-        .map(|column| column.name.chars().count())
-        .max()
-        .unwrap_or(0)
-        .max("column".len());
-    let mut text = format!(
-        "{:name$}  {:>6}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  largest at\n",
-        "column", "unit", "changed", "within", "max", "rms", "bias", "p95", "max sigma"
-    );
-    for column in differing {
-        let of = |pick: fn(&super::DifferenceStatistics) -> f64| {
-            column
-                .statistics
-                .as_ref()
-                .map_or_else(String::new, |found| short(pick(found)))
-        };
-        text.push_str(&format!(
-            "{:name$}  {:>6}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {}\n",
-            column.name,
-            column.unit,
-            column.changed,
-            column.within,
-            of(|found| found.max),
-            of(|found| found.rms),
-            of(|found| found.bias),
-            of(|found| found.p95),
-            column.max_sigmas.map_or_else(String::new, short),
-            column.worst_key.as_deref().unwrap_or("")
-        ));
-    }
-    if equal > 0 {
-        text.push_str(&format!("equal: {}\n", counted(equal, "more column")));
-    }
-    text
-}
-
 /// Three significant digits.
 pub fn short(value: f64) -> String {
     let size = value.abs();
@@ -223,19 +141,14 @@ pub fn html(title: &str, notes: &[String], tables: &[(String, TableDiff)]) -> Re
     environment
         .add_template("page", include_str!("page.html"))
         .map_err(bug)?;
-    let cells = |diff: &TableDiff| -> Vec<Vec<String>> {
-        let rows = diff.worst.iter();
-        rows.map(|row| row.cells.iter().map(cell).collect())
-            .collect()
-    };
-    let tables: Vec<minijinja::Value> = tables
+    let tables: Vec<Value> = tables
         .iter()
         .map(|(name, diff)| {
-            context! { name, cells => cells(diff), same => diff.is_same(), diff => minijinja::Value::from(Serde(diff)) }
+            context! { name, cells => cells(diff), same => diff.is_same(), diff => Value::from(Serde(diff)) }
         })
         .collect();
     let template = environment.get_template("page").map_err(bug)?;
     template
-        .render(context! { title, notes => minijinja::Value::from(Serde(notes)), tables })
+        .render(context! { title, notes => Value::from(Serde(notes)), tables })
         .map_err(bug)
 }

@@ -2,7 +2,7 @@
 //!
 //! Frames of links as others chose them, moved as little as the corrected axes demand: meshes and origins stay where they were.
 //!
-//! XML as exports write it: two blanks a level, and at the head, as comments, what the reader must know of the model.
+//! XML as exports write it: a template, and at the head, as comments, what the reader must know of the model.
 
 use super::Export;
 use super::model::{PLACEHOLDER, placeholder_inertia};
@@ -10,10 +10,10 @@ use crate::description::{JointDescription, JointKind};
 use crate::dynamics::Inertial;
 use crate::error::{Error, Result};
 use crate::spatial::Pose;
+use minijinja::syntax::SyntaxConfig;
+use minijinja::{Environment, UndefinedBehavior, Value};
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use quick_xml::Writer;
-use quick_xml::events::{BytesDecl, BytesText, Event};
-use std::io;
+use quick_xml::escape::escape;
 
 /// A body in a frame at its joint's point, parallel to the base at the zero pose.
 pub(super) struct LinkBody {
@@ -123,41 +123,27 @@ pub(super) fn tool(point: [f64; 3], rows: &[[f64; 3]; 3]) -> Pose {
     Pose::new(Matrix3::from_fn(|i, k| rows[i][k]), point.into())
 }
 
-/// What elements are written to.
-pub(super) type Xml = Writer<Vec<u8>>;
-
-/// A document: the remarks, then what `root` writes.
-pub(super) fn document(
-    remarks: &[String],
-    root: impl FnOnce(&mut Xml) -> io::Result<()>,
-) -> Result<String> {
-    let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
-    let written = || -> io::Result<Vec<u8>> {
-        xml.write_event(Event::Decl(BytesDecl::new("1.0", None, None)))?;
-        remarks
-            .iter()
-            .try_for_each(|line| comment(&mut xml, line))?;
-        root(&mut xml)?;
-        Ok(xml.into_inner())
+/// A document of XML: the remarks as comments, then the template with its values. Names in attributes go through its filter `xml`.
+pub(super) fn document(remarks: &[String], template: &str, values: Value) -> Result<String> {
+    let mut environment = Environment::new();
+    let syntax = SyntaxConfig::builder()
+        .trim_blocks(true)
+        .lstrip_blocks(true)
+        .keep_trailing_newline(true)
+        .build();
+    environment.set_syntax(syntax.map_err(|error| Error::Bug(error.to_string()))?);
+    environment.set_undefined_behavior(UndefinedBehavior::SemiStrict);
+    environment.add_filter("xml", |text: &str| escape(text).into_owned());
+    // Two hyphens would end a comment; of three, the first pass leaves two.
+    let comment = |line: &String| {
+        let line = line.replace("--", "- -").replace("--", "- -");
+        format!("<!-- {line} -->\n")
     };
-    let text = written().map_err(|error| Error::Bug(error.to_string()))?;
-    String::from_utf8(text)
-        .map(|text| text + "\n")
-        .map_err(|error| Error::Bug(error.to_string()))
-}
-
-pub(super) fn comment(xml: &mut Xml, text: &str) -> io::Result<()> {
-    // Two hyphens would end the comment; of three, the first pass leaves two.
-    let text = text.replace("--", "- -").replace("--", "- -");
-    xml.write_event(Event::Comment(BytesText::from_escaped(format!(" {text} "))))
-}
-
-/// An element without content.
-pub(super) fn empty(xml: &mut Xml, name: &str, attributes: &[(&str, &str)]) -> io::Result<()> {
-    xml.create_element(name)
-        .with_attributes(attributes.iter().copied())
-        .write_empty()?;
-    Ok(())
+    let head: String = remarks.iter().map(comment).collect();
+    let body = environment
+        .render_str(template, values)
+        .map_err(|error| Error::Bug(error.to_string()))?;
+    Ok(format!("<?xml version=\"1.0\"?>\n{head}{body}"))
 }
 
 /// A point as seen from another.
@@ -181,10 +167,7 @@ mod tests {
     #[test]
     fn hyphens_of_a_name_end_no_comment() {
         for name in ["a--b", "---", "-----", "-", "<!-- -->"] {
-            let text = document(&[name.to_string()], |xml| {
-                xml.create_element("robot").write_empty().map(drop)
-            })
-            .unwrap();
+            let text = document(&[name.to_string()], "<robot/>", Value::UNDEFINED).unwrap();
             let read = roxmltree::Document::parse(&text)
                 .unwrap_or_else(|error| panic!("{error} in {text}"));
             assert_eq!(read.root_element().tag_name().name(), "robot");

@@ -7,11 +7,9 @@ mod dynamics;
 mod friction;
 mod json;
 mod mark;
-mod mjcf;
 mod model;
-mod sdf;
+mod rigid;
 mod ur_kinematics;
-mod urdf;
 mod xacro;
 
 pub use mark::Belonging;
@@ -46,14 +44,14 @@ pub(crate) enum CarriedTorques {
 
 /// All formats, in the order of the help.
 pub(crate) const FORMATS: &[Format] = &[
-    urdf::URDF,
+    rigid::URDF,
     xacro::XACRO,
     ur_kinematics::UR_KINEMATICS,
     dh::DH,
     dh::MDH,
     json::JSON,
-    mjcf::MJCF,
-    sdf::SDF,
+    rigid::MJCF,
+    rigid::SDF,
     controller::CONTROLLER,
     dynamics::DYNAMICS,
 ];

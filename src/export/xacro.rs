@@ -7,6 +7,7 @@ use crate::error::{Error, Result, one_line};
 use crate::raw::{self, ending};
 use crate::spatial::Pose;
 use crate::yaml;
+use minijinja::context;
 use nalgebra::{Rotation3, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
@@ -79,34 +80,9 @@ fn text(export: &Export) -> Result<String> {
         .iter()
         .map(|(name, origin)| format!("('{name}', {})", quoted(origin)))
         .collect();
-    body::document(&remarks, |xml| {
-        xml.create_element("robot")
-            .with_attribute(("xmlns:xacro", "http://www.ros.org/wiki/xacro"))
-            .write_inner_content(|xml| {
-                // xacro ends an expression at the first brace.
-                let value = format!("${{dict([{}])}}", all.join(", "));
-                body::empty(
-                    xml,
-                    "xacro:property",
-                    &[("name", "calib_origins"), ("value", &value)],
-                )?;
-                let makes = xml
-                    .create_element("xacro:macro")
-                    .with_attributes([("name", "calib_origin"), ("params", "joint")]);
-                makes.write_inner_content(|xml| {
-                    body::empty(
-                        xml,
-                        "origin",
-                        &[
-                            ("xyz", "${calib_origins[joint][0]}"),
-                            ("rpy", "${calib_origins[joint][1]}"),
-                        ],
-                    )
-                })?;
-                Ok(())
-            })?;
-        Ok(())
-    })
+    // xacro ends an expression at the first brace.
+    let origins = format!("${{dict([{}])}}", all.join(", "));
+    body::document(&remarks, include_str!("xacro.xml"), context! { origins })
 }
 
 struct Origins {

@@ -64,19 +64,13 @@ fn rows(case: &Case) -> Vec<ScoreboardRow> {
         robot: case.robot.clone(),
         points: case.points as i64,
         effect,
-        place: None,
-        form: None,
-        visibility: None,
-        outcome: None,
-        place_right: None,
-        name_or_unknown: None,
-        wrong_name: None,
         said: case.strays.first().cloned(),
         strays: case.strays.len() as i64,
         verdict: case.verdict.clone(),
         heldout_before_mm: case.held_out.map(|held_out| held_out.before),
         heldout_after_mm: case.held_out.map(|held_out| held_out.after),
         heldout_bound_mm: case.held_out.map(|held_out| held_out.bound),
+        ..Default::default()
     };
     if case.causes.is_empty() {
         return vec![row(0, None)];

@@ -101,9 +101,9 @@ fn no_file_uses_what_uses_it() {
 #[test]
 fn a_circle_is_found_behind_a_door_that_hands_on() {
     let text = |module: &str| match module {
-        "room" => "pub use left::Left; use right::help;",
+        "room" => "pub use left::Left;\nuse right::help;",
         "room::left" => "use super::right::Right;",
-        "room::right" => "use crate::{other::Apart, room::Left}; pub fn help() {}",
+        "room::right" => "use crate::{other::Apart, room::Left};\npub fn help() {}",
         _ => "use crate::room::right::Right;",
     };
     let words = |module: &str| module.split("::").map(String::from).collect::<Vec<_>>();

@@ -1,7 +1,7 @@
 //! Curves of findings hold what the forms of each finding do, whatever the finding is called.
 
-use crate::desk::{Desk, table};
 use crate::fixture;
+use crate::recorded::{self, Recorded, made};
 use calib::description::{JointKind, RobotDescription};
 use calib::effect::{Form, Load};
 use calib::robot::RobotModel;
@@ -13,10 +13,7 @@ const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 const ROWS: usize = 40;
 
 fn labelled<T>(table: T) -> Vec<Labelled<T>> {
-    vec![Labelled {
-        stage: "diagnose".into(),
-        table,
-    }]
+    vec![recorded::labelled("diagnose", table)]
 }
 
 fn finding(rank: i64, effect: &str, forms: &serde_json::Value) -> FindingRow {
@@ -24,24 +21,9 @@ fn finding(rank: i64, effect: &str, forms: &serde_json::Value) -> FindingRow {
         rank,
         effect: effect.into(),
         place: "joint 3".into(),
-        follows: None,
         statement: String::new(),
-        f_statistic: None,
-        p_value: None,
-        delta_bic: None,
-        heldout_gain_mm: None,
-        effect_rms_mm: None,
-        heldout_gain_rad: None,
-        effect_rms_rad: None,
-        probability: None,
-        place_probability: None,
-        none_probability: None,
-        valid_joint: None,
-        valid_from_rad: None,
-        valid_to_rad: None,
-        valid_from_mm: None,
-        valid_to_mm: None,
         forms: forms.to_string(),
+        ..Default::default()
     }
 }
 
@@ -65,14 +47,10 @@ fn curves_of(
                 nominal: 0.0,
                 value: *size,
                 change: *size,
-                sigma: None,
                 status: "free".into(),
                 step: "diagnose".into(),
-                remark: None,
                 form: Some(text.clone()),
-                corrects: None,
-                robot: None,
-                kinematics: None,
+                ..Default::default()
             });
         }
     }
@@ -99,12 +77,8 @@ fn curves_of(
         .map(Into::into)
         .collect();
     let data = recording.measurements();
-    let split = |row: usize| SplitRow {
-        sequence: row as i64,
-        point_id: format!("P{row}"),
-        set: "validate".into(),
-    };
-    let split = Split((0..ROWS).map(split).collect());
+    let robot = Robot::from_description(description);
+    let Recorded { robot, split, .. } = Recorded::dealt(robot, recording.clone(), |_| "validate");
     let prediction = Prediction::of(
         "diagnose",
         &model,
@@ -118,7 +92,7 @@ fn curves_of(
         statistics: Statistics::default(),
         prediction: labelled(prediction),
         parameters: parameters.clone(),
-        robot: Robot::from_description(description),
+        robot,
         recording: recording.clone(),
         convention: vec![],
         split,
@@ -138,8 +112,7 @@ fn curves_of(
         cells: Vec::new(),
         suspects: Vec::new(),
     };
-    let tables = Desk::default().run(&Report::default(), reads).unwrap();
-    (recording, table(&tables).remove(0))
+    (recording, made(&Report::default(), reads).get())
 }
 
 #[test]

@@ -15,12 +15,26 @@ use std::sync::{Arc, Mutex};
 type Chunks = Arc<Mutex<BTreeMap<&'static str, Vec<Frame>>>>;
 
 /// Files, and everything a stage says.
-#[derive(Default)]
 pub struct Desk {
+    pub seed: u64,
+    pub jobs: usize,
     files: BTreeMap<PathBuf, Vec<u8>>,
     pub notes: Mutex<Vec<String>>,
     pub warnings: Mutex<Vec<String>>,
     chunks: Chunks,
+}
+
+impl Default for Desk {
+    fn default() -> Self {
+        Self {
+            seed: 7,
+            jobs: 1,
+            files: Default::default(),
+            notes: Default::default(),
+            warnings: Default::default(),
+            chunks: Default::default(),
+        }
+    }
 }
 
 impl Desk {
@@ -62,8 +76,8 @@ impl Desk {
         self.chunks.lock().unwrap().clear();
         let outputs = run(&Context {
             id: "stage",
-            seed: 7,
-            jobs: 1,
+            seed: self.seed,
+            jobs: self.jobs,
             services: self,
         })?;
         let mut tables = std::mem::take(&mut *self.chunks.lock().unwrap());

@@ -13,14 +13,13 @@ mod weight;
 mod without;
 
 use crate::answer::{self, has, put, read, root};
-use crate::desk::{Desk, diagnose_reads, shared, table};
-use crate::suspects::{Inputs, pipeline};
+use crate::desk::shared;
+use crate::recorded::Example;
 use calib::effect::{Form, Load};
 use calib::estimate::choose::{Site, median};
 use calib::estimate::{FitOptions, Model, fit};
 use calib::robot::{Measurements, PointReadings, RobotModel};
-use calib::stage::{Diagnose, DiagnoseReads};
-use calib::table::{Findings, ParameterRow, Parameters, Prediction, Recording, Robot, Verdict};
+use calib::table::{ParameterRow, Parameters, Prediction, Recording, Robot};
 use nalgebra::Vector3;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -52,24 +51,12 @@ fn the_practice_cases_are_solved() {
             continue;
         };
         let want: Value = serde_json::from_str(&want).unwrap();
-        let (inputs, stage): (Inputs, Diagnose) =
-            pipeline("case", &[("case", &case.display().to_string())], "diagnose");
-        let robot = RobotModel::new(inputs.robot.to_description().unwrap());
-        let data = inputs.recording.measurements();
-        let tables = Desk::default()
-            .run(
-                &stage,
-                diagnose_reads(inputs.robot, inputs.recording, inputs.split),
-            )
-            .unwrap();
-        let findings: Findings = table(&tables).remove(0);
-        let found: Named = findings
-            .0
-            .into_iter()
-            .map(|row| (row.effect, row.place))
-            .collect();
-        let verdict: Verdict = table(&tables).remove(0);
-        let row = &verdict.0[0];
+        let example = Example::new("case", &[("case", &case.display().to_string())]);
+        let of = example.ingested();
+        let robot = RobotModel::new(of.robot.to_description().unwrap());
+        let data = of.recording.measurements();
+        let made = of.diagnose_by(&example.with("diagnose")).unwrap();
+        let (found, row) = (made.named(), made.verdict());
         // Held-out rows come down to what a complete model of so many parameters leaves.
         let (after, floor) = (row.after_rms_mm.unwrap(), row.noise_floor_mm.unwrap());
         let wanted = wanted(&want["effects"]);
@@ -99,10 +86,10 @@ fn the_practice_cases_are_solved() {
             "{}: {after} {floor}",
             case.display()
         );
-        let predictions: Prediction = table(&tables).remove(0);
+        let predictions: Prediction = made.get();
         assert!(predictions.0.len() >= 160);
         // The table of parameters alone is the corrected model, but for products of small motions of the base.
-        let parameters: Parameters = table(&tables).remove(0);
+        let parameters: Parameters = made.get();
         let model = parameters.model(robot, &[], Load::GravityTorque).unwrap();
         for (point, row) in model.predict(&data).iter().zip(&predictions.0) {
             let apart = (point * 1e3 - Vector3::new(row.x_mm, row.y_mm, row.z_mm)).norm();
@@ -327,38 +314,21 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
         folder.path(),
     );
     let case = folder.path().join("sealed/recordings/c0001");
+    let example = Example::new("case", &[("case", &case.display().to_string())]);
+    let of = example.ingested();
+    let data = of.recording.measurements();
     let diagnosed = |simulated: Option<Vec<[f64; 3]>>| {
-        let (inputs, stage): (Inputs, Diagnose) =
-            pipeline("case", &[("case", &case.display().to_string())], "diagnose");
-        let robot = RobotModel::new(inputs.robot.to_description().unwrap());
-        let data = inputs.recording.measurements();
-        let reads = DiagnoseReads {
-            recording: inputs.recording,
-            robot: inputs.robot,
-            split: inputs.split,
-        };
-        let reads = DiagnoseReads {
-            recording: calib::table::Recording {
-                simulated,
-                ..reads.recording
-            },
-            ..reads
-        };
-        let tables = Desk::default().run(&stage, reads).unwrap();
-        let findings: Findings = table(&tables).remove(0);
-        let found: Named = findings
-            .0
-            .into_iter()
-            .map(|row| (row.effect, row.place))
-            .collect();
-        let parameters: Parameters = table(&tables).remove(0);
+        let mut of = of.clone();
+        of.recording.simulated = simulated;
+        let made = of.diagnose_by(&example.with("diagnose")).unwrap();
+        let robot = RobotModel::new(of.robot.to_description().unwrap());
+        let parameters: Parameters = made.get();
         (
-            found,
+            Named::from_iter(made.named()),
             parameters.model(robot, &[], Load::GravityTorque).unwrap(),
-            data,
         )
     };
-    let (alone, mut model, data) = diagnosed(None);
+    let (alone, mut model) = diagnosed(None);
     let truth = read(folder.path().join("sealed/sealed/c0001.json"));
     let truth: Value = serde_json::from_str(&truth).unwrap();
     assert_eq!(alone, wanted(&truth["want"]));

@@ -75,6 +75,44 @@ fn file(folder: &Path, name: &str, rest: &str) -> PathBuf {
     write(folder.join(format!("{name}.yaml")), &text)
 }
 
+/// Robots of a fleet `line`, each a folder of recordings of its own.
+struct Line {
+    folder: tempfile::TempDir,
+    cases: PathBuf,
+    store: PathBuf,
+    file: PathBuf,
+}
+
+impl Line {
+    fn new(robots: usize) -> Self {
+        Self::of(robots, "robots:\n  - folders: cases/recordings/*\n")
+    }
+    /// With these lines of its file.
+    fn of(robots: usize, lines: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
+        recordings(&cases, robots);
+        let file = file(folder.path(), "line", lines);
+        Self {
+            folder,
+            cases,
+            store,
+            file,
+        }
+    }
+    fn run(&self, code: i32) -> Value {
+        run(&self.file, &self.store, code)
+    }
+    fn recording(&self, case: &str) -> PathBuf {
+        self.cases.join("recordings").join(case)
+    }
+    /// Robots that stand, and those that were computed for it, of a run that ends with a code.
+    fn stand(&self, code: i32) -> [Option<u64>; 2] {
+        let told = self.run(code);
+        ["done", "computed"].map(|count| told[count].as_u64())
+    }
+}
+
 /// Hash of the fleet's tables by port.
 fn tables(store: &Path, name: &str) -> BTreeMap<String, String> {
     let folder = store.join("tables").join(name);
@@ -99,28 +137,23 @@ fn copy(from: &Path, to: &Path) {
 
 #[test]
 fn broken_robots_are_listed_with_their_reasons_and_the_others_finish() {
-    let folder = tempfile::tempdir().unwrap();
-    let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
-    recordings(&cases, 5);
-    let recordings = cases.join("recordings");
-    put(&recordings, "c0002/tracker.csv", "point_id,x_mm\n1,wrong\n");
-    std::fs::remove_file(recordings.join("c0003/robot.json")).unwrap();
-    let file = file(
-        folder.path(),
-        "line",
-        "robots:\n  - folders: cases/recordings/*\n",
+    let line = Line::new(5);
+    put(
+        line.recording("c0002"),
+        "tracker.csv",
+        "point_id,x_mm\n1,wrong\n",
     );
-    let (result, said) = output(&mut fleet("run", &file, &store));
+    std::fs::remove_file(line.recording("c0003").join("robot.json")).unwrap();
+    let (result, said) = output(&mut fleet("run", &line.file, &line.store));
     assert_eq!(result.status.code(), Some(10), "{said}");
-    for line in [
+    let faults = [
         "error: 2 faults",
         "c0002: rejected: ",
         "c0003: rejected: ",
         "robot.json",
-    ] {
-        assert!(said.contains(line), "{line}: {said}");
-    }
-    let told = run(&file, &store, 10);
+    ];
+    has(&said, faults);
+    let told = line.run(10);
     assert_eq!(
         (
             told["done"].as_u64(),
@@ -135,19 +168,15 @@ fn broken_robots_are_listed_with_their_reasons_and_the_others_finish() {
     );
 
     // Mended data are other data: the same command takes them up.
-    copy(&recordings.join("c0001"), &recordings.join("c0003"));
-    let told = run(&file, &store, 10);
-    assert_eq!(
-        (told["done"].as_u64(), told["computed"].as_u64()),
-        (Some(4), Some(1))
-    );
+    copy(&line.recording("c0001"), &line.recording("c0003"));
+    assert_eq!(line.stand(10), [Some(4), Some(1)]);
     // Asked for, what was rejected is tried again.
     let (result, said) =
-        output(fleet("retry", &file, &store).args(["--failed", "--json", "--quiet"]));
+        output(fleet("retry", &line.file, &line.store).args(["--failed", "--json", "--quiet"]));
     assert_eq!(result.status.code(), Some(10), "{said}");
     let told: Value = serde_json::from_slice(&result.stdout).unwrap();
     assert_eq!(told["computed"].as_u64(), Some(1));
-    let (result, _) = output(fleet("status", &file, &store).args(["--robot", "c0002"]));
+    let (result, _) = output(fleet("status", &line.file, &line.store).args(["--robot", "c0002"]));
     let text = String::from_utf8(result.stdout).unwrap();
     starts_with(&text, "c0002: rejected\n");
     has(&text, "manifest.json");
@@ -155,40 +184,35 @@ fn broken_robots_are_listed_with_their_reasons_and_the_others_finish() {
 
 #[test]
 fn a_sweep_leaves_what_the_records_of_a_fleet_need() {
-    let folder = tempfile::tempdir().unwrap();
-    let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
-    recordings(&cases, 3);
-    let file = file(
-        folder.path(),
-        "line",
-        "robots:\n  - folders: cases/recordings/*\n",
-    );
-    run(&file, &store, 0);
+    let line = Line::new(3);
+    line.run(0);
     // The same robot with other data: of two runs of its pipeline the earlier is a record's as well.
-    let tracker = |case: &str| cases.join("recordings").join(case).join("tracker.csv");
-    let before = read(tracker("c0001"));
+    let tracker = line.recording("c0001").join("tracker.csv");
+    let before = read(&tracker);
     let shorter = before.trim_end().rsplit_once('\n').unwrap().0;
-    std::fs::write(tracker("c0001"), format!("{shorter}\n")).unwrap();
-    assert_eq!(run(&file, &store, 0)["computed"].as_u64(), Some(1));
-    let (result, said) =
-        output(calib(&["gc", "--keep-runs", "1", "--grace-hours", "0", "--store"]).arg(&store));
+    std::fs::write(&tracker, format!("{shorter}\n")).unwrap();
+    assert_eq!(line.run(0)["computed"].as_u64(), Some(1));
+    let (result, said) = output(
+        calib(&["gc", "--keep-runs", "1", "--grace-hours", "0", "--store"]).arg(&line.store),
+    );
     assert!(result.status.success(), "{said}");
-    std::fs::write(tracker("c0001"), before).unwrap();
+    std::fs::write(&tracker, before).unwrap();
     assert_eq!(
-        run(&file, &store, 0)["computed"].as_u64(),
+        line.run(0)["computed"].as_u64(),
         Some(0),
         "nothing that is recorded was taken"
     );
-    let (result, _) = output(calib(&["verify", "--store"]).arg(&store));
+    let (result, _) = output(calib(&["verify", "--store"]).arg(&line.store));
     assert!(
         result.status.success(),
         "{}",
         String::from_utf8_lossy(&result.stdout)
     );
     // With its records a fleet gives its tables up.
-    std::fs::remove_dir_all(store.join("fleets")).unwrap();
-    let (result, _) =
-        output(calib(&["gc", "--keep-runs", "1", "--grace-hours", "0", "--store"]).arg(&store));
+    std::fs::remove_dir_all(line.store.join("fleets")).unwrap();
+    let (result, _) = output(
+        calib(&["gc", "--keep-runs", "1", "--grace-hours", "0", "--store"]).arg(&line.store),
+    );
     let text = String::from_utf8_lossy(&result.stdout).into_owned();
     assert!(
         text.starts_with("removed ") && !text.starts_with("removed 0 tables"),
@@ -198,37 +222,28 @@ fn a_sweep_leaves_what_the_records_of_a_fleet_need() {
 
 #[test]
 fn a_cancelled_run_stops_and_the_next_goes_on() {
-    let folder = tempfile::tempdir().unwrap();
-    let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
-    recordings(&cases, 12);
-    let file = file(
-        folder.path(),
-        "line",
-        "robots:\n  - folders: cases/recordings/*\n",
-    );
+    let line = Line::new(12);
     // One robot that nobody can take, so that the run cannot be over before it is cancelled.
-    let alone = folder.path().join("alone");
-    let (result, said) = output(fleet("run", &file, &alone).args(["--robot", "c0012"]));
+    let alone = line.folder.path().join("alone");
+    let (result, said) = output(fleet("run", &line.file, &alone).args(["--robot", "c0012"]));
     assert!(result.status.success(), "{said}");
-    let held = killed::hold(&alone, &store, "line", 1);
-    let mut command = fleet("run", &file, &store);
+    let held = killed::hold(&alone, &line.store, "line", 1);
+    let mut command = fleet("run", &line.file, &line.store);
     command
         .args(["--quiet", "-j", "1"])
         .stdout(std::process::Stdio::null())
         .stderr(std::process::Stdio::piped());
     let mut child = command.spawn().unwrap();
-    held_locks::until(&mut child, || !killed::records(&store, "line").is_empty());
-    let (result, said) = output(&mut fleet("cancel", &file, &store));
+    held_locks::until(&mut child, || {
+        !killed::records(&line.store, "line").is_empty()
+    });
+    let (result, said) = output(&mut fleet("cancel", &line.file, &line.store));
     assert!(result.status.success(), "{said}");
     assert_eq!(child.wait().unwrap().code(), Some(75));
     drop(held);
-    let stood = killed::records(&store, "line").len();
+    let stood = killed::records(&line.store, "line").len();
     assert!((1..12).contains(&stood), "{stood}");
-    let told = run(&file, &store, 0);
-    assert_eq!(
-        (told["done"].as_u64(), told["computed"].as_u64()),
-        (Some(12), Some(12 - stood as u64))
-    );
+    assert_eq!(line.stand(0), [Some(12), Some(12 - stood as u64)]);
 }
 
 #[test]
@@ -239,24 +254,26 @@ fn every_fault_of_a_fleet_file_comes_at_once_with_its_place() {
     let path = write(folder.path().join("FLEET.yaml"), text);
     let (result, said) = output(&mut fleet("run", &path, &store));
     assert_eq!(result.status.code(), Some(2));
-    for part in [
-        "5:5: robots[0].folder: unknown key; did you mean `folders`?",
-        "7:1: priors: unknown key; did you mean `prior`?",
-    ] {
-        assert!(said.contains(part), "{part}: {said}");
-    }
+    has(
+        &said,
+        [
+            "5:5: robots[0].folder: unknown key; did you mean `folders`?",
+            "7:1: priors: unknown key; did you mean `prior`?",
+        ],
+    );
     let text = text
         .replace("folder: x", "list: none.csv")
         .replace("priors: 1\n", "");
     let path = write(folder.path().join("FLEET.yaml"), &text);
     let (_, said) = output(&mut fleet("run", &path, &store));
-    for part in [
-        "calib: format 2",
-        "expected letters, digits, `-` and `_`",
-        "robots[1]: expected exactly one",
-    ] {
-        assert!(said.contains(part), "{part}: {said}");
-    }
+    has(
+        &said,
+        [
+            "calib: format 2",
+            "expected letters, digits, `-` and `_`",
+            "robots[1]: expected exactly one",
+        ],
+    );
     let file = file(
         folder.path(),
         "sound",

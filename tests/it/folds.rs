@@ -1,13 +1,13 @@
 //! Cross-validation: as honest as held-out points, repeats together, and the same on any number of threads.
 
 use crate::answer::has;
-use crate::desk::{Desk, identify_reads, table};
 use crate::fixture::{self, fit_all};
 use crate::identify::{GEOMETRY, SIGMA, model, recording};
-use crate::sr210d::{experiment, settings};
+use crate::recorded::{labelled, made};
+use crate::sr210d::{example, experiment};
 use calib::estimate::{Fitted, Folds, Model, Session, align, cross_validate, leave_one_out};
 use calib::robot::{Measurements, RobotModel};
-use calib::stage::{FoldSetting, Identify, Labelled, Stage, Validate, ValidateReads};
+use calib::stage::{FoldSetting, Identify, Stage, Validate, ValidateReads};
 use calib::table::{Observability, Prediction, Statistics};
 
 fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
@@ -30,6 +30,16 @@ fn folds(data: &Measurements, effects: &[&str], count: usize) -> Option<Folds> {
         count,
         7,
     )
+}
+
+/// Every row, and every row again.
+fn twice(once: &Measurements) -> Measurements {
+    let mut twice = once.clone();
+    twice.q.extend_from_within(..);
+    twice.points.position.extend_from_within(..);
+    twice.points.sigma.extend_from_within(..);
+    twice.payload.extend_from_within(..);
+    twice
 }
 
 fn rms(errors: &[f64]) -> f64 {
@@ -95,11 +105,7 @@ fn a_fold_is_what_a_fit_without_its_rows_says() {
 #[test]
 fn rows_of_one_pose_are_never_on_both_sides() {
     let (once, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 60, 5);
-    let mut twice = once.clone();
-    twice.q.extend_from_within(..);
-    twice.points.position.extend_from_within(..);
-    twice.points.sigma.extend_from_within(..);
-    twice.payload.extend_from_within(..);
+    let twice = twice(&once);
     let (one, two) = (
         folds(&once, &GEOMETRY, 6).unwrap(),
         folds(&twice, &GEOMETRY, 6).unwrap(),
@@ -139,35 +145,21 @@ fn any_number_of_threads_gives_the_same_folds() {
 
 #[test]
 fn statistics_have_the_folds_of_fitted_rows_and_of_no_others() {
-    let of = experiment("none", 5);
-    let stage: Identify = settings("geometry", "none");
-    let tables = Desk::default()
-        .run(
-            &stage,
-            identify_reads(of.robot.clone(), of.recording.clone(), of.split.clone()),
-        )
-        .unwrap();
-    let prediction: Prediction = table(&tables).remove(0);
+    let (of, _) = experiment("none", 5);
+    let stage: Identify = example("none").with("geometry");
+    let found = of.identify_by(&stage).unwrap();
+    let prediction: Prediction = found.get();
     assert!(
         prediction
             .0
             .iter()
             .all(|row| row.fold_error_mm.is_some() == (row.set == "unloaded_fit"))
     );
-    let observability: Observability = table(&tables).remove(0);
-    let label = |stage: &str| stage.to_string();
     let reads = ValidateReads {
-        prediction: vec![Labelled {
-            stage: label("geometry"),
-            table: prediction.clone(),
-        }],
-        observability: vec![Labelled {
-            stage: label("geometry"),
-            table: observability,
-        }],
+        prediction: vec![labelled("geometry", prediction.clone())],
+        observability: vec![labelled("geometry", found.get())],
     };
-    let statistics: Statistics =
-        table(&Desk::default().run(&Validate::default(), reads).unwrap()).remove(0);
+    let statistics: Statistics = made(&Validate::default(), reads).get();
     for row in &statistics.0 {
         assert_eq!(
             row.fold_rms_mm.is_some(),
@@ -236,11 +228,7 @@ fn with_one_fold_a_pose_each_is_predicted_by_a_fit_to_all_others() {
             found.random[left]
         );
     }
-    let mut twice = data.clone();
-    twice.q.extend_from_within(..);
-    twice.points.position.extend_from_within(..);
-    twice.points.sigma.extend_from_within(..);
-    twice.payload.extend_from_within(..);
+    let twice = twice(&data);
     assert_eq!(
         one_out(&twice).unwrap().count,
         40,
@@ -252,7 +240,7 @@ fn with_one_fold_a_pose_each_is_predicted_by_a_fit_to_all_others() {
 
 #[test]
 fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
-    let of = experiment("none", 5);
+    let (of, _) = experiment("none", 5);
     let yaml = |folds: &str| serde_json::from_str::<FoldSetting>(folds);
     assert_eq!(yaml("\"n\"").unwrap(), FoldSetting::EachPose);
     assert_eq!(yaml("5").unwrap(), FoldSetting::default());
@@ -262,18 +250,12 @@ fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
         "a number of folds (0 for none), or n for one a pose",
     );
     let run = |folds: FoldSetting| {
-        let desk = Desk::default();
         let stage = Identify {
             folds,
-            ..settings("geometry", "none")
+            ..example("none").with("geometry")
         };
-        let tables = desk
-            .run(
-                &stage,
-                identify_reads(of.robot.clone(), of.recording.clone(), of.split.clone()),
-            )
-            .unwrap();
-        let observability: Observability = table(&tables).remove(0);
+        let made = of.identify_by(&stage).unwrap();
+        let observability: Observability = made.get();
         let value = |quantity: &str| {
             observability
                 .0
@@ -281,14 +263,8 @@ fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
                 .find(|row| row.quantity == quantity)
                 .map(|row| row.value)
         };
-        let warned: Vec<String> = desk
-            .warnings
-            .lock()
-            .unwrap()
-            .iter()
-            .filter(|line| line.contains("cross"))
-            .cloned()
-            .collect();
+        let warned = made.warnings.lines().filter(|line| line.contains("cross"));
+        let warned: Vec<String> = warned.map(Into::into).collect();
         (value("folds"), value("unfolded"), warned)
     };
     let each = run(FoldSetting::EachPose);

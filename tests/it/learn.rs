@@ -1,99 +1,15 @@
 //! The stage `learn`: what it gains on the twin, what it refuses, and what it says.
 
-use crate::answer::{has, root};
-use crate::desk::{Desk, identify_reads, table};
-use crate::fixture::robot_of;
+use crate::answer::has;
+use crate::desk::Desk;
+use crate::recorded::{mean_mm_of, settings};
+use crate::sr210d::{experiment, papers_sequence};
 use calib::error::Result;
-use calib::stage::split::{SplitBy, SplitReads};
 use calib::stage::{Context, Learn, LearnReads, LearnWrites, Stage};
-use calib::stage::{Identify, Simulate, SimulateReads, Stiffness, StiffnessReads};
-use calib::store::frame::Frame;
-use calib::table::{
-    Parameters, Prediction, PredictionRow, Recording, Robot, Split, SplitRow, Table,
-};
+use calib::table::{Prediction, PredictionRow, Recording, Split, SplitRow};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
-
-fn settings<S: Stage>(value: Value) -> S {
-    serde_json::from_value(value).unwrap()
-}
-
-fn only<T: Table>(tables: &BTreeMap<&'static str, Vec<Frame>>) -> T {
-    table(tables).remove(0)
-}
-
-fn mean_error(prediction: &Prediction, set: &str) -> f64 {
-    let errors: Vec<f64> = prediction
-        .0
-        .iter()
-        .filter(|row| row.set == set)
-        .map(|row| row.error_mm)
-        .collect();
-    errors.iter().sum::<f64>() / errors.len() as f64
-}
-
-/// The paper's sequence on the twin of `pipelines/sr210d` up to the network.
-fn paper_sequence(seed: u64) -> (Recording, Split, Prediction) {
-    let folder = root("pipelines/sr210d");
-    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
-    let description = robot_of(&read("robot.yaml"));
-    let robot = Robot::from_description(&description);
-    let yaml: Value =
-        serde_saphyr::from_str(&read("pipeline.yaml").replace("${remainder}", "all")).unwrap();
-    let stages = yaml["stages"].as_array().unwrap();
-    let mut twin = stages
-        .iter()
-        .find(|stage| stage["uses"] == "simulate")
-        .unwrap()["with"]
-        .clone();
-    twin["seed"] = json!(seed);
-
-    let desk = Desk::default();
-    let recording: Recording = only(
-        &desk
-            .run(
-                &settings::<Simulate>(twin),
-                SimulateReads {
-                    robot: robot.clone(),
-                },
-            )
-            .unwrap(),
-    );
-    let by_usage = settings::<SplitBy>(json!({"by": "usage"}));
-    let split: Split = only(
-        &desk
-            .run(
-                &by_usage,
-                SplitReads {
-                    recording: recording.clone(),
-                },
-            )
-            .unwrap(),
-    );
-    let geometry = settings::<Identify>(json!({
-        "on": ["unloaded_fit"], "load": "current",
-        "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"],
-    }));
-    let tables = desk
-        .run(
-            &geometry,
-            identify_reads(robot.clone(), recording.clone(), split.clone()),
-        )
-        .unwrap();
-    let reads = StiffnessReads {
-        robot,
-        recording: recording.clone(),
-        split: split.clone(),
-        parameters: only::<Parameters>(&tables),
-        covariance: None,
-        prediction: only(&tables),
-    };
-    let stiffness = settings::<Stiffness>(json!({"on": ["loaded"], "load": "current"}));
-    let prediction = only(&desk.run(&stiffness, reads).unwrap());
-    (recording, split, prediction)
-}
 
 /// `rows` poses of a six-joint arm, the last third in set `check`; residuals of `signal` mm along smooth functions plus `noise` mm.
 fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> (Recording, Split, Prediction) {
@@ -142,14 +58,7 @@ fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> (Recording, Split, Pr
             dz_mm,
             error_mm: (dx_mm * dx_mm + dy_mm * dy_mm + dz_mm * dz_mm).sqrt(),
             noise_mm: 0.02,
-            noise_basis: None,
-            sigma_mm: None,
-            fold_error_mm: None,
-            block_error_mm: None,
-            weight: None,
-            measured: None,
-            turn_rad: None,
-            remark: None,
+            ..Default::default()
         });
     }
     (recording, split, prediction)
@@ -190,7 +99,9 @@ fn quick() -> Value {
 fn on_the_twin_the_network_leaves_about_what_the_paper_s_leaves() {
     let mut ratios: Vec<f64> = (1..=3)
         .map(|seed| {
-            let before = paper_sequence(seed);
+            let (of, _) = experiment("all", seed);
+            let (_, prediction) = papers_sequence(&of);
+            let before = (of.recording, of.split, prediction);
             let after = learn(
                 json!({"on": ["learn"], "rivals": ["mlp"], "starts": ["bso"], "hidden": 12, "generations": 20, "ensemble": 3}),
                 &before,
@@ -199,7 +110,7 @@ fn on_the_twin_the_network_leaves_about_what_the_paper_s_leaves() {
             )
             .unwrap()
             .prediction;
-            let ratio = |set| mean_error(&after, set) / mean_error(&before.2, set);
+            let ratio = |set| mean_mm_of(&after, set) / mean_mm_of(&before.2, set);
             println!("seed {seed}: training {:.3}, held out {:.3}", ratio("learn"), ratio("check"));
             assert!(ratio("learn") < ratio("check"), "training rows flatter");
             ratio("check")
@@ -254,7 +165,7 @@ fn what_it_writes_does_not_depend_on_the_threads() {
 fn a_smooth_remainder_shrinks_on_rows_that_were_not_trained_on() {
     let arm = arm(300, 0.5, 0.05, 2);
     let written = learn(quick(), &arm, 2, &Desk::default()).unwrap();
-    let ratio = mean_error(&written.prediction, "check") / mean_error(&arm.2, "check");
+    let ratio = mean_mm_of(&written.prediction, "check") / mean_mm_of(&arm.2, "check");
     assert!((0.1..0.5).contains(&ratio), "{ratio}");
     for (after, before) in written.prediction.0.iter().zip(&arm.2.0) {
         assert_eq!(after.held_out, before.held_out && before.set == "check");
@@ -293,7 +204,7 @@ fn gross_errors_are_not_learnt_and_rows_outside_the_range_are_left_alone() {
     arm.0.q[299 * 6] = 3.0;
     let desk = Desk::default();
     let after = learn(quick(), &arm, 1, &desk).unwrap().prediction;
-    let ratio = mean_error(&after, "check") / mean_error(&arm.2, "check");
+    let ratio = mean_mm_of(&after, "check") / mean_mm_of(&arm.2, "check");
     assert!(ratio < 0.5, "{ratio}");
     assert_eq!(after.0[299].dx_mm, arm.2.0[299].dx_mm);
     let notes = desk.notes.lock().unwrap().join("\n");

@@ -58,6 +58,7 @@ mod program;
 mod query;
 mod raw;
 mod readme;
+mod recorded;
 mod remedies;
 mod repeats;
 mod report;

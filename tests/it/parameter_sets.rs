@@ -1,8 +1,9 @@
 //! Parameters free, held, bounded or known beforehand, by name: in the numerics, and as settings of a stage.
 
-use crate::desk::{Desk, identify_reads, table};
+use crate::answer::has;
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, recording};
+use crate::recorded::settings;
 use crate::sr210d::experiment;
 use calib::estimate::{
     Bounds, CONFLICT, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, align, fit,
@@ -232,17 +233,13 @@ fn what_only_a_prior_tells_keeps_its_mean_and_its_sigma() {
     assert_eq!(fitted.prior_checks[&k].without, None);
 }
 
-fn stage(settings: serde_json::Value) -> Identify {
-    serde_json::from_value(settings).unwrap()
-}
-
 fn row<'a>(table: &'a Parameters, name: &str) -> &'a ParameterRow {
     table.0.iter().find(|row| row.name == name).unwrap()
 }
 
 #[test]
 fn settings_by_name_are_found_again_in_the_table_and_what_matches_nothing_is_said() {
-    let of = experiment("none", 5);
+    let (of, _) = experiment("none", 5);
     let effects = [
         "base_frame",
         "tool_offset",
@@ -255,15 +252,8 @@ fn settings_by_name_are_found_again_in_the_table_and_what_matches_nothing_is_sai
         all.as_object_mut()
             .unwrap()
             .extend(settings.as_object().cloned().unwrap());
-        let desk = Desk::default();
-        let tables = desk
-            .run(
-                &stage(all),
-                identify_reads(of.robot.clone(), of.recording.clone(), of.split.clone()),
-            )
-            .unwrap();
-        let warnings = desk.warnings.lock().unwrap().clone();
-        (table::<Parameters>(&tables).remove(0), warnings)
+        let made = of.identify(all);
+        (made.get::<Parameters>(), made.warnings)
     };
     let free = ["base_frame.*", "tool_offset.*", "reduction_ratio.*"];
     let (parameters, warnings) = run(json!({
@@ -305,41 +295,37 @@ fn settings_by_name_are_found_again_in_the_table_and_what_matches_nothing_is_sai
         "{:?}",
         told.remark
     );
-    let said = |text: &str| {
-        assert!(
-            warnings.iter().any(|line| line.contains(text)),
-            "`{text}` in {warnings:#?}"
-        )
-    };
-    said(
-        "hold: `reduction_ratio.k2` matches no parameter of this model; did you mean `reduction_ratio.j2`?",
+    has(
+        &warnings,
+        [
+            "hold: `reduction_ratio.k2` matches no parameter of this model; did you mean `reduction_ratio.j2`?",
+            "tool_offset.x: the prior says 3.0000 +- 0.0010 mm, the data say",
+        ],
     );
-    said("tool_offset.x: the prior says 3.0000 +- 0.0010 mm, the data say");
 }
 
 #[test]
 fn settings_that_say_nothing_or_something_impossible_are_faults_with_their_place() {
-    let faults = stage(json!({
+    let faults = settings::<Identify>(json!({
         "free": ["reduction_ration.j2"],
         "prior": {"joint_offset.j2": {"sigma": 0}, "base_frame.x": {"sigma": 1}},
         "bounds": {"link_geometry.*": [1, -1]},
     }))
     .check();
-    let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
-    let said = |text: &str| {
-        assert!(
-            faults.iter().any(|fault| fault.contains(text)),
-            "`{text}` in {faults:#?}"
-        )
-    };
     assert_eq!(faults.len(), 4, "{faults:#?}");
-    said("free: `reduction_ration.j2` names no effect; did you mean `reduction_ratio`?");
-    said("prior.joint_offset.j2: expected a sigma above zero");
-    said("prior.base_frame.x: where the robot stands");
-    said("bounds.link_geometry.*: expected two numbers, the lower one first");
-    assert_eq!(stage(json!({"free": []})).check().len(), 1);
+    let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    has(
+        &faults.join("\n"),
+        [
+            "free: `reduction_ration.j2` names no effect; did you mean `reduction_ratio`?",
+            "prior.joint_offset.j2: expected a sigma above zero",
+            "prior.base_frame.x: where the robot stands",
+            "bounds.link_geometry.*: expected two numbers, the lower one first",
+        ],
+    );
+    assert_eq!(settings::<Identify>(json!({"free": []})).check().len(), 1);
     assert!(
-        stage(json!({"free": ["*"], "hold": ["*.j6"]}))
+        settings::<Identify>(json!({"free": ["*"], "hold": ["*.j6"]}))
             .check()
             .is_empty()
     );

@@ -1,6 +1,6 @@
 //! Poses measured more than once: the joints' repeatability, the floor, lack of fit, and sigmas that allow for shared errors.
 
-use crate::desk::{Desk, identify_reads, table};
+use crate::answer::has;
 use crate::fixture::{self, all_rows, fit_all, question};
 use crate::identify::{GEOMETRY, SIGMA, model, normal, recording};
 use crate::sr210d::experiment;
@@ -8,7 +8,7 @@ use calib::diagnose::{Diagnosis, diagnose};
 use calib::estimate::{Fitted, Model, ParameterStatus, Poses, align, spread};
 use calib::robot::{Measurements, NoiseBasis, PointReadings, RobotModel};
 use calib::stage::{Identify, Stage};
-use calib::table::{Observability, Parameters, Split};
+use calib::table::Observability;
 use nalgebra::Vector3;
 use serde_json::json;
 
@@ -260,25 +260,8 @@ fn known_repeatability_weighs_rows_better_than_one_figure_for_all() {
 
 #[test]
 fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
-    let of = experiment("none", 5);
+    let (of, _) = experiment("none", 5);
     let mut settings = json!({"on": ["unloaded_fit"], "effects": ["base_frame", "tool_offset"], "repeatability": {"arcsec": 4.0}});
-    let run = |settings: &serde_json::Value, recording: &calib::table::Recording, split: &Split| {
-        let desk = Desk::default();
-        let stage: Identify = serde_json::from_value(settings.clone()).unwrap();
-        assert!(stage.check().is_empty());
-        let tables = desk
-            .run(
-                &stage,
-                identify_reads(of.robot.clone(), recording.clone(), split.clone()),
-            )
-            .unwrap();
-        let notes = desk.notes.lock().unwrap().clone();
-        (
-            table::<Observability>(&tables).remove(0),
-            table::<Parameters>(&tables).remove(0),
-            notes,
-        )
-    };
     let value = |table: &Observability, quantity: &str| {
         table
             .0
@@ -286,36 +269,33 @@ fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
             .find(|row| row.quantity == quantity)
             .map(|row| row.value)
     };
-    let (stated, _, _) = run(&settings, &of.recording, &of.split);
+    let stated = of.identify(settings.clone()).get();
     assert!(
         value(&stated, "joint_repeatability_rad")
             .is_some_and(|sigma| (sigma / (4.0 * ARCSEC) - 1.0).abs() < 1e-9)
     );
     assert_eq!(value(&stated, "repeated_poses"), None);
     // Every second of the first hundred rows takes the joints of the one before: fifty poses at rest.
-    let mut recording = of.recording.clone();
+    let mut of = of;
+    let recording = &mut of.recording;
     for row in (1..50).step_by(2) {
         let joints = recording.q(row - 1).to_vec();
         recording.q[row * recording.joints..(row + 1) * recording.joints].copy_from_slice(&joints);
         recording.position[row] = recording.position[row - 1].map(|value| value + 3e-6);
     }
     settings["repeatability"] = json!("measured");
-    let (measured, _, notes) = run(&settings, &recording, &of.split);
+    let made = of.identify(settings);
+    let (measured, notes): (Observability, _) = (made.get(), &made.notes);
     assert_eq!(value(&measured, "repeated_poses"), Some(25.0));
     assert_eq!(value(&measured, "clusters"), Some(25.0));
     assert!(value(&measured, "repeat_noise_mm").is_some_and(|noise| noise < 0.01));
     assert!(value(&measured, "lack_of_fit_p").is_some_and(|chance| chance < 1e-6));
-    assert!(
-        notes
-            .iter()
-            .any(|line| line.contains("measured more than once: 25 poses")),
-        "{notes:#?}"
-    );
-    assert!(
-        notes
-            .iter()
-            .any(|line| line.contains("this model lacks something")),
-        "{notes:#?}"
+    has(
+        notes,
+        [
+            "measured more than once: 25 poses",
+            "this model lacks something",
+        ],
     );
     let wrong: Identify =
         serde_json::from_value(json!({"repeatability": {"arcsec": 0.0}})).unwrap();

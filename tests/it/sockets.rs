@@ -13,34 +13,19 @@ mod twins;
 
 use crate::fixture::{self, fit_all};
 use crate::identify::{GEOMETRY, model, normal};
+use crate::recorded::made;
 use calib::description::RobotDescription;
 use calib::effect::names;
-use calib::error::Result;
 use calib::estimate::{
     FitOptions, Fitted, Known, KnownLength, Model, ParameterStatus, Prior, fit, gauge,
 };
 use calib::robot::{Measurements, Named, RobotModel};
-use calib::stage::{Context, OpenedInput, RawFile, Services, Simulate, SimulateReads, Sink, Stage};
+use calib::stage::{Simulate, SimulateReads, Stage};
 use calib::table::{Recording, Robot};
 use calib::twin::touch::{Fixture, FixtureKind};
 use calib::twin::truth::{LinkError, TrueRobot};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
-
-struct Quiet;
-
-impl Services for Quiet {
-    fn open(&self, _file: &RawFile) -> Result<OpenedInput> {
-        unreachable!("no files")
-    }
-    fn sink(&self, _kind: &'static str) -> Result<Box<dyn Sink>> {
-        unreachable!("no streams")
-    }
-    fn begin(&self, _what: &str, _total: Option<u64>, _unit: &str) {}
-    fn advance(&self, _done: u64, _message: &str) {}
-    fn note(&self, _line: String) {}
-    fn warn(&self, _line: String) {}
-}
 
 fn socket(name: &str, centre_mm: [f64; 3], points: usize, sigma_um: f64) -> Fixture {
     let (normal, radius_mm, usage) = (None, None, "fit".into());
@@ -130,21 +115,8 @@ fn touched_with(
         ..serde_saphyr::from_str("{}").unwrap()
     };
     assert_eq!(settings.check(), []);
-    let context = Context {
-        id: "simulate",
-        seed: 1,
-        jobs: 1,
-        services: &Quiet,
-    };
-    settings
-        .run(
-            SimulateReads {
-                robot: Robot::from_description(robot),
-            },
-            &context,
-        )
-        .unwrap()
-        .recording
+    let robot = Robot::from_description(robot);
+    made(&settings, SimulateReads { robot }).get()
 }
 
 /// A length between two fixtures of a setup, m.

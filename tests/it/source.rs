@@ -1,5 +1,4 @@
-//! The sources as the compiler sees them: which module a file is, and what it names of other modules. Unit tests, comments and texts
-//! are left out; groups (`use crate::{a, b::{c, d}}`), `self`, `super` and paths inside expressions are not.
+//! What each file of the sources names of other modules, read line by line as rustfmt sets them: imports and paths inside expressions.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -85,9 +84,10 @@ fn module_of(file: &str) -> Vec<String> {
 
 /// What a text names of its crate. `modules` are all modules of it.
 pub fn uses(text: &str, module: &[String], modules: &[Vec<String>]) -> Vec<Use> {
-    let tokens = without_tests(&tokens(text));
     let mut found = Vec::new();
-    let mut add = |line: usize, path: Vec<String>, name: Option<String>, handed_on: bool| {
+    let mut add = |line: usize, path: &str, name: Option<String>, handed_on: bool| {
+        let path: Vec<String> = path.split("::").map(String::from).collect();
+        let path: Vec<String> = path.into_iter().filter(|part| !part.is_empty()).collect();
         if let Some(path) = absolute(&path, module, modules) {
             found.push(Use {
                 line,
@@ -97,80 +97,70 @@ pub fn uses(text: &str, module: &[String], modules: &[Vec<String>]) -> Vec<Use> 
             });
         }
     };
-    let mut at = 0;
-    while at < tokens.len() {
-        let before = at.checked_sub(1).map(|before| tokens[before].text.as_str());
-        if tokens[at].text == "use" {
-            let handed_on = matches!(before, Some("pub" | ")"));
+    let mut lines = code(text).into_iter();
+    while let Some((line, text)) = lines.next() {
+        let plain = ["pub(crate) ", "pub(super) ", "pub "]
+            .iter()
+            .find_map(|word| text.strip_prefix(word));
+        if let Some(tree) = plain.unwrap_or(text).strip_prefix("use ") {
+            let mut tree = tree.to_string();
+            while !tree.contains(';') {
+                tree += lines.next().map_or(";", |(_, more)| more);
+            }
             let mut leaves = Vec::new();
-            at = tree(&tokens, at + 1, &mut Vec::new(), &mut leaves);
-            for (line, path, name) in leaves {
-                add(line, path, Some(name), handed_on);
+            spread(tree.trim_end_matches(';'), "", &mut leaves);
+            for (path, name) in leaves {
+                add(line, &path, Some(name), plain.is_some());
             }
-        } else if tokens[at].is_word() && before != Some("::") {
-            let line = tokens[at].line;
-            let mut path = vec![tokens[at].text.clone()];
-            while tokens.get(at + 1).is_some_and(|token| token.text == "::")
-                && tokens.get(at + 2).is_some_and(Token::is_word)
-            {
-                path.push(tokens[at + 2].text.clone());
-                at += 2;
-            }
-            at += 1;
-            if path.len() > 1 {
-                add(line, path, None, false);
-            }
-        } else {
-            at += 1;
+            continue;
+        }
+        let is_of_path = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
+        let paths = text.split(|c: char| !is_of_path(c));
+        for path in paths.filter(|path| path.trim_matches(':').contains("::")) {
+            add(line, path, None, false);
         }
     }
     found
 }
 
-/// The leaves of an import's tree that begins at a token: line, path, name. Gives the token after it.
-fn tree(
-    tokens: &[Token],
-    mut at: usize,
-    path: &mut Vec<String>,
-    leaves: &mut Vec<(usize, Vec<String>, String)>,
-) -> usize {
-    let depth = path.len();
-    let mut name = None;
-    let line = tokens[at].line;
-    let mut group = false;
-    while let Some(token) = tokens.get(at) {
-        match token.text.as_str() {
-            "::" => at += 1,
-            "{" => {
-                group = true;
-                at += 1;
-                while tokens[at].text != "}" {
-                    at = if tokens[at].text == "," {
-                        at + 1
-                    } else {
-                        tree(tokens, at, path, leaves)
-                    };
-                }
-                at += 1;
+/// The leaves of an import's tree: path and name.
+fn spread(tree: &str, before: &str, leaves: &mut Vec<(String, String)>) {
+    let Some((path, inner)) = tree.split_once('{') else {
+        let (path, name) = tree.trim().split_once(" as ").unwrap_or((tree.trim(), ""));
+        let path = format!("{before}{path}");
+        let path = path.trim_end_matches("::self");
+        let last = path.rsplit("::").next().unwrap_or_default();
+        let name = if name.is_empty() { last } else { name };
+        return leaves.push((path.into(), name.into()));
+    };
+    let before = format!("{before}{}", path.trim());
+    let inner = inner.rsplit_once('}').map_or(inner, |(inner, _)| inner);
+    let mut depth = 0;
+    let members = inner.split(|c: char| {
+        depth += i32::from(c == '{') - i32::from(c == '}');
+        depth == 0 && c == ','
+    });
+    for member in members.filter(|member| !member.trim().is_empty()) {
+        spread(member, &before, leaves);
+    }
+}
+
+/// Lines with their numbers, without comments and without items behind `#[cfg(test)]`, as rustfmt sets them.
+fn code(text: &str) -> Vec<(usize, &str)> {
+    let mut kept = Vec::new();
+    let mut lines = (1..).zip(text.lines());
+    while let Some((number, line)) = lines.next() {
+        let own = line.trim_start();
+        if own.starts_with("#[cfg(test)]") {
+            let end = format!("{}}}", &line[..line.len() - own.len()]);
+            if !lines.next().is_some_and(|(_, item)| item.ends_with(';')) {
+                lines.by_ref().find(|(_, line)| *line == end);
             }
-            "as" => {
-                name = Some(tokens[at + 1].text.clone());
-                at += 2;
-            }
-            "self" if path.len() > depth || depth > 0 => at += 1,
-            _ if token.is_word() || token.text == "*" => {
-                path.push(token.text.clone());
-                at += 1;
-            }
-            _ => break,
+        } else if !own.starts_with("//") {
+            kept.push((number, own.split(" // ").next().unwrap_or(own)));
         }
     }
-    if !group {
-        let last = path.last().cloned().unwrap_or_default();
-        leaves.push((line, path.clone(), name.unwrap_or(last)));
-    }
-    path.truncate(depth);
-    at
+    kept
 }
 
 /// A path from the root of the crate; none for one into another crate.
@@ -239,207 +229,47 @@ pub fn home<'a>(
     }
 }
 
-/// A word, a number, `::` or another single character; a text or a comment is none.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Token {
-    line: usize,
-    text: String,
-}
-
-impl Token {
-    fn is_word(&self) -> bool {
-        self.text
-            .starts_with(|c: char| c.is_alphabetic() || c == '_')
-    }
-}
-
-fn tokens(text: &str) -> Vec<Token> {
-    let chars: Vec<char> = text.chars().collect();
-    let (mut found, mut at, mut line) = (Vec::new(), 0, 1);
-    while at < chars.len() {
-        let next = chars.get(at + 1).copied();
-        let end = match chars[at] {
-            '/' if next == Some('/') => to(&chars, at, |c| c == '\n'),
-            '/' if next == Some('*') => after_comment(&chars, at),
-            '"' => after_text(&chars, at + 1),
-            'r' | 'b' if raw(&chars, at).is_some() => raw(&chars, at).unwrap_or(at),
-            '\'' => after_tick(&chars, at),
-            ':' if next == Some(':') => {
-                found.push(Token {
-                    line,
-                    text: "::".into(),
-                });
-                at + 2
-            }
-            c if c.is_alphanumeric() || c == '_' => {
-                let end = to(&chars, at, |c| !(c.is_alphanumeric() || c == '_'));
-                found.push(Token {
-                    line,
-                    text: chars[at..end].iter().collect(),
-                });
-                end
-            }
-            c => {
-                if !c.is_whitespace() {
-                    found.push(Token {
-                        line,
-                        text: c.to_string(),
-                    });
-                }
-                at + 1
-            }
-        };
-        line += chars[at..end.min(chars.len())]
-            .iter()
-            .filter(|c| **c == '\n')
-            .count();
-        at = end;
-    }
-    found
-}
-
-fn to(chars: &[char], from: usize, stop: impl Fn(char) -> bool) -> usize {
-    (from..chars.len())
-        .find(|at| stop(chars[*at]))
-        .unwrap_or(chars.len())
-}
-
-fn after_comment(chars: &[char], from: usize) -> usize {
-    let (mut at, mut depth) = (from, 0);
-    while at + 1 < chars.len() {
-        match (chars[at], chars[at + 1]) {
-            ('/', '*') => (at, depth) = (at + 2, depth + 1),
-            ('*', '/') => (at, depth) = (at + 2, depth - 1),
-            _ => at += 1,
-        }
-        if depth == 0 {
-            return at;
-        }
-    }
-    chars.len()
-}
-
-fn after_text(chars: &[char], from: usize) -> usize {
-    let mut at = from;
-    while at < chars.len() && chars[at] != '"' {
-        at += if chars[at] == '\\' { 2 } else { 1 };
-    }
-    at + 1
-}
-
-/// The end of `r"..."`, `r#"..."#`, `b"..."`, `br"..."` that begins here.
-fn raw(chars: &[char], from: usize) -> Option<usize> {
-    if from > 0 && (chars[from - 1].is_alphanumeric() || chars[from - 1] == '_') {
-        return None;
-    }
-    let quote = to(chars, from, |c| !"rb#".contains(c));
-    let prefix: String = chars[from..quote].iter().collect();
-    let marks = prefix.chars().filter(|c| *c == '#').count();
-    if chars.get(quote) != Some(&'"') {
-        return None;
-    }
-    if !prefix.contains('r') {
-        return Some(after_text(chars, quote + 1));
-    }
-    let closes = |at: &usize| {
-        chars[*at] == '"'
-            && chars[at + 1..]
-                .iter()
-                .take(marks)
-                .filter(|c| **c == '#')
-                .count()
-                == marks
-    };
-    (quote + 1..chars.len())
-        .find(closes)
-        .map(|at| at + 1 + marks)
-}
-
-/// After a character, or after the tick of a lifetime.
-fn after_tick(chars: &[char], from: usize) -> usize {
-    match (chars.get(from + 1), chars.get(from + 2)) {
-        (Some('\\'), _) => to(chars, from + 3, |c| c == '\'') + 1,
-        (_, Some('\'')) => from + 3,
-        _ => from + 1,
-    }
-}
-
-/// Without items behind `#[cfg(test)]`, each up to its `;` or the end of its block.
-fn without_tests(tokens: &[Token]) -> Vec<Token> {
-    let mut kept = Vec::new();
-    let mut at = 0;
-    while at < tokens.len() {
-        let here: Vec<&str> = tokens[at..]
-            .iter()
-            .take(7)
-            .map(|token| token.text.as_str())
-            .collect();
-        if here != ["#", "[", "cfg", "(", "test", ")", "]"] {
-            kept.push(tokens[at].clone());
-            at += 1;
-            continue;
-        }
-        at += 7;
-        let mut depth = 0;
-        while at < tokens.len() {
-            let text = tokens[at].text.as_str();
-            depth += match text {
-                "{" | "(" | "[" => 1,
-                "}" | ")" | "]" => -1,
-                _ => 0,
-            };
-            at += 1;
-            if depth == 0 && (text == ";" || text == "}") {
-                break;
-            }
-        }
-    }
-    kept
-}
-
 #[test]
 fn every_way_to_name_a_module_is_seen() {
-    let text = r##"
+    let text = "
 //! crate::comment::a
-use crate::{alpha::{self, One}, beta::Two as Second, gamma};
+use crate::{
+    alpha::{self, One},
+    beta::Two as Second, gamma,
+};
 #[cfg(test)]
-mod tests { use crate::hidden::Thing; fn f() { "}" ; } }
-use super::delta::{Three, four::*};
+mod tests {
+    use crate::hidden::Thing;
+}
 pub(crate) use child::Five;
-fn g<'a>(x: &'a str) -> char { let _ = r#"crate::text::b"#; let _ = "crate::text::\"c"; crate::epsilon::h::<u8>(x); '\'' }
-/* crate::comment::d /* nested */ crate::comment::e */
+use super::delta::{Three, four::*}; // crate::comment::b
+fn g(x: &str) -> u8 { crate::epsilon::h::<u8>(x) }
 fn k() { std::mem::swap(); child::call(self::own::Six); vec![super::super::top::Seven]; }
-"##;
+";
     let words = |path: &str| path.split("::").map(String::from).collect::<Vec<_>>();
-    let named: Vec<Vec<String>> = uses(
-        "use crate::arm::Arm; use calib_foundation::units::Unit;",
-        &words("twin::motion"),
-        &[],
-    )
-    .into_iter()
-    .map(|one| one.path)
-    .collect();
-    assert_eq!(named, [words("twin::arm::Arm"), words("units::Unit")]);
+    let named = |text: &str, module: &str, modules: &[Vec<String>]| {
+        let uses = uses(text, &words(module), modules).into_iter();
+        uses.map(|one| (one.line, one.path.join("::"), one.handed_on))
+            .collect::<Vec<_>>()
+    };
+    let foreign = "use crate::arm::Arm;\nuse calib_foundation::units::Unit;";
+    let found = named(foreign, "twin::motion", &[]);
+    assert_eq!(found[0].1, "twin::arm::Arm");
+    assert_eq!(found[1].1, "units::Unit");
     let modules = [words("room::here"), words("room::here::child")];
-    let found: Vec<(usize, String, bool)> = uses(text, &words("room::here"), &modules)
-        .into_iter()
-        .map(|one| (one.line, one.path.join("::"), one.handed_on))
-        .collect();
     let wanted = [
         (3, "alpha", false),
         (3, "alpha::One", false),
         (3, "beta::Two", false),
         (3, "gamma", false),
-        (6, "room::delta::Three", false),
-        (6, "room::delta::four::*", false),
-        (7, "room::here::child::Five", true),
-        (8, "epsilon::h", false),
-        (10, "room::here::child::call", false),
-        (10, "room::here::own::Six", false),
-        (10, "top::Seven", false),
+        (11, "room::here::child::Five", true),
+        (12, "room::delta::Three", false),
+        (12, "room::delta::four::*", false),
+        (13, "epsilon::h", false),
+        (14, "room::here::child::call", false),
+        (14, "room::here::own::Six", false),
+        (14, "top::Seven", false),
     ];
-    assert_eq!(
-        found,
-        wanted.map(|(line, path, handed_on)| (line, path.to_string(), handed_on))
-    );
+    let wanted = wanted.map(|(line, path, handed_on)| (line, path.to_string(), handed_on));
+    assert_eq!(named(text, "room::here", &modules), wanted);
 }

@@ -1,95 +1,18 @@
 //! What the stages say of rows that do not belong: tables, notes, and silence on good recordings.
 
-use crate::answer::{has, read, root};
-use crate::desk::{Desk, identify_reads, shared, table};
-use crate::sr210d::{experiment, settings};
-use calib::stage::ingest::{Ingest, IngestReads};
-use calib::stage::split::{SplitBy, SplitReads};
-use calib::stage::{Identify, ReadRobot, RobotReads};
-use calib::table::{Prediction, PredictionRow, Recording, Robot, Split, Suspects};
-use serde::de::DeserializeOwned;
-use serde_json::Value;
+use crate::answer::has;
+use crate::desk::shared;
+use crate::recorded::Example;
+use crate::sr210d::{example, experiment};
+use calib::stage::Identify;
+use calib::table::{Prediction, PredictionRow, Suspects};
 
-pub struct Inputs {
-    pub robot: Robot,
-    pub recording: Recording,
-    pub split: Split,
-}
-
-/// Robot, recording and split of a pipeline of ours on recordings beside the repository, and the settings of one stage.
-pub fn pipeline<T: DeserializeOwned>(
-    name: &str,
-    variables: &[(&str, &str)],
-    stage: &str,
-) -> (Inputs, T) {
-    let folder = root("pipelines").join(name);
-    let text = read(folder.join("pipeline.yaml"));
-    let text = variables.iter().fold(text, |text, (key, value)| {
-        text.replace(&format!("${{{key}}}"), value)
-    });
-    let whole: Value = serde_saphyr::from_str(&text).unwrap();
-    let with = |id: &str| {
-        let mut stages = whole["stages"].as_array().unwrap().iter();
-        let found = stages
-            .find(|stage| stage["id"] == id || (stage["id"].is_null() && stage["uses"] == id));
-        let with = found.unwrap()["with"].clone();
-        if with.is_null() {
-            serde_json::json!({})
-        } else {
-            with
-        }
-    };
-    let desk = Desk::default();
-    let mut robot: ReadRobot = serde_json::from_value(with("robot")).unwrap();
-    robot.file.0 = folder.join(&robot.file.0);
-    let robot: Robot = table(&desk.run(&robot, RobotReads {}).unwrap()).remove(0);
-    let ingest: Ingest = serde_json::from_value(with("ingest")).unwrap();
-    let chunks = table(
-        &desk
-            .run(
-                &ingest,
-                IngestReads {
-                    robot: robot.clone(),
-                },
-            )
-            .unwrap(),
-    );
-    let recording: Recording = match <[Recording; 1]>::try_from(chunks) {
-        Ok([recording]) => recording,
-        Err(chunks) => panic!("{} chunks of a small recording", chunks.len()),
-    };
-    let split: SplitBy = serde_json::from_value(with("split")).unwrap();
-    let split = table(
-        &desk
-            .run(
-                &split,
-                SplitReads {
-                    recording: recording.clone(),
-                },
-            )
-            .unwrap(),
-    )
-    .remove(0);
-    (
-        Inputs {
-            robot,
-            recording,
-            split,
-        },
-        serde_json::from_value(with(stage)).unwrap(),
-    )
-}
-
-fn identify(desk: &Desk, stage: &Identify, inputs: Inputs) -> (Suspects, Prediction) {
-    let Inputs {
-        robot,
-        recording,
-        split,
-    } = inputs;
-    let tables = desk
-        .run(stage, identify_reads(robot, recording, split))
-        .unwrap();
-    (table(&tables).remove(0), table(&tables).remove(0))
+/// Suspects of each of these steps of a pipeline.
+fn suspects(example: &Example, steps: [&str; 3]) -> Vec<(Suspects, usize)> {
+    let of = example.ingested();
+    let step = |step| of.identify_by(&example.with(step)).unwrap();
+    let rows = of.recording.rows();
+    steps.map(|name| (step(name).get(), rows)).into()
 }
 
 #[test]
@@ -97,11 +20,9 @@ fn a_recording_without_mistakes_has_no_suspects() {
     let Some(folder) = shared("practice/p05_null") else {
         return;
     };
-    let case = folder.display().to_string();
-    for step in ["nominal", "geometry", "joint"] {
-        let (inputs, stage) = pipeline("case", &[("case", &case)], step);
-        let (suspects, _) = identify(&Desk::default(), &stage, inputs);
-        assert_eq!(suspects.0, [], "{step}");
+    let example = Example::new("case", &[("case", &folder.display().to_string())]);
+    for (suspects, _) in suspects(&example, ["nominal", "geometry", "joint"]) {
+        assert_eq!(suspects.0, []);
     }
 }
 
@@ -110,15 +31,13 @@ fn on_a_real_robot_what_the_model_lacks_is_not_taken_for_mistakes() {
     let Some(folder) = shared("data/ipa_ur10") else {
         return;
     };
-    let data = folder.display().to_string();
     let variables = [
-        ("data", data.as_str()),
+        ("data", &*folder.display().to_string()),
         ("series", "Series_C/measurements_random_poses.csv"),
     ];
-    for step in ["nominal", "geometry", "ratios"] {
-        let (inputs, stage) = pipeline("ur10", &variables, step);
-        let rows = inputs.recording.rows();
-        let (suspects, _) = identify(&Desk::default(), &stage, inputs);
+    let steps = ["nominal", "geometry", "ratios"];
+    let found = suspects(&Example::new("ur10", &variables), steps);
+    for (step, (suspects, rows)) in steps.iter().zip(found) {
         println!("{step}: {} of {rows} rows are suspects", suspects.0.len());
         for row in &suspects.0 {
             println!(
@@ -136,7 +55,7 @@ fn on_a_real_robot_what_the_model_lacks_is_not_taken_for_mistakes() {
 
 #[test]
 fn suspects_are_named_to_the_person_listed_and_still_predicted() {
-    let clean = experiment("all", 1);
+    let (clean, _) = experiment("all", 1);
     let sequence = |set: &str, k: usize| {
         clean
             .split
@@ -161,18 +80,15 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
             .position(|s| *s as usize == sequence)
             .unwrap()
     });
-    let mut recording = clean.recording.clone();
-    recording.position.swap(a, b);
-    recording.position[inch] = recording.position[inch].map(|value| 25.4 * value);
-    recording.position[lost] = [0.0; 3];
-    let mut stage: Identify = settings("geometry", "all");
-    let inputs = || Inputs {
-        robot: clean.robot.clone(),
-        recording: recording.clone(),
-        split: clean.split.clone(),
-    };
-    let desk = Desk::default();
-    let (suspects, prediction) = identify(&desk, &stage, inputs());
+    let mut dirty = clean.clone();
+    let points = &mut dirty.recording.position;
+    points.swap(a, b);
+    points[inch] = points[inch].map(|value| 25.4 * value);
+    points[lost] = [0.0; 3];
+    let recording = &dirty.recording;
+    let mut stage: Identify = example("all").with("geometry");
+    let made = dirty.identify_by(&stage).unwrap();
+    let (suspects, prediction): (Suspects, Prediction) = (made.get(), made.get());
     let id = |row: usize| &recording.point_id[row];
     let kinds: Vec<(&str, &str, Option<i64>)> = suspects
         .0
@@ -194,13 +110,12 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
     expected.sort_by_key(|(name, ..)| recording.point_id.iter().position(|id| id == name));
     assert_eq!(kinds, expected);
     let (first, second) = (id(a.min(b)), id(a.max(b)));
-    let said = desk.warnings.lock().unwrap().join("\n");
     let sentence = format!(
         "4 rows set aside: {first} and {second} look exchanged; {} is 25.4 times too far; {} is zero",
         id(inch),
         id(lost)
     );
-    has(&said, &sentence);
+    has(&made.warnings, &sentence);
     let marked = prediction.0.iter().filter(|row| row.suspect).count();
     assert_eq!((prediction.0.len(), marked), (recording.rows(), 4));
     // A row that was looked at to set it aside is no held-out row of the fit's own set.
@@ -217,8 +132,8 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
     };
     assert!(prediction.0.iter().all(weight));
     stage.screen = false;
-    let desk = Desk::default();
-    let (suspects, prediction) = identify(&desk, &stage, inputs());
+    let made = dirty.identify_by(&stage).unwrap();
+    let (suspects, prediction): (Suspects, Prediction) = (made.get(), made.get());
     assert_eq!(
         (
             suspects.0.len(),
@@ -237,9 +152,8 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
                 .all(|weight| weight >= least),
         "{least}"
     );
-    let said = desk.notes.lock().unwrap().join("\n");
     has(
-        &said,
+        &made.notes,
         [
             "far off and down-weighted: ",
             &*format!("({} to 0.0", id(inch)),

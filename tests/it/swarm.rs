@@ -1,10 +1,7 @@
 //! Swarm optimisers on landscapes with known minima.
 
 use crate::desk::Desk;
-use calib::estimate::swarm::{
-    Algorithm, BeetleAntennae, BeetleSwarm, Budget, Landscape, Method, SearchBox, SearchStop,
-    SwarmResult, minimise,
-};
+use calib::estimate::swarm::{Algorithm, Budget, Landscape, SearchBox, SearchStop, SwarmResult};
 use calib::stage::{Context, Optimise, OptimiseReads, Stage};
 use serde_json::json;
 use std::f64::consts::PI;
@@ -17,21 +14,19 @@ fn sphere(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
 }
 
-fn search<M: Method>(
-    method: &M,
-    f: fn(&[f64]) -> f64,
-    bounds: &SearchBox,
-    seed: u64,
-    jobs: usize,
-) -> SwarmResult {
-    let budget = Budget {
-        generations: 200,
+fn budget(generations: usize, seed: u64, jobs: usize) -> Budget {
+    Budget {
+        generations,
         evaluations: None,
         target: None,
         seed,
         jobs,
-    };
-    minimise(method, &f, bounds, &budget, |_, _| {})
+    }
+}
+
+/// 200 generations of 50.
+fn search(method: Algorithm, f: fn(&[f64]) -> f64, bounds: &SearchBox, seed: u64) -> SwarmResult {
+    method.minimise(50, &f, bounds, &budget(200, seed, 1), |_, _| {})
 }
 
 #[test]
@@ -110,18 +105,15 @@ fn every_optimiser_keeps_within_its_budget_and_on_any_number_of_threads() {
                 && method.evaluations(20, generations + 1) > 3000,
             "{method:?}"
         );
-        let run = |jobs: usize| {
-            let budget = Budget {
-                generations,
-                evaluations: None,
-                target: None,
-                seed: 4,
-                jobs,
-            };
+        let run = |seed: u64, jobs: usize| {
+            let budget = budget(generations, seed, jobs);
             method.minimise(20, &sphere, &bounds, &budget, |_, _| {})
         };
-        let one = run(1);
-        assert_eq!(one, run(3), "{method:?}");
+        let one = run(4, 1);
+        for jobs in [1, 3, 64] {
+            assert_eq!(one, run(4, jobs), "{method:?} on {jobs} threads");
+        }
+        assert_ne!(one.position, run(5, 1).position, "{method:?}");
         // A colony's scouts come on top, at most one a generation.
         let most = 3000
             + if method == Algorithm::Abc {
@@ -167,81 +159,32 @@ fn the_landscapes_have_their_minima_where_the_literature_says() {
 }
 
 #[test]
-fn the_minimum_lies_where_the_paper_says() {
-    let outcome = search(
-        &BeetleSwarm::default(),
-        michalewicz,
-        &SearchBox::cube(2, 0.0, PI),
-        1,
-        1,
-    );
-    assert!((outcome.value - -1.8013).abs() < 1e-4, "{}", outcome.value);
-    assert!(
-        (outcome.position[0] - 2.20).abs() < 0.01 && (outcome.position[1] - 1.57).abs() < 0.01,
-        "{:?}",
-        outcome.position
-    );
-}
-
-#[test]
-fn the_sphere_is_descended_to_its_bottom() {
-    let bounds = SearchBox::cube(5, -3.0, 4.0);
+fn the_minimum_lies_where_the_paper_says_and_the_sphere_is_descended_to_its_bottom() {
+    let square = SearchBox::cube(2, 0.0, PI);
+    let SwarmResult {
+        value, position, ..
+    } = search(Algorithm::Bso, michalewicz, &square, 1);
+    assert!((value - -1.8013).abs() < 1e-4, "{value}");
+    let off = [position[0] - 2.20, position[1] - 1.57];
+    assert!(off.iter().all(|off| off.abs() < 0.01), "{position:?}");
     for seed in 0..10 {
-        let outcome = search(&BeetleSwarm::default(), sphere, &bounds, seed, 1);
-        assert!(outcome.value < 1e-6, "seed {seed}: {}", outcome.value);
+        let bottom = search(Algorithm::Bso, sphere, &SearchBox::cube(5, -3.0, 4.0), seed);
+        assert!(bottom.value < 1e-6, "seed {seed}: {}", bottom.value);
     }
     // One beetle's steps sum to at most 10 and die out: it comes near, not there.
-    let outcome = search(
-        &BeetleAntennae::default(),
-        sphere,
-        &SearchBox::cube(2, -3.0, 4.0),
-        3,
-        1,
-    );
-    assert!(
-        outcome.value < 0.05 && outcome.value > 0.0,
-        "{}",
-        outcome.value
-    );
-}
-
-#[test]
-fn two_threads_give_the_bits_of_one_and_a_seed_gives_its_search_again() {
-    let bounds = SearchBox::cube(6, -1.0, 1.0);
-    let method = BeetleSwarm {
-        beetles: 17,
-        ..BeetleSwarm::default()
-    };
-    let one = search(&method, sphere, &bounds, 5, 1);
-    for jobs in [1, 2, 3, 64] {
-        assert_eq!(
-            one,
-            search(&method, sphere, &bounds, 5, jobs),
-            "{jobs} threads"
-        );
-    }
-    assert_ne!(
-        one.position,
-        search(&method, sphere, &bounds, 6, 1).position
-    );
+    let lone = search(Algorithm::Bas, sphere, &SearchBox::cube(2, -3.0, 4.0), 3);
+    assert!(lone.value < 0.05 && lone.value > 0.0, "{}", lone.value);
 }
 
 #[test]
 fn the_history_falls_counts_every_evaluation_and_is_observed() {
-    let method = BeetleSwarm {
-        beetles: 10,
-        ..BeetleSwarm::default()
-    };
     let mut seen = Vec::new();
     let budget = Budget {
-        generations: 40,
         evaluations: Some(910),
-        target: None,
-        seed: 2,
-        jobs: 2,
+        ..budget(40, 2, 2)
     };
-    let outcome = minimise(
-        &method,
+    let outcome = Algorithm::Bso.minimise(
+        10,
         &michalewicz,
         &SearchBox::cube(2, 0.0, PI),
         &budget,
@@ -278,20 +221,12 @@ fn the_bounds_hold_and_a_value_that_is_no_number_is_never_best() {
             (x[0] - 2.0).abs() + x[1].abs()
         }
     };
-    let budget = Budget {
-        generations: 100,
-        evaluations: None,
-        target: None,
-        seed: 9,
-        jobs: 2,
-    };
     let bounds = SearchBox::cube(2, -1.0, 2.0);
-    let swarm = minimise(&BeetleSwarm::default(), &f, &bounds, &budget, |_, _| {});
-    let beetle = minimise(&BeetleAntennae::default(), &f, &bounds, &budget, |_, _| {});
-    assert!(
-        swarm.value < 1e-3 && beetle.value.is_finite(),
-        "{} {}",
-        swarm.value,
-        beetle.value
-    );
+    let run = |method: Algorithm| {
+        method
+            .minimise(50, &f, &bounds, &budget(100, 9, 2), |_, _| {})
+            .value
+    };
+    let (swarm, beetle) = (run(Algorithm::Bso), run(Algorithm::Bas));
+    assert!(swarm < 1e-3 && beetle.is_finite(), "{swarm} {beetle}");
 }

@@ -2,7 +2,8 @@
 //!
 //! `CALIB_RECORDINGS=100 cargo test --release --test it -- compensate::concealed --nocapture` prints the whole table.
 
-use crate::desk::{Desk, diagnose_reads, identify_reads, table};
+use super::true_error::exact;
+use crate::recorded::{Recorded, recording_of};
 use calib::compensate::{
     CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, Coverage, IdentifiedArm,
     Scatter, Uncertainty,
@@ -11,10 +12,7 @@ use calib::description::RobotDescription;
 use calib::effect::Load;
 use calib::estimate::Model;
 use calib::robot::{JointConvention, RobotModel};
-use calib::stage::{Diagnose, Identify};
-use calib::table::{
-    CovarianceTable, Findings, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict,
-};
+use calib::table::{CovarianceTable, Parameters, Prediction, Recording, Robot};
 use calib::twin::arm::Arm;
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
@@ -26,7 +24,6 @@ use calib::twin::effect::{GearCyclic, JointCompliance, Physical};
 use calib::twin::noise::{Noise, Purpose};
 use calib::twin::plan::{Point, Poses, allowed};
 use calib::twin::recorder::{Experiment, Shot};
-use calib::twin::tracker::Tracker;
 use nalgebra::Vector3;
 use serde_json::json;
 
@@ -71,8 +68,7 @@ pub fn outcomes_at(
     case: &Case,
     (targets, outside): (Vec<Point>, Vec<bool>),
 ) -> (Vec<Outcome>, String) {
-    let recording = recording(case);
-    let split = split(case, &recording);
+    let mut of = recorded(case);
     let mut robot = case.robot.clone();
     if case.bare {
         robot
@@ -80,48 +76,35 @@ pub fn outcomes_at(
             .iter_mut()
             .for_each(|joint| (joint.mass, joint.centre) = (None, None));
     }
-    let table_of_robot = Robot::from_description(&robot);
-    let geometry: Identify = serde_json::from_value(json!({"effects": GEOMETRY})).unwrap();
-    let tables = Desk::default()
-        .run(
-            &geometry,
-            identify_reads(table_of_robot.clone(), recording.clone(), split.clone()),
-        )
-        .unwrap();
-    let plain = IdentifiedArm::new(model(&robot, &table::<Parameters>(&tables).remove(0)), None);
+    of.robot = Robot::from_description(&robot);
+    let geometry = of.identify(json!({"effects": GEOMETRY}));
+    let plain = IdentifiedArm::new(model(&robot, &geometry.get()), None);
 
-    let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
-    let tables = Desk::default()
-        .run(
-            &stage,
-            diagnose_reads(table_of_robot, recording.clone(), split),
-        )
-        .unwrap();
-    let model = model(&robot, &table::<Parameters>(&tables).remove(0));
-    let covariance = table::<CovarianceTable>(&tables).remove(0).of_model(&model);
-    let verdict = table::<Verdict>(&tables).remove(0);
+    let made = of.diagnose(json!({}));
+    let model = model(&robot, &made.get());
+    let covariance = made.get::<CovarianceTable>().of_model(&model);
+    let verdict = made.verdict();
     if from_environment("CALIB_DETAILS", 0) == 1 {
-        for row in &table::<Parameters>(&tables).remove(0).0 {
+        for row in &made.get::<Parameters>().0 {
             println!(
                 "  {} {} = {:.4} +- {:?} {} {}",
                 row.name, row.place, row.change, row.sigma, row.unit, row.status
             );
         }
-        println!("  {:?}", verdict.0[0].statement);
+        println!("  {:?}", verdict.statement);
     }
-    let unexplained = table::<Prediction>(&tables).remove(0).unexplained_mm() * 1e-3;
-    let findings = table::<Findings>(&tables).remove(0);
-    let named: Vec<String> = findings
-        .0
+    let unexplained = made.get::<Prediction>().unexplained_mm() * 1e-3;
+    let named = made.named();
+    let named: Vec<String> = named
         .iter()
-        .map(|row| format!("{} at {}", row.effect, row.place))
+        .map(|(effect, place)| format!("{effect} at {place}"))
         .collect();
     let scatter = Scatter {
         unexplained,
-        repeatability: verdict.0[0].repeatability_rad,
+        repeatability: verdict.repeatability_rad,
     };
     let arm = IdentifiedArm::new(model, None);
-    let data = recording.measurements();
+    let data = of.recording.measurements();
 
     let options = || CorrectionOptions {
         clock: data.has_clock(),
@@ -163,52 +146,32 @@ pub fn model(robot: &RobotDescription, parameters: &Parameters) -> Model {
         .unwrap()
 }
 
-pub fn split(case: &Case, recording: &Recording) -> Split {
-    let row = |k: usize| SplitRow {
-        sequence: k as i64,
-        point_id: recording.point_id[k].clone(),
-        set: if case.shots[k].block == FIT {
-            "fit"
-        } else {
-            "validate"
-        }
-        .into(),
+/// A recording of which the rows of its design's fit are fitted.
+pub fn recorded(case: &Case) -> Recorded {
+    let robot = Robot::from_description(&case.robot);
+    let set = |row: usize| match case.shots[row].block == FIT {
+        true => "fit",
+        false => "validate",
     };
-    Split((0..recording.rows()).map(row).collect())
+    Recorded::dealt(robot, recording(case), set)
 }
 
-pub fn recording(case: &Case) -> Recording {
+fn recording(case: &Case) -> Recording {
     let shown = |column: Column| !case.hidden.contains(&column);
-    let rows = case.shots.len();
-    Recording {
-        joints: case.robot.joints.len(),
-        prismatic: vec![false; case.robot.joints.len()],
-        sequence: (0..rows as i64).collect(),
-        point_id: (0..rows).map(|row| format!("P{row}")).collect(),
-        usage: vec![None; rows],
-        q: case
-            .shots
+    let all = recording_of(&case.robot, &case.shots);
+    let currents = || {
+        case.shots
             .iter()
-            .flat_map(|shot| shot.q.iter().copied())
-            .collect(),
-        position: case.shots.iter().map(|shot| shot.position).collect(),
+            .flat_map(|shot| shot.current.iter().copied())
+    };
+    Recording {
         position_sigma: Some(case.shots.iter().map(|shot| [shot.sigma; 3]).collect()),
-        time: shown(Column::Time).then(|| case.shots.iter().map(|shot| shot.time_s).collect()),
+        time: all.time.filter(|_| shown(Column::Time)),
         payload: Some(case.payload_kg.clone()),
         temperature: shown(Column::Temperature).then(|| case.thermometer_c.clone()),
-        current: shown(Column::Current).then(|| {
-            case.shots
-                .iter()
-                .flat_map(|shot| shot.current.iter().copied())
-                .collect()
-        }),
-        direction: shown(Column::Direction).then(|| {
-            case.shots
-                .iter()
-                .flat_map(|shot| shot.direction.iter().copied())
-                .collect()
-        }),
-        ..Recording::default()
+        current: shown(Column::Current).then(|| currents().collect()),
+        direction: all.direction.filter(|_| shown(Column::Direction)),
+        ..all
     }
 }
 
@@ -299,16 +262,11 @@ fn misses(
         .flat_map(|one| one.cause.physical.clone())
         .chain(case.friction.iter().cloned())
         .collect();
-    let exact = Tracker {
-        noise_um: 0.0,
-        noise_um_per_m: 0.0,
-        ..case.tracker.clone()
-    };
     let experiment = Experiment {
         robot: &case.robot,
         truth: &case.truth,
         effects: &effects,
-        tracker: &exact,
+        tracker: &exact(&case.tracker),
         motors: &case.motors,
         repeatability_arcsec: &[],
         poses: &Poses::default(),

@@ -2,17 +2,16 @@
 //! instrument leaves open; such points are counted and named. A small finding beyond its range is none, and harms no target in silence.
 
 use super::concealed::{
-    Outcome, Room, again, is_harmed, limits, model, nothing, outcomes_at, recording, split,
-    targets, upright,
+    Outcome, Room, again, is_harmed, limits, model, nothing, outcomes_at, recorded, targets,
+    upright,
 };
 use super::true_error::physics;
 use crate::answer::has;
-use crate::desk::{Desk, diagnose_reads, table};
+use crate::recorded::{labelled, made};
 use calib::compensate::{Chain, Circumstance, IdentifiedArm, Nominal};
 use calib::robot::{Posture, RobotModel};
-use calib::stage::{Diagnose, Labelled, Validate, ValidateReads};
-use calib::store::frame::Frame;
-use calib::table::{Parameters, Prediction, Robot, Statistics, StatisticsRow, Verdict};
+use calib::stage::{Validate, ValidateReads};
+use calib::table::{Prediction, Statistics, StatisticsRow, VerdictRow};
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::points::FIT;
 use calib::twin::effect::{
@@ -22,37 +21,17 @@ use calib::twin::effect::{JointCompliance, JointHardening, Physical};
 use calib::twin::noise::{Noise, Purpose};
 use calib::twin::recorder::Shot;
 use serde_json::json;
-use std::collections::BTreeMap;
-
-/// The tables of a diagnosis of a recording.
-fn diagnosed(case: &Case) -> BTreeMap<&'static str, Vec<Frame>> {
-    let recording = recording(case);
-    let split = split(case, &recording);
-    let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
-    let reads = diagnose_reads(Robot::from_description(&case.robot), recording, split);
-    Desk::default().run(&stage, reads).unwrap()
-}
 
 /// What a diagnosis and its validation say of a recording.
-fn judged(case: &Case) -> (Verdict, Prediction, StatisticsRow) {
-    let tables = diagnosed(case);
-    let prediction = table::<Prediction>(&tables).remove(0);
-    let labelled = Labelled {
-        stage: "diagnose".into(),
-        table: prediction.clone(),
-    };
+fn judged(case: &Case) -> (VerdictRow, Prediction, StatisticsRow) {
+    let diagnosed = recorded(case).diagnose(json!({}));
     let reads = ValidateReads {
-        prediction: vec![labelled],
+        prediction: vec![labelled("diagnose", diagnosed.get())],
         observability: Vec::new(),
     };
-    let stated = Desk::default().run(&Validate::default(), reads).unwrap();
-    let held_out = table::<Statistics>(&stated)
-        .remove(0)
-        .0
-        .into_iter()
-        .find(|row| row.held_out)
-        .unwrap();
-    (table::<Verdict>(&tables).remove(0), prediction, held_out)
+    let stated: Statistics = made(&Validate::default(), reads).get();
+    let held_out = stated.0.into_iter().find(|row| row.held_out).unwrap();
+    (diagnosed.verdict(), diagnosed.get(), held_out)
 }
 
 /// Every remark of a held-out row; table, figures and verdict count alike.
@@ -66,7 +45,7 @@ fn counted(case: &Case) -> Vec<Option<String>> {
         .collect();
     let remarked = remarks.iter().flatten().count();
     assert_eq!(held_out.remarked, Some(remarked as i64));
-    let statement = verdict.0[0].statement.clone().unwrap();
+    let statement = verdict.statement.clone().unwrap();
     println!("{statement}\n{:?}", held_out.doubts());
     assert_eq!(remarked > 0, held_out.doubts().is_some());
     assert_eq!(
@@ -191,18 +170,15 @@ fn asked_beyond_small_loads(
         }),
     ];
     let case = again(case, effects, seed, pose);
-    let recording = recording(&case);
-    let data = recording.measurements();
-    let tables = diagnosed(&case);
-    let arm = IdentifiedArm::new(
-        model(&case.robot, &table::<Parameters>(&tables).remove(0)),
-        None,
-    );
+    let of = recorded(&case);
+    let data = of.recording.measurements();
+    let made = of.diagnose(json!({}));
+    let arm = IdentifiedArm::new(model(&case.robot, &made.get()), None);
     let (mut reach, mut nominal) = (arm.reach(), Nominal::new(&robot));
     let instrument = case.noise_mm[0] * 3f64.sqrt();
     let mut counts = [0; 3];
-    for (row, prediction) in table::<Prediction>(&tables)
-        .remove(0)
+    for (row, prediction) in made
+        .get::<Prediction>()
         .0
         .iter()
         .enumerate()

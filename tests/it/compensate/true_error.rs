@@ -1,19 +1,17 @@
 //! The true robot, a twin that shares no kinematics with the model, goes where it was wanted: every kind of effect that acts.
 
 use super::concealed::model;
-use crate::desk::{Desk, diagnose_reads, identify_reads, table};
+use crate::recorded::{Recorded, made, recording_of, settings};
 use calib::compensate::{
     Circumstance, IdentifiedArm as Identified, Nominal, Reach, SETTLED, ToolGoal, least_change,
     one_step,
 };
-use calib::description::{JointKind, RobotDescription};
+use calib::description::RobotDescription;
 use calib::estimate::Model;
 use calib::estimate::network::Correction;
 use calib::robot::{RobotModel, RowTime};
-use calib::stage::{Diagnose, Identify, Learn, LearnReads};
-use calib::table::{
-    Findings, Network, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict,
-};
+use calib::stage::{Learn, LearnReads};
+use calib::table::{Findings, Network, Parameters, Prediction, Robot};
 use calib::twin::arm::Arm;
 use calib::twin::conceal::robots::Kind;
 use calib::twin::effect::Physical;
@@ -31,13 +29,6 @@ pub struct Cell {
     tracker: Tracker,
     poses: Poses,
     climate: Climate,
-}
-
-/// What a recording of the cell comes to.
-pub struct Recorded {
-    pub robot: Robot,
-    pub recording: Recording,
-    pub split: Split,
 }
 
 impl Cell {
@@ -129,49 +120,11 @@ impl Cell {
 
     /// A recording of these points with the noise of a seed.
     pub fn recorded_by(&self, points: Vec<Point>, seed: u64) -> Recorded {
-        let payload: Vec<f64> = points.iter().map(|point| point.payload_kg).collect();
         let shots = self.measure(points, &self.tracker, seed);
-        let recording = Recording {
-            joints: self.robot.joints.len(),
-            prismatic: self
-                .robot
-                .joints
-                .iter()
-                .map(|joint| joint.kind == JointKind::Prismatic)
-                .collect(),
-            sequence: (0..shots.len() as i64).collect(),
-            point_id: (0..shots.len()).map(|k| format!("p{k}")).collect(),
-            usage: vec![None; shots.len()],
-            q: shots
-                .iter()
-                .flat_map(|shot| shot.q.iter().copied())
-                .collect(),
-            position: shots.iter().map(|shot| shot.position).collect(),
-            position_sigma: None,
-            time: Some(shots.iter().map(|shot| shot.time_s).collect()),
-            payload: Some(payload),
-            temperature: Some(shots.iter().map(|shot| shot.temperature_c).collect()),
-            current: None,
-            direction: Some(
-                shots
-                    .iter()
-                    .flat_map(|shot| shot.direction.iter().copied())
-                    .collect(),
-            ),
-            ..Recording::default()
-        };
+        let recording = recording_of(&self.robot, &shots);
+        let robot = Robot::from_description(&self.robot);
         let set = |k: usize| if k % 4 == 3 { "validate" } else { "fit" };
-        let row = |k: usize| SplitRow {
-            sequence: k as i64,
-            point_id: format!("p{k}"),
-            set: set(k).into(),
-        };
-        let split = Split((0..shots.len()).map(row).collect());
-        Recorded {
-            robot: Robot::from_description(&self.robot),
-            recording,
-            split,
-        }
+        Recorded::dealt(robot, recording, set)
     }
 
     /// The model of a recording of 80 points, with the geometry alone.
@@ -184,31 +137,23 @@ impl Cell {
         let geometry = json!({
             "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"], "folds": 0,
         });
-        let stage: Identify = serde_json::from_value(geometry).unwrap();
-        let (robot, recording) = (of.robot.clone(), of.recording.clone());
-        let reads = identify_reads(robot, recording, of.split.clone());
-        let tables = Desk::default().run(&stage, reads).unwrap();
-        let parameters: Parameters = table(&tables).remove(0);
-        let model = model(&self.robot, &parameters);
-        (model, parameters, table(&tables).remove(0))
+        let made = of.identify(geometry);
+        let parameters = made.get();
+        (model(&self.robot, &parameters), parameters, made.get())
     }
 
     /// What `diagnose` makes of it: the model, its findings, the noise of a measured point, mm.
     fn diagnosed(&self, of: Recorded) -> (Model, Findings, f64) {
-        let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
-        let reads = diagnose_reads(of.robot, of.recording, of.split);
-        let tables = Desk::default().run(&stage, reads).unwrap();
-        let verdict: Verdict = table(&tables).remove(0);
-        let floor = verdict.0[0].noise_floor_mm.unwrap();
-        let model = model(&self.robot, &table(&tables).remove(0));
-        (model, table(&tables).remove(0), floor)
+        let made = of.diagnose(json!({}));
+        let floor = made.verdict().noise_floor_mm.unwrap();
+        (model(&self.robot, &made.get()), made.get(), floor)
     }
 
     /// The rigid model, and the joint curves that are learned on top of it.
     fn learned(&self, of: Recorded) -> (Model, Option<Correction>) {
         let (model, parameters, prediction) = self.rigid(&of);
         let learn = json!({"rivals": ["curves"], "folds": 2});
-        let learn: Learn = serde_json::from_value(learn).unwrap();
+        let learn: Learn = settings(learn);
         let prismatic = of.recording.prismatic.clone();
         let reads = LearnReads {
             robot: Some(of.robot),
@@ -217,18 +162,13 @@ impl Cell {
             parameters: Some(parameters),
             prediction,
         };
-        let network: Network = table(&Desk::default().run(&learn, reads).unwrap()).remove(0);
+        let network: Network = made(&learn, reads).get();
         (model, network.correction(&prismatic).unwrap())
     }
 
     /// Where (m) the true robot puts its tool in its own base, without the noise of measurement; `base` as it was identified or set up.
     pub fn places(&self, points: Vec<Point>) -> Vec<Vector3<f64>> {
-        let exact = Tracker {
-            noise_um: 0.0,
-            noise_um_per_m: 0.0,
-            ..self.tracker.clone()
-        };
-        self.measure(points, &exact, 77)
+        self.measure(points, &exact(&self.tracker), 77)
             .iter()
             .map(|shot| Vector3::from(shot.position))
             .collect()
@@ -267,11 +207,6 @@ impl Cell {
         targets: &[Point],
         mut solve: impl FnMut(&mut Reach, &ToolGoal, &[f64]) -> Vec<f64>,
     ) -> Vec<f64> {
-        let exact = Tracker {
-            noise_um: 0.0,
-            noise_um_per_m: 0.0,
-            ..self.tracker.clone()
-        };
         let robot = RobotModel::new(self.robot.clone());
         let mut reach = arm.reach();
         let mut commands = Vec::new();
@@ -292,13 +227,22 @@ impl Cell {
                 ..target.clone()
             });
         }
-        let shots = self.measure(commands, &exact, 77);
+        let shots = self.measure(commands, &exact(&self.tracker), 77);
         let wanted = |target: &Point| arm.base().point(&robot.forward(&target.q).translation);
         shots
             .iter()
             .zip(targets)
             .map(|(shot, target)| (Vector3::from(shot.position) - wanted(target)).norm())
             .collect()
+    }
+}
+
+/// A tracker without noise.
+pub fn exact(tracker: &Tracker) -> Tracker {
+    Tracker {
+        noise_um: 0.0,
+        noise_um_per_m: 0.0,
+        ..tracker.clone()
     }
 }
 

@@ -1,7 +1,6 @@
 //! Of targets that no fit has seen, the true robot hits 95 % within the radius that is stated for them.
 
 use super::true_error::Cell;
-use crate::desk::{Desk, identify_reads, table};
 use calib::compensate::{IdentifiedArm, SETTLED, Scatter, Uncertainty, least_change};
 use calib::effect::{EffectStack, Form, Law, Load, Motion, Term, Unknown, Variable};
 use calib::estimate::Model;
@@ -23,15 +22,9 @@ fn within(cell: &Cell, effects: &[&str], payload_kg: &[f64]) -> f64 {
     let mut hits = 0;
     for seed in 0..RECORDINGS {
         let recorded = cell.recorded_by(cell.points(80, payload_kg, 1000 + seed), 2000 + seed);
-        let tables = Desk::default()
-            .run(
-                &stage,
-                identify_reads(recorded.robot, recorded.recording, recorded.split),
-            )
-            .unwrap();
-        let parameters: Parameters = table(&tables).remove(0);
-        let covariance: CovarianceTable = table(&tables).remove(0);
-        let prediction: Prediction = table(&tables).remove(0);
+        let made = recorded.identify_by(&stage).unwrap();
+        let (parameters, prediction): (Parameters, Prediction) = (made.get(), made.get());
+        let covariance: CovarianceTable = made.get();
         let model = parameters
             .model(robot.clone(), &[], Load::GravityTorque)
             .unwrap();

@@ -2,10 +2,8 @@
 //!
 //! `CALIB_RECORDINGS=100 cargo test --test it -- diagnose::left_out --nocapture` prints every recording.
 
-use crate::compensate::concealed::{from_environment, recording, split};
-use crate::desk::{Desk, diagnose_reads, table};
-use calib::stage::Diagnose;
-use calib::table::{Findings, Robot, Verdict};
+use crate::compensate::concealed::{from_environment, recorded};
+use calib::table::Findings;
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
 use serde_json::json;
@@ -61,17 +59,8 @@ impl Bins {
 }
 
 pub fn said(case: &Case, without: &[&str]) -> Said {
-    let recording = recording(case);
-    let split = split(case, &recording);
-    let stage: Diagnose = serde_json::from_value(json!({"without": without})).unwrap();
-    let tables = Desk::default()
-        .run(
-            &stage,
-            diagnose_reads(Robot::from_description(&case.robot), recording, split),
-        )
-        .unwrap();
-    let verdict = table::<Verdict>(&tables).remove(0).0.remove(0);
-    let findings = table::<Findings>(&tables).remove(0);
+    let made = recorded(case).diagnose(json!({"without": without}));
+    let (verdict, findings): (_, Findings) = (made.verdict(), made.get());
     let found = findings.0.iter().filter(|row| row.forms != "[]");
     Said {
         found: found

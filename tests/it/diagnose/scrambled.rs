@@ -1,15 +1,10 @@
 //! Held-out rows choose nothing: whatever they say, the same causes are found, with the same numbers.
 
-use crate::desk::{Desk, table};
-use crate::suspects::{Inputs, pipeline};
-use calib::stage::{Diagnose, DiagnoseReads};
-use calib::table::{
-    CovarianceTable, FindingRow, Findings, Frame, Parameters, Prediction, Rivals, Table, Verdict,
-};
-use std::collections::BTreeMap;
+use crate::recorded::{Example, Made, Recorded};
+use calib::table::{CovarianceTable, FindingRow, Findings, Parameters, Prediction, Rivals, Table};
 
 /// Moves the measured points of held-out rows by 0.3 mm, to and fro.
-fn scattered(inputs: &mut Inputs) {
+fn scattered(inputs: &mut Recorded) {
     let held = (0..inputs.split.0.len()).filter(|row| inputs.split.0[*row].set != "fit");
     for (k, row) in held.enumerate() {
         inputs.recording.position[row][k % 3] += if k % 2 == 0 { 3e-4 } else { -3e-4 };
@@ -17,7 +12,7 @@ fn scattered(inputs: &mut Inputs) {
 }
 
 /// Gives the measured points of held-out rows to one another.
-fn exchanged(inputs: &mut Inputs) {
+fn exchanged(inputs: &mut Recorded) {
     let held: Vec<usize> = (0..inputs.split.0.len())
         .filter(|row| inputs.split.0[*row].set != "fit")
         .collect();
@@ -31,8 +26,8 @@ fn exchanged(inputs: &mut Inputs) {
 }
 
 /// Findings that explain something: that held-out rows themselves are wrong is said, too.
-fn causes(tables: &BTreeMap<&'static str, Vec<Frame>>) -> Vec<FindingRow> {
-    let findings: Findings = table(tables).remove(0);
+fn causes(made: &Made) -> Vec<FindingRow> {
+    let findings: Findings = made.get();
     findings
         .0
         .into_iter()
@@ -53,35 +48,25 @@ fn every_choice_of_a_diagnosis_is_the_same_whatever_held_out_rows_say() {
             .join("sealed/recordings/c0001")
             .display()
             .to_string();
-        let diagnosed = |change: fn(&mut Inputs)| -> BTreeMap<&'static str, Vec<Frame>> {
-            let (mut inputs, stage): (Inputs, Diagnose) =
-                pipeline("case", &[("case", &case)], "diagnose");
-            change(&mut inputs);
-            let reads = DiagnoseReads {
-                recording: inputs.recording,
-                robot: inputs.robot,
-                split: inputs.split,
-            };
-            Desk::default().run(&stage, reads).unwrap()
+        let example = Example::new("case", &[("case", &case)]);
+        let recorded = example.ingested();
+        let diagnosed = |change: fn(&mut Recorded)| {
+            let mut of = recorded.clone();
+            change(&mut of);
+            of.diagnose_by(&example.with("diagnose")).unwrap()
         };
         let (sound, other, mixed) = (
             diagnosed(|_| ()),
             diagnosed(scattered),
             diagnosed(exchanged),
         );
-        let after = |tables: &BTreeMap<&'static str, Vec<Frame>>| {
-            let verdict: Verdict = table(tables).remove(0);
-            verdict.0[0].after_rms_mm.unwrap()
-        };
+        let after = |made: &Made| made.verdict().after_rms_mm.unwrap();
         assert!(
             after(&other) > 2.0 * after(&sound),
             "{family}: nothing was scattered"
         );
-        fn same<T: Table + PartialEq + std::fmt::Debug>(
-            a: &BTreeMap<&'static str, Vec<Frame>>,
-            b: &BTreeMap<&'static str, Vec<Frame>>,
-        ) {
-            let [a, b]: [T; 2] = [a, b].map(|tables| table(tables).remove(0));
+        fn same<T: Table + PartialEq + std::fmt::Debug>(a: &Made, b: &Made) {
+            let [a, b]: [T; 2] = [a, b].map(|made| made.get());
             assert_eq!(a, b, "{}", T::KIND);
         }
         for other in [&other, &mixed] {
@@ -90,8 +75,8 @@ fn every_choice_of_a_diagnosis_is_the_same_whatever_held_out_rows_say() {
             same::<CovarianceTable>(&sound, other);
             same::<Rivals>(&sound, other);
         }
-        let folds = |tables| -> Vec<Option<f64>> {
-            let prediction: Prediction = table(tables).remove(0);
+        let folds = |made: &Made| -> Vec<Option<f64>> {
+            let prediction: Prediction = made.get();
             prediction.0.iter().map(|row| row.fold_error_mm).collect()
         };
         assert_eq!(folds(&sound), folds(&other));

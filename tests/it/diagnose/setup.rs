@@ -2,13 +2,12 @@
 
 use super::{CASE, calib, case_with, concealed, ended, refused};
 use crate::answer::{has, read, starts_with};
-use crate::desk::{Desk, diagnose_reads, table};
 use crate::fixture;
+use crate::recorded::{Recorded, made, settings};
 use calib::description::RobotDescription;
 use calib::error::Error;
-use calib::stage::split::{SplitBy, SplitReads};
-use calib::stage::{Diagnose, Simulate, SimulateReads};
-use calib::table::{FindingRow, Findings, Recording, Robot, Split, Verdict};
+use calib::stage::{Simulate, SimulateReads};
+use calib::table::{FindingRow, Findings, Recording, Robot};
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -60,7 +59,7 @@ fn recorded(robot: &RobotDescription, seed: u64, effects: Value) -> Inputs {
         [-100.0, 95.0],
         [-150.0, 160.0],
     ];
-    let settings = json!({
+    let twin = json!({
         "truth": {
             "offset_deg": [0.1, -0.12, 0.2, 0.08, -0.15, 0.3],
             "links": [
@@ -73,18 +72,12 @@ fn recorded(robot: &RobotDescription, seed: u64, effects: Value) -> Inputs {
         "blocks": [{"usage": "fit", "points": 48}, {"usage": "validate", "points": 24}],
         "seed": seed,
     });
-    let stage: Simulate = serde_json::from_value(settings).unwrap();
-    let tables = Desk::default()
-        .run(
-            &stage,
-            SimulateReads {
-                robot: Robot::from_description(robot),
-            },
-        )
-        .unwrap();
+    let reads = SimulateReads {
+        robot: Robot::from_description(robot),
+    };
     Inputs {
         robot: robot.clone(),
-        recording: table(&tables).remove(0),
+        recording: made(&settings::<Simulate>(twin), reads).get(),
     }
 }
 
@@ -96,30 +89,15 @@ struct Said {
 }
 
 fn diagnosed(inputs: &Inputs) -> Result<Said, Error> {
-    let desk = Desk::default();
-    let split: SplitBy = serde_json::from_value(json!({"by": "usage", "blank": "fit"})).unwrap();
-    let split: Split = table(&desk.run(
-        &split,
-        SplitReads {
-            recording: inputs.recording.clone(),
-        },
-    )?)
-    .remove(0);
-    let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
-    let robot = Robot::from_description(&inputs.robot);
-    let tables = desk.run(
-        &stage,
-        diagnose_reads(robot, inputs.recording.clone(), split),
-    )?;
-    let verdict: Verdict = table(&tables).remove(0);
-    let findings: Findings = table(&tables).remove(0);
-    let statement = verdict.0[0].statement.clone().unwrap_or_default();
-    let warnings = desk.warnings.lock().unwrap().clone();
+    let (robot, recording) = (Robot::from_description(&inputs.robot), &inputs.recording);
+    let set = |row: usize| recording.usage[row].as_deref().unwrap_or("fit");
+    let made = Recorded::dealt(robot, recording.clone(), set).diagnose_by(&settings(json!({})))?;
+    let verdict = made.verdict();
     Ok(Said {
-        verdict: verdict.0[0].verdict.clone(),
-        statement,
-        findings: findings.0,
-        warnings,
+        verdict: verdict.verdict,
+        statement: verdict.statement.unwrap_or_default(),
+        findings: made.get::<Findings>().0,
+        warnings: made.warnings.lines().map(Into::into).collect(),
     })
 }
 

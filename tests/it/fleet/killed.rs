@@ -1,6 +1,6 @@
 //! A fleet killed three times ends as an undisturbed one, and nothing recorded is computed again.
 
-use super::{file, fleet, recordings, run, tables};
+use super::{Line, fleet, run, tables};
 use crate::held_locks::{self, Held};
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
@@ -40,30 +40,22 @@ pub fn hold(undisturbed: &Path, store: &Path, name: &str, count: usize) -> Vec<H
 #[test]
 fn a_fleet_killed_three_times_ends_as_an_undisturbed_one() {
     const ROBOTS: usize = 16;
-    let folder = tempfile::tempdir().unwrap();
-    let cases = folder.path().join("cases");
-    recordings(&cases, ROBOTS);
-    std::fs::remove_file(cases.join("recordings/c0004/tracker.csv")).unwrap();
-    let file = file(
-        folder.path(),
-        "line",
-        "robots:\n  - folders: cases/recordings/*\n",
-    );
-    let undisturbed = folder.path().join("undisturbed");
-    run(&file, &undisturbed, 10);
+    let line = Line::new(ROBOTS);
+    std::fs::remove_file(line.recording("c0004").join("tracker.csv")).unwrap();
+    let undisturbed = line.folder.path().join("undisturbed");
+    run(&line.file, &undisturbed, 10);
 
-    let store = folder.path().join("killed");
     // Robots that nobody can take: no fleet is complete before it is killed, on however busy a machine.
-    let held = hold(&undisturbed, &store, "line", 4);
+    let held = hold(&undisturbed, &line.store, "line", 4);
     let mut stood: Vec<(PathBuf, std::time::SystemTime)> = Vec::new();
     for kill in 1..=3 {
-        let mut child = fleet("run", &file, &store)
+        let mut child = fleet("run", &line.file, &line.store)
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
         held_locks::until(&mut child, || {
-            records(&store, "line").len() >= kill * ROBOTS / 5
+            records(&line.store, "line").len() >= kill * ROBOTS / 5
         });
         std::thread::sleep(Duration::from_millis(7 * kill as u64));
         child.kill().unwrap();
@@ -72,7 +64,7 @@ fn a_fleet_killed_three_times_ends_as_an_undisturbed_one() {
         for (path, modified) in &stood {
             assert_eq!(path.metadata().unwrap().modified().unwrap(), *modified);
         }
-        stood = records(&store, "line")
+        stood = records(&line.store, "line")
             .into_iter()
             .map(|path| (path.clone(), path.metadata().unwrap().modified().unwrap()))
             .collect();
@@ -83,7 +75,7 @@ fn a_fleet_killed_three_times_ends_as_an_undisturbed_one() {
         );
     }
     drop(held);
-    let told = run(&file, &store, 10);
+    let told = line.run(10);
     assert_eq!(
         told["computed"].as_u64(),
         Some((ROBOTS - stood.len()) as u64)
@@ -91,22 +83,15 @@ fn a_fleet_killed_three_times_ends_as_an_undisturbed_one() {
     for (path, modified) in &stood {
         assert_eq!(path.metadata().unwrap().modified().unwrap(), *modified);
     }
-    assert_eq!(tables(&store, "line"), tables(&undisturbed, "line"));
-    assert_eq!(run(&file, &store, 10)["computed"].as_u64(), Some(0));
+    assert_eq!(tables(&line.store, "line"), tables(&undisturbed, "line"));
+    assert_eq!(line.run(10)["computed"].as_u64(), Some(0));
 }
 
 #[test]
 fn two_runs_at_once_share_the_robots() {
-    let folder = tempfile::tempdir().unwrap();
-    let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
-    recordings(&cases, 8);
-    let file = file(
-        folder.path(),
-        "line",
-        "robots:\n  - folders: cases/recordings/*\n",
-    );
+    let line = Line::new(8);
     let start = || {
-        let mut run = fleet("run", &file, &store);
+        let mut run = fleet("run", &line.file, &line.store);
         run.args(["--json", "--quiet", "-j", "1"])
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

@@ -1,23 +1,20 @@
 //! Robots from a list, from one big table, and with settings of their own.
 
-use super::{file, recordings, run, write};
+use super::{Line, write};
 use crate::answer::read;
 use std::path::Path;
 
 #[test]
 fn a_list_names_robots_their_folders_groups_and_settings() {
-    let folder = tempfile::tempdir().unwrap();
-    let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
-    recordings(&cases, 3);
     let list = "robot;folder;model;plant;set.joint.effects\n\
         \"r;1\";cases/recordings/c0001;c6;Linz;\n\
         r2;cases/recordings/c0002;c6;Graz;\"[base_frame, joint_offset]\"\n\
         r3;cases/recordings/none;c6;;\n";
-    write(folder.path().join("robots.csv"), list);
     let rest = "groups: {plant: Wien, campaign: 2026-10-01}\nrobots:\n  - list: robots.csv\n\
         overrides:\n  - robots: ['r;*']\n    set: {joint.effects: [base_frame, tool_offset], joint.screen: false}\n    groups: {model: other}\n";
-    let file = file(folder.path(), "line", rest);
-    let told = run(&file, &store, 10);
+    let line = Line::of(3, rest);
+    write(line.folder.path().join("robots.csv"), list);
+    let told = line.run(10);
     assert_eq!(
         (told["done"].as_u64(), told["rejected"].as_u64()),
         (Some(2), Some(1))
@@ -32,7 +29,7 @@ fn a_list_names_robots_their_folders_groups_and_settings() {
     let manifest = |robot: usize| -> serde_json::Value {
         let run = told["robots"][robot]["run"].as_str().unwrap();
         serde_json::from_slice(
-            &std::fs::read(store.join("runs").join(run).join("manifest.json")).unwrap(),
+            &std::fs::read(line.store.join("runs").join(run).join("manifest.json")).unwrap(),
         )
         .unwrap()
     };
@@ -106,11 +103,13 @@ fn together(cases: &Path, names: &[(&str, &str)]) -> String {
 
 #[test]
 fn one_big_table_is_parted_by_robot_once() {
-    let folder = tempfile::tempdir().unwrap();
-    let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
-    recordings(&cases, 3);
+    let line = Line::of(
+        3,
+        "robots:\n  - {recording: all.csv, by: cell, variable: part}\n",
+    );
+    let (cases, here) = (&line.cases, line.folder.path());
     let names = [("c0001", "../a"), ("c0002", "b, c"), ("c0003", "d")];
-    write(folder.path().join("all.csv"), &together(&cases, &names));
+    write(here.join("all.csv"), &together(cases, &names));
     let text = read(super::pipeline());
     let start = text.find("        - file: ${case}/controller.csv").unwrap();
     let end = text.find("        - file: ${case}/tracker.csv").unwrap();
@@ -129,12 +128,10 @@ fn one_big_table_is_parted_by_robot_once() {
             .display()
             .to_string(),
     );
-    write(folder.path().join("one.yaml"), &text);
-    let rest = "robots:\n  - {recording: all.csv, by: cell, variable: part}\n";
-    let file = file(folder.path(), "line", rest);
-    let text = read(&file).replace(&super::pipeline().display().to_string(), "one.yaml");
-    std::fs::write(&file, text).unwrap();
-    let told = run(&file, &store, 0);
+    write(here.join("one.yaml"), &text);
+    let text = read(&line.file).replace(&super::pipeline().display().to_string(), "one.yaml");
+    std::fs::write(&line.file, text).unwrap();
+    let told = line.run(0);
     let names: Vec<&str> = told["robots"]
         .as_array()
         .unwrap()
@@ -147,9 +144,9 @@ fn one_big_table_is_parted_by_robot_once() {
         told["robots"][0]["after_rms_mm"].as_f64().unwrap() < 0.2,
         "{told}"
     );
-    assert_eq!(run(&file, &store, 0)["computed"].as_u64(), Some(0));
+    assert_eq!(line.run(0)["computed"].as_u64(), Some(0));
     // A row more of one robot is another recording of that one alone.
-    let mut all = read(folder.path().join("all.csv"));
+    let mut all = read(here.join("all.csv"));
     let last = all
         .lines()
         .next_back()
@@ -157,6 +154,6 @@ fn one_big_table_is_parted_by_robot_once() {
         .replacen("d\",", "d\",x", 1)
         + "\n";
     all.push_str(&last);
-    write(folder.path().join("all.csv"), &all);
-    assert_eq!(run(&file, &store, 0)["computed"].as_u64(), Some(1));
+    write(here.join("all.csv"), &all);
+    assert_eq!(line.run(0)["computed"].as_u64(), Some(1));
 }

@@ -1,21 +1,18 @@
 //! Targets, orientations and distances as tables: identified, stored and read back.
 
 use super::{Cell, THREE};
-use crate::desk::{Desk, identify_reads, table};
 use crate::fixture;
+use crate::recorded::{Recorded, settings};
 use calib::effect::Load;
 use calib::robot::{Measurements, Named, RobotModel};
 use calib::spatial::Pose;
-use calib::stage::{Identify, IdentifyReads};
-use calib::table::{
-    Observability, Parameters, Prediction, Recording, Robot, Split, SplitRow, Table,
-};
+use calib::table::{Observability, Parameters, Prediction, Recording, Table};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::json;
 use std::collections::BTreeMap;
 
 /// The cell as tables: the robot, a recording of it, and rows that are all to be fitted.
-fn tables(cell: &Cell, data: &Measurements) -> IdentifyReads {
+fn tables(cell: &Cell, data: &Measurements) -> Recorded {
     let rows = data.rows();
     let measured = |row: usize| {
         [0, 1, 2].map(|k| {
@@ -54,16 +51,7 @@ fn tables(cell: &Cell, data: &Measurements) -> IdentifyReads {
         ..Recording::default()
     };
     let recording = Recording::from_frame(&recording.to_frame().unwrap()).unwrap();
-    let split = |row: usize| SplitRow {
-        sequence: row as i64,
-        point_id: format!("P{row}"),
-        set: "fit".into(),
-    };
-    identify_reads(
-        Robot::from_description(&cell.description),
-        recording,
-        Split((0..rows).map(split).collect()),
-    )
+    Recorded::fitted(&cell.description, recording)
 }
 
 /// What is beside points, by setting.
@@ -105,14 +93,9 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
         data.points.sigma[row] = Vector3::repeat(f64::INFINITY);
         data.points.position[row] = Vector3::zeros();
     }
-    let reads = tables(&cell, &data);
-    let (description, recording) = (cell.description.clone(), reads.recording.clone());
-    let desk = Desk::default();
-    let stage: Identify =
-        serde_json::from_value(json!({"targets": {"A": [119.0, 1.0, 30.0]}, "screen": false}))
-            .unwrap();
-    let tables = desk.run(&stage, reads).unwrap();
-    let parameters = table::<Parameters>(&tables).remove(0);
+    let of = tables(&cell, &data);
+    let made = of.identify(json!({"targets": {"A": [119.0, 1.0, 30.0]}, "screen": false}));
+    let parameters: Parameters = made.get();
     let placed = |name: &str| {
         parameters
             .0
@@ -132,11 +115,15 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
         placed("anchor.N.x")
     );
     let model = parameters
-        .model(RobotModel::new(description), &[], Load::GravityTorque)
+        .model(
+            RobotModel::new(cell.description.clone()),
+            &[],
+            Load::GravityTorque,
+        )
         .unwrap();
-    let own = recording.measurements();
+    let own = of.recording.measurements();
     let errors = model.row_errors(&own);
-    let prediction = table::<Prediction>(&tables).remove(0);
+    let prediction: Prediction = made.get();
     for (row, error) in prediction.0.iter().zip(&errors) {
         assert!(
             (row.error_mm - error.length * 1e3).abs() < 1e-6,
@@ -152,7 +139,7 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
         );
     }
     let rank = |quantity: &str| {
-        let table = table::<Observability>(&tables).remove(0);
+        let table: Observability = made.get();
         table
             .0
             .iter()
@@ -168,12 +155,11 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
 #[test]
 fn a_target_that_the_recording_does_not_have_is_named_with_those_it_has() {
     let cell = Cell::new(fixture::offset_wrist(), &THREE, 9);
-    let stage: Identify =
-        serde_json::from_value(json!({"targets": {"D": [1.0, 2.0, 3.0]}})).unwrap();
-    let error = Desk::default()
-        .run(&stage, tables(&cell, &cell.rows(20, 0)))
-        .map(|_| ())
-        .expect_err("no such target");
+    let stage = settings(json!({"targets": {"D": [1.0, 2.0, 3.0]}}));
+    let error = tables(&cell, &cell.rows(20, 0))
+        .identify_by(&stage)
+        .err()
+        .unwrap();
     assert_eq!(error.exit_code(), 2);
     assert!(
         error

@@ -1,6 +1,7 @@
 //! Fabricated tables of a whole pipeline: an arm whose error each step makes smaller, with files, fits and a training.
 
 use super::validate;
+use crate::recorded::labelled;
 use calib::stage::{Labelled, ReportReads};
 use calib::table::*;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -28,14 +29,7 @@ pub fn point(
         dz_mm,
         error_mm: (dx_mm * dx_mm + dy_mm * dy_mm + dz_mm * dz_mm).sqrt(),
         noise_mm: 0.03 + 0.01 * (sequence % 2) as f64,
-        noise_basis: None,
-        sigma_mm: None,
-        fold_error_mm: None,
-        block_error_mm: None,
-        weight: None,
-        measured: None,
-        turn_rad: None,
-        remark: None,
+        ..Default::default()
     }
 }
 
@@ -123,106 +117,99 @@ fn parameter(
         }
         .into(),
         remark: remark.map(str::to_owned),
-        form: None,
-        corrects: None,
-        robot: None,
-        kinematics: None,
+        ..Default::default()
     }
 }
 
 fn parameters() -> Parameters {
     let mut rows = Vec::new();
-    for (axis, value) in ["x", "y", "z"].into_iter().zip([12.412, -3.207, 880.114]) {
-        let name = format!("base_frame.{axis}");
+    let mut add = |effect: &str,
+                   of: &str,
+                   [place, unit]: [&str; 2],
+                   numbers: [f64; 3],
+                   [status, remark]: [&str; 2]| {
+        let remark = Some(remark).filter(|remark| !remark.is_empty());
+        let name = format!("{effect}.{of}");
         rows.push(parameter(
-            &name,
+            &name, effect, place, unit, numbers, status, remark,
+        ));
+    };
+    let free = ["free", ""];
+    for (axis, value) in [("x", 12.412), ("y", -3.207), ("z", 880.114)] {
+        add(
             "base_frame",
-            "base",
-            "mm",
+            axis,
+            ["base", "mm"],
             [0.0, value, 0.0113],
-            "free",
-            None,
-        ));
+            free,
+        );
     }
-    rows.push(parameter(
-        "base_frame.rz",
+    add(
         "base_frame",
-        "base",
-        "rad",
+        "rz",
+        ["base", "rad"],
         [0.0, 0.002_341_7, 8.1e-6],
-        "free",
-        None,
-    ));
-    for j in 1..=6 {
-        let value = [3.1e-4, -1.2e-3, 7.7e-4, -2.0e-4, 1.1e-3, 0.0][j - 1];
-        let status = if j == 6 { "unseen" } else { "earlier" };
-        let sigma = if j == 6 { 0.0 } else { 9e-6 * j as f64 };
-        let remark = (j == 6).then_some("the measured point lies on the axis of joint 6");
-        let name = format!("joint_offset.j{j}");
-        rows.push(parameter(
-            &name,
-            "joint_offset",
-            &format!("joint {j}"),
-            "rad",
-            [0.0, value, sigma],
-            status,
-            remark,
-        ));
-    }
-    for (j, axis) in [(2, "x"), (2, "z"), (3, "x"), (3, "z"), (4, "y")] {
-        let redundant = (j, axis) == (3, "z");
-        let numbers = if redundant {
-            [0.0; 3]
+        free,
+    );
+    let last = ["unseen", "the measured point lies on the axis of joint 6"];
+    for (j, value) in (1..).zip([3.1e-4, -1.2e-3, 7.7e-4, -2.0e-4, 1.1e-3, 0.0]) {
+        let (sigma, says) = if j == 6 {
+            (0.0, last)
         } else {
-            [0.0, 0.31 * j as f64 - 0.9, 0.021]
+            (9e-6 * f64::from(j), ["earlier", ""])
         };
-        let remark =
-            redundant.then_some("does the same as link_geometry.l2.z with joint_offset.j2");
-        let status = if redundant { "redundant" } else { "free" };
-        let name = format!("link_geometry.l{j}.{axis}");
-        rows.push(parameter(
-            &name,
+        let place = format!("joint {j}");
+        add(
+            "joint_offset",
+            &format!("j{j}"),
+            [&place, "rad"],
+            [0.0, value, sigma],
+            says,
+        );
+    }
+    let same = [
+        "redundant",
+        "does the same as link_geometry.l2.z with joint_offset.j2",
+    ];
+    for (j, axis) in [(2, "x"), (2, "z"), (3, "x"), (3, "z"), (4, "y")] {
+        let (numbers, says) = if (j, axis) == (3, "z") {
+            ([0.0; 3], same)
+        } else {
+            ([0.0, 0.31 * f64::from(j) - 0.9, 0.021], free)
+        };
+        add(
             "link_geometry",
-            &format!("link {j}"),
-            "mm",
+            &format!("l{j}.{axis}"),
+            [&format!("link {j}"), "mm"],
             numbers,
-            status,
-            remark,
-        ));
+            says,
+        );
     }
     for j in 1..=6 {
-        let numbers = [1.0, 1.0 + 1.3e-4 * (j as f64 - 3.2), 6e-6];
-        rows.push(parameter(
-            &format!("reduction_ratio.j{j}"),
+        let numbers = [1.0, 1.0 + 1.3e-4 * (f64::from(j) - 3.2), 6e-6];
+        add(
             "reduction_ratio",
-            &format!("joint {j}"),
-            "1",
+            &format!("j{j}"),
+            [&format!("joint {j}"), "1"],
             numbers,
-            "free",
-            None,
-        ));
+            free,
+        );
     }
     for j in 2..=3 {
-        let numbers = [0.0, 4.1e-7 * j as f64, 1.2e-8];
-        let name = format!("joint_compliance.j{j}");
-        rows.push(parameter(
-            &name,
+        let numbers = [0.0, 4.1e-7 * f64::from(j), 1.2e-8];
+        add(
             "joint_compliance",
-            &format!("joint {j}"),
-            "rad/Nm",
+            &format!("j{j}"),
+            [&format!("joint {j}"), "rad/Nm"],
             numbers,
-            "free",
-            None,
-        ));
+            free,
+        );
     }
     Parameters(rows)
 }
 
-fn diagnosed<T>(table: T) -> Vec<Labelled<T>> {
-    vec![Labelled {
-        stage: "diagnose".into(),
-        table,
-    }]
+fn of<T>(stage: &str, table: T) -> Vec<Labelled<T>> {
+    vec![labelled(stage, table)]
 }
 
 fn verdict() -> Verdict {
@@ -240,18 +227,14 @@ fn verdict() -> Verdict {
         after_rms_mm: Some(0.037),
         after_max_mm: Some(0.08),
         leftover_rms_mm: Some(0.034),
-        noise_floor_rad: None,
-        before_rms_rad: None,
-        after_rms_rad: None,
-        leftover_rms_rad: None,
         chi_square: 1.02,
         p_before: Some(1e-12),
         p_after: Some(0.4),
         repeatability_rad: 2e-6,
         repeats: 0,
         points: 300,
-        signature: None,
         clock: Some("s".into()),
+        ..Default::default()
     }])
 }
 
@@ -295,17 +278,14 @@ pub fn findings() -> Findings {
         delta_bic: Some(330.0),
         heldout_gain_mm: Some(0.3),
         effect_rms_mm: Some(0.28),
-        heldout_gain_rad: None,
-        effect_rms_rad: None,
         probability: Some(0.85),
         place_probability: Some(0.95),
         none_probability: Some(0.05),
         valid_joint: Some(2),
         valid_from_rad: Some(-0.8),
         valid_to_rad: Some(1.1),
-        valid_from_mm: None,
-        valid_to_mm: None,
         forms: "[]".into(),
+        ..Default::default()
     }])
 }
 
@@ -366,30 +346,8 @@ fn robot(name: &str) -> Robot {
         point_z_mm: Some(point[2]),
         lower_rad: (kind == "revolute").then_some(-2.5),
         upper_rad: (kind == "revolute").then_some(2.5),
-        lower_mm: None,
-        upper_mm: None,
-        reduction_ratio: None,
-        motor_constant_nm_a: None,
         mass_kg: (kind == "tool").then_some(210.0),
-        centre_x_mm: None,
-        centre_y_mm: None,
-        centre_z_mm: None,
-        orientation_w: None,
-        orientation_x: None,
-        orientation_y: None,
-        orientation_z: None,
-        gravity_m_s2: None,
-        couplings: None,
-        inertia_xx_kg_m2: None,
-        inertia_xy_kg_m2: None,
-        inertia_xz_kg_m2: None,
-        inertia_yy_kg_m2: None,
-        inertia_yz_kg_m2: None,
-        inertia_zz_kg_m2: None,
-        tolerance_mass: None,
-        tolerance_centre_mm: None,
-        tolerance_inertia: None,
-        coulomb_nm: None,
+        ..Default::default()
     };
     let axes = [
         ([0.0, 0.0, 1.0], [0.0, 0.0, 0.0]),
@@ -421,10 +379,7 @@ fn fits() -> Vec<Labelled<Fit>> {
                 stop: (k == 7).then(|| "converged: gradient".into()),
             }
         });
-        Labelled {
-            stage: step.into(),
-            table: Fit(rows.collect()),
-        }
+        labelled(step, Fit(rows.collect()))
     };
     vec![fit("geometry", 2.4, 0.31), fit("stiffness", 1.5, 0.22)]
 }
@@ -472,10 +427,7 @@ fn observability() -> Vec<Labelled<Observability>> {
             "of the whitened Jacobian, columns scaled to unit prior sigma",
         )
     }));
-    vec![Labelled {
-        stage: "geometry".into(),
-        table: Observability(rows),
-    }]
+    of("geometry", Observability(rows))
 }
 
 fn training() -> Vec<Labelled<Training>> {
@@ -498,10 +450,7 @@ fn training() -> Vec<Labelled<Training>> {
     let rows = phase("swarm", 400, 0.62, 0.3)
         .chain(phase("gradient", 120, 0.3, 0.17))
         .collect();
-    vec![Labelled {
-        stage: "network".into(),
-        table: Training(rows),
-    }]
+    of("network", Training(rows))
 }
 
 fn corrections() -> Vec<Labelled<Corrections>> {
@@ -537,10 +486,7 @@ fn corrections() -> Vec<Labelled<Corrections>> {
             "it could not be fitted to these rows",
         ),
     ];
-    vec![Labelled {
-        stage: "network".into(),
-        table: Corrections(rows),
-    }]
+    of("network", Corrections(rows))
 }
 
 fn rejected(rows: i64) -> Vec<Labelled<Rejected>> {
@@ -555,10 +501,7 @@ fn rejected(rows: i64) -> Vec<Labelled<Rejected>> {
             k % 60
         ),
     };
-    vec![Labelled {
-        stage: "ingest".into(),
-        table: Rejected((0..rows).map(row).collect()),
-    }]
+    of("ingest", Rejected((0..rows).map(row).collect()))
 }
 
 /// The tables of a whole pipeline of a robot with this name.
@@ -601,33 +544,27 @@ pub fn tables(name: &str) -> ReportReads {
         statistics: validate(prediction.clone()),
         prediction: prediction
             .into_iter()
-            .map(|table| Labelled {
-                stage: "identify".into(),
-                table,
-            })
+            .map(|table| labelled("identify", table))
             .collect(),
         parameters: parameters(),
         robot: robot(name),
         recording,
         convention: vec![],
         split: Split(split),
-        intake: vec![Labelled {
-            stage: "ingest".into(),
-            table: Intake(vec![intake]),
-        }],
+        intake: of("ingest", Intake(vec![intake])),
         rejected: rejected(61),
         fit: fits(),
         observability: observability(),
         training: training(),
         corrections: corrections(),
         models: Vec::new(),
-        verdict: diagnosed(verdict()),
-        sentences: diagnosed(sentences()),
-        findings: diagnosed(findings()),
-        finding_numbers: diagnosed(numbers()),
-        rivals: diagnosed(rivals()),
-        forms: diagnosed(formulas()),
-        cells: diagnosed(cells()),
+        verdict: of("diagnose", verdict()),
+        sentences: of("diagnose", sentences()),
+        findings: of("diagnose", findings()),
+        finding_numbers: of("diagnose", numbers()),
+        rivals: of("diagnose", rivals()),
+        forms: of("diagnose", formulas()),
+        cells: of("diagnose", cells()),
         suspects: Vec::new(),
     }
 }

@@ -1,16 +1,13 @@
 //! What is missing is found where nothing but joints was recorded, and what befell ball and plates is said by rows.
 
-use super::dirty::all;
 use super::{fixture, socket, touched, touched_with, truth};
 use crate::answer::has;
-use crate::desk::{self, Desk, diagnose_reads};
+use crate::recorded::Recorded;
 use calib::description::RobotDescription;
-use calib::stage::Diagnose;
-use calib::table::{
-    Findings, Recording, Robot, Verdict, VerdictRow, VerdictSentences, VerdictTopic,
-};
+use calib::table::{Recording, VerdictRow, VerdictSentences, VerdictTopic};
 use calib::twin::touch::Fixture;
 use calib::twin::truth::TrueRobot;
+use serde_json::json;
 
 fn cell(points: usize) -> Vec<Fixture> {
     let places = [
@@ -41,27 +38,17 @@ fn diagnosed_with_sentences(
     robot: &RobotDescription,
     recording: Recording,
 ) -> (Vec<String>, VerdictRow, String, String) {
-    let split = all(&recording);
-    let desk = Desk::default();
-    let stage: Diagnose = serde_saphyr::from_str("{}").unwrap();
-    let tables = desk
-        .run(
-            &stage,
-            diagnose_reads(Robot::from_description(robot), recording, split),
-        )
-        .unwrap();
-    let findings = desk::table::<Findings>(&tables).remove(0).0;
-    let verdict = desk::table::<Verdict>(&tables).remove(0).0.remove(0);
-    let named = findings
+    let made = Recorded::fitted(robot, recording).diagnose(json!({}));
+    let verdict = made.verdict();
+    let named = made.named();
+    let named = named
         .iter()
-        .map(|finding| format!("{} at {}", finding.effect, finding.place))
-        .collect();
-    let warnings = desk.warnings.into_inner().unwrap().join("\n");
-    let sentences = desk::table::<VerdictSentences>(&tables).remove(0);
+        .map(|(effect, place)| format!("{effect} at {place}"));
+    let sentences: VerdictSentences = made.get();
     let unseen = sentences
         .about(&verdict.step, VerdictTopic::NotObservable)
         .join("\n");
-    (named, verdict, unseen, warnings)
+    (named.collect(), verdict, unseen, made.warnings)
 }
 
 #[test]

@@ -2,11 +2,11 @@
 
 use super::{fixture, plane, socket, sphere, touched, truth};
 use crate::answer::has;
-use crate::desk::{self, Desk, identify_reads};
+use crate::recorded::Recorded;
 use calib::description::RobotDescription;
 use calib::observation::{KINDS, RowView, Weight};
 use calib::stage::Identify;
-use calib::table::{Parameters, Recording, Robot, Split, SplitRow};
+use calib::table::{Parameters, Recording};
 use nalgebra::Vector3;
 
 pub const SETTINGS: &str = r#"
@@ -25,36 +25,13 @@ pub fn cell(points: usize) -> [calib::twin::touch::Fixture; 4] {
     ]
 }
 
-/// Every row to fit.
-pub fn all(recording: &Recording) -> Split {
-    let ids = recording.sequence.iter().zip(&recording.point_id);
-    Split(
-        ids.map(|(sequence, id)| SplitRow {
-            sequence: *sequence,
-            point_id: id.clone(),
-            set: "fit".into(),
-        })
-        .collect(),
-    )
-}
-
 /// All that an identification says, and its parameters.
 fn said(robot: &RobotDescription, recording: Recording, settings: &str) -> (String, Parameters) {
-    let split = all(&recording);
-    let desk = Desk::default();
     let stage: Identify = serde_saphyr::from_str(settings).unwrap();
-    let tables = desk
-        .run(
-            &stage,
-            identify_reads(Robot::from_description(robot), recording, split),
-        )
+    let made = Recorded::fitted(robot, recording)
+        .identify_by(&stage)
         .unwrap();
-    let parameters = desk::table::<Parameters>(&tables).remove(0);
-    let (warnings, notes) = (
-        desk.warnings.into_inner().unwrap(),
-        desk.notes.into_inner().unwrap(),
-    );
-    ([warnings, notes].concat().join("\n"), parameters)
+    ([&*made.warnings, &made.notes].join("\n"), made.get())
 }
 
 #[test]
@@ -147,7 +124,7 @@ fn names_that_the_recording_does_not_have_are_refused() {
         &[socket("a/0", [480.0, 120.0, 300.0], 9, 60.0)],
         5,
     );
-    let split = all(&recording);
+    let of = Recorded::fitted(&robot, recording);
     for (more, expected) in [
         (
             "distances: [{between: [a/0, a/7], mm: 50, sigma: 0.1}]",
@@ -159,17 +136,7 @@ fn names_that_the_recording_does_not_have_are_refused() {
         ),
     ] {
         let stage: Identify = serde_saphyr::from_str(more).unwrap();
-        let message = Desk::default()
-            .run(
-                &stage,
-                identify_reads(
-                    Robot::from_description(&robot),
-                    recording.clone(),
-                    split.clone(),
-                ),
-            )
-            .expect_err("refused")
-            .to_string();
+        let message = of.identify_by(&stage).err().unwrap().to_string();
         has(&message, expected);
     }
 }

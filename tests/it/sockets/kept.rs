@@ -1,11 +1,11 @@
 //! A model of sockets, planes and spheres is the same when it is read from its tables again.
 
 use super::{dirty, fixture, plane, socket, sphere, touched, truth};
-use crate::desk::{self, Desk, identify_reads};
+use crate::recorded::Recorded;
 use calib::effect::Load;
 use calib::robot::{Anchor, RobotModel};
 use calib::stage::Identify;
-use calib::table::{Parameters, Prediction, Robot};
+use calib::table::{Parameters, Prediction};
 use nalgebra::Vector3;
 
 #[test]
@@ -20,15 +20,11 @@ fn planes_and_spheres_stand_where_they_were_identified() {
     let robot = fixture::seven();
     let recording = touched(&robot, &truth(&robot, 12), &things, 12);
     let stage: Identify = serde_saphyr::from_str(dirty::SETTINGS).unwrap();
-    let (data, split) = (recording.measurements(), dirty::all(&recording));
-    let tables = Desk::default()
-        .run(
-            &stage,
-            identify_reads(Robot::from_description(&robot), recording, split),
-        )
+    let data = recording.measurements();
+    let made = Recorded::fitted(&robot, recording)
+        .identify_by(&stage)
         .unwrap();
-    let parameters = desk::table::<Parameters>(&tables).remove(0);
-    let prediction = desk::table::<Prediction>(&tables).remove(0);
+    let (parameters, prediction): (Parameters, Prediction) = (made.get(), made.get());
     let model = parameters
         .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
         .unwrap();

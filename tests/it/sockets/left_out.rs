@@ -2,7 +2,8 @@
 
 use super::dirty::{SETTINGS, cell};
 use super::{fixture, touched, truth};
-use crate::desk::{Desk, identify_reads, table};
+use crate::recorded::{Recorded, tried};
+use calib::description::RobotDescription;
 use calib::stage::Identify;
 use calib::stage::split::{SplitBy, SplitReads};
 use calib::table::{Prediction, PredictionRow, Recording, Robot, Split};
@@ -11,30 +12,32 @@ use calib::twin::touch::Fixture;
 fn split(yaml: &str, recording: &Recording) -> Result<Split, String> {
     let options = serde_saphyr::options! { strict_booleans: true };
     let settings: SplitBy = serde_saphyr::from_str_with_options(yaml, options).unwrap();
-    let tables = Desk::default()
-        .run(
-            &settings,
-            SplitReads {
-                recording: recording.clone(),
-            },
-        )
-        .map_err(|error| error.to_string())?;
-    Ok(table::<Split>(&tables).remove(0))
+    let recording = recording.clone();
+    let made = tried(&settings, SplitReads { recording });
+    made.map(|made| made.get())
+        .map_err(|error| error.to_string())
+}
+
+/// Predictions of an identification by the rows that a split says.
+fn predicted(robot: &RobotDescription, recording: Recording, yaml: &str) -> Vec<PredictionRow> {
+    let of = Recorded {
+        robot: Robot::from_description(robot),
+        split: split(yaml, &recording).unwrap(),
+        recording,
+    };
+    let stage: Identify = serde_saphyr::from_str(SETTINGS).unwrap();
+    of.identify_by(&stage).unwrap().get::<Prediction>().0
 }
 
 #[test]
 fn a_place_that_no_row_was_fitted_to_closes_as_well_as_the_others() {
     let robot = fixture::seven();
     let recording = touched(&robot, &truth(&robot, 6), &cell(30), 6);
-    let split = split("{by: named, column: socket, names: [b/*]}", &recording).unwrap();
-    let stage: Identify = serde_saphyr::from_str(SETTINGS).unwrap();
-    let tables = Desk::default()
-        .run(
-            &stage,
-            identify_reads(Robot::from_description(&robot), recording, split),
-        )
-        .unwrap();
-    let rows = table::<Prediction>(&tables).remove(0).0;
+    let rows = predicted(
+        &robot,
+        recording,
+        "{by: named, column: socket, names: [b/*]}",
+    );
     let mean = |rows: &[&PredictionRow], error: fn(&PredictionRow) -> Option<f64>| {
         let all: Vec<f64> = rows.iter().filter_map(|row| error(row)).collect();
         assert_eq!(all.len(), 60);
@@ -59,18 +62,7 @@ fn a_place_that_no_row_was_fitted_to_closes_as_well_as_the_others() {
 fn blocks_of_a_cross_validation_are_whole_places() {
     let robot = fixture::seven();
     let recording = touched(&robot, &truth(&robot, 8), &cell(30), 8);
-    let all = split("{by: order, sets: [{set: fit}]}", &recording).unwrap();
-    let stage: Identify = serde_saphyr::from_str(SETTINGS).unwrap();
-    let rows = table::<Prediction>(
-        &Desk::default()
-            .run(
-                &stage,
-                identify_reads(Robot::from_description(&robot), recording, all),
-            )
-            .unwrap(),
-    )
-    .remove(0)
-    .0;
+    let rows = predicted(&robot, recording, "{by: order, sets: [{set: fit}]}");
     let mean = |error: fn(&PredictionRow) -> Option<f64>| {
         rows.iter().filter_map(error).sum::<f64>() / rows.len() as f64
     };

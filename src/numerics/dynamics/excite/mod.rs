@@ -7,7 +7,7 @@ mod series;
 use super::arm::{DynamicArm, inertial_name, inertial_unit};
 use super::scene::ends;
 use crate::error::{Error, Fault, Result};
-use crate::estimate::swarm::{Budget, ParticleSwarm, SearchBox, minimise};
+use crate::estimate::swarm::{Algorithm, Budget, SearchBox};
 use information::{Information, base_of};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -128,16 +128,7 @@ pub fn excite(arm: &DynamicArm, request: &ExciteRequest) -> Result<ExcitingMotio
         jobs: request.jobs,
     };
     let objective = |x: &[f64]| -of(x).log_determinant();
-    let found = minimise(
-        &ParticleSwarm {
-            particles: 40,
-            ..ParticleSwarm::default()
-        },
-        &objective,
-        &bounds,
-        &budget,
-        |_, _| (),
-    );
+    let found = Algorithm::Pso.minimise(40, &objective, &bounds, &budget, |_, _| ());
     let best = of(&found.position);
     let others: Vec<_> = draws.iter().map(|x| of(x)).collect();
     let fine = SeriesBasis::new(request.seconds, request.rate, request.harmonics);

@@ -1,19 +1,13 @@
-//! Derivative-free minimisation within bounds by swarms: one file per method, one loop for all.
+//! Derivative-free minimisation within bounds by swarms: one state and one loop for all, a generation of each method in `steps`.
 //!
-//! A [`Method`] says how its first generation starts and how it goes on; [`minimise`] counts, records and stops. Random numbers
-//! are drawn on one thread and only evaluations are spread, so the result is the same for any number of threads.
-//!
-//! The five optimisers by name, with the parameters of their papers.
+//! [`Algorithm::minimise`] counts, records and stops. Random numbers are drawn on one thread and only evaluations are spread, so the
+//! result is the same for any number of threads.
 //!
 //! Functions with known minima on which optimisers are compared.
 //!
 //! Michalewicz is Eq. 35 of Wang et al. (2020) with its sign, `-sum sin(x_i) sin(i x_i^2 / pi)^20` on `[0, pi]^n`; the others as in
 //! Jamil and Yang (2013), minimum 0.
 
-pub use crate::estimate::swarm::bee_colony::BeeColony;
-pub use crate::estimate::swarm::beetle_swarm::{BeetleAntennae, BeetleSwarm};
-pub use crate::estimate::swarm::genetic::Genetic;
-pub use crate::estimate::swarm::particle_swarm::ParticleSwarm;
 use crate::estimate::threads::in_order;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -21,10 +15,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{E, PI};
 
-mod bee_colony;
-mod beetle_swarm;
-mod genetic;
-mod particle_swarm;
+mod steps;
+
+pub use steps::Found;
+use steps::{ELITE, Swarm, ranked};
 
 /// A function to be made small. Values that are no number count as infinitely bad.
 pub trait Objective: Sync {
@@ -82,6 +76,12 @@ impl SearchBox {
             *value = if above > *upper { *upper } else { above };
         }
     }
+    /// A point moved along a direction, within the box.
+    fn moved(&self, x: &[f64], by: f64, direction: &[f64]) -> Vec<f64> {
+        let mut moved: Vec<f64> = x.iter().zip(direction).map(|(x, d)| x + by * d).collect();
+        self.clamp(&mut moved);
+        moved
+    }
     /// A point anywhere in the box.
     pub(super) fn random(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
         (0..self.dimensions())
@@ -137,7 +137,7 @@ pub struct SwarmResult {
     /// The value there.
     pub value: f64,
     /// The best position of each individual with its value, best first.
-    pub elite: Vec<(f64, Vec<f64>)>,
+    pub elite: Vec<Found>,
     /// Generation by generation.
     pub history: Vec<Generation>,
     /// How often the function was asked.
@@ -146,24 +146,8 @@ pub struct SwarmResult {
     pub stop: SearchStop,
 }
 
-/// A swarm optimiser: plain parameters, with the state of a search apart from them.
-pub trait Method {
-    /// What it keeps from generation to generation.
-    type State;
-    /// Evaluations of the first generation.
-    fn first(&self) -> usize;
-    /// Evaluations of each further generation.
-    fn further(&self) -> usize;
-    /// The first generation, visited.
-    fn start<O: Objective>(&self, search: &mut Search<O>) -> Self::State;
-    /// One generation further.
-    fn step<O: Objective>(&self, state: &mut Self::State, search: &mut Search<O>);
-    /// The best position of each individual so far with its value, in any order.
-    fn elite(&self, state: &Self::State) -> Vec<(f64, Vec<f64>)>;
-}
-
 /// A search under way, as a method sees it.
-pub struct Search<'a, O: Objective> {
+struct Search<'a, O: Objective> {
     objective: &'a O,
     bounds: &'a SearchBox,
     rng: ChaCha8Rng,
@@ -174,7 +158,7 @@ pub struct Search<'a, O: Objective> {
     generation: usize,
     generations: usize,
     evaluations: u64,
-    best: (f64, Vec<f64>),
+    best: Found,
     mean: f64,
 }
 
@@ -219,74 +203,6 @@ impl<O: Objective> Search<'_, O> {
     }
 }
 
-/// Keeps what each individual found better than before.
-fn remember(best: &mut [(f64, Vec<f64>)], positions: &[Vec<f64>], values: &[f64]) {
-    for ((best, position), value) in best.iter_mut().zip(positions).zip(values) {
-        if *value < best.0 {
-            *best = (*value, position.clone());
-        }
-    }
-}
-
-/// Minimises `objective` within `bounds`; `observe` is called once per generation with the best position so far.
-pub fn minimise<M: Method, O: Objective>(
-    method: &M,
-    objective: &O,
-    bounds: &SearchBox,
-    budget: &Budget,
-    mut observe: impl FnMut(&Generation, &[f64]),
-) -> SwarmResult {
-    let mut search = Search {
-        objective,
-        bounds,
-        rng: ChaCha8Rng::seed_from_u64(budget.seed),
-        jobs: budget.jobs,
-        scratch: objective.scratch(),
-        generation: 0,
-        generations: budget.generations,
-        evaluations: 0,
-        best: (f64::INFINITY, Vec::new()),
-        mean: f64::INFINITY,
-    };
-    let mut state = method.start(&mut search);
-    let mut history = Vec::with_capacity(budget.generations + 1);
-    let stop = loop {
-        let generation = Generation {
-            index: search.generation,
-            best: search.best.0,
-            mean: search.mean,
-            evaluations: search.evaluations,
-        };
-        observe(&generation, &search.best.1);
-        history.push(generation);
-        if budget.target.is_some_and(|target| search.best.0 <= target) {
-            break SearchStop::Target;
-        }
-        if search.generation >= budget.generations {
-            break SearchStop::Generations;
-        }
-        if budget
-            .evaluations
-            .is_some_and(|most| search.evaluations >= most)
-        {
-            break SearchStop::Evaluations;
-        }
-        search.generation += 1;
-        method.step(&mut state, &mut search);
-    };
-    let mut elite = method.elite(&state);
-    elite.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (value, position) = search.best;
-    SwarmResult {
-        position,
-        value,
-        elite,
-        history,
-        evaluations: search.evaluations,
-        stop,
-    }
-}
-
 /// An optimiser with the parameters of its paper.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
@@ -305,46 +221,6 @@ pub enum Algorithm {
     Abc,
 }
 
-/// Runs the body with `$method` bound to the optimiser of a population.
-macro_rules! with {
-    ($algorithm:expr, $population:expr, |$method:ident| $body:expr) => {
-        match $algorithm {
-            Algorithm::Bas => {
-                let $method = BeetleAntennae::default();
-                $body
-            }
-            Algorithm::Bso => {
-                let $method = BeetleSwarm {
-                    beetles: $population,
-                    ..BeetleSwarm::default()
-                };
-                $body
-            }
-            Algorithm::Pso => {
-                let $method = ParticleSwarm {
-                    particles: $population,
-                    ..ParticleSwarm::default()
-                };
-                $body
-            }
-            Algorithm::Ga => {
-                let $method = Genetic {
-                    individuals: $population,
-                    ..Genetic::default()
-                };
-                $body
-            }
-            Algorithm::Abc => {
-                let $method = BeeColony {
-                    sources: $population.div_ceil(2),
-                    ..BeeColony::default()
-                };
-                $body
-            }
-        }
-    };
-}
-
 impl Algorithm {
     /// All of them, as tables list them.
     pub const ALL: [Self; 5] = [Self::Bas, Self::Bso, Self::Pso, Self::Ga, Self::Abc];
@@ -360,35 +236,104 @@ impl Algorithm {
         }
     }
 
+    /// Individuals of a `population`: a lone beetle has none with it, half of a colony's bees have a source each.
+    fn size(self, population: usize) -> usize {
+        match self {
+            Self::Bas => 1,
+            Self::Abc => population.div_ceil(2),
+            Self::Bso | Self::Pso | Self::Ga => population,
+        }
+    }
+
+    /// Evaluations of each generation after the first; a colony's scouts, at most one a generation, come on top.
+    fn further(self, size: usize) -> usize {
+        match self {
+            Self::Bas | Self::Bso => 3 * size,
+            Self::Pso => size,
+            Self::Ga => size.saturating_sub(ELITE),
+            Self::Abc => 2 * size,
+        }
+    }
+
     /// Generations of a `population` that fit into so many evaluations.
     pub fn generations(self, population: usize, evaluations: u64) -> usize {
-        with!(self, population, |method| {
-            let left = evaluations.saturating_sub(method.first() as u64);
-            (left / method.further().max(1) as u64) as usize
-        })
+        let size = self.size(population);
+        let left = evaluations.saturating_sub(size as u64);
+        (left / self.further(size).max(1) as u64) as usize
     }
 
     /// Evaluations that `generations` of a `population` take; a colony's scouts come on top.
     pub fn evaluations(self, population: usize, generations: usize) -> u64 {
-        with!(
-            self,
-            population,
-            |method| (method.first() + generations * method.further()) as u64
-        )
+        let size = self.size(population);
+        (size + generations * self.further(size)) as u64
     }
 
-    /// Minimises with a `population` (at least 4; a lone beetle has none); see [`minimise`].
+    /// Minimises with a `population` (at least 4; a lone beetle has none) within `bounds`; `observe` is called once per generation with the
+    /// best position so far.
     pub fn minimise<O: Objective>(
         self,
         population: usize,
         objective: &O,
         bounds: &SearchBox,
         budget: &Budget,
-        observe: impl FnMut(&Generation, &[f64]),
+        mut observe: impl FnMut(&Generation, &[f64]),
     ) -> SwarmResult {
-        with!(self, population, |method| minimise(
-            &method, objective, bounds, budget, observe
-        ))
+        let mut search = Search {
+            objective,
+            bounds,
+            rng: ChaCha8Rng::seed_from_u64(budget.seed),
+            jobs: budget.jobs,
+            scratch: objective.scratch(),
+            generation: 0,
+            generations: budget.generations,
+            evaluations: 0,
+            best: (f64::INFINITY, Vec::new()),
+            mean: f64::INFINITY,
+        };
+        let flies = matches!(self, Self::Bso | Self::Pso);
+        let mut swarm = Swarm::start(self.size(population), flies, &mut search);
+        let mut history = Vec::with_capacity(budget.generations + 1);
+        let stop = loop {
+            let generation = Generation {
+                index: search.generation,
+                best: search.best.0,
+                mean: search.mean,
+                evaluations: search.evaluations,
+            };
+            observe(&generation, &search.best.1);
+            history.push(generation);
+            if budget.target.is_some_and(|target| search.best.0 <= target) {
+                break SearchStop::Target;
+            }
+            if search.generation >= budget.generations {
+                break SearchStop::Generations;
+            }
+            if budget
+                .evaluations
+                .is_some_and(|most| search.evaluations >= most)
+            {
+                break SearchStop::Evaluations;
+            }
+            search.generation += 1;
+            match self {
+                Self::Bas => swarm.antennae_search(&mut search),
+                Self::Bso => swarm.beetle_swarm(&mut search),
+                Self::Pso => swarm.particle_swarm(&mut search),
+                Self::Ga => swarm.genetic(&mut search),
+                Self::Abc => swarm.bee_colony(&mut search),
+            }
+        };
+        let mut elite = swarm.best;
+        ranked(&mut elite);
+        let (value, position) = search.best;
+        SwarmResult {
+            position,
+            value,
+            elite,
+            history,
+            evaluations: search.evaluations,
+            stop,
+        }
     }
 }
 
