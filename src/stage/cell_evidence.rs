@@ -37,7 +37,7 @@ pub struct Given {
 }
 
 crate::stage::stage! {
-    CellEvidence, "cell_evidence", 5, "says what every possible cause explains of one robot, for the sum over a fleet",
+    CellEvidence, "cell_evidence", 6, "says what every possible cause explains of one robot, for the sum over a fleet",
         DiagnoseReads -> CellEvidenceWrites {
             cell_evidence: CellEvidenceTable,
         }
@@ -85,7 +85,7 @@ pub struct TorqueEvidence {
 }
 
 crate::stage::stage! {
-    TorqueEvidence, "torque_evidence", 1, "says what every possible cause explains of the torques of one robot",
+    TorqueEvidence, "torque_evidence", 2, "says what every possible cause explains of the torques of one robot",
         DiagnoseTorquesReads -> TorqueEvidenceWrites {
             cell_evidence: CellEvidenceTable,
         }
@@ -143,6 +143,7 @@ fn table(answers: Vec<CellAnswer>, (unit, per_si): (&str, f64)) -> CellEvidenceT
         sigma: answer
             .sigma
             .map(|sigma| rounded(1e3 * per_si * sigma) / 1e3),
+        log_ratio: answer.log_ratio.map(rounded),
         unit: unit.into(),
     };
     let mut rows: Vec<CellEvidenceRow> = answers

@@ -1,13 +1,15 @@
-//! Robots on a cluster: what is asked of it, and the wait for their records.
+//! Where robots are computed, here or on a cluster: what is asked of it, and the wait for their records.
 
-use super::super::surroundings::program;
+use super::super::surroundings::{cores, program};
+use super::records;
 use crate::error::{Error, Fault, Result, counted};
 use crate::fleet::cluster::ClusterOptions;
 use crate::fleet::ledger::RunNote;
+use crate::fleet::local::{self, FleetResults};
 use crate::fleet::slurm::{self, Waited};
 use crate::fleet::{Ending, Workshop};
-use crate::progress::FleetProgress;
-use clap::Args;
+use crate::progress::{FleetProgress, Verbosity};
+use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
 #[derive(Args)]
@@ -68,8 +70,79 @@ impl ClusterArguments {
     }
 }
 
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Engine {
+    /// Threads of this process
+    Local,
+    /// Arrays of jobs on a Slurm cluster that shares the store
+    Slurm,
+}
+
+/// Who computes robots.
+#[derive(Args)]
+pub(super) struct EngineArguments {
+    /// Robots at once on this machine; no result depends on it [default: all cores]
+    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Where the robots are computed
+    #[arg(long, value_enum, default_value_t = Engine::Local)]
+    engine: Engine,
+    #[command(flatten)]
+    cluster: ClusterArguments,
+}
+
+impl EngineArguments {
+    /// Bars on a terminal, of so many robots.
+    pub(super) fn progress(&self, quiet: bool, robots: usize) -> FleetProgress {
+        let verbosity = match quiet {
+            true => Verbosity::Quiet,
+            false => Verbosity::Normal,
+        };
+        let workers = match self.engine {
+            Engine::Local => self.workers(),
+            Engine::Slurm => 0,
+        };
+        FleetProgress::new(verbosity, workers, robots)
+    }
+
+    fn workers(&self) -> usize {
+        self.jobs.map_or_else(cores, usize::from)
+    }
+
+    /// Computes robots that have no record; gives the records of the whole fleet, or nothing where the wait is the person's.
+    pub(super) fn work(
+        &self,
+        workshop: &Workshop,
+        note: &mut RunNote,
+        chosen: &[usize],
+        fail_fast: bool,
+        progress: &FleetProgress,
+    ) -> Result<Option<FleetResults>> {
+        if self.engine == Engine::Slurm {
+            note.engine = "slurm".into();
+            let Some(computed) = on_slurm(workshop, note, chosen, &self.cluster, progress)? else {
+                return Ok(None);
+            };
+            let records = records(workshop)?;
+            return Ok(Some(FleetResults { records, computed }));
+        }
+        workshop.ledger.put_run(note)?;
+        let options = local::WorkerOptions {
+            workers: self.workers(),
+            fail_fast,
+            stop: &|| workshop.ledger.cancelled(&note.run),
+        };
+        let mut worked = local::work(workshop, chosen, &options, progress)?;
+        // Of robots outside of what was asked for, what is known stays known.
+        if worked.records.iter().any(Option::is_none) {
+            worked.records = records(workshop)?;
+        }
+        Ok(Some(worked))
+    }
+}
+
 /// Submits what has no record and waits for it; gives how many were computed, or nothing where the wait is the person's.
-pub(super) fn on_slurm(
+fn on_slurm(
     workshop: &Workshop,
     note: &mut RunNote,
     chosen: &[usize],

@@ -1,15 +1,14 @@
 //! `calib fleet diagnose`: causes that the robots of a model have in common.
 
-use super::super::surroundings::{cores, surroundings};
+use super::super::surroundings::surroundings;
 use super::super::{emit, emit_json};
-use super::cluster::{ClusterArguments, on_slurm};
-use super::run::{Engine, note, sound};
-use super::{FleetLocation, records, workshop};
+use super::cluster::EngineArguments;
+use super::run::{note, sound};
+use super::{FleetLocation, workshop};
 use crate::error::{Error, Result, counted, visible};
 use crate::fleet::causes::{self, CauseSearch, Published};
 use crate::fleet::round::GroupColumn;
-use crate::fleet::{Ending, Fleet, local};
-use crate::progress::{FleetProgress, Verbosity};
+use crate::fleet::{Ending, Fleet};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::ffi::OsString;
@@ -28,14 +27,8 @@ pub(super) struct FleetDiagnoseArguments {
     /// Label of the roster by which robots are grouped
     #[arg(long, value_enum, default_value_t = By::Model)]
     by: By,
-    /// Robots at once on this machine; no result depends on it [default: all cores]
-    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
-    /// Where the robots are computed
-    #[arg(long, value_enum, default_value_t = Engine::Local)]
-    engine: Engine,
     #[command(flatten)]
-    cluster: ClusterArguments,
+    engine: EngineArguments,
     /// Prints one JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -77,40 +70,19 @@ impl FleetDiagnoseArguments {
         workshop.round = Some(search.round().clone());
         sound(&workshop)?;
         let chosen: Vec<usize> = (0..fleet.roster.0.len()).collect();
-        let verbosity = if self.quiet {
-            Verbosity::Quiet
-        } else {
-            Verbosity::Normal
-        };
         let mut computed = 0;
         let last = loop {
             let mut note = note(&fleet, &self.place, &fresh().run_id)?;
             note.round.clone_from(&workshop.round);
-            let slurm = self.engine == Engine::Slurm;
-            let workers = self.jobs.map_or_else(cores, usize::from);
-            let shown = if slurm { 0 } else { workers };
-            let progress = FleetProgress::new(verbosity, shown, chosen.len());
-            let records = if slurm {
-                note.engine = "slurm".into();
-                let waited = on_slurm(&workshop, &mut note, &chosen, &self.cluster, &progress);
-                let Some(now) = waited? else {
-                    return emit(
-                        "submitted the robots of one round; the same command again goes on\n",
-                    );
-                };
-                computed += now;
-                records(&workshop)?
-            } else {
-                workshop.ledger.put_run(&note)?;
-                let options = local::WorkerOptions {
-                    workers,
-                    fail_fast: false,
-                    stop: &|| workshop.ledger.cancelled(&note.run),
-                };
-                let worked = local::work(&workshop, &chosen, &options, &progress)?;
-                computed += worked.computed;
-                worked.records
+            let progress = self.engine.progress(self.quiet, chosen.len());
+            let worked = self
+                .engine
+                .work(&workshop, &mut note, &chosen, false, &progress)?;
+            let Some(worked) = worked else {
+                return emit("submitted the robots of one round; the same command again goes on\n");
             };
+            computed += worked.computed;
+            let records = worked.records;
             let missing = records.iter().filter(|record| record.is_none()).count();
             if missing > 0 {
                 let message = format!("{} not computed yet; run again", counted(missing, "robot"));
