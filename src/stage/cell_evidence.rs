@@ -12,16 +12,21 @@ use crate::table::{CellEvidence as CellEvidenceTable, CellEvidenceRow};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Settings of `cell_evidence`.
+/// Settings of both: those of the diagnosis in whose place it is.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct CellEvidence {
-    /// Settings as of a stage `diagnose`.
-    pub(crate) diagnose: Diagnose,
+pub struct Evidence<D> {
+    /// Settings as of a stage `diagnose`, or `diagnose_torques`.
+    pub(crate) diagnose: D,
     /// Cells that are taken to be in the robot.
     #[serde(default)]
     pub(crate) given: Vec<Given>,
 }
+
+/// Of positions.
+pub type CellEvidence = Evidence<Diagnose>;
+/// Of torques.
+pub type TorqueEvidence = Evidence<DiagnoseTorques>;
 
 /// A cell that is taken to be in the robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -73,22 +78,9 @@ impl Stage for CellEvidence {
     }
 }
 
-/// Settings of `torque_evidence`.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TorqueEvidence {
-    /// Settings as of a stage `diagnose_torques`.
-    pub(crate) diagnose: DiagnoseTorques,
-    /// Cells that are taken to be in the robot.
-    #[serde(default)]
-    pub(crate) given: Vec<Given>,
-}
-
 crate::stage::stage! {
     TorqueEvidence, "torque_evidence", 2, "says what every possible cause explains of the torques of one robot",
-        DiagnoseTorquesReads -> TorqueEvidenceWrites {
-            cell_evidence: CellEvidenceTable,
-        }
+        DiagnoseTorquesReads -> CellEvidenceWrites
 }
 
 impl Stage for TorqueEvidence {
@@ -97,12 +89,12 @@ impl Stage for TorqueEvidence {
         must_have_sizes(&self.given, at);
     }
 
-    fn run(&self, reads: DiagnoseTorquesReads, context: &Context) -> Result<TorqueEvidenceWrites> {
+    fn run(&self, reads: DiagnoseTorquesReads, context: &Context) -> Result<CellEvidenceWrites> {
         let (arm, recording, question) = self.diagnose.asked(&reads, context)?;
         let given = cells(&self.given, 1.0);
         let tell = &mut |line| context.note(line);
         let answers = dynamics::cell_evidence(&arm, &recording, &question, &given, tell)?;
-        Ok(TorqueEvidenceWrites {
+        Ok(CellEvidenceWrites {
             cell_evidence: table(answers, ("Nm", 1.0)),
         })
     }

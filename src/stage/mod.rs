@@ -30,9 +30,7 @@ mod stiffness;
 mod transfer;
 mod validate;
 
-pub use cell_evidence::{
-    CellEvidence, CellEvidenceWrites, Given, TorqueEvidence, TorqueEvidenceWrites,
-};
+pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given, TorqueEvidence};
 pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};
 use diagnose::AskedRows;
