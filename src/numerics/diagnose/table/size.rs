@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 pub struct SizeEvidence {
     /// The likeliest, in the unit of the columns.
     pub size: f64,
-    /// By how much more ln of the likelihood is less by a half.
+    /// Half of by how much more ln of the likelihood is less by two.
     pub sigma: f64,
     /// ln of the likelihood at that size over that of none.
     pub log_ratio: f64,
@@ -82,10 +82,10 @@ pub fn rms_size(
         ratio if best > 0 && ratio > 0.0 => (peak, ratio),
         _ => (0.0, 0.0),
     };
-    let (mut low, mut high) = (size.max(1e-6 * most), size.max(1e-6 * most) + most);
+    let (mut low, mut high) = (size.max(1e-6 * most), size.max(1e-6 * most) + 2.0 * most);
     for _ in 0..STEPS {
         let middle = (low + high) / 2.0;
-        if log(middle) > log_ratio - 0.5 {
+        if log(middle) > log_ratio - 2.0 {
             low = middle;
         } else {
             high = middle;
@@ -93,7 +93,7 @@ pub fn rms_size(
     }
     Some(SizeEvidence {
         size,
-        sigma: high - size,
+        sigma: (high - size) / 2.0,
         log_ratio,
     })
 }
@@ -192,8 +192,8 @@ mod tests {
             let found = one_case(2, along);
             assert!((found.size - size).abs() < 0.05, "{found:?} {size}");
             assert!((found.log_ratio - log).abs() < 0.15, "{found:?} {log}");
-            let half = by_hand(found.size + found.sigma);
-            assert!((log - half - 0.5).abs() < 0.15, "{found:?} {half}");
+            let off = by_hand(found.size + 2.0 * found.sigma);
+            assert!((log - off - 2.0).abs() < 0.3, "{found:?} {off}");
         }
     }
 
