@@ -164,7 +164,7 @@ impl TorqueTable<'_, '_> {
         let cell = self.cell_of[&own.form];
         let (gram, along) = self.seen(own.form, state);
         let prior = vec![own.amplitude.powi(2) / along.len() as f64; along.len()];
-        let found = rms_size(&gram, &along, &self.forms[own.form].0, &prior)?;
+        let found = rms_size(&gram, &along, &prior)?;
         let unit = self.newton_metres(own.form);
         let TorqueCell {
             name,

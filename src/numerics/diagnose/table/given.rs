@@ -311,6 +311,6 @@ impl CauseTable<'_, '_> {
         let prior: Vec<f64> = prior
             .map(|share| own.amplitude * own.amplitude * share)
             .collect();
-        rms_size(&gram, &gradient, &whole, &prior)
+        rms_size(&gram, &gradient, &prior)
     }
 }

@@ -22,12 +22,11 @@ const STEPS: usize = 40;
 /// Sizes that are looked at before the likeliest is sought among them.
 const SIZES: usize = 24;
 
-/// The size of columns of unit rms by their products seen through a model, their products with each other alone, and their variances
-/// beforehand.
+/// The size of columns of unit rms by their products seen through a model and their variances beforehand: of what is seen, by how much of
+/// such a motion is seen on average, as what a model absorbs might have any size.
 pub fn rms_size(
     gram: &DMatrix<f64>,
     gradient: &DVector<f64>,
-    whole: &DMatrix<f64>,
     prior: &[f64],
 ) -> Option<SizeEvidence> {
     let seen: Vec<usize> = (0..prior.len()).filter(|k| prior[*k] > 0.0).collect();
@@ -39,7 +38,8 @@ pub fn rms_size(
             if i == j { prior[seen[i]] } else { 0.0 }
         },
     );
-    let mut precision = DMatrix::from_fn(count, count, |i, j| gram[(seen[i], seen[j])]);
+    let products = DMatrix::from_fn(count, count, |i, j| gram[(seen[i], seen[j])]);
+    let mut precision = products.clone();
     (0..count).for_each(|i| precision[(i, i)] += 1.0 / prior[seen[i]]);
     let along = DVector::from_fn(count, |i, _| gradient[seen[i]]);
     let factor = precision.cholesky()?;
@@ -48,13 +48,11 @@ pub fn rms_size(
         .sum();
     let mean = factor.solve(&along);
     let log_evidence = 0.5 * (along.dot(&mean) - log_determinant);
-    // Coordinates in which the square of the rms motion is a sum of squares.
-    let length = |k: usize| whole[(k, k)].sqrt().max(f64::MIN_POSITIVE);
-    let alike = DMatrix::from_fn(count, count, |i, j| {
-        let same = if i == j { 1e-9 } else { 0.0 };
-        whole[(seen[i], seen[j])] / length(seen[i]) / length(seen[j]) + same
-    });
-    let root = alike.cholesky()?.l().transpose();
+    // Coordinates in which the square of the size is a sum of squares.
+    let all: f64 = seen.iter().map(|k| prior[*k]).sum();
+    let mean_seen = (before.component_mul(&products)).trace() / all;
+    let jitter = DMatrix::from_diagonal_element(count, count, 1e-6);
+    let root = (products / mean_seen + jitter).cholesky()?.l().transpose();
     let after = SymmetricEigen::new(&root * factor.inverse() * root.transpose());
     let after = Squares {
         variances: after.eigenvalues.as_slice().to_vec(),
@@ -158,8 +156,7 @@ mod tests {
         let gram = DMatrix::from_diagonal_element(columns, columns, 4.0);
         let mut gradient = DVector::zeros(columns);
         gradient[columns - 1] = along;
-        let whole = DMatrix::identity(columns, columns);
-        rms_size(&gram, &gradient, &whole, &vec![9.0; columns]).unwrap()
+        rms_size(&gram, &gradient, &vec![9.0; columns]).unwrap()
     }
 
     fn peak(log: impl Fn(f64) -> f64) -> (f64, f64) {
