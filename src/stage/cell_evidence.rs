@@ -1,7 +1,6 @@
 //! `cell_evidence`: what every cell of the table of causes says of a robot given cells that its fleet has accepted. `calib fleet diagnose` puts
 //! it in the place of a stage `diagnose`, with that stage's settings; `torque_evidence` in that of a stage `diagnose_torques`.
 
-use crate::criteria::fleet::LEAST_EVIDENCE;
 use crate::diagnose::{CellAnswer, GivenCell, cell_evidence};
 use crate::dynamics;
 use crate::error::{Error, Place, Result};
@@ -130,8 +129,7 @@ fn table(answers: Vec<CellAnswer>, (unit, per_si): (&str, f64)) -> CellEvidenceT
         effect: answer.effect.into(),
         place: answer.place.to_string(),
         follows: answer.follows.into(),
-        // A sum takes no less for what is less.
-        log_evidence: rounded(answer.log.max(*LEAST_EVIDENCE)),
+        log_evidence: rounded(answer.log),
         log_prior: rounded(answer.log_prior),
         size: rounded(1e3 * per_si * answer.size) / 1e3,
         sigma: answer

@@ -6,6 +6,7 @@ use super::cause::{TorqueForm, UNKNOWN};
 use super::cells::{TorqueCell, TorqueComponent, TorqueState, TorqueTable, without};
 use super::choice::CauseChoice;
 use super::solve::SolvedTorques;
+use crate::criteria::fleet::LEAST_EVIDENCE;
 use crate::criteria::torque::PER_METRE;
 use crate::diagnose::table::{ComponentSearch, log_sum, rms_size};
 use crate::diagnose::{CellAnswer, GivenCell};
@@ -179,7 +180,7 @@ impl TorqueTable<'_, '_> {
             effect: name,
             place: at,
             follows: follows(self.choice.form(own.form)),
-            log: self.odds_of(components, place, kappa).log_odds - log_prior,
+            log: (self.odds_of(components, place, kappa).log_odds - log_prior).max(*LEAST_EVIDENCE),
             log_prior,
             size: found.size * unit,
             sigma: Some(found.sigma * unit),

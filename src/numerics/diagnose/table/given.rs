@@ -11,7 +11,7 @@ use super::size::{SizeEvidence, rms_size};
 use super::state::KnownState;
 use super::{by_currents, estimated, is_kept};
 use crate::criteria::cells::{CLOSELY, OPEN, SMALLEST};
-use crate::criteria::fleet::WRITTEN;
+use crate::criteria::fleet::{LEAST_EVIDENCE, WRITTEN};
 use crate::diagnose::round::{EstimatedCause, FitState, Fitter, RoundView};
 use crate::effect::{Basis, Form, Place, Term, names};
 use rayon::prelude::*;
@@ -287,7 +287,8 @@ impl CauseTable<'_, '_> {
             effect: cell.name,
             place: cell.place,
             follows: own.forms.first()?.follows(cell.place),
-            log,
+            // A sum takes no less for what is less.
+            log: log.max(*LEAST_EVIDENCE),
             log_prior: cell.log_prior,
             size: found_size.size,
             sigma: Some(found_size.sigma),

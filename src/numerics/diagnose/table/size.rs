@@ -19,8 +19,6 @@ pub struct SizeEvidence {
 
 /// Steps of a search in one variable.
 const STEPS: usize = 40;
-/// Sizes that are looked at before the likeliest is sought among them.
-const SIZES: usize = 24;
 
 /// The size of columns of unit rms by their products seen through a model and their variances beforehand: of what is seen, by how much of
 /// such a motion is seen on average, as what a model absorbs might have any size.
@@ -68,8 +66,8 @@ pub fn rms_size(
     let log =
         |size: f64| log_evidence + after.log_density(size * size) - before.log_density(size * size);
     let most = 2.0 * after.mean().sqrt();
-    let at = |k: f64| most * 0.01f64.powf(1.0 - k / (SIZES - 1) as f64);
-    let best = (0..SIZES).max_by(|a, b| log(at(*a as f64)).total_cmp(&log(at(*b as f64))))?;
+    let at = |k: f64| most * 0.01f64.powf(1.0 - k / (STEPS - 1) as f64);
+    let best = (0..STEPS).max_by(|a, b| log(at(*a as f64)).total_cmp(&log(at(*b as f64))))?;
     let (mut low, mut high) = (at(best as f64 - 1.0), at(best as f64 + 1.0));
     for _ in 0..STEPS {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
