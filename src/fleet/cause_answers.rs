@@ -62,6 +62,7 @@ pub(super) fn of(
                 probability: 1.0,
                 size: row.size,
                 sigma: sigma.max(1e-6),
+                log_ratio: row.log_ratio.unwrap_or_default(),
                 unit: row.unit.clone(),
                 deviation: None,
             });
@@ -170,7 +171,7 @@ pub(super) fn of(
             robot.deviation = Some(deviation);
             let kind = match () {
                 () if have < *SIBLINGS => None,
-                () if 1.0 - robot.probability > *LACKS && decided && is_usual => Some("lacks"),
+                () if 1.0 - robot.probability > *LACKS && is_usual => Some("lacks"),
                 () if !has(&robot) => None,
                 () if deviation > limit && ratio > *APART => Some("larger"),
                 () if -deviation > limit && ratio < 1.0 / *APART => Some("smaller"),
@@ -269,8 +270,7 @@ pub(super) fn population(robots: &mut [FleetCellRow]) -> Population {
         for robot in robots.iter_mut() {
             let wide = spread.hypot(robot.sigma);
             let off = ((robot.size - usual).min(0.0) / wide).powi(2);
-            let none = (robot.size / robot.sigma).powi(2);
-            let log = 0.5 * (none - off) + (robot.sigma / wide).ln() - 2f64.ln();
+            let log = robot.log_ratio - 0.5 * off + (robot.sigma / wide).ln();
             let odds = (share / (1.0 - share)).ln() + log;
             robot.probability = 1.0 / (1.0 + (-odds).exp());
         }

@@ -259,6 +259,7 @@ mod tests {
             log_prior: 0.0,
             size: 0.05,
             sigma: None,
+            log_ratio: None,
             unit: "mm".into(),
         }
     }

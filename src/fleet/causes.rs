@@ -13,7 +13,7 @@ use crate::effect::names;
 use crate::error::{Result, visible};
 use crate::report::fleet_causes as page;
 use crate::stage::Given;
-use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey, TableRef};
+use crate::store::TableRef;
 use crate::table::{CellEvidence, CellEvidenceRow, Table};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -278,37 +278,14 @@ pub(crate) fn publish(
             table.map(|table| table.table_hash.to_string())
         ])
     });
-    let key = StageKey {
-        key_format: KEY_FORMAT,
-        id: STAGE.into(),
-        stage: STAGE.into(),
-        implementation: 4,
-        settings: json!({ "robots": robots.collect::<Vec<_>>(), "round": search.round() }),
-        reads: BTreeMap::new(),
-        files: BTreeMap::new(),
-        schemas: BTreeMap::new(),
-        seed: 0,
-    };
-    let frame = |port: &str, frame| (port.to_string(), PendingTable::Frame(frame));
-    let products = vec![
-        frame("fleet_findings", answers.findings.to_frame()?),
-        frame("fleet_cells", answers.cells.to_frame()?),
-        frame("fleet_outliers", answers.outliers.to_frame()?),
+    let settings = json!({ "robots": robots.collect::<Vec<_>>(), "round": search.round() });
+    let frames = vec![
+        ("fleet_findings", answers.findings.to_frame()?),
+        ("fleet_cells", answers.cells.to_frame()?),
+        ("fleet_outliers", answers.outliers.to_frame()?),
     ];
-    let published = ledger.store.publish(&key, products, Account::default())?;
-    let mut tables = Vec::new();
-    for (port, made) in &published.record.tables {
-        tables.push(ledger.store.expose(fleet.name(), STAGE, port, made)?);
-    }
-    // By this note a sweep knows that the tables are needed, and a later fleet finds them.
-    let note = json!({ "action": published.record.id, "tables": published.record.tables });
-    ledger
-        .store
-        .put_note(&["fleets", fleet.name()], NOTE, &note)?;
-    let page = ledger
-        .store
-        .expose_document(fleet.name(), "causes.html", html.as_bytes())?;
-    ledger.store.sync()?;
+    let page = ("causes.html", html.as_str());
+    let (tables, page) = ledger.publish((STAGE, 5), settings, frames, NOTE, page)?;
     Ok(Published {
         answers,
         tables,
@@ -340,6 +317,7 @@ mod tests {
             log_prior: 0.0,
             size: 0.05,
             sigma: None,
+            log_ratio: None,
             unit: "mm".into(),
         }
     }

@@ -7,9 +7,12 @@ use super::file::Groups;
 use super::robot::FleetRobot;
 use super::round::Round;
 use crate::error::Result;
-use crate::store::{Store, TableRef};
+use crate::store::frame::Frame;
+use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey, Store, TableRef};
 use crate::table::Table;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::PathBuf;
 
@@ -238,6 +241,45 @@ impl<'a> Ledger<'a> {
         table
             .map(|table| T::from_frame(&self.store.load(table)?))
             .transpose()
+    }
+
+    /// Publishes tables of the whole fleet and its page, which people then find; by the note a sweep knows that they are needed, and a later
+    /// fleet finds them.
+    pub(super) fn publish(
+        &self,
+        (stage, implementation): (&str, u32),
+        settings: Value,
+        frames: Vec<(&str, Frame)>,
+        note: &str,
+        (page, html): (&str, &str),
+    ) -> Result<(Vec<PathBuf>, PathBuf)> {
+        let key = StageKey {
+            key_format: KEY_FORMAT,
+            id: stage.into(),
+            stage: stage.into(),
+            implementation,
+            settings,
+            reads: BTreeMap::new(),
+            files: BTreeMap::new(),
+            schemas: BTreeMap::new(),
+            seed: 0,
+        };
+        let product = |(port, frame): (&str, Frame)| (port.into(), PendingTable::Frame(frame));
+        let products = frames.into_iter().map(product).collect();
+        let published = self.store.publish(&key, products, Account::default())?;
+        let made = &published.record;
+        let expose = |(port, table): (&String, &TableRef)| {
+            self.store.expose(&self.fleet, stage, port, table)
+        };
+        let tables = made.tables.iter().map(expose).collect::<Result<_>>()?;
+        let content = json!({ "action": made.id, "tables": made.tables });
+        self.store
+            .put_note(&["fleets", &self.fleet], note, &content)?;
+        let page = self
+            .store
+            .expose_document(&self.fleet, page, html.as_bytes())?;
+        self.store.sync()?;
+        Ok((tables, page))
     }
 
     /// Takes a record away, so that the robot is computed again.

@@ -1,26 +1,19 @@
-//! Robots from a list: CSV or Parquet, one row a robot.
+//! Robots from a list: a table of any kind, one row a robot.
 
 use super::robot::FleetRobot;
 use crate::error::{Error, Fault, Result, nearest};
 use crate::pipeline::Override;
-use crate::raw;
-use arrow::util::display::array_value_to_string;
-use std::fs::File;
+use crate::raw::{self, Delimiter, Record, TextLayout};
+use crate::stage::ingest::{TableLayout, records};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// Columns that a list may have beside `set.TARGET` and `path.TARGET`.
 const COLUMNS: [&str; 5] = ["robot", "folder", "model", "plant", "campaign"];
 
-/// Rows read at a time.
-const BATCH: usize = 1 << 10;
-
 /// Reads a list; `variable` takes the folder. Fails with every fault of its columns and rows.
 pub(super) fn read(path: &Path, variable: &str) -> Result<Vec<FleetRobot>> {
-    let (columns, rows) = if is_parquet(path) {
-        parquet(path)?
-    } else {
-        csv(path)?
-    };
+    let (columns, rows) = cells(path)?;
     let shown = path.display();
     let mut faults = Vec::new();
     for column in &columns {
@@ -89,78 +82,56 @@ pub(super) fn is_parquet(path: &Path) -> bool {
         .is_some_and(|extension| extension.eq_ignore_ascii_case("parquet"))
 }
 
-/// A reader of delimited text with a header, its delimiter the one of `,`, `;` and tab that the first line has most of.
-pub(super) fn csv_reader(path: &Path, setting: &str) -> Result<csv::Reader<File>> {
+/// What parts the cells of a text: the one of `,`, `;` and tab that the first line has most of.
+pub(super) fn delimiter(path: &Path, setting: &str) -> Result<u8> {
     let fault = |error: std::io::Error| {
         Error::spec(
             setting,
             format!("`{}` cannot be read: {error}", path.display()),
         )
     };
-    let mut head = String::new();
-    std::io::BufRead::read_line(
-        &mut std::io::BufReader::new(raw::open(path).map_err(fault)?),
-        &mut head,
-    )
-    .map_err(fault)?;
-    let count = |delimiter: u8| head.bytes().filter(|byte| *byte == delimiter).count();
-    let delimiter = [b',', b';', b'\t']
+    let mut head = Vec::new();
+    let mut reader = BufReader::new(raw::open(path).map_err(fault)?);
+    reader.read_until(b'\n', &mut head).map_err(fault)?;
+    let count = |delimiter: u8| head.iter().filter(|byte| **byte == delimiter).count();
+    let most = [b'\t', b';', b',']
         .into_iter()
-        .rev()
-        .max_by_key(|delimiter| count(*delimiter))
-        .unwrap_or(b',');
-    Ok(csv::ReaderBuilder::new()
-        .delimiter(delimiter)
-        .from_reader(raw::open(path).map_err(fault)?))
+        .max_by_key(|delimiter| count(*delimiter));
+    Ok(most.unwrap_or(b','))
 }
 
 type Cells = (Vec<String>, Vec<Vec<String>>);
 
-fn csv(path: &Path) -> Result<Cells> {
-    let mut reader = csv_reader(path, "list")?;
-    let fault = |error: csv::Error| Error::spec("list", format!("`{}`: {error}", path.display()));
-    let text = |record: &csv::StringRecord| record.iter().map(String::from).collect::<Vec<_>>();
-    let columns = text(reader.headers().map_err(fault)?);
-    let columns = columns
-        .iter()
-        .map(|name| name.trim_start_matches('\u{feff}').trim().to_string())
-        .collect();
-    let rows = reader
-        .records()
-        .map(|record| record.map(|record| text(&record)).map_err(fault))
-        .collect::<Result<_>>()?;
-    Ok((columns, rows))
-}
-
-fn parquet(path: &Path) -> Result<Cells> {
-    let fault = |error: String| {
-        Error::spec(
-            "list",
-            format!("`{}` cannot be read: {error}", path.display()),
-        )
+/// Names of columns, then rows, of a table of any kind.
+fn cells(path: &Path) -> Result<Cells> {
+    let shown = path.display().to_string();
+    let fault = |error: String| Error::spec("list", format!("`{shown}` cannot be read: {error}"));
+    let source = raw::source(path).map_err(|error| fault(error.to_string()))?;
+    let text = TextLayout {
+        delimiter: Delimiter::Byte(delimiter(path, "list")?),
+        ..TextLayout::default()
     };
-    let file = raw::open(path).map_err(|error| fault(error.to_string()))?;
-    let reader = raw::parquet(file, BATCH).map_err(fault)?;
-    let (mut columns, mut rows) = (Vec::new(), Vec::new());
-    for batch in reader {
-        let batch = batch.map_err(fault)?;
-        columns = batch
-            .schema()
-            .fields()
-            .iter()
-            .map(|field| field.name().clone())
-            .collect();
-        for row in 0..batch.num_rows() {
-            let cells = batch
-                .columns()
-                .iter()
-                .map(|column| array_value_to_string(column, row));
-            rows.push(
-                cells
-                    .collect::<Result<_, _>>()
-                    .map_err(|error| fault(error.to_string()))?,
-            );
+    let layout = TableLayout {
+        text,
+        ..TableLayout::default()
+    };
+    let broken = |error: Error| fault(error.to_string());
+    let (_, mut reader) = records(source, &shown, layout).map_err(broken)?;
+    let (mut record, mut rows) = (Record::default(), Vec::new());
+    let mut columns: Option<Vec<String>> = None;
+    while reader.next(&mut record).map_err(broken)? {
+        let cells = record.cells();
+        match &columns {
+            None => columns = Some(cells),
+            _ if cells.len() < 2 && record.is_blank(0) => (),
+            Some(columns) if cells.len() != columns.len() => {
+                let (line, have, want) = (record.line, cells.len(), columns.len());
+                return Err(fault(format!("line {line} has {have} of {want} cells")));
+            }
+            Some(_) => rows.push(cells),
         }
     }
+    let name = |name: &String| name.trim_start_matches('\u{feff}').trim().to_string();
+    let columns = columns.iter().flatten().map(name).collect();
     Ok((columns, rows))
 }

@@ -87,12 +87,17 @@ pub(crate) fn work(
     std::thread::scope(|scope| -> Result<()> {
         let one = &one;
         for worker in 0..options.workers.clamp(1, robots.len().max(1)) {
-            let builder = std::thread::Builder::new()
-                .name(format!("worker {worker}"))
-                .stack_size(STACK);
-            builder
-                .spawn_scoped(scope, move || one(worker))
-                .map_err(|error| Error::store("--jobs", error.to_string()))?;
+            let failed = |error: String| Error::store("--jobs", error);
+            // One for all of a worker's robots: every further thread would keep memory of its own.
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(workshop.threads)
+                .stack_size(STACK)
+                .thread_name(move |_| format!("worker {worker}"))
+                .build()
+                .map_err(|error| failed(error.to_string()))?;
+            std::thread::Builder::new()
+                .spawn_scoped(scope, move || pool.install(|| one(worker)))
+                .map_err(|error| failed(error.to_string()))?;
         }
         Ok(())
     })?;

@@ -1,6 +1,6 @@
 //! One big recording table, parted by robot into files below the store; a table that was parted before is not parted again.
 
-use super::list::{csv_reader, is_parquet};
+use super::list::{delimiter, is_parquet};
 use super::robot::FleetRobot;
 use crate::error::{Error, Result};
 use crate::raw;
@@ -75,7 +75,11 @@ fn file_name(name: &str, path: &Path) -> String {
 type Parts = BTreeMap<String, Vec<u8>>;
 
 fn csv(path: &Path, by: &str) -> Result<Parts, String> {
-    let mut reader = csv_reader(path, "recording").map_err(|error| error.to_string())?;
+    let delimiter = delimiter(path, "recording").map_err(|error| error.to_string())?;
+    let file = raw::open(path).map_err(|error| error.to_string())?;
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(delimiter)
+        .from_reader(file);
     let header = reader
         .byte_headers()
         .map_err(|error| error.to_string())?

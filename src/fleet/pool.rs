@@ -226,6 +226,7 @@ mod tests {
             probability: f64::from(size_mm > 0.0),
             size: size_mm,
             sigma: 0.002,
+            log_ratio: 0.5 * (size_mm / 0.002f64).powi(2),
             unit: "mm".into(),
             deviation: None,
         };

@@ -5,13 +5,12 @@ use super::ledger::{Ending, Ledger, RobotRecord};
 use super::recalibration::{self, FalseAlarmRate};
 use crate::error::Result;
 use crate::report::fleet as page;
-use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey};
 use crate::table::{
     Changes, Findings, FleetChangeRow, FleetRow, FleetTable, Statistics, StatisticsRow, Table,
     Verdict,
 };
 use rayon::prelude::*;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -79,28 +78,13 @@ pub(crate) fn publish(
         })
         .collect();
     let html = page::html(fleet.name(), &table, &changes, &links)?;
-    let key = key(fleet, &table, records);
-    let products = vec![
-        ("fleet".to_string(), PendingTable::Frame(table.to_frame()?)),
-        (
-            "fleet_changes".into(),
-            PendingTable::Frame(changes.to_frame()?),
-        ),
+    let frames = vec![
+        ("fleet", table.to_frame()?),
+        ("fleet_changes", changes.to_frame()?),
     ];
-    let published = ledger.store.publish(&key, products, Account::default())?;
-    let mut tables = Vec::new();
-    for (port, made) in &published.record.tables {
-        tables.push(ledger.store.expose(fleet.name(), STAGE, port, made)?);
-    }
-    // By this note a sweep knows that the tables are needed.
-    let note = json!({ "action": published.record.id, "tables": published.record.tables });
-    ledger
-        .store
-        .put_note(&["fleets", fleet.name()], "tables.json", &note)?;
-    let page = ledger
-        .store
-        .expose_document(fleet.name(), "fleet.html", html.as_bytes())?;
-    ledger.store.sync()?;
+    let page = ("fleet.html", html.as_str());
+    let settings = settings(fleet, &table, records);
+    let (tables, page) = ledger.publish((STAGE, 1), settings, frames, "tables.json", page)?;
     Ok(FleetSummary {
         fleet: table,
         tables,
@@ -109,7 +93,7 @@ pub(crate) fn publish(
 }
 
 /// What the tables were made of: the settings and the robots' own tables.
-fn key(fleet: &Fleet, table: &FleetTable, records: &[Option<RobotRecord>]) -> StageKey {
+fn settings(fleet: &Fleet, table: &FleetTable, records: &[Option<RobotRecord>]) -> Value {
     let robots = fleet
         .roster
         .0
@@ -131,17 +115,7 @@ fn key(fleet: &Fleet, table: &FleetTable, records: &[Option<RobotRecord>]) -> St
             ])
         });
     let alpha = fleet.file.previous.as_ref().map(|previous| previous.alpha);
-    StageKey {
-        key_format: KEY_FORMAT,
-        id: STAGE.into(),
-        stage: STAGE.into(),
-        implementation: 1,
-        settings: json!({ "robots": robots.collect::<Vec<_>>(), "alpha": alpha }),
-        reads: BTreeMap::new(),
-        files: BTreeMap::new(),
-        schemas: BTreeMap::new(),
-        seed: 0,
-    }
+    json!({ "robots": robots.collect::<Vec<_>>(), "alpha": alpha })
 }
 
 /// The tables of a robot that the fleet's row is made of.

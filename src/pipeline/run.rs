@@ -7,7 +7,7 @@
 //! What a plan computes, as one hash: stages, settings, wiring and the content of the files; no paths, no dates.
 
 use super::manifest::{
-    FileRecord, InputRecord, Manifest, OutputRecord, RunOptions, RunStatus, StageStatus,
+    FileRecord, InputRecord, Manifest, OutputRecord, Purpose, RunOptions, RunStatus, StageStatus,
     Surroundings,
 };
 use super::plan::{Plan, Selected};
@@ -59,10 +59,16 @@ pub fn run(
     observer: &dyn Observer,
 ) -> Result<CompletedRun> {
     let selected = options.selection.of(plan)?;
-    let threads = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.jobs)
-        .build()
-        .map_err(|e| Error::store("--jobs", e.to_string()))?;
+    // Who calls on so many threads as are wanted has made them for many runs.
+    let is_among_them =
+        rayon::current_thread_index().is_some() && rayon::current_num_threads() == options.jobs;
+    let threads = (!is_among_them)
+        .then(|| {
+            let builder = rayon::ThreadPoolBuilder::new().num_threads(options.jobs);
+            let pool = builder.build();
+            pool.map_err(|e| Error::store("--jobs", e.to_string()))
+        })
+        .transpose()?;
     let begun = (surroundings.now)();
     let mut manifest = Manifest::new(plan, surroundings, options, rfc3339(begun));
     manifest.previous = store.last_ended()?;
@@ -97,7 +103,7 @@ pub fn run(
         RunStatus::Failed
     };
     manifest.error = result.as_ref().err().map(ToString::to_string);
-    let finished = store.finish_run(record, &manifest);
+    let finished = store.finish_run(record, &manifest, options.purpose == Purpose::Fleet);
     // The first error is the one that explains the others.
     result.and(finished)?;
     Ok(CompletedRun {
@@ -111,7 +117,7 @@ struct Running<'a> {
     store: &'a Store,
     selected: Selected,
     now: fn() -> SystemTime,
-    threads: rayon::ThreadPool,
+    threads: Option<rayon::ThreadPool>,
     observer: &'a dyn Observer,
     manifest: Manifest,
     record: Run,
@@ -121,6 +127,11 @@ struct Running<'a> {
 }
 
 impl Running<'_> {
+    /// Whether this is one run of thousands, which are made durable together and whose history nobody asks for.
+    fn among_many(&self) -> bool {
+        self.manifest.purpose == Purpose::Fleet
+    }
+
     fn stage(&mut self, index: usize) -> Result<()> {
         let plan = self.state.plan;
         let inside = self.selected.stages.contains(&index);
@@ -145,7 +156,10 @@ impl Running<'_> {
             _ if !inside => return Ok(()),
             _ => {}
         }
-        let reason = reason::why(self.store, plan, &key, &found, forced)?;
+        let reason = match self.among_many() {
+            true => "a robot of a fleet".into(),
+            false => reason::why(self.store, plan, &key, &found, forced)?,
+        };
         let id = &plan.stages[index].id;
         let mut waiting = || {
             self.observer
@@ -179,7 +193,8 @@ impl Running<'_> {
         self.manifest.stages[index].reason = Some(reason);
         let place = ExecutionSite {
             store: self.store,
-            threads: &self.threads,
+            threads: self.threads.as_ref(),
+            jobs: self.manifest.jobs,
             observer: self.observer,
             run: &self.manifest.run_id,
         };
@@ -208,7 +223,7 @@ impl Running<'_> {
                 ..published.record
             },
         )?;
-        if self.at_risk < GROUP {
+        if self.at_risk < GROUP || self.among_many() {
             return Ok(());
         }
         self.at_risk = 0.0;
@@ -312,7 +327,9 @@ fn seconds(from: SystemTime, to: SystemTime) -> f64 {
 /// Where a stage is executed.
 pub(super) struct ExecutionSite<'a> {
     pub(crate) store: &'a Store,
-    pub(crate) threads: &'a rayon::ThreadPool,
+    /// None where this thread is one of them.
+    pub(crate) threads: Option<&'a rayon::ThreadPool>,
+    pub(crate) jobs: usize,
     pub(crate) observer: &'a dyn Observer,
     pub(crate) run: &'a str,
 }
@@ -330,10 +347,14 @@ pub(super) fn products(
     let context = Context {
         id: &stage.id,
         seed: state.seed(index),
-        jobs: place.threads.current_num_threads(),
+        jobs: place.jobs,
         services: &services,
     };
-    let body = || place.threads.install(|| stage.stage.run(inputs, &context));
+    let run = || stage.stage.run(inputs, &context);
+    let body = || match place.threads {
+        Some(threads) => threads.install(run),
+        None => run(),
+    };
     let outputs = catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
         if panic.is::<Interrupted>() {
             return Err(Error::store(&stage.id, "was interrupted: run it again"));

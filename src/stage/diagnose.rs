@@ -1,13 +1,8 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
-//!
-//! `cell_evidence`: what every cell of the table of causes says of a robot given cells that its fleet has accepted. `calib fleet diagnose` puts
-//! it in the place of a stage `diagnose`, with that stage's settings; `torque_evidence` in that of a stage `diagnose_torques`.
 
 use crate::diagnose::{
-    CellAnswer, Diagnosis, GivenCell, KnownCell, Question, VerdictKind, against_simulation,
-    cell_evidence, diagnose, wrong_setup,
+    Diagnosis, KnownCell, Question, VerdictKind, against_simulation, diagnose, wrong_setup,
 };
-use crate::dynamics;
 use crate::effect::{CAUSES, DeclaredCause, names};
 use crate::error::{Error, Place, Result, instead};
 use crate::estimate::{Session, gauge};
@@ -18,11 +13,10 @@ use crate::stage::doubtful::{self, KnownModel};
 use crate::stage::remarks::{
     WeightlessLinks, blank_payload, misplaced_tool, must_move, rounded_logs, weightless_links,
 };
-use crate::stage::{Context, DiagnoseTorques, DiagnoseTorquesReads, RawFile, Stage, contact};
+use crate::stage::{Context, RawFile, Stage, contact};
 use crate::table::{
-    CellEvidence as CellEvidenceTable, CellEvidenceRow, Cells, Corrected, CovarianceTable,
-    FindingNumbers, Findings, Forms, Parameters, Prediction, Recording, Rivals, Robot, Shares,
-    Spectrum, Split, Suspects, Verdict, VerdictSentences,
+    Cells, Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction,
+    Recording, Rivals, Robot, Shares, Spectrum, Split, Suspects, Verdict, VerdictSentences,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -412,148 +406,4 @@ fn mismatch(
     context.note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)");
     context.warn("parameters correct that simulation: they are not the robot file's");
     Ok((data, Corrected::OutsideSimulation))
-}
-
-/// Settings of `cell_evidence`.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CellEvidence {
-    /// Settings as of a stage `diagnose`.
-    pub(crate) diagnose: Diagnose,
-    /// Cells that are taken to be in the robot.
-    #[serde(default)]
-    pub(crate) given: Vec<Given>,
-}
-
-/// A cell that is taken to be in the robot.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Given {
-    /// Its key, as the table cell_evidence has it.
-    pub(crate) cell: String,
-    /// Key of the shape that all robots share; the robot's likeliest if none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) shape: Option<String>,
-    /// Rms motion at the tool that is expected of it, mm, or rms torque, Nm.
-    pub(crate) size: f64,
-}
-
-crate::stage::stage! {
-    CellEvidence, "cell_evidence", 5, "says what every possible cause explains of one robot, for the sum over a fleet",
-        DiagnoseReads -> CellEvidenceWrites {
-            cell_evidence: CellEvidenceTable,
-        }
-}
-
-impl Stage for CellEvidence {
-    fn faults(&self, at: &mut Place) {
-        self.diagnose.faults(&mut at.at("diagnose"));
-        must_have_sizes(&self.given, at);
-    }
-
-    fn files(&self) -> Vec<(String, RawFile)> {
-        let below = |(place, file)| (format!("diagnose.{place}"), file);
-        Stage::files(&self.diagnose)
-            .into_iter()
-            .map(below)
-            .collect()
-    }
-
-    fn sets_named(&self) -> Vec<(String, String)> {
-        let below = |(place, set)| (format!("diagnose.{place}"), set);
-        self.diagnose.sets_named().into_iter().map(below).collect()
-    }
-
-    fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<CellEvidenceWrites> {
-        let asked = AskedRows::of(&self.diagnose, &reads, context)?;
-        let question = asked.question(&self.diagnose, context.seed);
-        let answers = cell_evidence(&question, &cells(&self.given, 1e-3))
-            .map_err(|message| Error::data("table recording", message))?;
-        Ok(CellEvidenceWrites {
-            cell_evidence: table(answers, ("mm", 1e3)),
-        })
-    }
-}
-
-/// Settings of `torque_evidence`.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TorqueEvidence {
-    /// Settings as of a stage `diagnose_torques`.
-    pub(crate) diagnose: DiagnoseTorques,
-    /// Cells that are taken to be in the robot.
-    #[serde(default)]
-    pub(crate) given: Vec<Given>,
-}
-
-crate::stage::stage! {
-    TorqueEvidence, "torque_evidence", 1, "says what every possible cause explains of the torques of one robot",
-        DiagnoseTorquesReads -> TorqueEvidenceWrites {
-            cell_evidence: CellEvidenceTable,
-        }
-}
-
-impl Stage for TorqueEvidence {
-    fn faults(&self, at: &mut Place) {
-        self.diagnose.faults(&mut at.at("diagnose"));
-        must_have_sizes(&self.given, at);
-    }
-
-    fn run(&self, reads: DiagnoseTorquesReads, context: &Context) -> Result<TorqueEvidenceWrites> {
-        let (arm, recording, question) = self.diagnose.asked(&reads, context)?;
-        let given = cells(&self.given, 1.0);
-        let tell = &mut |line| context.note(line);
-        let answers = dynamics::cell_evidence(&arm, &recording, &question, &given, tell)?;
-        Ok(TorqueEvidenceWrites {
-            cell_evidence: table(answers, ("Nm", 1.0)),
-        })
-    }
-}
-
-fn must_have_sizes(given: &[Given], at: &mut Place) {
-    for (k, given) in given.iter().enumerate() {
-        at.at(format!("given[{k}].size")).must(
-            given.size > 0.0 && given.size < 1e6,
-            "expected a size above 0 and below 1e6",
-        );
-    }
-}
-
-/// Given cells with their sizes in SI.
-fn cells(given: &[Given], unit: f64) -> Vec<GivenCell> {
-    let cell = |given: &Given| GivenCell {
-        cell: given.cell.clone(),
-        shape: given.shape.clone(),
-        size: unit * given.size,
-    };
-    given.iter().map(cell).collect()
-}
-
-fn table(answers: Vec<CellAnswer>, (unit, per_si): (&str, f64)) -> CellEvidenceTable {
-    // So many digits decide nothing, and they would fill the store.
-    let rounded = |value: f64| (1e3 * value).round() / 1e3;
-    let row = |answer: CellAnswer| CellEvidenceRow {
-        given: answer.left_out.unwrap_or_default(),
-        cell: answer.cell,
-        shape: answer.shape.unwrap_or_default(),
-        effect: answer.effect.into(),
-        place: answer.place.to_string(),
-        follows: answer.follows.into(),
-        log_evidence: rounded(answer.log),
-        log_prior: rounded(answer.log_prior),
-        size: rounded(1e3 * per_si * answer.size) / 1e3,
-        sigma: answer
-            .sigma
-            .map(|sigma| rounded(1e3 * per_si * sigma) / 1e3),
-        unit: unit.into(),
-    };
-    let mut rows: Vec<CellEvidenceRow> = answers
-        .into_iter()
-        .filter(CellAnswer::counts)
-        .map(row)
-        .collect();
-    let key = |row: &CellEvidenceRow| (row.given.clone(), row.cell.clone(), row.shape.clone());
-    rows.sort_by_cached_key(key);
-    rows.dedup_by_key(|row| key(row));
-    CellEvidenceTable(rows)
 }

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::io::Read;
 use std::path::PathBuf;
 
+mod cell_evidence;
 mod compare;
 mod contact;
 mod curves;
@@ -36,8 +37,8 @@ mod transfer;
 mod validate;
 
 pub use crate::report::{Accepted, Report, ReportReads, ReportTorquesReads};
+pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given, TorqueEvidence};
 pub use compare::{Compare, CompareReads};
-pub use diagnose::{CellEvidence, CellEvidenceWrites, Given, TorqueEvidence, TorqueEvidenceWrites};
 pub use diagnose::{CellPrior, Diagnose, DiagnoseReads};
 pub use diagnose_torques::{CompareTorques, CompareTorquesReads};
 pub use diagnose_torques::{

@@ -55,6 +55,15 @@ pub struct Store {
     /// Opened with the first write, so that looking leaves no trace.
     workspace: Mutex<Option<Arc<Workspace>>>,
     durability: Durability,
+    /// What this process knows of runs.
+    runs: Mutex<KnownRuns>,
+}
+
+/// Runs that this process has seen or made: among the thousands of a fleet nobody looks through all for every robot.
+#[derive(Debug, Default)]
+struct KnownRuns {
+    last: Option<String>,
+    ended: Option<Link>,
 }
 
 impl Store {
@@ -74,6 +83,7 @@ impl Store {
             remote: None,
             workspace: Mutex::new(None),
             durability: Durability::default(),
+            runs: Mutex::default(),
         })
     }
 

@@ -4,9 +4,9 @@
 //!
 //! Names for runs, `tags/<name>.json`: what is tagged is kept.
 
-use super::Store;
 use super::disk::{component, make_dir, place, refused, replace, write, write_synced};
 use super::notes::{seal, unseal};
+use super::{KnownRuns, Store};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::{MutexGuard, PoisonError};
 
 /// A run in flight.
 #[derive(Debug)]
@@ -106,29 +107,36 @@ impl Store {
         if reserved {
             return Ok(fresh.into());
         }
+        let after = |id: &str| {
+            let id = ulid::Ulid::from_string(id).ok()?;
+            Some(id.increment().ok()?.to_string())
+        };
+        let mut known = self.known_runs();
+        if known.last.is_none() {
+            known.last = self.run_folders()?.pop();
+        }
         let mut id = fresh.to_string();
+        if let Some(last) = known.last.as_deref().filter(|last| **last >= *id) {
+            id = after(last).unwrap_or(id);
+        }
         loop {
-            if let Some(last) = self.run_folders()?.pop().filter(|last| *last >= id) {
-                let next = ulid::Ulid::from_string(&last)
-                    .ok()
-                    .and_then(|last| last.increment().ok());
-                id = next.map_or(id, |next| next.to_string());
-            }
             let dir = self.run_dir(&id)?;
             match fs::create_dir(&dir) {
-                Ok(()) => return Ok(id),
+                Ok(()) => {
+                    known.last = Some(id.clone());
+                    return Ok(id);
+                }
                 // Another run took it in this moment.
                 Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
-                    let next = ulid::Ulid::from_string(&id)
-                        .ok()
-                        .and_then(|id| id.increment().ok());
-                    id = next
-                        .ok_or_else(|| refused(&dir, "make the folder", &e))?
-                        .to_string();
+                    id = after(&id).ok_or_else(|| refused(&dir, "make the folder", &e))?;
                 }
                 Err(e) => return Err(refused(&dir, "make the folder", &e)),
             }
         }
+    }
+
+    fn known_runs(&self) -> MutexGuard<'_, KnownRuns> {
+        self.runs.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Opens the record of a run whose id was reserved; its manifest stands from then on (durable after the next `sync`), so that a
@@ -170,14 +178,26 @@ impl Store {
         replace(&aside, &run.dir.join("manifest.json"))
     }
 
-    /// Closes the record of a run: everything that it made is durable before its last manifest is seen, and that then.
-    pub fn finish_run(&self, run: Run, manifest: &impl Serialize) -> Result<()> {
+    /// Closes the record of a run: everything that it made is durable before its last manifest is seen, and that then; of one among many,
+    /// of which the record of each says that it is done, with the next `sync`.
+    pub fn finish_run(&self, run: Run, manifest: &impl Serialize, among_many: bool) -> Result<()> {
         let path = run.dir.join("manifest.json");
         let aside = self.workspace()?.fresh();
-        self.owe(&aside, write(&aside, &seal(manifest)?)?)?;
+        let text = seal(manifest)?;
+        let file = write(&aside, &text)?;
         self.give_state(&run, &aside)?;
         self.owe(&run.dir.join("events.jsonl"), run.events)?;
-        self.sync_then(|| place(&aside, &path).map(|()| Some(path)))
+        if among_many {
+            place(&aside, &path)?;
+            self.owe(&path, file)?;
+        } else {
+            self.owe(&aside, file)?;
+            self.sync_then(|| place(&aside, &path).map(|()| Some(path)))?;
+        }
+        let id = run.dir.file_name().map(|id| id.to_string_lossy().into());
+        let link = |(run, sealed)| Link { run, sealed };
+        self.known_runs().ended = id.zip(unseal(&text).ok()).map(link);
+        Ok(())
     }
 
     /// Sends the events of a run so far, then its manifest, which is still aside.
@@ -216,6 +236,9 @@ impl Store {
 
     /// The last run whose manifest is whole and says that it ended.
     pub(crate) fn last_ended(&self) -> Result<Option<Link>> {
+        if let Some(link) = &self.known_runs().ended {
+            return Ok(Some(link.clone()));
+        }
         for run in self.run_folders()?.into_iter().rev() {
             // A manifest that is not there or cannot be read is found by a verification; it must not stop a run.
             if let Ok(Sealed { manifest, sealed }) = self.sealed_manifest(&run)

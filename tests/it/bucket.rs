@@ -161,7 +161,7 @@ fn run(store: &Store, id: &str) -> Result<()> {
     store.expose_document("cell", "report.html", b"<p>fine</p>")?;
     store.write_manifest(&run, &manifest(&id, "running"))?;
     run.append_event(&serde_json::json!({"event": "ends"}))?;
-    store.finish_run(run, &manifest(&id, "done"))
+    store.finish_run(run, &manifest(&id, "done"), false)
 }
 
 #[test]

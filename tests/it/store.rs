@@ -513,7 +513,7 @@ fn a_run_leaves_a_manifest_from_its_first_moment_and_events_line_by_line() {
         .unwrap();
     let dir = run.dir().to_owned();
     store
-        .finish_run(run, &serde_json::json!({"status": "done"}))
+        .finish_run(run, &serde_json::json!({"status": "done"}), false)
         .unwrap();
     assert_eq!(store.manifest(id).unwrap()["status"], "done");
     assert_eq!(read(dir.join("events.jsonl")).lines().count(), 2);

@@ -2,16 +2,18 @@
 //!
 //! `calib fleet exec`: the one command that a cluster runs; idempotent, and silent about names.
 
-use super::super::surroundings::{cores, surroundings};
+use super::super::surroundings::surroundings;
 use super::super::{emit, emit_json};
-use super::{ClusterArguments, FleetLocation, on_slurm, records, verdict, workshop};
+use super::cluster::EngineArguments;
+use super::{FleetLocation, records, verdict, workshop};
 use crate::error::{Error, Result, counted, visible};
 use crate::fleet::ledger::{Member, RunNote};
-use crate::fleet::{Ending, Fleet, Ledger, RobotRecord, Workshop, local, tables};
+use crate::fleet::local::{self, FleetResults};
+use crate::fleet::{Ending, Fleet, Ledger, RobotRecord, Workshop, tables};
 use crate::progress::{FleetProgress, Verbosity};
 use crate::store::Store;
 use crate::table::picked;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use serde_json::json;
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -36,14 +38,8 @@ pub(super) struct FleetRunOptions {
     /// Only these robots, by name; may be given several times
     #[arg(long, value_name = "NAME")]
     robot: Vec<String>,
-    /// Robots at once on this machine; no result depends on it [default: all cores]
-    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
-    /// Where the robots are computed
-    #[arg(long, value_enum, default_value_t = Engine::Local)]
-    engine: Engine,
     #[command(flatten)]
-    cluster: ClusterArguments,
+    engine: EngineArguments,
     /// Stops at the first robot that is not done
     #[arg(long)]
     fail_fast: bool,
@@ -53,14 +49,6 @@ pub(super) struct FleetRunOptions {
     /// Prints no progress
     #[arg(long, short)]
     quiet: bool,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Engine {
-    /// Threads of this process
-    Local,
-    /// Arrays of jobs on a Slurm cluster that shares the store
-    Slurm,
 }
 
 /// Compute robots again that were rejected or failed.
@@ -127,49 +115,18 @@ fn run(
     sound(&workshop)?;
     let chosen = chosen(fleet, &how.robot)?;
     let mut note = note(fleet, place, &fresh().run_id)?;
-    let verbosity = if how.quiet {
-        Verbosity::Quiet
-    } else {
-        Verbosity::Normal
-    };
-    let (fresh_records, computed) = match how.engine {
-        Engine::Local => {
-            workshop.ledger.put_run(&note)?;
-            let workers = how.jobs.map_or_else(cores, usize::from);
-            let progress = FleetProgress::new(verbosity, workers, chosen.len());
-            let stop = || workshop.ledger.cancelled(&note.run);
-            let options = local::WorkerOptions {
-                workers,
-                fail_fast: how.fail_fast,
-                stop: &stop,
-            };
-            let worked = local::work(&workshop, &chosen, &options, &progress);
-            progress.finish();
-            let worked = worked?;
-            (worked.records, worked.computed)
-        }
-        Engine::Slurm => {
-            note.engine = "slurm".into();
-            let progress = FleetProgress::new(verbosity, 0, chosen.len());
-            let waited = on_slurm(&workshop, &mut note, &chosen, &how.cluster, &progress);
-            progress.finish();
-            match waited? {
-                Some(computed) => (Vec::new(), computed),
-                None => {
-                    return emit(&format!(
-                        "submitted: jobs {} of run {}\n",
-                        note.jobs.join(", "),
-                        note.run
-                    ));
-                }
-            }
-        }
-    };
-    // Of robots outside of what was asked for, what is known stays known.
-    let all = if fresh_records.iter().all(Option::is_some) && !fresh_records.is_empty() {
-        fresh_records
-    } else {
-        records(&workshop)?
+    let progress = how.engine.progress(how.quiet, chosen.len());
+    let worked = how
+        .engine
+        .work(&workshop, &mut note, &chosen, how.fail_fast, &progress);
+    progress.finish();
+    let Some(FleetResults {
+        records: all,
+        computed,
+    }) = worked?
+    else {
+        let jobs = note.jobs.join(", ");
+        return emit(&format!("submitted: jobs {jobs} of run {}\n", note.run));
     };
     for (member, record) in note.robots.iter_mut().zip(&all) {
         member.key = record.as_ref().map(|record| record.key.clone());

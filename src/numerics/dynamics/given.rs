@@ -6,6 +6,7 @@ use super::cause::{TorqueForm, UNKNOWN};
 use super::cells::{TorqueCell, TorqueComponent, TorqueState, TorqueTable, without};
 use super::choice::CauseChoice;
 use super::solve::SolvedTorques;
+use crate::criteria::fleet::LEAST_EVIDENCE;
 use crate::criteria::torque::PER_METRE;
 use crate::diagnose::table::{ComponentSearch, log_sum, rms_size};
 use crate::diagnose::{CellAnswer, GivenCell};
@@ -123,6 +124,7 @@ impl TorqueTable<'_, '_> {
             log_prior: own.log_prior,
             size: best.amplitude * self.newton_metres(best.form),
             sigma: None,
+            log_ratio: None,
         };
         // Forms of each shape, and ln of the evidence of those that may be.
         let mut shapes: BTreeMap<String, (usize, Vec<f64>)> = BTreeMap::new();
@@ -163,7 +165,7 @@ impl TorqueTable<'_, '_> {
         let cell = self.cell_of[&own.form];
         let (gram, along) = self.seen(own.form, state);
         let prior = vec![own.amplitude.powi(2) / along.len() as f64; along.len()];
-        let (size, sigma) = rms_size(&gram, &along, &self.forms[own.form].0, &prior)?;
+        let found = rms_size(&gram, &along, &prior)?;
         let unit = self.newton_metres(own.form);
         let TorqueCell {
             name,
@@ -178,10 +180,11 @@ impl TorqueTable<'_, '_> {
             effect: name,
             place: at,
             follows: follows(self.choice.form(own.form)),
-            log: self.odds_of(components, place, kappa).log_odds - log_prior,
+            log: (self.odds_of(components, place, kappa).log_odds - log_prior).max(*LEAST_EVIDENCE),
             log_prior,
-            size: size * unit,
-            sigma: Some(sigma * unit),
+            size: found.size * unit,
+            sigma: Some(found.sigma * unit),
+            log_ratio: Some(found.log_ratio),
         })
     }
 }

@@ -157,6 +157,7 @@ fn size(robot: usize) -> FleetCellRow {
         probability: 1.0,
         size: 0.03 + 0.003 * deviation,
         sigma: 0.003,
+        log_ratio: 50.0,
         unit: "mm".into(),
         deviation: Some(deviation),
     }

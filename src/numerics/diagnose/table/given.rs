@@ -7,13 +7,13 @@ use super::evidence::log_sum;
 use super::frame::{SearchRows, product, view as matrix};
 use super::noise_shape::NoiseShape;
 use super::search::without;
+use super::size::{SizeEvidence, rms_size};
 use super::state::KnownState;
 use super::{by_currents, estimated, is_kept};
 use crate::criteria::cells::{CLOSELY, OPEN, SMALLEST};
-use crate::criteria::fleet::WRITTEN;
+use crate::criteria::fleet::{LEAST_EVIDENCE, WRITTEN};
 use crate::diagnose::round::{EstimatedCause, FitState, Fitter, RoundView};
 use crate::effect::{Basis, Form, Place, Term, names};
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// A cell that is taken to be in the robot.
@@ -50,6 +50,8 @@ pub struct CellAnswer {
     pub size: f64,
     /// One standard deviation of the size of a given cell, in its unit.
     pub sigma: Option<f64>,
+    /// ln of the likelihood of the size of a given cell over that of none.
+    pub log_ratio: Option<f64>,
 }
 
 impl CellAnswer {
@@ -210,6 +212,7 @@ impl CauseTable<'_, '_> {
                 log_prior: cell.log_prior,
                 size: best.1,
                 sigma: None,
+                log_ratio: None,
             };
             let shared = cell.is_named() && logs.len() > 1;
             let shape = |((seen, log), key): ((&SeenGroup, &f64), String)| {
@@ -276,7 +279,7 @@ impl CauseTable<'_, '_> {
         let log = self
             .of_component(own, state, others)
             .map_or(found.log, |(log, _)| log.max(found.log));
-        let (size, sigma) = self.sized(own, state, others)?;
+        let found_size = self.sized(own, state, others)?;
         Some(CellAnswer {
             left_out: Some(key.clone()),
             cell: key,
@@ -284,20 +287,22 @@ impl CauseTable<'_, '_> {
             effect: cell.name,
             place: cell.place,
             follows: own.forms.first()?.follows(cell.place),
-            log,
+            // A sum takes no less for what is less.
+            log: log.max(*LEAST_EVIDENCE),
             log_prior: cell.log_prior,
-            size,
-            sigma: Some(sigma),
+            size: found_size.size,
+            sigma: Some(found_size.sigma),
+            log_ratio: Some(found_size.log_ratio),
         })
     }
 
-    /// Rms motion of a component given others and the standard deviation of that, m; what noise adds to the square is taken off.
+    /// Rms motion of a component given others, m.
     fn sized(
         &self,
         own: &Component,
         state: &KnownState,
         others: &[&Component],
-    ) -> Option<(f64, f64)> {
+    ) -> Option<SizeEvidence> {
         let block = CellColumns::of_component(own, self.frame);
         let across = self.across_block(&block, state, others);
         let whole = product(matrix(&own.values), matrix(&own.values));
@@ -307,34 +312,6 @@ impl CauseTable<'_, '_> {
         let prior: Vec<f64> = prior
             .map(|share| own.amplitude * own.amplitude * share)
             .collect();
-        rms_size(&gram, &gradient, &whole, &prior)
+        rms_size(&gram, &gradient, &prior)
     }
-}
-
-/// Rms of what some columns do together and the standard deviation of that, what noise adds to the square taken off; by their products seen
-/// through the rest of a model, with each other alone, and their variances beforehand.
-pub fn rms_size(
-    gram: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    whole: &DMatrix<f64>,
-    prior: &[f64],
-) -> Option<(f64, f64)> {
-    let seen: Vec<usize> = (0..prior.len()).filter(|k| prior[*k] > 0.0).collect();
-    let pick = |matrix: &DMatrix<f64>| {
-        DMatrix::from_fn(seen.len(), seen.len(), |i, j| matrix[(seen[i], seen[j])])
-    };
-    let mut precision = pick(gram);
-    (0..seen.len()).for_each(|i| precision[(i, i)] += 1.0 / prior[seen[i]]);
-    let covariance = precision.cholesky()?.inverse();
-    let values = &covariance * DVector::from_fn(seen.len(), |i, _| gradient[seen[i]]);
-    // What unit columns do together, by how alike they are.
-    let length = |k: usize| whole[(k, k)].sqrt().max(f64::MIN_POSITIVE);
-    let alike = DMatrix::from_fn(seen.len(), seen.len(), |i, j| {
-        whole[(seen[i], seen[j])] / length(seen[i]) / length(seen[j])
-    });
-    let square = (values.transpose() * &alike * &values)[0].max(f64::MIN_POSITIVE);
-    let by = &alike * &values;
-    let variance = (by.transpose() * &covariance * &by)[0] / square;
-    let noise = (&alike * &covariance).trace() - variance;
-    Some(((square - noise.max(0.0)).max(0.0).sqrt(), variance.sqrt()))
 }

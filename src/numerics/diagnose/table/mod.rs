@@ -20,6 +20,7 @@ mod refine;
 mod scan;
 mod search;
 mod separable;
+mod size;
 mod state;
 mod stepped;
 
@@ -27,9 +28,10 @@ pub(crate) use answer::{Answer, FoundCell};
 pub use evidence::{AMPLITUDES, EvidenceRows, GroupEvidence, evidence, log_sum};
 pub(crate) use forms::forms_of;
 pub(crate) use generated::places;
-pub use given::{CellAnswer, GivenCell, rms_size};
+pub use given::{CellAnswer, GivenCell};
 pub(crate) use given::{answers, given_causes};
 pub use search::ComponentSearch;
+pub use size::rms_size;
 pub use state::KnownState;
 
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
