@@ -39,6 +39,8 @@ criteria! {
     /// Rows before that noise remembers, at most, where it is what the rich model leaves, whose slow part went with what is slow in that model,
     /// and where it is what a set leaves.
     MEMORY: [usize; 2] = [4, 12], "judged rows", "count: noise that lasts a fifth of a second has 0.71 of its density at rest by 4 rows, 0.98 by 12", "";
+    /// What a shape number that is not the usual one must gain beyond the logarithm of the number of rows.
+    UNUSUAL: f64 = 4.0, "square", "literature: 95 % of one number", "";
     /// A gain that is worth a new shape or another step.
     BETTER: f64 = 0.05, "square", "judgement: nothing that rows could show", "";
     /// Time over which the squared residual is averaged to look for a push.

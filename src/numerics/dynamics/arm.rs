@@ -100,7 +100,19 @@ fn steiner(mass: f64, arm: &Vector3<f64>) -> Matrix3<f64> {
     (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass
 }
 
-/// Inertial numbers of the whole arm, payload included, and the tolerance of those of its links.
+/// Two bodies as one.
+fn joined(a: &Inertial, b: &Inertial) -> Inertial {
+    let mass = a.mass + b.mass;
+    let centre = ((a.centre.coords * a.mass + b.centre.coords * b.mass) / mass.max(1e-9)).into();
+    let of = |body: &Inertial| body.inertia + steiner(body.mass, &(body.centre - centre));
+    Inertial {
+        mass,
+        centre,
+        inertia: of(a) + of(b),
+    }
+}
+
+/// Inertial numbers of the whole arm, payload included, and their tolerance.
 #[derive(Debug, Clone)]
 pub(super) struct DeclaredInertials {
     /// 10 n, of the links alone.
@@ -135,7 +147,13 @@ impl DeclaredInertials {
                 .zip(own)
                 .for_each(|(sum, value)| *sum += value);
         }
-        let tolerance = (0..bodies.len()).map(|link| tolerance(arm, &bodies[link], &point(link)));
+        let tolerance = (0..bodies.len()).map(|link| {
+            let whole = match &arm.payload {
+                Some(payload) if link == last => joined(&bodies[link], payload),
+                _ => bodies[link],
+            };
+            tolerance(arm, &whole, &point(link))
+        });
         let payload = unit_payload(arm);
         Self {
             tolerance: tolerance.collect(),

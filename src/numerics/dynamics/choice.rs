@@ -99,10 +99,7 @@ impl<'a> CauseChoice<'a> {
 
     /// Viscous and Coulomb friction of every joint: hardly an arm is without.
     pub(crate) fn common(&self) -> Vec<usize> {
-        let common = |number: &usize| {
-            let form = self.form(*number);
-            [VISCOUS, COULOMB].contains(&form.cause.name) && form.is_usual()
-        };
+        let common = |number: &usize| [VISCOUS, COULOMB].contains(&self.form(*number).cause.name);
         (0..self.open).filter(common).collect()
     }
 

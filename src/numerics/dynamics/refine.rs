@@ -1,12 +1,104 @@
-//! Shape numbers of what was found, with the coefficients and the width over which the sign of friction turns, all at once: steps of Gauss and
-//! Newton.
+//! Shape numbers of what was found: finer and finer grids about each, then all at once with the coefficients and the width over which the sign of
+//! friction turns, by steps of Gauss and Newton: one number after the other stays where two go together.
 
-use super::cause::TorqueForm;
+use super::cause::{ShapeSpan, TorqueForm};
 use super::problem::TorqueProblem;
 use super::shape_slopes::{ShapeNumber, ShapeSlopes};
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
-use crate::criteria::torque::BETTER;
+use crate::criteria::torque::{BETTER, UNUSUAL};
+
+/// Half widths of the grids: of the logarithm, or of the number itself.
+const HALVES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
+/// Points on either side.
+const POINTS: i32 = 3;
+
+/// Replaces forms of a set by better shaped ones; tells whether any was.
+pub(super) fn refine(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &mut [usize],
+) -> bool {
+    let before = set.to_vec();
+    for place in 0..set.len() {
+        refine_one(problem, weighted, set, place);
+    }
+    before != set
+}
+
+/// Replaces one form of a set.
+fn refine_one(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &mut [usize],
+    place: usize,
+) {
+    let form = &problem.all.forms[set[place]];
+    for span in (form.cause.spans)(form) {
+        for half in HALVES {
+            try_grid(problem, weighted, set, place, span, half);
+            // What the coarsest grid leaves as it usually is stays so.
+            if span.usual == Some(problem.all.forms[set[place]].shape[span.index]) {
+                break;
+            }
+        }
+    }
+}
+
+/// One grid about the present number.
+fn try_grid(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &mut [usize],
+    place: usize,
+    span: ShapeSpan,
+    half: f64,
+) {
+    let form = problem.all.forms[set[place]].clone();
+    let now = form.shape[span.index];
+    let mut trials = vec![set[place]];
+    let is_usual = span.usual == Some(now);
+    for point in (-POINTS..=POINTS).filter(|point| {
+        if is_usual {
+            point.abs() == POINTS
+        } else {
+            *point != 0
+        }
+    }) {
+        let step = half * f64::from(point) / f64::from(POINTS);
+        let moved = if span.by_ratio {
+            now * step.exp()
+        } else {
+            now + step
+        };
+        if moved < span.least || moved > span.most {
+            continue;
+        }
+        let mut trial = form.clone();
+        trial.shape[span.index] = moved;
+        let number = push(problem, weighted, trial);
+        trials.push(number);
+    }
+    let rest: Vec<usize> = (0..set.len())
+        .filter(|other| *other != place)
+        .map(|other| set[other])
+        .collect();
+    let sweep = SweptColumns::base(&problem.all, weighted).with(&rest);
+    let gain = |number: usize| sweep.gain(number);
+    let best = trials
+        .iter()
+        .copied()
+        .max_by(|a, b| gain(*a).total_cmp(&gain(*b)))
+        .unwrap_or(set[place]);
+    let asked = if is_usual {
+        *UNUSUAL + (weighted.rows as f64).ln()
+    } else {
+        *BETTER
+    };
+    if gain(best) > gain(set[place]) + asked {
+        set[place] = best;
+    }
+}
 
 /// Steps, at most.
 const STEPS: usize = 3;

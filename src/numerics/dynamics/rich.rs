@@ -32,9 +32,7 @@ pub(super) fn basic_forms(problem: &TorqueProblem) -> Vec<usize> {
     let forms = &problem.all.forms;
     let is_basic = |form: &usize| {
         let form = &forms[*form];
-        form.width == 1
-            && form.is_usual()
-            && [VISCOUS, COULOMB, OFFSET, ROTOR].contains(&form.cause.name)
+        form.width == 1 && [VISCOUS, COULOMB, OFFSET, ROTOR].contains(&form.cause.name)
     };
     (0..problem.all.listed).filter(is_basic).collect()
 }

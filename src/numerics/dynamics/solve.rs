@@ -7,7 +7,7 @@ use super::clock::RecordingClock;
 use super::contact::contacts;
 use super::latency::{Latency, latency, take_friction_lead};
 use super::problem::TorqueProblem;
-use super::refine::polish;
+use super::refine::{polish, refine};
 use super::rich::{basic_forms, noise_apart, noise_left, noise_of_fit, rich_forms};
 use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
@@ -65,7 +65,7 @@ pub(super) fn solve<'a>(
     let mut weighted = problem.weighted(&[]);
     let mut set = from_common(&CauseChoice::named(&problem, &weighted));
     tell(explained_by(&problem, &set));
-    polish(&mut problem, &mut weighted, &mut set);
+    refine(&mut problem, &mut weighted, &mut set);
     set = again(&mut problem, &mut weighted, set);
     if touched {
         let residual = left_by(&problem, &weighted, &set);
@@ -149,10 +149,7 @@ fn again(
     learn(problem, &set);
     *weighted = problem.weighted(&set);
     let mut set = search(&CauseChoice::new(problem, weighted), &set);
-    let listed = set.clone();
-    polish(problem, weighted, &mut set);
-    *weighted = problem.weighted(&set);
-    if set != listed {
+    if refine(problem, weighted, &mut set) {
         set = settle(&CauseChoice::new(problem, weighted), &set);
     }
     set

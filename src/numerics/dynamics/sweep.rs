@@ -14,6 +14,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// A column of which less than this share is new adds nothing.
 const REDUNDANT: f64 = 1e-9;
+/// The same inside a form: what the base and the set leave of its columns.
+const INVISIBLE: f64 = 2e-5;
 
 /// What a form would gain.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -108,6 +110,29 @@ impl<'a> SweptColumns<'a> {
     /// 1 / variance beforehand of a coefficient.
     fn prior(&self, column: usize) -> f64 {
         self.all.prior.get(column).copied().unwrap_or(0.0)
+    }
+
+    /// What a form would gain, given the present ones.
+    pub(crate) fn gain(&self, form: usize) -> f64 {
+        let (gram, right) = self.left_among(form);
+        let first = self.all.of(form).start;
+        let scale: Vec<f64> = (0..right.len())
+            .map(|a| {
+                self.weighted.gram[first + a][first + a]
+                    .max(f64::MIN_POSITIVE)
+                    .sqrt()
+            })
+            .collect();
+        let mut block = DMatrix::from_fn(right.len(), right.len(), |a, b| {
+            gram[(a, b)] / (scale[a] * scale[b])
+        });
+        (0..right.len()).for_each(|a| {
+            block[(a, a)] += INVISIBLE + self.prior(first + a) / (scale[a] * scale[a])
+        });
+        let along = DVector::from_fn(right.len(), |a, _| right[a] / scale[a]);
+        block
+            .cholesky()
+            .map_or(0.0, |factor| along.dot(&factor.solve(&along)))
     }
 
     /// What the present ones leave of the inner products of a column with all others.

@@ -17,17 +17,14 @@ pub const COULOMB: &str = "coulomb_friction";
 /// Its name.
 pub(crate) const VISCOUS: &str = "viscous_friction";
 
-/// The power of speed of grease that thins, from which another one is found.
-const THINNING: f64 = 0.7;
-
 /// Friction that grows with the velocity of a joint. Shape: its exponent, 1 but where the data show another: grease that thins with speed.
 pub(super) static VISCOUS_FRICTION: TorqueCause = TorqueCause {
     name: VISCOUS,
     coefficients: &[("viscous", "Nm s/rad")],
     price: |_| 0.0,
-    rich: TorqueForm::is_usual,
+    rich: |_| true,
     brakes: true,
-    forms: |cause, scene| at_each_joint(cause, scene, 1, &[&[1.0], &[THINNING]]),
+    forms: |cause, scene| at_each_joint(cause, scene, 1, &[&[1.0]]),
     spans: |form| {
         let span = ShapeSpan {
             usual: Some(1.0),
@@ -303,7 +300,10 @@ pub(super) static WRIST_COUPLING: TorqueCause = TorqueCause {
         } else {
             [-2.0, -0.05]
         };
-        vec![span("ratio", "1", ends)]
+        vec![ShapeSpan {
+            by_ratio: false,
+            ..span("ratio", "1", ends)
+        }]
     },
     cell: |form| form.with,
     torque: ColumnTorque::Row(|column, row| {

@@ -62,7 +62,7 @@ pub(super) static TORQUE_CAUSES: [&TorqueCause; 27] = [
     &memory::HYSTERESIS,
 ];
 
-/// A shape number that is found from the data.
+/// A shape number that is refined.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ShapeSpan {
     /// As the cause's parameters call it.
@@ -72,6 +72,8 @@ pub(super) struct ShapeSpan {
     pub(crate) index: usize,
     pub(crate) least: f64,
     pub(crate) most: f64,
+    /// Refined by ratios instead of differences.
+    pub(crate) by_ratio: bool,
     /// What it is unless the data are worth another number.
     pub(crate) usual: Option<f64>,
 }
@@ -130,7 +132,7 @@ pub(super) struct TorqueCause {
     pub(crate) is_possible: fn(&TorqueForm, &[f64]) -> bool,
     /// Whether its shape numbers are still those of this cause and not at an end where it is another's torque.
     pub(crate) is_itself: fn(&TorqueForm, &DynamicScene) -> bool,
-    /// Shape numbers that are found from the data.
+    /// Shape numbers that are refined once it is found.
     pub(crate) spans: fn(&TorqueForm) -> Vec<ShapeSpan>,
     /// Torque per coefficient of a column at a velocity and its smoothed sign, for causes that are friction over velocity.
     pub(crate) friction: Option<FrictionLaw>,
@@ -375,11 +377,6 @@ impl TorqueForm {
         self.is_called_as(other) && (self.cause.name != UNKNOWN || kind(self) == kind(other))
     }
 
-    /// Whether no number of it is another than it usually is.
-    pub(crate) fn is_usual(&self) -> bool {
-        self.shape_numbers().iter().all(|span| span.usual.is_none())
-    }
-
     /// Shape numbers that are found from the data, each once.
     pub(crate) fn shape_numbers(&self) -> Vec<ShapeSpan> {
         let mut numbers: Vec<ShapeSpan> = Vec::new();
@@ -483,7 +480,7 @@ fn at_each_link(
     (0..links).map(form).collect()
 }
 
-/// A shape number between two ends.
+/// A shape number that is refined by ratios between two ends.
 fn span(name: &'static str, unit: &'static str, [least, most]: [f64; 2]) -> ShapeSpan {
     ShapeSpan {
         name,
@@ -491,6 +488,7 @@ fn span(name: &'static str, unit: &'static str, [least, most]: [f64; 2]) -> Shap
         index: 0,
         least,
         most,
+        by_ratio: true,
         usual: None,
     }
 }
