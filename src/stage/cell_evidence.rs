@@ -85,7 +85,7 @@ pub struct TorqueEvidence {
 }
 
 crate::stage::stage! {
-    TorqueEvidence, "torque_evidence", 1, "says what every possible cause explains of the torques of one robot",
+    TorqueEvidence, "torque_evidence", 2, "says what every possible cause explains of the torques of one robot",
         DiagnoseTorquesReads -> TorqueEvidenceWrites {
             cell_evidence: CellEvidenceTable,
         }
