@@ -52,7 +52,6 @@ pub fn torque_page(
         "joints": tables.course.joints,
         "verdict": verdict,
         "findings": tables.findings.0.iter().map(|row| finding(row, tables)).collect::<Vec<_>>(),
-        "withdrawn": said(VerdictTopic::Withdrawn),
         "errors": &tables.joints.0,
         "pictures": (0..tables.course.joints).map(|joint| pictures(&locale, tables, joint)).collect::<Vec<_>>(),
         "contacts": &tables.contacts.0,

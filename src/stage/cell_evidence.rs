@@ -4,9 +4,9 @@
 use crate::diagnose::{CellAnswer, GivenCell, cell_evidence};
 use crate::dynamics;
 use crate::error::{Error, Place, Result};
-use crate::stage::diagnose::AskedRows;
 use crate::stage::{
-    Context, Diagnose, DiagnoseReads, DiagnoseTorques, DiagnoseTorquesReads, RawFile, Stage,
+    AskedRows, Context, Diagnose, DiagnoseReads, DiagnoseTorques, DiagnoseTorquesReads, RawFile,
+    Stage,
 };
 use crate::table::{CellEvidence as CellEvidenceTable, CellEvidenceRow};
 use schemars::JsonSchema;
@@ -79,7 +79,7 @@ impl Stage for CellEvidence {
 }
 
 crate::stage::stage! {
-    TorqueEvidence, "torque_evidence", 2, "says what every possible cause explains of the torques of one robot",
+    TorqueEvidence, "torque_evidence", 3, "says what every possible cause explains of the torques of one robot",
         DiagnoseTorquesReads -> CellEvidenceWrites
 }
 

@@ -39,6 +39,7 @@ mod validate;
 pub use crate::report::{Accepted, Report, ReportReads, ReportTorquesReads};
 pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given, TorqueEvidence};
 pub use compare::{Compare, CompareReads};
+use diagnose::AskedRows;
 pub use diagnose::{CellPrior, Diagnose, DiagnoseReads};
 pub use diagnose_torques::{CompareTorques, CompareTorquesReads};
 pub use diagnose_torques::{

@@ -6,7 +6,7 @@
 
 use super::short_finding::ShortFinding;
 use crate::effect::{EffectDeclaration, ShapeRange};
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result};
 use serde::Serialize;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
@@ -74,19 +74,6 @@ pub(super) fn not_seen(sentences: &[&str], width: usize) -> String {
         &sentences.iter().map(name).collect::<Vec<_>>(),
         width,
     )
-}
-
-/// How many findings did not stand; nothing where all did.
-pub(super) fn withdrawn(count: usize) -> String {
-    let was = if count == 1 { "was" } else { "were" };
-    if count == 0 {
-        String::new()
-    } else {
-        labelled(
-            "withdrawn",
-            &format!("{} {was} not confirmed", counted(count, "finding")),
-        )
-    }
 }
 
 /// One thing to do next.

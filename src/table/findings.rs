@@ -428,8 +428,6 @@ pub enum VerdictTopic {
     NotObservable,
     /// What to measure next.
     NextMeasurement,
-    /// A finding on torques that the fit of the whole model left without size.
-    Withdrawn,
     /// What is odd about the recording.
     Remark,
 }
@@ -440,7 +438,6 @@ impl VerdictTopic {
         match self {
             Self::NotObservable => "not_observable",
             Self::NextMeasurement => "next_measurement",
-            Self::Withdrawn => "withdrawn",
             Self::Remark => "remark",
         }
     }
@@ -480,13 +477,11 @@ impl VerdictSentences {
 
     /// The same of a diagnosis of torques.
     pub(crate) fn of_torques(step: &str, diagnosis: &TorqueDiagnosis) -> Self {
-        let withdrawn = (VerdictTopic::Withdrawn, diagnosis.withdrawn.as_slice());
         let remarks = (VerdictTopic::Remark, diagnosis.remarks.as_slice());
         Self::of(
             step,
             &[
                 (VerdictTopic::NotObservable, &diagnosis.not_observable),
-                withdrawn,
                 remarks,
             ],
         )

@@ -19,10 +19,6 @@ criteria! {
     PAUSE: f64 = 6.0, "periods", "judgement: what a smooth course bridges", "";
     /// Standard deviations below which a number is not named.
     NAMED: f64 = 2.0, "standard deviations", "literature: 95 % of a normal law", "";
-    /// Blocks in time of the fitted rows, each predicted by the others.
-    BLOCKS: usize = 5, "blocks", "count: without them errors of a UR10 are 0.105 for 0.103, of a TX40 0.201 with and without", "";
-    /// By how much each column of a finding must lower the whitened squared error of the blocks.
-    CONFIRMED: f64 = 3.0, "square", "judgement: a number that explains nothing loses one", "";
     /// How near (logarithm) a shape number is to an end of its search to be none.
     AT_END: f64 = 0.02, "logarithm", "count: the finest grid has steps of 0.003, the one before of 0.01", "";
     /// Greatest torque of one law of friction, one standard deviation beforehand, over half the range of its joint's torque.
@@ -43,8 +39,6 @@ criteria! {
     /// Rows before that noise remembers, at most, where it is what the rich model leaves, whose slow part went with what is slow in that model,
     /// and where it is what a set leaves.
     MEMORY: [usize; 2] = [4, 12], "judged rows", "count: noise that lasts a fifth of a second has 0.71 of its density at rest by 4 rows, 0.98 by 12", "";
-    /// Named causes that are tried instead of one without a name, at most.
-    UNFOLDED: usize = 3, "causes", "judgement: as of points", "";
     /// What a shape number that is not the usual one must gain beyond the logarithm of the number of rows.
     UNUSUAL: f64 = 4.0, "square", "literature: 95 % of one number", "";
     /// A gain that is worth a new shape or another step.
@@ -65,8 +59,6 @@ criteria! {
     PUSH_GAIN: f64 = 100.0, "square", "judgement: seven standard deviations for each of three components, as some hundred times are looked at", "";
     /// Share that it must explain of what stands above the noise.
     PUSH_SHARE: f64 = 0.6, "share", "judgement: more than half", "";
-    /// The same where the model was fitted to the rows of the push, too, and bends around it.
-    PUSH_BENT_SHARE: f64 = 0.35, "share", "judgement: about half of that", "";
     /// Share of the gain that is not of one joint: what only one joint feels is no force at the tool.
     PUSH_OTHERS: f64 = 0.001, "share", "physics: levers differ by less than thirty, squares by less than a thousand", "";
     /// That gain itself, at least.

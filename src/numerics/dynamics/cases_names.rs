@@ -260,27 +260,6 @@ fn a_push_of_two_seconds_early_in_the_recording_is_one() {
     );
 }
 
-#[test]
-fn friction_that_one_block_of_the_fitted_rows_has_is_withdrawn() {
-    let diagnosis = diagnosed_with(&|(joint, time, _, velocity, ..)| {
-        let only = joint == 2 && (5.0..10.0).contains(&time);
-        5.0 * (velocity / 0.003).tanh() + if only { 4.0 * velocity } else { 0.0 }
-    });
-    let frictions: Vec<String> = (1..=4)
-        .map(|joint| format!("coulomb_friction joint {joint}"))
-        .collect();
-    assert_eq!(found(&diagnosis), frictions);
-    let viscous = "viscous_friction at joint 3: blocks of the fitted rows";
-    assert!(
-        diagnosis
-            .withdrawn
-            .iter()
-            .any(|sentence| sentence.starts_with(viscous)),
-        "{:?}",
-        diagnosis.withdrawn
-    );
-}
-
 // Causes whose law has other numbers or another curve than the usual one: one name each, and numbers that say how certain they are.
 
 fn diagnosed_with(extra: &dyn Fn((usize, f64, f64, f64, f64, f64)) -> f64) -> TorqueDiagnosis {
@@ -315,12 +294,7 @@ fn a_zero_that_drifts_is_an_offset_and_nothing_else() {
             0.0
         }
     });
-    assert_eq!(
-        found(&drifting),
-        ["current_offset joint 4"],
-        "{:#?}",
-        drifting.withdrawn
-    );
+    assert_eq!(found(&drifting), ["current_offset joint 4"]);
     assert!(
         covers(stated(&drifting, "current_offset", "offset"), 3.0)
             && covers(stated(&drifting, "current_offset", "time"), 10.0)

@@ -1,12 +1,10 @@
 //! Torques by the evidence of the table of causes: a cell is a cause at a place in every shape that it may have; what was accepted stands in the
 //! covariance with its amplitude, and every other cell is compared given these.
 
-use super::cause::{TorqueForm, UNKNOWN};
+use super::cause::TORQUE_CONSTANT;
 use super::choice::CauseChoice;
 use crate::criteria::cells::{COMMON, NU, SWAPS};
-use crate::criteria::torque::{
-    APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, UNFOLDED, USUAL,
-};
+use crate::criteria::torque::{APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, USUAL};
 use crate::diagnose::table::{
     AMPLITUDES, ComponentSearch, EvidenceRows, KnownState, evidence, log_sum,
 };
@@ -42,9 +40,6 @@ pub(super) struct CellPosterior {
 
 /// A form's columns at unit amplitude, the base swept out: with each other, and with the measured torque.
 pub(super) type FormProducts = (DMatrix<f64>, DVector<f64>);
-
-/// Whether a form is of a kind.
-type FormKind = fn(&TorqueForm) -> bool;
 
 /// Components in the covariance.
 pub(super) struct TorqueState {
@@ -404,71 +399,6 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         components
     }
 
-    /// One wrong mass, drive or mounting instead of several; one gear that turns with two joints instead of another and friction of its joint;
-    /// one torque over angles instead of several at a joint.
-    fn merge(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        let kinds: [(FormKind, FormKind); 3] = [
-            (|form| form.cause.inertial, |form| form.cause.inertial),
-            (TorqueForm::is_gear_of_two, |form| {
-                form.is_gear_of_two() || form.cause.brakes
-            }),
-            (TorqueForm::is_over_angles, TorqueForm::is_over_angles),
-        ];
-        for (is_one, may_leave) in kinds {
-            let form = |place: &usize| self.choice.form(components[*place].form);
-            let places: Vec<usize> = (0..components.len())
-                .filter(|place| may_leave(form(place)))
-                .collect();
-            let alike = |a: &usize, b: &usize| {
-                let [a, b] = [form(a), form(b)];
-                a.place == b.place || (a.cause.inertial && b.cause.inertial)
-            };
-            let together = |group: &Vec<usize>| {
-                group.len() > 1
-                    && group.iter().all(|place| alike(&group[0], place))
-                    && group.iter().any(|place| is_one(form(place)))
-            };
-            let of_one = |place: &usize| -> Vec<usize> {
-                let others = places.iter().copied();
-                others.filter(|other| alike(place, other)).collect()
-            };
-            let whole = places.iter().map(of_one).filter(|group| group.len() > 2);
-            let mut groups: Vec<Vec<usize>> = pairs(&places).into_iter().chain(whole).collect();
-            groups.retain(together);
-            groups.dedup();
-            components = self.merged(&components, &groups, &|number| {
-                is_one(self.choice.form(number))
-            });
-        }
-        components
-    }
-
-    fn merged(
-        &self,
-        components: &[TorqueComponent],
-        groups: &[Vec<usize>],
-        may: &dyn Fn(usize) -> bool,
-    ) -> Vec<TorqueComponent> {
-        let mut best = (self.total(components), components.to_vec());
-        for group in groups {
-            let rest: Vec<TorqueComponent> = (0..components.len())
-                .filter(|place| !group.contains(place))
-                .map(|place| components[place])
-                .collect();
-            let state = self.state(&rest, None);
-            let cells = (0..self.cells.len()).filter(|cell| may(self.cells[*cell].forms[0]));
-            let Some(one) = self.strongest(cells, &state) else {
-                continue;
-            };
-            let next = self.backfit(rest.into_iter().chain([one.best]).collect());
-            let total = self.total(&next);
-            if total > best.0 && self.choice.is_whole(&forms(&next)) {
-                best = (total, next);
-            }
-        }
-        best.1
-    }
-
     /// Components of given forms.
     pub(super) fn components(&self, set: &[usize]) -> Vec<TorqueComponent> {
         self.backfit(
@@ -489,42 +419,13 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         self.prune(components)
     }
 
-    /// Exchanges, merges and removals.
+    /// Exchanges and removals.
     pub(super) fn settled(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
         // What an arm cannot have is first exchanged for what it can have.
         let components = self.swap(components);
         let components = self.prune(components);
-        let components = self.unfold(self.merge(self.swap(components)));
+        let components = self.swap(components);
         self.prune(components)
-    }
-
-    /// Several named causes at a place instead of one without a name.
-    fn unfold(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        let nameless: Vec<usize> = forms(&components)
-            .into_iter()
-            .filter(|form| self.choice.form(*form).cause.name == UNKNOWN)
-            .collect();
-        for form in nameless {
-            let at = self.choice.form(form).place;
-            let mut next: Vec<TorqueComponent> = components.clone();
-            next.retain(|own| own.form != form);
-            for _ in 0..*UNFOLDED {
-                let state = self.state(&next, None);
-                let named = |cell: &usize| {
-                    self.cells[*cell].name != UNKNOWN && self.cells[*cell].place == at
-                };
-                let best = self.strongest((0..self.cells.len()).filter(named), &state);
-                let Some(best) = best.filter(|best| best.log_odds > 0.0) else {
-                    break;
-                };
-                next.push(best.best);
-                next = self.backfit(next);
-            }
-            if self.choice.is_whole(&forms(&next)) && self.total(&next) > self.total(&components) {
-                components = next;
-            }
-        }
-        components
     }
 
     /// The odds of a component and of all that could stand in its place.
@@ -574,13 +475,58 @@ pub(super) fn without(components: &[TorqueComponent], place: usize) -> Vec<Torqu
         .collect()
 }
 
-/// Two of some.
-fn pairs(of: &[usize]) -> Vec<Vec<usize>> {
-    let with = |(place, first): (usize, &usize)| {
-        of[place + 1..]
-            .iter()
-            .map(|second| vec![*first, *second])
-            .collect::<Vec<_>>()
+/// The best set from what hardly an arm is without. One factor on the whole torque of each joint is asked before masses: where factors explain as
+/// much, it is these.
+pub(super) fn from_common(choice: &CauseChoice) -> Vec<usize> {
+    let mut table = TorqueTable::new(choice);
+    let is_drive = |number: &usize| choice.form(*number).cause.name == TORQUE_CONSTANT;
+    let has_masses = |set: &[TorqueComponent]| {
+        let masses = |number: &usize| choice.form(*number).cause.inertial && !is_drive(number);
+        forms(set).iter().any(masses)
     };
-    of.iter().enumerate().flat_map(with).collect()
+    let masses = table.searched(&choice.common());
+    let drives =
+        (0..choice.open).filter(|number| is_drive(number) && choice.form(*number).shape.is_empty());
+    let start: Vec<usize> = choice.common().into_iter().chain(drives).collect();
+    if !has_masses(&masses) || start == choice.common() {
+        return forms(&masses);
+    }
+    let scaled = table.searched(&start);
+    let worse = table.total(&masses) - table.total(&scaled);
+    let most = if has_masses(&scaled) {
+        0.0
+    } else {
+        0.5 * *APART
+    };
+    forms(if worse <= most { &scaled } else { &masses })
+}
+
+/// The best set from a start.
+pub(super) fn search(choice: &CauseChoice, start: &[usize]) -> Vec<usize> {
+    forms(&TorqueTable::new(choice).searched(start))
+}
+
+/// A set after exchanges and removals.
+pub(super) fn settle(choice: &CauseChoice, set: &[usize]) -> Vec<usize> {
+    let mut table = TorqueTable::new(choice);
+    let components = table.components(set);
+    forms(&table.settled(components))
+}
+
+/// What of a set would not be found under the present noise; `silent` stays in any case.
+pub(super) fn faint(choice: &CauseChoice, set: &[usize], silent: &[usize]) -> Vec<usize> {
+    let mut table = TorqueTable::new(choice);
+    table.kept = silent.to_vec();
+    let components = table.components(set);
+    let clear = table.prune(components);
+    let kappa = table.noise(&clear);
+    // What others need stays in the set, but not for itself.
+    let pays = |place: &usize| table.odds_of(&clear, *place, kappa).log_odds > table.least();
+    let clear: Vec<usize> = (0..clear.len())
+        .filter(pays)
+        .map(|place| clear[place].form)
+        .collect();
+    let mut faint = set.to_vec();
+    faint.retain(|number| !clear.contains(number) && !silent.contains(number));
+    faint
 }

@@ -57,7 +57,7 @@ impl<'a> CauseChoice<'a> {
     }
 
     /// Whether a curve of speed without a name is at the place of a form, in a set.
-    pub(crate) fn is_part_of_curve(&self, form: &TorqueForm, set: &[usize]) -> bool {
+    fn is_part_of_curve(&self, form: &TorqueForm, set: &[usize]) -> bool {
         set.iter()
             .map(|other| self.form(*other))
             .any(|curve| curve.place == form.place && curve.is_nameless_curve())
@@ -103,19 +103,11 @@ impl<'a> CauseChoice<'a> {
         (0..self.open).filter(common).collect()
     }
 
-    /// The next form of the same cause and place with fewer numbers.
-    pub(crate) fn plainer(&self, form: &TorqueForm) -> Option<&TorqueForm> {
-        let listed = self.problem.all.forms[..self.open].iter();
-        let plainer = listed.filter(|other| {
-            other.is_called_as(form) && other.with == form.with && other.width < form.width
-        });
-        plainer.max_by_key(|other| other.width)
-    }
-
-    /// Whether two forms may stand in each other's place: on one joint, or both wrong masses, drives or mounting.
+    /// Whether two forms may stand in each other's place: they change the torque of one joint.
     pub(crate) fn compete(&self, a: usize, b: usize) -> bool {
-        let (a, b) = (self.form(a), self.form(b));
-        a.place == b.place || (a.cause.inertial && b.cause.inertial)
+        let joints = self.problem.joints();
+        let [a, b] = [a, b].map(|number| self.form(number).acts_on(joints));
+        a.iter().any(|joint| b.contains(joint))
     }
 
     /// Viscous or Coulomb friction where a set has only the other one: hardly a joint is without either, and the missing one would bias the

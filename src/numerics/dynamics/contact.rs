@@ -3,8 +3,8 @@
 use super::problem::TorqueProblem;
 use super::types::ContactEvent;
 use crate::criteria::torque::{
-    PUSH_APART, PUSH_AVERAGED, PUSH_BENT_SHARE, PUSH_DEVIATIONS, PUSH_FEWEST, PUSH_GAIN,
-    PUSH_MOVING, PUSH_OTHERS, PUSH_OTHERS_GAIN, PUSH_SHARE, PUSH_TIMES_USUAL, PUSHES,
+    PUSH_APART, PUSH_AVERAGED, PUSH_DEVIATIONS, PUSH_FEWEST, PUSH_GAIN, PUSH_MOVING, PUSH_OTHERS,
+    PUSH_OTHERS_GAIN, PUSH_SHARE, PUSH_TIMES_USUAL, PUSHES,
 };
 use crate::statistics::nearest;
 use crate::weighted::JointNoise;
@@ -22,17 +22,6 @@ const STEP: f64 = 0.1;
 const FINE: [f64; 2] = [0.08, 0.02];
 const FINE_STEPS: i32 = 3;
 
-/// What a residual is left by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ContactModel {
-    /// A model too rich for rows that it was not fitted to.
-    Rich,
-    /// A model that is bare or still searched for: held-out rows are not looked at.
-    Present,
-    /// The model that stands.
-    Judged,
-}
-
 /// Noise by how many rows count as one.
 #[derive(Clone, Copy)]
 struct EffectiveNoise<'a> {
@@ -42,12 +31,13 @@ struct EffectiveNoise<'a> {
     usual: f64,
 }
 
-/// Contacts in a residual (`[joint][judged row]`, Nm) under noise, in the order of time. Rows count by how long noise lasts.
+/// Contacts in a residual (`[joint][judged row]`, Nm) under noise, in the order of time: of the fitted rows, or of those that are held out too.
+/// Rows count by how long noise lasts.
 pub(super) fn contacts(
     problem: &TorqueProblem,
     residual: &[Vec<f64>],
     noise: &[JointNoise],
-    model: ContactModel,
+    held_out: bool,
 ) -> Vec<ContactEvent> {
     let lasting: Vec<f64> = noise
         .iter()
@@ -73,7 +63,7 @@ pub(super) fn contacts(
         })
         .collect();
     let shown: Vec<usize> = (0..rows)
-        .filter(|row| model == ContactModel::Judged || !problem.is_held_out(*row))
+        .filter(|row| held_out || !problem.is_held_out(*row))
         .collect();
     let energy: Vec<f64> = shown.iter().map(|row| energy[*row]).collect();
     let average = averaged(
@@ -83,11 +73,6 @@ pub(super) fn contacts(
     let median = nearest(&mut average.clone(), 0.5).unwrap_or(0.0);
     let mut apart: Vec<f64> = average.iter().map(|value| (value - median).abs()).collect();
     let spread = 1.4826 * nearest(&mut apart, 0.5).unwrap_or(0.0);
-    let least_share = if model == ContactModel::Rich {
-        *PUSH_BENT_SHARE
-    } else {
-        *PUSH_SHARE
-    };
     let (mut used, mut events) = (vec![false; shown.len()], Vec::new());
     for _ in 0..*PUSHES {
         let free = (0..shown.len()).filter(|row| !used[*row]);
@@ -105,7 +90,6 @@ pub(super) fn contacts(
             EffectiveNoise { sigma, usual },
             &time,
             time[shown[highest]],
-            least_share,
         );
         events.extend(found.filter(|event| moves(problem, &time, event)));
         let near = |row: &usize| (time[shown[*row]] - time[shown[highest]]).abs() < *PUSH_APART;
@@ -124,7 +108,6 @@ fn best_window(
     noise: EffectiveNoise,
     time: &[f64],
     middle: f64,
-    least_share: f64,
 ) -> Option<ContactEvent> {
     let mut best: Option<(ContactEvent, f64)> = None;
     let mut look = |start: f64, duration: f64| {
@@ -164,7 +147,7 @@ fn best_window(
             now = look(start + begin, duration + end - begin);
         }
     }
-    best.filter(|(event, share)| event.gain > *PUSH_GAIN && *share > least_share)
+    best.filter(|(event, share)| event.gain > *PUSH_GAIN && *share > *PUSH_SHARE)
         .map(|(event, _)| event)
 }
 

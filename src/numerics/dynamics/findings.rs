@@ -1,22 +1,17 @@
 //! What was found in words and numbers: sizes, evidence, rivals, probabilities.
 //!
-//! What of a set is named. A number at an end of its search would be better beyond it, friction that drives is none, and what is less than
-//! two standard deviations may as well be nothing: such forms leave the set, or stay as parts of a sum without a name.
+//! A number at an end of its search would be better beyond it: such forms leave the set.
 
-use crate::cause::{
-    COULOMB, FittedNumber, TorqueForm, TorqueParameter, UNKNOWN, VISCOUS, line_of_power,
-};
+use crate::cause::{COULOMB, FittedNumber, TorqueForm, TorqueParameter, VISCOUS, line_of_power};
 use crate::cells::{CellOdds, TorqueTable};
 use crate::choice::CauseChoice;
 use crate::criteria::cells::{MISLED, RIVAL};
-use crate::criteria::torque::NAMED;
 use crate::diagnose::table::log_sum;
 use crate::diagnose::{Evidence, Probabilities, RivalCause};
 use crate::effect::Place;
 use crate::estimate::tail;
-use crate::judge::OtherInertials;
 use crate::problem::TorqueProblem;
-use crate::refine::{polish, push};
+use crate::refine::push;
 use crate::scene::largest;
 use crate::shape_slopes::{ShapeNumber, ShapeSlopes, slope};
 use crate::sweep::{SweptColumns, value_of};
@@ -26,14 +21,13 @@ use crate::weighted::WeightedColumns;
 /// Residual rows of a test, at most: beyond it the tail does not change.
 const FREEDOM: f64 = 1e4;
 
-/// Findings of a judged set but for what is silent, strongest first. A name that the data exclude by others of its place is none; the common
+/// Findings of a set but for what is silent, strongest first. A name that the data exclude by others of its place is none; the common
 /// frictions are parts of sums.
 pub(super) fn findings(
     choice: &CauseChoice,
-    JudgedSet { set, silent, .. }: &JudgedSet,
+    (set, silent): (&[usize], &[usize]),
     held_out: &[usize],
     uncertain: (&SweptColumns, &ShapeSlopes),
-    other: Option<&OtherInertials>,
 ) -> Vec<TorqueFinding> {
     let sweep = choice.base.with(set);
     let solution = sweep.solution();
@@ -46,13 +40,7 @@ pub(super) fn findings(
     let components = table.components(set);
     let mut found: Vec<TorqueFinding> = named
         .map(|number| {
-            let mut odds = table.odds_in_place(&components, *number);
-            let other = other.filter(|_| choice.form(*number).cause.inertial);
-            odds.rivals.extend(
-                other
-                    .into_iter()
-                    .flat_map(|other| other.rivals(choice, odds.own)),
-            );
+            let odds = table.odds_in_place(&components, *number);
             weighed(
                 finding(
                     choice,
@@ -274,129 +262,28 @@ pub(super) fn contact(event: &ContactEvent) -> TorqueFinding {
     )
 }
 
-/// Forms that lose their name one after the other, at most.
-const ROUNDS: usize = 40;
-
-/// What explains a recording.
-#[derive(Default)]
-pub(super) struct JudgedSet {
-    pub(crate) set: Vec<usize>,
-    /// What of the set is part of the model, but too little to be named.
-    pub(crate) silent: Vec<usize>,
-    /// What cross-validation did not confirm, with what left-out rows gained by each.
-    pub(crate) withdrawn: Vec<(usize, f64)>,
-}
-
-/// What becomes of a form.
-enum NotNamed {
-    /// At a position of the set: it leaves.
-    Out(usize),
-    /// It stays in the model without a name.
-    Silent(usize),
-    /// Numbers at an end are what they usually are.
-    Within(usize, TorqueForm),
-}
-
 /// Takes forms with a number at an end of its search out of a set, and their causes out of the search at their places; tells whether any was.
 pub(super) fn take_out_ends(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
     set: &mut Vec<usize>,
 ) -> bool {
-    let mut changed = false;
-    while let Some(one) = at_end(problem, set) {
-        changed = true;
-        match one {
-            NotNamed::Within(place, form) => set[place] = push(problem, weighted, form),
-            NotNamed::Out(place) | NotNamed::Silent(place) => {
-                let form = problem.all.forms[set.remove(place)].clone();
+    let before = set.clone();
+    for number in before.iter().copied() {
+        let form = problem.all.forms[number].clone();
+        let place = set.iter().position(|other| *other == number);
+        match (form.within_ends(), place) {
+            (Some(within), Some(place)) if within.shape != form.shape => {
+                set[place] = push(problem, weighted, within);
+            }
+            (None, Some(place)) => {
+                set.remove(place);
                 problem.barred.push(form);
             }
+            _ => (),
         }
     }
-    changed
-}
-
-/// The first form of a set with a number at an end.
-fn at_end(problem: &TorqueProblem, set: &[usize]) -> Option<NotNamed> {
-    set.iter().enumerate().find_map(|(place, number)| {
-        let form = &problem.all.forms[*number];
-        match form.within_ends() {
-            None => Some(NotNamed::Out(place)),
-            Some(within) => (within.shape != form.shape).then_some(NotNamed::Within(place, within)),
-        }
-    })
-}
-
-/// Takes names off until all that are left are right.
-pub(super) fn settle_names(
-    problem: &mut TorqueProblem,
-    weighted: &mut WeightedColumns,
-    judged: &mut JudgedSet,
-) {
-    for _ in 0..ROUNDS {
-        let slopes = ShapeSlopes::of(problem, weighted, &judged.set);
-        let next = at_end(problem, &judged.set)
-            .or_else(|| next(&CauseChoice::new(problem, weighted), judged, &slopes));
-        match next {
-            None => return,
-            Some(NotNamed::Silent(place)) => {
-                judged.silent.push(judged.set[place]);
-                continue;
-            }
-            Some(NotNamed::Out(place)) => _ = judged.set.remove(place),
-            Some(NotNamed::Within(place, form)) => {
-                judged.set[place] = push(problem, weighted, form)
-            }
-        }
-        polish(problem, weighted, &mut judged.set);
-    }
-}
-
-/// The form with the least right to its name.
-fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Option<NotNamed> {
-    let set = &judged.set;
-    let sweep = choice.base.with(set);
-    let solution = sweep.solution();
-    let uncertain = slopes.with_slopes(&sweep);
-    let named = |place: &usize| {
-        let form = choice.form(set[*place]);
-        form.cause.name != UNKNOWN
-            && !judged
-                .silent
-                .iter()
-                .any(|silent| choice.form(*silent).is_called_as(form))
-    };
-    // The largest of its numbers in standard deviations, with its sign.
-    let sure = |place: usize| {
-        let numbers = fitted(choice, set, set[place], &solution, (&uncertain, slopes));
-        let over = numbers
-            .iter()
-            .map(|number| number.value / number.sigma.max(f64::MIN_POSITIVE));
-        over.max_by(|a, b| a.abs().total_cmp(&b.abs()))
-            .unwrap_or(0.0)
-    };
-    let wrong = |place: usize, sure: f64| choice.form(set[place]).cause.brakes && sure <= 0.0;
-    let weak = (0..set.len())
-        .filter(named)
-        .map(|place| (place, sure(place)));
-    let weak = weak.filter(|(place, sure)| sure.abs() < *NAMED || wrong(*place, *sure));
-    let (place, sure) = weak.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let form = choice.form(set[place]);
-    // Numbers of many waves are uncertain one by one where few of them are not.
-    if let Some(plainer) = choice
-        .plainer(form)
-        .filter(|_| sweep.loss(set[place], &solution).square > NAMED.powi(2) * form.width as f64)
-    {
-        return Some(NotNamed::Within(place, plainer.clone()));
-    }
-    let mut leaning = (0..set.len()).filter(|other| choice.form(set[*other]).modifies(form));
-    let is_summed = choice.is_part_of_curve(form, set);
-    if is_summed || (form.cause.brakes && sure > 0.0) {
-        return Some(NotNamed::Silent(place));
-    }
-    // What leans on friction that is none is none either.
-    Some(NotNamed::Out(leaning.next().unwrap_or(place)))
+    before != *set
 }
 
 /// Coefficients of a form with their standard deviations; of viscous and Coulomb friction where speed enters by another power than the first,

@@ -18,7 +18,7 @@ pub(super) fn answers(solved: &mut SolvedTorques, given: &[GivenCell]) -> Vec<Ce
     solved.problem.barred.clear();
     let choice = CauseChoice::new(&solved.problem, &solved.weighted);
     let mut table = TorqueTable::new(&choice);
-    let components = table.components(&solved.judged.set);
+    let components = table.components(&solved.set);
     let components = table.with_given(components, given);
     let (state, mut out) = (table.state(&components, None), Vec::new());
     let kappa = state.known.kappa;

@@ -32,7 +32,6 @@ mod filter;
 mod findings;
 mod friction_curve;
 mod given;
-mod judge;
 mod latency;
 mod masses;
 mod model;

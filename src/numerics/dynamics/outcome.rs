@@ -32,7 +32,7 @@ pub(super) fn outcome(
 ) -> TorqueDiagnosis {
     let problem = &solved.problem;
     let choice = CauseChoice::new(problem, &solved.weighted);
-    let set = &solved.judged.set;
+    let set = &solved.set;
     let sweep = choice.base.with(set);
     let free = sweep.solution();
     let uncertain = solved.slopes.with_slopes(&sweep);
@@ -78,10 +78,9 @@ pub(super) fn outcome(
     }
     let mut found = findings(
         &choice,
-        &solved.judged,
+        (set, &solved.silent),
         &held,
         (&uncertain, &solved.slopes),
-        solved.other.as_ref(),
     );
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));
@@ -124,7 +123,6 @@ pub(super) fn outcome(
         after,
         held_out: !held.is_empty(),
         findings: found,
-        withdrawn: withdrawn(&choice, &solved.judged.withdrawn),
         not_observable: not_observable(&choice, set, &sweep),
         leftover,
         events: problem.events.clone(),
@@ -207,22 +205,6 @@ fn statement(verdict: VerdictKind, found: &[TorqueFinding], nrmse: [f64; 2], ove
             counted(found.len(), "finding")
         ),
     }
-}
-
-fn withdrawn(choice: &CauseChoice, withdrawn: &[(usize, f64)]) -> Vec<String> {
-    let sentence = |(number, gain): &(usize, f64)| {
-        let form = choice.form(*number);
-        let squares = if *gain < 0.0 {
-            format!("grows by {:.1}", -gain)
-        } else {
-            format!("falls by {gain:.1} only")
-        };
-        format!(
-            "{} at {}: blocks of the fitted rows that are predicted by the others do not confirm it (with it their squared error over the noise {squares})",
-            form.cause.name, form.place
-        )
-    };
-    withdrawn.iter().map(sentence).collect()
 }
 
 /// What is left of fitted rows.

@@ -1,21 +1,17 @@
 //! Shape numbers of what was found: finer and finer grids about each, then all at once with the coefficients and the width over which the sign of
 //! friction turns, by steps of Gauss and Newton: one number after the other stays where two go together.
 
-use super::cause::{COULOMB, ShapeSpan, TorqueForm, VISCOUS};
-use super::choice::CauseChoice;
+use super::cause::{ShapeSpan, TorqueForm};
 use super::problem::TorqueProblem;
 use super::shape_slopes::{ShapeNumber, ShapeSlopes};
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
 use crate::criteria::torque::{BETTER, UNUSUAL};
-use crate::effect::Place;
 
 /// Half widths of the grids: of the logarithm, or of the number itself.
 const HALVES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 /// Points on either side.
 const POINTS: i32 = 3;
-/// The power of speed from which one is looked for.
-const START_POWER: f64 = 0.7;
 
 /// Replaces forms of a set by better shaped ones; tells whether any was.
 pub(super) fn refine(
@@ -30,76 +26,8 @@ pub(super) fn refine(
     before != set
 }
 
-/// Replaces viscous and Coulomb friction of a joint by friction that grows with a power of speed where it leaves no more than the two: with a
-/// sign that turns slowly they are nearly this power. Tells whether it did.
-pub(super) fn one_power_of_speed(
-    problem: &mut TorqueProblem,
-    weighted: &mut WeightedColumns,
-    set: &mut Vec<usize>,
-    joint: usize,
-) -> bool {
-    let is_coulomb = |form: &TorqueForm| form.cause.name == COULOMB;
-    powered(problem, weighted, set, (joint, &is_coulomb), 0.0)
-}
-
-/// Replaces a curve of speed without a name by a power of speed of the viscous friction where that explains nearly as much. Tells whether it
-/// did.
-pub(super) fn power_for_curve(
-    problem: &mut TorqueProblem,
-    weighted: &mut WeightedColumns,
-    set: &mut Vec<usize>,
-    joint: usize,
-) -> bool {
-    // The curve has three numbers more.
-    let worth = 3.0 * (weighted.rows as f64).ln();
-    powered(
-        problem,
-        weighted,
-        set,
-        (joint, &TorqueForm::is_nameless_curve),
-        worth,
-    )
-}
-
-/// Takes a form of a joint out of a set and lets its viscous friction grow with a power of speed, where the sum of squares so rises by no more
-/// than `worth`. Tells whether it did.
-fn powered(
-    problem: &mut TorqueProblem,
-    weighted: &mut WeightedColumns,
-    set: &mut Vec<usize>,
-    (joint, is_replaced): (usize, &dyn Fn(&TorqueForm) -> bool),
-    worth: f64,
-) -> bool {
-    let at = |is: &dyn Fn(&TorqueForm) -> bool| {
-        let mut forms = set.iter().map(|number| &problem.all.forms[*number]);
-        forms.position(|form| form.place == Place::Joint(joint) && is(form))
-    };
-    let viscous = at(&|form| form.cause.name == VISCOUS);
-    let (Some(viscous), Some(replaced)) = (viscous, at(is_replaced)) else {
-        return false;
-    };
-    let mut next = set.clone();
-    let form = &problem.all.forms[set[viscous]];
-    if form.shape.first() == Some(&1.0) {
-        let form = form.with_shape(0, START_POWER);
-        next[viscous] = push(problem, weighted, form);
-    }
-    next.remove(replaced);
-    if !CauseChoice::new(problem, weighted).is_whole(&next) {
-        return false;
-    }
-    let place = viscous - usize::from(replaced < viscous);
-    refine_one(problem, weighted, &mut next, place);
-    let square = |set: &[usize]| SweptColumns::base(&problem.all, weighted).with(set).square;
-    let is_better = square(&next) <= square(set) + worth;
-    if is_better {
-        *set = next;
-    }
-    is_better
-}
-
 /// Replaces one form of a set.
-pub(super) fn refine_one(
+fn refine_one(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
     set: &mut [usize],

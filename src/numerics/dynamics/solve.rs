@@ -1,31 +1,25 @@
 //! The steps of a diagnosis of torques, one after the other.
 
 use super::arm::DynamicArm;
-use super::cause::TorqueForm;
+use super::cells::{faint, from_common, search, settle};
 use super::choice::CauseChoice;
 use super::clock::RecordingClock;
-use super::contact::{ContactModel, contacts};
-use super::judge::judge;
+use super::contact::contacts;
 use super::latency::{Latency, latency, take_friction_lead};
 use super::problem::TorqueProblem;
-use super::refine::{one_power_of_speed, polish, power_for_curve, refine};
+use super::refine::{polish, refine};
 use super::rich::{basic_forms, noise_apart, noise_left, noise_of_fit, rich_forms};
 use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::WeightedColumns;
-use crate::findings::{JudgedSet, settle_names, take_out_ends};
-use crate::judge::{OtherInertials, faint, from_common, search, settle, settle_with_priors};
+use crate::findings::take_out_ends;
 use crate::shape_slopes::sign_width;
 use crate::types::TorqueRecording;
 use crate::weighted::NoiseMemory;
 
 /// Rounds in which others are looked for in place of forms with a number at an end of its search, at most.
 const END_ROUNDS: usize = 3;
-/// Rounds in which causes that predict left-out rows worse are replaced, at most.
-const JUDGED_ROUNDS: usize = 6;
-/// s.
-const SAME_TIME: f64 = 0.1;
 /// Rounds in which a latency and the lead of friction find each other, at most.
 const CLOCK_ROUNDS: usize = 4;
 
@@ -33,12 +27,13 @@ const CLOCK_ROUNDS: usize = 4;
 pub(super) struct SolvedTorques<'a> {
     pub(crate) problem: TorqueProblem<'a>,
     pub(crate) weighted: WeightedColumns,
-    pub(crate) judged: JudgedSet,
-    /// Slopes of the judged set.
+    /// Forms of the model.
+    pub(crate) set: Vec<usize>,
+    /// Those of them that are too little to be named.
+    pub(crate) silent: Vec<usize>,
+    /// Slopes of the set.
     pub(crate) slopes: ShapeSlopes,
     pub(crate) latency: Option<Latency>,
-    /// Wrong masses or drives in place of those of the set.
-    pub(crate) other: Option<OtherInertials>,
 }
 
 /// Looks for causes.
@@ -68,21 +63,13 @@ pub(super) fn solve<'a>(
     }
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted(&[]);
-    let (mut set, mut other) = from_common(&CauseChoice::named(&problem, &weighted));
-    let before = problem.events.clone();
-    if touched {
-        look_for_contacts(&mut problem, &weighted, &set, ContactModel::Present);
-    }
-    if !alike(&before, &problem.events) {
-        learn(&mut problem, &[]);
-        weighted = problem.weighted(&[]);
-        (set, other) = from_common(&CauseChoice::named(&problem, &weighted));
-    }
+    let mut set = from_common(&CauseChoice::named(&problem, &weighted));
     tell(explained_by(&problem, &set));
     refine(&mut problem, &mut weighted, &mut set);
     set = again(&mut problem, &mut weighted, set);
     if touched {
-        look_for_contacts(&mut problem, &weighted, &set, ContactModel::Judged);
+        let residual = left_by(&problem, &weighted, &set);
+        problem.events = contacts(&problem, &residual, &problem.noise, true);
     }
     learn(&mut problem, &set);
     weighted = problem.weighted_of(&set);
@@ -94,54 +81,26 @@ pub(super) fn solve<'a>(
         set = again(&mut problem, &mut weighted, set);
         polish(&mut problem, &mut weighted, &mut set);
     }
-    for joint in 0..problem.scene.joints() {
-        if power_for_curve(&mut problem, &mut weighted, &mut set, joint) {
-            polish(&mut problem, &mut weighted, &mut set);
-        }
-    }
-    let mut judged = JudgedSet::default();
-    for _ in 0..JUDGED_ROUNDS {
-        weighted = problem.weighted(&set);
-        let choice = CauseChoice::new(&problem, &weighted);
-        let (settled, priors) = settle_with_priors(&choice, &set);
-        let found = judge(&choice, settled, &priors);
-        judged.set = found.set;
-        if found.withdrawn.is_empty() {
-            break;
-        }
-        let form = |number: &usize| problem.all.forms[*number].clone();
-        let barred: Vec<TorqueForm> = found
-            .withdrawn
-            .iter()
-            .map(|(number, _)| form(number))
-            .collect();
-        problem.barred.extend(barred);
-        judged.withdrawn.extend(found.withdrawn);
-        // Something else may be in their place.
-        set = again(&mut problem, &mut weighted, judged.set.clone());
-        polish(&mut problem, &mut weighted, &mut set);
-    }
-    weighted = problem.weighted(&judged.set);
-    judged.silent = CauseChoice::new(&problem, &weighted).other_friction(&judged.set);
-    judged.set.extend(&judged.silent);
-    weighted = problem.weighted_of(&judged.set);
-    polish(&mut problem, &mut weighted, &mut judged.set);
-    settle_names(&mut problem, &mut weighted, &mut judged);
+    weighted = problem.weighted(&set);
+    let named = set.len();
+    set.extend(CauseChoice::new(&problem, &weighted).other_friction(&set));
+    weighted = problem.weighted_of(&set);
+    polish(&mut problem, &mut weighted, &mut set);
+    let mut silent = set[named..].to_vec();
     let rich = problem.noise.clone();
-    problem.noise = noise_left(&problem, &judged.set);
-    weighted = problem.weighted(&judged.set);
-    let faint = faint(&CauseChoice::new(&problem, &weighted), &judged);
-    judged.silent.extend(faint);
+    problem.noise = noise_left(&problem, &set);
+    weighted = problem.weighted(&set);
+    silent.extend(faint(&CauseChoice::new(&problem, &weighted), &set, &silent));
     problem.noise = rich;
-    weighted = problem.weighted(&judged.set);
-    let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &judged.set);
+    weighted = problem.weighted(&set);
+    let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &set);
     SolvedTorques {
         problem,
         weighted,
-        judged,
+        set,
+        silent,
         slopes,
         latency: found,
-        other,
     }
 }
 
@@ -163,38 +122,17 @@ fn clocked(
     found
 }
 
-/// Candidates for pushes before anything else is known: in what the common causes leave, as a rich model bends around a push that comes early;
-/// where there are none, in what a rich model leaves. What only looks like one is dropped with the first set.
+/// Candidates for pushes before anything else is known: in what the common causes leave, as a rich model bends around a push that comes early.
 fn first_contacts(problem: &TorqueProblem) -> Vec<ContactEvent> {
     let (_, residual) = noise_of_fit(problem, &basic_forms(problem), NoiseMemory::Short);
     let noise = noise_apart(problem, &residual);
-    let events = contacts(problem, &residual, &noise, ContactModel::Present);
-    if !events.is_empty() {
-        return events;
-    }
-    let (noise, residual) = noise_of_fit(problem, &rich_forms(problem, &[]), NoiseMemory::Short);
-    contacts(problem, &residual, &noise, ContactModel::Rich)
+    contacts(problem, &residual, &noise, false)
 }
 
-/// Sets rows aside in which the residual of a set looks like a push.
-fn look_for_contacts(
-    problem: &mut TorqueProblem,
-    weighted: &WeightedColumns,
-    set: &[usize],
-    model: ContactModel,
-) {
-    let solution = SweptColumns::base(&problem.all, weighted)
-        .with(set)
-        .solution();
-    problem.events = contacts(problem, &problem.residual(&solution), &problem.noise, model);
-}
-
-/// Whether the same rows are set aside, to a tenth of a second.
-fn alike(before: &[ContactEvent], after: &[ContactEvent]) -> bool {
-    let near = |(a, b): (&ContactEvent, &ContactEvent)| {
-        (a.start - b.start).abs() < SAME_TIME && (a.end - b.end).abs() < SAME_TIME
-    };
-    before.len() == after.len() && before.iter().zip(after).all(near)
+/// What the base and a set leave of the measured torque, Nm.
+fn left_by(problem: &TorqueProblem, weighted: &WeightedColumns, set: &[usize]) -> Vec<Vec<f64>> {
+    let fit = SweptColumns::base(&problem.all, weighted).with(set);
+    problem.residual(&fit.solution())
 }
 
 /// From the fitted rigid torque and noise: searches on from a set and refines it.
@@ -211,11 +149,7 @@ fn again(
     learn(problem, &set);
     *weighted = problem.weighted(&set);
     let mut set = search(&CauseChoice::new(problem, weighted), &set);
-    let mut changed = refine(problem, weighted, &mut set);
-    for joint in 0..problem.scene.joints() {
-        changed |= one_power_of_speed(problem, weighted, &mut set, joint);
-    }
-    if changed {
+    if refine(problem, weighted, &mut set) {
         set = settle(&CauseChoice::new(problem, weighted), &set);
     }
     set

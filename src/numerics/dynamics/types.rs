@@ -192,8 +192,6 @@ pub struct TorqueDiagnosis {
     pub held_out: bool,
     /// Strongest first.
     pub findings: Vec<TorqueFinding>,
-    /// Findings that cross-validation over blocks of the fitted rows did not confirm, a sentence each: they are not in the model.
-    pub withdrawn: Vec<String>,
     /// What these data cannot show, a sentence each.
     pub not_observable: Vec<String>,
     /// Per joint.

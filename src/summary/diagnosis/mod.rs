@@ -210,7 +210,6 @@ impl DiagnosisSummary {
             }
             Kind::Torques(diagnosis) => {
                 let mut document = diagnosis.document();
-                document["withdrawn"] = json!(self.statements(VerdictTopic::Withdrawn));
                 document["remarks"] = json!(self.statements(VerdictTopic::Remark));
                 document
             }
@@ -252,7 +251,6 @@ impl DiagnosisSummary {
                 .map(|line| format!("{label}{line}\n"))
                 .collect()
         };
-        text += &lines("withdrawn: ", &self.statements(VerdictTopic::Withdrawn));
         text += &lines(
             "not observable: ",
             &self.statements(VerdictTopic::NotObservable),
@@ -345,9 +343,6 @@ impl DiagnosisSummary {
                 .map(|row| format!("{} ({})", row.point_id, length(row.size_mm)));
             text.push_str(&screen::names("set aside", &Vec::from_iter(aside), width));
         }
-        text.push_str(&screen::withdrawn(
-            self.statements(VerdictTopic::Withdrawn).len(),
-        ));
         let not_seen = self.statements(VerdictTopic::NotObservable);
         text.push_str(&screen::not_seen(&not_seen, width));
         let next = self

@@ -343,16 +343,6 @@ impl TorqueForm {
         self.cause.name == UNKNOWN && self.cause.bends
     }
 
-    /// Whether it is a torque over the angles of joints.
-    pub(crate) fn is_over_angles(&self) -> bool {
-        self.cause.of_angle || self.cause.alike_at_joints
-    }
-
-    /// Whether it is a gear that turns with two joints.
-    pub(crate) fn is_gear_of_two(&self) -> bool {
-        (self.cause.and_on)(self).is_some()
-    }
-
     /// Whether a curve without a name and another curve of speed would be one sum at one joint.
     pub(crate) fn is_one_curve_with(&self, other: &Self) -> bool {
         let [one, two] = [self, other].map(|form| form.cause.bends);
@@ -374,11 +364,6 @@ impl TorqueForm {
             within.shape[span.index] = span.usual?;
         }
         (!(self.cause.has_ends)(self)).then_some(within)
-    }
-
-    /// Whether it modifies the friction that another form is.
-    pub(crate) fn modifies(&self, friction: &Self) -> bool {
-        self.place == friction.place && self.cause.modifies.contains(&friction.cause.name)
     }
 
     /// Whether both are the same cause at the same place.
