@@ -125,9 +125,9 @@ fn a_product_of_which_neither_variable_is_of_its_joint_or_shows_by_itself_is_fou
     // Joint 3 turns by jumps over the angle of joint 1, to one side without the payload and to the other with it.
     assert_eq!((&*case.name, &*cause.place), ("c0048", "joint 3"));
     let said = said(&case, &[]);
-    let largest = said.found.iter().max_by(|a, b| a.3.total_cmp(&b.3));
-    let largest = largest.map(|(name, place, ..)| (&**name, &**place));
-    assert_eq!(largest, Some(("unknown", "joint 3")), "{:?}", said.found);
+    // Part of it may be called by link 3, which joint 3 turns.
+    let found = found(&said);
+    assert!(found.contains(&("unknown", "joint 3")), "{found:?}");
     halves_the_error(&said);
 }
 
