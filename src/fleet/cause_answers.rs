@@ -171,7 +171,7 @@ pub(super) fn of(
             robot.deviation = Some(deviation);
             let kind = match () {
                 () if have < *SIBLINGS => None,
-                () if 1.0 - robot.probability > *LACKS && is_usual => Some("lacks"),
+                () if 1.0 - robot.probability > *LACKS && decided && is_usual => Some("lacks"),
                 () if !has(&robot) => None,
                 () if deviation > limit && ratio > *APART => Some("larger"),
                 () if -deviation > limit && ratio < 1.0 / *APART => Some("smaller"),
