@@ -38,6 +38,8 @@ pub(super) struct CauseTable<'f, 'a> {
     pub(crate) declared: Vec<usize>,
     /// Motions and variables whose products with others are cells.
     pub(crate) multiplied: Vec<FreeShape>,
+    /// Whether curves may have steps: once all that is smooth was asked.
+    pub(crate) has_steps: bool,
     /// What a joint that yields out of proportion to its load is called.
     pub(crate) bent: &'static str,
 }
@@ -114,6 +116,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             declared,
             from_before: Vec::new(),
             multiplied: shown.to_vec(),
+            has_steps: false,
             bent: if question
                 .without
                 .iter()

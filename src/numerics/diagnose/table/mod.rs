@@ -168,6 +168,7 @@ impl Rounds {
         let mut table = CauseTable::new(&mut frame, &survey, question, products, is_open, keeps);
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
         table.from_before.clone_from(&before);
+        table.has_steps = self.pairs.is_some();
         let mut components = Vec::new();
         for (key, component) in std::mem::take(&mut self.components) {
             if let Some(cell) = table.cell(&key) {
@@ -241,7 +242,8 @@ impl Rounds {
                             .collect::<Vec<_>>(),
                     );
                 }
-                is_last = seen.is_empty();
+                // What is left may be jumps.
+                is_last = seen.is_empty() && !unexplained;
                 self.has_new_pairs = !is_last;
                 self.pairs = Some(seen);
             }

@@ -83,6 +83,9 @@ impl CauseTable<'_, '_> {
         others: &[&Component],
     ) -> Option<Refined> {
         let values = self.frame.values(of).filter(|values| !has_few(values))?;
+        if !self.has_steps {
+            return None;
+        }
         let (line, [low, high]) = (free.line(&values)?, support(&values));
         let all = gaps(values);
         let fields = fields(free.motion);
