@@ -207,11 +207,3 @@ fn a_curve_that_jumps_is_found_where_it_is() {
     assert!(found.contains(&("unknown", "link 1")), "{found:?}");
     assert!(said.after < 0.25 * said.before, "{}", said.after);
 }
-
-#[test]
-fn a_product_of_which_one_curve_has_corners_or_jumps_predicts() {
-    // Link 2 bends with corners over the angle of joint 4, in proportion to the payload.
-    let case = recorded_of(1_795_825_471, 47);
-    assert_eq!(case.concealed[0].cause.place, "link 2");
-    halves_the_error(&said(&case, &[]));
-}

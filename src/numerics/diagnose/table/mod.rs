@@ -242,13 +242,8 @@ impl Rounds {
                             .collect::<Vec<_>>(),
                     );
                 }
-                // What is left may be jumps, or a place of which nothing has a name.
-                let is_known = |component: &&Component| {
-                    let place = table.cells[component.cell].place;
-                    let mut known = named.iter();
-                    known.any(|named| table.cells[named.cell].place == place)
-                };
-                is_last = seen.is_empty() && !unexplained && all.iter().all(is_known);
+                // What is left may be jumps.
+                is_last = seen.is_empty() && !unexplained;
                 self.has_new_pairs = !is_last;
                 self.pairs = Some(seen);
             }
