@@ -232,8 +232,8 @@ fn check(arguments: &PosesArguments, request: &PoseRequest, pair: &[String]) -> 
 /// Propose a motion from which torques tell most of masses and friction.
 ///
 /// A Fourier series of each joint that starts and stops at rest, within range, speed and acceleration; a particle swarm makes its information
-/// on base parameters, viscous and Coulomb friction greatest (D-optimal). Said before anything is recorded: the condition number, the standard
-/// deviation expected of each parameter, both beside those of random motions within the same limits, and what the motion will not determine.
+/// on base parameters, viscous and Coulomb friction greatest (D-optimal). Reported before anything is recorded: the condition number, the standard
+/// deviation expected of each parameter, both compared with those of random motions within the same limits, and what the motion will not determine.
 /// The file has time_s, q1_deg .., dq1_deg_s .., ddq1_deg_s2 .. in even steps.
 ///
 /// SELF-COLLISION IS NOT CHECKED, nor collision with the cell or torque limits: drive the motion slowly first.

@@ -150,7 +150,7 @@ fn table<T: Table>(outcome: &CompletedRun, store: &Store) -> Result<T> {
 /// that `diagnose` knows, many in other forms, and sized so that they range from hardly visible to plain.
 ///
 /// With --dynamics recordings are torques or motor currents of an arm that moves (robot.json, recording.csv), for
-/// `calib diagnose pipelines/dynamics/pipeline.yaml`; most joints have friction beside what is concealed.
+/// `calib diagnose pipelines/dynamics/pipeline.yaml`; most joints have friction in addition to the concealed effects.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib simulate conceal --out blind --seed 7 --cases 40 --nulls 0.25

@@ -445,7 +445,7 @@ pub(super) fn points(names: &[Name]) -> Points {
             .cloned()
             .collect()
     };
-    // `x_t` beside `x_dif` is the target; alone it may be the tracker's.
+    // `x_t` next to `x_dif` is the target; alone it may be the tracker's.
     let others = families
         .iter()
         .any(|family| family.role == PointRole::Difference || family.words.is_empty());

@@ -1,6 +1,6 @@
 //! `calib poses --run`: poses that tell a finding of a diagnosis from a rival, at the sizes that the run found.
 //!
-//! What the poses promise of a finding beside its rival, as text and as JSON.
+//! What the poses promise of a finding against its rival, as text and as JSON.
 
 use crate::audit::{POSITIONS, diagnosis};
 use crate::description::RobotDescription;
@@ -45,7 +45,7 @@ pub struct Apart<'a> {
     /// mm.
     sigma: f64,
     circumstances: Circumstances,
-    told: Discrimination,
+    discrimination: Discrimination,
 }
 
 /// A run by its name, and which of its diagnoses.
@@ -126,7 +126,7 @@ pub fn apart<'a>(
         return Err(Error::spec("--separate", message));
     }
     let mut tried = None;
-    let told = match discrimination_problem(&diagnosed, &forms, (&rival.0, rival.1)) {
+    let discrimination = match discrimination_problem(&diagnosed, &forms, (&rival.0, rival.1)) {
         Ok((problem, form)) => {
             // A free curve is known where points were fitted, and nowhere else.
             if forms
@@ -161,7 +161,7 @@ pub fn apart<'a>(
         rows: rows.len(),
         sigma: sigma * 1e3,
         circumstances,
-        told,
+        discrimination,
     })
 }
 
@@ -192,8 +192,8 @@ fn table<T: Table>(store: &Store, table: Option<&TableRef>) -> Result<T> {
 }
 
 /// `joint_compliance@joint 2`, `joint_compliance at joint 2` or `joint_compliance` -> effect and place; effects of the library, and those
-/// that the diagnosis `told` of.
-fn name<'t>(text: &'t str, told: &[&str]) -> Result<(&'t str, Option<Place>)> {
+/// that the diagnosis found.
+fn name<'t>(text: &'t str, found: &[&str]) -> Result<(&'t str, Option<Place>)> {
     let (effect, place) = match text.split_once('@').or_else(|| text.split_once(" at ")) {
         Some((effect, place)) => (effect.trim(), Some(place.trim())),
         None => (text.trim(), None),
@@ -202,7 +202,7 @@ fn name<'t>(text: &'t str, told: &[&str]) -> Result<(&'t str, Option<Place>)> {
         CAUSES
             .iter()
             .map(|cause| cause.name())
-            .chain(told.iter().copied())
+            .chain(found.iter().copied())
     };
     let named = |place: &str| {
         let allowed = "allowed are e.g. `joint 2`, `joint 4->5`, `link 3`, `link 2-4`, `base`, `tool`, `tracker`, `recording`";
@@ -410,7 +410,7 @@ impl Apart<'_> {
             before,
             alike,
             proposed,
-        } = &self.told;
+        } = &self.discrimination;
         let Some(proposed) = proposed else {
             let means =
                 other.unwrap_or("measure something else: another payload, another temperature, a second target off the first");
@@ -472,7 +472,7 @@ impl Apart<'_> {
 
 impl PoseAnswer for Apart<'_> {
     fn drive(&self) -> Option<Drive<'_>> {
-        let proposed = self.told.proposed.as_ref()?;
+        let proposed = self.discrimination.proposed.as_ref()?;
         let Self {
             robot,
             ranges,
@@ -490,15 +490,15 @@ impl PoseAnswer for Apart<'_> {
 
     fn text(&self) -> String {
         let count = self
-            .told
+            .discrimination
             .proposed
             .as_ref()
             .map_or(0, |proposed| proposed.poses.rows());
         let mut rows = vec![(
             format!("the recording, {}", counted(self.rows, "point")),
-            self.told.before,
+            self.discrimination.before,
         )];
-        if let Some(proposed) = &self.told.proposed {
+        if let Some(proposed) = &self.discrimination.proposed {
             rows.push((
                 format!("and {count} random poses, median of 200"),
                 proposed.random,
@@ -521,7 +521,7 @@ impl PoseAnswer for Apart<'_> {
             before,
             alike,
             proposed,
-        } = &self.told;
+        } = &self.discrimination;
         let separation = [0, 1].map(|k: usize| {
             json!({
                 "if": names[k], "fitted": names[1 - k], "recorded": before[k], "imitated": alike[k],

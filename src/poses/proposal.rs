@@ -266,7 +266,7 @@ fn document(work: &PoseProposal) -> serde_json::Value {
         json!({ "name": name, "unit": unit.symbol(), "sigma": sigma(0), "sigma_random": sigma(1), "sigma_recorded": sigma(2) })
     });
     let separation = proposal.separation.iter().map(|part| {
-        let told = part.sigma.iter().map(|(parameter, sigma, random)| {
+        let parameters = part.sigma.iter().map(|(parameter, sigma, random)| {
             let unit = work.parameters[*parameter].1;
             json!({
                 "name": name(*parameter), "unit": unit.symbol(), "sigma": unit.from_si(*sigma), "sigma_random": unit.from_si(*random),
@@ -274,7 +274,7 @@ fn document(work: &PoseProposal) -> serde_json::Value {
         });
         json!({
             "effect": part.effect, "rival": part.rival, "noncentrality_over_random": part.gain,
-            "told": told.collect::<Vec<_>>(),
+            "parameters": parameters.collect::<Vec<_>>(),
             "imitated": part.imitated.iter().map(|parameter| name(*parameter)).collect::<Vec<_>>(),
         })
     });

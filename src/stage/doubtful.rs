@@ -310,7 +310,7 @@ pub(crate) fn note_screened(context: &Context, screening: &Screening, recording:
     }
     if screening.crowd > 0 {
         context.note(format!(
-            "{} far out without evidence beside this model that they are mistakes of the recording: it lacks something there; they are kept",
+            "{} far out without evidence other than this model that they are mistakes of the recording: it lacks something there; they are kept",
             if screening.crowd == 1 { "one row stands".into() } else { format!("{} rows stand", screening.crowd) }
         ));
     }

@@ -277,7 +277,7 @@ impl StatisticsRow {
         ))
     }
 
-    /// Whether it is of rows in which the target was brought to places: blocks that are left out are places then.
+    /// Whether it is of rows of contact constraints: folds are places then.
     pub(crate) fn is_contact(&self) -> bool {
         let own = |word: &str| self.set.ends_with(&format!("({word})"));
         KINDS

@@ -411,7 +411,7 @@ impl VisitorMut for Names<'_> {
         }
         match self.tables.find(&parts.join(".")) {
             Ok(table) => {
-                // A name in one part stands as it was written: columns may be told by it.
+                // A name in one part stays as it was written: columns may be qualified by it.
                 let name = if let [one] = parts[..] {
                     one.to_string()
                 } else {

@@ -367,7 +367,7 @@ impl Torques {
         filled(include_str!("../text/torques.txt"), about)
     }
 
-    /// What is left at each joint, a line each.
+    /// The residual at each joint, a line each.
     pub(crate) fn left(&self) -> String {
         let line = |row: &JointTorqueRow| {
             let left = row.signature.as_ref()?;

@@ -242,8 +242,7 @@ impl Rounds {
                             .collect::<Vec<_>>(),
                     );
                 }
-                // What is left may be jumps.
-                is_last = seen.is_empty() && !unexplained;
+                is_last = seen.is_empty();
                 self.has_new_pairs = !is_last;
                 self.pairs = Some(seen);
             }
