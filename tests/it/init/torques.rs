@@ -252,7 +252,7 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
     let (code, said) = told("init . --data data.csv");
     assert!(
         code == Some(0)
-            && said.contains("wrote ./pipeline.yaml beside ./robot.yaml, which is used as it is"),
+            && said.contains("wrote ./pipeline.yaml next to ./robot.yaml, which is used as it is"),
         "{said}"
     );
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
