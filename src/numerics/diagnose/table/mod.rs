@@ -37,6 +37,7 @@ pub use state::KnownState;
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::Located;
 use crate::criteria::cells::{IDLE, OPEN, ROUNDS, UNEXPLAINED};
+use crate::criteria::screen::MISTAKES;
 use crate::effect::{Basis, Form, Law, Place, Survey, names};
 use crate::estimate::Prior;
 use crate::observation::only_contacts;
@@ -61,6 +62,8 @@ pub(crate) struct Rounds {
     pairs: Option<Vec<FreeShape>>,
     /// Whether those have come since the last round.
     has_new_pairs: bool,
+    /// Whether rows that are far off count as the others in the next round.
+    all_count: bool,
     first: Option<(Located, f64)>,
     round: usize,
     /// Keys of cells that are not asked again: in the whole model they came to nothing.
@@ -141,11 +144,13 @@ impl Rounds {
     pub(crate) fn search(&mut self, view: &RoundView, now: &FitState, fitter: &Fitter) -> Round {
         self.round += 1;
         let survey = view.survey();
-        let noise = if self.round > 1 {
+        let all_count = std::mem::take(&mut self.all_count);
+        let noise = if self.round > 1 && !all_count {
             NoiseShape::of(view, fitter.data.rows())
         } else {
             NoiseShape::at_first(view, fitter.data.rows())
         };
+        let many_far = noise.far > *MISTAKES;
         let mut frame = SearchRows::of(view, now, fitter, noise);
         let question = fitter.question;
         let contacts_only = only_contacts(&fitter.data, question.fit);
@@ -218,7 +223,7 @@ impl Rounds {
         if is_last && !(is_open && self.pairs.is_some()) {
             let all: Vec<&Component> = components.iter().collect();
             let state = table.state(&all, None);
-            let unexplained = state.kappa > *UNEXPLAINED && !contacts_only;
+            let unexplained = (state.kappa > *UNEXPLAINED || many_far) && !contacts_only;
             if !is_open {
                 self.is_open = unexplained;
                 is_last = !unexplained;
@@ -242,7 +247,9 @@ impl Rounds {
                             .collect::<Vec<_>>(),
                     );
                 }
-                is_last = seen.is_empty();
+                // Rows that stand out in number may be those between two steps.
+                self.all_count = many_far && !contacts_only;
+                is_last = seen.is_empty() && !self.all_count;
                 self.has_new_pairs = !is_last;
                 self.pairs = Some(seen);
             }

@@ -9,6 +9,8 @@ use nalgebra::{Matrix3, Vector3};
 pub(super) struct NoiseShape {
     /// Square root of the weight of each row of the recording; empty where all count fully.
     pub(super) weights: Vec<f64>,
+    /// Rows that are far off.
+    pub(super) far: usize,
     /// What makes the three numbers of a point white, in the axes of the recording.
     pub(super) whitening: Option<Matrix3<f64>>,
     /// Factor of motor currents, so that their residual is as large as that of points.
@@ -53,6 +55,7 @@ impl NoiseShape {
         for (size, row) in by_row.iter().zip(&problem.rows) {
             weights[*row] = (*FAR * scale / size.max(f64::MIN_POSITIVE)).min(1.0);
         }
+        let far = weights.iter().filter(|weight| **weight < 0.5).count();
         let points = (0..problem.rows.len())
             .filter(|i| weights[problem.rows[*i]] == 1.0 && problem.readings_of(*i).len() == 3);
         let (mut sum, mut count) = (Matrix3::zeros(), 0.0);
@@ -73,6 +76,7 @@ impl NoiseShape {
         });
         Self {
             weights,
+            far,
             whitening: evened(sum, count),
             currents,
         }
