@@ -86,7 +86,7 @@ fn fit() -> Vec<String> {
 const LAST: f64 = 0.3;
 
 crate::stage::stage! {
-    DiagnoseTorques, "diagnose_torques", 16, "names the physics that the simulated torques of a moving arm lack",
+    DiagnoseTorques, "diagnose_torques", 17, "names the physics that the simulated torques of a moving arm lack",
         DiagnoseTorquesReads {
             robot: Robot,
             motion: Chunks<ArmMotion>,

@@ -57,6 +57,48 @@ fn document(case: &Path, store: &Path) -> Value {
     serde_json::from_str(&diagnose(case, store, "--json").ok()).unwrap()
 }
 
+#[test]
+fn torques_of_a_real_arm_are_predicted_on_rows_that_no_cause_was_fitted_to() {
+    let Some(bags) = shared("data/ur10_bags") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let bag = bags.join("ur10_exciting_trajectory.db3");
+    let joints = [
+        "shoulder_pan",
+        "shoulder_lift",
+        "elbow",
+        "wrist_1",
+        "wrist_2",
+        "wrist_3",
+    ];
+    let columns = |what: &str| -> Vec<String> {
+        let name = |joint: &&str| format!("{joint}_joint.{what}");
+        joints.iter().map(name).collect()
+    };
+    let columns = serde_json::json!({
+        "time": {"column": "stamp", "unit": "s"},
+        "q": {"columns": columns("position"), "unit": "rad"},
+        "velocity": {"columns": columns("velocity"), "unit": "rad/s"},
+        // Motor currents; without constants their unit is that of the masses.
+        "torque": {"columns": columns("effort"), "unit": "Nm"},
+    });
+    let pipeline = serde_json::json!({"calib": 1, "name": "bag", "stages": [
+        {"uses": "robot", "with": {"file": root("pipelines/ur10/robot.yaml")}},
+        {"uses": "ingest_torques", "with": {"files": [{"file": bag, "topic": "/joint_states", "columns": columns}]}},
+        {"uses": "diagnose_torques", "with": {"hold_out": {"last": 0.4}, "cutoff_hz": 6}},
+    ]});
+    put(&folder, "pipeline.yaml", pipeline.to_string());
+    let found: Value =
+        serde_json::from_str(&calib(folder.path(), "diagnose pipeline.yaml --json --quiet").ok())
+            .unwrap();
+    let error = found["after"]["validate_nrmse"].as_f64().unwrap();
+    assert!(
+        error <= 0.104,
+        "{error} of the torques' rms about their mean"
+    );
+}
+
 /// What of a diagnosis is missed, and what is named beside.
 struct Marks {
     missed: Vec<String>,

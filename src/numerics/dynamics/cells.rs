@@ -513,6 +513,15 @@ pub(super) fn settle(choice: &CauseChoice, set: &[usize]) -> Vec<usize> {
     forms(&table.settled(components))
 }
 
+/// 1 / variance beforehand of the columns of a set, by the amplitudes that the rows show.
+pub(super) fn priors(choice: &CauseChoice, set: &[usize]) -> Vec<(usize, f64)> {
+    let table = TorqueTable::new(choice);
+    let state = table.state(&table.components(set), None);
+    let seen = state.columns.iter().filter(|(_, root)| *root > 0.0);
+    seen.map(|(column, root)| (*column, root.powi(-2)))
+        .collect()
+}
+
 /// What of a set would not be found under the present noise; `silent` stays in any case.
 pub(super) fn faint(choice: &CauseChoice, set: &[usize], silent: &[usize]) -> Vec<usize> {
     let mut table = TorqueTable::new(choice);

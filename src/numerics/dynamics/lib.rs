@@ -33,6 +33,7 @@ mod findings;
 mod friction_curve;
 mod given;
 mod latency;
+mod left_out;
 mod masses;
 mod model;
 mod newton_euler;

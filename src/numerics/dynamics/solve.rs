@@ -1,11 +1,12 @@
 //! The steps of a diagnosis of torques, one after the other.
 
 use super::arm::DynamicArm;
-use super::cells::{faint, from_common, search, settle};
+use super::cells::{faint, from_common, priors, search, settle};
 use super::choice::CauseChoice;
 use super::clock::RecordingClock;
 use super::contact::contacts;
 use super::latency::{Latency, latency, take_friction_lead};
+use super::left_out::unconfirmed;
 use super::problem::TorqueProblem;
 use super::refine::{polish, refine};
 use super::rich::{basic_forms, noise_apart, noise_left, noise_of_fit, rich_forms};
@@ -20,6 +21,8 @@ use crate::weighted::NoiseMemory;
 
 /// Rounds in which others are looked for in place of forms with a number at an end of its search, at most.
 const END_ROUNDS: usize = 3;
+/// Rounds in which others are looked for in place of what does not predict rows that are left out, at most.
+const CONFIRMED_ROUNDS: usize = 6;
 /// Rounds in which a latency and the lead of friction find each other, at most.
 const CLOCK_ROUNDS: usize = 4;
 
@@ -82,6 +85,21 @@ pub(super) fn solve<'a>(
         polish(&mut problem, &mut weighted, &mut set);
     }
     weighted = problem.weighted(&set);
+    for _ in 0..CONFIRMED_ROUNDS {
+        let choice = CauseChoice::new(&problem, &weighted);
+        let leave = unconfirmed(&choice, &set, &priors(&choice, &set));
+        if leave.is_empty() {
+            break;
+        }
+        set.retain(|form| !leave.contains(form));
+        let barred = leave.iter().map(|form| problem.all.forms[*form].clone());
+        let barred: Vec<_> = barred.collect();
+        problem.barred.extend(barred);
+        // Something else may be in their place.
+        set = again(&mut problem, &mut weighted, set);
+        polish(&mut problem, &mut weighted, &mut set);
+        weighted = problem.weighted(&set);
+    }
     let named = set.len();
     set.extend(CauseChoice::new(&problem, &weighted).other_friction(&set));
     weighted = problem.weighted_of(&set);
@@ -93,6 +111,9 @@ pub(super) fn solve<'a>(
     silent.extend(faint(&CauseChoice::new(&problem, &weighted), &set, &silent));
     problem.noise = rich;
     weighted = problem.weighted(&set);
+    for (column, precision) in priors(&CauseChoice::new(&problem, &weighted), &set) {
+        weighted.gram[column][column] += precision;
+    }
     let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &set);
     SolvedTorques {
         problem,
