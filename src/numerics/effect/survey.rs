@@ -83,12 +83,12 @@ impl<'a> Survey<'a> {
     }
 
     /// Whether the payload changes once, so that what follows it may as well have moved then.
-    pub(crate) fn payload_changes_once(&self) -> bool {
+    pub fn payload_changes_once(&self) -> bool {
         self.payload_change.is_some()
     }
 
     /// Whether what steps at a time may as well follow the payload, which changes once, and about then.
-    pub(crate) fn is_payload_change(&self, time: f64) -> bool {
+    pub fn is_payload_change(&self, time: f64) -> bool {
         self.payload_change
             .is_some_and(|[first, last]| (first..=last).contains(&time))
     }

@@ -118,7 +118,7 @@ pub(super) fn products(
                 of: *of,
                 over: Over::Product(other),
             };
-            if seen.contains(&other) || free.is_square() {
+            if seen.contains(&other) || free.is_square() || are_one(*of, other, survey) {
                 continue;
             }
             seen.push(other);
@@ -154,8 +154,9 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
             }
             frame.prepare(&[motion], &variables);
             for (i, of) in variables.iter().enumerate() {
-                let others = variables.iter().enumerate().skip(i + 1);
-                out.extend(others.map(|(_, other)| FreeShape {
+                let others = variables.iter().skip(i + 1);
+                let others = others.filter(|other| !are_one(*of, **other, survey));
+                out.extend(others.map(|other| FreeShape {
                     motion,
                     of: *of,
                     over: Over::Product(*other),
@@ -194,8 +195,20 @@ pub(super) fn siblings(free: &FreeShape, survey: &Survey) -> Vec<FreeShape> {
     motions
         .chain(first)
         .chain(second)
-        .filter(|one| one != free && one.over != Over::Product(one.of))
+        .filter(|one| {
+            let Over::Product(other) = one.over else {
+                return false;
+            };
+            one != free && other != one.of && !are_one(one.of, other, survey)
+        })
         .collect()
+}
+
+/// Whether two variables change together, so that their product is a curve of one with a break: a clock, and a payload that changes once.
+fn are_one(a: Variable, b: Variable, survey: &Survey) -> bool {
+    let clocks = [Variable::Time, Variable::Temperature];
+    let both = |a, b| clocks.contains(&a) && b == Variable::Payload;
+    survey.payload_changes_once() && (both(a, b) || both(b, a))
 }
 
 /// Whether two places are so many steps from each other at most, along the chain of base, joints, links and tool.

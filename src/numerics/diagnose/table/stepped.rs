@@ -10,7 +10,6 @@ use super::evidence::{EvidenceRows, GroupEvidence, evidence};
 use super::scan::{CellEvidence, Refined};
 use super::state::KnownState;
 use crate::criteria::cells::{FINELY, LENGTHS, LEVELS, NU, THRESHOLDS};
-use crate::criteria::screen::MISTAKES;
 use crate::effect::{Basis, Form, Law, Term, Variable};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -90,7 +89,7 @@ impl CauseTable<'_, '_> {
         let (line, [low, high]) = (free.line(&values)?, support(&values));
         let mut all = gaps(values);
         if of == Variable::Time {
-            self.without_payload_changes(&mut all);
+            all.retain(|at| !self.survey.is_payload_change(*at));
         }
         let fields = fields(free.motion);
         let curves = free.smooth(*FINELY, LENGTHS.len());
@@ -169,28 +168,6 @@ impl CauseTable<'_, '_> {
             log: best.log,
             amplitude: best.amplitude,
         })
-    }
-}
-
-impl CauseTable<'_, '_> {
-    /// Times without those next to a change of the payload: a step there is the payload's.
-    fn without_payload_changes(&self, times: &mut Vec<f64>) {
-        let [Some(time), Some(payload)] =
-            [Variable::Time, Variable::Payload].map(|of| self.frame.values(of))
-        else {
-            return;
-        };
-        let mut rows: Vec<(f64, f64)> = time.into_iter().zip(payload).collect();
-        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let changes: Vec<usize> = (1..rows.len())
-            .filter(|row| rows[*row].1 != rows[row - 1].1)
-            .collect();
-        times.retain(|time| {
-            let row = rows.partition_point(|row| row.0 < *time);
-            changes
-                .iter()
-                .all(|change| change.abs_diff(row) > *MISTAKES)
-        });
     }
 }
 
