@@ -4,8 +4,8 @@ use crate::error::{counted, visible};
 use minijinja::syntax::SyntaxConfig;
 use minijinja::{Environment, UndefinedBehavior};
 
-/// A template, filled.
-pub(crate) fn filled(template: &'static str, about: minijinja::Value) -> String {
+/// Templates of plain text: what has no name is a bug, columns of tables are set left and right.
+pub(crate) fn environment() -> Environment<'static> {
     let mut environment = Environment::new();
     // Lines of tags alone leave no line.
     let syntax = SyntaxConfig::builder()
@@ -16,6 +16,16 @@ pub(crate) fn filled(template: &'static str, about: minijinja::Value) -> String 
     environment.set_syntax(syntax.expect("the usual delimiters"));
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
     environment.add_filter("counted", |count: u64, what: &str| counted(count, what));
+    environment.add_filter("left", |text: &str, width: usize| format!("{text:width$}"));
+    environment.add_filter("right", |value: minijinja::Value, width: usize| {
+        format!("{:>width$}", value.to_string())
+    });
+    environment
+}
+
+/// A template, filled.
+pub(crate) fn filled(template: &'static str, about: minijinja::Value) -> String {
+    let mut environment = environment();
     environment.add_filter("words", |name: &str| name.replace('_', " "));
     // A number that is not finite is null in JSON.
     environment.add_filter("fixed", |value: Option<f64>, decimals: usize| {
@@ -23,10 +33,6 @@ pub(crate) fn filled(template: &'static str, about: minijinja::Value) -> String 
     });
     environment.add_filter("figure", |value: Option<f64>| {
         value.map_or_else(|| "-".into(), |value| format!("{value:.3}"))
-    });
-    environment.add_filter("left", |text: &str, width: usize| format!("{text:width$}"));
-    environment.add_filter("right", |value: minijinja::Value, width: usize| {
-        format!("{:>width$}", value.to_string())
     });
     environment.add_filter("brief", brief);
     environment.add_filter("visible", |text: &str| visible(text));

@@ -1,10 +1,9 @@
 //! A comparison as a short text: counts, columns that differ, the worst rows; never a dump.
 
 use super::{ColumnDiff, Equal, TableDiff, WorstCell};
-use crate::error::{Error, Result, counted};
-use minijinja::syntax::SyntaxConfig;
+use crate::error::{Error, Result};
 use minijinja::value::Serde;
-use minijinja::{AutoEscape, Environment, Value, context};
+use minijinja::{AutoEscape, Environment, UndefinedBehavior, Value, context};
 
 /// How much a text shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,20 +24,10 @@ pub fn text(diff: &TableDiff, detail: Detail) -> String {
         diff => Serde(diff), equal => diff.equal.map(Equal::says), differing => Serde(&differing), width,
         full => detail == Detail::Full, cells => cells(diff),
     };
-    // Lines of tags alone leave no line.
-    let syntax = SyntaxConfig::builder()
-        .trim_blocks(true)
-        .lstrip_blocks(true)
-        .keep_trailing_newline(true)
-        .build();
-    let mut environment = Environment::new();
-    environment.set_syntax(syntax.expect("the usual delimiters"));
+    let mut environment = crate::text::environment();
+    // Keys of an answer that is not asked for are not there.
+    environment.set_undefined_behavior(UndefinedBehavior::Lenient);
     environment.add_filter("short", short);
-    environment.add_filter("counted", |count: u64, what: &str| counted(count, what));
-    environment.add_filter("left", |text: &str, width: usize| format!("{text:width$}"));
-    environment.add_filter("right", |value: Value, width: usize| {
-        format!("{:>width$}", value.to_string())
-    });
     environment
         .render_str(include_str!("text.txt"), about)
         .expect("a template that names what it is given")

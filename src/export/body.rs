@@ -10,8 +10,7 @@ use crate::description::{JointDescription, JointKind};
 use crate::dynamics::Inertial;
 use crate::error::{Error, Result};
 use crate::spatial::Pose;
-use minijinja::syntax::SyntaxConfig;
-use minijinja::{Environment, UndefinedBehavior, Value};
+use minijinja::{UndefinedBehavior, Value};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use quick_xml::escape::escape;
 
@@ -125,13 +124,7 @@ pub(super) fn tool(point: [f64; 3], rows: &[[f64; 3]; 3]) -> Pose {
 
 /// A document of XML: the remarks as comments, then the template with its values. Names in attributes go through its filter `xml`.
 pub(super) fn document(remarks: &[String], template: &str, values: Value) -> Result<String> {
-    let mut environment = Environment::new();
-    let syntax = SyntaxConfig::builder()
-        .trim_blocks(true)
-        .lstrip_blocks(true)
-        .keep_trailing_newline(true)
-        .build();
-    environment.set_syntax(syntax.map_err(|error| Error::Bug(error.to_string()))?);
+    let mut environment = crate::text::environment();
     environment.set_undefined_behavior(UndefinedBehavior::SemiStrict);
     environment.add_filter("xml", |text: &str| escape(text).into_owned());
     // Two hyphens would end a comment; of three, the first pass leaves two.
