@@ -108,6 +108,8 @@ criteria! {
     LIMITS: [f64; 4] = [0.06, 0.12, 0.24, 0.48], "share of the joint's travel", "count: twofold, up to half of it", "";
     /// The same at most: what sticks over more of the travel is the joint's angle.
     STICKS: f64 = 0.5, "share of the joint's travel", "physics: half of it either way is all of it", "";
+    /// Share of the rows that may be uncertain by moves before the first: what remembers longer is taken to begin at rest.
+    UNRECORDED: f64 = 0.1, "share", "judgement: the others say what it is", "";
     /// Times in which a move fades.
     FADING: [f64; 3] = [15.0, 35.0, 80.0], "s", "judgement: between two readings and some minutes", "";
     /// ln of the odds, below the best, from which a cell is not asked.

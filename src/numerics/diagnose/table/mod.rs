@@ -150,6 +150,10 @@ impl Rounds {
         } else {
             NoiseShape::at_first(view, fitter.data.rows())
         };
+        let components = self.components.iter();
+        let known =
+            components.flat_map(|(_, one)| one.forms.iter().map(move |form| (form, one.amplitude)));
+        let noise = noise.with_unknown_memory(&survey, known);
         let many_far = noise.far > *MISTAKES;
         let mut frame = SearchRows::of(view, now, fitter, noise);
         let question = fitter.question;

@@ -1,7 +1,9 @@
 //! How the noise of the rows differs from what they state, by the residual of a model.
 
-use crate::criteria::cells::{EVEN, FAR, UNEVEN};
+use crate::criteria::cells::{EVEN, FAR, UNEVEN, UNRECORDED};
 use crate::diagnose::round::RoundView;
+use crate::effect::{Form, Survey, Variable};
+use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
 /// How the noise of the rows differs from what they state: weights of rows that are far off, and the shape of the others'.
@@ -26,6 +28,32 @@ impl NoiseShape {
             weights,
             ..Self::default()
         }
+    }
+
+    /// With the first rows uncertain by what some forms, each of such a size (m), may remember of moves before them.
+    pub(crate) fn with_unknown_memory<'a>(
+        mut self,
+        survey: &Survey,
+        forms: impl Iterator<Item = (&'a Form, f64)>,
+    ) -> Self {
+        let data = survey.data;
+        let mut square = vec![0.0; data.rows()];
+        for (form, size) in forms {
+            for of in form.variables() {
+                let shares = unrecorded(of, data);
+                let rows: f64 = shares.iter().sum();
+                let is_brief = rows <= *UNRECORDED * data.rows() as f64;
+                for (row, share) in shares.into_iter().enumerate().filter(|_| is_brief) {
+                    square[row] += (size * share / data.points.sigma[row].mean()).powi(2);
+                }
+            }
+        }
+        for (weight, square) in self.weights.iter_mut().zip(square) {
+            if square.is_finite() {
+                *weight /= (1.0 + square).sqrt();
+            }
+        }
+        self
     }
 
     /// By the residual of a fitted model: rows that are far off count less, and a noise that is stronger in some direction is made
@@ -81,6 +109,33 @@ impl NoiseShape {
             currents,
         }
     }
+}
+
+/// How much of what a variable remembers is of moves before the first row, which nobody recorded: a share by row; none of a variable that
+/// remembers no moves.
+fn unrecorded(of: Variable, data: &Measurements) -> Vec<f64> {
+    let mut shares = vec![0.0; data.rows()];
+    // The least and the most that it may be.
+    let [mut least, mut most] = [-1.0, 1.0];
+    for place in 1..data.rows() {
+        let [before, row] = [place - 1, place].map(|place| data.at_place(place));
+        let (moved, passed) = match of {
+            Variable::Recent { time, .. } => {
+                let kept = libm::exp((data.time(before) - data.time(row)) / time);
+                (0.0, kept)
+            }
+            Variable::Stretch { joint, limit } => {
+                ((data.q(row)[joint] - data.q(before)[joint]) / limit, 1.0)
+            }
+            _ => return Vec::new(),
+        };
+        [least, most] = [least, most].map(|state: f64| (state * passed + moved).clamp(-1.0, 1.0));
+        shares[row] = 0.5 * (most - least);
+    }
+    if data.rows() > 0 {
+        shares[data.at_place(0)] = 1.0;
+    }
+    shares
 }
 
 /// Rows that measured one pose one after another count as one where they differ less among each other than from the model: what they leave is
