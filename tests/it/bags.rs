@@ -11,7 +11,8 @@ use std::io::Cursor;
 use std::path::Path;
 use write::{FRAMES, JOINTS, Message, POINT, db3, frames, joint_state, mcap, point};
 
-const ARM: [&str; 6] = [
+/// Joints of a UR10 as its driver calls them.
+pub const ARM: [&str; 6] = [
     "shoulder_pan_joint",
     "shoulder_lift_joint",
     "elbow_joint",

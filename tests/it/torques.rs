@@ -11,6 +11,7 @@ mod results;
 mod rigid;
 
 use crate::answer::{Answer, calib, put, read, root};
+use crate::bags::ARM;
 use crate::desk::shared;
 use calib::dynamics::{
     DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow,
@@ -64,18 +65,7 @@ fn torques_of_a_real_arm_are_predicted_on_rows_that_no_cause_was_fitted_to() {
     };
     let folder = tempfile::tempdir().unwrap();
     let bag = bags.join("ur10_exciting_trajectory.db3");
-    let joints = [
-        "shoulder_pan",
-        "shoulder_lift",
-        "elbow",
-        "wrist_1",
-        "wrist_2",
-        "wrist_3",
-    ];
-    let columns = |what: &str| -> Vec<String> {
-        let name = |joint: &&str| format!("{joint}_joint.{what}");
-        joints.iter().map(name).collect()
-    };
+    let columns = |what: &str| ARM.map(|joint| format!("{joint}.{what}"));
     let columns = serde_json::json!({
         "time": {"column": "stamp", "unit": "s"},
         "q": {"columns": columns("position"), "unit": "rad"},

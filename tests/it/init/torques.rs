@@ -2,6 +2,7 @@
 
 use super::layouts::{cells, joints, made, point, table};
 use crate::answer::{calib, put};
+use crate::bags::ARM;
 use arrow::array::{ArrayRef, FixedSizeListArray, Float64Array, ListArray, RecordBatch};
 use arrow::datatypes::{Field, Float32Type};
 use std::fmt::Write;
@@ -72,15 +73,7 @@ fn torques_under_any_name_make_a_pipeline_that_reads_torques() {
 
 #[test]
 fn joint_states_of_ros_are_told_by_their_names_and_an_effort_may_be_a_current() {
-    let arm = [
-        "shoulder_pan",
-        "shoulder_lift",
-        "elbow",
-        "wrist_1",
-        "wrist_2",
-        "wrist_3",
-    ];
-    let of = |what: &str| arm.map(|joint| format!("{joint}_joint_{what}")).join(",");
+    let of = |what: &str| ARM.map(|joint| format!("{joint}_{what}")).join(",");
     // Efforts before positions: the first column of a joint is not its position.
     let header = [of("effort"), of("velocity"), of("position")].join(",");
     let made = made(&[("log.csv", log(&header, 18, wave).into())]);
