@@ -206,3 +206,13 @@ fn a_curve_that_jumps_is_found_and_predicts() {
     assert_eq!(found(&said), [("unknown", "base")]);
     assert!(said.after < 0.1 * said.before, "{}", said.after);
 }
+
+#[test]
+fn rows_that_are_set_aside_and_taken_back_in_turns_come_to_an_end() {
+    // Where free forms move a row as far as it is off, it was readmitted in every second fit, for ever.
+    let case = recorded_of(1_795_856_227, 5);
+    assert_eq!(case.concealed[0].cause.place, "joint 3");
+    let said = said(&case, &[]);
+    assert_eq!(found(&said), [("unknown", "joint 3")]);
+    halves_the_error(&said);
+}

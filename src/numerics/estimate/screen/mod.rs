@@ -113,6 +113,7 @@ pub fn fit_screened(
         },
     );
     let mut aside = BTreeSet::new();
+    // Held rows stay suspects, so that later rounds only add to them and it ends.
     for round in 0.. {
         let held = if round < *READMITTING {
             BTreeSet::new()
@@ -267,7 +268,8 @@ fn screen(
             kind
         };
         // A row that judges the model is not set aside by the model alone.
-        let needs_more = residual.norm() <= 2.0 * free || asked.binary_search(&row).is_err();
+        let needs_more = asked.binary_search(&row).is_err()
+            || residual.norm() <= 2.0 * free && !held.contains(&row);
         let corroborated = kind::is_wrong(data, row, residual.norm());
         let among_many = crowded.contains(&set[row])
             && *distance < *BEYOND_CROWD * limit
