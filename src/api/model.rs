@@ -230,7 +230,8 @@ impl Model {
         };
         let mut corrector = self.corrector(insisted, "force=True")?;
         let answers = corrector.batch((0..data.rows()).map(target).collect());
-        let numbers = |of: fn(&CorrectedCommand) -> f64| answers.iter().map(of).collect();
+        let numbers =
+            |value_of: fn(&CorrectedCommand) -> f64| answers.iter().map(value_of).collect();
         let joints = answers.iter().flat_map(|answer| {
             let q = answer.q.as_deref();
             robot.from_si(q.unwrap_or(&vec![f64::NAN; n]))

@@ -63,10 +63,10 @@ fn found(program: &Path) -> Vec<PathBuf> {
             .map(|name| name.to_string_lossy().to_lowercase())
             .unwrap_or_default()
     };
-    let (own, stem) = (name(program), stem(program));
+    let (its_name, stem) = (name(program), stem(program));
     let is_other = |path: &PathBuf| {
         let known = Language::of_ending(&raw::ending(path)) == Some(Language::Krl);
-        known && self::stem(path) == stem && name(path) != own
+        known && self::stem(path) == stem && name(path) != its_name
     };
     let mut out: Vec<PathBuf> = files(folder).into_iter().filter(is_other).collect();
     let whole = folder
@@ -82,7 +82,7 @@ fn found(program: &Path) -> Vec<PathBuf> {
     let configuration = configuration
         .flat_map(|folder| files(&folder))
         .find(|path| name(path) == CONFIGURATION);
-    out.extend(configuration.filter(|path| name(path) != own));
+    out.extend(configuration.filter(|path| name(path) != its_name));
     out
 }
 

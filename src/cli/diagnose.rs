@@ -72,13 +72,14 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
     let (manifest, stage) = if is_pipeline(&arguments.what) {
         let file = arguments.what.display().to_string();
         let plan = arguments.means.plan(&arguments.what)?;
-        let own = plan
+        let stages = plan
             .stages
             .iter()
             .enumerate()
             .filter(|(_, stage)| DIAGNOSES.contains(&stage.entry.name));
-        let own: Vec<(usize, &str)> = own.map(|(at, stage)| (at, stage.id.as_str())).collect();
-        let Some((at, id)) = the_stage(&file, &own, arguments.step.as_deref())? else {
+        let stages: Vec<(usize, &str)> =
+            stages.map(|(at, stage)| (at, stage.id.as_str())).collect();
+        let Some((at, id)) = the_stage(&file, &stages, arguments.step.as_deref())? else {
             return Err(Error::spec(
                 file,
                 "has no stage `diagnose`; put `- uses: diagnose` after the split, or `- uses: diagnose_torques` after `ingest_torques`",

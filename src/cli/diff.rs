@@ -174,10 +174,10 @@ fn execute(arguments: &DiffArguments) -> Result<u8> {
 /// In which counting the joints of two runs' tables stand; none where both controllers count as the robot file does.
 fn counting(store: &Store, runs: [&RunAddress; 2]) -> Result<Option<String>> {
     // Runs are compared by what is left of them, too.
-    let of = |run: &RunAddress| -> Result<Option<String>> {
+    let of_run = |run: &RunAddress| -> Result<Option<String>> {
         Ok(counted_otherwise(&Manifest::of(store, &run.run)?, store).unwrap_or_default())
     };
-    let controllers = match (of(runs[0])?, of(runs[1])?) {
+    let controllers = match (of_run(runs[0])?, of_run(runs[1])?) {
         (None, None) => return Ok(None),
         (Some(a), Some(b)) if a == b => format!("both controllers count otherwise ({a})"),
         (Some(a), None) => format!("the controller of A counts otherwise ({a})"),

@@ -85,12 +85,12 @@ impl ExportArguments {
             None => emit(&text)?,
         }
         if !self.model.quiet {
-            let said: String = export
+            let names: String = export
                 .remarks_in(self.format.0)
                 .iter()
                 .map(|line| format!("{line}\n"))
                 .collect();
-            let _ = std::io::stderr().write_all(said.as_bytes());
+            let _ = std::io::stderr().write_all(names.as_bytes());
         }
         Ok(())
     }
@@ -142,18 +142,18 @@ impl CheckExportArguments {
                 ),
                 1,
             ),
-            Belonging::Other(file, own) if file.serial != own.serial => (
+            Belonging::Other(file, here) if file.serial != here.serial => (
                 format!(
                     "is of the robot with serial {}; that of {origin} is {}",
                     serial(&file.serial),
-                    serial(&own.serial)
+                    serial(&here.serial)
                 ),
                 1,
             ),
-            Belonging::Other(file, own) => (
+            Belonging::Other(file, here) => (
                 format!(
                     "is of the model {}; that of {origin} is {}",
-                    file.model, own.model
+                    file.model, here.model
                 ),
                 1,
             ),

@@ -10,7 +10,7 @@ use std::io::{Read, Write};
 use std::path::Path;
 
 /// Faults of rows named of one file.
-const MOST: usize = 20;
+const LIMIT: usize = 20;
 
 pub(super) struct FeedForward<'a> {
     /// `-`: stdin.
@@ -112,7 +112,7 @@ fn refused(judged: &[JudgedRow], trajectory: &Trajectory, place: &str) -> Result
         .iter()
         .enumerate()
         .filter(|(_, row)| row.is_refused())
-        .take(MOST);
+        .take(LIMIT);
     let fault = |(row, judged): (usize, &JudgedRow)| {
         Fault::new(
             trajectory.place(row, place),

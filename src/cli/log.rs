@@ -62,7 +62,7 @@ impl LogArguments {
                 text.push_str("older ones: --limit 0\n");
                 break;
             }
-            let own: Vec<&str> = tags
+            let on_run: Vec<&str> = tags
                 .iter()
                 .filter(|(_, tagged)| **tagged == run)
                 .map(|(tag, _)| tag.as_str())
@@ -81,19 +81,19 @@ impl LogArguments {
                     let names: Vec<&str> = is_head
                         .then_some("HEAD")
                         .into_iter()
-                        .chain(own.iter().copied())
+                        .chain(on_run.iter().copied())
                         .collect();
                     let [executed, cached] = counts(&store, &manifest);
                     text.push_str(&line(&manifest, [executed, cached], &names));
                     rows.push(json!({
                     "run": run, "started": manifest.started, "what": manifest.what(), "pipeline": manifest.pipeline.name, "status": manifest.status,
                     "wall_seconds": manifest.wall_seconds, "executed": executed,
-                    "cached": cached, "tags": own, "head": is_head, "error": manifest.error,
+                    "cached": cached, "tags": on_run, "head": is_head, "error": manifest.error,
                 }));
                 }
                 Err(error) => {
                     text.push_str(&format!("{run}  {error}\n"));
-                    rows.push(json!({ "run": run, "status": "unreadable", "error": error.to_string(), "tags": own }));
+                    rows.push(json!({ "run": run, "status": "unreadable", "error": error.to_string(), "tags": on_run }));
                 }
             }
             shown += 1;

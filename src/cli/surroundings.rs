@@ -76,13 +76,13 @@ pub(super) fn columns() -> Option<usize> {
 
 /// The program to start calib with. In the process of an interpreter that is the script that it runs.
 pub(super) fn program() -> std::io::Result<PathBuf> {
-    let own = std::env::current_exe()?;
-    let is_python = own
+    let program = std::env::current_exe()?;
+    let is_python = program
         .file_name()
         .is_some_and(|name| name.to_string_lossy().starts_with("python"));
     match std::env::args_os().nth(1).filter(|_| is_python) {
         Some(script) => std::path::absolute(script),
-        None => Ok(own),
+        None => Ok(program),
     }
 }
 
@@ -183,12 +183,12 @@ fn caught(verb: impl FnOnce() -> u8) -> Result<u8> {
 }
 
 fn keep(panic: &PanicHookInfo) {
-    let said = panic.payload_as_str().unwrap_or("stopped without a word");
+    let message = panic.payload_as_str().unwrap_or("stopped without a word");
     let place = panic.location().map_or_else(String::new, |place| {
         format!(", at {}:{}", place.file(), place.line())
     });
     *LAST.lock().unwrap_or_else(PoisonError::into_inner) =
-        format!("{}{place}", said.replace('\n', " "));
+        format!("{}{place}", message.replace('\n', " "));
 }
 
 /// Labels of lines that say what is to be seen to, and all others.
@@ -227,7 +227,7 @@ pub(crate) fn painted(text: &str) -> String {
 }
 
 fn line_of(line: &str) -> String {
-    let Some((label, rest)) = line.split_at_checked(LABEL) else {
+    let Some((label, tail)) = line.split_at_checked(LABEL) else {
         return line.into();
     };
     let word = label.trim();
@@ -244,15 +244,15 @@ fn line_of(line: &str) -> String {
     let judges = ["verdict", "limits"].contains(&word);
     let verdict = VERDICTS
         .iter()
-        .find(|(begins, _)| judges && rest.starts_with(begins));
-    let rest = match verdict {
+        .find(|(begins, _)| judges && tail.starts_with(begins));
+    let ending = match verdict {
         Some((word, colour)) => {
             let colour = Style::new().bold().fg_color(Some((*colour).into()));
-            format!("{colour}{word}{colour:#}{}", &rest[word.len()..])
+            format!("{colour}{word}{colour:#}{}", &tail[word.len()..])
         }
-        None => rest.into(),
+        None => tail.into(),
     };
-    format!("{bold}{label}{bold:#}{rest}")
+    format!("{bold}{label}{bold:#}{ending}")
 }
 
 #[cfg(test)]
@@ -273,16 +273,16 @@ mod tests {
         let sound = guarded(|| 10);
         std::panic::set_hook(hook);
         assert_eq!((code, sound), (70, 10));
-        let said = super::super::message(&bug.unwrap_err());
+        let message = super::super::message(&bug.unwrap_err());
         assert!(
-            said.starts_with(
+            message.starts_with(
                 "error: index out of bounds: the len is 3 but the index is 3, at src/cli/surroundings.rs:"
             ),
-            "{said}"
+            "{message}"
         );
         assert!(
-            said.ends_with("(this is a bug in calib)") && said.lines().count() == 1,
-            "{said}"
+            message.ends_with("(this is a bug in calib)") && message.lines().count() == 1,
+            "{message}"
         );
     }
 

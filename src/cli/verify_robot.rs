@@ -215,7 +215,7 @@ fn report_text(origin: &str, found: &Achieved, new_base: bool) -> String {
 }
 
 fn document(origin: &str, found: &Achieved) -> serde_json::Value {
-    let of = |lengths: &[f64]| {
+    let of_lengths = |lengths: &[f64]| {
         let [mean, p95, max] = figures(lengths);
         json!({ "mean_mm": mean, "p95_mm": p95, "max_mm": max })
     };
@@ -223,8 +223,8 @@ fn document(origin: &str, found: &Achieved) -> serde_json::Value {
         json!({ "cycles": pose.cycles, "accuracy_ap_mm": 1e3 * pose.accuracy, "repeatability_rp_mm": 1e3 * pose.repeatability })
     });
     json!({
-        "model": origin, "points": found.achieved.len(), "before": of(&found.before),
-        "predicted_u95": if found.predicted.is_empty() { serde_json::Value::Null } else { of(&found.predicted) },
-        "achieved": of(&found.achieved), "unreached": found.unreached, "iso_9283": poses.collect::<Vec<_>>(),
+        "model": origin, "points": found.achieved.len(), "before": of_lengths(&found.before),
+        "predicted_u95": if found.predicted.is_empty() { serde_json::Value::Null } else { of_lengths(&found.predicted) },
+        "achieved": of_lengths(&found.achieved), "unreached": found.unreached, "iso_9283": poses.collect::<Vec<_>>(),
     })
 }

@@ -351,12 +351,12 @@ fn tolerance(a: &TableFile, name: &str, options: &DiffOptions, unit: Unit) -> (f
         .schema()
         .and_then(|schema| schema.field_of(name))
         .map(|(field, _)| &field.diff);
-    let of = |wish: &Tolerances, schema: Option<f64>| {
+    let of_wish = |wish: &Tolerances, schema: Option<f64>| {
         wish.of(name, unit).unwrap_or(schema.unwrap_or(0.0))
     };
     (
-        of(&options.atol, field.map(|field| field.atol)),
-        of(&options.rtol, field.map(|field| field.rtol)),
+        of_wish(&options.atol, field.map(|field| field.atol)),
+        of_wish(&options.rtol, field.map(|field| field.rtol)),
     )
 }
 

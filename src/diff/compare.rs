@@ -255,12 +255,12 @@ fn judge(
 }
 
 fn count(rows: &[AtomicU8], pairing: &Pairing) -> RowCounts {
-    let of = |class: u8| {
+    let of_class = |class: u8| {
         rows.iter()
             .filter(|row| row.load(Ordering::Relaxed) == class)
             .count() as u64
     };
-    let (within, changed) = (of(WITHIN), of(CHANGED));
+    let (within, changed) = (of_class(WITHIN), of_class(CHANGED));
     RowCounts {
         same: pairing.paired as u64 - within - changed,
         within_tolerance: within,
@@ -297,8 +297,8 @@ fn worst_rows(
     let units = row_units(a, comparisons, &order)?;
     let texts = keys.texts(&order)?;
     let rows = order.into_iter().zip(texts).map(|(row, key)| {
-        let own = cells.iter().filter(|(_, cell)| cell.row == row);
-        let cells = own.map(|(at, cell)| {
+        let of_row = cells.iter().filter(|(_, cell)| cell.row == row);
+        let cells = of_row.map(|(at, cell)| {
             let comparison = &comparisons[*at];
             let unit = if comparison.unit == "row" {
                 units.get(&row).cloned().unwrap_or_default()

@@ -82,7 +82,7 @@ impl Keys {
         }
         let fields = types.iter().cloned().map(SortField::new).collect();
         let converter = Arc::new(RowConverter::new(fields).map_err(bug)?);
-        let of = |source: &TableFile| -> Result<Self> {
+        let of_source = |source: &TableFile| -> Result<Self> {
             let mut rows = converter.empty_rows(source.rows, 0);
             let columns = names
                 .iter()
@@ -110,7 +110,7 @@ impl Keys {
                 rows,
             })
         };
-        let (left, right) = rayon::join(|| of(a), || of(b));
+        let (left, right) = rayon::join(|| of_source(a), || of_source(b));
         Ok((left?, right?))
     }
 

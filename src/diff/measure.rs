@@ -79,8 +79,8 @@ fn numbers(
     sees: &mut Seer,
 ) -> Result<()> {
     let (sigma_a, sigma_b) = comparison.sigma.unzip();
-    let columns = |of: &[usize], sigma: Option<usize>| -> Vec<usize> {
-        of.iter().copied().chain(sigma).collect()
+    let columns = |numbers: &[usize], sigma: Option<usize>| -> Vec<usize> {
+        numbers.iter().copied().chain(sigma).collect()
     };
     let theirs = columns(&comparison.b, sigma_b)
         .into_iter()
@@ -197,8 +197,8 @@ impl NumberPairs<'_> {
     /// B minus A; none where both are the same, as rotations are whose quaternions differ in sign.
     fn difference(&self, at: usize) -> Option<f64> {
         let comparison = self.comparison;
-        let cells = |of: &Numbers| -> Vec<f64> {
-            let numbers = &of.numbers[..comparison.a.len()];
+        let cells = |source: &Numbers| -> Vec<f64> {
+            let numbers = &source.numbers[..comparison.a.len()];
             numbers.iter().map(|cells| cells.value(at)).collect()
         };
         let difference = if comparison.a.len() == 1 {

@@ -78,13 +78,13 @@ impl TableFile {
                 ),
             ));
         }
-        let said: BTreeMap<String, String> = footer
+        let pairs: BTreeMap<String, String> = footer
             .key_value_metadata()
             .into_iter()
             .flatten()
             .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)))
             .collect();
-        let units: BTreeMap<String, String> = said
+        let units: BTreeMap<String, String> = pairs
             .get("calib.units")
             .and_then(|text| serde_json::from_str(text).ok())
             .unwrap_or_default();
@@ -107,15 +107,15 @@ impl TableFile {
             }
         });
         let columns = columns.collect();
-        let table = said.get("calib.schema").and_then(|id| {
+        let table = pairs.get("calib.schema").and_then(|id| {
             let (kind, version) = id.split_once('/')?;
             Some((kind.to_string(), Version::parse(version)?))
         });
-        let key = said
+        let key = pairs
             .get("calib.primary_key")
             .map(|key| key.split(',').map(String::from).collect())
             .unwrap_or_default();
-        let table_hash = said.get("calib.table_hash").cloned();
+        let table_hash = pairs.get("calib.table_hash").cloned();
         Ok(Self {
             path: path.into(),
             rows,

@@ -36,7 +36,7 @@ impl LinkBody {
 impl Export {
     /// The body that joint `index` (from 0) moves; none where it has no mass.
     pub(super) fn body(&self, index: usize) -> Option<LinkBody> {
-        if let Some((body, own)) = self
+        if let Some((body, is_identified)) = self
             .identified
             .torques
             .as_ref()
@@ -44,7 +44,7 @@ impl Export {
         {
             return Some(identified(
                 &body,
-                own,
+                is_identified,
                 index + 1 == self.corrected.joints.len(),
             ));
         }
@@ -64,8 +64,8 @@ impl Export {
 }
 
 /// An identified body; `own`: it is no nearest one.
-fn identified(body: &Inertial, own: bool, last: bool) -> LinkBody {
-    let remark = match (last, own) {
+fn identified(body: &Inertial, is_identified: bool, last: bool) -> LinkBody {
+    let remark = match (last, is_identified) {
         (true, true) => "as the torques show it, payload included",
         (false, true) => "as the torques show it",
         (true, false) => {

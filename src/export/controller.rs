@@ -79,21 +79,25 @@ fn lines(identified: &IdentifiedModel) -> Vec<String> {
         .unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
     let shares = shares(identified, &convention);
     let line = |entry: DeviationEntry| {
-        let own: Vec<(&Share, f64)> = shares
+        let at_joint: Vec<(&Share, f64)> = shares
             .iter()
             .filter(|share| share.by.holds(entry))
             .map(|share| (share, share.by.at(entry)))
             .collect();
-        if own.is_empty() {
+        if at_joint.is_empty() {
             return None;
         }
         let (quantity, scale, unit, decimals) = shown(entry, robot);
-        let value = own.iter().map(|(share, by)| share.value * by).sum::<f64>() * scale;
-        let sigma = sigma(&own, identified.covariance.as_ref());
+        let value = at_joint
+            .iter()
+            .map(|(share, by)| share.value * by)
+            .sum::<f64>()
+            * scale;
+        let sigma = sigma(&at_joint, identified.covariance.as_ref());
         let sigma = sigma
             .map(|sigma| format!("{:.3e}", sigma * scale))
             .unwrap_or_default();
-        let statuses: BTreeSet<&str> = own.iter().map(|(share, _)| share.status).collect();
+        let statuses: BTreeSet<&str> = at_joint.iter().map(|(share, _)| share.status).collect();
         let status = statuses.into_iter().collect::<Vec<_>>().join(" and ");
         Some(format!(
             "{quantity},{},{value:.decimals$},{unit},{sigma},{status}\n",
@@ -137,8 +141,8 @@ fn shown(entry: DeviationEntry, robot: &RobotModel) -> (&'static str, f64, Strin
 
 /// Standard deviation of a sum of parameters, each times a factor: of those that were estimated. None where none was, and of several
 /// where their covariance is not known.
-fn sigma(own: &[(&Share, f64)], covariance: Option<&Covariance>) -> Option<f64> {
-    let estimated: Vec<(&Share, f64, f64)> = own
+fn sigma(shares: &[(&Share, f64)], covariance: Option<&Covariance>) -> Option<f64> {
+    let estimated: Vec<(&Share, f64, f64)> = shares
         .iter()
         .filter_map(|(share, by)| share.sigma.map(|sigma| (*share, *by, sigma)))
         .collect();

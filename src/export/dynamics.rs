@@ -46,19 +46,19 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Result<V
         let alone = |effect: &str| {
             model.terms.iter().any(|term| term.effect == effect && term.place.to_string() == place && stands_alone(torques, term))
         };
-        let of = |effect: &'static str| {
-            let mut own = rows(effect).filter(|row| row.place == place && row.form.is_some() && alone(effect));
-            own.next().map_or(Value::Null, number)
+        let of_effect = |effect: &'static str| {
+            let mut numbers = rows(effect).filter(|row| row.place == place && row.form.is_some() && alone(effect));
+            numbers.next().map_or(Value::Null, number)
         };
         let curve = curves
             .iter()
             .find(|curve| curve.joint == index)
             .map(|curve| json!({ "speed_rad_s": curve.velocity, "torque_nm": curve.torque, "sigma_nm": curve.sigma }));
         let seen = &model.range[index];
-        let (mut viscous, mut coulomb) = (of(DAMPING), of(FRICTION));
-        let own = |effect: &str| model.terms.iter().find(|term| term.effect == effect && term.place == Place::Joint(index));
+        let (mut viscous, mut coulomb) = (of_effect(DAMPING), of_effect(FRICTION));
+        let model_term = |effect: &str| model.terms.iter().find(|term| term.effect == effect && term.place == Place::Joint(index));
         for (effect, unit, number) in [(DAMPING, "Nm s/rad", &mut viscous), (FRICTION, "Nm", &mut coulomb)] {
-            let line = own(effect).and_then(|term| of_line(torques, term));
+            let line = model_term(effect).and_then(|term| of_line(torques, term));
             if let (Some(raw), Some(FittedNumber { value, sigma })) = (number.as_object_mut(), line) {
                 raw.extend(Map::from_iter([
                     ("value".into(), json!(value)),
@@ -68,14 +68,14 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Result<V
             }
         }
         let power = rows(DAMPING).find(|row| row.place == place && row.form.is_some());
-        let exponent = own(DAMPING).and_then(|term| term.shape.first()).filter(|exponent| **exponent != 1.0);
-        if let (Some(own), Some(power), Some(exponent)) = (viscous.as_object_mut(), power, exponent) {
+        let exponent = model_term(DAMPING).and_then(|term| term.shape.first()).filter(|exponent| **exponent != 1.0);
+        if let (Some(friction), Some(power), Some(exponent)) = (viscous.as_object_mut(), power, exponent) {
             let law = json!({ "value": power.value, "unit": "Nm (s/rad)^exponent", "sigma": power.sigma, "exponent": exponent });
-            own.insert("law".into(), law);
+            friction.insert("law".into(), law);
         }
         json!({
             "name": joint.name, "viscous": viscous, "coulomb": coulomb, "friction": curve,
-            "armature": of(ARMATURE), "reduction_ratio": joint.reduction_ratio, "motor_constant_nm_a": joint.motor_constant,
+            "armature": of_effect(ARMATURE), "reduction_ratio": joint.reduction_ratio, "motor_constant_nm_a": joint.motor_constant,
             "sign_width_rad_s": seen.sign_width,
             "seen": { "position_rad": seen.position, "speed_rad_s": seen.speed, "acceleration_rad_s2": seen.acceleration },
         })
@@ -141,11 +141,11 @@ fn causes(torques: &IdentifiedTorques) -> Vec<Value> {
     let model = &torques.model;
     let cause = |(place, term): (usize, &crate::dynamics::TorqueTerm)| {
         let prefix = format!("{}.", model.prefix(place));
-        let own = torques.parameters.0.iter().filter(|row| {
+        let at_place = torques.parameters.0.iter().filter(|row| {
             let quantity = row.name.strip_prefix(&prefix);
             quantity.is_some_and(|quantity| quantity == row.quantity)
         });
-        let numbers: Map<String, Value> = own
+        let numbers: Map<String, Value> = at_place
             .map(|row| {
                 (
                     row.quantity.clone(),

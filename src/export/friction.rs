@@ -32,14 +32,14 @@ pub(super) fn stands_alone(torques: &IdentifiedTorques, term: &TorqueTerm) -> bo
         return value > 0.0 && value >= *NAMED * sigma;
     }
     let place = term.place.to_string();
-    let mut own = torques
+    let mut numbers = torques
         .parameters
         .0
         .iter()
         .filter(|row| row.effect == term.effect && row.place == place && row.form.is_some());
     let drives = [DAMPING, FRICTION].contains(&term.effect.as_str()) && term.coefficients[0] <= 0.0;
     !drives
-        && own.any(|row| {
+        && numbers.any(|row| {
             row.sigma
                 .is_none_or(|sigma| row.value.abs() >= *NAMED * sigma)
         })
@@ -48,21 +48,21 @@ pub(super) fn stands_alone(torques: &IdentifiedTorques, term: &TorqueTerm) -> bo
 /// The coefficient of a cause of one number at a joint (from 0), SI; none where it was not found or does not stand alone. Of a law with a shape
 /// it is the number that formats can hold, see [`as_one_number`].
 pub(super) fn coefficient(torques: &IdentifiedTorques, effect: &str, joint: usize) -> Option<f64> {
-    let own = torques
+    let single = torques
         .model
         .terms
         .iter()
         .find(|term| term.effect == effect && term.place == Place::Joint(joint))?;
-    if !stands_alone(torques, own) {
+    if !stands_alone(torques, single) {
         return None;
     }
     let (value, seen) = (
-        own.coefficients.first().copied()?,
+        single.coefficients.first().copied()?,
         torques.model.range.get(joint)?,
     );
-    let held = of_line(torques, own).map(|line| line.value);
+    let held = of_line(torques, single).map(|line| line.value);
     Some(
-        held.or_else(|| as_one_number(own, value, seen, None).map(|(held, _)| held))
+        held.or_else(|| as_one_number(single, value, seen, None).map(|(held, _)| held))
             .unwrap_or(value),
     )
 }
@@ -109,13 +109,13 @@ pub(super) fn spring(torques: &IdentifiedTorques, joint: usize) -> Option<[f64; 
     let at = |term: &&TorqueTerm| {
         SPRINGS.contains(&term.effect.as_str()) && term.place == Place::Joint(joint)
     };
-    let own = torques
+    let single = torques
         .model
         .terms
         .iter()
         .find(at)
         .filter(|term| stands_alone(torques, term))?;
-    let [stiffness, at_zero] = own.coefficients[..] else {
+    let [stiffness, at_zero] = single.coefficients[..] else {
         return None;
     };
     (stiffness > 0.0).then(|| [stiffness, -at_zero / stiffness])

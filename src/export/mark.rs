@@ -35,15 +35,15 @@ impl fmt::Display for ExportMark {
 impl ExportMark {
     /// The mark of a file; none where it has none.
     fn of(text: &str) -> Option<Self> {
-        let (_, rest) = text.split_once(BEGINS)?;
-        let line = rest
+        let (_, tail) = text.split_once(BEGINS)?;
+        let line = tail
             .lines()
             .next()?
             .trim_end_matches(['"', ',', ' '])
             .trim_end_matches("-->")
             .trim_end();
-        let (format, rest) = line.split_once(", model ")?;
-        let (model, serial) = rest.split_once(", robot serial ")?;
+        let (format, tail) = line.split_once(", model ")?;
+        let (model, serial) = tail.split_once(", robot serial ")?;
         let serial = (serial != "not stated").then(|| serial.to_string());
         Some(Self {
             format: format.into(),
@@ -114,18 +114,18 @@ impl Export {
             .iter()
             .find(|format| format.name == found.format)
             .ok_or_else(none)?;
-        let own = self.mark(format.name);
-        if own != found {
-            return Ok(Belonging::Other(found, own));
+        let mark = self.mark(format.name);
+        if mark != found {
+            return Ok(Belonging::Other(found, mark));
         }
         let written = (format.text)(self)?;
         let (theirs, ours) = (content(text, format), content(&written, format));
         let differs = (0..theirs.len().max(ours.len()))
             .find(|k| theirs.get(*k).map(|line| line.1) != ours.get(*k).map(|line| line.1));
         Ok(match differs {
-            None => Belonging::Same(own),
+            None => Belonging::Same(mark),
             Some(k) => Belonging::Edited(
-                own,
+                mark,
                 theirs
                     .get(k)
                     .map_or(text.lines().count() + 1, |line| line.0),

@@ -111,7 +111,7 @@ fn arm(export: &Export) -> Value {
             name => one_line(&joint.name), kind, parent, child => child.clone(), body, axis => numbers(joint.axis),
             offset => offset(joint.point, before), limits => joint.limits.map(|limits| limits.map(|limit| numbers([limit]))),
             damping => found(DAMPING), friction => found(FRICTION), armature => found(ARMATURE),
-            stiffness => text(spring.map(|[stiffness, _]| stiffness)), springref => text(spring.map(|[_, rest]| rest)),
+            stiffness => text(spring.map(|[stiffness, _]| stiffness)), springref => text(spring.map(|[_, reference]| reference)),
             gear => text(torques.and_then(|torques| gear(torques, index))),
         });
         (before, parent) = (joint.point, child);

@@ -106,7 +106,7 @@ fn three(node: Option<Node>, name: &str, otherwise: [f64; 3]) -> Option<[f64; 3]
 
 /// The corrected origins of the moving joints; none where the description has not the model's joints.
 fn origins(export: &Export, document: &Document, base: &str) -> Option<Origins> {
-    let mut own: BTreeMap<&str, OwnJoint> = BTreeMap::new();
+    let mut urdf_joints: BTreeMap<&str, OwnJoint> = BTreeMap::new();
     for node in document
         .root_element()
         .children()
@@ -127,7 +127,7 @@ fn origins(export: &Export, document: &Document, base: &str) -> Option<Origins> 
         else {
             continue;
         };
-        own.insert(
+        urdf_joints.insert(
             child,
             OwnJoint {
                 name,
@@ -140,16 +140,18 @@ fn origins(export: &Export, document: &Document, base: &str) -> Option<Origins> 
     }
     let robot = &export.corrected;
     // From the last joint back to the base.
-    let last = own.values().find(|joint| {
+    let last = urdf_joints.values().find(|joint| {
         robot
             .joints
             .last()
             .is_some_and(|last| last.name == joint.name)
     })?;
     let mut path: Vec<&OwnJoint> = std::iter::successors(Some(last), |joint| {
-        own.get(joint.parent).filter(|_| joint.parent != base)
+        urdf_joints
+            .get(joint.parent)
+            .filter(|_| joint.parent != base)
     })
-    .take(own.len())
+    .take(urdf_joints.len())
     .collect();
     path.reverse();
     let (mut nominal, mut corrected) = (Pose::identity(), Pose::identity());
@@ -160,19 +162,19 @@ fn origins(export: &Export, document: &Document, base: &str) -> Option<Origins> 
             corrected = corrected * joint.origin;
             continue;
         };
-        let own = moved(
+        let inverse = moved(
             &nominal,
             &(nominal.rotation * joint.axis),
             &robot.joints[at],
         );
-        let (place, turn) = origin(&corrected, &own);
+        let (place, turn) = origin(&corrected, &inverse);
         // Names stand in an expression between quotes.
         let plain = joint
             .name
             .chars()
             .all(|c| c.is_ascii_alphanumeric() || "_-./ ".contains(c));
         joints.push((plain.then(|| joint.name.to_string())?, [place, turn]));
-        corrected = own;
+        corrected = inverse;
     }
     let (place, turn) = origin(&corrected, &tool(robot.tool, &robot.tool_rotation));
     let tool = format!(

@@ -253,8 +253,12 @@ pub(super) fn population(robots: &mut [FleetCellRow]) -> Population {
         robots.iter_mut().for_each(|robot| robot.probability = 1.0);
     }
     for _ in 0..10 {
-        let median = |of: &dyn Fn(&FleetCellRow) -> f64| {
-            let mut values: Vec<f64> = robots.iter().filter(|robot| has(robot)).map(of).collect();
+        let median = |value_of: &dyn Fn(&FleetCellRow) -> f64| {
+            let mut values: Vec<f64> = robots
+                .iter()
+                .filter(|robot| has(robot))
+                .map(value_of)
+                .collect();
             nearest(&mut values, 0.5)
         };
         let Some(usual) = median(&|robot| robot.size) else {

@@ -258,16 +258,16 @@ mod tests {
             decided: Some(true),
             statement: String::new(),
         };
-        let of = |robot: &str| {
+        let of_robot = |robot: &str| {
             let prior = expected(&finding, &sizes, robot);
             (prior["share"].as_f64(), prior["size_mm"].as_f64())
         };
         // By hand: five of six have it; a median of 0.06, 0.06, 0.06, 0.04, 0.04.
-        assert_eq!(of("new"), (Some(5.0 / 6.0), Some(0.06)));
-        assert_eq!(of("f"), (Some(1.0), Some(0.06)));
-        assert_eq!(of("a"), (Some(0.8), Some(0.06)));
+        assert_eq!(of_robot("new"), (Some(5.0 / 6.0), Some(0.06)));
+        assert_eq!(of_robot("f"), (Some(1.0), Some(0.06)));
+        assert_eq!(of_robot("a"), (Some(0.8), Some(0.06)));
         // Of the two that remain of c, d, e with a and b either is a median.
-        let (share, size) = of("c");
+        let (share, size) = of_robot("c");
         assert!(share == Some(0.8) && size.is_some_and(|size| size < 0.0601));
     }
 

@@ -44,10 +44,10 @@ impl Roster {
                 Err(other) => return Err(other),
             };
             for robot in &mut found {
-                let own = std::mem::take(&mut robot.sets);
+                let sets = std::mem::take(&mut robot.sets);
                 robot.set_values(&file.set);
                 robot.set_values(&source.set);
-                robot.sets.extend(own);
+                robot.sets.extend(sets);
                 robot.groups = robot.groups.or(&source.groups).or(&file.groups);
             }
             robots.extend(found);

@@ -59,8 +59,8 @@ impl Round {
 
     fn given(&self, robot: &FleetRobot) -> Vec<Given> {
         let group = self.groups.get(self.by.of(&robot.groups));
-        let own = self.robots.get(&robot.name);
-        group.into_iter().chain(own).flatten().cloned().collect()
+        let given = self.robots.get(&robot.name);
+        group.into_iter().chain(given).flatten().cloned().collect()
     }
 
     /// The plan of a robot up to its last stage `diagnose` or `diagnose_torques`, which says what its cells do in place of a diagnosis.

@@ -219,20 +219,20 @@ fn final_rows(statistics: &Statistics) -> Vec<&StatisticsRow> {
     let Some(last) = statistics.0.iter().map(|row| row.order).max() else {
         return Vec::new();
     };
-    let of = |order: i64, held_out: bool| {
+    let of_order = |order: i64, held_out: bool| {
         statistics
             .0
             .iter()
             .filter(move |row| row.order == order && row.held_out == held_out)
     };
-    let held_out = of(last, true).next().is_some();
-    let Some(set) = of(last, held_out)
+    let held_out = of_order(last, true).next().is_some();
+    let Some(set) = of_order(last, held_out)
         .max_by_key(|row| row.points)
         .map(|row| row.set.as_str())
     else {
         return Vec::new();
     };
     (0..=last)
-        .filter_map(|order| of(order, held_out).find(|row| row.set == set))
+        .filter_map(|order| of_order(order, held_out).find(|row| row.set == set))
         .collect()
 }

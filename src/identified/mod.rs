@@ -222,15 +222,15 @@ impl IdentifiedModel {
             .flat_map(Standing::warnings)
             .chain(unexplained.clone())
             .collect();
-        let told = manifest
+        let reason = manifest
             .stages
             .iter()
             .flat_map(|stage| &stage.warnings)
             .find(|line| line.starts_with(WRONG_SETUP))
             .cloned();
-        let refusals = wrong.or(told).into_iter().collect();
+        let refusals = wrong.or(reason).into_iter().collect();
         let learned = learned.filter(|_| correction.is_some());
-        let said = |stage: &StageReport| {
+        let warnings_of = |stage: &StageReport| {
             stage
                 .warnings
                 .iter()
@@ -239,15 +239,15 @@ impl IdentifiedModel {
         };
         let stage_warnings = std::iter::once(stage)
             .chain(learned)
-            .flat_map(said)
+            .flat_map(warnings_of)
             .collect();
         let of_stage = |stage: &StageReport, kind: &str| {
-            let own = stage.outputs.iter().find(|output| output.kind == kind);
-            own.map(|output| load(&output.table)).transpose()
+            let written = stage.outputs.iter().find(|output| output.kind == kind);
+            written.map(|output| load(&output.table)).transpose()
         };
         let of_learned = learned.map(|learned| move |kind: &str| of_stage(learned, kind));
         let of_learned = of_learned.as_ref().map(|tables| tables as &TablesByKind);
-        let own = Self::of_tables(robot, origin, &|kind| of_stage(stage, kind), of_learned)?;
+        let model = Self::of_tables(robot, origin, &|kind| of_stage(stage, kind), of_learned)?;
         let convention = Some(convention);
         let serial = serial(&manifest.pipeline.resolved);
         let known = Self {
@@ -256,7 +256,7 @@ impl IdentifiedModel {
             correction,
             data,
             convention,
-            ..own
+            ..model
         };
         Ok(Self {
             unexplained,
@@ -370,12 +370,12 @@ impl IdentifiedModel {
         let sources = vec![files.parameters.clone(), files.robot.clone()];
         if let Some(loose) = torques {
             let table = files.vouched(&files.parameters, loose, &mut warnings)?;
-            let own =
+            let by_torques =
                 Self::of_torques(robot.clone(), IdentifiedTorques::of(&robot, table, origin)?)?;
             return Ok(Self {
-                warnings: [warnings, own.warnings].concat(),
+                warnings: [warnings, by_torques.warnings].concat(),
                 sources,
-                ..own
+                ..by_torques
             });
         }
         Ok(Self {

@@ -91,7 +91,7 @@ pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing
         let unseen = Unseen::of_frame(&store.load(&prediction)?)?;
         Ok(Step {
             id: stage.id.clone(),
-            own: output(stage, Parameters::KIND).is_some(),
+            is_identified: output(stage, Parameters::KIND).is_some(),
             unseen,
         })
     };

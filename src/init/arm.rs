@@ -101,7 +101,7 @@ impl StartingArm {
             .iter()
             .map(|joint| joint.kind == JointKind::Prismatic)
             .collect();
-        let own = counted(sliding.len(), "joint");
+        let sliding_joints = counted(sliding.len(), "joint");
         Ok(Self {
             text: None,
             joints: sliding.len(),
@@ -111,7 +111,7 @@ impl StartingArm {
             other: (
                 "robot.yaml",
                 format!(
-                    "{label} has {own}, the recording {{}}; put the robot of the recording there"
+                    "{label} has {sliding_joints}, the recording {{}}; put the robot of the recording there"
                 ),
             ),
         })
@@ -185,7 +185,7 @@ impl ExaminedFile {
         };
         let others = [TORQUES, CURRENTS, VELOCITIES];
         let part = |column: usize| {
-            let name = &self.said[column];
+            let name = &self.stated[column];
             let named = || {
                 let (stem, joints) = (name.stem(), NAMED_JOINTS[2]);
                 let joint = joints.iter().position(|joint| stem.contains(joint))?;
@@ -198,7 +198,7 @@ impl ExaminedFile {
             let mut others = others.iter().filter(|other| **other != listed);
             has(key, listed) && !others.any(|other| has(key, other))
         };
-        let numeric = (0..self.said.len()).filter(|column| self.sheet.is_numeric(*column));
+        let numeric = (0..self.stated.len()).filter(|column| self.sheet.is_numeric(*column));
         let parts = numeric.filter_map(|column| Some((column, part(column)?)));
         let runs = numbered(parts.filter(|(_, (key, _))| is_meant(key))).into_iter();
         let mut rows: Vec<(bool, Vec<usize>)> = runs
@@ -218,8 +218,8 @@ impl ExaminedFile {
             .get("q")
             .is_some_and(|joints| joints.choices[0].lines[0].contains("unit: deg"));
         if let Some(best) = torques.first() {
-            let unit = self.said[best[0]].unit_of(&["Nm"]);
-            let effort = self.said[best[0]]
+            let unit = self.stated[best[0]].unit_of(&["Nm"]);
+            let effort = self.stated[best[0]]
                 .words
                 .iter()
                 .any(|word| word.starts_with("effort"));
@@ -243,7 +243,7 @@ impl ExaminedFile {
             }
         }
         if let Some(best) = currents.first() {
-            let unit = self.said[best[0]].unit_of(&["A", "mA"]);
+            let unit = self.stated[best[0]].unit_of(&["A", "mA"]);
             self.drive(
                 "current",
                 &currents,
@@ -255,9 +255,9 @@ impl ExaminedFile {
             }
         }
         if let Some(best) = velocities.first() {
-            let said = |unit: &str| self.said[best[0]].words.iter().any(|word| word == unit);
-            let named = said("deg") || said("rad");
-            let unit = if said("deg") || (degrees && !named) {
+            let is_stated = |unit: &str| self.stated[best[0]].words.iter().any(|word| word == unit);
+            let named = is_stated("deg") || is_stated("rad");
+            let unit = if is_stated("deg") || (degrees && !named) {
                 "deg/s"
             } else {
                 "rad/s"
@@ -269,8 +269,8 @@ impl ExaminedFile {
                 (!named).then_some("the unit").into_iter().collect(),
             );
         }
-        let trajectories = |column: &usize| lists(TRAJECTORIES, &self.said[*column].stem());
-        let trajectories: Vec<usize> = (0..self.said.len()).filter(trajectories).collect();
+        let trajectories = |column: &usize| lists(TRAJECTORIES, &self.stated[*column].stem());
+        let trajectories: Vec<usize> = (0..self.stated.len()).filter(trajectories).collect();
         self.map("trajectory", &trajectories, None, None);
     }
 

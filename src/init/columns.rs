@@ -45,7 +45,7 @@ pub(super) struct ExaminedFile {
     pub(crate) path: PathBuf,
     pub(crate) name: String,
     pub(crate) sheet: Sheet,
-    pub(crate) said: Vec<Name>,
+    pub(crate) stated: Vec<Name>,
     /// How many columns are called so.
     named: BTreeMap<String, usize>,
     pub(crate) mappings: Vec<Mapping>,
@@ -57,18 +57,19 @@ pub(super) struct ExaminedFile {
 impl ExaminedFile {
     /// Nothing is known yet of its columns.
     pub(crate) fn unknown(path: &Path, sheet: Sheet) -> Self {
-        let own = path.file_name().map_or_else(
+        let file_name = path.file_name().map_or_else(
             || path.display().to_string(),
             |name| name.to_string_lossy().into_owned(),
         );
         let part = |what: &str, part: &Option<String>| {
-            part.as_ref().map(|part| format!("{own} {what} `{part}`"))
+            part.as_ref()
+                .map(|part| format!("{file_name} {what} `{part}`"))
         };
         let name = part("sheet", &sheet.of_book)
             .or_else(|| part("topic", &sheet.topic))
-            .unwrap_or_else(|| own.clone());
-        let mut said: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
-        for (name, unit) in said.iter_mut().zip(&sheet.units) {
+            .unwrap_or_else(|| file_name.clone());
+        let mut stated: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
+        for (name, unit) in stated.iter_mut().zip(&sheet.units) {
             name.unit = name.unit.or(*unit);
         }
         let mut named = BTreeMap::new();
@@ -80,7 +81,7 @@ impl ExaminedFile {
             path: path.into(),
             name,
             sheet,
-            said,
+            stated,
             named,
             mappings: Vec::new(),
             second: 1.0,
@@ -135,7 +136,7 @@ impl ExaminedFile {
             .cloned()
             .collect();
         parts.extend(self.mappings.iter().map(|mapping| mapping.account.clone()));
-        let unused = (0..self.said.len())
+        let unused = (0..self.stated.len())
             .filter(|column| !self.is_taken(*column))
             .collect::<Vec<usize>>();
         if !unused.is_empty() && self.sheet.trouble.is_none() {
@@ -337,7 +338,7 @@ impl ExaminedFile {
     pub(crate) fn ids(&self) -> Vec<usize> {
         let rows = self.sheet.rows.len();
         let named = |column: &usize| {
-            let stem = self.said[*column].stem();
+            let stem = self.stated[*column].stem();
             let name = self.sheet.names[*column].trim();
             let ends = stem.ends_with("_id")
                 || stem.ends_with("_name")
@@ -346,7 +347,7 @@ impl ExaminedFile {
             let first = !self.sheet.header && *column == 0 && self.may_be_names(0);
             (names::lists(names::IDS, &stem) || ends || first) && whole && !self.is_taken(*column)
         };
-        let mut columns: Vec<usize> = (0..self.said.len()).filter(named).collect();
+        let mut columns: Vec<usize> = (0..self.stated.len()).filter(named).collect();
         let rank = |column: usize| (self.distinct(column) < rows, self.sheet.is_numeric(column));
         columns.sort_by_key(|column| rank(*column));
         let best = columns.first().map(|column| rank(*column));
@@ -387,7 +388,7 @@ pub(super) struct Points {
     pub(crate) ways: Vec<PointColumns>,
     pub(crate) question: Option<String>,
     /// Whether the name of the best one says that it was measured.
-    pub(crate) said: bool,
+    pub(crate) is_stated: bool,
     /// Points of several targets side by side, by the targets' names; none where the names do not say so.
     pub(crate) targets: Vec<(String, [usize; 3])>,
     pub(crate) wanted: Option<[usize; 3]>,
@@ -398,11 +399,11 @@ pub(super) struct Points {
 pub(super) fn families(names: &[Name]) -> Vec<Family> {
     let mut groups: BTreeMap<Vec<String>, [Vec<usize>; 3]> = BTreeMap::new();
     for (column, name) in names.iter().enumerate() {
-        let Some((axis, mut rest)) = name.axis() else {
+        let Some((axis, mut remainder)) = name.axis() else {
             continue;
         };
-        rest.sort();
-        groups.entry(rest).or_default()[axis].push(column);
+        remainder.sort();
+        groups.entry(remainder).or_default()[axis].push(column);
     }
     let mut found = Vec::new();
     for (words, [x, y, z]) in groups {
@@ -419,8 +420,8 @@ pub(super) fn families(names: &[Name]) -> Vec<Family> {
     found
 }
 
-fn role(rest: &[String]) -> PointRole {
-    let has = |list| rest.iter().any(|word| names::lists(list, word));
+fn role(words: &[String]) -> PointRole {
+    let has = |list| words.iter().any(|word| names::lists(list, word));
     match (
         has(names::SIGMA),
         has(names::DIFFERENCE),
@@ -438,7 +439,7 @@ fn role(rest: &[String]) -> PointRole {
 /// The measured point among them.
 pub(super) fn points(names: &[Name]) -> Points {
     let mut families = families(names);
-    let of = |families: &[Family], role: PointRole| -> Vec<Family> {
+    let of_families = |families: &[Family], role: PointRole| -> Vec<Family> {
         families
             .iter()
             .filter(|family| family.role == role)
@@ -461,7 +462,7 @@ pub(super) fn points(names: &[Name]) -> Points {
         PointRole::Difference,
         PointRole::Sigma,
     ]
-    .map(|role| of(&families, role));
+    .map(|role| of_families(&families, role));
     let direct = |family: &Family| PointColumns {
         columns: family.columns,
         difference: None,
@@ -480,7 +481,7 @@ pub(super) fn points(names: &[Name]) -> Points {
     let mut found = Points {
         wanted: wanted.first().map(|family| family.columns),
         sigma: sigma.first().map(|family| family.columns),
-        said: !measured.is_empty(),
+        is_stated: !measured.is_empty(),
         ..Points::default()
     };
     let candidates = if measured.is_empty() {

@@ -85,7 +85,7 @@ impl Name {
             .iter()
             .enumerate()
             .find_map(|(at, word)| Some((at, axis(word)?)))?;
-        let rest = self
+        let others = self
             .words
             .iter()
             .enumerate()
@@ -102,7 +102,8 @@ impl Name {
         }
         Some((
             axis,
-            rest.chain((!more.is_empty()).then(|| more.to_string()))
+            others
+                .chain((!more.is_empty()).then(|| more.to_string()))
                 .chain(ending)
                 .collect(),
         ))
@@ -423,7 +424,7 @@ mod tests {
             ("Rz", None),
         ] {
             let expected =
-                expected.map(|(axis, rest)| (axis, rest.into_iter().map(String::from).collect()));
+                expected.map(|(axis, words)| (axis, words.into_iter().map(String::from).collect()));
             assert_eq!(Name::of(text).axis(), expected, "{text}");
         }
     }

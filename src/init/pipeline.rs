@@ -411,8 +411,8 @@ pub(crate) fn marked(paths: &[&Path]) -> Vec<MarkedLines> {
         let mut lines = Vec::new();
         for path in paths {
             let text = raw::text(path).unwrap_or_default();
-            let own = (1..).zip(text.lines()).filter(|(_, line)| counts(line));
-            lines.extend(own.map(|(number, line)| {
+            let numbered = (1..).zip(text.lines()).filter(|(_, line)| counts(line));
+            lines.extend(numbered.map(|(number, line)| {
                 (path.display().to_string(), number, line.trim().to_string())
             }));
         }

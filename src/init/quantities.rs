@@ -78,11 +78,11 @@ impl ExaminedFile {
         let angle = |column: usize| {
             self.sheet.is_numeric(column)
                 && self.sheet.largest(column) <= 400.0
-                && self.said[column]
+                && self.stated[column]
                     .unit
                     .is_none_or(|unit| ["deg", "rad"].contains(&unit))
         };
-        let mut rows = joints(&self.said, count, angle);
+        let mut rows = joints(&self.stated, count, angle);
         rows.retain(|columns| {
             columns.iter().all(|column| self.sheet.is_numeric(*column)) && !self.is_unit(columns)
         });
@@ -95,14 +95,14 @@ impl ExaminedFile {
             .filter(|_| numbers > count)
             .for_each(|row| row.truncate(count));
         let Some(best) = rows.first() else { return };
-        let turning = |column: &&usize| self.said[**column].unit_of(&LENGTHS).is_none();
+        let turning = |column: &&usize| self.stated[**column].unit_of(&LENGTHS).is_none();
         let degrees = best
             .iter()
             .filter(turning)
             .any(|column| self.sheet.largest(*column) > MOST_RADIANS);
         let named = best
             .iter()
-            .find_map(|column| self.said[*column].unit_of(&["deg", "rad"]));
+            .find_map(|column| self.stated[*column].unit_of(&["deg", "rad"]));
         let (unit, why) = match named {
             Some(unit) => (unit, None),
             None if degrees => (
@@ -140,7 +140,7 @@ impl ExaminedFile {
     }
 
     fn point(&mut self) {
-        let found = points(&self.said);
+        let found = points(&self.stated);
         if found
             .targets
             .iter()
@@ -169,10 +169,10 @@ impl ExaminedFile {
         };
         if let Some(sigma) = found.sigma {
             // In the unit of the point, unless the name says another.
-            let unit = self.said[sigma[0]]
+            let unit = self.stated[sigma[0]]
                 .unit_of(&LENGTHS)
                 .unwrap_or(self.length_unit(&best.columns).0);
-            let (names, what) = match self.said[sigma[0]].stem().contains(names::U95) {
+            let (names, what) = match self.stated[sigma[0]].stem().contains(names::U95) {
                 true => (["u95_x", "u95_y", "u95_z"], "two standard deviations"),
                 false => (["sigma_x", "sigma_y", "sigma_z"], "one standard deviation"),
             };
@@ -188,7 +188,7 @@ impl ExaminedFile {
             .1
             .then(|| "the unit, by the size of the numbers".to_string());
         let checks = found.question.into_iter().chain(by_size);
-        let said = if found.said {
+        let source = if found.is_stated {
             "the measured point"
         } else {
             "the point"
@@ -202,7 +202,7 @@ impl ExaminedFile {
         });
         let less = less.unwrap_or_default();
         let choices: Vec<Choice> = ways.iter().map(|way| self.way(way)).collect();
-        let account = format!("{said} ({}{less})", self.shown(&best.columns));
+        let account = format!("{source} ({}{less})", self.shown(&best.columns));
         self.propose("x", choices, checks, account);
     }
 
@@ -210,8 +210,8 @@ impl ExaminedFile {
     /// poses.
     fn quaternion(&mut self) {
         let column = |name: &str| {
-            (0..self.said.len())
-                .find(|k| self.said[*k].stem() == name && self.sheet.holds_numbers(*k))
+            (0..self.stated.len())
+                .find(|k| self.stated[*k].stem() == name && self.sheet.holds_numbers(*k))
         };
         let all =
             |prefix: &&str| ["w", "x", "y", "z"].map(|axis| column(&format!("{prefix}{axis}")));
@@ -286,7 +286,7 @@ impl ExaminedFile {
         let key = if minus { "minus" } else { "plus" };
         let lines = (["x", "y", "z"].iter().zip(way.columns).zip(difference)).map(
             |((name, target), column)| {
-                let other = self.said[column].unit_of(&LENGTHS);
+                let other = self.stated[column].unit_of(&LENGTHS);
                 let other = other
                     .filter(|other| *other != unit)
                     .map(|other| format!(", difference_unit: {other}"))
@@ -302,7 +302,7 @@ impl ExaminedFile {
     pub(super) fn length_unit(&self, columns: &[usize]) -> (&'static str, bool) {
         if let Some(unit) = columns
             .iter()
-            .find_map(|column| self.said[*column].unit_of(&LENGTHS))
+            .find_map(|column| self.stated[*column].unit_of(&LENGTHS))
         {
             return (unit, false);
         }
@@ -344,7 +344,7 @@ impl ExaminedFile {
             ("temperature", names::TEMPERATURES, "C", 200.0),
         ] {
             let fits = |column: &usize| {
-                let name = &self.said[*column];
+                let name = &self.stated[*column];
                 let named = if quantity == "payload" {
                     names::lists(listed, &name.stem())
                 } else {
@@ -357,18 +357,19 @@ impl ExaminedFile {
                     && !self.is_taken(*column)
                     && name.unit.is_none_or(|other| other == unit)
             };
-            let columns: Vec<usize> = (0..self.said.len()).filter(fits).collect();
+            let columns: Vec<usize> = (0..self.stated.len()).filter(fits).collect();
             let Some(first) = columns.first() else {
                 continue;
             };
-            let check = (self.said[*first].unit.is_none()).then(|| "the unit".to_string());
+            let check = (self.stated[*first].unit.is_none()).then(|| "the unit".to_string());
             self.map(quantity, &columns, Some(unit), check);
         }
     }
 
     fn time(&mut self) {
-        let named = |column: &usize| self.said[*column].is(names::TIMES) && !self.is_taken(*column);
-        let unit = |column: usize| match self.said[column].unit {
+        let named =
+            |column: &usize| self.stated[*column].is(names::TIMES) && !self.is_taken(*column);
+        let unit = |column: usize| match self.stated[column].unit {
             // Beyond what ms of a date are, it is finer than any unit that is read.
             None => Some((
                 if self.sheet.largest(column) > 1e11 {
@@ -381,7 +382,7 @@ impl ExaminedFile {
             .filter(|_| self.sheet.largest(column) < 1e14),
             Some(unit) => Some((unit, true)).filter(|(unit, _)| ["s", "ms"].contains(unit)),
         };
-        let columns: Vec<usize> = (0..self.said.len()).filter(named).collect();
+        let columns: Vec<usize> = (0..self.stated.len()).filter(named).collect();
         let running: Vec<usize> = columns
             .iter()
             .copied()
@@ -405,7 +406,7 @@ impl ExaminedFile {
                 "{name} cannot be read as time; allowed: s or ms as numbers that never decrease, 08:15:03, or 2026-11-22T08:15:03"
             ));
         }
-        let Some((unit, said)) = running.first().and_then(|column| unit(*column)) else {
+        let Some((unit, is_stated)) = running.first().and_then(|column| unit(*column)) else {
             self.map("time", &clocks, Some("clock"), None);
             return;
         };
@@ -414,7 +415,7 @@ impl ExaminedFile {
             "time",
             &running,
             Some(unit),
-            (!said).then(|| "the unit".to_string()),
+            (!is_stated).then(|| "the unit".to_string()),
         );
     }
 
@@ -432,14 +433,14 @@ impl ExaminedFile {
 
     /// What rows are for, which reflector they measured, and what points are called in a file that stands alone.
     fn texts(&mut self) {
-        let columns = 0..self.said.len();
+        let columns = 0..self.stated.len();
         let few = |column: usize| {
             let distinct = self.distinct(column);
             (2..=10).contains(&distinct)
                 && 3 * distinct <= self.sheet.rows.len()
                 && !self.sheet.is_numeric(column)
         };
-        let listed = |list, column: usize| names::lists(list, &self.said[column].stem());
+        let listed = |list, column: usize| names::lists(list, &self.stated[column].stem());
         let usages: Vec<usize> = columns
             .clone()
             .filter(|column| listed(names::USAGES, *column) && few(*column))

@@ -345,11 +345,11 @@ fn unit(cell: &str) -> Option<&'static str> {
 }
 
 fn is_units(row: &[String]) -> bool {
-    let mut said = row
+    let mut stated = row
         .iter()
         .filter(|cell| !cell.is_empty() && *cell != "-")
         .peekable();
-    said.peek().is_some() && said.all(|cell| unit(cell).is_some())
+    stated.peek().is_some() && stated.all(|cell| unit(cell).is_some())
 }
 
 /// The line of names above the first line of numbers as wide as itself.

@@ -159,16 +159,16 @@ fn reflectors(stems: &[String]) -> Vec<String> {
     };
     let front = alike(&|stem, k| stem[k]);
     let back = alike(&|stem, k| stem[stem.len() - 1 - k]).min(shortest - front);
-    let own = all
+    let trimmed = all
         .iter()
         .map(|stem| stem[front..stem.len() - back].iter().collect::<String>());
-    let own: Vec<String> = own
+    let names: Vec<String> = trimmed
         .map(|name| name.trim_matches(['_', '-', ' ', '.']).to_string())
         .collect();
-    if own.iter().any(String::is_empty) {
+    if names.iter().any(String::is_empty) {
         stems.to_vec()
     } else {
-        own
+        names
     }
 }
 
@@ -259,7 +259,7 @@ fn pairs(one: &ExaminedFile, two: &ExaminedFile) -> Vec<Pair> {
 
 fn pairs_by(one: &ExaminedFile, two: &ExaminedFile, numbers: bool) -> Vec<Pair> {
     let [left, right] = [one, two].map(|file| {
-        (0..file.said.len())
+        (0..file.stated.len())
             .filter(|column| may_name(file, *column))
             .filter_map(|column| {
                 Some((
@@ -282,7 +282,7 @@ fn pairs_by(one: &ExaminedFile, two: &ExaminedFile, numbers: bool) -> Vec<Pair> 
             if shared >= LEAST_SHARED {
                 let text = names.iter().any(|name| number(name).is_none());
                 let listed = |file: &ExaminedFile, column: usize| {
-                    usize::from(names::lists(names::IDS, &file.said[column].stem()))
+                    usize::from(names::lists(names::IDS, &file.stated[column].stem()))
                 };
                 let named = listed(one, *a) + listed(two, *b);
                 pairs.push(Pair {
@@ -320,7 +320,7 @@ fn may_name(file: &ExaminedFile, column: usize) -> bool {
     let whole = file.sheet.texts(column).all(|cell| {
         number(cell).is_none_or(|value| value.fract() == 0.0 && !cell.contains(['.', ',']))
     });
-    let listed = names::lists(names::IDS, &file.said[column].stem());
+    let listed = names::lists(names::IDS, &file.stated[column].stem());
     !file.is_taken(column) && distinct >= 2 && 2 * distinct >= rows && (whole || listed)
 }
 

@@ -270,7 +270,7 @@ mod tests {
 
     #[test]
     fn one_of_a_thing_is_named_as_one() {
-        let said = [
+        let counts = [
             (1, "row"),
             (2, "row"),
             (0, "fault"),
@@ -280,9 +280,9 @@ mod tests {
             (2, "class"),
             (5, "action record"),
         ];
-        let said = said.map(|(count, noun)| counted(count, noun));
+        let counts = counts.map(|(count, noun)| counted(count, noun));
         assert_eq!(
-            said,
+            counts,
             [
                 "1 row",
                 "2 rows",

@@ -10,7 +10,7 @@ use glob::{MatchOptions, Pattern, glob_with};
 use std::path::{Component, Path, PathBuf};
 
 /// Most files that a pattern may stand for: a slip must not read a whole disk.
-const MOST: usize = 10_000;
+const LIMIT: usize = 10_000;
 
 /// Fills in the entries of `files` below the settings of a stage; relative paths start at `folder`.
 pub(super) fn expand(with: &mut Node, folder: &Path) -> Vec<Trouble> {
@@ -51,11 +51,11 @@ pub(super) fn expand(with: &mut Node, folder: &Path) -> Vec<Trouble> {
                 );
             }
             Ok(found) => all.extend(found.into_iter().map(|path| {
-                let mut own = item.clone();
-                if let Some(file) = own.at_mut("file") {
+                let mut entry = item.clone();
+                if let Some(file) = entry.at_mut("file") {
                     file.value = YamlValue::Text(path);
                 }
-                own
+                entry
             })),
             Err(message) => troubles.push(Trouble::new(message).at(mark).below(&place)),
         }
@@ -110,13 +110,13 @@ fn matching(start: &Path, pattern: &str) -> Result<Vec<String>, String> {
     };
     let found = glob_with(&whole.to_string_lossy(), options).map_err(|error| error.to_string())?;
     let relative = |path: PathBuf| {
-        let own = path.strip_prefix(&start).unwrap_or(&path);
-        Some(here.to_string() + own.to_str()?)
+        let inside = path.strip_prefix(&start).unwrap_or(&path);
+        Some(here.to_string() + inside.to_str()?)
     };
     let files = found.flatten().filter(|path| path.is_file());
-    let mut found: Vec<String> = files.filter_map(relative).take(MOST + 1).collect();
-    if found.len() > MOST {
-        return Err(format!("more than {MOST} files match; name a folder"));
+    let mut found: Vec<String> = files.filter_map(relative).take(LIMIT + 1).collect();
+    if found.len() > LIMIT {
+        return Err(format!("more than {LIMIT} files match; name a folder"));
     }
     found.sort();
     Ok(found)
@@ -131,13 +131,13 @@ fn named(pattern: &str, path: &str) -> Result<String, String> {
     };
     let (parts, all): (Vec<&str>, Vec<&str>) =
         (pattern.split('/').collect(), path.split('/').collect());
-    let own = all
+    let middle = all
         .len()
         .checked_sub(parts.len())
         .map(|first| &all[first..])
         .ok_or_else(wrong)?;
     let mut names = Vec::new();
-    for (pattern, text) in parts.iter().zip(own) {
+    for (pattern, text) in parts.iter().zip(middle) {
         names.extend(braces(pattern, text).ok_or_else(wrong)?);
     }
     if names.is_empty() {
@@ -150,10 +150,10 @@ fn named(pattern: &str, path: &str) -> Result<String, String> {
 
 /// What stands for the braces of one name: each the shortest text that lets the rest match.
 fn braces(pattern: &str, text: &str) -> Option<Vec<String>> {
-    let Some((before, rest)) = pattern.split_once('{') else {
+    let Some((before, tail)) = pattern.split_once('{') else {
         return (pattern == text).then(Vec::new);
     };
-    let (_, after) = rest.split_once('}')?;
+    let (_, after) = tail.split_once('}')?;
     let text = text.strip_prefix(before)?;
     let ends = text
         .char_indices()

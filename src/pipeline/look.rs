@@ -122,8 +122,8 @@ fn faults_of_robots(
                 services: &services,
             },
         );
-        if let Err(Error::Spec(own)) = seen {
-            faults.extend(own);
+        if let Err(Error::Spec(more)) = seen {
+            faults.extend(more);
         }
     }
     faults

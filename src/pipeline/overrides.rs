@@ -100,19 +100,19 @@ pub(super) fn apply(tree: &mut Node, overrides: &[Override]) -> (Variables, Vec<
 }
 
 fn unknown(target: &str, names: &BTreeSet<String>, ids: &[String]) -> String {
-    let (head, rest) = match target.find(['.', '[']) {
+    let (head, tail) = match target.find(['.', '[']) {
         Some(dot) => target.split_at(dot),
         None => (target, ""),
     };
-    if rest.is_empty() && ids.iter().any(|id| id == target) {
+    if tail.is_empty() && ids.iter().any(|id| id == target) {
         return format!("`{target}` is a stage: name a setting of it, e.g. {target}.SETTING=VALUE");
     }
-    let candidates: Vec<&str> = if rest.is_empty() {
+    let candidates: Vec<&str> = if tail.is_empty() {
         names.iter().map(String::as_str).chain(["seed"]).collect()
     } else {
         ids.iter().map(String::as_str).collect()
     };
-    let hint = nearest(head, candidates).map(|name| format!("; did you mean `{name}{rest}`?"));
+    let hint = nearest(head, candidates).map(|name| format!("; did you mean `{name}{tail}`?"));
     let list = |items: &mut dyn Iterator<Item = String>| items.collect::<Vec<_>>().join(", ");
     format!(
         "no variable or setting of that name{} Allowed: {}",
@@ -233,22 +233,22 @@ enum Piece<'t> {
 
 /// Splits text at its `${name}`; anything else with a dollar is plain.
 fn pieces(text: &str) -> impl Iterator<Item = Piece<'_>> {
-    let mut rest = text;
+    let mut remainder = text;
     std::iter::from_fn(move || {
-        if rest.is_empty() {
+        if remainder.is_empty() {
             return None;
         }
-        if let Some(name) = variable_at(rest) {
-            rest = &rest[name.len() + 3..];
+        if let Some(name) = variable_at(remainder) {
+            remainder = &remainder[name.len() + 3..];
             return Some(Piece::Variable(name));
         }
-        let end = rest
+        let end = remainder
             .char_indices()
             .skip(1)
-            .find(|(at, _)| variable_at(&rest[*at..]).is_some())
-            .map_or(rest.len(), |(at, _)| at);
-        let (plain, after) = rest.split_at(end);
-        rest = after;
+            .find(|(at, _)| variable_at(&remainder[*at..]).is_some())
+            .map_or(remainder.len(), |(at, _)| at);
+        let (plain, after) = remainder.split_at(end);
+        remainder = after;
         Some(Piece::Plain(plain))
     })
 }

@@ -408,13 +408,13 @@ fn find(
         ));
     };
     if stage >= index {
-        let own = if stage == index {
+        let stage_id = if stage == index {
             "is this stage itself"
         } else {
             "comes later"
         };
         return Err(format!(
-            "`{id}` {own}, which would be a cycle; a stage reads from stages before it"
+            "`{id}` {stage_id}, which would be a cycle; a stage reads from stages before it"
         ));
     }
     let Some(entry) = stages[stage].entry else {

@@ -116,10 +116,10 @@ pub fn changes_of(before: &StageKey, now: &StageKey) -> Vec<KeyChange> {
     for (what, old, new) in pairs {
         let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
         for name in names {
-            let of = |map: &BTreeMap<String, String>| {
+            let of_map = |map: &BTreeMap<String, String>| {
                 map.get(name).cloned().unwrap_or_else(|| "-".into())
             };
-            push(what, name, of(&old), of(&new));
+            push(what, name, of_map(&old), of_map(&new));
         }
     }
     push("seed", "", before.seed.to_string(), now.seed.to_string());

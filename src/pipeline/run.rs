@@ -495,12 +495,12 @@ fn all(faults: Vec<Fault>, plan: &Plan, id: &str) -> Vec<Fault> {
 
 /// None where the fault is not in a setting.
 fn one(fault: &Fault, plan: &Plan, id: &str) -> Option<Fault> {
-    let own = fault
+    let place = fault
         .place
         .strip_prefix(id)
-        .and_then(|rest| rest.strip_prefix('.'))
+        .and_then(|tail| tail.strip_prefix('.'))
         .unwrap_or(&fault.place);
-    if own != "with" && !own.starts_with("with.") {
+    if place != "with" && !place.starts_with("with.") {
         return None;
     }
     let mut tree = yaml::parse(&plan.text).0?;
@@ -513,7 +513,7 @@ fn one(fault: &Fault, plan: &Plan, id: &str) -> Option<Fault> {
             .is_some_and(|name| name == id)
     };
     let index = tree.get("stages")?.items().iter().position(named)?;
-    let path = format!("stages[{index}].{own}");
+    let path = format!("stages[{index}].{place}");
     let message = format!("stage `{id}`: {}", fault.message);
     Some(
         Trouble::new(message)

@@ -243,14 +243,14 @@ pub fn run_in_memory(
     });
     let files: Vec<InputFile> = files.collect();
     let inputs = (entry.reads)().into_iter().map(|port| {
-        let own = tables.iter().filter(|frame| frame.kind() == port.kind);
-        let own: Vec<(String, InputTable)> = own
+        let matching = tables.iter().filter(|frame| frame.kind() == port.kind);
+        let taken: Vec<(String, InputTable)> = matching
             .map(|frame| (frame.kind().into(), Box::new(frame.clone()) as InputTable))
             .collect();
-        if own.is_empty() && port.arity == Arity::One {
+        if taken.is_empty() && port.arity == Arity::One {
             return Err(Error::spec(id, format!("reads a table `{}`", port.kind)));
         }
-        Ok(own)
+        Ok(taken)
     });
     let inputs = inputs.collect::<Result<Vec<_>>>()?;
     let services = StageServices::new(id, None, &files, observer);

@@ -175,10 +175,13 @@ fn go(store: &Path, plan: &Plan, options: &RunOptions) -> Result<(Vec<String>, C
 #[test]
 fn what_is_done_is_not_done_again_and_what_changed_says_why() {
     let folder = tempfile::tempdir().unwrap();
-    let (said, first) = go(folder.path(), &plan(TWO, &[]).unwrap(), &options(None)).unwrap();
-    assert_eq!(said, ["a: never run", "b: never run", "count: never run"]);
-    let (said, second) = go(folder.path(), &plan(TWO, &[]).unwrap(), &options(None)).unwrap();
-    assert_eq!(said, [""; 0]);
+    let (messages, first) = go(folder.path(), &plan(TWO, &[]).unwrap(), &options(None)).unwrap();
+    assert_eq!(
+        messages,
+        ["a: never run", "b: never run", "count: never run"]
+    );
+    let (messages, second) = go(folder.path(), &plan(TWO, &[]).unwrap(), &options(None)).unwrap();
+    assert_eq!(messages, [""; 0]);
     assert!(second.nothing_done() && !first.nothing_done());
     assert_eq!(
         second.manifest.stages[0].notes,
@@ -201,16 +204,16 @@ fn what_is_done_is_not_done_again_and_what_changed_says_why() {
             Prospect::Pending { on: "b".into() }
         ]
     );
-    let (said, _) = go(folder.path(), &changed, &options(None)).unwrap();
+    let (messages, _) = go(folder.path(), &changed, &options(None)).unwrap();
     assert_eq!(
-        said,
+        messages,
         [
             "b: settings changed: b.rows",
             "count: input all, last changed"
         ]
     );
-    let (said, _) = go(folder.path(), &plan(TWO, &[]).unwrap(), &options(None)).unwrap();
-    assert_eq!(said, [""; 0], "going back costs nothing");
+    let (messages, _) = go(folder.path(), &plan(TWO, &[]).unwrap(), &options(None)).unwrap();
+    assert_eq!(messages, [""; 0], "going back costs nothing");
 }
 
 #[test]
@@ -225,9 +228,9 @@ fn a_stage_whose_inputs_came_out_equal_is_not_run_again() {
     );
     go(&store, &plan(&text, &[]).unwrap(), &options(None)).unwrap();
     std::fs::write(&file, "xyz").unwrap();
-    let (said, _) = go(&store, &plan(&text, &[]).unwrap(), &options(None)).unwrap();
+    let (messages, _) = go(&store, &plan(&text, &[]).unwrap(), &options(None)).unwrap();
     assert_eq!(
-        said,
+        messages,
         ["a: file raw.txt changed"],
         "another file of the same length gives the same table"
     );
@@ -272,12 +275,12 @@ fn nothing_is_kept_of_a_file_that_changed_after_it_was_hashed() {
         )
     };
     let error = with("abcdef").err().unwrap();
-    let said = format!(
+    let expected = format!(
         "{}: the file changed while stage `a` waited or ran: nothing of the stage was kept",
         file.display()
     );
     assert_eq!(
-        (error.exit_code(), error.to_string().starts_with(&said)),
+        (error.exit_code(), error.to_string().starts_with(&expected)),
         (75, true),
         "{error}"
     );
@@ -323,10 +326,10 @@ fn forcing_runs_what_is_cached() {
     let folder = tempfile::tempdir().unwrap();
     let plan = plan(TWO, &[]).unwrap();
     go(folder.path(), &plan, &options(None)).unwrap();
-    let (said, _) = go(folder.path(), &plan, &options(Some(vec!["b".into()]))).unwrap();
-    assert_eq!(said, ["b: forced"]);
-    let (said, _) = go(folder.path(), &plan, &options(Some(Vec::new()))).unwrap();
-    assert_eq!(said, ["a: forced", "b: forced", "count: forced"]);
+    let (messages, _) = go(folder.path(), &plan, &options(Some(vec!["b".into()]))).unwrap();
+    assert_eq!(messages, ["b: forced"]);
+    let (messages, _) = go(folder.path(), &plan, &options(Some(Vec::new()))).unwrap();
+    assert_eq!(messages, ["a: forced", "b: forced", "count: forced"]);
 }
 
 #[test]
@@ -348,8 +351,8 @@ fn a_selected_stage_needs_its_inputs() {
             .contains("stage `count` reads from `b`, which is not cached"),
         "{error}"
     );
-    let (said, outcome) = go(folder.path(), &plan, &only("a")).unwrap();
-    assert_eq!(said, ["a: never run"]);
+    let (messages, outcome) = go(folder.path(), &plan, &only("a")).unwrap();
+    assert_eq!(messages, ["a: never run"]);
     assert_eq!(outcome.manifest.stages[2].status, StageStatus::NotRun);
     let error = go(folder.path(), &plan, &only("cuont")).err().unwrap();
     assert_eq!(
@@ -371,8 +374,8 @@ fn a_panic_is_a_bug_of_the_stage_and_leaves_the_others_done() {
         (70, true),
         "{error}"
     );
-    let (said, _) = go(folder.path(), &plan(TWO, &[]).unwrap(), &options(None)).unwrap();
-    assert_eq!(said, ["b: never run", "count: never run"]);
+    let (messages, _) = go(folder.path(), &plan(TWO, &[]).unwrap(), &options(None)).unwrap();
+    assert_eq!(messages, ["b: never run", "count: never run"]);
 }
 
 #[test]

@@ -60,10 +60,10 @@ pub struct RunStage<'a> {
 pub fn apart<'a>(
     request: &'a PoseRequest,
     store: &Store,
-    of: &RunStage,
+    run_stage: &RunStage,
     names: &[String],
 ) -> Result<Apart<'a>> {
-    let (manifest, stage) = diagnosis(store, of.run, of.step, &POSITIONS)?;
+    let (manifest, stage) = diagnosis(store, run_stage.run, run_stage.step, &POSITIONS)?;
     let place = format!("run {}", manifest.run_id);
     let findings: Findings = written(store, &stage)?;
     let rivals: Rivals = written(store, &stage)?;
@@ -166,12 +166,12 @@ pub fn apart<'a>(
 }
 
 fn written<T: Table>(store: &Store, stage: &StageReport) -> Result<T> {
-    let own = stage
+    let reference = stage
         .outputs
         .iter()
         .find(|output| output.kind == T::KIND)
         .map(|output| &output.table);
-    table(store, own)
+    table(store, reference)
 }
 
 fn read<T: Table>(store: &Store, stage: &StageReport) -> Result<T> {
@@ -242,8 +242,9 @@ fn pair(
     }
     // The first by name of equally close rivals, as the table is sorted.
     let closest = |row: &FindingRow| {
-        let own = rivals.0.iter().filter(|rival| rival.rank == row.rank);
-        own.min_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic))
+        let of_finding = rivals.0.iter().filter(|rival| rival.rank == row.rank);
+        of_finding
+            .min_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic))
             .and_then(|rival| Some((rival.effect.clone(), rival.place.parse().ok()?)))
     };
     let name_one = |found: &FindingRow| {
@@ -263,13 +264,13 @@ fn pair(
         );
         return found.ok_or_else(|| Error::spec(place, message.replace(['[', ']', '"'], "")));
     };
-    let told: Vec<&str> = findings
+    let named: Vec<&str> = findings
         .0
         .iter()
         .map(|row| row.effect.as_str())
         .chain(rivals.0.iter().map(|row| row.effect.as_str()))
         .collect();
-    let fits = |row: &&FindingRow| match (first.trim().parse::<i64>(), name(first, &told)) {
+    let fits = |row: &&FindingRow| match (first.trim().parse::<i64>(), name(first, &named)) {
         (Ok(rank), _) => row.rank == rank,
         (_, Ok((effect, place))) => {
             row.effect == effect && place.is_none_or(|place| is_at(&row.place, place))
@@ -279,7 +280,7 @@ fn pair(
     let fitting: Vec<&FindingRow> = findings.0.iter().filter(fits).collect();
     let [found] = fitting[..] else {
         if first.trim().parse::<i64>().is_err() {
-            name(first, &told)?;
+            name(first, &named)?;
         }
         let many = if fitting.is_empty() {
             "no finding"
@@ -298,7 +299,7 @@ fn pair(
         let rival = closest(found).ok_or_else(|| name_one(found))?;
         return Ok((found.clone(), rival));
     };
-    let (effect, at) = name(second, &told)?;
+    let (effect, at) = name(second, &named)?;
     let Some(at) = at else {
         return Err(Error::spec(
             "--separate",
@@ -345,13 +346,13 @@ fn as_fitted(
 
 /// Range of every joint over some rows, rad or m.
 fn ranges(data: &Measurements, rows: &[usize]) -> Vec<[f64; 2]> {
-    let of = |joint: usize| {
+    let of_joint = |joint: usize| {
         let all = rows.iter().map(|row| data.q(*row)[joint]);
         all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
             [low.min(q), high.max(q)]
         })
     };
-    (0..data.joints).map(of).collect()
+    (0..data.joints).map(of_joint).collect()
 }
 
 fn within(site: &mut Site, recorded: &[[f64; 2]]) {
@@ -391,7 +392,7 @@ fn circumstances(data: &Measurements, rows: &[usize]) -> Circumstances {
 }
 
 /// Nobody measures more poses than these.
-const MOST: f64 = 10_000.0;
+const LIMIT: f64 = 10_000.0;
 
 impl Apart<'_> {
     /// Finding and rival in words.
@@ -450,7 +451,7 @@ impl Apart<'_> {
             ));
         } else {
             let needed = ((MIN_SEPARATION_L - was) / (will - was) * count as f64).ceil();
-            let more = if needed < MOST {
+            let more = if needed < LIMIT {
                 format!("some {needed:.0} such poses would")
             } else {
                 "no number of poses would".into()

@@ -172,10 +172,10 @@ impl PoseAnswer for SocketProposal<'_> {
             .places
             .iter()
             .zip(without)
-            .map(|(place, own)| json!({"place_m": place, "postures": own.count, "growth_without": own.growth}));
-        let offsets = offsets.iter().map(|own| {
-            let weakest = own.weakest.is_finite().then_some(1e3 * own.weakest);
-            json!({"off_axis_mm": 1e3 * own.off, "directions": own.directions, "known": own.known, "weakest_mm_or_mrad": weakest})
+            .map(|(place, left_out)| json!({"place_m": place, "postures": left_out.count, "growth_without": left_out.growth}));
+        let offsets = offsets.iter().map(|offset| {
+            let weakest = offset.weakest.is_finite().then_some(1e3 * offset.weakest);
+            json!({"off_axis_mm": 1e3 * offset.off, "directions": offset.directions, "known": offset.known, "weakest_mm_or_mrad": weakest})
         });
         json!({
             "joints_counted_as": drive::counting(&self.convention, &self.robot),

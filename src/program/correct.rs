@@ -36,8 +36,8 @@ impl ProgramFile<'_> {
     }
 
     fn refused(&self, refusal: ProgramRefusal) -> Error {
-        let told = refusal.faults.iter().take(MOST_FAULTS);
-        let mut faults: Vec<Fault> = told
+        let shown = refusal.faults.iter().take(MOST_FAULTS);
+        let mut faults: Vec<Fault> = shown
             .map(|note| Fault::new(self.at(note), &note.message))
             .collect();
         if refusal.faults.len() > MOST_FAULTS {
@@ -152,7 +152,7 @@ pub fn has_mark(bytes: &[u8], language: Language) -> bool {
         };
         let line = &line[line.iter().take_while(|byte| is_before(byte)).count()..];
         line.strip_prefix(sign(language).as_bytes())
-            .is_some_and(|rest| rest.trim_ascii_start().starts_with(MARK.as_bytes()))
+            .is_some_and(|tail| tail.trim_ascii_start().starts_with(MARK.as_bytes()))
     })
 }
 

@@ -96,9 +96,9 @@ fn positions(bytes: &[u8], found: &mut Gathered, names: &mut Vec<String>) -> boo
             b' '
         }
     };
-    let own: Vec<u8> = bytes.iter().enumerate().map(blank).collect();
+    let blanked: Vec<u8> = bytes.iter().enumerate().map(blank).collect();
     let source = ProgramText {
-        bytes: &own,
+        bytes: &blanked,
         language: Language::Fanuc,
     };
     let all = tokens(source, found);
@@ -413,7 +413,7 @@ impl Reader<'_, '_> {
             parts.push(from + blanks..from + blanks + part.trim_ascii().len());
             from += part.len() + 1;
         }
-        let of = |span: &Range<usize>| {
+        let of_span = |span: &Range<usize>| {
             String::from_utf8_lossy(&self.source.bytes[span.clone()]).to_ascii_uppercase()
         };
         let read = || {
@@ -422,13 +422,13 @@ impl Reader<'_, '_> {
             };
             let [one, four, six] = turns else { return None };
             let turn = |span: &Range<usize>| {
-                of(span)
+                of_span(span)
                     .parse::<i32>()
                     .ok()
                     .filter(|turn| f64::from(turn.abs()) <= MOST_TURNS)
             };
             let turns = [turn(one)?, turn(four)?, turn(six)?];
-            let letters = of(letters);
+            let letters = of_span(letters);
             let [wrist @ ("N" | "F"), elbow @ ("U" | "D"), "T"] =
                 letters.split_whitespace().collect::<Vec<_>>()[..]
             else {
@@ -480,20 +480,20 @@ fn motions(bytes: &[u8], found: &mut Gathered) {
         let Some(body) = body.strip_prefix(':').map(str::trim_start) else {
             continue;
         };
-        let (head, rest) = body.split_at(
+        let (head, tail) = body.split_at(
             body.find(|c: char| !c.is_ascii_alphanumeric())
                 .unwrap_or(body.len()),
         );
         if !MOTIONS.contains(&head) {
             continue;
         }
-        if rest.trim_start().starts_with("PR[") {
+        if tail.trim_start().starts_with("PR[") {
             found.warn(
                 at,
                 "left as it is: moves to a position register, which is not in the listing",
             );
         }
-        let words = rest.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+        let words = tail.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
         if let Some(word) = words.into_iter().find(|word| DISPLACED.contains(word)) {
             found.frame(
                 at,

@@ -275,11 +275,11 @@ impl Builder {
             }
         }
         // The first routine is the program's own, others may be called from elsewhere where nothing here does.
-        let own = self.routines.values().map(|(first, _)| *first).min();
+        let earliest = self.routines.values().map(|(first, _)| *first).min();
         let routines = self
             .routines
             .iter()
-            .filter(|(name, (first, _))| !called.contains(name) || Some(*first) == own);
+            .filter(|(name, (first, _))| !called.contains(name) || Some(*first) == earliest);
         let mut entries: Vec<usize> = routines.map(|(_, (first, _))| *first).collect();
         if !lines.is_empty() && !matches!(lines[0].step, FlowStep::Routine(_)) {
             entries.push(0);

@@ -155,7 +155,7 @@ impl Literal {
 fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
-        Some(rest) if rest.bytes().all(|byte| matches!(byte, b'0' | b'.')) => rest.into(),
+        Some(tail) if tail.bytes().all(|byte| matches!(byte, b'0' | b'.')) => tail.into(),
         _ => text,
     }
 }
@@ -192,7 +192,7 @@ impl PartialEq for ToolInForce {
     /// Two tools of one frame are one, whatever their names.
     fn eq(&self, other: &Self) -> bool {
         match (&self.frame, &other.frame) {
-            (Some(own), Some(others)) => own == others,
+            (Some(one), Some(others)) => one == others,
             _ => self.name == other.name,
         }
     }
@@ -203,8 +203,8 @@ impl<T: PartialEq> PartialEq for Setting<T> {
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Unset, Self::Unset) => true,
-            (Self::Known(own, _), Self::Known(others, _)) => own == others,
-            (Self::Open(own), Self::Open(others)) => own == others,
+            (Self::Known(one, _), Self::Known(others, _)) => one == others,
+            (Self::Open(one), Self::Open(others)) => one == others,
             _ => false,
         }
     }
@@ -215,7 +215,7 @@ impl<T: Clone + PartialEq> JoinedState for Setting<T> {
         match (self, other) {
             (Self::Open(_), _) => self.clone(),
             (_, Self::Open(_)) => other.clone(),
-            (Self::Known(own, at), Self::Known(others, also)) if own != others => Self::Open(
+            (Self::Known(one, at), Self::Known(others, also)) if one != others => Self::Open(
                 format!("differs between the ways to this target: {at} and {also}; expected one"),
             ),
             (Self::Known(_, at), Self::Unset) | (Self::Unset, Self::Known(_, at)) => {

@@ -358,10 +358,11 @@ impl<'p> Program<'p> {
 }
 
 /// Bytes as lines and columns, in order.
-fn placed(bytes: &[u8], mut said: Vec<(usize, String)>) -> Vec<Note> {
-    said.sort();
+fn placed(bytes: &[u8], mut messages: Vec<(usize, String)>) -> Vec<Note> {
+    messages.sort();
     let (mut line, mut start, mut from) = (1, 0, 0);
-    said.into_iter()
+    messages
+        .into_iter()
         .map(|(at, message)| {
             for (k, _) in bytes[from..at]
                 .iter()
@@ -382,7 +383,7 @@ fn placed(bytes: &[u8], mut said: Vec<(usize, String)>) -> Vec<Note> {
 
 /// A piece of a program for a message: on one line, and not without end.
 fn quoted(bytes: &[u8], span: Range<usize>) -> String {
-    const MOST: usize = 40;
+    const LIMIT: usize = 40;
     let text = String::from_utf8_lossy(&bytes[span]);
     let words: Vec<&str> = text.split_whitespace().collect();
     let text: String = words
@@ -390,7 +391,7 @@ fn quoted(bytes: &[u8], span: Range<usize>) -> String {
         .chars()
         .map(|c| if c.is_control() { '?' } else { c })
         .collect();
-    let short: String = text.chars().take(MOST).collect();
+    let short: String = text.chars().take(LIMIT).collect();
     if short.len() < text.len() {
         format!("`{short}..`")
     } else {

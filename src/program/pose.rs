@@ -139,10 +139,10 @@ fn values(
         TargetKind::Radians => return q.to_vec(),
         _ => {}
     }
-    let mut own = q.to_vec();
-    convention.to_robot(&mut own);
+    let mut joints = q.to_vec();
+    convention.to_robot(&mut joints);
     let pose =
-        literal.frame.unwrap_or_else(Pose::identity).inverse() * Nominal::new(robot).place(&own);
+        literal.frame.unwrap_or_else(Pose::identity).inverse() * Nominal::new(robot).place(&joints);
     let pose = pose * literal.tool.unwrap_or_else(Pose::identity);
     let unit = if literal.kind == TargetKind::RotationVector {
         1.0

@@ -28,7 +28,7 @@ impl Reached {
         literals: &[Literal],
         names: &[(Range<usize>, String)],
     ) -> Vec<Vec<InForce>> {
-        let of = |(k, literal): (usize, &Literal)| {
+        let of_k = |(k, literal): (usize, &Literal)| {
             let name = names.get(names.partition_point(|(literals, _)| literals.end <= k));
             if let Some((_, name)) = name.filter(|(literals, _)| literals.contains(&k)) {
                 return self
@@ -50,7 +50,7 @@ impl Reached {
                 .into_iter()
                 .collect()
         };
-        literals.iter().enumerate().map(of).collect()
+        literals.iter().enumerate().map(of_k).collect()
     }
 }
 
@@ -64,7 +64,7 @@ pub(super) struct Words {
 
 /// Gives literals their frames, tools and payloads, and says which they are. `uses`: for each literal what is in force wherever it is reached.
 pub(super) fn settle(found: &mut Gathered, uses: Vec<Vec<InForce>>, words: &Words) {
-    let mut told = BTreeSet::new();
+    let mut reported = BTreeSet::new();
     let mut notes: Vec<(bool, usize, String)> = Vec::new();
     for (literal, uses) in found.literals.iter_mut().zip(uses) {
         let at = literal.at();
@@ -81,7 +81,7 @@ pub(super) fn settle(found: &mut Gathered, uses: Vec<Vec<InForce>>, words: &Word
             continue;
         };
         let mut tell = |refuses: bool, note: String| {
-            if refuses || told.insert(note.clone()) {
+            if refuses || reported.insert(note.clone()) {
                 notes.push((refuses, at, note));
             }
         };

@@ -161,12 +161,12 @@ impl PostureReader<'_> {
 
     /// What a target states once its joints are `q` (rad, as the controller counts); what it does not state stays unstated.
     pub(crate) fn restated(&self, stated: PostureStatement, q: &[f64]) -> PostureStatement {
-        let mut own = q.to_vec();
-        self.convention.to_robot(&mut own);
+        let mut joints = q.to_vec();
+        self.convention.to_robot(&mut joints);
         let shares = self
             .sides
             .filter(|_| self.uses_sides(stated))
-            .map(|sides| sides.at(self.robot, &own));
+            .map(|sides| sides.at(self.robot, &joints));
         // Whether side `side` is above zero, as it was stated at a border.
         let above = |side: usize, was: bool| match shares {
             Some(shares) if shares[side].abs() > AT_BORDER => shares[side] > 0.0,

@@ -165,26 +165,26 @@ impl ProgramText<'_> {
 fn is_number(text: &[u8], language: Language) -> bool {
     let digits = |text: &[u8]| text.iter().take_while(|byte| byte.is_ascii_digit()).count();
     let whole = digits(text);
-    let mut rest = &text[whole..];
+    let mut remainder = &text[whole..];
     let mut fraction = None;
-    if rest.first() == Some(&b'.') {
-        let count = digits(&rest[1..]);
-        (fraction, rest) = (Some(count), &rest[1 + count..]);
+    if remainder.first() == Some(&b'.') {
+        let count = digits(&remainder[1..]);
+        (fraction, remainder) = (Some(count), &remainder[1 + count..]);
     }
     let mantissa = match (language, fraction) {
         (_, None) => whole > 0,
         (Language::Krl, Some(count)) => whole > 0 && count > 0,
         (_, Some(count)) => whole + count > 0,
     };
-    if matches!(rest.first(), Some(b'e' | b'E')) {
-        rest = &rest[1..];
-        if matches!(rest.first(), Some(b'+' | b'-')) {
-            rest = &rest[1..];
+    if matches!(remainder.first(), Some(b'e' | b'E')) {
+        remainder = &remainder[1..];
+        if matches!(remainder.first(), Some(b'+' | b'-')) {
+            remainder = &remainder[1..];
         }
-        let count = digits(rest);
-        return mantissa && count > 0 && count == rest.len();
+        let count = digits(remainder);
+        return mantissa && count > 0 && count == remainder.len();
     }
-    mantissa && rest.is_empty()
+    mantissa && remainder.is_empty()
 }
 
 /// Letters of names; bytes beyond ASCII are such, RAPID has those of ISO 8859-1.

@@ -78,7 +78,7 @@ impl RobotTool {
             .collect();
         let found = known
             .iter()
-            .find(|(own, _)| *own == name)
+            .find(|(there, _)| *there == name)
             .map(|(_, frame)| **frame);
         found.ok_or_else(|| {
             let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
@@ -122,8 +122,9 @@ pub(super) fn relate(
             continue;
         };
         match (of_the_file, &tool.frame) {
-            (Some(own), Some(frame)) => {
-                literal.tool = Some(own.inverse() * *frame).filter(|by| *by != Pose::identity())
+            (Some(its_frame), Some(frame)) => {
+                literal.tool =
+                    Some(its_frame.inverse() * *frame).filter(|by| *by != Pose::identity())
             }
             (Some(_), None) => {
                 let name = &tool.name;
@@ -153,7 +154,7 @@ pub(super) fn relate(
         notes.push((false, at, message));
     }
     let is_other = |tool: &ToolInForce| match of_the_file {
-        Some(frame) => tool.frame.is_some_and(|own| own != frame),
+        Some(frame) => tool.frame.is_some_and(|its_frame| its_frame != frame),
         None => one.as_ref().is_some_and(|one| one != tool),
     };
     if let Some((at, tool)) = of_joints.into_iter().find(|(_, tool)| is_other(tool)) {
@@ -203,15 +204,15 @@ pub(super) fn relate(
 fn apart(robot: &RobotModel, frame: &Pose) -> Option<String> {
     let last = robot.joints() - 1;
     let out = robot.home().translation - robot.point(last);
-    let own = out.cross(robot.axis(last)).norm();
+    let reach = out.cross(robot.axis(last)).norm();
     let stated = frame.translation.xy().norm();
     let message = || {
         format!(
             "the tool stands {:.1} mm from axis 6, the robot file's {:.1} mm: it is another one; --tool says which is the robot file's",
             stated * 1e3,
-            own * 1e3
+            reach * 1e3
         )
     };
-    let far = (stated - own).abs();
+    let far = (stated - reach).abs();
     (far > SAME || far.is_nan()).then(message)
 }

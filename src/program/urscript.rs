@@ -229,10 +229,10 @@ impl<'p> Reader<'p> {
             .take_while(|token| ["global", "local"].iter().any(|word| self.is(token, word)))
             .count();
         let line = &line[skipped..];
-        let [first, rest @ ..] = line else { return };
-        let assigns = rest.iter().position(|token| token.is(b'='));
+        let [first, others @ ..] = line else { return };
+        let assigns = others.iter().position(|token| token.is(b'='));
         if let (TokenKind::Word, Some(0)) = (first.sort, assigns) {
-            let (name, value) = (self.name(first), &rest[1..]);
+            let (name, value) = (self.name(first), &others[1..]);
             match self.six(value) {
                 Some(six) if six.tokens == value.len() => self.held.push((name, six)),
                 Some(_) => self.others(value, "an expression"),
@@ -242,8 +242,8 @@ impl<'p> Reader<'p> {
         }
         // `wp[2] = 0.3` changes a number of a target.
         if let (TokenKind::Word, Some(at)) = (first.sort, assigns)
-            && rest[0].is(b'[')
-            && closing(rest, 0) + 1 == at
+            && others[0].is(b'[')
+            && closing(others, 0) + 1 == at
         {
             self.hand_on(&line[..1], "is changed in one number");
         }
@@ -320,12 +320,12 @@ impl<'p> Reader<'p> {
         let six = match tokens {
             [word] if word.sort == TokenKind::Word => {
                 let name = self.name(word);
-                let mut own = self
+                let mut found = self
                     .held
                     .iter()
                     .filter(|(held, _)| *held == name)
                     .map(|(_, six)| six);
-                let (one, more) = (own.next()?, own.next());
+                let (one, more) = (found.next()?, found.next());
                 let (is_pose, values, spans) = (one.is_pose, one.values.clone(), one.spans.clone());
                 more.is_none().then_some(SixNumbers {
                     is_pose,
@@ -454,14 +454,15 @@ impl<'p> Reader<'p> {
     fn settle(&mut self) {
         let near: BTreeMap<String, Vec<f64>> = (self.uses.near.iter())
             .filter_map(|(pose, joints)| {
-                let mut own = self
+                let mut found = self
                     .held
                     .iter()
                     .filter(|(name, six)| name == joints && !six.is_pose);
                 Some((
                     pose.clone(),
-                    own.next()
-                        .filter(|_| own.next().is_none())?
+                    found
+                        .next()
+                        .filter(|_| found.next().is_none())?
                         .1
                         .values
                         .clone(),
@@ -559,7 +560,7 @@ trait NamedArgument {
 impl NamedArgument for &[Token] {
     fn strip_prefix_word(&self, reader: &Reader, word: &str) -> Self {
         match self {
-            [name, sign, rest @ ..] if reader.is(name, word) && sign.is(b'=') => rest,
+            [name, sign, tail @ ..] if reader.is(name, word) && sign.is(b'=') => tail,
             _ => self,
         }
     }

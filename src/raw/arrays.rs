@@ -106,15 +106,15 @@ fn entries(content: Vec<u8>) -> Result<Vec<PlainArray>, String> {
 
 /// The text behind a key of the head, up to where its value ends.
 fn value<'h>(head: &'h str, key: &str, ends: char) -> Option<&'h str> {
-    let (_, rest) = head.split_once(&format!("'{key}':"))?;
-    Some(rest[..rest.find(ends)? + 1].trim())
+    let (_, tail) = head.split_once(&format!("'{key}':"))?;
+    Some(tail[..tail.find(ends)? + 1].trim())
 }
 
 fn array(name: String, bytes: &[u8]) -> Result<PlainArray, String> {
     const BROKEN: &str = "its head is damaged";
     let version = bytes
         .strip_prefix(MAGIC)
-        .and_then(|rest| rest.first())
+        .and_then(|tail| tail.first())
         .ok_or(BROKEN)?;
     let (length, from) = match version {
         1 => (
@@ -185,37 +185,37 @@ fn array(name: String, bytes: &[u8]) -> Result<PlainArray, String> {
         } else {
             row * width + column
         };
-        let mut own = data[at * size..(at + 1) * size].to_vec();
+        let mut item = data[at * size..(at + 1) * size].to_vec();
         if order == '>' {
-            own.chunks_mut(if code == 'U' { 4 } else { size })
+            item.chunks_mut(if code == 'U' { 4 } else { size })
                 .for_each(<[u8]>::reverse);
         }
-        own
+        item
     };
     let column = |column: usize| -> Result<ArrayRef, String> {
         let cells = (0..rows).map(|row| cell(row, column));
         Ok(match (code, size) {
             ('f', 8) => Arc::new(
                 cells
-                    .map(|own| own.first_chunk().map(|own| f64::from_le_bytes(*own)))
+                    .map(|item| item.first_chunk().map(|first| f64::from_le_bytes(*first)))
                     .collect::<Float64Array>(),
             ),
             ('f', 4) => Arc::new(
                 cells
-                    .map(|own| {
-                        own.first_chunk()
-                            .map(|own| f64::from(f32::from_le_bytes(*own)))
+                    .map(|item| {
+                        item.first_chunk()
+                            .map(|first| f64::from(f32::from_le_bytes(*first)))
                     })
                     .collect::<Float64Array>(),
             ),
             ('i' | 'u' | 'b', 1 | 2 | 4 | 8) => Arc::new(
                 cells
-                    .map(|own| whole(&own, code == 'i'))
+                    .map(|item| whole(&item, code == 'i'))
                     .collect::<Int64Array>(),
             ),
             ('U', _) => {
-                let letters = |own: Vec<u8>| -> Option<String> {
-                    let codes = own.chunks_exact(4).filter_map(|four| {
+                let letters = |item: Vec<u8>| -> Option<String> {
+                    let codes = item.chunks_exact(4).filter_map(|four| {
                         four.first_chunk().map(|four| u32::from_le_bytes(*four))
                     });
                     codes

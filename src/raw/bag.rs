@@ -300,11 +300,11 @@ impl BagRows {
 
 /// Nanoseconds as seconds, without rounding.
 fn time(ns: i64) -> String {
-    let (whole, rest) = (
+    let (whole, fraction) = (
         ns.unsigned_abs() / 1_000_000_000,
         ns.unsigned_abs() % 1_000_000_000,
     );
-    format!("{}{whole}.{rest:09}", if ns < 0 { "-" } else { "" })
+    format!("{}{whole}.{fraction:09}", if ns < 0 { "-" } else { "" })
 }
 
 impl RecordReader for BagRows {

@@ -155,8 +155,8 @@ impl RecordReader for ColumnRows {
         }
         self.rows += 1;
         record.begin(self.rows);
-        let own = self.cells.iter().skip(self.next).step_by(self.held);
-        own.for_each(|cell| record.push(self.text[cell.clone()].as_bytes()));
+        let cells = self.cells.iter().skip(self.next).step_by(self.held);
+        cells.for_each(|cell| record.push(self.text[cell.clone()].as_bytes()));
         self.next += 1;
         Ok(true)
     }
@@ -326,17 +326,17 @@ fn unfolded(mut file: BatchFile) -> BatchFile {
 
 /// What kind of numbers the lists of a column hold; none where it holds none.
 fn number_of_list(field: &FieldRef) -> Option<DataType> {
-    let (DataType::List(of) | DataType::LargeList(of) | DataType::FixedSizeList(of, _)) =
+    let (DataType::List(item) | DataType::LargeList(item) | DataType::FixedSizeList(item, _)) =
         field.data_type()
     else {
         return None;
     };
-    Some(of.data_type().clone()).filter(DataType::is_numeric)
+    Some(item.data_type().clone()).filter(DataType::is_numeric)
 }
 
 fn lists(column: &ArrayRef, number: &DataType) -> std::result::Result<LargeListArray, ArrowError> {
-    let of = Arc::new(Field::new_list_field(number.clone(), true));
-    cast(column, &DataType::LargeList(of)).map(|lists| lists.as_list().clone())
+    let field = Arc::new(Field::new_list_field(number.clone(), true));
+    cast(column, &DataType::LargeList(field)).map(|lists| lists.as_list().clone())
 }
 
 /// The numbers of the lists of a column as so many columns.

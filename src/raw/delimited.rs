@@ -508,30 +508,30 @@ mod tests {
 
     #[test]
     fn a_quote_that_is_never_closed_is_a_fault_of_its_line() {
-        let said = |text: &str| {
+        let refusal = |text: &str| {
             all(&mut opened(text.as_bytes(), ",", None))
                 .unwrap_err()
                 .to_string()
         };
         assert!(
-            said("a,b\n\"never closed\n1,2\n").contains("a.csv:2")
-                && said("a,b\n\"never").contains("a quoted field is not closed")
+            refusal("a,b\n\"never closed\n1,2\n").contains("a.csv:2")
+                && refusal("a,b\n\"never").contains("a quoted field is not closed")
         );
         for length in [LONGEST - 3, LONGEST - 2, LONGEST - 1, LONGEST, LONGEST + 1] {
-            let said = said(&format!(
+            let message = refusal(&format!(
                 "\"{}\n{}\n",
                 "a".repeat(length - 2),
                 "b".repeat(100)
             ));
             assert!(
-                said.contains("a row of more than 1 MiB"),
-                "{length}: {said}"
+                message.contains("a row of more than 1 MiB"),
+                "{length}: {message}"
             );
         }
         // At once, however many lines and quotes it takes in.
         for line in ["a\n", "\"\"\n"] {
-            let said = said(&format!("\"{}", line.repeat(LONGEST)));
-            assert!(said.contains("a row of more than 1 MiB"), "{said}");
+            let message = refusal(&format!("\"{}", line.repeat(LONGEST)));
+            assert!(message.contains("a row of more than 1 MiB"), "{message}");
         }
     }
 }

@@ -81,16 +81,16 @@ fn ungrouped(text: &str, mark: DecimalMark) -> Option<Cow<'_, str>> {
     } else {
         (',', '.')
     };
-    let (whole, rest) = text
+    let (whole, fraction) = text
         .split_once(mark)
-        .filter(|(whole, rest)| whole.contains(group) && !rest.contains(mark))?;
+        .filter(|(whole, fraction)| whole.contains(group) && !fraction.contains(mark))?;
     let mut groups = whole.strip_prefix('-').unwrap_or(whole).split(group);
     let are_digits = |digits: &str| digits.bytes().all(|byte| byte.is_ascii_digit());
     let first = groups
         .next()
         .is_some_and(|digits| (1..=3).contains(&digits.len()) && are_digits(digits));
     let others = groups.all(|digits| digits.len() == 3 && are_digits(digits));
-    (first && others).then(|| format!("{}.{rest}", whole.replace(group, "")).into())
+    (first && others).then(|| format!("{}.{fraction}", whole.replace(group, "")).into())
 }
 
 fn read(text: &str) -> Result<f64, NumberFault> {

@@ -155,8 +155,8 @@ pub fn source(path: &Path) -> io::Result<Box<dyn InputSource>> {
         )
     };
     parts.sort_by_cached_key(|part| (number(part), part.clone()));
-    let of = |kind: &str| parts.iter().any(|part| ending(part) == kind);
-    if !PARTS.iter().any(|kind| of(kind)) || PARTS.iter().all(|kind| of(kind)) {
+    let of_kind = |kind: &str| parts.iter().any(|part| ending(part) == kind);
+    if !PARTS.iter().any(|kind| of_kind(kind)) || PARTS.iter().all(|kind| of_kind(kind)) {
         let message = "is a folder; allowed: a file, or a folder with the parts of one bag, all .mcap or all .db3";
         return Err(io::Error::new(ErrorKind::InvalidInput, message));
     }

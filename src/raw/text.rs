@@ -64,10 +64,10 @@ const KRL: &str =
 pub fn not_read(head: &[u8]) -> Option<&'static str> {
     let begins = head.trim_ascii_start();
     let is = |word: &str| {
-        let rest = begins.get(word.len()..).unwrap_or_default();
+        let tail = begins.get(word.len()..).unwrap_or_default();
         begins.starts_with(word.as_bytes())
             && (word == "%%%"
-                || rest
+                || tail
                     .first()
                     .is_some_and(|next| [b' ', b'\t'].contains(next)))
     };
@@ -125,13 +125,13 @@ mod tests {
 
     #[test]
     fn programs_are_told_from_text_by_how_they_begin() {
-        let said = |head: &[u8]| not_read(head).unwrap_or_default();
-        assert!(said(b"/PROG  MEASURE\n/ATTR\n").contains("FANUC"));
+        let reason = |head: &[u8]| not_read(head).unwrap_or_default();
+        assert!(reason(b"/PROG  MEASURE\n/ATTR\n").contains("FANUC"));
         assert!(
-            said(b"\r\nMODULE Measure\n").contains("ABB")
-                && said(b"%%%\n  VERSION:1\n").contains("ABB")
+            reason(b"\r\nMODULE Measure\n").contains("ABB")
+                && reason(b"%%%\n  VERSION:1\n").contains("ABB")
         );
-        assert!(said(b"DEF MEASURE( )\n").contains("KUKA"));
+        assert!(reason(b"DEF MEASURE( )\n").contains("KUKA"));
         for text in [
             &b"MODULE,X,Y\n"[..],
             b"DEFLECTION X Y\n",

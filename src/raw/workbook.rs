@@ -177,8 +177,8 @@ impl Workbook {
         let mut lines = String::with_capacity(texts.len() + cells.len());
         let mut line = 0;
         for row in rows {
-            let own = row.first().map_or(0, |([row, _], _)| *row);
-            lines.extend(std::iter::repeat_n('\n', (own - line) as usize));
+            let first_row = row.first().map_or(0, |([row, _], _)| *row);
+            lines.extend(std::iter::repeat_n('\n', (first_row - line) as usize));
             let mut at = 0;
             for ([_, column], [start, end]) in row {
                 lines.extend(std::iter::repeat_n('\t', (column - at) as usize));
@@ -186,7 +186,7 @@ impl Workbook {
                 at = *column;
             }
             lines.extend(std::iter::repeat_n('\t', (width - 1 - at) as usize));
-            line = own;
+            line = first_row;
         }
         lines.push('\n');
         Ok(lines)

@@ -254,7 +254,7 @@ const LEFT: f64 = 150.0;
 /// Height of a fixture's two bars.
 const ROW: f64 = 20.0;
 /// Fixtures in the picture; the table has all.
-const MOST: usize = 40;
+const LIMIT: usize = 40;
 
 /// Nothing where no row is a contact, or nothing was predicted.
 pub(super) fn closure_section(locale: &Locale, tables: &Tables) -> Option<Value> {
@@ -267,10 +267,10 @@ pub(super) fn closure_section(locale: &Locale, tables: &Tables) -> Option<Value>
     Some(json!({
         "before": name(tables.prediction.first())?,
         "after": name(standing_prediction(tables))?,
-        "picture": closure_picture(locale, &all[..all.len().min(MOST)]),
+        "picture": closure_picture(locale, &all[..all.len().min(LIMIT)]),
         "rows": &all,
         // Fixtures beyond those of the picture.
-        "more": all.len().saturating_sub(MOST),
+        "more": all.len().saturating_sub(LIMIT),
     }))
 }
 
@@ -327,7 +327,7 @@ fn closure_picture(locale: &Locale, all: &[FixtureFigures]) -> String {
     ]);
     let means = || {
         all.iter()
-            .flat_map(|own| [own.before[0], own.after[0]])
+            .flat_map(|figures| [figures.before[0], figures.after[0]])
             .filter(|mean| *mean > 0.0)
     };
     let (lower, upper) = (
@@ -337,10 +337,14 @@ fn closure_picture(locale: &Locale, all: &[FixtureFigures]) -> String {
     let scale = Scale::positive(0.5 * lower.min(upper), upper).over(area.left, area.right);
     let mut svg = Svg::new(locale, CLOSURE_WIDTH, area.bottom + 38.0);
     scale.grid_x(&mut svg, area, 7);
-    for (k, own) in all.iter().enumerate() {
+    for (k, figures) in all.iter().enumerate() {
         let top = area.top + ROW * k as f64;
-        svg.name("tick end", [area.left - 6.0, top + 0.7 * ROW], &own.name);
-        for (bar, (mean, colour)) in [(own.before[0], "s0"), (own.after[0], "s-last")]
+        svg.name(
+            "tick end",
+            [area.left - 6.0, top + 0.7 * ROW],
+            &figures.name,
+        );
+        for (bar, (mean, colour)) in [(figures.before[0], "s0"), (figures.after[0], "s-last")]
             .into_iter()
             .enumerate()
         {

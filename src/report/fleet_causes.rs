@@ -40,12 +40,12 @@ pub fn html(
     let names: BTreeSet<&str> = shared.iter().map(|row| row.group.as_str()).collect();
     let asked: BTreeSet<&str> = cells.0.iter().map(|row| row.robot.as_str()).collect();
     let groups = names.iter().map(|group| {
-        let own: Vec<&FleetFindingRow> = shared
+        let of_cell: Vec<&FleetFindingRow> = shared
             .iter()
             .copied()
             .filter(|row| row.group == **group)
             .collect();
-        self::group(group, &own, cells)
+        self::group(group, &of_cell, cells)
     });
     let mut groups: Vec<Value> = groups.collect();
     if groups.is_empty() {
@@ -89,13 +89,13 @@ fn short(size: f64, unit: &str) -> String {
 }
 
 fn along(place: &str) -> (usize, String) {
-    let number = |rest: &str| {
-        let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
+    let number = |text: &str| {
+        let digits: String = text.chars().take_while(char::is_ascii_digit).collect();
         digits.parse::<usize>().unwrap_or(0)
     };
     let rank = match place.split_once(' ') {
-        Some(("joint", rest)) => 2 * number(rest),
-        Some(("link", rest)) => 2 * number(rest) + 1,
+        Some(("joint", number_text)) => 2 * number(number_text),
+        Some(("link", number_text)) => 2 * number(number_text) + 1,
         _ if place == "base" => 0,
         _ if place == "tool" => 1000,
         _ => 1001,
@@ -153,13 +153,13 @@ fn group(name: &str, findings: &[&FleetFindingRow], cells: &FleetCells) -> Value
         )
     });
     let strips = findings.iter().map(|row| {
-        let own: Vec<&FleetCellRow> = cells
+        let sizes: Vec<&FleetCellRow> = cells
             .0
             .iter()
             .filter(|cell| cell.cell == row.cell && cell.group == row.group)
             .filter(|cell| cell.deviation.is_some())
             .collect();
-        json!({ "title": words(&row.effect, &row.place), "svg": strip(&own, row) })
+        json!({ "title": words(&row.effect, &row.place), "svg": strip(&sizes, row) })
     });
     json!({
         "name": visible(name),

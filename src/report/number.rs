@@ -15,7 +15,7 @@ const MM: usize = 3;
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
-        Some(rest) if !rest.contains(|c: char| ('1'..='9').contains(&c)) => rest.into(),
+        Some(tail) if !tail.contains(|c: char| ('1'..='9').contains(&c)) => tail.into(),
         _ => text,
     }
 }

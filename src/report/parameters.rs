@@ -56,12 +56,12 @@ pub(super) fn section(locale: &Locale, parameters: &Parameters, counting: Option
 /// Order of a name by its numbers (`j2` before `j10`), shifts before turns (`z` before `rx`).
 fn along_the_chain(name: &str) -> Vec<(bool, String, u64)> {
     let mut parts = Vec::new();
-    let mut rest = name;
-    while !rest.is_empty() {
-        let digits = rest
+    let mut remainder = name;
+    while !remainder.is_empty() {
+        let digits = remainder
             .find(|c: char| c.is_ascii_digit())
-            .unwrap_or(rest.len());
-        let (text, after) = rest.split_at(digits);
+            .unwrap_or(remainder.len());
+        let (text, after) = remainder.split_at(digits);
         let end = after
             .find(|c: char| !c.is_ascii_digit())
             .unwrap_or(after.len());
@@ -70,7 +70,7 @@ fn along_the_chain(name: &str) -> Vec<(bool, String, u64)> {
             .iter()
             .any(|turn| text.ends_with(turn));
         parts.push((turn, text.to_owned(), number.parse().unwrap_or(0)));
-        rest = next;
+        remainder = next;
     }
     parts
 }

@@ -41,7 +41,7 @@ pub fn torque_page(
         verdict.ok_or_else(|| Error::Bug("a diagnosis of torques without a verdict".into()))?;
     let locale = Locale::default();
     let robot = data::robot_name(&locale, &tables.robot);
-    let said = |topic| -> Vec<&str> {
+    let sentences_of = |topic| -> Vec<&str> {
         let all = tables.sentences.iter();
         all.flat_map(|table| table.about(&verdict.step, topic))
             .collect()
@@ -57,8 +57,8 @@ pub fn torque_page(
         "contacts": &tables.contacts.0,
         "inertials": &tables.inertials.0,
         "bodies": &tables.consistency.0,
-        "not_observable": said(VerdictTopic::NotObservable),
-        "remarks": said(VerdictTopic::Remark),
+        "not_observable": sentences_of(VerdictTopic::NotObservable),
+        "remarks": sentences_of(VerdictTopic::Remark),
         "hashes": hashes,
     });
     render(&locale, "torques.html", include_str!("torques.html"), page)
@@ -84,11 +84,11 @@ fn finding(row: &TorqueFindingRow, tables: &ReportTorquesReads) -> Value {
 
 fn pictures(locale: &Locale, tables: &ReportTorquesReads, joint: usize) -> Value {
     let course = &tables.course;
-    let of = |all: &[f64]| course.of_joint(all, joint).collect::<Vec<f64>>();
+    let of_joint = |all: &[f64]| course.of_joint(all, joint).collect::<Vec<f64>>();
     let (measured, simulated, corrected) = (
-        of(&course.measured),
-        of(&course.simulated),
-        of(&course.corrected),
+        of_joint(&course.measured),
+        of_joint(&course.simulated),
+        of_joint(&course.corrected),
     );
     let less = |model: &[f64]| {
         measured

@@ -381,7 +381,7 @@ impl AskedRows {
             prior_weight: settings.prior_weight,
             open_world: settings.open_world,
             without: &settings.without,
-            own: &self.declared,
+            declared: &self.declared,
             beside_simulation: self.corrected == Corrected::OutsideSimulation,
             known: &self.known,
             seed,

@@ -175,7 +175,7 @@ impl Identify {
             prior_weight: 1.0,
             open_world: 0.3,
             without: &[],
-            own: &[],
+            declared: &[],
             beside_simulation: recording.simulated.is_some(),
             known: &[],
             seed: context.seed,

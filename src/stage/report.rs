@@ -50,7 +50,7 @@ impl Stage for Report {
                 Some(row) => row.step.clone(),
                 None => step.stage.clone(),
             },
-            own: model(&step.stage).is_some(),
+            is_identified: model(&step.stage).is_some(),
             unseen: Unseen::of(&step.table),
         };
         let steps: Vec<Step> = reads.prediction.iter().map(step).collect();

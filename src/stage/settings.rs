@@ -154,9 +154,10 @@ fn longest<'a, T>(patterns: &'a BTreeMap<String, T>, name: &str) -> Option<&'a T
 pub(crate) fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
-        Some((head, tail)) => name.strip_prefix(head).is_some_and(|rest| {
-            rest.char_indices()
-                .map(|(at, _)| &rest[at..])
+        Some((head, tail)) => name.strip_prefix(head).is_some_and(|middle| {
+            middle
+                .char_indices()
+                .map(|(at, _)| &middle[at..])
                 .chain([""])
                 .any(|end| matches(tail, end))
         }),

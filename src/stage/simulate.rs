@@ -82,7 +82,7 @@ crate::stage::stage! {
 }
 
 /// Points of a block, and candidates of a pose, at most: what fits into memory.
-const MOST: usize = 10_000_000;
+const LIMIT: usize = 10_000_000;
 
 impl Stage for Simulate {
     fn faults(&self, at: &mut Place) {
@@ -105,8 +105,8 @@ impl Stage for Simulate {
             "expected at least one block with points, e.g. [{usage: fit, points: 50}]",
         );
         at.at("poses.candidates").must(
-            self.poses.candidates <= MOST,
-            format!("expected {MOST} candidates at most"),
+            self.poses.candidates <= LIMIT,
+            format!("expected {LIMIT} candidates at most"),
         );
         for (place, pose) in given(&self.blocks) {
             all_faults(&mut at.at(place), pose.faults());
@@ -114,8 +114,8 @@ impl Stage for Simulate {
         for (index, block) in self.blocks.iter().enumerate() {
             let mut at = at.at(format!("blocks[{index}]"));
             at.at("points").must(
-                block.points <= MOST,
-                format!("expected {MOST} points at most"),
+                block.points <= LIMIT,
+                format!("expected {LIMIT} points at most"),
             );
             at.at("given").must(
                 self.motion.is_none() || block.given.is_empty(),

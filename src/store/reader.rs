@@ -248,7 +248,7 @@ type NamedArrays = BTreeMap<String, ArrayRef>;
 const BATCH_ROWS: usize = 1 << 16;
 
 pub(super) struct Decoded {
-    said: BTreeMap<String, String>,
+    metadata: BTreeMap<String, String>,
     batch: RecordBatch,
 }
 
@@ -261,7 +261,7 @@ impl Decoded {
     fn parse<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
         let text = |error: &dyn std::fmt::Display| error.to_string();
         let DecodedChunks {
-            said,
+            metadata,
             schema,
             file_schema,
             reader,
@@ -273,12 +273,12 @@ impl Decoded {
         let batch = concat_batches(&file_schema, &batches).map_err(|error| text(&error))?;
         let batch =
             RecordBatch::try_new(schema, batch.columns().to_vec()).map_err(|error| text(&error))?;
-        Ok(Self { said, batch })
+        Ok(Self { metadata, batch })
     }
 
     /// The file's own key-value metadata.
     pub(crate) fn metadata_value(&self, key: &str) -> Option<&str> {
-        self.said.get(key).map(String::as_str)
+        self.metadata.get(key).map(String::as_str)
     }
 
     pub(crate) fn rows(&self) -> u64 {
@@ -321,7 +321,7 @@ impl Decoded {
 
 /// A file decoded chunk by chunk.
 pub(super) struct DecodedChunks {
-    said: BTreeMap<String, String>,
+    metadata: BTreeMap<String, String>,
     /// With the units of columns, and as Parquet has it.
     schema: SchemaRef,
     file_schema: SchemaRef,
@@ -347,10 +347,10 @@ impl DecodedChunks {
             .key_value_metadata()
             .into_iter()
             .flatten();
-        let said: BTreeMap<String, String> = pairs
+        let metadata: BTreeMap<String, String> = pairs
             .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)))
             .collect();
-        let units: BTreeMap<String, String> = said
+        let units: BTreeMap<String, String> = metadata
             .get(UNITS)
             .and_then(|text| serde_json::from_str(text).ok())
             .unwrap_or_default();
@@ -376,7 +376,7 @@ impl DecodedChunks {
             .build()
             .map_err(|error| text(&error))?;
         Ok(Self {
-            said,
+            metadata,
             schema,
             file_schema,
             reader,
@@ -396,7 +396,7 @@ impl DecodedChunks {
             None => return Ok(None),
         };
         Ok(Some(Decoded {
-            said: self.said.clone(),
+            metadata: self.metadata.clone(),
             batch,
         }))
     }

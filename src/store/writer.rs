@@ -303,9 +303,9 @@ impl Open {
         for start in (0..whole).step_by(GROUP_ROWS) {
             self.write(&all.slice(start, GROUP_ROWS))?;
         }
-        let rest = all.slice(whole, all.num_rows() - whole);
-        self.waiting = if rest.num_rows() > 0 {
-            vec![rest]
+        let remainder = all.slice(whole, all.num_rows() - whole);
+        self.waiting = if remainder.num_rows() > 0 {
+            vec![remainder]
         } else {
             Vec::new()
         };
@@ -328,8 +328,8 @@ impl Open {
 
     fn finish(mut self) -> Result<(TableRef, File)> {
         if !self.waiting.is_empty() {
-            let rest = self.waiting()?;
-            self.write(&rest)?;
+            let remainder = self.waiting()?;
+            self.write(&remainder)?;
         }
         self.writer(None)?;
         let (schema, path) = (self.schema, &self.path);

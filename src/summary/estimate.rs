@@ -8,7 +8,7 @@ const MILLIMETRES: f64 = 0.0995;
 /// Numbers from the first of these sizes up to the second are written without a power of ten.
 const PLAIN: [f64; 2] = [1e-3, 1e5];
 /// Significant digits at most.
-const MOST: i32 = 4;
+const LARGEST_POWER: i32 = 4;
 /// A share from this on reads in percent, below in parts per million.
 const PERCENT: f64 = 1e-3;
 
@@ -47,8 +47,11 @@ pub(super) fn estimate(value: f64, sigma: Option<f64>, unit: &str) -> String {
     // One that shows in no digit is as good as none.
     let sigma = sigma
         .map(|sigma| sigma / scale)
-        .filter(|sigma| *sigma > 0.0 && decimals(*sigma, 1) <= decimals(value, MOST));
-    let decimals = sigma.map_or_else(|| decimals(value, MOST), |sigma| decimals(sigma, 1));
+        .filter(|sigma| *sigma > 0.0 && decimals(*sigma, 1) <= decimals(value, LARGEST_POWER));
+    let decimals = sigma.map_or_else(
+        || decimals(value, LARGEST_POWER),
+        |sigma| decimals(sigma, 1),
+    );
     let number = match sigma {
         Some(sigma) => format!("{value:.decimals$} +- {sigma:.decimals$}"),
         None => format!("{value:.decimals$}"),
@@ -77,7 +80,7 @@ mod tests {
 
     #[test]
     fn a_number_has_the_digits_that_its_standard_deviation_tells() {
-        let said = [
+        let written = [
             estimate(4.1712e-7, Some(2.3e-9), "rad/Nm"),
             estimate(4.1712e-7, Some(2.3e-12), "rad/Nm"),
             estimate(4.1712e-7, None, "rad/Nm"),
@@ -89,7 +92,7 @@ mod tests {
             estimate(0.0, Some(0.0), "mm"),
         ];
         assert_eq!(
-            said,
+            written,
             [
                 "(4.17 +- 0.02)e-7 rad/Nm",
                 "4.171e-7 rad/Nm",

@@ -64,8 +64,8 @@ pub fn in_short(
     };
     let stands = || standing.map(|stands| stands.step.as_str()).or_else(last);
     let step = carried.map(|stage| stage.id.as_str()).or_else(stands);
-    let own = || rows.iter().filter(|row| Some(row.step.as_str()) == step);
-    let Some(after) = own().max_by_key(|row| (row.held_out, row.points)) else {
+    let of_step = || rows.iter().filter(|row| Some(row.step.as_str()) == step);
+    let Some(after) = of_step().max_by_key(|row| (row.held_out, row.points)) else {
         return Ok(diagnosed.map(|diagnosis| diagnosis.in_short(width, on.store)));
     };
     let earlier = rows
@@ -77,7 +77,7 @@ pub fn in_short(
         .next()
         .and_then(|robot| robot.0.into_iter().next());
     let points = |held_out: bool| {
-        own()
+        of_step()
             .filter(|row| row.held_out == held_out)
             .map(|row| row.points as usize)
             .sum::<usize>()
@@ -114,10 +114,12 @@ pub fn in_short(
             .map_or_else(|| verdict(after), DiagnosisSummary::verdict),
     ));
     if let Some(doubtful) = after.remarked.filter(|doubtful| *doubtful > 0) {
-        let of = counted(after.points as usize, "point");
+        let counted_points = counted(after.points as usize, "point");
         text.push_str(&labelled(
             "doubt",
-            &format!("{doubtful} of {of}: correction uncertain by more than half of itself"),
+            &format!(
+                "{doubtful} of {counted_points}: correction uncertain by more than half of itself"
+            ),
         ));
     }
     for warning in carried
@@ -144,9 +146,9 @@ fn warnings(standing: &Standing) -> impl Iterator<Item = String> {
                     than_rms_mm,
                     points,
                 }: &Withdrawn| {
-        let [own, other] = [rms_mm, than_rms_mm].map(|mm| length(*mm));
+        let [here, other] = [rms_mm, than_rms_mm].map(|mm| length(*mm));
         format!(
-            "{step} withdrawn, {than} used: {own} rms against {other} at {points} points unseen by either fit"
+            "{step} withdrawn, {than} used: {here} rms against {other} at {points} points unseen by either fit"
         )
     };
     let against = |Contradicted(Withdrawn {
@@ -156,8 +158,8 @@ fn warnings(standing: &Standing) -> impl Iterator<Item = String> {
                        than_rms_mm,
                        points,
                    }): &Contradicted| {
-        let [own, other] = [rms_mm, than_rms_mm].map(|mm| length(*mm));
-        format!("the {points} held-out points prefer {than}: {other} rms against {own} of {step}")
+        let [here, other] = [rms_mm, than_rms_mm].map(|mm| length(*mm));
+        format!("the {points} held-out points prefer {than}: {other} rms against {here} of {step}")
     };
     standing
         .withdrawn

@@ -42,9 +42,9 @@ fn tables<T: Table>(manifest: &Manifest, store: &Store) -> Result<Vec<T>> {
 
 /// The name of the robot that a stage read; none where it read none. Fails where its table has left the store.
 fn robot_of(stage: &StageReport, store: &Store) -> Result<Option<String>> {
-    let Some(own) = stage.inputs.iter().find(|input| input.port == Robot::KIND) else {
+    let Some(robot_input) = stage.inputs.iter().find(|input| input.port == Robot::KIND) else {
         return Ok(None);
     };
-    let robot = Robot::from_frame(&store.load(&own.table)?)?;
+    let robot = Robot::from_frame(&store.load(&robot_input.table)?)?;
     Ok(robot.0.into_iter().next().map(|base| base.name))
 }

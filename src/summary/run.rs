@@ -197,7 +197,7 @@ impl LimitsSummary {
             .iter()
             .filter(|stage| stage.uses == Report::NAME && !stage.outputs.is_empty())
         {
-            let Some(own) = stage
+            let Some(acceptance) = stage
                 .outputs
                 .iter()
                 .find(|output| output.kind == Acceptance::KIND)
@@ -207,7 +207,7 @@ impl LimitsSummary {
             };
             all.extend(judged(
                 &stage.id,
-                Acceptance::from_frame(&store.load(&own.table)?)?,
+                Acceptance::from_frame(&store.load(&acceptance.table)?)?,
             ));
         }
         Ok(Self(all))

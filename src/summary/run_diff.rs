@@ -208,9 +208,10 @@ impl DiagnosedCauses {
             return Ok(None);
         };
         let finding = |row: &FindingRow| {
-            let own = rivals.0.iter().filter(|rival| rival.rank == row.rank);
-            let own = own.map(|rival| (cause(&rival.effect, &rival.place), rival.probability));
-            (cause(&row.effect, &row.place), own.collect())
+            let of_finding = rivals.0.iter().filter(|rival| rival.rank == row.rank);
+            let named =
+                of_finding.map(|rival| (cause(&rival.effect, &rival.place), rival.probability));
+            (cause(&row.effect, &row.place), named.collect())
         };
         Ok(Some(Self(findings.0.iter().map(finding).collect())))
     }
@@ -221,8 +222,9 @@ impl DiagnosedCauses {
 
     /// Findings with the rivals that are not excluded, and their probabilities.
     fn open(&self) -> impl Iterator<Item = (&CauseAtPlace, &CauseAtPlace, Option<f64>)> {
-        let pairs = self.0.iter().flat_map(|(finding, own)| {
-            own.iter()
+        let pairs = self.0.iter().flat_map(|(finding, rivals)| {
+            rivals
+                .iter()
                 .map(move |(rival, value)| (finding, rival, *value))
         });
         pairs.filter(|(_, _, value)| is_open(*value))
@@ -230,12 +232,12 @@ impl DiagnosedCauses {
 
     /// A rival of a finding, if it is listed.
     fn rival(&self, finding: &CauseAtPlace, rival: &CauseAtPlace) -> Option<&Listed> {
-        let own = self
+        let rivals = self
             .0
             .iter()
             .filter(|(cause, _)| cause == finding)
-            .flat_map(|(_, own)| own);
-        own.into_iter().find(|(cause, _)| cause == rival)
+            .flat_map(|(_, rivals)| rivals);
+        rivals.into_iter().find(|(cause, _)| cause == rival)
     }
 }
 
@@ -253,13 +255,13 @@ fn cause(effect: &str, place: &str) -> CauseAtPlace {
 
 /// A table of a stage; none where it was not written or has left the store.
 fn table<T: Table>(stage: &StageReport, store: &Store) -> Result<Option<T>> {
-    let Some(own) = stage.outputs.iter().find(|output| output.kind == T::KIND) else {
+    let Some(record) = stage.outputs.iter().find(|output| output.kind == T::KIND) else {
         return Ok(None);
     };
-    if !store.object(&own.table)?.exists() {
+    if !store.object(&record.table)?.exists() {
         return Ok(None);
     }
-    T::from_frame(&store.load(&own.table)?).map(Some)
+    T::from_frame(&store.load(&record.table)?).map(Some)
 }
 
 fn compare(stage: &str, a: &DiagnosedCauses, b: &DiagnosedCauses) -> Vec<RivalChange> {
@@ -318,14 +320,14 @@ fn compare(stage: &str, a: &DiagnosedCauses, b: &DiagnosedCauses) -> Vec<RivalCh
 pub fn rival_changes(
     store: &Store,
     diff: &RunDiff,
-    of: [&RunAddress; 2],
+    runs: [&RunAddress; 2],
 ) -> Result<Vec<RivalChange>> {
     let (a, b) = (
         Manifest::of(store, &diff.a.run)?,
         Manifest::of(store, &diff.b.run)?,
     );
     let asked = |id: &String| {
-        of.iter().all(|place| {
+        runs.iter().all(|place| {
             place.port.is_none() && place.stage.as_ref().is_none_or(|stage| stage == id)
         })
     };
@@ -367,15 +369,15 @@ mod tests {
                 .map(|(effect, place)| cause(effect, place))
                 .expect("EFFECT@PLACE")
         };
-        let rivals = |own: &[(&str, f64)]| {
-            own.iter()
+        let rivals = |all: &[(&str, f64)]| {
+            all.iter()
                 .map(|(name, value)| (named(name), Some(*value)))
                 .collect()
         };
         DiagnosedCauses(
             findings
                 .iter()
-                .map(|(name, own)| (named(name), rivals(own)))
+                .map(|(name, all)| (named(name), rivals(all)))
                 .collect(),
         )
     }

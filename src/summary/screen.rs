@@ -36,11 +36,11 @@ pub(super) fn measured(robot: Option<&str>, rows: &str, noise: Option<&str>) -> 
 }
 
 /// Mean and largest error of a step (mm), with the decimals that suit the smaller of all means.
-pub(super) fn errors(label: &str, [mean, largest]: [f64; 2], least: f64, of: &str) -> String {
+pub(super) fn errors(label: &str, [mean, largest]: [f64; 2], least: f64, subject: &str) -> String {
     let decimals = if least < SMALL { 4 } else { 3 };
     labelled(
         label,
-        &format!("{mean:>7.decimals$} mm mean {largest:>8.decimals$} mm largest  {of}"),
+        &format!("{mean:>7.decimals$} mm mean {largest:>8.decimals$} mm largest  {subject}"),
     )
 }
 
@@ -149,7 +149,7 @@ pub(super) fn found(mut findings: Vec<ShortFinding>, width: usize) -> String {
 /// A finding with its number under its rank; what it might be instead stands beside it where there is room, else below.
 pub(super) fn ranked(rank: i64, finding: &ShortFinding, at: &str, width: usize) -> String {
     let room = width.saturating_sub(LABEL);
-    let told = |at: &str| {
+    let printed = |at: &str| {
         let size = finding.size.as_ref().map(|(_, size)| format!("{size}{at}"));
         let figures: Vec<&str> = finding
             .number
@@ -163,16 +163,16 @@ pub(super) fn ranked(rank: i64, finding: &ShortFinding, at: &str, width: usize) 
             format!("{}: {}", finding.what, figures.join(", "))
         }
     };
-    let told = Some(told(at))
+    let printed_here = Some(printed(at))
         .filter(|text| text.width() <= room)
-        .unwrap_or_else(|| cut(&told(""), room));
+        .unwrap_or_else(|| cut(&printed(""), room));
     let label = format!("{rank:>3}.");
     match &finding.instead {
-        Some(instead) if told.width() + instead.width() + 2 <= room => {
-            labelled(&label, &format!("{told}; {instead}"))
+        Some(instead) if printed_here.width() + instead.width() + 2 <= room => {
+            labelled(&label, &format!("{printed_here}; {instead}"))
         }
-        Some(instead) => labelled(&label, &told) + &labelled("", &cut(instead, room)),
-        None => labelled(&label, &told),
+        Some(instead) => labelled(&label, &printed_here) + &labelled("", &cut(instead, room)),
+        None => labelled(&label, &printed_here),
     }
 }
 
@@ -180,9 +180,9 @@ pub(super) fn ranked(rank: i64, finding: &ShortFinding, at: &str, width: usize) 
 pub(super) fn names(label: &str, all: &[String], width: usize) -> String {
     let room = width.saturating_sub(LABEL);
     let shown = |count: usize| {
-        let rest = all.len() - count;
-        let more = if rest > 0 {
-            format!(" and {rest} more")
+        let remaining = all.len() - count;
+        let more = if remaining > 0 {
+            format!(" and {remaining} more")
         } else {
             String::new()
         };

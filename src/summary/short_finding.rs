@@ -202,7 +202,7 @@ impl ShortFinding {
 
 /// The cause by whose form something unknown is modelled, where that is its closest rival.
 fn nearest(found: &Found) -> Option<&str> {
-    let own = |rival: &&RivalRow| rival.place == found.place && rival.effect != names::UNKNOWN;
+    let is_here = |rival: &&RivalRow| rival.place == found.place && rival.effect != names::UNKNOWN;
     let modelled = |effect: &str| {
         found
             .forms
@@ -212,7 +212,7 @@ fn nearest(found: &Found) -> Option<&str> {
     found
         .rivals
         .iter()
-        .filter(own)
+        .filter(is_here)
         .find(|rival| modelled(&rival.effect))
         .map(|rival| rival.effect.as_str())
 }
@@ -221,11 +221,11 @@ fn nearest(found: &Found) -> Option<&str> {
 fn changed_at(forms: &Value) -> Option<f64> {
     match forms {
         Value::Object(all) => {
-            let own = all
+            let sigma = all
                 .get("after")
                 .and_then(|after| after.get("at"))
                 .and_then(Value::as_f64);
-            own.or_else(|| all.values().find_map(changed_at))
+            sigma.or_else(|| all.values().find_map(changed_at))
         }
         Value::Array(all) => all.iter().find_map(changed_at),
         _ => None,
@@ -324,7 +324,7 @@ fn amplitude(all: &[FindingNumberRow]) -> Option<String> {
     let order = sine
         .name
         .split_once("order")
-        .map(|(_, rest)| digits(rest))
+        .map(|(_, tail)| digits(tail))
         .filter(|order| !order.is_empty());
     let order = order.map_or_else(String::new, |order| format!(", {order} per turn"));
     Some(estimate(size, sigma.filter(|sigma| sigma.is_finite()), &sine.unit) + &order)
@@ -371,7 +371,7 @@ mod tests {
         }
     }
 
-    fn said(found: Found) -> [String; 3] {
+    fn lines_of(found: Found) -> [String; 3] {
         let short = ShortFinding::of(&found, false);
         [
             short.what,
@@ -389,7 +389,7 @@ mod tests {
             )
         };
         assert_eq!(
-            said(compliance()),
+            lines_of(compliance()),
             ["joint 3 yields under load", "(4.17 +- 0.02)e-7 rad/Nm", ""]
         );
         let wave = vec![
@@ -398,7 +398,7 @@ mod tests {
             number("j3.order5.cos", 1.0, "arcsec", 0.3),
             number("j3.order5.sin", 0.0, "arcsec", 0.3),
         ];
-        let wave = said(found("gear_cyclic", wave));
+        let wave = lines_of(found("gear_cyclic", wave));
         assert_eq!(
             wave,
             [
@@ -413,26 +413,26 @@ mod tests {
             ..found("zero_shift", vec![number("j3.step", -14.8, "arcsec", 0.4)])
         };
         assert_eq!(
-            said(step),
+            lines_of(step),
             ["zero of joint 3 steps at 447 s", "14.8 +- 0.4 arcsec", ""]
         );
-        let mass = said(found(
+        let mass = lines_of(found(
             "payload_error",
             vec![number("tool.mass", 0.031, "1", 0.004)],
         ));
         assert_eq!(mass, ["payload differs", "+3.1 +- 0.4 %", ""]);
-        let own = said(found(
+        let shown = lines_of(found(
             "worn_tooth",
             vec![number("j3.depth", 12.0, "arcsec", 1.0)],
         ));
-        assert_eq!(own, ["worn tooth at joint 3", "12.0 +- 1.0 arcsec", ""]);
+        assert_eq!(shown, ["worn tooth at joint 3", "12.0 +- 1.0 arcsec", ""]);
     }
 
     #[test]
     fn rivals_are_named_only_where_the_name_is_not_certain() {
         let backlash = || rival("backlash", 0.3);
         let doubtful = |probability, rivals, none| {
-            said(Found {
+            lines_of(Found {
                 probabilities: [Some(probability), None, Some(none)],
                 rivals,
                 ..found("gear_cyclic", Vec::new())
@@ -462,7 +462,7 @@ mod tests {
             ..found("unknown", numbers())
         };
         assert_eq!(
-            said(near),
+            lines_of(near),
             [
                 "joint 3 yields under load, roughly",
                 "(4.17 +- 0.02)e-7 rad/Nm",
@@ -474,7 +474,7 @@ mod tests {
             rivals: rivals(),
             ..found("unknown", numbers())
         };
-        assert_eq!(said(far), ["unknown cause at joint 3", "", ""]);
+        assert_eq!(lines_of(far), ["unknown cause at joint 3", "", ""]);
     }
 
     #[test]

@@ -121,7 +121,7 @@ impl CauseGrid {
         places.dedup();
         places.sort_by_key(|place| place.parse().ok().and_then(along).unwrap_or(usize::MAX));
         let rows = places.into_iter().map(|place| {
-            let of = |all: &BTreeMap<(String, String), CauseGridCell>, column: &str| {
+            let of_all = |all: &BTreeMap<(String, String), CauseGridCell>, column: &str| {
                 let key = (place.to_string(), column.to_string());
                 asked
                     .contains(&key)
@@ -129,8 +129,11 @@ impl CauseGrid {
             };
             CauseGridRow {
                 place: place.into(),
-                found: columns.iter().map(|column| of(&found, column)).collect(),
-                left: columns.iter().map(|column| of(&left, column)).collect(),
+                found: columns
+                    .iter()
+                    .map(|column| of_all(&found, column))
+                    .collect(),
+                left: columns.iter().map(|column| of_all(&left, column)).collect(),
             }
         });
         Self {

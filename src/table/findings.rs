@@ -45,15 +45,15 @@ impl RivalRow {
 
 impl FindingNumbers {
     pub(crate) fn of_finding(&self, rank: i64) -> Vec<FindingNumberRow> {
-        let own = self.0.iter().filter(|row| row.rank == rank);
-        own.cloned().collect()
+        let of_rank = self.0.iter().filter(|row| row.rank == rank);
+        of_rank.cloned().collect()
     }
 }
 
 impl Rivals {
     pub(crate) fn of_finding(&self, rank: i64) -> Vec<RivalRow> {
-        let own = self.0.iter().filter(|row| row.rank == rank);
-        own.cloned().collect()
+        let of_rank = self.0.iter().filter(|row| row.rank == rank);
+        of_rank.cloned().collect()
     }
 }
 
@@ -289,10 +289,10 @@ impl Forms {
 
     /// Formulas of a finding, each as its rows, cheapest first.
     pub(crate) fn of_finding(&self, rank: i64) -> impl Iterator<Item = &[FormRow]> {
-        let own = move |rows: &&[FormRow]| rows.first().is_some_and(|row| row.rank == rank);
+        let is_of_rank = move |rows: &&[FormRow]| rows.first().is_some_and(|row| row.rank == rank);
         self.0
             .chunk_by(|a, b| (a.rank, a.form) == (b.rank, b.form))
-            .filter(own)
+            .filter(is_of_rank)
     }
 }
 
@@ -387,8 +387,8 @@ impl Verdict {
         let lengths = diagnosis.dimension == Dimension::Length;
         let in_mm = |size: f64| lengths.then_some(size * 1e3);
         let in_rad = |size: f64| (!lengths).then_some(size);
-        let mm = |errors: Option<ErrorLengths>, of: fn(ErrorLengths) -> f64| {
-            errors.and_then(|errors| in_mm(of(errors)))
+        let mm = |errors: Option<ErrorLengths>, value_of: fn(ErrorLengths) -> f64| {
+            errors.and_then(|errors| in_mm(value_of(errors)))
         };
         let rms_rad = |errors: Option<ErrorLengths>| errors.and_then(|errors| in_rad(errors.rms));
         Self(vec![VerdictRow {
@@ -455,7 +455,7 @@ impl VerdictSentences {
         let rows = topics.iter().flat_map(|(topic, all)| {
             (1..)
                 .zip(*all)
-                .map(|(number, said)| row(*topic, number, said))
+                .map(|(number, text)| row(*topic, number, text))
         });
         Self(rows.collect())
     }
@@ -489,10 +489,10 @@ impl VerdictSentences {
 
     /// What the stage `step` says of a topic, in its order.
     pub fn about(&self, step: &str, topic: VerdictTopic) -> Vec<&str> {
-        let own = self
+        let sentences = self
             .0
             .iter()
             .filter(|row| row.step == step && row.about == topic.name());
-        own.map(|row| row.sentence.as_str()).collect()
+        sentences.map(|row| row.sentence.as_str()).collect()
     }
 }

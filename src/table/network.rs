@@ -258,8 +258,8 @@ fn marks(body: &Body, mut mark: impl FnMut(&'static str, [usize; 3])) {
     }
 }
 
-fn name<T: PartialEq>(names: &[(T, &'static str)], of: T) -> &'static str {
-    let found = names.iter().find(|(one, _)| *one == of);
+fn name<T: PartialEq>(names: &[(T, &'static str)], value: T) -> &'static str {
+    let found = names.iter().find(|(one, _)| *one == value);
     found.expect("a name for each").1
 }
 

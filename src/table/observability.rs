@@ -24,14 +24,14 @@ pub struct FitContext {
 
 impl Observability {
     /// What a fit could see.
-    pub fn of(step: &str, fitted: &Fitted, beside: &FitContext) -> Self {
+    pub fn of(step: &str, fitted: &Fitted, context: &FitContext) -> Self {
         let FitContext {
             geometry,
             repeatability,
             folds,
             unfolded,
             earlier,
-        } = *beside;
+        } = *context;
         let mut rows = Vec::new();
         let mut push = |quantity: &str, index: usize, value: f64, meaning: &str| {
             // A null space exactly zero has no logarithm, no ratio: such figures are left out, not stored as infinite.

@@ -168,7 +168,7 @@ impl Parameters {
     /// What these correct: of an outside simulation they say nothing of the robot file's model.
     pub fn corrected(&self) -> Corrected {
         // Tables before version 1.2 say it in their remarks alone, and must not correct commands.
-        let said = |row: &ParameterRow| {
+        let is_stated = |row: &ParameterRow| {
             row.remark
                 .as_deref()
                 .is_some_and(|remark| remark.starts_with(Corrected::REMARK))
@@ -176,7 +176,7 @@ impl Parameters {
         let outside = self
             .0
             .iter()
-            .any(|row| row.corrects.as_deref() == Some(Corrected::OUTSIDE) || said(row));
+            .any(|row| row.corrects.as_deref() == Some(Corrected::OUTSIDE) || is_stated(row));
         if outside {
             Corrected::OutsideSimulation
         } else {
@@ -310,14 +310,14 @@ impl Parameters {
 
     /// An anchor by its name, and where it stands: with a radius a sphere, with an offset a plane.
     fn anchor(&self, name: String, stand: &Pose) -> Anchor {
-        let of = |ending: &str| {
+        let of_ending = |ending: &str| {
             let full = format!("{}{ending}", AnchorShift::prefix(&name));
             self.0
                 .iter()
                 .find(|row| row.name == full)
                 .map(|row| Unit::Millimetre.to_si(row.value))
         };
-        let (place, shape) = match (of("offset"), of("radius")) {
+        let (place, shape) = match (of_ending("offset"), of_ending("radius")) {
             (Some(offset), _) => {
                 let turned = stand.rotation_vector();
                 let normal = Anchor::normal([turned.x, turned.y]);
@@ -333,8 +333,8 @@ impl Parameters {
     fn placed(&self, effect: &str) -> BTreeMap<String, Pose> {
         let mut parts: BTreeMap<String, [f64; 6]> = BTreeMap::new();
         for row in self.0.iter().filter(|row| row.effect == effect) {
-            let own = row.name.strip_prefix(effect).unwrap_or_default();
-            let (name, axis) = own.rsplit_once('.').unwrap_or_default();
+            let suffix = row.name.strip_prefix(effect).unwrap_or_default();
+            let (name, axis) = suffix.rsplit_once('.').unwrap_or_default();
             let axis = ["x", "y", "z", "rx", "ry", "rz"]
                 .iter()
                 .position(|known| *known == axis);
@@ -390,17 +390,18 @@ impl Parameters {
 fn against_prior(check: &PriorCheck, unit: Unit) -> Option<String> {
     match check.without {
         Some((without, sigma)) if check.conflict > CONFLICT => {
-            let [mean, own, without, sigma] = [check.prior.mean, check.prior.sigma, without, sigma]
-                .map(|value| unit.from_si(value));
+            let [mean, prior, without, sigma] =
+                [check.prior.mean, check.prior.sigma, without, sigma]
+                    .map(|value| unit.from_si(value));
             let apart = check.conflict;
             Some(format!(
-                "prior {mean:.4e} +- {own:.1e} and data {without:.4e} +- {sigma:.1e} contradict each other ({apart:.1} sigma)"
+                "prior {mean:.4e} +- {prior:.1e} and data {without:.4e} +- {sigma:.1e} contradict each other ({apart:.1} sigma)"
             ))
         }
         Some((_, sigma)) if sigma < SILENT * check.prior.sigma => {
-            let [mean, own] =
+            let [mean, prior] =
                 [check.prior.mean, check.prior.sigma].map(|value| unit.from_si(value));
-            Some(format!("prior {mean} +- {own}"))
+            Some(format!("prior {mean} +- {prior}"))
         }
         _ => Some("known from its prior alone: the data add nothing".into()),
     }
@@ -410,11 +411,11 @@ impl CovarianceTable {
     /// The covariance of a fit. Parameters that it kept are taken over from `earlier`: what was estimated on top is held to be independent.
     pub fn of(model: &Model, fitted: &Fitted, earlier: Option<&Self>) -> Self {
         let specs = model.stack.specs();
-        let own = fitted
+        let blocks = fitted
             .covariance
             .iter()
             .flat_map(|covariance| covariance.pairs());
-        let mut rows: Vec<CovarianceRow> = own
+        let mut rows: Vec<CovarianceRow> = blocks
             .map(|(a, b, value, correlation)| row(&specs[a], &specs[b], value, correlation))
             .collect();
         let new: BTreeSet<String> = rows.iter().map(|row| row.parameter.clone()).collect();

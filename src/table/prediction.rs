@@ -87,7 +87,7 @@ impl Prediction {
                 measured(row)
                     .into_iter()
                     .zip(point)
-                    .all(|(own, m)| (own - m * 1e3).abs() < ROUNDING_MM)
+                    .all(|(value, m)| (value - m * 1e3).abs() < ROUNDING_MM)
             };
             row.sequence == recording.sequence[at]
                 && row.point_id == recording.point_id[at]
@@ -172,8 +172,8 @@ impl Prediction {
     ) -> Self {
         for (row, remark) in self.0.iter_mut().zip(remarks) {
             row.remark = match (row.remark.take(), remark) {
-                (Some(said), Some(more)) => Some(format!("{said}; {more}")),
-                (said, more) => said.or(more),
+                (Some(first), Some(more)) => Some(format!("{first}; {more}")),
+                (first, more) => first.or(more),
             };
         }
         self
@@ -279,10 +279,10 @@ impl StatisticsRow {
 
     /// Whether it is of rows of contact constraints: folds are places then.
     pub(crate) fn is_contact(&self) -> bool {
-        let own = |word: &str| self.set.ends_with(&format!("({word})"));
+        let is_named = |word: &str| self.set.ends_with(&format!("({word})"));
         KINDS
             .iter()
-            .any(|kind| kind.is_contact() && own(kind.about().word))
+            .any(|kind| kind.is_contact() && is_named(kind.about().word))
     }
 
     /// Whether its figures of noise rest on nothing that was stated or measured again.

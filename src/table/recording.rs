@@ -419,22 +419,26 @@ pub(super) fn points(
     source: Option<&[SigmaSource]>,
 ) -> (PointReadings, bool) {
     let there = |row: usize, axis: usize| position[row][axis].is_finite();
-    let own = |row: usize, axis: usize| sigma.map(|all| all[row][axis]).filter(|own| *own > 0.0);
+    let sigma_of = |row: usize, axis: usize| {
+        sigma
+            .map(|all| all[row][axis])
+            .filter(|stated| *stated > 0.0)
+    };
     let measured = |value: &f64| if value.is_finite() { *value } else { 0.0 };
     let points: Vec<Vector3<f64>> = position
         .iter()
         .map(|point| Vector3::from_iterator(point.iter().map(measured)))
         .collect();
-    let of = |row: usize, axis: usize| match there(row, axis) {
-        true => own(row, axis).unwrap_or_else(|| START.sigma(&points[row])),
+    let of_row = |row: usize, axis: usize| match there(row, axis) {
+        true => sigma_of(row, axis).unwrap_or_else(|| START.sigma(&points[row])),
         false => f64::INFINITY,
     };
     let sigma = (0..points.len())
-        .map(|row| Vector3::from_fn(|axis, _| of(row, axis)))
+        .map(|row| Vector3::from_fn(|axis, _| of_row(row, axis)))
         .collect();
     let inferred = |row: usize| {
         let is_inferred = source.is_some_and(|all| all[row] == SigmaSource::Inferred);
-        (0..3).any(|axis| there(row, axis) && (is_inferred || own(row, axis).is_none()))
+        (0..3).any(|axis| there(row, axis) && (is_inferred || sigma_of(row, axis).is_none()))
     };
     let is_inferred = (0..points.len()).any(inferred);
     (

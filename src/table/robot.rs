@@ -65,13 +65,13 @@ impl Robot {
 
     /// The description that the rows hold; fails when a body or one of its numbers is missing.
     pub fn to_description(&self) -> Result<RobotDescription> {
-        let (Some((base, rest)), true) = (self.0.split_first(), self.0.len() > 2) else {
+        let (Some((base, others)), true) = (self.0.split_first(), self.0.len() > 2) else {
             return Err(Error::data(
                 "table robot",
                 "expected a base, at least one joint and a tool",
             ));
         };
-        let Some((tool, joints)) = rest.split_last() else {
+        let Some((tool, joints)) = others.split_last() else {
             return Err(Error::data("table robot", "has no tool"));
         };
         let size = need(base.gravity_m_s2, base, "gravity_m_s2")?;

@@ -37,7 +37,7 @@ pub struct Unseen {
 pub struct Step {
     pub(crate) id: String,
     /// Whether it has a model of its own; else it learned on the step before it that has.
-    pub(crate) own: bool,
+    pub(crate) is_identified: bool,
     /// Its errors at rows that its fits have not seen.
     pub(crate) unseen: Unseen,
 }
@@ -175,25 +175,25 @@ struct StepComparison {
 fn worse(one: &ErrorsByRow, other: &ErrorsByRow) -> Option<StepComparison> {
     let pairs: Vec<(f64, f64)> = one
         .iter()
-        .filter_map(|(row, own)| Some((own * own, other.get(row).map(|error| error * error)?)))
+        .filter_map(|(row, left)| Some((left * left, other.get(row).map(|error| error * error)?)))
         .collect();
     if pairs.len() < FEWEST {
         return None;
     }
     let count = pairs.len() as f64;
-    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
-    let (own, theirs) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    let mean = |value_of: fn(&(f64, f64)) -> f64| pairs.iter().map(value_of).sum::<f64>() / count;
+    let (ours, theirs) = (mean(|pair| pair.0), mean(|pair| pair.1));
     let off: Vec<f64> = pairs
         .iter()
-        .map(|(own_square, square)| own_square - square - (own - theirs))
+        .map(|(own_square, square)| own_square - square - (ours - theirs))
         .collect();
     let variance = off.iter().map(|value| value * value).sum::<f64>() / (count - 1.0);
     // Points along a path are not as many opinions as there are points.
     let independent = count / autocorrelation_time(&off, 1);
-    let clearly = (own - theirs) / (variance / independent).sqrt();
-    let is_worse = own.sqrt() > theirs.sqrt() * (1.0 + WORSE) && clearly > CLEARLY;
+    let clearly = (ours - theirs) / (variance / independent).sqrt();
+    let is_worse = ours.sqrt() > theirs.sqrt() * (1.0 + WORSE) && clearly > CLEARLY;
     is_worse.then(|| StepComparison {
-        rms: [own.sqrt(), theirs.sqrt()],
+        rms: [ours.sqrt(), theirs.sqrt()],
         points: pairs.len(),
         clearly,
         independent,
@@ -212,7 +212,14 @@ impl StepComparison {
 /// None where nothing predicts.
 pub fn standing(steps: &[Step], diagnosed: Option<&str>) -> Option<Standing> {
     let end = match diagnosed.and_then(|id| steps.iter().position(|step| step.id == id)) {
-        Some(own) => own + 1 + steps[own + 1..].iter().take_while(|step| !step.own).count(),
+        Some(before) => {
+            before
+                + 1
+                + steps[before + 1..]
+                    .iter()
+                    .take_while(|step| !step.is_identified)
+                    .count()
+        }
         None => steps.len(),
     };
     let never = never_fitted(steps);
@@ -262,7 +269,7 @@ pub fn standing(steps: &[Step], diagnosed: Option<&str>) -> Option<Standing> {
     let model = steps[..end]
         .get(..=stands)?
         .iter()
-        .rfind(|step| step.own)
+        .rfind(|step| step.is_identified)
         .unwrap_or(&steps[stands]);
     let chosen = &steps[stands];
     let guard = |step: &Step| -> ErrorsByRow {
@@ -311,9 +318,9 @@ mod tests {
     fn steps(all: &[(&str, bool, f64, f64)], folds: i64) -> Vec<Step> {
         let scattered =
             |mean: f64, row: i64| (row, mean * (1.0 + 0.1 * f64::from((row % 3) as i32)));
-        let step = |(id, own, fold, held_out): &(&str, bool, f64, f64)| Step {
+        let step = |(id, is_identified, fold, held_out): &(&str, bool, f64, f64)| Step {
             id: (*id).into(),
-            own: *own,
+            is_identified: *is_identified,
             unseen: Unseen {
                 folds: (0..folds).map(|row| scattered(*fold, row)).collect(),
                 held_out: (folds..80).map(|row| scattered(*held_out, row)).collect(),
@@ -333,18 +340,24 @@ mod tests {
             ("joint", true, 0.07),
             ("more", false, 0.06),
         ];
-        let all = steps(&all.map(|(id, own, error)| (id, own, error, error)), 40);
-        let of = |diagnosed| standing(&all, diagnosed).map(|s| (s.step, s.model));
+        let all = steps(
+            &all.map(|(id, is_identified, error)| (id, is_identified, error, error)),
+            40,
+        );
+        let of_diagnosed = |diagnosed| standing(&all, diagnosed).map(|s| (s.step, s.model));
         assert_eq!(
-            of(Some("diagnose")),
+            of_diagnosed(Some("diagnose")),
             Some(("on_top".into(), "diagnose".into()))
         );
-        assert_eq!(of(Some("joint")), Some(("more".into(), "joint".into())));
         assert_eq!(
-            of(Some("nominal")),
+            of_diagnosed(Some("joint")),
+            Some(("more".into(), "joint".into()))
+        );
+        assert_eq!(
+            of_diagnosed(Some("nominal")),
             Some(("network".into(), "nominal".into()))
         );
-        assert_eq!(of(None), Some(("more".into(), "joint".into())));
+        assert_eq!(of_diagnosed(None), Some(("more".into(), "joint".into())));
         assert_eq!(standing(&[], None), None);
     }
 

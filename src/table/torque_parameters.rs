@@ -133,8 +133,8 @@ impl TorqueParameters {
             let here = |row: &&TorqueParameterRow| {
                 row.effect == COULOMB && row.place == place && row.form.is_some()
             };
-            let own = self.0.iter().find(here)?;
-            (own.value > SURE * own.sigma.unwrap_or(0.0)).then_some(own.value)
+            let entry = self.0.iter().find(here)?;
+            (entry.value > SURE * entry.sigma.unwrap_or(0.0)).then_some(entry.value)
         };
         (0..joints).map(at).collect()
     }
@@ -214,18 +214,18 @@ impl TorqueParameters {
     }
 
     fn range(&self, joint: usize) -> Result<JointRange> {
-        let of = |quantity: &str| self.value(&format!("{SEEN}.j{joint}.{quantity}"));
+        let of_quantity = |quantity: &str| self.value(&format!("{SEEN}.j{joint}.{quantity}"));
         let [least, greatest, speed, acceleration] =
-            [RANGE[0].0, RANGE[1].0, RANGE[2].0, RANGE[3].0].map(of);
+            [RANGE[0].0, RANGE[1].0, RANGE[2].0, RANGE[3].0].map(of_quantity);
         // Tables of before these were written say nothing of them.
         let [load, misfit, usual] = [
             (RANGE[4].0, f64::INFINITY),
             (RANGE[5].0, 0.0),
             (RANGE[6].0, 0.0),
         ]
-        .map(|(quantity, unknown)| of(quantity).unwrap_or(unknown));
+        .map(|(quantity, unknown)| of_quantity(quantity).unwrap_or(unknown));
         let sign_width =
-            of(RANGE[7].0).or_else(|_| self.value(&format!("{SEEN}.{}", WHOLE[0].0)))?;
+            of_quantity(RANGE[7].0).or_else(|_| self.value(&format!("{SEEN}.{}", WHOLE[0].0)))?;
         let position = [least?, greatest?];
         Ok(JointRange {
             position,
@@ -273,7 +273,7 @@ fn seen(model: &TorqueModel) -> Vec<TorqueParameterRow> {
         )
     });
     let ranges = model.range.iter().enumerate().flat_map(|(joint, range)| {
-        let of = move |(named, value): (&(&'static str, &'static str), f64)| {
+        let of_named = move |(named, value): (&(&'static str, &'static str), f64)| {
             row(
                 format!("{SEEN}.j{}.{}", joint + 1, named.0),
                 Place::Joint(joint),
@@ -281,7 +281,11 @@ fn seen(model: &TorqueModel) -> Vec<TorqueParameterRow> {
                 value,
             )
         };
-        RANGE.iter().zip(ends(range)).map(of).collect::<Vec<_>>()
+        RANGE
+            .iter()
+            .zip(ends(range))
+            .map(of_named)
+            .collect::<Vec<_>>()
     });
     let temperature = TEMPERATURE
         .iter()

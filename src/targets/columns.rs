@@ -111,8 +111,8 @@ impl TargetColumns {
             Some((found.0, found.2))
         };
         let joints: Vec<(usize, Unit)> = (0..n).filter_map(joint).collect();
-        let count = |of: fn(usize) -> ColumnRole, most: usize| {
-            let has = |k: &usize| columns.iter().any(|(_, role, _)| *role == of(*k));
+        let count = |role_of: fn(usize) -> ColumnRole, most: usize| {
+            let has = |k: &usize| columns.iter().any(|(_, role, _)| *role == role_of(*k));
             (0..most).filter(has).count()
         };
         let point = count(ColumnRole::Axis, 3);
@@ -193,19 +193,20 @@ fn role(
     } else {
         Header::of(&lower)
     };
-    let of = |quantity: Quantity, otherwise: Option<Unit>, option: &str| match unit.or(otherwise) {
-        Some(unit) if unit.quantity() == quantity => Ok(Some(unit)),
-        // A letter behind the name is a word then: the point C of `x_c`.
-        Some(_) if ending.is_some_and(|ending| ending.len() == 1) => Ok(None),
-        Some(unit) => Err(format!(
-            "column `{name}`: {unit} is no unit of it; allowed: {}",
-            Unit::symbols(quantity).join(", ")
-        )),
-        None => Err(format!(
-            "column `{name}` has no unit; call it e.g. `{stem}_{}`, or give {option}",
-            option.rsplit(' ').next().unwrap_or_default()
-        )),
-    };
+    let of_quantity =
+        |quantity: Quantity, otherwise: Option<Unit>, option: &str| match unit.or(otherwise) {
+            Some(unit) if unit.quantity() == quantity => Ok(Some(unit)),
+            // A letter behind the name is a word then: the point C of `x_c`.
+            Some(_) if ending.is_some_and(|ending| ending.len() == 1) => Ok(None),
+            Some(unit) => Err(format!(
+                "column `{name}`: {unit} is no unit of it; allowed: {}",
+                Unit::symbols(quantity).join(", ")
+            )),
+            None => Err(format!(
+                "column `{name}` has no unit; call it e.g. `{stem}_{}`, or give {option}",
+                option.rsplit(' ').next().unwrap_or_default()
+            )),
+        };
     let numbered = |prefix: &str| {
         stem.strip_prefix(prefix)
             .and_then(|number| number.parse::<usize>().ok())
@@ -219,13 +220,13 @@ fn role(
     });
     if let Some(joint) = joint {
         let unit = match robot.joints[joint].kind {
-            JointKind::Revolute => of(Quantity::Angle, units.angle, "--angle deg")?,
-            JointKind::Prismatic => of(Quantity::Length, units.length, "--length mm")?,
+            JointKind::Revolute => of_quantity(Quantity::Angle, units.angle, "--angle deg")?,
+            JointKind::Prismatic => of_quantity(Quantity::Length, units.length, "--length mm")?,
         };
         return Ok(unit.map(|unit| (ColumnRole::Joint(joint), unit)));
     }
     if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == stem) {
-        return Ok(of(Quantity::Length, units.length, "--length mm")?
+        return Ok(of_quantity(Quantity::Length, units.length, "--length mm")?
             .map(|unit| (ColumnRole::Axis(axis), unit)));
     }
     if let (Some(part), None) = (
@@ -237,7 +238,7 @@ fn role(
         return Ok(Some((ColumnRole::Quaternion(part), Unit::One)));
     }
     if let Some(turn) = ["a", "b", "c"].iter().position(|turn| *turn == stem) {
-        return Ok(of(Quantity::Angle, units.angle, "--angle deg")?
+        return Ok(of_quantity(Quantity::Angle, units.angle, "--angle deg")?
             .map(|unit| (ColumnRole::Turn(turn), unit)));
     }
     let role = match (stem, unit) {

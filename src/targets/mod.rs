@@ -24,7 +24,7 @@ pub(crate) mod text;
 mod trajectory;
 
 /// Faults that are named of one file.
-const MOST: usize = 20;
+const LIMIT: usize = 20;
 /// Rows held in memory at a time.
 const BATCH: usize = 1 << 13;
 
@@ -168,7 +168,7 @@ pub(crate) struct Unreached {
 impl Unreached {
     fn push(&mut self, place: impl FnOnce() -> String, remark: &str) {
         self.count += 1;
-        if self.faults.len() < MOST {
+        if self.faults.len() < LIMIT {
             self.faults.push(Fault::new(
                 place(),
                 format!("{remark}: no joints are written"),

@@ -1,7 +1,7 @@
 //! Targets in delimited text: read in batches, every byte kept but the numbers of joints; what is known of each is appended.
 
 use super::columns::{TargetColumns, TargetRow};
-use super::{Appended, BATCH, Layout, MOST, TargetTable, Unreached, corrected};
+use super::{Appended, BATCH, LIMIT, Layout, TargetTable, Unreached, corrected};
 use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
 use crate::error::{Error, Fault, Result};
 use crate::raw::{self, DecimalMark, Delimiter, NumberFault, number, unquoted_text};
@@ -235,7 +235,7 @@ impl TargetTable for TextTable<'_> {
                     targets.extend(target.map(|target| (number, target)));
                     self.rows.push((line, spans));
                 }
-                Err(message) if faults.len() < MOST => {
+                Err(message) if faults.len() < LIMIT => {
                     faults.push(Fault::new(self.place(number), message));
                 }
                 Err(_) => {}

@@ -2,7 +2,7 @@
 
 use super::columns::{ColumnRole, ReadColumn, read_columns};
 use super::text::{TableText, TextField, fields, parse, table};
-use super::{MOST, text};
+use super::{LIMIT, text};
 use crate::description::RobotDescription;
 use crate::dynamics::{JudgedRow, NeededTorques, PlannedMotion};
 use crate::error::{Error, Fault, Result};
@@ -90,7 +90,7 @@ impl<'a> Trajectory<'a> {
         for row in 0..rows {
             let (number, line) = self.lines[row];
             let mut fault = |message: String| {
-                if faults.len() < MOST {
+                if faults.len() < LIMIT {
                     faults.push(Fault::new(format!("{place}:{number}"), message));
                 }
             };
@@ -180,7 +180,7 @@ impl<'a> Trajectory<'a> {
         text.push('\n');
         for (row, ((_, line), judged)) in self.lines.iter().zip(rows).enumerate() {
             text.push_str(line.trim_end());
-            let own = n * row..n * (row + 1);
+            let cells = n * row..n * (row + 1);
             let mut number = |value: Option<f64>| {
                 text.push(between);
                 if let Some(value) = value {
@@ -188,11 +188,11 @@ impl<'a> Trajectory<'a> {
                 }
             };
             let allowed = |value: f64| (!judged.is_refused()).then_some(value);
-            needed.torque[own.clone()]
+            needed.torque[cells.clone()]
                 .iter()
                 .for_each(|torque| number(allowed(*torque)));
             if let Some(factors) = per_ampere {
-                needed.torque[own.clone()]
+                needed.torque[cells.clone()]
                     .iter()
                     .zip(factors)
                     .for_each(|(torque, factor)| number(allowed(torque / factor)));
@@ -200,7 +200,7 @@ impl<'a> Trajectory<'a> {
             needed
                 .u95
                 .iter()
-                .flat_map(|all| &all[own.clone()])
+                .flat_map(|all| &all[cells.clone()])
                 .for_each(|u95| number(Some(*u95)));
             text.push(between);
             text::push_text(&mut text, &judged.to_string(), between);

@@ -56,10 +56,10 @@ pub fn settle(arm: &Arm, row: &Row, effects: &[Physical]) -> Equilibrium {
 }
 
 /// What the tracker reads of the measured point, m in its frame, without its noise; `base` is the base frame as it sees it at first.
-pub fn sighted(rest: &Equilibrium, base: &Matrix, row: &Row, effects: &[Physical]) -> Vector {
+pub fn sighted(at_rest: &Equilibrium, base: &Matrix, row: &Row, effects: &[Physical]) -> Vector {
     let there = matrix::place(
-        &matrix::times(&rest.motion.tracker, base),
-        rest.posture.tool,
+        &matrix::times(&at_rest.motion.tracker, base),
+        at_rest.posture.tool,
     );
     effects
         .iter()

@@ -150,7 +150,7 @@ fn word(text: &str) -> String {
 fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
-        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_string(),
+        Some(tail) if tail.chars().all(|c| c == '0' || c == '.') => tail.to_string(),
         _ => text,
     }
 }

@@ -283,13 +283,13 @@ pub fn allowed(
     draw: &mut Noise,
 ) -> Result<(Vec<f64>, Vector), String> {
     let floor = 1e-3 * poses.floor_mm;
-    let rest = Motion::none(arm.links.len());
+    let at_rest = Motion::none(arm.links.len());
     for _ in 0..TRIES {
         let q: Vec<f64> = ranges
             .iter()
             .map(|range| draw.uniform(range[0], range[1]))
             .collect();
-        let posture = arm.posture(&q, &rest);
+        let posture = arm.posture(&q, &at_rest);
         let far = posture.tool[0].hypot(posture.tool[1]) >= 1e-3 * poses.clearance_mm;
         // Joints up to the second stand on the base, which may reach to the floor.
         let high = posture

@@ -227,9 +227,9 @@ impl Experiment<'_> {
                     break;
                 }
                 let moved = |joint: usize| {
-                    let mut beside = q.clone();
-                    beside[joint] += STEP;
-                    matrix::scale(matrix::minus(ball(&beside), tool), 1.0 / STEP)
+                    let mut nearby = q.clone();
+                    nearby[joint] += STEP;
+                    matrix::scale(matrix::minus(ball(&nearby), tool), 1.0 / STEP)
                 };
                 let columns: Vec<Vector> = (0..joints).map(moved).collect();
                 let Some(step) = least_step(&columns, left) else {

@@ -171,7 +171,9 @@ fn a_formula_moves_the_arm_as_the_same_law_of_the_library() {
             declaration("tracker", "azimuth", &["sin(azimuth)", "cos(azimuth)"]),
             term(
                 "tracker_circle",
-                Motion::Instrument { of: Polar::Azimuth },
+                Motion::Instrument {
+                    reading: Polar::Azimuth,
+                },
                 Law::new(
                     Variable::Azimuth,
                     Basis::Wave {

@@ -196,7 +196,7 @@ pub fn question<'a>(
         prior_weight: 1.0,
         open_world: 0.3,
         without: &[],
-        own: &[],
+        declared: &[],
         beside_simulation: false,
         known: &[],
         seed: 1,

@@ -114,7 +114,8 @@ fn unnamed(survey: &Survey) -> Vec<Hypothesis> {
             axes: Axes::Rotation,
         },
     ];
-    let read = [Polar::Azimuth, Polar::Elevation, Polar::Range].map(|of| Motion::Instrument { of });
+    let read = [Polar::Azimuth, Polar::Elevation, Polar::Range]
+        .map(|of| Motion::Instrument { reading: of });
     let along = [0.0, 0.6, 0.8];
     let everywhere = [
         Variable::Angle { joint: 1 },

@@ -93,7 +93,7 @@ fn diagnosed(case: &Case, data: &Measurements, without: &[String]) -> Diagnosis 
         prior_weight: 1.0,
         open_world: 0.3,
         without,
-        own: &[],
+        declared: &[],
         beside_simulation: false,
         known: &[],
         seed: case.seed,

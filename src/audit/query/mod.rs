@@ -305,11 +305,11 @@ fn missing(text: &str) -> Option<&str> {
         "no column named '",
         "no table or struct column named '",
     ];
-    let rest = after
+    let tail = after
         .into_iter()
         .find_map(|words| text.split_once(words))?
         .1;
-    rest.split(['"', '\'']).next()
+    tail.split(['"', '\'']).next()
 }
 
 /// Nothing where a table has the column: then it is lost on the way, and polars says where.

@@ -181,11 +181,11 @@ impl BlindDiagnosis<'_> {
             .and_then(|()| std::fs::rename(&part, &verdict))
             .map_err(fault)?;
         let answer: Option<serde_json::Value> = serde_json::from_slice(&done.stdout).ok();
-        let said = answer
+        let message = answer
             .as_ref()
             .and_then(|answer| answer.get("verdict")?.as_str())
             .unwrap_or("a verdict that is no JSON");
-        Ok(said.chars().filter(|c| !c.is_control()).collect())
+        Ok(message.chars().filter(|c| !c.is_control()).collect())
     }
 }
 

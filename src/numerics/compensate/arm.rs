@@ -386,7 +386,7 @@ mod tests {
         assert!(
             Stated::Direction
                 .fault(7.0)
-                .is_some_and(|said| said.ends_with(", found 7"))
+                .is_some_and(|message| message.ends_with(", found 7"))
         );
         assert!(
             Stated::Payload.fault(f64::INFINITY).is_some()

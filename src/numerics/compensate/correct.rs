@@ -192,8 +192,8 @@ impl CorrectionTotals {
                 "outside of what was measured: the model extrapolates there",
             ),
         ];
-        let said = all.into_iter().filter(|(count, ..)| *count > 0);
-        said.map(|(count, one, several, what)| {
+        let stated = all.into_iter().filter(|(count, ..)| *count > 0);
+        stated.map(|(count, one, several, what)| {
             format!(
                 "{count} of them {} {what}",
                 if count == 1 { one } else { several }

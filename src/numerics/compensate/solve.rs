@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 pub const SETTLED: f64 = 1e-8;
 
 /// Placements before it is given up.
-const MOST: usize = 60;
+const LIMIT: usize = 60;
 
 /// The largest move of a joint in one step, rad or m: beyond it the Jacobian says nothing.
 const STRIDE: f64 = 0.4;
@@ -136,7 +136,7 @@ pub fn least_change(
     let mut iterations = 0;
     // Whether the chain stands at `q` and not at a step that was refused.
     let mut placed = true;
-    while iterations < MOST && (error.norm() > SETTLED) {
+    while iterations < LIMIT && (error.norm() > SETTLED) {
         let Some(step) = step(&jacobian, damping, (&error, wanted.oriented), &q, home) else {
             damping = harder(damping);
             iterations += 1;
@@ -169,7 +169,7 @@ fn harder(damping: f64) -> f64 {
 }
 
 /// (J J^T + damping)^-1 of a twist, or of a displacement where the orientation does not count; none where the arm is singular.
-fn solved(jacobian: &[Twist], damping: f64, rest: &Twist, oriented: bool) -> Option<Vector6<f64>> {
+fn solved(jacobian: &[Twist], damping: f64, error: &Twist, oriented: bool) -> Option<Vector6<f64>> {
     let solved = if oriented {
         let mut normal = Matrix6::zeros();
         for column in jacobian {
@@ -178,7 +178,7 @@ fn solved(jacobian: &[Twist], damping: f64, rest: &Twist, oriented: bool) -> Opt
         let damping = damping * normal.trace() / 6.0;
         (normal + Matrix6::identity() * damping)
             .cholesky()?
-            .solve(rest)
+            .solve(error)
     } else {
         let mut normal = Matrix3::zeros();
         for column in jacobian {
@@ -186,10 +186,10 @@ fn solved(jacobian: &[Twist], damping: f64, rest: &Twist, oriented: bool) -> Opt
             normal += v * v.transpose();
         }
         let damping = damping * normal.trace() / 3.0;
-        let rest: Vector3<f64> = rest.fixed_rows::<3>(0).into();
+        let position: Vector3<f64> = error.fixed_rows::<3>(0).into();
         let v = (normal + Matrix3::identity() * damping)
             .cholesky()?
-            .solve(&rest);
+            .solve(&position);
         Vector6::new(v.x, v.y, v.z, 0.0, 0.0, 0.0)
     };
     solved
@@ -209,11 +209,11 @@ fn step<'a>(
     // Pulled home, a damped step would rest between home and the wanted point.
     let pull = if damping == 0.0 { 1.0 } else { 0.0 };
     let back = move |(q, home): (&f64, &f64)| pull * (home - q);
-    let mut rest = *error;
+    let mut remaining = *error;
     for (column, d) in jacobian.iter().zip(q.iter().zip(home).map(back)) {
-        rest -= column * d;
+        remaining -= column * d;
     }
-    let solved = solved(jacobian, damping, &rest, oriented)?;
+    let solved = solved(jacobian, damping, &remaining, oriented)?;
     let raw = move |(column, d): (&Twist, f64)| d + column.dot(&solved);
     let largest = jacobian
         .iter()
@@ -311,11 +311,11 @@ pub(super) fn spread(robot: &RobotModel, number: u32) -> Vec<f64> {
     const PRIMES: [u32; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
     let position = |joint: usize| {
         let base = PRIMES[joint % PRIMES.len()];
-        let (mut rest, mut digit, mut share) = (number, 1.0, 0.0);
-        while rest > 0 {
+        let (mut remaining, mut digit, mut share) = (number, 1.0, 0.0);
+        while remaining > 0 {
             digit /= f64::from(base);
-            share += digit * f64::from(rest % base);
-            rest /= base;
+            share += digit * f64::from(remaining % base);
+            remaining /= base;
         }
         let [lower, upper] = limits(robot, joint);
         lower + share * (upper - lower)

@@ -256,7 +256,7 @@ impl Uncertainty {
             );
             let most = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
             finding = most
-                .filter(|(_, own)| *own >= NAMED * variance)
+                .filter(|(_, share)| *share >= NAMED * variance)
                 .map(|(name, _)| name);
         }
         CorrectionUncertainty {

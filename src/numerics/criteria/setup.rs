@@ -64,7 +64,7 @@ criteria! {
     /// Points farther off than this many medians are wrong by themselves.
     FAR: f64 = 4.0, "medians", "literature: robust statistics, Huber (1981)", "";
     /// More rows say no more of errors of this size.
-    MOST: usize = 240, "rows", "judgement: bounds time", "";
+    SAMPLE: usize = 240, "rows", "judgement: bounds time", "";
     /// Rows farther off than this many medians take no part.
     TRIM: f64 = 4.0, "medians", "literature: robust statistics, Huber (1981)", "";
     /// Arms that reach less far, or farther, are not what a robot file in the right unit describes.

@@ -44,7 +44,7 @@ struct RowMisfit {
 }
 
 /// What a model leaves of every row.
-fn left(model: &Model, data: &Measurements, of: Dimension) -> Vec<RowMisfit> {
+fn left(model: &Model, data: &Measurements, dimension: Dimension) -> Vec<RowMisfit> {
     let kinds = kinds(data);
     let one = |scratch: &mut PlacementBuffers, row: usize| {
         let placed = model
@@ -60,7 +60,7 @@ fn left(model: &Model, data: &Measurements, of: Dimension) -> Vec<RowMisfit> {
             .iter()
             .filter_map(|kind| Residual::of(*kind, data, row, &placed))
         {
-            if residual.dimension() == of {
+            if residual.dimension() == dimension {
                 left.size.get_or_insert(residual.error.norm());
             }
             left.whitened += residual.whitened(data, 0.0).norm_squared();

@@ -42,10 +42,15 @@ pub fn discrimination_problem(
     let (torque, compliance) = (problem.torques(), compliance(model));
     let survey = Survey::new(&model.robot, data, rows, &torque, &compliance);
     let is = |form: &&Form| finding.contains(*form);
-    let of = |(other, range): (&dyn Effect, std::ops::Range<usize>)| {
+    let of_other = |(other, range): (&dyn Effect, std::ops::Range<usize>)| {
         other.form().filter(is).map(|_| range)
     };
-    let own: Vec<usize> = model.stack.effects().filter_map(of).flatten().collect();
+    let forms: Vec<usize> = model
+        .stack
+        .effects()
+        .filter_map(of_other)
+        .flatten()
+        .collect();
     let mut caused = vec![0.0; problem.residual_rows()];
     for (form, range) in model
         .stack
@@ -63,40 +68,44 @@ pub fn discrimination_problem(
                 .for_each(|(sum, value)| *sum += value * size);
         }
     }
-    let nuisances: Vec<usize> = free.iter().copied().filter(|k| !own.contains(k)).collect();
+    let nuisances: Vec<usize> = free
+        .iter()
+        .copied()
+        .filter(|k| !forms.contains(k))
+        .collect();
     let jacobian = problem.jacobian(&nuisances);
     let open: Vec<f64> = problem
         .residual
         .iter()
         .zip(&caused)
-        .map(|(left, own)| left + own)
+        .map(|(left, right)| left + right)
         .collect();
     // As diagnosis names rivals: by what fits in place of the finding.
-    let beside = FormRegression::new(&problem, &jacobian, &[], &open);
+    let reference = FormRegression::new(&problem, &jacobian, &[], &open);
     let others = rivals(&survey, &problem, model, (effect, place))?
         .into_iter()
         .filter(|form| finding != std::slice::from_ref(form));
-    let fitted = others.map(|form| (beside.solve(&form), form));
-    let best = fitted.min_by(|a, b| score(&beside, &a.0).total_cmp(&score(&beside, &b.0)));
+    let fitted = others.map(|form| (reference.solve(&form), form));
+    let best = fitted.min_by(|a, b| score(&reference, &a.0).total_cmp(&score(&reference, &b.0)));
     let Some((_, form)) = best else {
         return Err(format!("no form of {effect} at {place} can be tried"));
     };
-    let rival = beside.refined(form, &survey);
+    let rival = reference.refined(form, &survey);
     let both = with(model, &rival);
     let held = both
         .stack
         .effects()
         .find(|(other, _)| other.form() == Some(&rival));
     let of_rival: Vec<usize> = held.map(|(_, range)| range.collect()).unwrap_or_default();
-    let sizes = own.iter().map(|k| model.x[*k]).collect();
+    let sizes = forms.iter().map(|k| model.x[*k]).collect();
     let sides = [
         Alternative {
-            parameters: own,
+            parameters: forms,
             sizes,
         },
         Alternative {
             parameters: of_rival,
-            sizes: beside.solve(&rival).coefficients,
+            sizes: reference.solve(&rival).coefficients,
         },
     ];
     Ok((
@@ -110,10 +119,10 @@ pub fn discrimination_problem(
 }
 
 /// How well one form fits, with a penalty for every parameter (Schwarz, 1978).
-fn score(beside: &FormRegression, of: &Solution) -> f64 {
-    let rows = beside.rows() as f64;
-    rows * ((beside.square - of.gain).max(f64::MIN_POSITIVE) / rows).ln()
-        + rows.ln() * of.rank as f64
+fn score(reference: &FormRegression, solution: &Solution) -> f64 {
+    let rows = reference.rows() as f64;
+    rows * ((reference.square - solution.gain).max(f64::MIN_POSITIVE) / rows).ln()
+        + rows.ln() * solution.rank as f64
 }
 
 /// The forms of this name at this place, as diagnosis has them.
@@ -126,8 +135,9 @@ fn rivals(
     let declared = |(other, _): (&dyn Effect, std::ops::Range<usize>)| {
         Some(other.form()?.declared()?.declaration())
     };
-    let mut own: Vec<&'static DeclaredCause> = model.stack.effects().filter_map(declared).collect();
-    own.dedup_by_key(|cause| &cause.declaration().name);
+    let mut declared_causes: Vec<&'static DeclaredCause> =
+        model.stack.effects().filter_map(declared).collect();
+    declared_causes.dedup_by_key(|cause| &cause.declaration().name);
     let question = Question {
         robot: survey.robot,
         data: survey.data,
@@ -137,7 +147,7 @@ fn rivals(
         prior_weight: 1.0,
         open_world: *USUAL,
         without: &[],
-        own: &own,
+        declared: &declared_causes,
         beside_simulation: false,
         known: &[],
         seed: 0,

@@ -25,7 +25,7 @@ pub struct Question<'a> {
     /// Names that are not given: the cells of these causes stay and are `unknown`; of the base model, causes that are not fitted.
     pub without: &'a [String],
     /// Effects that the user declares: cells beside those of the library.
-    pub own: &'a [&'static DeclaredCause],
+    pub declared: &'a [&'static DeclaredCause],
     /// Whether the points stand beside an outside simulation: what moves them says nothing of the robot file.
     pub beside_simulation: bool,
     /// What other robots of the model say of cells; empty where nothing is known of any.

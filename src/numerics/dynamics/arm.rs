@@ -104,11 +104,11 @@ fn steiner(mass: f64, arm: &Vector3<f64>) -> Matrix3<f64> {
 fn joined(a: &Inertial, b: &Inertial) -> Inertial {
     let mass = a.mass + b.mass;
     let centre = ((a.centre.coords * a.mass + b.centre.coords * b.mass) / mass.max(1e-9)).into();
-    let of = |body: &Inertial| body.inertia + steiner(body.mass, &(body.centre - centre));
+    let of_body = |body: &Inertial| body.inertia + steiner(body.mass, &(body.centre - centre));
     Inertial {
         mass,
         centre,
-        inertia: of(a) + of(b),
+        inertia: of_body(a) + of_body(b),
     }
 }
 
@@ -141,10 +141,10 @@ impl DeclaredInertials {
             .collect();
         let mut theta = links.clone();
         if let Some(payload) = &arm.payload {
-            let own = numbers(payload, &point(last));
+            let load = numbers(payload, &point(last));
             theta[INERTIAL_NUMBERS * last..]
                 .iter_mut()
-                .zip(own)
+                .zip(load)
                 .for_each(|(sum, value)| *sum += value);
         }
         let tolerance = (0..bodies.len()).map(|link| {

@@ -5,7 +5,7 @@ use crate::error::counted;
 use crate::types::TorqueRecording;
 
 /// Rows lost in a row, at most; a longer gap ends a stretch.
-const MOST: usize = 5;
+const LIMIT: usize = 5;
 /// Steps before and after a long one that say whether rows are lost there or a row is stamped late.
 const AROUND: usize = 2;
 
@@ -117,16 +117,16 @@ fn weights(recording: &TorqueRecording, row: usize, share: f64, steps: f64) -> V
         vec![(row, 0.0), (row + 1, steps)]
     };
     let at = share * steps;
-    let weight = |own: f64| -> f64 {
+    let weight = |value: f64| -> f64 {
         nodes
             .iter()
-            .filter(|(_, other)| *other != own)
-            .map(|(_, other)| (at - other) / (own - other))
+            .filter(|(_, other)| *other != value)
+            .map(|(_, other)| (at - other) / (value - other))
             .product()
     };
     nodes
         .iter()
-        .map(|(row, own)| (*row, weight(*own)))
+        .map(|(row, value)| (*row, weight(*value)))
         .collect()
 }
 
@@ -144,7 +144,7 @@ fn lost(recording: &TorqueRecording, usual: f64) -> Vec<(usize, usize)> {
         let here = ((time[row + 1] - time[row]) / usual).round() - 1.0;
         let around = ((time[last] - time[first]) / usual).round() - (last - first) as f64;
         let count = here.min(around);
-        (count >= 1.0 && count <= MOST as f64).then_some((row, count as usize))
+        (count >= 1.0 && count <= LIMIT as f64).then_some((row, count as usize))
     };
     (0..time.len().saturating_sub(1))
         .filter_map(after)

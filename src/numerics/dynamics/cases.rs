@@ -308,7 +308,7 @@ fn a_payload_that_was_not_declared_is_found_with_its_mass() {
         !diagnosis
             .not_observable
             .iter()
-            .any(|said| said.contains("payload")),
+            .any(|remark| remark.contains("payload")),
         "{:?}",
         diagnosis.not_observable
     );
@@ -326,7 +326,7 @@ fn rows_that_are_lost_now_and_then_change_no_finding_and_a_remark_counts_them() 
     let whole = holed.clone();
     // Two rows of each 60: every stretch between would be too short to be filtered.
     let kept = |row: usize| row % 60 < 58;
-    let of = |values: &[f64], width: usize| -> Vec<f64> {
+    let of_values = |values: &[f64], width: usize| -> Vec<f64> {
         values
             .chunks_exact(width)
             .enumerate()
@@ -335,9 +335,9 @@ fn rows_that_are_lost_now_and_then_change_no_finding_and_a_remark_counts_them() 
             .collect()
     };
     (holed.time, holed.position, holed.torque) = (
-        of(&whole.time, 1),
-        of(&whole.position, 4),
-        of(&whole.torque, 4),
+        of_values(&whole.time, 1),
+        of_values(&whole.position, 4),
+        of_values(&whole.torque, 4),
     );
     holed.held_out = (0..whole.rows())
         .filter(|row| kept(*row))
@@ -351,7 +351,7 @@ fn rows_that_are_lost_now_and_then_change_no_finding_and_a_remark_counts_them() 
         diagnosis
             .remarks
             .iter()
-            .any(|said| said.contains("steps of the clock without a row")),
+            .any(|remark| remark.contains("steps of the clock without a row")),
         "{:?}",
         diagnosis.remarks
     );
@@ -451,7 +451,7 @@ fn masses_that_are_not_declared_are_identified_and_a_sentence_states_it() {
 #[test]
 fn a_recording_that_cannot_be_used_is_refused_with_its_reason() {
     let good = record(&arm(), 0.0, &|_| 0.0);
-    let said = |change: &dyn Fn(&mut TorqueRecording)| {
+    let refusal = |change: &dyn Fn(&mut TorqueRecording)| {
         let mut bad = good.clone();
         change(&mut bad);
         diagnose(&arm(), &bad, &TorqueQuestion::default(), &mut |_| ())
@@ -467,22 +467,22 @@ fn a_recording_that_cannot_be_used_is_refused_with_its_reason() {
         .fold(0.0, f64::min);
     let answers = [
         (
-            said(&|r| r.torque.iter_mut().for_each(|torque| *torque *= 1e3)),
+            refusal(&|r| r.torque.iter_mut().for_each(|torque| *torque *= 1e3)),
             "by 1,000?",
         ),
         (
-            said(&|r| r.torque.iter_mut().for_each(|torque| *torque *= 0.08)),
+            refusal(&|r| r.torque.iter_mut().for_each(|torque| *torque *= 0.08)),
             "map them as `current`",
         ),
         (
-            said(&|r| {
+            refusal(&|r| {
                 r.torque.iter_mut().for_each(|torque| *torque *= 12.0);
                 r.from_current = true;
             }),
             "map them as `torque`",
         ),
         (
-            said(&|r| {
+            refusal(&|r| {
                 r.position
                     .iter_mut()
                     .for_each(|angle| *angle = angle.to_degrees())
@@ -490,15 +490,15 @@ fn a_recording_that_cannot_be_used_is_refused_with_its_reason() {
             "degrees?",
         ),
         (
-            said(&|r| r.torque.chunks_exact_mut(4).for_each(|row| row.swap(1, 2))),
+            refusal(&|r| r.torque.chunks_exact_mut(4).for_each(|row| row.swap(1, 2))),
             "joint 2 and joint 3 look exchanged",
         ),
         (
-            said(&|r| r.time[700] = r.time[600]),
+            refusal(&|r| r.time[700] = r.time[600]),
             "row 701: the clock goes",
         ),
         (
-            said(&|r| {
+            refusal(&|r| {
                 r.torque
                     .iter_mut()
                     .skip(3)
@@ -508,7 +508,7 @@ fn a_recording_that_cannot_be_used_is_refused_with_its_reason() {
             "joint 4: torque is 1 in every row",
         ),
         (
-            said(&|r| {
+            refusal(&|r| {
                 r.torque
                     .iter_mut()
                     .skip(1)
@@ -518,11 +518,11 @@ fn a_recording_that_cannot_be_used_is_refused_with_its_reason() {
             "is cut off",
         ),
         (
-            said(&|r| r.position.iter_mut().for_each(|angle| *angle *= 1e-3)),
+            refusal(&|r| r.position.iter_mut().for_each(|angle| *angle *= 1e-3)),
             "hardly moves",
         ),
         (
-            said(&|r| r.torque[17] = f64::NAN),
+            refusal(&|r| r.torque[17] = f64::NAN),
             "row 5: not a finite number",
         ),
     ];

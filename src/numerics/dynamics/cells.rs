@@ -188,14 +188,14 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     /// Components in the covariance, with the noise that fits them or a stated one.
     pub(super) fn state(&self, components: &[TorqueComponent], kappa: Option<f64>) -> TorqueState {
         let all = &self.choice.problem.all;
-        let own = |own: &TorqueComponent| {
-            let columns = all.of(own.form);
-            let root = own.amplitude / (columns.len() as f64).sqrt();
+        let columns_of = |component: &TorqueComponent| {
+            let columns = all.of(component.form);
+            let root = component.amplitude / (columns.len() as f64).sqrt();
             columns
                 .map(|column| (column, self.unit[column] * root))
                 .collect::<Vec<_>>()
         };
-        let columns: Vec<(usize, f64)> = components.iter().flat_map(own).collect();
+        let columns: Vec<(usize, f64)> = components.iter().flat_map(columns_of).collect();
         let left: Vec<Rc<Vec<f64>>> = columns
             .iter()
             .map(|(column, _)| self.left_of(*column))
@@ -217,16 +217,19 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
 
     /// A form's products seen through the covariance.
     pub(super) fn seen(&self, number: usize, state: &TorqueState) -> FormProducts {
-        let own: Vec<usize> = self.choice.problem.all.of(number).collect();
+        let columns: Vec<usize> = self.choice.problem.all.of(number).collect();
         let left: Vec<Rc<Vec<f64>>> = state
             .columns
             .iter()
             .map(|(column, _)| self.left_of(*column))
             .collect();
-        let product = |a: usize, b: usize| left[a][own[b]] * state.columns[a].1 * self.unit[own[b]];
-        let across = state
-            .known
-            .solved(DMatrix::from_fn(state.columns.len(), own.len(), product));
+        let product =
+            |a: usize, b: usize| left[a][columns[b]] * state.columns[a].1 * self.unit[columns[b]];
+        let across = state.known.solved(DMatrix::from_fn(
+            state.columns.len(),
+            columns.len(),
+            product,
+        ));
         let (gram, along) = &self.forms[number];
         state.known.see((gram, along), &across, 0)
     }
@@ -307,22 +310,25 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         kappa: f64,
     ) -> CellPosterior {
         let state = self.state(&without(components, place), Some(kappa));
-        let own = components[place];
-        let cell = self.cell_of[&own.form];
+        let component = components[place];
+        let cell = self.cell_of[&component.form];
         let grid = self.cell(cell, &state);
         let prior = self.cells[cell].log_prior;
-        let of_itself = self.form(own.form, &state);
+        let of_itself = self.form(component.form, &state);
         let Some((log, amplitude)) = of_itself else {
             // One that the arm cannot have, whatever others of its cell would do.
             return CellPosterior {
                 log_odds: f64::NEG_INFINITY,
-                best: own,
+                best: component,
             };
         };
         let log = prior + log - self.log_count(cell);
         CellPosterior {
             log_odds: grid.map_or(log, |grid| grid.log_odds.max(log)),
-            best: TorqueComponent { amplitude, ..own },
+            best: TorqueComponent {
+                amplitude,
+                ..component
+            },
         }
     }
 
@@ -349,8 +355,8 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     pub(super) fn total(&self, components: &[TorqueComponent]) -> f64 {
         let state = self.state(components, Some(1.0)).known;
         let mut log = -state.log_determinant();
-        for own in components {
-            let cell = self.cell_of[&own.form];
+        for component in components {
+            let cell = self.cell_of[&component.form];
             log += self.cells[cell].log_prior - self.log_count(cell) - (AMPLITUDES as f64).ln();
         }
         log - 0.5 * (self.rows.freedom + *NU) * (*NU + state.rows.square).ln()
@@ -361,21 +367,21 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         'rounds: for _ in 0..*EXCHANGES {
             let kappa = self.state(&components, None).known.kappa;
             for place in 0..components.len() {
-                let own = components[place].form;
-                let rest = without(&components, place);
-                let state = self.state(&rest, Some(kappa));
+                let here = components[place].form;
+                let others = without(&components, place);
+                let state = self.state(&others, Some(kappa));
                 let stays = self.odds_of(&components, place, kappa).log_odds;
                 let may = |cell: &usize| {
                     let form = self.cells[*cell].forms[0];
-                    self.choice.compete(form, own)
+                    self.choice.compete(form, here)
                 };
                 let Some(best) = self.strongest((0..self.cells.len()).filter(may), &state) else {
                     continue;
                 };
-                let is_same = self.cell_of[&best.best.form] == self.cell_of[&own];
+                let is_same = self.cell_of[&best.best.form] == self.cell_of[&here];
                 let gain = if is_same {
                     // Another shape of the same cell: by itself, against the present one.
-                    let [one, other] = [best.best.form, own].map(|form| {
+                    let [one, other] = [best.best.form, here].map(|form| {
                         self.form(form, &state)
                             .map_or(f64::NEG_INFINITY, |found| found.0)
                     });
@@ -383,7 +389,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
                 } else {
                     best.log_odds - stays
                 };
-                let mut next = rest.clone();
+                let mut next = others.clone();
                 next.insert(place, best.best);
                 if gain <= *SWAPS || !self.choice.is_whole(&forms(&next)) {
                     continue;
@@ -431,13 +437,16 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     /// The odds of a component and of all that could stand in its place.
     pub(crate) fn odds_in_place(&self, components: &[TorqueComponent], form: usize) -> CellOdds {
         let kappa = self.state(components, None).known.kappa;
-        let Some(place) = components.iter().position(|own| own.form == form) else {
+        let Some(place) = components
+            .iter()
+            .position(|component| component.form == form)
+        else {
             return CellOdds {
-                own: 0.0,
+                log_odds: 0.0,
                 rivals: Vec::new(),
             };
         };
-        let own = self.odds_of(components, place, kappa).log_odds;
+        let log_odds = self.odds_of(components, place, kappa).log_odds;
         let state = self.state(&without(components, place), Some(kappa));
         let others = (0..self.cells.len()).filter(|cell| *cell != self.cell_of[&form]);
         let competing = others.filter(|cell| self.choice.compete(self.cells[*cell].forms[0], form));
@@ -449,7 +458,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             ))
         };
         CellOdds {
-            own,
+            log_odds,
             rivals: competing.filter_map(rival).collect(),
         }
     }
@@ -457,7 +466,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
 
 /// ln of posterior odds.
 pub(super) struct CellOdds {
-    pub(crate) own: f64,
+    pub(crate) log_odds: f64,
     /// Of other names and places.
     pub(crate) rivals: Vec<((&'static str, Place), f64)>,
 }
@@ -471,7 +480,7 @@ pub(super) fn without(components: &[TorqueComponent], place: usize) -> Vec<Torqu
         .iter()
         .enumerate()
         .filter(|(other, _)| *other != place)
-        .map(|(_, own)| *own)
+        .map(|(_, component)| *component)
         .collect()
 }
 

@@ -194,7 +194,7 @@ fn take_columns(
     problem: &mut TorqueProblem,
     base: &[(usize, [f64; INERTIAL_NUMBERS])],
     candidates: &[TorqueForm],
-    own: &TorqueModel,
+    identified: &TorqueModel,
     about: &TorqueModel,
 ) {
     let prior = problem.all.prior.first().copied().unwrap_or(0.0);
@@ -217,12 +217,12 @@ fn take_columns(
         problem.push(form.clone());
     }
     // Noise about its own masses: a payload of the other recording is none.
-    problem.theta.clone_from(&own.inertials);
-    problem.shift(own.latency);
+    problem.theta.clone_from(&identified.inertials);
+    problem.shift(identified.latency);
     let forms: Vec<usize> = (0..candidates.len()).collect();
     problem.noise = noise_of_fit(problem, &forms, NoiseMemory::Short).0;
     problem.theta.clone_from(&about.inertials);
-    problem.shift(own.latency);
+    problem.shift(identified.latency);
 }
 
 /// The numbers of a form.
@@ -293,7 +293,7 @@ fn change(
         return all;
     }
     let names = form.coefficient_names();
-    let of = |(place, (quantity, unit)): (usize, (String, &'static str))| {
+    let of_place = |(place, (quantity, unit)): (usize, (String, &'static str))| {
         let name = format!("{}.{}.{quantity}", form.cause.name, form.place.tag());
         number(
             name,
@@ -304,5 +304,5 @@ fn change(
             covariance[place * (count + 1)].max(0.0).sqrt(),
         )
     };
-    names.into_iter().enumerate().map(of).collect()
+    names.into_iter().enumerate().map(of_place).collect()
 }

@@ -251,7 +251,7 @@ fn joint_faults(
 /// A recorded velocity that is not that of the positions.
 fn velocity_fault(recording: &TorqueRecording, velocity: &[f64], joint: usize) -> Option<Fault> {
     let n = recording.joints;
-    let (mut product, mut own, mut other) = (0.0, 0.0, 0.0);
+    let (mut product, mut square, mut other) = (0.0, 0.0, 0.0);
     for row in 1..recording.rows() - 1 {
         let lasted = recording.time[row + 1] - recording.time[row - 1];
         let moved =
@@ -259,14 +259,15 @@ fn velocity_fault(recording: &TorqueRecording, velocity: &[f64], joint: usize) -
         if lasted > 0.0 && recording.trajectory[row + 1] == recording.trajectory[row - 1] {
             let (a, b) = (moved / lasted, velocity[row * n + joint]);
             product += a * b;
-            own += a * a;
+            square += a * a;
             other += b * b;
         }
     }
-    let correlation = product / (own * other).sqrt().max(f64::MIN_POSITIVE);
-    let ratio = (other / own.max(f64::MIN_POSITIVE)).sqrt();
-    let wrong =
-        own > 0.0 && other > 0.0 && (correlation < SAME_VELOCITY || !(0.2..5.0).contains(&ratio));
+    let correlation = product / (square * other).sqrt().max(f64::MIN_POSITIVE);
+    let ratio = (other / square.max(f64::MIN_POSITIVE)).sqrt();
+    let wrong = square > 0.0
+        && other > 0.0
+        && (correlation < SAME_VELOCITY || !(0.2..5.0).contains(&ratio));
     wrong.then(|| {
         fault(
             format!("joint {}", joint + 1),
@@ -379,11 +380,11 @@ impl TorqueExtremes {
 
     /// All of it, joint after joint.
     pub(crate) fn faults(&self) -> Vec<Fault> {
-        let of = |joint: usize| match self.constant(joint) {
+        let of_joint = |joint: usize| match self.constant(joint) {
             Some(constant) => vec![constant],
             None => self.saturated(joint).collect(),
         };
-        (0..self.joints.len()).flat_map(of).collect()
+        (0..self.joints.len()).flat_map(of_joint).collect()
     }
 }
 

@@ -75,7 +75,7 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -
         .copied()
         .max_by(|a, b| gravity_square[*a].total_cmp(&gravity_square[*b]));
     if let (Some(usual), Some(heaviest)) = (nearest(&mut ratios, 0.5), heaviest) {
-        let own = (measured_square[heaviest] / gravity_square[heaviest]).sqrt();
+        let ratio = (measured_square[heaviest] / gravity_square[heaviest]).sqrt();
         let share = |joint: &usize| products[*joint][*joint] / gravity_square[*joint];
         let wrong = |times: f64, most: f64| !(1.0 / most..=most).contains(&times.abs());
         let weighs = |joint: &&usize| {
@@ -91,11 +91,11 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -
             heavy().all(|joint| wrong(share(joint), *UNIT) && (share(joint).abs() > 1.0) == more)
         };
         let of_gravity = heavy().any(|joint| *joint == heaviest) && (beyond(true) || beyond(false));
-        if of_gravity || wrong(own, UNIT_RATIO) {
+        if of_gravity || wrong(ratio, UNIT_RATIO) {
             let times = if of_gravity {
                 share(&heaviest).abs()
             } else {
-                own
+                ratio
             };
             faults.push(Fault::new(
                 "torque",

@@ -108,7 +108,7 @@ const HARMONICS: f64 = 60.0;
 /// Hz, at least: joints swing faster than they are moved.
 const LEAST: f64 = 10.0;
 /// At most this share of the rate.
-const MOST: f64 = 0.1;
+const LARGEST: f64 = 0.1;
 /// s over which a velocity is taken: beyond the steps of encoders.
 const STEP: f64 = 0.02;
 
@@ -217,7 +217,7 @@ impl MotionPace {
         };
         let mut paces: Vec<f64> = self.joints.iter().map(|joint| often(joint.ended)).collect();
         let usual = nearest(&mut paces, 0.5).unwrap_or(0.0);
-        (HARMONICS * usual).clamp(LEAST, (MOST * rate).max(LEAST))
+        (HARMONICS * usual).clamp(LEAST, (LARGEST * rate).max(LEAST))
     }
 }
 

@@ -180,8 +180,8 @@ impl TorqueColumns {
     }
 
     fn rms(&self, column: usize, unit: impl Fn(usize) -> f64) -> f64 {
-        let own = &self.columns[column];
-        let of = |(joint, course): (&usize, &Vec<f64>)| {
+        let column_of = &self.columns[column];
+        let of_joint = |(joint, course): (&usize, &Vec<f64>)| {
             let unit = unit(*joint);
             course
                 .iter()
@@ -189,8 +189,12 @@ impl TorqueColumns {
                 .sum::<f64>()
                 / course.len().max(1) as f64
         };
-        let squares = own.joints.iter().zip(&own.courses).map(of);
-        (squares.sum::<f64>() / own.joints.len().max(1) as f64).sqrt()
+        let squares = column_of
+            .joints
+            .iter()
+            .zip(&column_of.courses)
+            .map(of_joint);
+        (squares.sum::<f64>() / column_of.joints.len().max(1) as f64).sqrt()
     }
 
     /// Columns of a form.
@@ -268,13 +272,13 @@ fn base_columns(scene: &DynamicScene, regressor: &ReducedRegressor) -> Base {
             .map(|value| value * value)
             .sum::<f64>()
     };
-    let of = |column: &TorqueColumn| {
+    let of_column = |column: &TorqueColumn| {
         if scene.declared.is_some() {
             1.0
         } else {
             UNKNOWN_BEFOREHAND * square(column)
         }
     };
-    let prior = columns.iter().map(of).collect();
+    let prior = columns.iter().map(of_column).collect();
     (changes, columns, prior)
 }

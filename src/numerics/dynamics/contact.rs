@@ -252,12 +252,12 @@ fn averaged(values: &[f64], width: usize) -> Vec<f64> {
     values
         .iter()
         .for_each(|value| sums.push(sums[sums.len() - 1] + value));
-    let of = |row: usize| {
+    let of_row = |row: usize| {
         let first = (row + 1)
             .saturating_sub(width - width / 2)
             .min(values.len());
         let last = (row + width / 2 + 1).min(values.len());
         (sums[last] - sums[first.min(last)]) / width as f64
     };
-    (0..values.len()).map(of).collect()
+    (0..values.len()).map(of_row).collect()
 }

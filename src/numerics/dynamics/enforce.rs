@@ -63,15 +63,15 @@ pub(super) fn nearest_bodies(theta: &[f64], covariance: &DMatrix<f64>) -> Option
     let back = to.lu();
     let theta = back.solve(&found)?.as_slice().to_vec();
     let moved = &found - &start;
-    let (own, vectors) = {
+    let (roots, vectors) = {
         let eigen = metric.symmetric_eigen();
         (eigen.eigenvalues, eigen.eigenvectors)
     };
-    let least = 1e-14 * own.max();
+    let least = 1e-14 * roots.max();
     let along = vectors.transpose() * moved;
     let cost = along
         .iter()
-        .zip(own.iter())
+        .zip(roots.iter())
         .filter(|(_, size)| **size > least)
         .map(|(value, size)| value * value / size)
         .sum();
@@ -227,21 +227,23 @@ pub(super) fn with_bodies(
             let Some(pivot) = pivots.iter().position(|one| *one == column) else {
                 continue;
             };
-            let mut own = shares.view_mut((INERTIAL_NUMBERS * link, pivot), (INERTIAL_NUMBERS, 1));
-            own.iter_mut()
+            let mut block =
+                shares.view_mut((INERTIAL_NUMBERS * link, pivot), (INERTIAL_NUMBERS, 1));
+            block
+                .iter_mut()
                 .zip(ten)
                 .for_each(|(sum, share)| *sum += share);
         }
     }
     let theta = problem.inertials(set, solution);
     let with = &covariance * shares.transpose();
-    let own = &shares * &with;
-    let found = nearest_bodies(&theta, &own)?;
+    let spread = &shares * &with;
+    let found = nearest_bodies(&theta, &spread)?;
     let moved = DVector::from_iterator(
         theta.len(),
         found.theta.iter().zip(&theta).map(|(new, old)| new - old),
     );
-    let change = with * solved(&own, &moved);
+    let change = with * solved(&spread, &moved);
     let solution = solution
         .iter()
         .zip(change.iter())
@@ -258,9 +260,13 @@ pub(super) fn with_bodies(
 
 /// What a matrix of numbers in many units takes to a vector; directions that it does not have are left out.
 fn solved(matrix: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
-    let scale = matrix
-        .diagonal()
-        .map(|own| if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 });
+    let scale = matrix.diagonal().map(|eigenvalue| {
+        if eigenvalue > 0.0 {
+            1.0 / eigenvalue.sqrt()
+        } else {
+            0.0
+        }
+    });
     let scaled = DMatrix::from_fn(right.len(), right.len(), |a, b| {
         scale[a] * matrix[(a, b)] * scale[b]
     });

@@ -125,9 +125,9 @@ impl TorqueSource for EvenSource<'_> {
     fn recorded(&self, rows: &[usize]) -> Result<Vec<usize>> {
         let (mut first, mut recorded) = (0, Vec::with_capacity(rows.len()));
         self.each(&mut |block, origin| {
-            let own = &rows[recorded.len()..];
-            let own = &own[..own.partition_point(|row| *row < first + block.rows())];
-            recorded.extend(own.iter().map(|row| origin[row - first]));
+            let tail = &rows[recorded.len()..];
+            let tail = &tail[..tail.partition_point(|row| *row < first + block.rows())];
+            recorded.extend(tail.iter().map(|row| origin[row - first]));
             first += block.rows();
             Ok(())
         })?;
@@ -176,7 +176,7 @@ impl ClockSteps {
             square
                 .iter()
                 .zip(&moved)
-                .map(|(own, of)| own / f64::max(*of, f64::MIN_POSITIVE))
+                .map(|(value, scale)| value / f64::max(*scale, f64::MIN_POSITIVE))
                 .sum()
         };
         Ok(Some(Self {

@@ -157,12 +157,12 @@ impl TorqueModel {
     }
 
     /// Value of a coefficient.
-    pub(super) fn coefficient(&self, of: &TermCourse) -> f64 {
-        let before: usize = self.terms[..of.term]
+    pub(super) fn coefficient(&self, course: &TermCourse) -> f64 {
+        let before: usize = self.terms[..course.term]
             .iter()
             .map(|term| term.coefficients.len())
             .sum();
-        self.terms[of.term].coefficients[of.coefficient - before]
+        self.terms[course.term].coefficients[course.coefficient - before]
     }
 
     /// The motion as causes see it.
@@ -211,7 +211,11 @@ impl TorqueModel {
             .iter()
             .map(|term| term.coefficients.as_slice())
             .collect();
-        let linear = known + coefficients.iter().map(|own| own.len()).sum::<usize>();
+        let linear = known
+            + coefficients
+                .iter()
+                .map(|values| values.len())
+                .sum::<usize>();
         let width = linear
             + forms
                 .iter()
@@ -239,9 +243,10 @@ impl TorqueModel {
                 split(&motion, n),
                 &scene.arm.gravity,
                 |joint, link, numbers| {
-                    let own = places[INERTIAL_NUMBERS * link..].iter().zip(numbers);
-                    let own = own.filter_map(|(place, value)| place.map(|place| (place, *value)));
-                    slopes[joint].extend(own.filter(|(_, value)| *value != 0.0));
+                    let placed = places[INERTIAL_NUMBERS * link..].iter().zip(numbers);
+                    let placed =
+                        placed.filter_map(|(place, value)| place.map(|place| (place, *value)));
+                    slopes[joint].extend(placed.filter(|(_, value)| *value != 0.0));
                 },
             );
             for (joint, slope) in slopes.iter_mut().enumerate() {
@@ -257,16 +262,16 @@ impl TorqueModel {
                         .map(|(number, _, course)| (*number, course[row])),
                 );
                 let row_of = |(a, first): &(usize, f64)| {
-                    let own = &self.covariance[a * width..(a + 1) * width];
+                    let covariance_row = &self.covariance[a * width..(a + 1) * width];
                     first
                         * slope
                             .iter()
-                            .map(|(b, second)| own[*b] * second)
+                            .map(|(b, second)| covariance_row[*b] * second)
                             .sum::<f64>()
                 };
-                let own = slope.iter().map(row_of).sum::<f64>().max(0.0)
+                let own_variance = slope.iter().map(row_of).sum::<f64>().max(0.0)
                     + self.range[joint].misfit.powi(2);
-                let variance = own + self.beyond(forms, scene, &by_joint[joint], row);
+                let variance = own_variance + self.beyond(forms, scene, &by_joint[joint], row);
                 all.push(COVERAGE * variance.sqrt());
             }
         }
@@ -277,9 +282,9 @@ impl TorqueModel {
     fn places(&self) -> Vec<Option<usize>> {
         let mut next = 0;
         let place = |known: &bool| {
-            let own = known.then_some(next);
+            let next_column = known.then_some(next);
             next += usize::from(*known);
-            own
+            next_column
         };
         self.identified.iter().map(place).collect()
     }
@@ -289,11 +294,11 @@ impl TorqueModel {
         &self,
         forms: &[TorqueForm],
         scene: &DynamicScene,
-        own: &[&TermCourse],
+        courses: &[&TermCourse],
         row: usize,
     ) -> f64 {
         let mut variance = 0.0;
-        for term in own.chunk_by(|a, b| a.term == b.term) {
+        for term in courses.chunk_by(|a, b| a.term == b.term) {
             let form = &forms[term[0].term];
             let joint = form.joint();
             let share = self.range[joint].beyond(form, scene, joint, row);

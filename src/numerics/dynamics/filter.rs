@@ -306,12 +306,12 @@ impl Resampler {
         // Weights of the rows before, here, next and after it.
         let mut weights = [0.0, start, end, 0.0];
         // Slopes times the step: of what this step alone has, and of what the neighbouring one has.
-        let mut slope = |weight: f64, own: [usize; 2], neighbour: Option<(f64, [usize; 2])>| {
+        let mut slope = |weight: f64, columns: [usize; 2], neighbour: Option<(f64, [usize; 2])>| {
             let (mine, other) = neighbour.map_or((1.0, 0.0), |(length, _)| {
                 (length / (step + length), step / (step + length))
             });
-            weights[own[0]] -= weight * mine;
-            weights[own[1]] += weight * mine;
+            weights[columns[0]] -= weight * mine;
+            weights[columns[1]] += weight * mine;
             if let Some((length, places)) = neighbour {
                 weights[places[0]] -= weight * other * step / length;
                 weights[places[1]] += weight * other * step / length;

@@ -73,12 +73,12 @@ fn finding(
 ) -> TorqueFinding {
     let (problem, form) = (choice.problem, choice.form(number));
     let fitted = fitted(choice, set, number, solution, (uncertain, slopes));
-    let rest: Vec<usize> = set
+    let others: Vec<usize> = set
         .iter()
         .copied()
         .filter(|other| *other != number)
         .collect();
-    let without = choice.base.with(&rest);
+    let without = choice.base.with(&others);
     let loss = sweep.loss(number, solution);
     let rank = loss.rank.max(1) as f64;
     let delta_bic = loss.square - rank * (choice.weighted.rows as f64).ln();
@@ -113,16 +113,16 @@ fn finding(
 }
 
 /// A finding with its probabilities: those of its name, of all that could stand in its place, and of nothing.
-fn weighed(mut finding: TorqueFinding, CellOdds { own, rivals }: CellOdds) -> TorqueFinding {
+fn weighed(mut finding: TorqueFinding, CellOdds { log_odds, rivals }: CellOdds) -> TorqueFinding {
     let whole = log_sum(
         &rivals
             .iter()
             .map(|(_, log)| *log)
-            .chain([own, 0.0])
+            .chain([log_odds, 0.0])
             .collect::<Vec<_>>(),
     );
     let share = |log: f64| (1.0 - *MISLED) * (log - whole).exp();
-    let mut here = share(own);
+    let mut here = share(log_odds);
     for ((effect, place), log) in rivals {
         let probability = share(log);
         here += if place == finding.place {
@@ -134,7 +134,7 @@ fn weighed(mut finding: TorqueFinding, CellOdds { own, rivals }: CellOdds) -> To
             finding.rivals.push(RivalCause {
                 effect,
                 place,
-                delta_bic: 2.0 * (own - log),
+                delta_bic: 2.0 * (log_odds - log),
                 probability,
             });
         }
@@ -143,7 +143,7 @@ fn weighed(mut finding: TorqueFinding, CellOdds { own, rivals }: CellOdds) -> To
         .rivals
         .sort_by(|a, b| b.probability.total_cmp(&a.probability));
     finding.probabilities = Probabilities {
-        name: share(own),
+        name: share(log_odds),
         place: here,
         none: share(0.0) + *MISLED,
     };
@@ -157,8 +157,9 @@ fn with_shapes(
     sigma: impl Fn(usize) -> Option<f64>,
 ) -> Vec<TorqueParameter> {
     for span in form.shape_numbers() {
-        let own = all.iter_mut().find(|parameter| parameter.name == span.name);
-        own.into_iter()
+        let entry = all.iter_mut().find(|parameter| parameter.name == span.name);
+        entry
+            .into_iter()
             .for_each(|parameter| parameter.sigma = sigma(span.index));
     }
     all
@@ -209,7 +210,7 @@ pub(super) fn plain_finding(
     weighed(
         finding,
         CellOdds {
-            own: 0.5 * gain,
+            log_odds: 0.5 * gain,
             rivals: Vec::new(),
         },
     )
@@ -300,11 +301,11 @@ pub(super) fn fitted(
     }
     let columns: Vec<usize> = choice.problem.all.of(number).collect();
     let covariance = uncertain.covariance(&columns);
-    let of = |(place, column): (usize, &usize)| FittedNumber {
+    let of_place = |(place, column): (usize, &usize)| FittedNumber {
         value: value_of(solution, *column),
         sigma: covariance[place * (columns.len() + 1)].max(0.0).sqrt(),
     };
-    columns.iter().enumerate().map(of).collect()
+    columns.iter().enumerate().map(of_place).collect()
 }
 
 /// The number of viscous or Coulomb friction in a set that is of the line; none where speed enters by its first power.
@@ -319,15 +320,19 @@ fn number_of_line(
     if !form.cause.brakes {
         return None;
     }
-    let is_power = |own: &TorqueForm| {
-        own.place == form.place && own.cause.name == VISCOUS && !own.shape_numbers().is_empty()
+    let is_power = |is_of_power: &TorqueForm| {
+        is_of_power.place == form.place
+            && is_of_power.cause.name == VISCOUS
+            && !is_of_power.shape_numbers().is_empty()
     };
-    let power = *set.iter().find(|own| is_power(choice.form(**own)))?;
+    let power = *set
+        .iter()
+        .find(|candidate| is_power(choice.form(**candidate)))?;
     let exponent = choice.form(power).shape[0];
     let fastest = largest(&choice.problem.scene.velocity[form.joint()]);
     let (column, is_viscous) = (all.of(power).start, form.cause.name == VISCOUS);
-    let of = |exponent: f64| line_of_power(exponent, fastest)[usize::from(is_viscous)];
-    let mut along = vec![(column, of(exponent))];
+    let of_exponent = |exponent: f64| line_of_power(exponent, fastest)[usize::from(is_viscous)];
+    let mut along = vec![(column, of_exponent(exponent))];
     if !is_viscous {
         along.push((all.of(number).start, 1.0));
     }
@@ -339,7 +344,12 @@ fn number_of_line(
         .iter()
         .map(|(column, share)| share * value_of(solution, *column))
         .sum();
-    along.extend(shape.map(|(_, own)| (*own, value_of(solution, column) * slope(exponent, of))));
+    along.extend(shape.map(|(_, term)| {
+        (
+            *term,
+            value_of(solution, column) * slope(exponent, of_exponent),
+        )
+    }));
     let columns: Vec<usize> = along.iter().map(|(column, _)| *column).collect();
     let covariance = uncertain.covariance(&columns);
     let pairs = (0..along.len()).flat_map(|a| (0..along.len()).map(move |b| (a, b)));

@@ -22,10 +22,10 @@ impl FrictionLaw<'_> {
     /// Nm at a velocity whose sign turns over a width.
     fn torque(&self, form: &TorqueForm, velocity: f64, width: f64) -> f64 {
         let sign = (velocity / width).tanh();
-        let of = |(column, value): (usize, &f64)| {
+        let of_column = |(column, value): (usize, &f64)| {
             form.friction(column, velocity, sign).unwrap_or(0.0) * value
         };
-        self.coefficients.iter().enumerate().map(of).sum()
+        self.coefficients.iter().enumerate().map(of_column).sum()
     }
 }
 
@@ -45,8 +45,8 @@ impl TorqueModel {
     /// None where speed enters by its first power. Fails where no cause has a term's name.
     pub fn friction_line(&self, joint: usize) -> Result<Option<[FittedNumber; 2]>> {
         let (laws, numbers) = self.laws()?;
-        let of = |name: &str| laws[joint].iter().find(|law| law.form.cause.name == name);
-        let Some(power) = of(VISCOUS).filter(|law| {
+        let of_name = |name: &str| laws[joint].iter().find(|law| law.form.cause.name == name);
+        let Some(power) = of_name(VISCOUS).filter(|law| {
             law.form
                 .shape
                 .first()
@@ -62,7 +62,7 @@ impl TorqueModel {
         let whole = self.covariance.len() == numbers * numbers;
         Ok(Some([1, 0].map(|part| {
             let of_line = |exponent: f64| line_of_power(exponent, fastest)[part];
-            let coulomb = of(COULOMB).filter(|_| part == 0);
+            let coulomb = of_name(COULOMB).filter(|_| part == 0);
             let mut along = vec![(power.first, of_line(exponent))];
             along.extend(
                 power
@@ -97,14 +97,14 @@ impl TorqueModel {
         let mut laws: Vec<Vec<FrictionLaw>> = (0..self.joints()).map(|_| Vec::new()).collect();
         for term in &self.terms {
             let form = term.form()?;
-            let (own, numbers) = (first, shapes);
+            let (count, numbers) = (first, shapes);
             first += term.coefficients.len();
             shapes += form.shape_numbers().len();
             if let (Place::Joint(joint), Some(_)) = (form.place, form.friction(0, 0.0, 0.0)) {
                 laws[joint].push(FrictionLaw {
                     form,
                     coefficients: &term.coefficients,
-                    first: own,
+                    first: count,
                     shapes: numbers,
                 });
             }
@@ -149,9 +149,11 @@ impl TorqueModel {
             )];
             for law in laws {
                 let sign = (velocity / range.sign_width).tanh();
-                let of = |column: usize| law.form.friction(column, *velocity, sign).unwrap_or(0.0);
+                let of_column =
+                    |column: usize| law.form.friction(column, *velocity, sign).unwrap_or(0.0);
                 along.extend(
-                    (0..law.coefficients.len()).map(|column| (law.first + column, of(column))),
+                    (0..law.coefficients.len())
+                        .map(|column| (law.first + column, of_column(column))),
                 );
                 along.extend(
                     law.form

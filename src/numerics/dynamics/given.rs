@@ -24,23 +24,23 @@ pub(super) fn answers(solved: &mut SolvedTorques, given: &[GivenCell]) -> Vec<Ce
     let kappa = state.known.kappa;
     let taken: Vec<usize> = components
         .iter()
-        .map(|own| table.cell_of[&own.form])
+        .map(|component| table.cell_of[&component.form])
         .collect();
     let open = || (0..table.cells.len()).filter(|cell| !taken.contains(cell));
     for cell in open() {
         out.extend(table.answer(cell, &state, None));
     }
-    for (place, own) in components.iter().enumerate() {
+    for (place, component) in components.iter().enumerate() {
         let state = table.state(&without(&components, place), Some(kappa));
         let key = table.key(taken[place]);
-        let left_out = table.kept.contains(&own.form).then_some(key.as_str());
+        let left_out = table.kept.contains(&component.form).then_some(key.as_str());
         let mut shapes = table.answer(taken[place], &state, left_out);
         shapes.retain(|answer| answer.shape.is_some());
         out.extend(shapes);
         out.extend(table.in_place(&components, place, (&state, kappa), left_out));
         if left_out.is_some() {
             let rivals =
-                open().filter(|cell| choice.compete(table.cells[*cell].forms[0], own.form));
+                open().filter(|cell| choice.compete(table.cells[*cell].forms[0], component.form));
             for cell in rivals {
                 out.extend(table.answer(cell, &state, left_out));
             }
@@ -52,17 +52,17 @@ pub(super) fn answers(solved: &mut SolvedTorques, given: &[GivenCell]) -> Vec<Ce
 impl TorqueTable<'_, '_> {
     /// Key of a cell: its name and place, and of what has no name what it depends on.
     fn key(&self, cell: usize) -> String {
-        let own = &self.cells[cell];
-        let form = self.choice.form(own.forms[0]);
+        let cell_of = &self.cells[cell];
+        let form = self.choice.form(cell_of.forms[0]);
         let kind = form.cause.coefficients.first();
-        let kind = kind.filter(|_| own.name == UNKNOWN);
+        let kind = kind.filter(|_| cell_of.name == UNKNOWN);
         let kind = kind.map_or(String::new(), |(kind, _)| format!(":{kind}"));
         let [one, two] = (form.cause.cell)(form);
         let with = match [one, two] {
             [0, 0] => String::new(),
             _ => format!(":{},{}", one + 1, two + 1),
         };
-        format!("{}@{}{kind}{with}", own.name, own.place)
+        format!("{}@{}{kind}{with}", cell_of.name, cell_of.place)
     }
 
     /// Nm of a form's torque at unit amplitude.
@@ -86,15 +86,15 @@ impl TorqueTable<'_, '_> {
                 let shape = one.shape.as_deref();
                 shape.is_none_or(|shape| shape_key(self.choice.form(form)) == shape)
             };
-            let place = components
-                .iter()
-                .position(|own| self.cell_of[&own.form] == cell && is_shape(own.form));
+            let place = components.iter().position(|component| {
+                self.cell_of[&component.form] == cell && is_shape(component.form)
+            });
             let place = place.or_else(|| {
                 let state = self.state(&components, None);
                 let mut shapes = self.shapes(cell, &state);
-                shapes.retain(|(_, own)| is_shape(own.form));
-                let (_, own) = shapes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-                components.push(own);
+                shapes.retain(|(_, component)| is_shape(component.form));
+                let (_, component) = shapes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+                components.push(component);
                 Some(components.len() - 1)
             });
             if let Some(place) = place {
@@ -111,24 +111,28 @@ impl TorqueTable<'_, '_> {
         let Some(posterior) = self.cell(cell, state) else {
             return Vec::new();
         };
-        let own = &self.cells[cell];
+        let cell_of = &self.cells[cell];
         let best = posterior.best;
         let whole = CellAnswer {
             left_out: left_out.map(Into::into),
             cell: self.key(cell),
             shape: None,
-            effect: own.name,
-            place: own.place,
+            effect: cell_of.name,
+            place: cell_of.place,
             follows: follows(self.choice.form(best.form)),
-            log: posterior.log_odds - own.log_prior,
-            log_prior: own.log_prior,
+            log: posterior.log_odds - cell_of.log_prior,
+            log_prior: cell_of.log_prior,
             size: best.amplitude * self.newton_metres(best.form),
             sigma: None,
             log_ratio: None,
         };
         // Forms of each shape, and ln of the evidence of those that may be.
         let mut shapes: BTreeMap<String, (usize, Vec<f64>)> = BTreeMap::new();
-        for form in own.forms.iter().filter(|form| **form < self.choice.open) {
+        for form in cell_of
+            .forms
+            .iter()
+            .filter(|form| **form < self.choice.open)
+        {
             let key = shape_key(self.choice.form(*form));
             shapes.entry(key).or_default().0 += 1;
         }
@@ -161,12 +165,12 @@ impl TorqueTable<'_, '_> {
         (state, kappa): (&TorqueState, f64),
         left_out: Option<&str>,
     ) -> Option<CellAnswer> {
-        let own = components[place];
-        let cell = self.cell_of[&own.form];
-        let (gram, along) = self.seen(own.form, state);
-        let prior = vec![own.amplitude.powi(2) / along.len() as f64; along.len()];
+        let component = components[place];
+        let cell = self.cell_of[&component.form];
+        let (gram, along) = self.seen(component.form, state);
+        let prior = vec![component.amplitude.powi(2) / along.len() as f64; along.len()];
         let found = rms_size(&gram, &along, &prior)?;
-        let unit = self.newton_metres(own.form);
+        let unit = self.newton_metres(component.form);
         let TorqueCell {
             name,
             place: at,
@@ -179,7 +183,7 @@ impl TorqueTable<'_, '_> {
             shape: None,
             effect: name,
             place: at,
-            follows: follows(self.choice.form(own.form)),
+            follows: follows(self.choice.form(component.form)),
             log: (self.odds_of(components, place, kappa).log_odds - log_prior).max(*LEAST_EVIDENCE),
             log_prior,
             size: found.size * unit,

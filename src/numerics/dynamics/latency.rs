@@ -93,7 +93,7 @@ pub(super) fn latency(problem: &TorqueProblem) -> Option<Latency> {
 }
 
 /// s: most on either side, and the first step.
-const MOST: f64 = 0.024;
+const LATEST: f64 = 0.024;
 const STEP: f64 = 0.004;
 /// s: steps about the best of the grid.
 const STEPS: [f64; 4] = [0.002, 0.001, 0.0005, 0.00025];
@@ -141,7 +141,7 @@ pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
             *best = (left, lead, moved);
         }
     };
-    let steps = (MOST / STEP).round() as i32;
+    let steps = (LATEST / STEP).round() as i32;
     (-steps..=steps)
         .filter(|step| *step != 0)
         .for_each(|step| try_lead(STEP * f64::from(step), 0.0, &mut best));
@@ -164,7 +164,7 @@ pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
         .zip(&left)
         .map(|(unmoved, left)| rows * (unmoved - left))
         .collect();
-    let is_one = (LEAST_LEAD..MOST - SAME).contains(&best.1.abs())
+    let is_one = (LEAST_LEAD..LATEST - SAME).contains(&best.1.abs())
         && gains.iter().sum::<f64>() > LEAD_GAIN
         && agree(gains.iter().copied(), JOINT_LEAD_GAIN);
     let found = if is_one { best.1 } else { 0.0 };
@@ -175,8 +175,8 @@ pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
         problem.scene.turn_over(width);
         if is_one {
             // A solver lets friction turn over an acceleration: the lighter a joint, the wider.
-            let own = joint_sign_widths(problem);
-            problem.scene.turn_each_over(own);
+            let widths = joint_sign_widths(problem);
+            problem.scene.turn_each_over(widths);
         }
     }
     is_new

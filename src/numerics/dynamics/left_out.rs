@@ -114,10 +114,11 @@ pub(super) fn unconfirmed(
 
 /// What rows that are left out gain by a form of a set, less what they would if it were right, whitened squares.
 fn short(choice: &CauseChoice, folds: &[Fold], set: &[usize], form: usize) -> f64 {
-    let rest: Vec<usize> = set.iter().copied().filter(|other| *other != form).collect();
+    let others: Vec<usize> = set.iter().copied().filter(|other| *other != form).collect();
     let (mut gain, mut expected) = (0.0, 0.0);
     for fold in folds {
-        let [Some(whole), Some(without)] = [set, &rest].map(|set| fold.errors(choice.problem, set))
+        let [Some(whole), Some(without)] =
+            [set, &others].map(|set| fold.errors(choice.problem, set))
         else {
             continue;
         };

@@ -30,19 +30,19 @@ impl TorqueModel {
         let point = |link: usize| arm.points[link].coords;
         let mut theta = self.inertials.clone();
         if let Some(payload) = &arm.payload {
-            let own = numbers(payload, &point(n - 1));
+            let load = numbers(payload, &point(n - 1));
             theta[INERTIAL_NUMBERS * (n - 1)..]
                 .iter_mut()
-                .zip(own)
+                .zip(load)
                 .for_each(|(sum, value)| *sum -= value);
         }
         let mut links = Vec::with_capacity(n);
         for link in (0..n).rev() {
             let whole = self.is_whole(link) && theta[INERTIAL_NUMBERS * link] > 0.0;
-            let (before, own) = theta.split_at_mut(INERTIAL_NUMBERS * link);
+            let (before, body) = theta.split_at_mut(INERTIAL_NUMBERS * link);
             if !whole {
-                let moved = masses[link] - own[0];
-                own[0] = masses[link];
+                let moved = masses[link] - body[0];
+                body[0] = masses[link];
                 if let Some(first) = link.checked_sub(1) {
                     // A point mass at this joint, seen from the joint before.
                     let there = Inertial {
@@ -57,7 +57,7 @@ impl TorqueModel {
                         .for_each(|(sum, value)| *sum -= value);
                 }
             }
-            let ten = &own[..INERTIAL_NUMBERS];
+            let ten = &body[..INERTIAL_NUMBERS];
             let centre = Point3::from(point(link) + Vector3::new(ten[1], ten[2], ten[3]) / ten[0]);
             links.push(LinkFromTorques {
                 mass: ten[0],
@@ -227,7 +227,7 @@ mod consistency_tests {
     #[test]
     fn numbers_of_no_body_become_those_of_the_nearest_with_the_same_mass_and_centre() {
         // A rod along x of 3 kg whose moment about its own axis is negative.
-        let (body, own) = nearest(&[
+        let (body, is_consistent) = nearest(&[
             3.0,
             0.3,
             0.0,
@@ -240,7 +240,9 @@ mod consistency_tests {
             0.05 + 0.03,
         ]);
         assert!(
-            (body.centre - Point3::new(0.1, 0.0, 0.0)).norm() < 1e-15 && body.mass == 3.0 && !own
+            (body.centre - Point3::new(0.1, 0.0, 0.0)).norm() < 1e-15
+                && body.mass == 3.0
+                && !is_consistent
         );
         let [xx, yy, zz] = [0, 1, 2].map(|k| body.inertia[(k, k)]);
         assert!(
@@ -248,9 +250,11 @@ mod consistency_tests {
             "{}",
             body.inertia
         );
-        let (right, own) = nearest(&[3.0, 0.3, 0.0, 0.0, 0.01, 0.0, 0.0, 0.08, 0.0, 0.08]);
+        let (right, is_consistent) =
+            nearest(&[3.0, 0.3, 0.0, 0.0, 0.01, 0.0, 0.0, 0.08, 0.0, 0.08]);
         assert!(
-            own && (right.inertia[(0, 0)] - 0.01).abs() < 1e-12
+            is_consistent
+                && (right.inertia[(0, 0)] - 0.01).abs() < 1e-12
                 && (right.inertia[(1, 1)] - 0.05).abs() < 1e-12
         );
     }
@@ -354,13 +358,16 @@ mod tests {
             })
             .collect();
         for position in [[0.0; 4], [0.3, -0.7, 1.1, 0.4], [-1.0, 0.9, -0.5, 2.0]] {
-            let (own, truth) = (
+            let (estimated, truth) = (
                 gravity(&arm, &found, &position),
                 gravity(&arm, &bodies, &position),
             );
             assert!(
-                own.iter().zip(&truth).all(|(a, b)| (a - b).abs() < 1e-10),
-                "{own:?} {truth:?}"
+                estimated
+                    .iter()
+                    .zip(&truth)
+                    .all(|(a, b)| (a - b).abs() < 1e-10),
+                "{estimated:?} {truth:?}"
             );
         }
     }

@@ -84,12 +84,19 @@ impl TorqueModel {
 
     /// The beginning of the names of a term's numbers.
     pub fn prefix(&self, term: usize) -> String {
-        let own = &self.terms[term];
-        let alike = |other: &&TorqueTerm| other.effect == own.effect && other.place == own.place;
+        let model_term = &self.terms[term];
+        let alike = |other: &&TorqueTerm| {
+            other.effect == model_term.effect && other.place == model_term.place
+        };
         let before = self.terms[..term].iter().filter(alike).count();
         match before {
-            0 => format!("{}.{}", own.effect, own.place.tag()),
-            _ => format!("{}.{}.{}", own.effect, own.place.tag(), before + 1),
+            0 => format!("{}.{}", model_term.effect, model_term.place.tag()),
+            _ => format!(
+                "{}.{}.{}",
+                model_term.effect,
+                model_term.place.tag(),
+                before + 1
+            ),
         }
     }
 
@@ -153,20 +160,20 @@ impl TorqueModel {
             .map(|number| (inertial_name(number), inertial_unit(number)))
             .collect();
         for (place, term) in self.terms.iter().enumerate() {
-            let own = self.prefix(place);
+            let prefix = self.prefix(place);
             names.extend(
                 term.names()?
                     .into_iter()
-                    .map(|(quantity, unit)| (format!("{own}.{quantity}"), unit)),
+                    .map(|(quantity, unit)| (format!("{prefix}.{quantity}"), unit)),
             );
         }
         for (place, term) in self.terms.iter().enumerate() {
-            let own = self.prefix(place);
+            let prefix = self.prefix(place);
             names.extend(
                 term.form()?
                     .shape_numbers()
                     .iter()
-                    .map(|span| (format!("{own}.{}", span.name), span.unit)),
+                    .map(|span| (format!("{prefix}.{}", span.name), span.unit)),
             );
         }
         names.push((SIGN_WIDTH.into(), "rad/s"));
@@ -257,11 +264,11 @@ fn certainty(
     } else {
         held
     };
-    let of = |joint: usize| {
+    let of_joint = |joint: usize| {
         let course = |(place, column): (usize, &usize)| {
             let column = &problem.all.columns[*column];
-            let own = column.joints.iter().position(|one| *one == joint)?;
-            Some((place, column.courses[own].as_slice()))
+            let at = column.joints.iter().position(|one| *one == joint)?;
+            Some((place, column.courses[at].as_slice()))
         };
         let acting: Vec<(usize, &[f64])> = columns.iter().enumerate().filter_map(course).collect();
         let variance = |row: &usize| {
@@ -294,7 +301,7 @@ fn certainty(
             .collect();
         [misfit.sqrt(), nearest(&mut usual, 0.5).unwrap_or(0.0)]
     };
-    (0..problem.joints()).map(of).collect()
+    (0..problem.joints()).map(of_joint).collect()
 }
 
 fn range(problem: &TorqueProblem, joint: usize, misfit: f64, usual: f64) -> JointRange {
@@ -332,15 +339,15 @@ fn covariance(
         let first = columns.len();
         columns.extend(changes.iter().map(|(column, _)| *column));
         for number in 0..INERTIAL_NUMBERS {
-            let own = changes
+            let shared = changes
                 .iter()
                 .enumerate()
                 .map(|(place, (_, ten))| (first + place, ten[number]));
-            let own: Vec<(usize, f64)> = own.filter(|(_, share)| *share != 0.0).collect();
-            let known = problem.scene.declared.is_some() || !own.is_empty();
+            let shared: Vec<(usize, f64)> = shared.filter(|(_, share)| *share != 0.0).collect();
+            let known = problem.scene.declared.is_some() || !shared.is_empty();
             identified.push(known);
             if known {
-                sums.push(own);
+                sums.push(shared);
             }
         }
     }

@@ -160,12 +160,12 @@ impl InverseDynamics {
         let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
         for joint in (0..self.joints()).rev() {
             let link = &self.links[joint];
-            let own = wrench_of(
+            let wrench = wrench_of(
                 link,
                 &theta[INERTIAL_NUMBERS * joint..INERTIAL_NUMBERS * (joint + 1)],
             );
-            force += own.force;
-            moment += own.moment;
+            force += wrench.force;
+            moment += wrench.moment;
             torque[joint] = self.axes[joint].dot(if self.prismatic[joint] {
                 &force
             } else {

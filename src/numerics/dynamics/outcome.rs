@@ -210,7 +210,7 @@ fn statement(verdict: VerdictKind, found: &[TorqueFinding], nrmse: [f64; 2], ove
 /// What is left of fitted rows.
 fn leftover(problem: &TorqueProblem, residual: &[Vec<f64>]) -> Vec<TorqueLeftover> {
     let runs = problem.runs(false);
-    let of = |(joint, course): (usize, &Vec<f64>)| {
+    let of_joint = |(joint, course): (usize, &Vec<f64>)| {
         let noise = JointNoise::of(course, &runs, 0.0, NoiseMemory::Short);
         let lasting = noise.autocorrelation();
         let signature = (lasting > LASTING)
@@ -221,7 +221,7 @@ fn leftover(problem: &TorqueProblem, residual: &[Vec<f64>]) -> Vec<TorqueLeftove
             signature,
         }
     };
-    residual.iter().enumerate().map(of).collect()
+    residual.iter().enumerate().map(of_joint).collect()
 }
 
 fn courses(problem: &TorqueProblem, first: &[Vec<f64>], last: &[Vec<f64>]) -> TorqueCourses {

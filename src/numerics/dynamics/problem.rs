@@ -146,7 +146,7 @@ impl<'a> TorqueProblem<'a> {
     ) -> Vec<(usize, [f64; INERTIAL_NUMBERS])> {
         let base = self.all.base_changes.iter().enumerate();
         let mut changes: Vec<_> = base
-            .filter(|(_, (own, _))| *own == link)
+            .filter(|(_, (body, _))| *body == link)
             .map(|(column, (_, ten))| (column, *ten))
             .collect();
         for number in set {
@@ -159,7 +159,7 @@ impl<'a> TorqueProblem<'a> {
             let columns = self.all.of(*number).zip(of_form.into_iter().flatten());
             changes.extend(
                 columns
-                    .filter(|(_, (own, _))| *own == link)
+                    .filter(|(_, (body, _))| *body == link)
                     .map(|(column, (_, ten))| (column, ten)),
             );
         }
@@ -170,10 +170,10 @@ impl<'a> TorqueProblem<'a> {
     pub(crate) fn inertials(&self, set: &[usize], solution: &[(usize, f64)]) -> Vec<f64> {
         let mut theta = self.theta.clone();
         for link in 0..self.joints() {
-            let own = &mut theta[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)];
+            let body = &mut theta[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)];
             for (column, ten) in self.inertial_changes(set, link) {
                 let value = value_of(solution, column);
-                own.iter_mut()
+                body.iter_mut()
                     .zip(ten)
                     .for_each(|(sum, part)| *sum += value * part);
             }
@@ -250,7 +250,7 @@ impl<'a> TorqueProblem<'a> {
 
     /// Measured minus rigid torque with torques that come `latency` s late.
     pub(crate) fn difference(&self, latency: f64) -> Vec<Vec<f64>> {
-        let of = |joint: usize| {
+        let of_joint = |joint: usize| {
             let mut course = self.torque_at(joint, latency);
             let rigid = self.regressor.torque(joint, &self.theta);
             course
@@ -259,7 +259,7 @@ impl<'a> TorqueProblem<'a> {
                 .for_each(|(value, rigid)| *value -= rigid);
             course
         };
-        (0..self.torque.len()).map(of).collect()
+        (0..self.torque.len()).map(of_joint).collect()
     }
 
     /// Takes a latency.
@@ -271,13 +271,13 @@ impl<'a> TorqueProblem<'a> {
     /// Courses of the regressor at each joint in some judged rows.
     pub(crate) fn base_courses(&self, rows: &[usize]) -> Vec<Vec<Vec<f64>>> {
         let numbers = 10 * self.joints();
-        let of = |joint: usize| {
+        let of_joint = |joint: usize| {
             let courses = (10 * joint..numbers).map(|number| self.regressor.course(joint, number));
             let used = courses.filter(|course| course.iter().any(|value| *value != 0.0));
             used.map(|course| rows.iter().map(|row| course[*row]).collect())
                 .collect()
         };
-        (0..self.joints()).map(of).collect()
+        (0..self.joints()).map(of_joint).collect()
     }
 
     /// Whether a judged row lies in an event.

@@ -15,7 +15,7 @@ const SETTLING: f64 = 0.3;
 /// Judged rows a second over the cut-off.
 const RATE_OVER_CUTOFF: f64 = 2.5;
 /// Judged rows at most: of longer recordings fewer a second.
-const MOST: usize = 4000;
+const LIMIT: usize = 4000;
 /// Rows that a block of a long stretch holds, its margins apart.
 const BLOCK: usize = 1 << 14;
 
@@ -41,7 +41,7 @@ impl Reduction {
     pub(crate) fn new(clock: &RecordingClock, cutoff: f64) -> Self {
         let recorded: usize = clock.stretches.iter().map(Range::len).sum();
         let every = ((clock.rate / (RATE_OVER_CUTOFF * cutoff)).round() as usize)
-            .max(recorded.div_ceil(MOST))
+            .max(recorded.div_ceil(LIMIT))
             .max(1);
         let settling = (SETTLING * clock.rate) as usize;
         let (mut rows, mut runs) = (Vec::new(), Vec::new());
@@ -67,11 +67,11 @@ impl Reduction {
     /// Filters whole courses (as long as the recording) in place.
     pub(crate) fn filter(&self, courses: &mut [Vec<f64>]) {
         for stretch in &self.stretches {
-            let mut own: Vec<&mut [f64]> = courses
+            let mut slices: Vec<&mut [f64]> = courses
                 .iter_mut()
                 .map(|course| &mut course[stretch.clone()])
                 .collect();
-            self.filter.apply(&mut own);
+            self.filter.apply(&mut slices);
         }
     }
 
@@ -169,13 +169,13 @@ impl ReducedRegressor {
             }
         });
         let mut courses = courses.into_iter();
-        let of = |joint: usize| {
+        let of_joint = |joint: usize| {
             let before = (0..INERTIAL_NUMBERS * joint).map(|_| Vec::new());
             before
                 .chain(courses.by_ref().take(INERTIAL_NUMBERS * (n - joint)))
                 .collect()
         };
-        Self((0..n).map(of).collect())
+        Self((0..n).map(of_joint).collect())
     }
 
     /// Number of joints.
@@ -192,9 +192,14 @@ impl ReducedRegressor {
     pub(crate) fn column(&self, link: usize, ten: &[f64; INERTIAL_NUMBERS]) -> TorqueColumn {
         let joints: Vec<usize> = (0..=link).collect();
         let course = |joint: &usize| {
-            let own = &self.0[*joint][INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)];
-            let mut sum = vec![0.0; own[0].len()];
-            for (course, share) in own.iter().zip(ten).filter(|(_, share)| **share != 0.0) {
+            let sensitivities =
+                &self.0[*joint][INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)];
+            let mut sum = vec![0.0; sensitivities[0].len()];
+            for (course, share) in sensitivities
+                .iter()
+                .zip(ten)
+                .filter(|(_, share)| **share != 0.0)
+            {
                 sum.iter_mut()
                     .zip(course)
                     .for_each(|(sum, value)| *sum += share * value);

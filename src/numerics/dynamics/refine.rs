@@ -79,11 +79,11 @@ fn try_grid(
         let number = push(problem, weighted, trial);
         trials.push(number);
     }
-    let rest: Vec<usize> = (0..set.len())
+    let others: Vec<usize> = (0..set.len())
         .filter(|other| *other != place)
         .map(|other| set[other])
         .collect();
-    let sweep = SweptColumns::base(&problem.all, weighted).with(&rest);
+    let sweep = SweptColumns::base(&problem.all, weighted).with(&others);
     let gain = |number: usize| sweep.gain(number);
     let best = trials
         .iter()

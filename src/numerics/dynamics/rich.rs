@@ -93,7 +93,7 @@ pub(super) fn noise_left(problem: &TorqueProblem, set: &[usize]) -> Vec<JointNoi
 /// Noise of a residual without the rows that stand far out: a push is none.
 pub(super) fn noise_apart(problem: &TorqueProblem, residual: &[Vec<f64>]) -> Vec<JointNoise> {
     let runs = problem.runs(false);
-    let of = |course: &Vec<f64>| {
+    let of_course = |course: &Vec<f64>| {
         let rows = runs.iter().flat_map(|run| &course[run.clone()]);
         let mut sizes: Vec<f64> = rows.map(|value| value.abs()).collect();
         let most = *FAR * MEDIAN * nearest(&mut sizes, 0.5).unwrap_or(0.0);
@@ -106,7 +106,7 @@ pub(super) fn noise_apart(problem: &TorqueProblem, residual: &[Vec<f64>]) -> Vec
         let near: Vec<Range<usize>> = runs.iter().flat_map(near).collect();
         JointNoise::of(course, &near, 0.0, NoiseMemory::Short)
     };
-    residual.iter().map(of).collect()
+    residual.iter().map(of_course).collect()
 }
 
 /// Half of the mean square, half of the median: neither outliers alone nor their absence decides.

@@ -53,8 +53,8 @@ impl ShapeSlopes {
         for (number, form) in set.iter().zip(&forms) {
             let spans = form.shape_numbers().into_iter();
             numbers.extend(spans.map(|span| {
-                let of = ShapeNumber::Of(*number, span.index);
-                (of, form.shape[span.index])
+                let shape_number = ShapeNumber::Of(*number, span.index);
+                (shape_number, form.shape[span.index])
             }));
         }
         numbers.push((ShapeNumber::SignWidth, problem.scene.sign_width));
@@ -128,11 +128,11 @@ pub(super) fn planned_slopes(
                 form.cause.of_sign && form.acts_on(scene.joints()).contains(&joint)
             })
         };
-        let own: Vec<_> = acting().collect();
+        let active: Vec<_> = acting().collect();
         let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|share| {
             scene.sign_width = share * width;
             let mut sum = vec![0.0; scene.rows()];
-            for (form, values) in &own {
+            for (form, values) in &active {
                 sum.iter_mut()
                     .zip(torque_at(form, values, scene, joint))
                     .for_each(|(sum, value)| *sum += value);
@@ -146,8 +146,8 @@ pub(super) fn planned_slopes(
 }
 
 /// The slope of a function of a shape number.
-pub(super) fn slope(size: f64, of: impl Fn(f64) -> f64) -> f64 {
-    (of(size * (1.0 + STEP)) - of(size * (1.0 - STEP))) / (2.0 * STEP * size)
+pub(super) fn slope(size: f64, function: impl Fn(f64) -> f64) -> f64 {
+    (function(size * (1.0 + STEP)) - function(size * (1.0 - STEP))) / (2.0 * STEP * size)
 }
 
 /// Nm, of a form with its coefficients at a joint.
@@ -188,13 +188,13 @@ pub(super) fn sign_width(problem: &mut TorqueProblem) -> f64 {
 /// The best of each joint by itself, rad/s.
 pub(super) fn joint_sign_widths(problem: &mut TorqueProblem) -> Vec<f64> {
     let fit = FrictionFit::new(problem);
-    let of = |joint: usize| {
+    let of_joint = |joint: usize| {
         best_width(&mut |width| {
             problem.scene.turn_one_over(joint, width);
             fit.left_at(problem, joint)
         })
     };
-    (0..fit.joints.len()).map(of).collect()
+    (0..fit.joints.len()).map(of_joint).collect()
 }
 
 /// The width that leaves least.
@@ -238,7 +238,7 @@ impl FrictionFit {
     pub(crate) fn new(problem: &TorqueProblem) -> Self {
         let rows: Vec<usize> = problem.runs(false).iter().flat_map(Clone::clone).collect();
         let velocities = problem.reduction.reduce(problem.scene.velocity.clone());
-        let of = |(joint, inertial): (usize, Vec<Vec<f64>>)| {
+        let of_joint = |(joint, inertial): (usize, Vec<Vec<f64>>)| {
             let velocity = rows.iter().map(|row| velocities[joint][*row]).collect();
             let columns: Vec<Vec<f64>> = inertial
                 .into_iter()
@@ -250,7 +250,7 @@ impl FrictionFit {
             .base_courses(&rows)
             .into_iter()
             .enumerate()
-            .map(of)
+            .map(of_joint)
             .collect();
         let mut fit = Self { rows, joints };
         fit.take(&problem.measured);
@@ -293,10 +293,10 @@ impl FrictionFit {
     }
 
     fn left_by(&self, fit: &JointFit, sign: &[f64]) -> f64 {
-        let own = DVector::from_iterator(self.rows.len(), self.rows.iter().map(|row| sign[*row]));
-        let apart = fit.apart(&own);
+        let signs = DVector::from_iterator(self.rows.len(), self.rows.iter().map(|row| sign[*row]));
+        let apart = fit.apart(&signs);
         let gain = apart.dot(&fit.left).powi(2)
-            / (apart.norm_squared() + RIDGE * own.norm_squared() + f64::MIN_POSITIVE);
+            / (apart.norm_squared() + RIDGE * signs.norm_squared() + f64::MIN_POSITIVE);
         ((fit.left.norm_squared() - gain) / self.rows.len().max(1) as f64 + f64::MIN_POSITIVE).ln()
     }
 }

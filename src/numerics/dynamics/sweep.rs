@@ -79,7 +79,7 @@ impl<'a> SweptColumns<'a> {
     /// Takes a column.
     pub(crate) fn take(&mut self, column: usize) {
         let prior = self.prior(column);
-        let own = self.weighted.gram[column][column] + prior;
+        let diagonal = self.weighted.gram[column][column] + prior;
         let mut row = self.weighted.gram[column].clone();
         for known in &self.rows {
             let share = known[column];
@@ -90,7 +90,7 @@ impl<'a> SweptColumns<'a> {
             }
         }
         let left = row[column] + prior;
-        if left <= REDUNDANT * own || own <= 0.0 {
+        if left <= REDUNDANT * diagonal || diagonal <= 0.0 {
             return;
         }
         let root = left.sqrt();
@@ -178,8 +178,10 @@ impl<'a> SweptColumns<'a> {
 
     /// What a form of the set gains in addition to the others.
     pub(crate) fn loss(&self, form: usize, solution: &[(usize, f64)]) -> Gain {
-        let of = |column: usize| solution.iter().find(|(pivot, _)| *pivot == column).copied();
-        let (columns, values): (Vec<usize>, Vec<f64>) = self.all.of(form).filter_map(of).unzip();
+        let of_column =
+            |column: usize| solution.iter().find(|(pivot, _)| *pivot == column).copied();
+        let (columns, values): (Vec<usize>, Vec<f64>) =
+            self.all.of(form).filter_map(of_column).unzip();
         let covariance =
             DMatrix::from_row_slice(columns.len(), columns.len(), &self.covariance(&columns));
         let values = DVector::from_vec(values);
@@ -273,22 +275,24 @@ impl StackedColumns {
         };
         let mut all = TorqueColumns::empty();
         let mut white = Vec::new();
-        let own = &problems[1].all;
-        all.base = (0..shared).fold(own.base, |end, form| end.max(own.of(form).end));
+        let other_columns = &problems[1].all;
+        all.base = (0..shared).fold(other_columns.base, |end, form| {
+            end.max(other_columns.of(form).end)
+        });
         for number in 0..all.base {
             let both = |whitened: bool| {
-                let of = |which: usize| {
+                let of_which = |which: usize| {
                     let column = &problems[which].all.columns[number];
                     let white = || weighings[which].column(column);
                     counted(which, if whitened { white() } else { column.clone() })
                 };
-                let [first, second] = [of(0), of(1)];
+                let [first, second] = [of_which(0), of_which(1)];
                 TorqueColumn {
                     joints: [first.joints, second.joints].concat(),
                     courses: [first.courses, second.courses].concat(),
                 }
             };
-            let prior = if number < own.base {
+            let prior = if number < other_columns.base {
                 problems[0].all.prior[number]
             } else {
                 0.0
@@ -298,8 +302,12 @@ impl StackedColumns {
             all.prior[number] = prior;
         }
         let payload = payload(&problems[1]).into_iter();
-        let forms = (0..own.forms.len())
-            .map(|form| (own.forms[form].clone(), own.columns[own.of(form)].to_vec()));
+        let forms = (0..other_columns.forms.len()).map(|form| {
+            (
+                other_columns.forms[form].clone(),
+                other_columns.columns[other_columns.of(form)].to_vec(),
+            )
+        });
         for (form, columns) in payload.chain(forms) {
             white.extend(
                 columns
@@ -365,7 +373,10 @@ impl StackedColumns {
             loop {
                 let now = self.fit(&set);
                 let solution = now.solution();
-                let idle = |form: &usize| now.loss(*form, &solution).square < self.penalty(*form);
+                // Not by rounding alone: what is removed so would be added again, for ever.
+                let idle = |form: &usize| {
+                    now.loss(*form, &solution).square < (1.0 - 1e-6) * self.penalty(*form)
+                };
                 let Some(place) = set.iter().position(idle) else {
                     break;
                 };

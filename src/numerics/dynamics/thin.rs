@@ -321,7 +321,7 @@ impl RecordingSurvey {
                 fastest
                     .iter_mut()
                     .zip(&pace.fastest)
-                    .for_each(|(most, own)| *most = most.max(*own));
+                    .for_each(|(most, value)| *most = most.max(*value));
                 usual.push(pace.usual);
             }
             Ok(())

@@ -270,11 +270,13 @@ impl TorqueRecording {
     /// Appends rows of a recording with the same columns.
     pub(super) fn extend(&mut self, other: &Self, rows: Range<usize>) {
         let wide = rows.start * self.joints..rows.end * self.joints;
-        let both = |own: &mut Option<Vec<f64>>, other: &Option<Vec<f64>>, rows: Range<usize>| {
-            own.iter_mut()
-                .zip(other)
-                .for_each(|(own, other)| own.extend_from_slice(&other[rows.clone()]));
-        };
+        let both =
+            |extended: &mut Option<Vec<f64>>, other: &Option<Vec<f64>>, rows: Range<usize>| {
+                extended
+                    .iter_mut()
+                    .zip(other)
+                    .for_each(|(values, other)| values.extend_from_slice(&other[rows.clone()]));
+            };
         self.time.extend_from_slice(&other.time[rows.clone()]);
         self.position
             .extend_from_slice(&other.position[wide.clone()]);

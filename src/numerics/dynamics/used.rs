@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::types::{TorqueRecording, TorqueSource};
 
 /// Rows that are used as they were recorded; of longer recordings about so many are kept, however long they are.
-const MOST: usize = 1 << 17;
+const LIMIT: usize = 1 << 17;
 
 /// Checked rows with their clock.
 pub(super) struct UsedRecording {
@@ -29,7 +29,7 @@ impl UsedRecording {
         source: &dyn TorqueSource,
         cutoff: Option<f64>,
     ) -> Result<Self> {
-        Self::within(arm, source, cutoff, MOST)
+        Self::within(arm, source, cutoff, LIMIT)
     }
 
     /// The same with room for another number of rows.
@@ -235,7 +235,7 @@ mod tests {
 
     #[test]
     fn spans_are_left_out_evenly_and_gaps_are_seen_where_they_were() {
-        let plan = ThinningPlan::new(10_000_000, 500.0, 10.0, MOST);
+        let plan = ThinningPlan::new(10_000_000, 500.0, 10.0, LIMIT);
         assert_eq!((plan.every, plan.spans), (5, [306, 20]));
         let mut recording = long();
         recording.time[30_001..]
@@ -248,11 +248,11 @@ mod tests {
         let used = UsedRecording::within(&arm(), &Blocks(lost, 4000), None, 10_000).unwrap();
         assert_eq!(used.clock.stretches.len(), 2);
         assert_eq!(used.origin[used.clock.stretches[1].start], 30_001);
-        let said = used.remarks.join("; ");
+        let remarks = used.remarks.join("; ");
         assert!(
-            said.contains("row 30002: the clock jumps by 0.501 s")
-                && said.contains("3 steps of the clock"),
-            "{said}"
+            remarks.contains("row 30002: the clock jumps by 0.501 s")
+                && remarks.contains("3 steps of the clock"),
+            "{remarks}"
         );
         assert!((used.recording.time.last().unwrap() - 40.5).abs() < 0.005);
     }

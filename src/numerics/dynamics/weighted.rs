@@ -106,7 +106,7 @@ impl WeightedColumns {
 
     /// Adds the inner products of a joint.
     fn take_joint(&mut self, joint: usize, chosen: &[usize]) {
-        let own: Vec<(usize, &[f64])> = chosen
+        let courses: Vec<(usize, &[f64])> = chosen
             .iter()
             .filter_map(|number| {
                 let column = &self.columns[*number];
@@ -115,8 +115,10 @@ impl WeightedColumns {
             })
             .collect();
         let measured = &self.measured[joint];
-        let rows = Mat::from_fn(measured.len(), own.len(), |row, column| own[column].1[row]);
-        let mut products = Mat::<f64>::zeros(own.len(), own.len());
+        let rows = Mat::from_fn(measured.len(), courses.len(), |row, column| {
+            courses[column].1[row]
+        });
+        let mut products = Mat::<f64>::zeros(courses.len(), courses.len());
         matmul(
             products.as_mut(),
             Accum::Replace,
@@ -125,10 +127,11 @@ impl WeightedColumns {
             1.0,
             Par::Seq,
         );
-        for (a, (number, course)) in own.iter().enumerate() {
+        for (a, (number, course)) in courses.iter().enumerate() {
             self.right[*number] += dot(course, measured);
             let row = &mut self.gram[*number];
-            own.iter()
+            courses
+                .iter()
                 .enumerate()
                 .for_each(|(b, (other, _))| row[*other] += products[(b, a)]);
         }
@@ -204,7 +207,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four sums at once: one would wait for itself.
     let mut sums = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4
+    let remainder: f64 = a4
         .remainder()
         .iter()
         .zip(b4.remainder())
@@ -215,7 +218,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
             sums[lane] += x[lane] * y[lane];
         }
     }
-    sums.iter().sum::<f64>() + rest
+    sums.iter().sum::<f64>() + remainder
 }
 
 /// How many rows before a row remembers, at most.

@@ -154,8 +154,8 @@ impl Basis {
             Self::Cosines { low, high, .. } => departure(k + 1, off / (high - low)),
             Self::Series { low, high, .. } => departure(k, off / (high - low)),
             Self::Curve { low, high, weights } => {
-                let of = |(k, weight): (usize, &f64)| weight * departure(k, off / (high - low));
-                let squares = weights.iter().enumerate().map(|one| of(one).powi(2));
+                let of_k = |(k, weight): (usize, &f64)| weight * departure(k, off / (high - low));
+                let squares = weights.iter().enumerate().map(|one| of_k(one).powi(2));
                 squares.sum::<f64>().sqrt()
             }
             // Sine and cosine together are their size whatever the phase.

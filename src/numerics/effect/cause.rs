@@ -111,7 +111,7 @@ impl Cause {
     /// What a mechanic is told of a finding, without its size at the tool.
     pub fn sentence(&self, summary: &Summary) -> String {
         match self.motion.as_ref().and_then(|motion| motion.sentence) {
-            Some(own) => own(summary),
+            Some(says) => says(summary),
             None => sentence::of(self, summary),
         }
     }
@@ -127,7 +127,7 @@ impl Cause {
         let of_speed = form
             .variables()
             .iter()
-            .all(|of| matches!(of, Variable::Speed | Variable::Velocity { .. }));
+            .all(|variable| matches!(variable, Variable::Speed | Variable::Velocity { .. }));
         let turns = !matches!(form.place(), Place::Joint(joint) if !robot.is_revolute(joint));
         self.hidden.filter(|_| of_speed && turns).map(|size| size())
     }

@@ -84,7 +84,11 @@ pub trait Placed: Send + Sync {
     fn sizes(&self, robot: &RobotModel, state: &ArmState) -> Vec<Option<f64>> {
         self.variables()
             .into_iter()
-            .map(|of| of.value(0, robot, state).filter(|_| of.is_single()))
+            .map(|variable| {
+                variable
+                    .value(0, robot, state)
+                    .filter(|_| variable.is_single())
+            })
             .collect()
     }
     /// The same with its laws held at the ends of what the fitted rows have of its variables, in their order, and of two of them together; none
@@ -102,10 +106,10 @@ pub trait Placed: Send + Sync {
         within: &[Option<[f64; 2]>],
         out: &mut BeyondRange,
     ) -> Option<Variable> {
-        let (of, share) = self.most_beyond(robot, state, within)?;
+        let (variable, share) = self.most_beyond(robot, state, within)?;
         self.deflect(robot, state, p, &mut out.motions);
         out.close(share * self.doubt());
-        Some(of)
+        Some(variable)
     }
     /// The variable that a row takes furthest beyond its fitted range, and the share of that, at most 1; none inside.
     fn most_beyond(
@@ -119,8 +123,9 @@ pub trait Placed: Send + Sync {
             .into_iter()
             .zip(self.sizes(robot, state))
             .zip(within);
-        let shares =
-            sizes.filter_map(|((of, size), range)| Some((of, of.share_beyond(size?, (*range)?))));
+        let shares = sizes.filter_map(|((variable, size), range)| {
+            Some((variable, variable.share_beyond(size?, (*range)?)))
+        });
         shares
             .filter(|(_, share)| *share > 0.0)
             .max_by(|a, b| a.1.total_cmp(&b.1))
@@ -229,14 +234,14 @@ impl Form {
     pub fn follows(&self, place: Place) -> &'static str {
         self.variables()
             .first()
-            .map_or("constant", |of| of.kind(place))
+            .map_or("constant", |variable| variable.kind(place))
     }
 
     /// Whether it changes slowly from row to row, whatever the arm does.
     pub fn follows_time(&self) -> bool {
-        self.variables().into_iter().any(|of| {
+        self.variables().into_iter().any(|variable| {
             matches!(
-                of,
+                variable,
                 Variable::Time | Variable::Temperature | Variable::Lagging { .. }
             )
         })

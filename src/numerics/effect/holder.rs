@@ -14,7 +14,7 @@ fn stepped(form: &Form, joints: usize) -> Option<f64> {
         .term()
         .filter(|_| last || form.name() == names::TOOL_SHIFT)?
         .law();
-    match (law.first.of, law.first.basis) {
+    match (law.first.variable, law.first.basis) {
         (Variable::Time, Basis::After { at }) => Some(at),
         _ => None,
     }

@@ -70,9 +70,9 @@ fn sentence(summary: &Summary) -> String {
     let weight = format!("by up to {largest} arcsec where its links stretch out level");
     // By a stiffness of its own.
     match summary.wordless(names::JOINT_COMPLIANCE).first() {
-        Some(own) => format!(
+        Some(estimate) => format!(
             "{place} winds up under its load by {:.3e} {}, and under its own weight, which the robot file does not give, {weight}",
-            own.value, own.unit
+            estimate.value, estimate.unit
         ),
         None => format!(
             "{place} winds up under gravity, {weight}; its stiffness cannot be separated from the links' weight, which the robot file does \

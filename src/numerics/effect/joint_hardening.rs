@@ -146,8 +146,8 @@ impl BentWindup {
     fn bend(&self, torque: f64) -> (f64, f64) {
         match self.law {
             HardeningLaw::Saturating { at_nm } => {
-                let rest = 1.0 + torque.abs() / at_nm;
-                (torque / rest, 1.0 / (rest * rest))
+                let share_of = 1.0 + torque.abs() / at_nm;
+                (torque / share_of, 1.0 / (share_of * share_of))
             }
             HardeningLaw::SoftZone { at_nm } => {
                 let t = libm::tanh(torque / at_nm);
@@ -205,7 +205,7 @@ impl Placed for BentWindup {
         within: &[Option<[f64; 2]>],
         out: &mut BeyondRange,
     ) -> Option<Variable> {
-        let (of, share) = self.most_beyond(robot, state, within)?;
+        let (variable, share) = self.most_beyond(robot, state, within)?;
         let (torque, [low, high]) = (
             state.torque()[self.joint],
             within.first().copied().flatten()?,
@@ -224,7 +224,7 @@ impl Placed for BentWindup {
             1.0,
         );
         add(end, share);
-        Some(of)
+        Some(variable)
     }
 
     fn needs_torque(&self) -> bool {

@@ -11,7 +11,7 @@ const FURTHER: f64 = 0.5;
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Factor {
     /// What they are functions of.
-    pub of: Variable,
+    pub variable: Variable,
     /// Which functions of it.
     pub basis: Basis,
     /// What the fitted rows have of the variable (SI): curves hold their values at its ends, other functions half of it beyond. None while
@@ -22,15 +22,15 @@ pub struct Factor {
 
 impl PartialEq for Factor {
     fn eq(&self, other: &Self) -> bool {
-        (self.of, self.basis) == (other.of, other.basis)
+        (self.variable, self.basis) == (other.variable, other.basis)
     }
 }
 
 impl Factor {
     /// Functions of a variable, wherever it is.
-    pub(crate) const fn new(of: Variable, basis: Basis) -> Self {
+    pub(crate) const fn new(variable: Variable, basis: Basis) -> Self {
         Self {
-            of,
+            variable,
             basis,
             within: None,
         }
@@ -38,7 +38,7 @@ impl Factor {
 
     /// The same, fitted to rows of this range; a variable of several numbers has none.
     pub(crate) fn held_within(self, [low, high]: [f64; 2]) -> Self {
-        let held = self.of.components() == 1 && low <= high;
+        let held = self.variable.components() == 1 && low <= high;
         Self {
             within: held.then_some([low, high]),
             ..self
@@ -64,7 +64,7 @@ impl Factor {
         state: &ArmState,
         nearest: Option<f64>,
     ) -> Option<(f64, f64)> {
-        let ([low, high], u) = (self.within?, self.of.value(0, robot, state)?);
+        let ([low, high], u) = (self.within?, self.variable.value(0, robot, state)?);
         let off = nearest.map_or((low - u).max(u - high).max(0.0), |nearest| {
             (u - nearest).abs()
         });
@@ -107,7 +107,7 @@ impl Factor {
 
     /// How many functions it has.
     pub(crate) fn count(&self) -> usize {
-        self.of.components() * self.basis.count()
+        self.variable.components() * self.basis.count()
     }
 
     /// The values of its functions in a row, those at `nearest` where that is given.
@@ -118,8 +118,8 @@ impl Factor {
         nearest: Option<f64>,
         each: &mut dyn FnMut(usize, f64),
     ) {
-        for component in 0..self.of.components() {
-            if let Some(u) = self.of.value(component, robot, state) {
+        for component in 0..self.variable.components() {
+            if let Some(u) = self.variable.value(component, robot, state) {
                 let u = nearest.unwrap_or_else(|| self.held(u));
                 // Long after the recording a function without a limit counts for nothing.
                 let mut counted = |k: usize, value: f64| {
@@ -212,9 +212,9 @@ pub(super) type Departures = Vec<Vec<(usize, f64)>>;
 
 impl Law {
     /// Functions of one variable.
-    pub const fn new(of: Variable, basis: Basis) -> Self {
+    pub const fn new(variable: Variable, basis: Basis) -> Self {
         Self {
-            first: Factor::new(of, basis),
+            first: Factor::new(variable, basis),
             times: None,
             seen: None,
         }
@@ -226,9 +226,9 @@ impl Law {
     }
 
     /// Multiplied by functions of another variable.
-    pub const fn times(self, of: Variable, basis: Basis) -> Self {
+    pub const fn times(self, variable: Variable, basis: Basis) -> Self {
         Self {
-            times: Some(Factor::new(of, basis)),
+            times: Some(Factor::new(variable, basis)),
             ..self
         }
     }
@@ -245,9 +245,9 @@ impl Law {
     }
 
     /// With another first variable.
-    pub(crate) fn by(self, of: Variable) -> Self {
+    pub(crate) fn by(self, variable: Variable) -> Self {
         Self {
-            first: Factor::new(of, self.first.basis),
+            first: Factor::new(variable, self.first.basis),
             ..self
         }
     }
@@ -283,7 +283,7 @@ impl Law {
     /// The nearest values of both variables that the fitted rows have together; none where they have those of the row.
     fn nearest(&self, robot: &RobotModel, state: &ArmState) -> Option<[f64; 2]> {
         let (seen, times) = (self.seen?, self.times.as_ref()?);
-        let values = [&self.first, times].map(|factor| factor.of.value(0, robot, state));
+        let values = [&self.first, times].map(|factor| factor.variable.value(0, robot, state));
         let [Some(u), Some(v)] = values else {
             return None;
         };
@@ -306,7 +306,7 @@ impl Law {
 
     /// What it depends on.
     pub fn variables(&self) -> Vec<Variable> {
-        self.factors().map(|factor| factor.of).collect()
+        self.factors().map(|factor| factor.variable).collect()
     }
 
     /// In a row beyond the fitted range of a variable: that variable, and what the law may be off, groups of (function, by how much) that
@@ -322,14 +322,18 @@ impl Law {
         let Some(times) = &self.times else {
             let (off, _) = first?;
             return Some((
-                self.first.of,
+                self.first.variable,
                 off.into_iter().enumerate().map(|one| vec![one]).collect(),
             ));
         };
         let second = times.off(robot, state, of_times);
         let share = |off: &Option<(Vec<f64>, f64)>| off.as_ref().map_or(0.0, |(_, share)| *share);
         let (a, b) = (share(&first), share(&second));
-        let most = if a >= b { self.first.of } else { times.of };
+        let most = if a >= b {
+            self.first.variable
+        } else {
+            times.variable
+        };
         let inner = times.count();
         let mut groups = Vec::new();
         for (i, off) in first.into_iter().flat_map(|(off, _)| off).enumerate() {
@@ -470,20 +474,20 @@ links:
             (Variable::Time, [0.0, 1000.0], |u| (0.0, [0.0, 0.0, u])),
             (Variable::Range, [2.0, 4.0], |u| (0.0, [u - 2.0, 0.0, 0.0])),
         ];
-        for (of, within, row) in variables {
+        for (variable, within, row) in variables {
             let span = within[1] - within[0];
             for (basis, further) in [(curve(within), 0.0), (line(within), FURTHER)] {
-                let factor = Factor::new(of, basis).held_within(within);
+                let factor = Factor::new(variable, basis).held_within(within);
                 let see = |u: f64| {
-                    let (angle, rest) = row(u);
-                    at(&factor, angle, rest)
+                    let (angle, others) = row(u);
+                    at(&factor, angle, others)
                 };
-                assert_eq!(see(within[0] + 0.3 * span).1, 0.0, "{of}");
+                assert_eq!(see(within[0] + 0.3 * span).1, 0.0, "{variable}");
                 let end = see(within[1] + further * span);
                 let (far, share) = see(within[1] + 0.8 * span);
-                assert!((far - end.0).abs() < 1e-9, "{of}: {far} {}", end.0);
-                assert!((share - 0.8).abs() < 1e-9, "{of}: {share}");
-                assert_eq!(see(within[1] + 5.0 * span).1, 1.0, "{of}");
+                assert!((far - end.0).abs() < 1e-9, "{variable}: {far} {}", end.0);
+                assert!((share - 0.8).abs() < 1e-9, "{variable}: {share}");
+                assert_eq!(see(within[1] + 5.0 * span).1, 1.0, "{variable}");
             }
         }
     }

@@ -46,7 +46,7 @@ pub struct Limit {
     /// SI.
     pub(crate) most: f64,
     /// Of what more is not possible.
-    pub(crate) of: &'static str,
+    pub(crate) subject: &'static str,
     /// Why a number below zero is not possible; `None` where it is.
     pub(crate) negative: Option<&'static str>,
 }
@@ -191,7 +191,7 @@ impl LawRow {
     /// Whether a term is one of its laws.
     pub(super) fn is(&self, term: &Term) -> bool {
         let law = term.law();
-        let times = law.times.map(|factor| Times::of(factor.of));
+        let times = law.times.map(|factor| Times::of(factor.variable));
         self.at.is(term.motion()) && self.follows.is(law.first) && times == self.times.map(Some)
     }
 
@@ -227,7 +227,7 @@ impl LawRow {
             (_, Follows::Warmth(kinds)) => {
                 let kind = kinds
                     .iter()
-                    .find(|kind| kind.is(term.law().first.of, term.basis()));
+                    .find(|kind| kind.is(term.law().first.variable, term.basis()));
                 vec![named(kind.map_or("", |kind| kind.number()).into())]
             }
             _ => vec![named(self.number.into())],
@@ -256,7 +256,7 @@ impl LawRow {
         let Some(order) = orders::order(term.basis()) else {
             return String::new();
         };
-        let rest = match (term.basis(), term.motion()) {
+        let tail = match (term.basis(), term.motion()) {
             (
                 Basis::Wave {
                     order,
@@ -267,7 +267,7 @@ impl LawRow {
             (_, Motion::Axis { turning: false, .. }) => "_fixed".into(),
             _ => String::new(),
         };
-        format!("order{}{rest}", orders::in_name(order))
+        format!("order{}{tail}", orders::in_name(order))
     }
 
     /// Why a term of it with coefficients `p` cannot be its cause: see [`Placed::impossible`](super::Placed::impossible).
@@ -279,25 +279,31 @@ impl LawRow {
         survey: &Survey,
     ) -> Option<String> {
         let value = *p.first()?;
-        let beyond = self.limit.and_then(|Limit { most, of, negative }| {
-            let per = if matches!(term.basis(), Basis::Settling { .. }) {
-                "in all"
-            } else {
-                "for each kelvin"
-            };
-            let size = if negative.is_some() {
-                value
-            } else {
-                value.abs()
-            };
-            match negative {
-                Some(why) if value < -error(0) => Some(why.to_string()),
-                _ => (size > most).then(|| {
-                    let [size, largest] = [size, most].map(|share| figure(1e6 * share, 0));
-                    format!("{size} um/m {per} is more than the {largest} {of}")
-                }),
-            }
-        });
+        let beyond = self.limit.and_then(
+            |Limit {
+                 most,
+                 subject: of,
+                 negative,
+             }| {
+                let per = if matches!(term.basis(), Basis::Settling { .. }) {
+                    "in all"
+                } else {
+                    "for each kelvin"
+                };
+                let size = if negative.is_some() {
+                    value
+                } else {
+                    value.abs()
+                };
+                match negative {
+                    Some(why) if value < -error(0) => Some(why.to_string()),
+                    _ => (size > most).then(|| {
+                        let [size, largest] = [size, most].map(|share| figure(1e6 * share, 0));
+                        format!("{size} um/m {per} is more than the {largest} {of}")
+                    }),
+                }
+            },
+        );
         beyond.or_else(|| match self.follows {
             Follows::Side | Follows::Push => lost_motion::impossible(term, value, error(0), survey),
             Follows::Warmth(_) => warmth::impossible(term, survey),
@@ -308,7 +314,7 @@ impl LawRow {
 
 /// Terms with other shapes around that of a term, closer with every level: see [`Placed::near`](super::Placed::near).
 pub(super) fn near(term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-    match (term.law().first.of, term.basis()) {
+    match (term.law().first.variable, term.basis()) {
         (Variable::Time, Basis::After { .. }) => change::near(term, survey),
         (
             _,
@@ -342,8 +348,10 @@ impl At {
     /// The motions, each with its joint, and how much rarer it is than others.
     fn motions(self, survey: &Survey) -> Vec<(Motion, Option<usize>, f64)> {
         let n = survey.joints();
-        let all = |axes: &[Axes], of: fn(Axes) -> Motion| {
-            axes.iter().map(|axes| (of(*axes), None, 0.0)).collect()
+        let all = |axes: &[Axes], value_of: fn(Axes) -> Motion| {
+            axes.iter()
+                .map(|axes| (value_of(*axes), None, 0.0))
+                .collect()
         };
         let joint = |joint| (Motion::Joint { joint }, Some(joint), 0.0);
         match self {
@@ -376,9 +384,9 @@ impl At {
             Self::Tool => all(&[Axes::Place], |axes| Motion::Tool { axes }),
             Self::Tracker(_) if survey.length() <= 0.0 => Vec::new(),
             Self::Tracker(axes) => all(axes, |axes| Motion::Tracker { axes }),
-            Self::Reading(of) => survey
+            Self::Reading(reading) => survey
                 .seen_from_outside()
-                .then_some((Motion::Instrument { of }, None, 0.0))
+                .then_some((Motion::Instrument { reading }, None, 0.0))
                 .into_iter()
                 .collect(),
         }
@@ -386,7 +394,7 @@ impl At {
 
     fn is(self, motion: Motion) -> bool {
         match (self, motion) {
-            (Self::Reading(own), Motion::Instrument { of }) => own == of,
+            (Self::Reading(reading), Motion::Instrument { reading: wanted }) => reading == wanted,
             (Self::Joints | Self::AllJoints, Motion::Joint { .. })
             | (Self::Axes, Motion::Axis { .. })
             | (Self::Pairs, Motion::Coupled { .. })
@@ -401,9 +409,10 @@ impl At {
 
 /// Tilts of the axis of a joint: about its own point, or rarely about those nearest to its neighbours.
 fn tilts(joint: usize, survey: &Survey) -> Vec<(Motion, Option<usize>, f64)> {
-    let own = survey.robot.point(joint);
-    let far =
-        |at: &AxisPoint| *at == AxisPoint::Own || (at.of(survey.robot, joint) - own).norm() > NEAR;
+    let point = survey.robot.point(joint);
+    let far = |at: &AxisPoint| {
+        *at == AxisPoint::Own || (at.of(survey.robot, joint) - point).norm() > NEAR
+    };
     let points = [AxisPoint::Own, AxisPoint::Next, AxisPoint::Before]
         .into_iter()
         .filter(far);
@@ -434,21 +443,21 @@ fn tilts(joint: usize, survey: &Survey) -> Vec<(Motion, Option<usize>, f64)> {
 impl Follows {
     /// The laws of a motion, each with how many like it are tried, and how much rarer it is than others.
     fn laws(self, motion: Motion, joint: Option<usize>, survey: &Survey) -> Vec<(Law, usize, f64)> {
-        let of = |of, basis| vec![(Law::new(of, basis), 1, 0.0)];
+        let of_of = |variable, basis| vec![(Law::new(variable, basis), 1, 0.0)];
         let [start, end] = survey.time;
         match (self, joint) {
             (Self::Waves(turning, [from, to], overtone), joint) => {
-                let Some(of) = turning.variable(joint, survey) else {
+                let Some(variable) = turning.variable(joint, survey) else {
                     return Vec::new();
                 };
                 // An axis tilts whether its joint travels far or not.
-                let is_seen = |order: &u32| match (motion, of) {
+                let is_seen = |order: &u32| match (motion, variable) {
                     (Motion::Joint { .. }, Variable::Angle { joint }) => {
                         orders::is_within(f64::from(*order), survey.travel(joint))
                     }
                     _ => true,
                 };
-                let law = |order| Law::new(of, Basis::Wave { order, overtone });
+                let law = |order| Law::new(variable, Basis::Wave { order, overtone });
                 (from..=to)
                     .filter(is_seen)
                     .map(|order| (law(order), 1, 0.0))
@@ -467,12 +476,12 @@ impl Follows {
                 .collect()
             }
             (Self::Approach, Some(joint)) if survey.both_directions(joint) => {
-                of(Variable::Approach { joint }, Basis::PROPORTIONAL)
+                of_of(Variable::Approach { joint }, Basis::PROPORTIONAL)
             }
             (Self::Side, Some(joint)) => lost_motion::by_load(joint, survey),
             (Self::Push, Some(joint)) => lost_motion::mixed(joint, survey),
             (Self::Slip, Some(joint)) => lost_motion::slip(joint, survey),
-            (Self::Angle, Some(joint)) => of(Variable::Angle { joint }, Basis::PROPORTIONAL),
+            (Self::Angle, Some(joint)) => of_of(Variable::Angle { joint }, Basis::PROPORTIONAL),
             (Self::Velocity, Some(joint)) => {
                 let moves = survey.moves()
                     && survey
@@ -480,7 +489,7 @@ impl Follows {
                         .iter()
                         .any(|row| survey.data.velocity(*row, joint) != 0.0);
                 if moves {
-                    of(
+                    of_of(
                         Variable::Velocity { joint },
                         Basis::Linear {
                             zero: 0.0,
@@ -492,8 +501,8 @@ impl Follows {
                 }
             }
             // 1 at any range.
-            (Self::Constant, _) => of(Variable::Range, Basis::After { at: 0.0 }),
-            (Self::Payload, _) if survey.payload_changes() => of(
+            (Self::Constant, _) => of_of(Variable::Range, Basis::After { at: 0.0 }),
+            (Self::Payload, _) if survey.payload_changes() => of_of(
                 Variable::Payload,
                 Basis::Linear {
                     zero: 0.0,
@@ -501,7 +510,7 @@ impl Follows {
                 },
             ),
             (Self::Step, _) => change::laws(motion, survey),
-            (Self::Steady, _) => of(
+            (Self::Steady, _) => of_of(
                 Variable::Time,
                 Basis::Power {
                     start,
@@ -509,7 +518,7 @@ impl Follows {
                     exponent: 1.0,
                 },
             ),
-            (Self::Slow, _) => of(
+            (Self::Slow, _) => of_of(
                 Variable::Time,
                 Basis::Cosines {
                     low: start,
@@ -525,25 +534,38 @@ impl Follows {
         }
     }
 
-    fn is(self, Factor { of, basis, .. }: Factor) -> bool {
+    fn is(
+        self,
+        Factor {
+            variable, basis, ..
+        }: Factor,
+    ) -> bool {
         match self {
             Self::Waves(turning, _, overtone) => {
-                turning.is(of)
-                    && matches!(basis, Basis::Wave { overtone: own, .. } if own == overtone)
+                turning.is(variable)
+                    && matches!(basis, Basis::Wave { overtone: is_overtone, .. } if is_overtone == overtone)
             }
-            Self::HalfWaves(_) => Turning::Joint.is(of) && matches!(basis, Basis::Sway { .. }),
-            Self::Approach => matches!(of, Variable::Approach { .. }),
-            Self::Side => matches!((of, basis), (Variable::Load { .. }, Basis::Rise { .. })),
-            Self::Push => matches!(of, Variable::Push { .. }),
-            Self::Slip => matches!(of, Variable::Slip { .. }),
-            Self::Angle => matches!((of, basis), (Variable::Angle { .. }, Basis::Linear { .. })),
-            Self::Velocity => matches!(of, Variable::Velocity { .. }),
-            Self::Constant => of == Variable::Range,
-            Self::Payload => of == Variable::Payload,
-            Self::Step => matches!((of, basis), (Variable::Time, Basis::After { .. })),
-            Self::Steady => matches!((of, basis), (Variable::Time, Basis::Power { .. })),
-            Self::Slow => matches!((of, basis), (Variable::Time, Basis::Cosines { .. })),
-            Self::Warmth(kinds) => kinds.iter().any(|kind| kind.is(of, basis)),
+            Self::HalfWaves(_) => {
+                Turning::Joint.is(variable) && matches!(basis, Basis::Sway { .. })
+            }
+            Self::Approach => matches!(variable, Variable::Approach { .. }),
+            Self::Side => matches!(
+                (variable, basis),
+                (Variable::Load { .. }, Basis::Rise { .. })
+            ),
+            Self::Push => matches!(variable, Variable::Push { .. }),
+            Self::Slip => matches!(variable, Variable::Slip { .. }),
+            Self::Angle => matches!(
+                (variable, basis),
+                (Variable::Angle { .. }, Basis::Linear { .. })
+            ),
+            Self::Velocity => matches!(variable, Variable::Velocity { .. }),
+            Self::Constant => variable == Variable::Range,
+            Self::Payload => variable == Variable::Payload,
+            Self::Step => matches!((variable, basis), (Variable::Time, Basis::After { .. })),
+            Self::Steady => matches!((variable, basis), (Variable::Time, Basis::Power { .. })),
+            Self::Slow => matches!((variable, basis), (Variable::Time, Basis::Cosines { .. })),
+            Self::Warmth(kinds) => kinds.iter().any(|kind| kind.is(variable, basis)),
         }
     }
 }
@@ -561,12 +583,12 @@ impl Turning {
         })
     }
 
-    fn is(self, of: Variable) -> bool {
+    fn is(self, variable: Variable) -> bool {
         match self {
-            Self::Joint => matches!(of, Variable::Angle { .. }),
-            Self::Motor => matches!(of, Variable::Motor { .. }),
-            Self::Azimuth => of == Variable::Azimuth,
-            Self::Elevation => of == Variable::Elevation,
+            Self::Joint => matches!(variable, Variable::Angle { .. }),
+            Self::Motor => matches!(variable, Variable::Motor { .. }),
+            Self::Azimuth => variable == Variable::Azimuth,
+            Self::Elevation => variable == Variable::Elevation,
         }
     }
 }
@@ -574,14 +596,14 @@ impl Turning {
 impl Times {
     /// The factor at a joint; none where the recording cannot tell.
     fn factor(self, joint: Option<usize>, survey: &Survey) -> Option<Factor> {
-        let of = |of| Some(Factor::new(of, Basis::PROPORTIONAL));
+        let of_of = |variable| Some(Factor::new(variable, Basis::PROPORTIONAL));
         match (self, joint) {
             (Self::Approach, Some(joint)) if survey.both_directions(joint) => {
-                of(Variable::Approach { joint })
+                of_of(Variable::Approach { joint })
             }
-            (Self::Load, Some(joint)) if survey.is_loaded(joint) => of(Variable::Load { joint }),
-            (Self::Angle, Some(joint)) => of(Variable::Angle { joint }),
-            (Self::Range, _) => of(Variable::Range),
+            (Self::Load, Some(joint)) if survey.is_loaded(joint) => of_of(Variable::Load { joint }),
+            (Self::Angle, Some(joint)) => of_of(Variable::Angle { joint }),
+            (Self::Range, _) => of_of(Variable::Range),
             (Self::Time, _) if survey.length() > 0.0 => {
                 let [start, end] = survey.time;
                 Some(Factor::new(

@@ -46,10 +46,10 @@ pub(super) fn mixed(joint: usize, survey: &Survey) -> RatedLaws {
         .into_iter()
         .chain(tried)
         .flat_map(|(friction, tried, rare)| {
-            let of = move |friction: f64| {
+            let of_friction = move |friction: f64| {
                 BLURS.map(|blur| (pushed(joint, friction, blur * friction.abs()), tried, rare))
             };
-            [friction, -friction].into_iter().flat_map(of)
+            [friction, -friction].into_iter().flat_map(of_friction)
         });
     laws.collect()
 }
@@ -80,7 +80,7 @@ fn otherwise(joint: usize, survey: &Survey) -> f64 {
 
 /// Other thresholds and blurs.
 pub(super) fn near(term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-    let Variable::Push { joint, friction_nm } = term.law().first.of else {
+    let Variable::Push { joint, friction_nm } = term.law().first.variable else {
         return Vec::new();
     };
     let width = if let Basis::Rise { width, .. } = term.basis() {
@@ -115,7 +115,7 @@ pub(super) fn impossible(
     error: f64,
     survey: &Survey,
 ) -> Option<String> {
-    if let Variable::Push { joint, friction_nm } = term.law().first.of {
+    if let Variable::Push { joint, friction_nm } = term.law().first.variable {
         let most = survey.recorded_load(joint);
         let [friction, largest] = [friction_nm.abs(), most].map(|torque| figure(torque, 0));
         if friction_nm.abs() > most {
@@ -156,7 +156,7 @@ pub(super) fn slip(joint: usize, survey: &Survey) -> RatedLaws {
 
 /// Other travels.
 pub(super) fn near_slip(term: &Term, level: i32) -> Vec<Term> {
-    let Variable::Slip { joint, travel } = term.law().first.of else {
+    let Variable::Slip { joint, travel } = term.law().first.variable else {
         return Vec::new();
     };
     let travels = around(travel, 1.6, 0.5, level, BOUNDS);

@@ -73,7 +73,7 @@ pub enum Motion {
     /// What the instrument reads.
     Instrument {
         /// What is misread.
-        of: Polar,
+        reading: Polar,
     },
 }
 
@@ -97,16 +97,16 @@ impl AxisPoint {
 
     /// Where it is, m, zero pose.
     pub(crate) fn of(self, robot: &RobotModel, joint: usize) -> Vector3<f64> {
-        let (own, axis) = (robot.point(joint), robot.axis(joint));
+        let (point, axis) = (robot.point(joint), robot.axis(joint));
         let other = match self {
-            Self::Own => *own,
+            Self::Own => *point,
             Self::Next if joint + 1 < robot.joints() => *robot.point(joint + 1),
             Self::Next => robot.home().translation,
             Self::Before => joint
                 .checked_sub(1)
-                .map_or(*own, |before| *robot.point(before)),
+                .map_or(*point, |before| *robot.point(before)),
         };
-        own + axis * axis.dot(&(other - own))
+        point + axis * axis.dot(&(other - point))
     }
 }
 
@@ -187,7 +187,7 @@ impl Motion {
             Self::Axis { .. }
             | Self::Bend { .. }
             | Self::Instrument {
-                of: Polar::Azimuth | Polar::Elevation,
+                reading: Polar::Azimuth | Polar::Elevation,
             } => Unit::Radian,
             _ => Unit::Millimetre,
         }
@@ -275,7 +275,7 @@ impl Motion {
             }
             Self::Base { axes } | Self::Tracker { axes } => shift(0, axes, k, value, p, out),
             Self::Tool { axes } => shift(robot.joints(), axes, k, value, p, out),
-            Self::Instrument { of } => out.misread(k, p, state.sight().moved(of) * value),
+            Self::Instrument { reading } => out.misread(k, p, state.sight().moved(reading) * value),
         }
     }
 }

@@ -18,18 +18,18 @@ pub(super) fn filled(sentence: &str, known: &dyn Fn(&str) -> String) -> String {
     let mut parts = sentence.split('{');
     let mut out = parts.next().unwrap_or_default().to_string();
     for part in parts {
-        let (word, rest) = part.split_once('}').unwrap_or(("", part));
+        let (word, tail) = part.split_once('}').unwrap_or(("", part));
         out.push_str(&known(word));
-        out.push_str(rest);
+        out.push_str(tail);
     }
     out
 }
 
 /// What a cause says of a finding: its own sentence, in which `{each}` are all of its laws, or what its first law says.
 pub(super) fn of(cause: &Cause, summary: &Summary) -> String {
-    let own: Vec<(&Term, Vec<&ParameterEstimate>)> = summary.estimates(cause.name).collect();
+    let terms: Vec<(&Term, Vec<&ParameterEstimate>)> = summary.estimates(cause.name).collect();
     let says = |term: &Term| cause.law(term).map_or("", |law| law.says);
-    let first = own.first().map(|(term, _)| *term);
+    let first = terms.first().map(|(term, _)| *term);
     let text = match first.map_or("", says) {
         "" => cause.sentence,
         _ if cause.sentence.contains("{each}") => cause.sentence,
@@ -43,7 +43,7 @@ pub(super) fn of(cause: &Cause, summary: &Summary) -> String {
         let one = |(term, numbers): &(&Term, Vec<&ParameterEstimate>)| {
             filled(says(term), &|word| hole(word, Some(term), numbers, summary))
         };
-        own.iter().map(one).collect::<Vec<String>>().join(", ")
+        terms.iter().map(one).collect::<Vec<String>>().join(", ")
     };
     filled(text, &|word| {
         if word == "each" {
@@ -65,7 +65,7 @@ pub(super) fn hole(
     let known = |text: Option<String>| text.unwrap_or_default();
     let order = || orders::order(term?.basis());
     let span = || warmth::time_constant(term?).map(|time| clock.span(time));
-    let of = term.map(|term| term.law().first.of);
+    let variable = term.map(|term| term.law().first.variable);
     match word {
         "place" => summary.place.to_string(),
         "value" => summary.value(),
@@ -88,15 +88,15 @@ pub(super) fn hole(
         }),
         "span" => known(span()),
         "lagging" => known(span().map(|span| format!(", lagging by {span}"))),
-        "travel" => known(match of {
+        "travel" => known(match variable {
             Some(Variable::Slip { travel, .. }) => Some(figure(travel.to_degrees(), 1)),
             _ => None,
         }),
-        "friction" => known(match of {
+        "friction" => known(match variable {
             Some(Variable::Push { friction_nm, .. }) => Some(figure(friction_nm.abs(), 0)),
             _ => None,
         }),
-        "pace" => match (of, term.map(Term::basis)) {
+        "pace" => match (variable, term.map(Term::basis)) {
             (_, Some(Basis::Power { exponent, .. })) if exponent < 0.7 => {
                 "slower and slower".into()
             }

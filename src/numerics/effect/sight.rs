@@ -41,9 +41,9 @@ impl Sight {
     }
 
     /// By how much the point moves (m) where a reading grows by 1 (rad, m).
-    pub(crate) fn moved(&self, of: Polar) -> Vector3<f64> {
+    pub(crate) fn moved(&self, reading: Polar) -> Vector3<f64> {
         let ((sa, ca), (se, ce)) = (libm::sincos(self.azimuth), libm::sincos(self.elevation));
-        match of {
+        match reading {
             Polar::Azimuth => Vector3::new(-sa, ca, 0.0) * (self.range * ce),
             Polar::Elevation => Vector3::new(-se * ca, -se * sa, ce) * self.range,
             Polar::Range => Vector3::new(ce * ca, ce * sa, se),
@@ -69,14 +69,17 @@ mod tests {
                 + (sight.range - at[2]).abs()
                 < 1e-12
         );
-        for (k, of) in [Polar::Azimuth, Polar::Elevation, Polar::Range]
+        for (k, reading) in [Polar::Azimuth, Polar::Elevation, Polar::Range]
             .into_iter()
             .enumerate()
         {
             let [mut more, mut less] = [at; 2];
             (more[k], less[k]) = (at[k] + step, at[k] - step);
             let expected = (point(more) - point(less)) / (2.0 * step);
-            assert!((sight.moved(of) - expected).norm() < 1e-8, "{of:?}");
+            assert!(
+                (sight.moved(reading) - expected).norm() < 1e-8,
+                "{reading:?}"
+            );
         }
     }
 }

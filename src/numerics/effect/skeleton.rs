@@ -18,8 +18,8 @@ pub(super) fn moments(robot: &RobotModel) -> Vec<Vector3<f64>> {
     let (mut carried, mut weight) = (Vector3::zeros(), 0.0);
     for body in (0..n).rev() {
         let line = knots[body + 1] - knots[body];
-        let own = line.norm();
-        let moment = line * (0.5 * own + weight) + carried;
+        let length = line.norm();
+        let moment = line * (0.5 * length + weight) + carried;
         let axis = robot.axis(body);
         let along = axis * axis.dot(&moment);
         moments[body] = moment - along;
@@ -28,7 +28,7 @@ pub(super) fn moments(robot: &RobotModel) -> Vec<Vector3<f64>> {
         } else {
             moment
         };
-        weight += own;
+        weight += length;
     }
     moments
 }

@@ -165,12 +165,12 @@ impl Placed for Spring {
         within: &[Option<[f64; 2]>],
         out: &mut BeyondRange,
     ) -> Option<Variable> {
-        let (of, share) = self.most_beyond(robot, state, within)?;
+        let (variable, share) = self.most_beyond(robot, state, within)?;
         for k in 0..2 * self.shape.orders as usize {
             out.motions.load(k, self.shape.joint, FRAC_1_SQRT_2);
             out.close(share);
         }
-        Some(of)
+        Some(variable)
     }
 
     fn needs_torque(&self) -> bool {

@@ -25,9 +25,9 @@ impl EffectStack {
         let mut specs = Vec::new();
         let mut numbered = Vec::new();
         for effect in effects {
-            let own = effect.parameters(robot);
-            numbered.push((Arc::from(effect), specs.len()..specs.len() + own.len()));
-            specs.extend(own);
+            let numbers = effect.parameters(robot);
+            numbered.push((Arc::from(effect), specs.len()..specs.len() + numbers.len()));
+            specs.extend(numbers);
         }
         Self::numbered(numbered, specs, base)
     }
@@ -89,11 +89,10 @@ impl EffectStack {
                 |form| Arc::new(form.fitted_within(ranges, pairs)),
             )
         };
-        let effects = self
-            .effects
-            .iter()
-            .zip(ranges.into_iter().zip(&pairs))
-            .map(|((effect, own), (ranges, pairs))| (held(effect, ranges, pairs), own.clone()));
+        let effects =
+            self.effects.iter().zip(ranges.into_iter().zip(&pairs)).map(
+                |((effect, span), (ranges, pairs))| (held(effect, ranges, pairs), span.clone()),
+            );
         Self::numbered(effects.collect(), self.specs.clone(), self.base)
     }
 
@@ -114,7 +113,7 @@ impl EffectStack {
                 continue;
             };
             beyond.clear();
-            let Some(of) = form.beyond(robot, &state, p, &mut beyond) else {
+            let Some(variable) = form.beyond(robot, &state, p, &mut beyond) else {
                 continue;
             };
             let moved = |(factor, motions): (f64, &[(usize, Direction)])| {
@@ -124,7 +123,7 @@ impl EffectStack {
                     .sum();
                 sum * sum.transpose() * (factor * factor)
             };
-            out.push((range.start, of, beyond.groups().map(moved).sum()));
+            out.push((range.start, variable, beyond.groups().map(moved).sum()));
         }
         out
     }
@@ -396,9 +395,9 @@ impl PointMotion {
         robot: &RobotModel,
         data: &Measurements,
         row: usize,
-        of: Variable,
+        variable: Variable,
     ) -> Option<f64> {
-        of.value(
+        variable.value(
             0,
             robot,
             &ArmState::new(data, row, &self.posture, self.point),

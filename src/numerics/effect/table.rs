@@ -49,7 +49,7 @@ const GROWTH: LawRow = LawRow {
 };
 const OF_LINKS: Limit = Limit {
     most: f64::INFINITY,
-    of: "of any material of links",
+    subject: "of any material of links",
     negative: Some("links do not shrink as they warm up"),
 };
 /// What of a joint follows its warmth is one of three.
@@ -78,7 +78,7 @@ const AIR: LawRow = LawRow {
 };
 const OF_AIR: Limit = Limit {
     most: f64::INFINITY,
-    of: "that air can make",
+    subject: "that air can make",
     negative: None,
 };
 

@@ -73,20 +73,20 @@ impl Term {
     /// The variable of a joint that moves by a law of one variable.
     pub fn of_one(&self) -> Option<(usize, Variable)> {
         match (self.motion, self.law.times) {
-            (Motion::Joint { joint }, None) => Some((joint, self.law.first.of)),
+            (Motion::Joint { joint }, None) => Some((joint, self.law.first.variable)),
             _ => None,
         }
     }
 
     /// Whether a joint follows a free curve of its own angle: nearly geometry, or another law of that angle, in its slow part.
     pub(crate) fn is_own_curve(&self) -> bool {
-        let own = |(joint, of)| of == Variable::Angle { joint };
-        self.basis().is_curve() && self.of_one().is_some_and(own)
+        let is_own_angle = |(joint, variable)| variable == Variable::Angle { joint };
+        self.basis().is_curve() && self.of_one().is_some_and(is_own_angle)
     }
 
     /// The angles of which it is a function, where they are two.
     pub(crate) fn two_angles(&self) -> Option<[usize; 2]> {
-        match (self.law.first.of, self.law.times?.of) {
+        match (self.law.first.variable, self.law.times?.variable) {
             (Variable::Angle { joint: a }, Variable::Angle { joint: b }) => Some([a, b]),
             _ => None,
         }
@@ -126,7 +126,9 @@ impl Placed for Term {
     }
 
     fn needs_torque(&self) -> bool {
-        self.law.factors().any(|factor| factor.of.needs_torque())
+        self.law
+            .factors()
+            .any(|factor| factor.variable.needs_torque())
     }
 
     fn needs_sight(&self) -> bool {
@@ -135,7 +137,7 @@ impl Placed for Term {
 
     fn missing(&self, _robot: &RobotModel, data: &Measurements) -> Option<String> {
         let velocity = |variable| matches!(variable, Variable::Velocity { .. });
-        let needed = self.law.factors().any(|factor| velocity(factor.of));
+        let needed = self.law.factors().any(|factor| velocity(factor.variable));
         (needed && data.velocity.is_none()).then(|| "the recording has no joint velocities".into())
     }
 
@@ -180,7 +182,7 @@ impl Placed for Term {
         _within: &[Option<[f64; 2]>],
         out: &mut BeyondRange,
     ) -> Option<Variable> {
-        let (of, groups) = self.law.beyond(robot, state)?;
+        let (variable, groups) = self.law.beyond(robot, state)?;
         let count = self.law.count();
         for group in groups {
             group.into_iter().for_each(|(k, off)| {
@@ -189,7 +191,7 @@ impl Placed for Term {
             });
             out.close(1.0);
         }
-        Some(of)
+        Some(variable)
     }
 
     fn body(&self) -> serde_json::Value {

@@ -46,7 +46,7 @@ pub(super) fn numbers(term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
         Motion::Joint { .. } => match term
             .law()
             .times
-            .filter(|factor| matches!(factor.of, Variable::Load { .. }))
+            .filter(|factor| matches!(factor.variable, Variable::Load { .. }))
         {
             Some(load) if load.basis == Basis::PROPORTIONAL => {
                 each(&["c"], Unit::RadianPerNewtonMetre, PER_LOAD)
@@ -58,7 +58,9 @@ pub(super) fn numbers(term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
                 if term.is_own_curve() { PLAUSIBLE } else { WIDE },
             ),
         },
-        Motion::Instrument { of: Polar::Range } => each(&["c"], Unit::Millimetre, 1e-3),
+        Motion::Instrument {
+            reading: Polar::Range,
+        } => each(&["c"], Unit::Millimetre, 1e-3),
         Motion::Instrument { .. } => each(&["c"], Unit::Radian, 1e-4),
         Motion::Axis {
             about: Some(axis), ..
@@ -79,7 +81,7 @@ pub(super) fn numbers(term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
 
 /// What tells a law without a name from others at its place: see [`Placed::variant`](super::Placed::variant).
 pub(super) fn variant(term: &Term) -> String {
-    let label = |of: &Variable| match of {
+    let label = |variable: &Variable| match variable {
         Variable::Gravity { axis: Some(axis) } => format!("gravity_{}", ["x", "y", "z"][*axis]),
         Variable::Stretch { joint, .. } => format!("stretch_{}", joint + 1),
         Variable::Recent { joint, .. } => format!("recent_{}", joint + 1),
@@ -89,7 +91,7 @@ pub(super) fn variant(term: &Term) -> String {
                 along.map(|value| format!("{:.0}", 100.0 * value)).join("_")
             )
         }
-        of => of.to_string().replace(' ', "_"),
+        variable => variable.to_string().replace(' ', "_"),
     };
     let names: Vec<String> = term.law().variables().iter().map(label).collect();
     let steps = |factor: &Factor| matches!(factor.basis, Basis::Steps { .. });
@@ -100,7 +102,7 @@ pub(super) fn variant(term: &Term) -> String {
         Basis::After { at } => format!("_after_{at:.0}"),
         _ => String::new(),
     };
-    if let Motion::Instrument { of } = term.motion() {
+    if let Motion::Instrument { reading: of } = term.motion() {
         return format!("{of:?}_{}{shape}", names.join("_")).to_lowercase();
     }
     let curve = term.law().factors().any(|factor| factor.basis.is_curve());
@@ -118,7 +120,7 @@ pub(super) fn variant(term: &Term) -> String {
     if !moves.is_empty() || curve && term.law().times.is_some() {
         return format!("{moves}{}{shape}", names.join("_"));
     }
-    match (term.basis(), term.law().first.of) {
+    match (term.basis(), term.law().first.variable) {
         _ if jumps => format!("{}{shape}", names.join("_")),
         (_, Variable::Gravity { .. }) if curve => names.join("_"),
         (_, Variable::Gravity { .. }) => "sag".into(),
@@ -135,7 +137,7 @@ pub(super) fn variant(term: &Term) -> String {
 pub(super) fn identities(term: &Term, called: &str) -> Vec<(&'static str, Place)> {
     let place = term.motion().place();
     let joint = matches!(place, Place::Joint(_));
-    match (term.basis(), term.law().first.of) {
+    match (term.basis(), term.law().first.variable) {
         (Basis::Wave { .. }, Variable::Angle { joint: by }) if term.law().times.is_none() => {
             vec![(names::AXIS_WOBBLE, Place::Joint(by))]
         }
@@ -180,28 +182,31 @@ fn in_words(term: &Term, clock: Clock) -> String {
         .into_iter()
         .map(|variable| clock.named(variable))
         .collect();
-    let of = variables.join(" and ");
-    if let Motion::Instrument { of: read } = term.motion() {
+    let subject = variables.join(" and ");
+    if let Motion::Instrument { reading: read } = term.motion() {
         let read = match read {
             Polar::Azimuth => "azimuths",
             Polar::Elevation => "elevations",
             Polar::Range => "ranges",
         };
-        return format!("its {read} err with the {of}");
+        return format!("its {read} err with the {subject}");
     }
-    match (term.basis(), term.law().first.of) {
+    match (term.basis(), term.law().first.variable) {
         (Basis::Wave { .. }, _) if term.law().times.is_some() => {
-            format!("product of functions of {of}")
+            format!("product of functions of {subject}")
         }
-        (Basis::Wave { order, .. }, _) => format!("periodic in {of}, {order} a turn"),
+        (Basis::Wave { order, .. }, _) => format!("periodic in {subject}, {order} a turn"),
         (_, Variable::Gravity { .. }) => {
             "depends on the direction of gravity, as when a mounting yields".into()
         }
         (_, Variable::Temperature) => match term.law().times {
-            Some(times) => format!("depends on the warm-up and on {}", clock.named(times.of)),
+            Some(times) => format!(
+                "depends on the warm-up and on {}",
+                clock.named(times.variable)
+            ),
             None => "depends on the warm-up".into(),
         },
         (_, Variable::Payload) => "differs with the payload".into(),
-        _ => format!("function of {of}"),
+        _ => format!("function of {subject}"),
     }
 }

@@ -158,7 +158,7 @@ impl UnweighedWindup {
             .moments
             .iter()
             .zip(numbers)
-            .map(|(moment, own)| (moment.body, own.value, own.sigma))
+            .map(|(moment, estimate)| (moment.body, estimate.value, estimate.sigma))
             .collect();
         let (mut size, mut variance) = (0.0, Some(0.0));
         for body in moments.chunk_by(|a, b| a.0 == b.0) {
@@ -199,12 +199,12 @@ fn is_plumb(robot: &RobotModel, joint: usize) -> bool {
 
 /// The largest lever of a joint for gravity: 1 about a level axis.
 fn lever(robot: &RobotModel, joint: usize, postures: &[Posture]) -> f64 {
-    let of = |posture: &Posture| {
+    let of_posture = |posture: &Posture| {
         posture.torque_of_moment(robot, joint, joint).norm() / posture.gravity.norm()
     };
     postures
         .iter()
-        .map(of)
+        .map(of_posture)
         .filter(|lever| lever.is_finite())
         .fold(0.0, f64::max)
 }

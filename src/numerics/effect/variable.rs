@@ -132,7 +132,7 @@ impl Variable {
     pub(crate) fn kind(self, place: Place) -> &'static str {
         match self {
             Self::Angle { joint } | Self::Motor { joint } => match place {
-                Place::Joint(own) | Place::Links(own, _) if own == joint => "own angle",
+                Place::Joint(at) | Place::Links(at, _) if at == joint => "own angle",
                 _ => "other angle",
             },
             Self::Load { .. }
@@ -246,8 +246,18 @@ impl Variable {
     /// Whether both are one quantity, with other numbers (a limit, a time, a direction) or the same.
     pub fn is_alike(self, other: Self) -> bool {
         match (self, other) {
-            (Self::Stretch { joint, .. }, Self::Stretch { joint: of, .. })
-            | (Self::Recent { joint, .. }, Self::Recent { joint: of, .. }) => joint == of,
+            (
+                Self::Stretch { joint, .. },
+                Self::Stretch {
+                    joint: joint_of, ..
+                },
+            )
+            | (
+                Self::Recent { joint, .. },
+                Self::Recent {
+                    joint: joint_of, ..
+                },
+            ) => joint == joint_of,
             (Self::Position { .. }, Self::Position { .. })
             | (Self::Sighted { .. }, Self::Sighted { .. }) => true,
             _ => self == other,

@@ -116,12 +116,12 @@ impl PlacedRow<'_> {
         }
         for joint in 0..joints {
             let axis = scratch.posture.behind[joint].rotation * robot.axis(joint);
-            let own = if robot.is_revolute(joint) {
+            let own_turn = if robot.is_revolute(joint) {
                 by_velocity[joint].cross(&axis)
             } else {
                 Vector3::zeros()
             };
-            moved[joint + 1] = moved[joint] + own;
+            moved[joint + 1] = moved[joint] + own_turn;
         }
         // The direction of what is closed turns too.
         let along: Vector3<f64> = match closing {
@@ -267,9 +267,9 @@ tool: {point: [20, 10, 60]}
             volume(&x, &mut |k, rate| rates[k] += rate);
             for (k, rate) in rates.iter().enumerate() {
                 let moved = |step: f64| {
-                    let mut beside = x.clone();
-                    beside[k] += step;
-                    volume(&beside, &mut |_, _| {})
+                    let mut shifted = x.clone();
+                    shifted[k] += step;
+                    volume(&shifted, &mut |_, _| {})
                 };
                 let central = (moved(1e-6) - moved(-1e-6)) / 2e-6;
                 let name = &stack.specs()[k].name;

@@ -34,10 +34,10 @@ impl Warmth {
                 .filter(move |_| end > start)
                 .map(move |share| share * (end - start))
         };
-        let above = |of| {
+        let above = |variable| {
             survey
                 .reference_c
-                .map(|zero| Law::new(of, Basis::Linear { zero, per: 1.0 }))
+                .map(|zero| Law::new(variable, Basis::Linear { zero, per: 1.0 }))
         };
         let kinds = 1 + 2 * usize::from(survey.reference_c.is_some());
         match (self, joint) {
@@ -84,18 +84,20 @@ impl Warmth {
         }
     }
 
-    pub(super) fn is(self, of: Variable, basis: Basis) -> bool {
+    pub(super) fn is(self, variable: Variable, basis: Basis) -> bool {
         match self {
-            Self::Temperature => matches!(of, Variable::Temperature | Variable::Lagging { .. }),
-            Self::WarmUp => matches!((of, basis), (Variable::Time, Basis::Settling { .. })),
-            Self::Work => matches!(of, Variable::Work { .. }),
+            Self::Temperature => {
+                matches!(variable, Variable::Temperature | Variable::Lagging { .. })
+            }
+            Self::WarmUp => matches!((variable, basis), (Variable::Time, Basis::Settling { .. })),
+            Self::Work => matches!(variable, Variable::Work { .. }),
         }
     }
 }
 
 /// The time constant of a term that follows a warmth, if it has one, s.
 pub(super) fn time_constant(term: &Term) -> Option<f64> {
-    match (term.law().first.of, term.basis()) {
+    match (term.law().first.variable, term.basis()) {
         (Variable::Lagging { lag: time } | Variable::Work { cooling: time, .. }, _) => Some(time),
         (_, Basis::Settling { constant, .. }) => Some(constant),
         _ => None,
@@ -123,7 +125,7 @@ const SLOWEST: f64 = 0.99;
 /// Other time constants around that of a term's first factor.
 pub(super) fn near(term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
     let bounds = |shares: [f64; 2]| shares.map(|share| share * survey.length());
-    match (term.law().first.of, term.basis()) {
+    match (term.law().first.variable, term.basis()) {
         (Variable::Lagging { lag }, _) => {
             let lags = around(lag, 1.7, 0.5, level, bounds(BEHIND));
             lags.map(|lag| term.with(term.law().by(Variable::Lagging { lag })))

@@ -32,7 +32,7 @@ pub struct ParameterChange {
 }
 
 /// Steps taken in at most.
-const MOST: usize = 6;
+const LIMIT: usize = 6;
 /// A step is taken in where chance gives one as large in one robot of so many. The fleet's own limit is stricter.
 const CHANCE: f64 = 1e-3;
 /// Below this share of its own length a column is a combination of the others.
@@ -54,7 +54,7 @@ pub fn changes(
     let mut reduced = Reduced::of(before, after, &shared, &base);
     let wide = |j: usize| stack.specs()[shared[j]].prior_sigma;
     let mut ranks: Vec<Option<usize>> = vec![None; shared.len()];
-    for rank in 1..=MOST {
+    for rank in 1..=LIMIT {
         let open: Vec<usize> = (0..shared.len())
             .filter(|j| ranks[*j].is_none())
             .filter(|j| reduced.sigma(*j).is_some_and(|s| s < wide(*j)))

@@ -366,7 +366,7 @@ impl<'a> NearbyFits<'a> {
 
     /// Values of some of the columns under a fit to all rows, the columns that have a step moved by it and kept, with their standard
     /// deviations by the stated noise. `None` where the others are not separable.
-    pub fn estimated(&self, steps: &[Option<f64>], of: &[usize]) -> Option<Vec<(f64, f64)>> {
+    pub fn estimated(&self, steps: &[Option<f64>], groups: &[usize]) -> Option<Vec<(f64, f64)>> {
         let whole = self.whole.given(steps);
         let (inverse, found) = (whole.inverse()?, whole.solve(0.0)?);
         let open: Vec<usize> = (0..steps.len())
@@ -378,7 +378,7 @@ impl<'a> NearbyFits<'a> {
             let square: f64 = (i..open.len()).map(|j| inverse.at(i, j).powi(2)).sum();
             Some((self.model.x[*parameter] + found[i], square.sqrt()))
         };
-        of.iter().map(one).collect()
+        groups.iter().map(one).collect()
     }
 
     fn without(

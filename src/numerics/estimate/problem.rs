@@ -90,15 +90,15 @@ impl Problem<'_> {
         for Span {
             residuals: some,
             factor,
-            volume: own,
+            volume: term,
             pull: towards,
         } in spans
         {
             residuals.extend(some);
-            volume += own;
+            volume += term;
             pull.iter_mut()
                 .zip(towards)
-                .for_each(|(sum, own)| *sum += own);
+                .for_each(|(sum, term)| *sum += term);
             sum = Some(sum.map_or_else(|| factor.clone(), |sum| sum.stack(&factor)));
         }
         let cost = self

@@ -29,7 +29,7 @@ pub enum Remedy {
 
 /// So many poses are tried at least and at most, about as many as the recording has.
 const FEWEST: usize = 60;
-const MOST: usize = 300;
+const LIMIT: usize = 300;
 /// A joint that used less than this share of its range hardly moved.
 const HARDLY: f64 = 0.25;
 /// A remedy has to show a parameter this many times better than its prior sigma.
@@ -152,7 +152,7 @@ fn shown(
 /// Poses all over the joints' ranges (an additive recurrence: even and reproducible), under the payloads in turn.
 fn poses(model: &Model, data: &Measurements, rows: &[usize], payloads: &[f64]) -> Measurements {
     let joints = data.joints;
-    let count = rows.len().clamp(FEWEST, MOST);
+    let count = rows.len().clamp(FEWEST, LIMIT);
     // The root of x^(d+1) = x + 1.
     let mut root: f64 = 2.0;
     for _ in 0..60 {

@@ -142,7 +142,7 @@ pub fn scale(
 fn carried(robot: &RobotModel, name: &str) -> usize {
     let parts = name
         .strip_prefix("link_geometry.l")
-        .and_then(|rest| rest.split_once('.'));
+        .and_then(|tail| tail.split_once('.'));
     let Some((Ok(link), axis)) = parts.map(|(link, axis)| (link.parse::<usize>(), axis)) else {
         return 0;
     };
@@ -270,19 +270,19 @@ impl ErrorScale {
 }
 
 /// Length of one sigma (m or rad) of the first kind of a dimension that a row measured.
-pub fn noise(data: &Measurements, row: usize, of: Dimension) -> Option<f64> {
+pub fn noise(data: &Measurements, row: usize, dimension: Dimension) -> Option<f64> {
     KINDS
         .iter()
-        .filter(|kind| kind.about().dimension == of)
+        .filter(|kind| kind.about().dimension == dimension)
         .find_map(|kind| kind.noise(data, row))
 }
 
 impl Model {
     /// Sizes (m or rad) of the residual of every row, of the first kind of a dimension that it measured.
-    pub fn error_sizes(&self, data: &Measurements, of: Dimension) -> Vec<Option<f64>> {
+    pub fn error_sizes(&self, data: &Measurements, dimension: Dimension) -> Vec<Option<f64>> {
         let kinds: Vec<_> = kinds(data)
             .into_iter()
-            .filter(|kind| kind.about().dimension == of)
+            .filter(|kind| kind.about().dimension == dimension)
             .collect();
         let size = |scratch: &mut PlacementBuffers, row: usize| {
             let placed = self.place(data, row, scratch);

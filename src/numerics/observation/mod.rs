@@ -420,7 +420,7 @@ pub fn rank(
         .copied()
         .filter(|kind| axes(*kind, 1..=kind.about().axes))
         .collect();
-    let (whole, rest): (Vec<&dyn MeasurementKind>, Vec<&dyn MeasurementKind>) = used
+    let (whole, others): (Vec<&dyn MeasurementKind>, Vec<&dyn MeasurementKind>) = used
         .iter()
         .copied()
         .partition(|kind| axes(*kind, kind.about().axes..=kind.about().axes));
@@ -432,7 +432,7 @@ pub fn rank(
         _ => (0, 0),
     };
     // Beside what fixes the whole cell it does not matter what single axes show.
-    if translations + rotations > 0 && !rest.is_empty() {
+    if translations + rotations > 0 && !others.is_empty() {
         return None;
     }
     let places = used.iter().any(|kind| kind.about().rank.places);

@@ -53,7 +53,7 @@ pub enum ColumnShape {
     /// One number a row: so many standard deviations, unless the file says another number, of each of these settings.
     Uncertainty {
         /// Settings that it is the standard deviation of.
-        of: &'static [&'static str],
+        columns: &'static [&'static str],
         /// Standard deviations that the number stands for.
         coverage: f64,
     },
@@ -154,12 +154,12 @@ impl DeclaredColumn {
     /// So many standard deviations of the settings `of`, which it stands for.
     pub(crate) const fn uncertainty(
         setting: &'static str,
-        of: &'static [&'static str],
+        columns: &'static [&'static str],
         coverage: f64,
         about: &'static str,
     ) -> Self {
         Self {
-            shape: ColumnShape::Uncertainty { of, coverage },
+            shape: ColumnShape::Uncertainty { columns, coverage },
             ..Self::number(setting, &[], Quantity::Length, [0.0, 1.0], about)
         }
     }

@@ -285,7 +285,7 @@ mod visited_tests {
             ..Measurements::default()
         };
         let visited = Visited::of(&data, &[0, 1, 2, 3]);
-        let said = |q: [f64; 2], payload, temperature| {
+        let row_of = |q: [f64; 2], payload, temperature| {
             let beyond = visited.beyond(&q, payload, temperature);
             beyond
                 .iter()
@@ -293,17 +293,17 @@ mod visited_tests {
                 .collect::<Vec<_>>()
                 .join("; ")
         };
-        assert_eq!(said([0.2, 0.3], 5.0, Some(22.0)), "");
+        assert_eq!(row_of([0.2, 0.3], 5.0, Some(22.0)), "");
         assert_eq!(
-            said([0.5, 0.6], 5.0, None),
+            row_of([0.5, 0.6], 5.0, None),
             "joint 1, 2 beyond the measured range"
         );
         assert_eq!(
-            said([-0.4, 0.1], 5.0, Some(25.5)),
+            row_of([-0.4, 0.1], 5.0, Some(25.5)),
             "joint 1 in a gap of the measured range"
         );
         assert_eq!(
-            said([0.2, 0.3], 20.0, Some(40.0)),
+            row_of([0.2, 0.3], 20.0, Some(40.0)),
             "payload beyond the measured range; temperature beyond the measured range"
         );
     }

@@ -8,7 +8,7 @@ pub struct Named {
     /// Different names, in their order.
     pub names: Vec<String>,
     /// By row, position in `names`.
-    pub(crate) of: Vec<u32>,
+    pub(crate) numbers: Vec<u32>,
 }
 
 /// What rows measured of one kind, SI.
@@ -81,14 +81,14 @@ impl Named {
                 .unwrap_or_default() as u32
         };
         Self {
-            of: rows.map(number).collect(),
+            numbers: rows.map(number).collect(),
             names,
         }
     }
 
     /// The name that a row carries; empty where it carries none.
     pub fn name(&self, row: usize) -> &str {
-        self.of
+        self.numbers
             .get(row)
             .and_then(|number| self.names.get(*number as usize))
             .map_or("", String::as_str)

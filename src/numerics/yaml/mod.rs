@@ -79,13 +79,13 @@ fn in_words(message: &str) -> String {
         .trim_start_matches("error: ");
     let twice = first
         .split_once("duplicate mapping key: ")
-        .and_then(|(_, rest)| rest.strip_suffix(" not allowed here"));
+        .and_then(|(_, tail)| tail.strip_suffix(" not allowed here"));
     if let Some(key) = twice {
         return format!("key `{key}` is given twice in this block");
     }
     match first
         .strip_prefix("line ")
-        .and_then(|rest| rest.split_once(": "))
+        .and_then(|tail| tail.split_once(": "))
     {
         Some((_, message)) => message.into(),
         None => first.into(),
@@ -213,12 +213,15 @@ mod tests {
     #[test]
     fn a_number_beyond_any_quantity_is_refused_at_its_place() {
         let text = "every: 4\nratio: .1e309\nlist: [1e15, -1e16]\n";
-        let said = |number: &str, place: &str| {
+        let expected = |number: &str, place: &str| {
             format!("f.yaml:{place}: {number} is no quantity of a cell; expected at most 1e15")
         };
         assert_eq!(
             faults(text),
-            [said("1e308", "2:8: ratio"), said("-1e16", "3:14: list[1]")]
+            [
+                expected("1e308", "2:8: ratio"),
+                expected("-1e16", "3:14: list[1]")
+            ]
         );
     }
 
@@ -284,17 +287,17 @@ mod tests {
 
     #[test]
     fn a_variable_without_quotes_inside_braces_says_what_to_write() {
-        let told = "f.yaml:2:9: inside {} and [] a variable stands in quotes: \"${u}\"";
+        let message = "f.yaml:2:9: inside {} and [] a variable stands in quotes: \"${u}\"";
         assert_eq!(
             faults("every: 4\nlist: [${u}]\n")
                 .last()
                 .map(String::as_str),
-            Some(told)
+            Some(message)
         );
-        let told = faults("every: 4\nlist: {a: \"${u}\", b: ${name}}\n");
+        let messages = faults("every: 4\nlist: {a: \"${u}\", b: ${name}}\n");
         assert!(
-            told[0].ends_with("stands in quotes: \"${name}\""),
-            "{told:?}"
+            messages[0].ends_with("stands in quotes: \"${name}\""),
+            "{messages:?}"
         );
     }
 

@@ -139,10 +139,10 @@ impl Node {
         match &self.value {
             YamlValue::Map(entries) => entries
                 .iter()
-                .find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at(rest))),
+                .find_map(|(key, _, node)| rest_after(path, key).and_then(|tail| node.at(tail))),
             YamlValue::List(items) => {
-                let (index, rest) = split_index(path)?;
-                items.get(index)?.at(rest)
+                let (index, tail) = split_index(path)?;
+                items.get(index)?.at(tail)
             }
             _ => None,
         }
@@ -154,11 +154,11 @@ impl Node {
         }
         match &mut self.value {
             YamlValue::Map(entries) => entries.iter_mut().find_map(|(key, _, node)| {
-                rest_after(path, key).and_then(|rest| node.at_mut(rest))
+                rest_after(path, key).and_then(|tail| node.at_mut(tail))
             }),
             YamlValue::List(items) => {
-                let (index, rest) = split_index(path)?;
-                items.get_mut(index)?.at_mut(rest)
+                let (index, tail) = split_index(path)?;
+                items.get_mut(index)?.at_mut(tail)
             }
             _ => None,
         }
@@ -189,19 +189,19 @@ impl Node {
         match &mut self.value {
             YamlValue::Map(entries) => {
                 for (key, _, child) in entries.iter_mut() {
-                    if let Some(rest) = rest_after(path, key) {
-                        return child.put(rest, node);
+                    if let Some(tail) = rest_after(path, key) {
+                        return child.put(tail, node);
                     }
                 }
-                let (key, rest) = split_key(path);
+                let (key, tail) = split_key(path);
                 let mut child = Node::new(YamlValue::Null, node.mark);
                 let mark = node.mark;
-                child.put(rest, node)?;
+                child.put(tail, node)?;
                 entries.push((key.into(), mark, child));
                 Ok(())
             }
             YamlValue::List(items) => {
-                let (index, rest) =
+                let (index, tail) =
                     split_index(path).ok_or_else(|| format!("`{path}` is no index of a list"))?;
                 if index > items.len() {
                     return Err(format!(
@@ -212,7 +212,7 @@ impl Node {
                 if index == items.len() {
                     items.push(Node::new(YamlValue::Null, node.mark));
                 }
-                items[index].put(rest, node)
+                items[index].put(tail, node)
             }
             _ => Err(format!("`{path}` lies below a plain value")),
         }
@@ -228,17 +228,17 @@ impl Node {
                 else {
                     return false;
                 };
-                let rest = rest_after(path, &entries[index].0)
+                let tail = rest_after(path, &entries[index].0)
                     .unwrap_or_default()
                     .to_string();
                 // The innermost entry that can go, so that the siblings are still looked at.
-                if rest.is_empty() || !entries[index].2.remove(&rest) {
+                if tail.is_empty() || !entries[index].2.remove(&tail) {
                     entries.remove(index);
                 }
                 true
             }
             YamlValue::List(items) => match split_index(path) {
-                Some((index, rest)) => items.get_mut(index).is_some_and(|item| item.remove(rest)),
+                Some((index, tail)) => items.get_mut(index).is_some_and(|item| item.remove(tail)),
                 None => false,
             },
             _ => false,
@@ -282,21 +282,21 @@ impl Node {
 }
 
 /// `stages[2]` + `with.every` -> `stages[2].with.every`.
-pub(crate) fn join(path: &str, rest: &str) -> String {
-    match (path.is_empty(), rest.is_empty() || rest.starts_with('[')) {
-        (true, _) => rest.into(),
-        (false, true) => format!("{path}{rest}"),
-        (false, false) => format!("{path}.{rest}"),
+pub(crate) fn join(path: &str, tail: &str) -> String {
+    match (path.is_empty(), tail.is_empty() || tail.starts_with('[')) {
+        (true, _) => tail.into(),
+        (false, true) => format!("{path}{tail}"),
+        (false, false) => format!("{path}.{tail}"),
     }
 }
 
 /// What follows a key at the head of a path.
 pub(super) fn rest_after<'p>(path: &'p str, key: &str) -> Option<&'p str> {
-    let rest = path.strip_prefix(key)?;
-    if rest.is_empty() || rest.starts_with('[') {
-        Some(rest)
+    let tail = path.strip_prefix(key)?;
+    if tail.is_empty() || tail.starts_with('[') {
+        Some(tail)
     } else {
-        rest.strip_prefix('.')
+        tail.strip_prefix('.')
     }
 }
 
@@ -311,9 +311,9 @@ pub(super) fn split_key(path: &str) -> (&str, &str) {
 
 /// The index at the head of a path, `[2]` or `2`, and what follows it.
 pub(super) fn split_index(path: &str) -> Option<(usize, &str)> {
-    let (digits, rest) = match path.strip_prefix('[') {
+    let (digits, tail) = match path.strip_prefix('[') {
         Some(inner) => inner.split_once(']')?,
         None => path.split_at(path.find(['.', '[']).unwrap_or(path.len())),
     };
-    Some((digits.parse().ok()?, rest.strip_prefix('.').unwrap_or(rest)))
+    Some((digits.parse().ok()?, tail.strip_prefix('.').unwrap_or(tail)))
 }

@@ -13,14 +13,14 @@ use serde::forward_to_deserialize_any;
 pub fn typed<T: DeserializeOwned>(node: &Node) -> Result<T, Vec<Trouble>> {
     let mut troubles: Vec<Trouble> = Vec::new();
     let mut removed: Vec<String> = Vec::new();
-    let mut rest = node.clone();
+    let mut remaining = node.clone();
     // serde stops at the first fault: what is faulty is taken out and the remainder is read again.
     loop {
-        match T::deserialize(&rest) {
+        match T::deserialize(&remaining) {
             Ok(value) if troubles.is_empty() => return Ok(value),
             Ok(_) => return Err(troubles),
             Err(trouble) => {
-                let trouble = locate::<T>(trouble, &rest);
+                let trouble = locate::<T>(trouble, &remaining);
                 if let Some(field) = trouble.missing {
                     let path = super::node::join(&trouble.path, field);
                     if !removed.iter().any(|gone: &String| gone.starts_with(&path)) {
@@ -30,7 +30,7 @@ pub fn typed<T: DeserializeOwned>(node: &Node) -> Result<T, Vec<Trouble>> {
                 }
                 let path = trouble.path.clone();
                 troubles.push(trouble);
-                if path.is_empty() || !rest.remove(&path) {
+                if path.is_empty() || !remaining.remove(&path) {
                     return Err(troubles);
                 }
                 removed.push(path);

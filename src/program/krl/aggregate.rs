@@ -73,11 +73,11 @@ impl<'t> Aggregate<'t> {
     pub(crate) fn new(source: ProgramText<'t>, tokens: &'t [Token]) -> Self {
         let mut inner = &tokens[1..tokens.len() - 1];
         let mut prefix = None;
-        if let [name, colon, rest @ ..] = inner
+        if let [name, colon, tail @ ..] = inner
             && name.sort == TokenKind::Word
             && colon.is(b':')
         {
-            (prefix, inner) = (Some(source.upper(name)), rest);
+            (prefix, inner) = (Some(source.upper(name)), tail);
         }
         let fields = arguments(inner).collect();
         Self {
@@ -126,13 +126,13 @@ impl<'t> Aggregate<'t> {
     /// Whether its fields are those of a target.
     pub(crate) fn may_be_target(&self) -> bool {
         let names: Vec<String> = self.names().collect();
-        let of =
+        let made =
             |sets: &[&[&str]], name: &String| sets.iter().any(|set| set.contains(&name.as_str()));
-        names.iter().any(|name| of(&[&AXES, &FRAME[..3]], name))
+        names.iter().any(|name| made(&[&AXES, &FRAME[..3]], name))
             || (!names.is_empty()
                 && names
                     .iter()
-                    .all(|name| of(&[&FRAME, &STATUS, &EXTERNALS], name)))
+                    .all(|name| made(&[&FRAME, &STATUS, &EXTERNALS], name)))
     }
 
     /// The number of a field, in capitals, where it is one.

@@ -16,9 +16,9 @@ pub(super) fn declared(source: ProgramText, line: &[Token]) -> Option<(String, V
         .iter()
         .take_while(|token| source.is_word(token, &["DECL", "GLOBAL", "CONST"]))
         .count();
-    let rest = &line[skipped..];
-    let [kind, first, ..] = rest else { return None };
-    let plain = rest
+    let tail = &line[skipped..];
+    let [kind, first, ..] = tail else { return None };
+    let plain = tail
         .get(2)
         .is_none_or(|next| next.is(b'=') || next.is(b'[') || next.is(b','));
     if kind.sort != TokenKind::Word || first.sort != TokenKind::Word || !plain {
@@ -30,7 +30,7 @@ pub(super) fn declared(source: ProgramText, line: &[Token]) -> Option<(String, V
     }
     let mut names = vec![source.upper(first)];
     let mut depth = 0;
-    for pair in rest.windows(2) {
+    for pair in tail.windows(2) {
         depth += pair[0].opens();
         if depth == 0 && pair[0].is(b',') && pair[1].sort == TokenKind::Word {
             names.push(source.upper(&pair[1]));
@@ -56,20 +56,20 @@ pub(super) fn structure(source: ProgramText, line: &[Token]) -> Option<String> {
 /// Behind a name: the last member of `[1].FRAME.X`, and what follows `=`; the second is none where nothing is set.
 pub(super) fn member<'t>(
     source: ProgramText,
-    rest: &'t [Token],
+    tail: &'t [Token],
 ) -> Option<(Option<String>, Option<&'t [Token]>)> {
     let mut member = None;
     let mut k = 0;
     loop {
-        match rest.get(k).map(|token| token.sort) {
+        match tail.get(k).map(|token| token.sort) {
             Some(TokenKind::Sign(b'[')) => {
-                k += rest[k..].iter().position(|token| token.is(b']'))? + 1
+                k += tail[k..].iter().position(|token| token.is(b']'))? + 1
             }
             Some(TokenKind::Sign(b'.')) => {
-                member = Some(source.upper(rest.get(k + 1)?));
+                member = Some(source.upper(tail.get(k + 1)?));
                 k += 2;
             }
-            Some(TokenKind::Sign(b'=')) => return Some((member, Some(&rest[k + 1..]))),
+            Some(TokenKind::Sign(b'=')) => return Some((member, Some(&tail[k + 1..]))),
             _ => return Some((member, None)),
         }
     }
@@ -77,22 +77,22 @@ pub(super) fn member<'t>(
 
 /// The variable that is set where `before` ends in `NAME[1].MEMBER =`: its name, and whether a member of it.
 pub(super) fn variable(source: ProgramText, before: &[Token]) -> Option<(String, Option<String>)> {
-    let (last, mut rest) = before.split_last()?;
+    let (last, mut tail) = before.split_last()?;
     if !last.is(b'=') {
         return None;
     }
-    let mut of = None;
+    let mut subject = None;
     loop {
-        let (last, front) = rest.split_last()?;
+        let (last, front) = tail.split_last()?;
         if last.is(b']') {
             let open = front.iter().rposition(|token| token.is(b'['))?;
-            rest = &front[..open];
+            tail = &front[..open];
         } else if last.sort == TokenKind::Word {
             if front.last().is_some_and(|token| token.is(b'.')) {
-                of = of.or_else(|| Some(source.upper(last)));
-                rest = &front[..front.len() - 1];
+                subject = subject.or_else(|| Some(source.upper(last)));
+                tail = &front[..front.len() - 1];
             } else {
-                return Some((source.upper(last), of));
+                return Some((source.upper(last), subject));
             }
         } else {
             return None;
@@ -133,12 +133,12 @@ pub(super) fn steps(
             named.collect()
         }
     };
-    let of = |(line, step): (&&[Token], FlowStep)| FlowLine {
+    let of_line = |(line, step): (&&[Token], FlowStep)| FlowLine {
         calls: called(line, &step),
         sets: sets(line),
         step,
     };
-    lines.iter().zip(all.clone()).map(of).collect()
+    lines.iter().zip(all.clone()).map(of_line).collect()
 }
 
 /// `EXT`, `INTERRUPT DECL` and `TRIGGER`: what they name runs at another time.

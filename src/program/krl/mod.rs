@@ -67,8 +67,8 @@ pub(super) fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
         bytes,
         language: Language::Krl,
     };
-    let own = tokens(source, &mut found);
-    let lines = lines(&own);
+    let all = tokens(source, &mut found);
+    let lines = lines(&all);
     let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for line in &lines {
         if let Some((kind, names)) = declared(source, line) {
@@ -104,7 +104,7 @@ pub(super) fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
 /// Gives targets their frames, tools and loads, by all files of the program.
 fn in_force(
     source: ProgramText,
-    own: &[&[Token]],
+    statements: &[&[Token]],
     companions: &[Companion],
     names: &[(Range<usize>, String)],
     found: &mut Gathered,
@@ -121,8 +121,8 @@ fn in_force(
     read.iter()
         .for_each(|(source, lines)| data.declare(*source, lines));
     data.declare_routines(&read);
-    data.declare(source, own);
-    reached::reach(source, own, &data, None, &mut reached);
+    data.declare(source, statements);
+    reached::reach(source, statements, &data, None, &mut reached);
     for (companion, tokens) in companions() {
         reached::reach(
             companion.text(Language::Krl),

@@ -17,7 +17,7 @@ pub(super) fn reach(
     out: &mut Reached,
 ) {
     let places = places(source.bytes, lines, file);
-    let own: Vec<String> = lines
+    let names: Vec<String> = lines
         .iter()
         .filter_map(|line| {
             if let FlowStep::Routine(name) = step(source, line) {
@@ -46,7 +46,7 @@ pub(super) fn reach(
             mentions(source, line, place, out);
             if let Some(name) = data
                 .unknown_call(source, line)
-                .filter(|name| !own.contains(name) && file.is_none())
+                .filter(|name| !names.contains(name) && file.is_none())
             {
                 let message = format!(
                     "calls {name} of a file that was not read: calib assumed that it leaves $BASE, $TOOL and $LOAD as they are"

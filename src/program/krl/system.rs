@@ -146,8 +146,8 @@ impl SystemData {
             .filter(|line| line.len() > 2 && declared(source, line).is_none())
         {
             let name = source.upper(&line[0]);
-            if let Some((of, Some(value))) = member(source, &line[1..]) {
-                let whole = of.is_none();
+            if let Some((subject, Some(value))) = member(source, &line[1..]) {
+                let whole = subject.is_none();
                 if self.frames.contains_key(&name) {
                     note(
                         &mut self.frames,
@@ -274,26 +274,26 @@ impl SystemData {
     /// `$BASE = ...` and the like.
     fn set(&self, source: ProgramText, line: &[Token], place: &str, state: &mut SystemState) {
         let name = source.upper(&line[0]);
-        let Some((of, Some(value))) = member(source, &line[1..]) else {
+        let Some((subject, Some(value))) = member(source, &line[1..]) else {
             return;
         };
         let by = format!("{name} of {place}");
         let open = |why: &str| format!("{why} ({name} of {place})");
         match name.as_str() {
             "$BASE" => {
-                state.force.base = match self.base(source, value).filter(|_| of.is_none()) {
+                state.force.base = match self.base(source, value).filter(|_| subject.is_none()) {
                     Some(pose) => Setting::Known(pose, by),
-                    None => Setting::Open(open(&self.unknown(source, value, of.is_some()))),
+                    None => Setting::Open(open(&self.unknown(source, value, subject.is_some()))),
                 }
             }
             "$TOOL" => {
-                state.force.tool = match self.tool(source, value).filter(|_| of.is_none()) {
+                state.force.tool = match self.tool(source, value).filter(|_| subject.is_none()) {
                     Some(tool) => Setting::Known(tool, by),
-                    None => Setting::Open(open(&self.unknown(source, value, of.is_some()))),
+                    None => Setting::Open(open(&self.unknown(source, value, subject.is_some()))),
                 }
             }
             "$LOAD" => {
-                state.force.load = match self.load(source, value).filter(|_| of.is_none()) {
+                state.force.load = match self.load(source, value).filter(|_| subject.is_none()) {
                     Some(mass) => Setting::Known(mass, by),
                     None => Setting::Open(open("is set when the program runs")),
                 }
@@ -317,7 +317,7 @@ impl SystemData {
                 state.point = value
                     .first()
                     .map(|name| source.upper(name))
-                    .filter(|_| of.is_none())
+                    .filter(|_| subject.is_none())
             }
             _ => {}
         }
@@ -325,14 +325,14 @@ impl SystemData {
 
     /// `BAS(#BASE, 3)`.
     fn call(&self, source: ProgramText, line: &[Token], place: &str, state: &mut SystemState) {
-        let [_, open, sharp, what, rest @ ..] = line else {
+        let [_, open, sharp, what, tail @ ..] = line else {
             return;
         };
         if !open.is(b'(') || !sharp.is(b'#') {
             return;
         }
         let what = source.upper(what);
-        let number = rest
+        let number = tail
             .get(1..2)
             .and_then(|number| source.number(number))
             .map(|(number, _)| number as i64);
@@ -493,18 +493,18 @@ const FIXED: &str = "is carried by the robot: the tool stands still ($IPO_MODE #
 
 /// `BASE_DATA[3] = {...}`: name, number, and the value; none where a part of it is set.
 fn entry<'t>(source: ProgramText, line: &'t [Token]) -> Option<(String, i64, Option<&'t [Token]>)> {
-    let [name, open, number, close, rest @ ..] = line else {
+    let [name, open, number, close, tail @ ..] = line else {
         return None;
     };
     let is = open.is(b'[')
         && close.is(b']')
         && source.is_word(name, &["BASE_DATA", "TOOL_DATA", "LOAD_DATA"]);
     let (number, _) = source.number(std::slice::from_ref(number))?;
-    let (of, value) = member(source, rest).filter(|_| is)?;
+    let (subject, value) = member(source, tail).filter(|_| is)?;
     Some((
         source.upper(name),
         number as i64,
-        value.filter(|_| of.is_none()),
+        value.filter(|_| subject.is_none()),
     ))
 }
 

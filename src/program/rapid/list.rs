@@ -307,21 +307,21 @@ impl<'t> List<'t> {
 
 /// `[cf1,cf4,cf6,cfx]`: whole quarter turns, and one of eight configurations.
 fn configuration(numbers: &[(f64, Range<usize>)], found: &mut Gathered) -> PostureStatement {
-    const MOST: f64 = 100.0;
+    const LARGEST: f64 = 100.0;
     let mut all = [0; 4];
     if numbers.iter().any(|(value, _)| *value == NOT_CONNECTED) {
         return PostureStatement::Unstated;
     }
-    for (k, (own, (value, span))) in all.iter_mut().zip(numbers).enumerate() {
+    for (k, (number, (value, span))) in all.iter_mut().zip(numbers).enumerate() {
         let fault = match k {
             3 if value.fract() != 0.0 || !(0.0..8.0).contains(value) => {
                 "no configuration cfx, expected a whole number from 0 to 7"
             }
-            _ if value.fract() != 0.0 || value.abs() > MOST => {
+            _ if value.fract() != 0.0 || value.abs() > LARGEST => {
                 "no quadrant of a joint, expected a whole number"
             }
             _ => {
-                *own = *value as i32;
+                *number = *value as i32;
                 continue;
             }
         };

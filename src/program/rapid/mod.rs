@@ -65,8 +65,8 @@ pub(super) fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
         bytes,
         language: Language::Rapid,
     };
-    let own = tokens(source, &mut found);
-    let statements = statements(source, &own, &mut found);
+    let all = tokens(source, &mut found);
+    let statements = statements(source, &all, &mut found);
     let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for statement in &statements {
         if let Some(declaration) = declaration(source, statement) {
@@ -170,7 +170,7 @@ fn declaration<'t>(source: ProgramText, statement: &'t [Token]) -> Option<Declar
         .iter()
         .take_while(|token| source.is_word(token, &["LOCAL", "TASK"]))
         .count();
-    let [storage, kind, name, rest @ ..] = &statement[scoped..] else {
+    let [storage, kind, name, tail @ ..] = &statement[scoped..] else {
         return None;
     };
     if !source.is_word(storage, &STORAGE)
@@ -179,14 +179,14 @@ fn declaration<'t>(source: ProgramText, statement: &'t [Token]) -> Option<Declar
     {
         return None;
     }
-    let assign = rest
+    let assign = tail
         .iter()
         .position(|token| token.sort == TokenKind::Pair(b':'));
-    let dimensions = rest.iter().take_while(|token| !token.is(b'}')).count();
-    let named = if rest.first().is_some_and(|token| token.is(b'{')) {
-        rest.get(dimensions + 1..).unwrap_or_default()
+    let dimensions = tail.iter().take_while(|token| !token.is(b'}')).count();
+    let named = if tail.first().is_some_and(|token| token.is(b'{')) {
+        tail.get(dimensions + 1..).unwrap_or_default()
     } else {
-        rest
+        tail
     };
     let stray = if assign.is_none() {
         named.first()
@@ -196,7 +196,7 @@ fn declaration<'t>(source: ProgramText, statement: &'t [Token]) -> Option<Declar
     Some(Declaration {
         kind: source.upper(kind),
         name: source.upper(name),
-        value: assign.map(|k| &rest[k + 1..]),
+        value: assign.map(|k| &tail[k + 1..]),
         stray,
     })
 }
@@ -303,12 +303,12 @@ impl Reader<'_> {
             }
             _ if kind.is_some_and(|kind| NUMBERS.contains(&kind)) => {}
             _ => {
-                let of = kind.map_or_else(
+                let kind_of = kind.map_or_else(
                     || "whose type this file does not state".into(),
                     |kind| format!("of type {kind}"),
                 );
                 self.computed(value, want.is_some());
-                self.others(value, format!("a variable {of}"));
+                self.others(value, format!("a variable {kind_of}"));
             }
         }
     }
@@ -474,8 +474,8 @@ pub(super) fn listed(bytes: &[u8]) -> Declared {
     };
     let (mut names, mut poses) = (Vec::new(), 0);
     for statement in statements {
-        let Some((value, kind)) =
-            declaration(source, statement).and_then(|own| Some((own.value?, own.kind)))
+        let Some((value, kind)) = declaration(source, statement)
+            .and_then(|declared| Some((declared.value?, declared.kind)))
         else {
             continue;
         };

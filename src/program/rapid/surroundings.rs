@@ -278,7 +278,7 @@ fn object(list: Option<&List>) -> DeclaredValue<Pose> {
         .list(3)
         .and_then(frame)
         .zip(list.list(4).and_then(frame))
-        .map(|(user, own)| user * own);
+        .map(|(user, object)| user * object);
     pose.ok_or_else(|| "is not declared with its numbers".into())
 }
 
@@ -307,7 +307,7 @@ const WORDS: Words = Words {
 
 /// Gives targets their frames, tools and loads, by all files of the program. `names`: literals that a variable holds, and its name.
 pub(super) fn in_force(
-    (source, own): (ProgramText, &[&[Token]]),
+    (source, lines): (ProgramText, &[&[Token]]),
     companions: &[Companion],
     names: &[(Range<usize>, String)],
     found: &mut Gathered,
@@ -327,7 +327,7 @@ pub(super) fn in_force(
     for (source, statements) in &others {
         surroundings.declare_all(*source, statements);
     }
-    surroundings.declare_all(source, own);
+    surroundings.declare_all(source, lines);
     let mut reached = Reached::default();
     for (source, statement) in others
         .iter()
@@ -335,7 +335,7 @@ pub(super) fn in_force(
     {
         reach(*source, statement, &surroundings, false, &mut reached);
     }
-    for statement in own {
+    for statement in lines {
         reach(source, statement, &surroundings, true, &mut reached);
     }
     let uses = reached.uses(&found.literals, names);

@@ -242,16 +242,16 @@ impl MessageCells {
     }
     /// Takes the names of joints, unless they are those of the message before.
     fn take_joints(&mut self, names: &[&[u8]]) -> Result<(), FieldFault> {
-        let mut own = Vec::with_capacity(self.joints.len());
+        let mut values = Vec::with_capacity(self.joints.len());
         for name in names {
-            own.resize(own.len().next_multiple_of(4), 0);
-            own.extend_from_slice(&(name.len() as u32).to_le_bytes());
-            own.extend_from_slice(name);
+            values.resize(values.len().next_multiple_of(4), 0);
+            values.extend_from_slice(&(name.len() as u32).to_le_bytes());
+            values.extend_from_slice(name);
         }
-        if own == self.joints && self.is_closed {
+        if values == self.joints && self.is_closed {
             return Ok(());
         }
-        self.joints = own;
+        self.joints = values;
         let names: Vec<_> = names
             .iter()
             .map(|name| String::from_utf8_lossy(name))

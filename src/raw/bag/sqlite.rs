@@ -269,7 +269,7 @@ fn text(row: &[u8], column: usize) -> Option<String> {
 
 /// Names of the columns by the statement that made a table.
 fn columns(statement: &str) -> Vec<String> {
-    let inside = statement.split_once('(').map_or("", |(_, rest)| rest);
+    let inside = statement.split_once('(').map_or("", |(_, tail)| tail);
     let name = |part: &str| {
         part.split_whitespace()
             .next()

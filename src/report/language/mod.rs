@@ -115,8 +115,8 @@ impl Locale {
 
     /// What [`say!`] calls.
     pub(super) fn say(&self, id: &str, arguments: &[(&str, String)]) -> String {
-        let of = |name: &str| arguments.iter().find(|(known, _)| *known == name);
-        let filled = self.message(id, |name| of(name).map(|(_, value)| value.clone()));
+        let of_name = |name: &str| arguments.iter().find(|(known, _)| *known == name);
+        let filled = self.message(id, |name| of_name(name).map(|(_, value)| value.clone()));
         filled.unwrap_or_else(|| id.into())
     }
 

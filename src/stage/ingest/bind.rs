@@ -343,9 +343,11 @@ impl Binder<'_> {
     }
     /// Uncertainties, each as the standard deviations that it stands for.
     fn uncertainties(&mut self, columns: &Columns, arm: &RobotJoints) -> Result<()> {
-        for (declared, mapped, of, divisor) in columns.uncertainties() {
+        for (declared, mapped, own_columns, divisor) in columns.uncertainties() {
             let unit = unit(mapped.unit.as_deref())?;
-            let places = of.iter().map(|setting| arm.slots.of(setting).start);
+            let places = own_columns
+                .iter()
+                .map(|setting| arm.slots.of(setting).start);
             if let Some(value) = mapped.value {
                 let value = unit.to_si(value) / divisor;
                 self.binding

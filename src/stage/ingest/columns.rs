@@ -93,12 +93,14 @@ impl Columns {
         self.0
             .iter()
             .filter_map(|(column, mapped)| match (column.shape, mapped) {
-                (ColumnShape::Uncertainty { of, coverage }, Mapped::Uncertainty(mapped)) => Some((
-                    *column,
-                    mapped,
-                    of,
-                    mapped.coverage_factor.unwrap_or(coverage),
-                )),
+                (ColumnShape::Uncertainty { columns, coverage }, Mapped::Uncertainty(mapped)) => {
+                    Some((
+                        *column,
+                        mapped,
+                        columns,
+                        mapped.coverage_factor.unwrap_or(coverage),
+                    ))
+                }
                 _ => None,
             })
     }

@@ -340,12 +340,12 @@ pub(super) fn no_copies(read: &[Measurement]) -> Result<()> {
 }
 
 /// Rows that are used of both files; none where what they measured differs.
-fn used_twice(of: [&Measurement; 2], files: [&FileRows; 2]) -> u64 {
+fn used_twice(measurements: [&Measurement; 2], files: [&FileRows; 2]) -> u64 {
     let [one, other] = files;
     if !one.measured_same(other) {
         return 0;
     }
-    if of.iter().any(|of| of.partners.is_empty()) {
+    if measurements.iter().any(|used| used.partners.is_empty()) {
         return one.count_used().min(other.count_used());
     }
     let both = |row: &usize| one.is_used(*row) && other.is_used(*row);

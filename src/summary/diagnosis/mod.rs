@@ -46,8 +46,8 @@ impl DiagnosisSummary {
     /// What a stage of a run that diagnoses wrote. Fails where a table has left the store.
     pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
         let load = |kind: &str| {
-            let own = stage.outputs.iter().find(|output| output.kind == kind);
-            own.map(|output| store.load(&output.table)).transpose()
+            let record = stage.outputs.iter().find(|output| output.kind == kind);
+            record.map(|output| store.load(&output.table)).transpose()
         };
         let recording = stage.inputs.iter().find(|input| input.port == "recording");
         let diagnosis = if stage.uses == DiagnoseTorques::NAME {

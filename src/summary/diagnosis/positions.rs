@@ -142,10 +142,10 @@ impl Positions {
             text.push_str(&screen::errors("after", last, least, &after));
         }
         if let (Some(first), Some(last)) = (v.before_rms_rad, v.after_rms_rad) {
-            for (label, rad, of) in [("before", first, &before), ("after", last, &after)] {
+            for (label, rad, noun) in [("before", first, &before), ("after", last, &after)] {
                 text.push_str(&labelled(
                     label,
-                    &format!("{:>7.1} arcsec rms  {of}", Unit::Arcsecond.from_si(rad)),
+                    &format!("{:>7.1} arcsec rms  {noun}", Unit::Arcsecond.from_si(rad)),
                 ));
             }
         }
@@ -319,7 +319,7 @@ impl Torques {
             v.rows, v.rate_hz, v.cutoff_hz
         );
         let rows = screen::measured(robot, &rows, None);
-        let of = if v.held_out {
+        let subject = if v.held_out {
             "held out"
         } else {
             "fitted rows: flattered"
@@ -333,7 +333,7 @@ impl Torques {
                 ),
             )
         };
-        rows + &line("before", v.before_nrmse, &format!("rigid arm, {of}"))
+        rows + &line("before", v.before_nrmse, &format!("rigid arm, {subject}"))
             + &line("after", v.after_nrmse, screen::with_findings(found))
     }
 

@@ -191,11 +191,11 @@ impl<'a> Bench<'a> {
         };
         for point in points {
             let row = point.row(point.q.clone(), Vec::new());
-            let rest = settle(&arm, &row, &[]);
-            for (peak, torque) in bench.peak.iter_mut().zip(&rest.torque) {
+            let at_rest = settle(&arm, &row, &[]);
+            for (peak, torque) in bench.peak.iter_mut().zip(&at_rest.torque) {
                 *peak = peak.max(torque.abs());
             }
-            let loads = crate::arm::Loads::new(&arm, &rest.posture, point.payload_kg);
+            let loads = crate::arm::Loads::new(&arm, &at_rest.posture, point.payload_kg);
             let (_, moment) = loads.wrench(0, [0.0; 3]);
             bench.overturning = bench.overturning.max(moment[0].hypot(moment[1]));
         }

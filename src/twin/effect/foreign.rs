@@ -275,11 +275,11 @@ struct Seen<'a> {
 impl ForeignVariable {
     /// Its value; 0 for a joint that there is not.
     fn value(&self, seen: &Seen) -> f64 {
-        let of = |all: &[f64], joint: usize| all.get(joint.wrapping_sub(1)).copied().unwrap_or(0.0);
+        let at = |all: &[f64], joint: usize| all.get(joint.wrapping_sub(1)).copied().unwrap_or(0.0);
         match self {
-            Self::Angle(joint) => of(&seen.row.command, *joint),
-            Self::Approach(joint) => of(&seen.row.direction, *joint),
-            Self::Load(joint) => of(seen.torque, *joint),
+            Self::Angle(joint) => at(&seen.row.command, *joint),
+            Self::Approach(joint) => at(&seen.row.direction, *joint),
+            Self::Load(joint) => at(seen.torque, *joint),
             Self::Payload => seen.row.payload_kg,
             Self::Time => seen.row.time_s,
             Self::Temperature => seen.row.temperature_c,

@@ -331,16 +331,17 @@ impl Physical {
 
 /// What every effect makes of the rows before, row by row: [`Row::memory`] of each.
 pub fn recall(effects: &[Physical], past: &[Moment]) -> Vec<Vec<f64>> {
-    let own: Vec<Vec<f64>> = effects
+    let torques: Vec<Vec<f64>> = effects
         .iter()
         .map(|effect| effect.inner().remember(past))
         .collect();
-    if own.iter().all(Vec::is_empty) {
+    if torques.iter().all(Vec::is_empty) {
         return vec![Vec::new(); past.len()];
     }
     (0..past.len())
         .map(|row| {
-            own.iter()
+            torques
+                .iter()
                 .map(|all| all.get(row).copied().unwrap_or(0.0))
                 .collect()
         })

@@ -107,9 +107,9 @@ fn expected(cause: &Cause, number: &Number) -> Option<Expected> {
         (_, "mass") if number.value == 0.0 => None,
         (effect, what) => {
             let (.., ending, factor, unit) =
-                COUNTERPARTS.iter().find(|(of, word, forms, ..)| {
+                COUNTERPARTS.iter().find(|(subject, word, forms, ..)| {
                     let form = forms.is_empty() || forms.contains(&cause.form.as_str());
-                    (*of, *word) == (effect, what) && form
+                    (*subject, *word) == (effect, what) && form
                 })?;
             expected(format!("{seat}{ending}"), *factor, unit)
         }

@@ -229,9 +229,12 @@ fn places(names: &Atoms) -> BTreeSet<&str> {
 
 /// Judges what was named of `cause`; `known` are all names that are there or accepted.
 fn placed(cause: &Cause, truth: &Truth, findings: &[Finding], known: &Atoms) -> Placed {
-    let own = cause.atoms();
+    let accepts = cause.atoms();
     let accepted = all_atoms(&truth.accepted);
-    let right: BTreeSet<&str> = places(&own).union(&places(&accepted)).copied().collect();
+    let right: BTreeSet<&str> = places(&accepts)
+        .union(&places(&accepted))
+        .copied()
+        .collect();
     let others: Atoms = truth.effects.iter().flat_map(Cause::atoms).collect();
     let elsewhere: BTreeSet<&str> = places(&others).difference(&right).copied().collect();
 
@@ -255,7 +258,7 @@ fn placed(cause: &Cause, truth: &Truth, findings: &[Finding], known: &Atoms) -> 
         place: physical()
             .find(|(_, names)| !places(names).is_subset(&elsewhere))
             .is_some_and(|(_, names)| there(names)),
-        name_or_unknown: own.is_subset(&found)
+        name_or_unknown: accepts.is_subset(&found)
             || !accepted.is_disjoint(&found)
             || named
                 .iter()

@@ -130,7 +130,7 @@ pub(crate) type Atoms = BTreeSet<(String, String)>;
 pub(super) fn atoms(effect: &str, place: &str) -> Atoms {
     let run = place
         .strip_prefix("link ")
-        .and_then(|rest| rest.split_once('-'));
+        .and_then(|tail| tail.split_once('-'));
     let ends = run.and_then(|(from, to)| Some((from.parse::<u8>().ok()?, to.parse::<u8>().ok()?)));
     match ends {
         Some((from, to)) => (from..=to)

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Share {
     pub(crate) count: usize,
-    pub(crate) of: usize,
+    pub(crate) index: usize,
 }
 
 impl Share {
@@ -22,7 +22,7 @@ impl Share {
     }
     fn add(&mut self, holds: bool) {
         self.count += usize::from(holds);
-        self.of += 1;
+        self.index += 1;
     }
     /// What holds by kind.
     pub(super) fn by_kind<'a>(
@@ -34,10 +34,10 @@ impl Share {
     }
     /// E. B. Wilson, 1927.
     pub(crate) fn limits(&self) -> [f64; 2] {
-        if self.of == 0 {
+        if self.index == 0 {
             return [0.0, 1.0];
         }
-        let (n, z) = (self.of as f64, 1.959_964f64);
+        let (n, z) = (self.index as f64, 1.959_964f64);
         let p = self.count as f64 / n;
         let middle = p + z * z / (2.0 * n);
         let wide = z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
@@ -48,7 +48,7 @@ impl Share {
 impl Serialize for Share {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         let limits = self.limits();
-        json!({ "count": self.count, "of": self.of, "wilson_95": limits }).serialize(to)
+        json!({ "count": self.count, "of": self.index, "wilson_95": limits }).serialize(to)
     }
 }
 
@@ -120,8 +120,8 @@ fn bins<'a>(statements: &[&'a Statement], subject: Subject) -> Vec<(f64, f64, Ve
     ENDS.windows(2).map(bin).collect()
 }
 
-fn sum(statements: &[&Statement], of: impl Fn(&Statement) -> f64) -> f64 {
-    statements.iter().map(|one| of(one)).sum()
+fn sum(statements: &[&Statement], value_of: impl Fn(&Statement) -> f64) -> f64 {
+    statements.iter().map(|one| value_of(one)).sum()
 }
 
 fn outcome(statement: &Statement) -> f64 {
@@ -168,8 +168,8 @@ fn auc(all: &[&Statement]) -> Option<f64> {
 pub(super) fn mixed(listed: &[&Statement], without: &[&Statement], unlisted: f64) -> Vec<Value> {
     let [listed, without] = [listed, without].map(|all| bins(all, Subject::Name));
     let bin = |((from, to, listed), (_, _, without)): ((f64, f64, Vec<_>), (_, _, Vec<_>))| {
-        let sum = |of: fn(&Statement) -> f64| {
-            (1.0 - unlisted) * sum(&listed, of) + unlisted * sum(&without, of)
+        let sum = |value_of: fn(&Statement) -> f64| {
+            (1.0 - unlisted) * sum(&listed, value_of) + unlisted * sum(&without, value_of)
         };
         let all = sum(|_| 1.0);
         let (stated, right) = (sum(|one| one.probability) / all, sum(outcome) / all);
@@ -231,7 +231,7 @@ mod tests {
         let bins = mixed(&listed, &[name(1.0, false), name(1.0, true)], 0.25);
         let figure = |bin: usize, what: &str| bins[bin][what].as_f64().expect("a figure");
         let counts =
-            |bin| ["statements_whole_list", "statements_left_out"].map(|of| figure(bin, of));
+            |bin| ["statements_whole_list", "statements_left_out"].map(|kind| figure(bin, kind));
         assert_eq!(
             (bins.len(), counts(0), figure(0, "right")),
             (2, [1.0, 0.0], 1.0)

@@ -469,8 +469,8 @@ impl Machine {
         let pose = self.pose(q);
         let last = pose.frames.last();
         let tool = last.map_or(self.tool, |frame| matrix::place(frame, self.tool));
-        let own = pose.axes.iter().zip(&pose.points);
-        own.map(|(axis, point)| -dot(*axis, cross(minus(tool, *point), force)))
+        let axes = pose.axes.iter().zip(&pose.points);
+        axes.map(|(axis, point)| -dot(*axis, cross(minus(tool, *point), force)))
             .collect()
     }
 }

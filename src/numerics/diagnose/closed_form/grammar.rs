@@ -72,20 +72,20 @@ pub(super) fn declarations(
         [first, second] => of_two(first, second),
         _ => Vec::new(),
     };
-    let of: Vec<String> = variables
+    let subject: Vec<String> = variables
         .iter()
         .map(|variable| variable.name.replace(['(', ')', '.'], "_"))
         .collect();
     sketches
         .into_iter()
-        .map(|sketch| declaration((place, unit), &of.join("_and_"), sketch))
+        .map(|sketch| declaration((place, unit), &subject.join("_and_"), sketch))
         .collect()
 }
 
-fn declaration((place, unit): (&str, &str), of: &str, sketch: Sketch) -> EffectDeclaration {
+fn declaration((place, unit): (&str, &str), subject: &str, sketch: Sketch) -> EffectDeclaration {
     let formulas = sketch.laws.join("; ");
     EffectDeclaration {
-        name: format!("{}_of_{of}", sketch.label),
+        name: format!("{}_of_{subject}", sketch.label),
         place: place.into(),
         sentence: Some(format!(
             "{{place}} errs by {{values}} times {formulas}{}",

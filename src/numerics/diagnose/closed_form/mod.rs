@@ -51,23 +51,23 @@ impl FormulaSearch<'_, '_> {
     fn forms(&self, at: usize, finding: &Finding) -> Option<Vec<ClosedForm>> {
         let nameless = |form: &Form| form.cause().is_nameless();
         // What it has elsewhere are details of the model.
-        let own: Vec<&Form> = finding
+        let forms: Vec<&Form> = finding
             .forms
             .iter()
             .filter(|form| form.place() == finding.place)
             .collect();
         if finding.effect != names::UNKNOWN
-            || own.is_empty()
-            || !own.iter().all(|form| nameless(form))
+            || forms.is_empty()
+            || !forms.iter().all(|form| nameless(form))
         {
             return None;
         }
         let causes = &self.state.causes;
         let members: Vec<usize> = (0..causes.len())
-            .filter(|i| own.contains(&&causes[*i].form))
+            .filter(|i| forms.contains(&&causes[*i].form))
             .collect();
-        let (place, variables) = self.variables(&own)?;
-        let rest: Vec<&Form> = (0..causes.len())
+        let (place, variables) = self.variables(&forms)?;
+        let others: Vec<&Form> = (0..causes.len())
             .filter(|i| !members.contains(i))
             .map(|i| &causes[i].form)
             .collect();
@@ -78,7 +78,7 @@ impl FormulaSearch<'_, '_> {
         let given = FormRegression::new(
             problem,
             &jacobian,
-            &rest,
+            &others,
             &self.view.without_causes(self.state),
         );
         let Place::Joint(joint) = finding.place else {
@@ -131,15 +131,15 @@ impl FormulaSearch<'_, '_> {
     }
 
     /// The place as a declaration has it, and the variables, where they are one or two.
-    fn variables(&self, own: &[&Form]) -> Option<(String, Vec<NamedVariable>)> {
+    fn variables(&self, forms: &[&Form]) -> Option<(String, Vec<NamedVariable>)> {
         let mut joint = None;
         let mut variables: Vec<Variable> = Vec::new();
-        for form in own {
+        for form in forms {
             let term = form.term()?;
-            let Motion::Joint { joint: own } = term.motion() else {
+            let Motion::Joint { joint: joint_here } = term.motion() else {
                 return None;
             };
-            joint = Some(own);
+            joint = Some(joint_here);
             for variable in term.law().variables() {
                 if !variables.contains(&variable) {
                     variables.push(variable);
@@ -148,10 +148,10 @@ impl FormulaSearch<'_, '_> {
         }
         let joint = joint?;
         let slides = |joint: usize| !self.survey.robot.is_revolute(joint);
-        let named = |of: &Variable| NamedVariable::of(*of, joint, self.range(*of)?, slides);
+        let named = |one: &Variable| NamedVariable::of(*one, joint, self.range(*one)?, slides);
         let named: Vec<NamedVariable> = variables.iter().map(named).collect::<Option<_>>()?;
-        let anywhere =
-            self.survey.robot.is_revolute(joint) && variables.iter().all(|of| of.is_of(joint));
+        let anywhere = self.survey.robot.is_revolute(joint)
+            && variables.iter().all(|asked| asked.is_of(joint));
         let place = if anywhere {
             "joint".into()
         } else {
@@ -161,10 +161,10 @@ impl FormulaSearch<'_, '_> {
     }
 
     /// Lowest and highest value over the fitted rows.
-    fn range(&self, of: Variable) -> Option<[f64; 2]> {
+    fn range(&self, variable: Variable) -> Option<[f64; 2]> {
         let survey = self.survey;
         let value = |(i, row): (usize, &usize)| {
-            Some(match of {
+            Some(match variable {
                 Variable::Angle { joint } => survey.data.q(*row)[joint],
                 Variable::Load { joint } => survey.torque[i * survey.joints() + joint],
                 Variable::Approach { joint } => survey.data.direction(*row, joint),

@@ -66,7 +66,7 @@ impl<'a> Alternatives<'a> {
         columns.extend(ranges[state.causes.len()..].iter().cloned().flatten());
         let nearby = NearbyFits::of(&session, folds, &columns, fitter.scale)?;
         Some(NearAlternatives {
-            of: self,
+            alternatives: self,
             session,
             columns,
             nearby,
@@ -76,7 +76,7 @@ impl<'a> Alternatives<'a> {
 
 /// Fits around a state, in a linear picture.
 pub(crate) struct NearAlternatives<'n> {
-    of: &'n Alternatives<'n>,
+    alternatives: &'n Alternatives<'n>,
     session: Session<'n>,
     columns: Vec<usize>,
     nearby: NearbyFits<'n>,
@@ -90,7 +90,7 @@ impl NearAlternatives<'_> {
             model,
             ranges,
             ..
-        } = self.of;
+        } = self.alternatives;
         let causes = state.causes.len();
         let left_out = |k: &usize| out.iter().any(|i| ranges[*i].contains(k));
         let other = |k: &usize| {
@@ -112,16 +112,18 @@ impl NearAlternatives<'_> {
             .collect();
         Some(FoldErrors::gathered(
             &self.session,
-            &self.of.folds,
+            &self.alternatives.folds,
             &errors?,
         ))
     }
 
     /// The coefficients of a rival (by its position) in the place of some causes, with their standard deviations, SI.
     pub(crate) fn coefficients(&self, out: &[usize], rival: usize) -> Option<Vec<(f64, f64)>> {
-        let Alternatives { state, ranges, .. } = self.of;
-        let own: Vec<usize> = ranges[state.causes.len() + rival].clone().collect();
-        let found = self.nearby.estimated(&self.steps(out, Some(rival)), &own)?;
+        let Alternatives { state, ranges, .. } = self.alternatives;
+        let columns: Vec<usize> = ranges[state.causes.len() + rival].clone().collect();
+        let found = self
+            .nearby
+            .estimated(&self.steps(out, Some(rival)), &columns)?;
         let scale = state.fitted.noise_scale;
         Some(
             found

@@ -35,9 +35,9 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
         if family.len() < 2 {
             continue;
         }
-        let own: Vec<usize> = family.iter().map(|k| range.start + k).collect();
+        let numbers: Vec<usize> = family.iter().map(|k| range.start + k).collect();
         let specs = cause.form.parameters(&state.model.robot);
-        let free: Vec<usize> = own
+        let free: Vec<usize> = numbers
             .iter()
             .copied()
             .filter(|k| covariance.parameters().contains(k))
@@ -53,7 +53,7 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
         // Bodies farther out are lighter and shorter: what rows hardly show of them is no larger than what they show of the arm's lines.
         let others = range
             .clone()
-            .filter(|k| !own.contains(k) && is_shown(state, *k))
+            .filter(|k| !numbers.contains(k) && is_shown(state, *k))
             .map(|k| state.model.x[k].abs());
         let most = others.fold(0.0, f64::max);
         let size = if most > 0.0 {
@@ -87,9 +87,9 @@ fn is_shown(state: &FitState, k: usize) -> bool {
 }
 
 /// The largest size (SI) that the evidence allows, at most `plausible`; none where the parameters were not all estimated.
-fn size(model: &Model, covariance: &Covariance, own: &[usize], plausible: f64) -> Option<f64> {
-    let block = covariance.block(own)?;
-    let values = DVector::from_iterator(own.len(), own.iter().map(|k| model.x[*k]));
+fn size(model: &Model, covariance: &Covariance, numbers: &[usize], plausible: f64) -> Option<f64> {
+    let block = covariance.block(numbers)?;
+    let values = DVector::from_iterator(numbers.len(), numbers.iter().map(|k| model.x[*k]));
     let prior = |k: usize| {
         model
             .known(k)
@@ -100,8 +100,8 @@ fn size(model: &Model, covariance: &Covariance, own: &[usize], plausible: f64) -
     let about = &posterior * values;
     let data = posterior
         - DMatrix::from_diagonal(&DVector::from_iterator(
-            own.len(),
-            own.iter().map(|k| prior(*k)),
+            numbers.len(),
+            numbers.iter().map(|k| prior(*k)),
         ));
     let SymmetricEigen {
         eigenvectors,

@@ -80,11 +80,11 @@ pub(crate) fn correlation_left_by(
 }
 
 /// -2 ln of the prior odds of some findings.
-fn price_of(found: &[FoundCell], of: &dyn Fn(usize) -> bool) -> f64 {
-    let of = found
+fn price_of(found: &[FoundCell], value_of: &dyn Fn(usize) -> bool) -> f64 {
+    let made = found
         .iter()
-        .filter(|found| found.members.iter().any(|i| of(*i)));
-    -2.0 * of.map(|found| found.log_prior).sum::<f64>()
+        .filter(|found| found.members.iter().any(|i| value_of(*i)));
+    -2.0 * made.map(|found| found.log_prior).sum::<f64>()
 }
 
 /// Points by the base model and some causes, in a linear picture.

@@ -343,10 +343,10 @@ pub(crate) fn with_causes(from: &Model, causes: &[EstimatedCause]) -> (Model, Ve
             .filter(|(effect, _)| effect.form().is_none())
     };
     let again = base().filter_map(|(effect, _)| arm_effect(effect.name(), &setting));
-    let own = causes
+    let forms = causes
         .iter()
         .map(|cause| Box::new(cause.form.clone()) as Box<dyn Effect>);
-    let stack = EffectStack::new(&from.robot, setting.base, again.chain(own).collect());
+    let stack = EffectStack::new(&from.robot, setting.base, again.chain(forms).collect());
     let mut model = Model::nominal(from.robot.clone(), stack);
     let stack = model.stack.clone();
     for ((effect, range), (_, found)) in stack

@@ -126,17 +126,19 @@ impl<'a> AsStated<'a> {
         let counts = number.is_none_or(|number| {
             beyond_manufacture(number, &placed.values, self.question.robot, self.reach)
         });
-        let own = if number.is_some() { *OWN_NUMBERS } else { 1.0 };
+        let price = if number.is_some() { *OWN_NUMBERS } else { 1.0 };
         // One error of the list is found by its kind; what has more freedom must leave what a robot that is set up rightly does.
         let is_free =
             number.is_some() || wrong.len() > 1 || matches!(wrong[..], [WrongSetup::Counting(_)]);
         let most = if is_free { *GOOD } else { *NOMINAL } * pairs.reach();
-        let explains =
-            counts && *BETTER * own * share < self.share() && share < *CLOUD && placed.left < most;
+        let explains = counts
+            && *BETTER * price * share < self.share()
+            && share < *CLOUD
+            && placed.left < most;
         Try {
             wrong,
             placed,
-            share: own * share,
+            share: price * share,
             explains,
         }
     }
@@ -155,7 +157,7 @@ impl<'a> AsStated<'a> {
 
     /// Two set-ups whose rows were read as one, where that explains it.
     pub(crate) fn two_setups(&self) -> Option<TwoSetups> {
-        let of = |rows: &[usize]| {
+        let of_rows = |rows: &[usize]| {
             PointPairs::of(
                 self.question.robot,
                 self.question.data,
@@ -163,9 +165,9 @@ impl<'a> AsStated<'a> {
             )
         };
         let sample: Vec<usize> = self.judges.iter().map(|k| self.rows[*k]).collect();
-        let found = TwoSetups::of(&of(&sample), &self.placed)?;
+        let found = TwoSetups::of(&of_rows(&sample), &self.placed)?;
         let is_right = found.left < *CLOUD * self.cloud && found.left < *NOMINAL * self.reach;
-        is_right.then(|| found.of_all(&of(&self.rows), &self.rows))
+        is_right.then(|| found.of_all(&of_rows(&self.rows), &self.rows))
     }
 
     /// What explains it: one set-up error as a right set-up does, else the whole counting of joints, else one as far as it goes, else a

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
 /// Arms of more joints are not searched.
-pub(super) const MOST: usize = 8;
+pub(super) const LIMIT: usize = 8;
 /// Share of a normal equation's diagonal that keeps unseen numbers where they are.
 const RIDGE: f64 = 1e-9;
 /// A choice that leaves less by this share is better.
@@ -32,7 +32,7 @@ pub(super) struct CountedJoint {
 
 /// Of each joint of an arm.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Counting([CountedJoint; MOST]);
+pub(super) struct Counting([CountedJoint; LIMIT]);
 
 /// A number that is searched, of a joint.
 #[derive(Clone, Copy)]
@@ -89,7 +89,7 @@ impl Counting {
             .iter_mut()
             .skip(joint)
             .take(1)
-            .for_each(|own| own.quarters = quarters);
+            .for_each(|counted| counted.quarters = quarters);
         out
     }
 
@@ -101,17 +101,17 @@ impl Counting {
                 *q = -*q;
             }
         }
-        for joint in 1..q.len().min(MOST) {
+        for joint in 1..q.len().min(LIMIT) {
             q[joint] -= f64::from(self.0[joint].coupled) * q[joint - 1];
         }
     }
 
     /// How much is otherwise: of two countings that are the same by kinematics the smaller one is meant.
     fn effort(&self) -> i32 {
-        let of = |joint: &CountedJoint| {
+        let of_joint = |joint: &CountedJoint| {
             2 * i32::from(joint.reversed) + 3 * joint.quarters.abs() + 5 * joint.coupled.abs()
         };
-        self.0.iter().map(of).sum()
+        self.0.iter().map(of_joint).sum()
     }
 
     /// Those that leave least of these points, from the one that changes least on, each in its simplest form.
@@ -120,7 +120,7 @@ impl Counting {
         let turning: Vec<usize> = (0..robot.joints())
             .filter(|joint| robot.is_revolute(*joint))
             .collect();
-        if robot.joints() > MOST {
+        if robot.joints() > LIMIT {
             return Vec::new();
         }
         let some: Vec<usize> = (0..pairs.rows())
@@ -337,11 +337,13 @@ impl AffineImage<'_, '_> {
             }
             out
         };
-        let own: [DMatrix<f64>; 3] = [0, 1, 2].map(columns);
-        let rest = own.each_ref().map(|own| own - &basis * basis.tr_mul(own));
-        let normal = rest
+        let columns_of: [DMatrix<f64>; 3] = [0, 1, 2].map(columns);
+        let projected = columns_of
+            .each_ref()
+            .map(|block| block - &basis * basis.tr_mul(block));
+        let normal = projected
             .iter()
-            .map(|rest| rest.tr_mul(rest))
+            .map(|part| part.tr_mul(part))
             .fold(DMatrix::zeros(width + 1, width + 1), |sum, one| sum + one);
         let mut seats = normal.view((0, 0), (width, width)).into_owned();
         let ridge = RIDGE * seats.diagonal().max().max(f64::MIN_POSITIVE);
@@ -354,14 +356,14 @@ impl AffineImage<'_, '_> {
                 .map(|row| (x[row] * x[row] + y[row] * y[row] + z[row] * z[row]).sqrt())
                 .collect()
         };
-        let centred = own.map(|own| {
-            let mean = own.row_mean();
+        let centred = columns_of.map(|block| {
+            let mean = block.row_mean();
             DMatrix::from_fn(count, width + 1, |row, column| {
-                own[(row, column)] - mean[column]
+                block[(row, column)] - mean[column]
             })
         });
         let spread =
             (size(&centred).iter().map(|x| x * x).sum::<f64>() / count.max(1) as f64).sqrt();
-        Some((size(&rest), spread.max(f64::MIN_POSITIVE)))
+        Some((size(&projected), spread.max(f64::MIN_POSITIVE)))
     }
 }

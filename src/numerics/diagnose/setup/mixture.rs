@@ -35,7 +35,7 @@ impl TwoSetups {
     /// All rows of a recording, of which `numbers` are those of the pairs, by the placement that has them nearest.
     pub(crate) fn of_all(self, all: &PointPairs, numbers: &[usize]) -> Self {
         let rows =
-            nearest(all, &self.placed).map(|own| own.into_iter().map(|k| numbers[k]).collect());
+            nearest(all, &self.placed).map(|part| part.into_iter().map(|k| numbers[k]).collect());
         Self { rows, ..self }
     }
 
@@ -129,10 +129,10 @@ fn dealt(pairs: &PointPairs, first: Vec<bool>, before: f64) -> Option<TwoSetups>
         .partition::<Vec<usize>, _>(|row| first[*row])
         .into();
     for _ in 0..*MIXED_ROUNDS {
-        if rows.iter().any(|own| own.len() < fewest) {
+        if rows.iter().any(|part| part.len() < fewest) {
             return None;
         }
-        let placed = rows.each_ref().map(|own| place(&pairs.only(own), None));
+        let placed = rows.each_ref().map(|part| place(&pairs.only(part), None));
         let next = nearest(pairs, &placed);
         if next == rows {
             let off: Vec<f64> = placed

@@ -5,7 +5,7 @@
 //!
 //! One number of the robot file that may be wrong: a length between two axes, the place of one axis, or the zero of a joint.
 
-use crate::criteria::setup::{MOST, TRIM};
+use crate::criteria::setup::{SAMPLE, TRIM};
 use crate::estimate::align_points;
 use crate::robot::{Measurements, RobotModel, Travel};
 use crate::spatial::{Pose, hat};
@@ -61,7 +61,7 @@ impl Placement {
         self.seats
             .iter()
             .zip(&other.seats)
-            .map(|(own, other)| (own - other).norm())
+            .map(|(one, other)| (one - other).norm())
             .fold(0.0, f64::max)
     }
 }
@@ -234,7 +234,7 @@ pub(super) struct PointPairs<'a> {
 pub(super) fn sampled(rows: &[usize]) -> Vec<usize> {
     rows.iter()
         .copied()
-        .step_by(rows.len().div_ceil(*MOST).max(1))
+        .step_by(rows.len().div_ceil(*SAMPLE).max(1))
         .collect()
 }
 

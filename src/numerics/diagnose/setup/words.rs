@@ -9,7 +9,7 @@ use crate::estimate::{FitOptions, Screening, fit};
 use crate::observation::Dimension;
 use crate::robot::{RobotModel, numbered};
 use crate::setup::compare::{AsStated, ExplainedSetup};
-use crate::setup::counting::{CountedJoint, Counting, MOST};
+use crate::setup::counting::{CountedJoint, Counting, LIMIT};
 use crate::setup::mixture::TwoSetups;
 use crate::setup::placement::{FreeNumber, median};
 use crate::setup::wrong::{LENGTHS, RowOrder, WrongSetup};
@@ -42,7 +42,9 @@ pub(super) fn words(
     reach: f64,
 ) -> SetupWords {
     let joints = robot.joints();
-    let list = |of: &dyn Fn(usize) -> String| (0..joints).map(of).collect::<Vec<_>>().join(", ");
+    let list = |value_of: &dyn Fn(usize) -> String| {
+        (0..joints).map(value_of).collect::<Vec<_>>().join(", ")
+    };
     let (what, mend) = match wrong {
         WrongSetup::PointUnit(unit) => return of_lengths(unit, reach),
         WrongSetup::InRadians => {
@@ -176,12 +178,12 @@ fn of_counting(counting: Counting, joints: usize) -> SetupWords {
         .collect();
     let reversed: Vec<usize> = all
         .iter()
-        .filter(|(_, own)| own.reversed)
+        .filter(|(_, counted)| counted.reversed)
         .map(|(joint, _)| *joint)
         .collect();
-    let list = |of: &dyn Fn(&CountedJoint) -> i32| {
+    let list = |value_of: &dyn Fn(&CountedJoint) -> i32| {
         all.iter()
-            .map(|(_, own)| of(own).to_string())
+            .map(|(_, counted)| value_of(counted).to_string())
             .collect::<Vec<_>>()
             .join(", ")
     };
@@ -190,26 +192,29 @@ fn of_counting(counting: Counting, joints: usize) -> SetupWords {
         what.push(of_signs(&reversed, joints).0);
         mend.push(format!(
             "sign: [{}]",
-            list(&|own| if own.reversed { -1 } else { 1 })
+            list(&|counted| if counted.reversed { -1 } else { 1 })
         ));
     }
-    let turned = all.iter().filter(|(_, own)| own.quarters != 0);
-    let zeros = turned.map(|(joint, own)| {
+    let turned = all.iter().filter(|(_, counted)| counted.quarters != 0);
+    let zeros = turned.map(|(joint, counted)| {
         format!(
             "the recording reads {} deg at the zero of joint {}",
-            90 * own.quarters,
+            90 * counted.quarters,
             joint + 1
         )
     });
     what.extend(zeros);
     let in_degrees = what.len() > usize::from(!reversed.is_empty());
     if in_degrees {
-        mend.push(format!("zero: [{}]", list(&|own| 90 * own.quarters)));
+        mend.push(format!(
+            "zero: [{}]",
+            list(&|counted| 90 * counted.quarters)
+        ));
     }
     let coupled: Vec<(usize, i32)> = all
         .iter()
-        .filter(|(_, own)| own.coupled != 0)
-        .map(|(joint, own)| (joint + 1, own.coupled))
+        .filter(|(_, counted)| counted.coupled != 0)
+        .map(|(joint, counted)| (joint + 1, counted.coupled))
         .collect();
     if !coupled.is_empty() {
         let how = |ratio: i32| if ratio < 0 { "minus" } else { "plus" };
@@ -261,10 +266,10 @@ fn of_lengths(unit: usize, reach: f64) -> SetupWords {
         return SetupWords::of(what, mend);
     }
     // As much too small as the points seem too large.
-    let own = LENGTHS
+    let pair = LENGTHS
         .iter()
         .find(|other| (other.0 * factor - 1.0).abs() < 1e-9 && other.2 != "cm");
-    let (read, is) = own.map_or(("mm", "m"), |own| (own.1, own.2));
+    let (read, is) = pair.map_or(("mm", "m"), |pair| (pair.1, pair.2));
     SetupWords {
         what: format!(
             "the lengths of the robot file are in {} and were read in {}",
@@ -333,11 +338,11 @@ fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
         FreeNumber::Zero(joint) => {
             let degrees = values.first().copied().unwrap_or_default().to_degrees();
             let quarters = (-degrees / 90.0).round() as i32;
-            let rest = -degrees - 90.0 * f64::from(quarters);
-            if quarters != 0 && rest.abs() < *QUARTERLY && joints <= MOST {
+            let remaining = -degrees - 90.0 * f64::from(quarters);
+            if quarters != 0 && remaining.abs() < *QUARTERLY && joints <= LIMIT {
                 let SetupWords { what, mend, .. } =
                     of_counting(Counting::of_a_zero(joint, quarters), joints);
-                let what = format!("{what}, and is also {} deg off", figure(rest, 2));
+                let what = format!("{what}, and is also {} deg off", figure(remaining, 2));
                 return SetupWords::of(what, mend);
             }
             (
@@ -385,8 +390,8 @@ pub(super) fn explained(
     stated: &AsStated,
     found: &ExplainedSetup,
 ) -> Diagnosis {
-    let own = |wrong| words(wrong, question.robot, &found.placed.values, stated.reach);
-    let all = together(&found.wrong, question.robot, own);
+    let words_of = |wrong| words(wrong, question.robot, &found.placed.values, stated.reach);
+    let all = together(&found.wrong, question.robot, words_of);
     let what: Vec<&str> = all.iter().map(|words| words.what.as_str()).collect();
     let mend: Vec<&str> = all.iter().map(|words| words.mend.as_str()).collect();
     let scale: f64 = all.iter().map(|words| words.scale).product();
@@ -402,7 +407,7 @@ pub(super) fn explained(
         .alike
         .iter()
         .filter(|wrong| wrong.number().is_none())
-        .map(|wrong| own(*wrong))
+        .map(|wrong| words_of(*wrong))
         .collect();
     alike.dedup_by(|a, b| a.what == b.what);
     alike.retain(|other| !what.contains(&other.what.as_str()));

@@ -193,10 +193,10 @@ impl SignGroup {
             .windows(2)
             .find(|pair| robot.is_parallel(pair[0], pair[1]))
             .map(|pair| pair[0]);
-        let of = |choose: &dyn Fn(usize) -> bool| {
+        let of_choose = |choose: &dyn Fn(usize) -> bool| {
             Self::of(turning.iter().copied().filter(|joint| choose(*joint)))
         };
-        let mut out = vec![of(&|joint| {
+        let mut out = vec![of_choose(&|joint| {
             robot.joints() == 6 && [0, 3, 5].contains(&joint)
         })];
         if let Some(pitch) = pitch {
@@ -205,12 +205,12 @@ impl SignGroup {
                 .find(|joint| !is_pitch(*joint))
                 .unwrap_or(robot.joints());
             out.extend([
-                of(&|joint| !is_pitch(joint)),
-                of(&is_pitch),
-                of(&|joint| is_pitch(joint) && joint < wrist),
+                of_choose(&|joint| !is_pitch(joint)),
+                of_choose(&is_pitch),
+                of_choose(&|joint| is_pitch(joint) && joint < wrist),
             ]);
         }
-        out.push(of(&|_| true));
+        out.push(of_choose(&|_| true));
         let two = |k: usize| turning[k + 1..].iter().map(move |b| (k, *b));
         out.extend(
             (0..turning.len())

@@ -37,14 +37,14 @@ pub(crate) struct FoundCell {
 impl FoundCell {
     /// That it is no cause at all with a probability, names and places as probable among the rest as before.
     pub(crate) fn or_nothing(&mut self, probability: f64) {
-        let rest = (1.0 - probability).max(0.0);
+        let remaining = (1.0 - probability).max(0.0);
         self.probabilities = Probabilities {
-            name: rest * self.probabilities.name,
-            place: rest * self.probabilities.place,
-            none: rest * self.probabilities.none + probability,
+            name: remaining * self.probabilities.name,
+            place: remaining * self.probabilities.place,
+            none: remaining * self.probabilities.none + probability,
         };
         for rival in &mut self.rivals {
-            rival.probability *= rest;
+            rival.probability *= remaining;
         }
     }
 }
@@ -129,22 +129,22 @@ impl CauseTable<'_, '_> {
         kappa: f64,
     ) -> (FoundCell, Option<(usize, CellEvidence)>) {
         let others = without(components, members);
-        let rest: Vec<&Component> = others.iter().collect();
-        let state = self.state(&rest, Some(kappa));
+        let next_to: Vec<&Component> = others.iter().collect();
+        let state = self.state(&next_to, Some(kappa));
         let with = self.state(&components.iter().collect::<Vec<_>>(), Some(kappa));
         // The strongest of several stands for its finding; further ones of its cell add to it.
-        let log_of = |i: usize, state: &KnownState, rest: &[&Component]| {
-            self.log_evidence(&components[i], state, rest)
+        let log_of = |i: usize, state: &KnownState, next_to: &[&Component]| {
+            self.log_evidence(&components[i], state, next_to)
         };
         let strongest = members
             .iter()
             .copied()
-            .max_by(|a, b| log_of(*a, &state, &rest).total_cmp(&log_of(*b, &state, &rest)));
+            .max_by(|a, b| log_of(*a, &state, &next_to).total_cmp(&log_of(*b, &state, &next_to)));
         let main = strongest.unwrap_or(members[0]);
         let cell = components[main].cell;
-        let log_main = log_of(main, &state, &rest);
+        let log_main = log_of(main, &state, &next_to);
         let mut log = log_main;
-        let mut known = rest.clone();
+        let mut known = next_to.clone();
         known.push(&components[main]);
         for i in members.iter().copied().filter(|i| *i != main) {
             let given = self.state(&known, Some(kappa));
@@ -152,10 +152,10 @@ impl CauseTable<'_, '_> {
             known.push(&components[i]);
         }
         let also: Vec<usize> = std::iter::once(cell)
-            .chain(self.over_its_variable(&components[main], &state, &rest))
+            .chain(self.over_its_variable(&components[main], &state, &next_to))
             .collect();
         let alike = self.alike(&components[main], 60);
-        let mut scan = self.scan_instead(&components[main], &alike, &state, &rest, 8, &also);
+        let mut scan = self.scan_instead(&components[main], &alike, &state, &next_to, 8, &also);
         let log_prior = members
             .iter()
             .map(|i| self.cells[components[*i].cell].log_prior)
@@ -310,7 +310,7 @@ impl CauseTable<'_, '_> {
                 let variables: Vec<String> = form
                     .variables()
                     .into_iter()
-                    .map(|of| clock.named(of))
+                    .map(|asked| clock.named(asked))
                     .collect();
                 let variable =
                     (!variables.is_empty()).then(|| ("variable", variables.join(" and ")));
@@ -397,7 +397,7 @@ pub(super) fn nothing(scan: &CellScan) -> f64 {
 /// The joint, side of the gear and order of a pure sine and cosine of a joint's or its motor's angle at that joint.
 fn wave(form: &Form) -> Option<(usize, bool, u32)> {
     let term = form.term()?;
-    let (joint, of) = term.of_one()?;
+    let (joint, variable) = term.of_one()?;
     let Basis::Wave {
         order,
         overtone: false,
@@ -405,6 +405,6 @@ fn wave(form: &Form) -> Option<(usize, bool, u32)> {
     else {
         return None;
     };
-    let motor = of == Variable::Motor { joint };
-    (motor || of == Variable::Angle { joint }).then_some((joint, motor, order))
+    let motor = variable == Variable::Motor { joint };
+    (motor || variable == Variable::Angle { joint }).then_some((joint, motor, order))
 }

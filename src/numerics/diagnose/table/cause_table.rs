@@ -62,13 +62,13 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 .into_iter()
                 .filter(|cell| known.insert(cell.key.clone())),
         );
-        let values = |of: Variable| frame.values(of);
+        let values = |variable: Variable| frame.values(variable);
         let mut named = listed::cells(survey, &values, question);
         named.append(&mut cells);
         named.retain(keeps);
         for cell in &mut named {
-            let of = |known: &&KnownCell| known.cell == cell.key;
-            if let Some(known) = question.known.iter().find(of) {
+            let of_known = |known: &&KnownCell| known.cell == cell.key;
+            if let Some(known) = question.known.iter().find(of_known) {
                 // However usual a cause is, a recording has to show something of it.
                 let probability = known.probability.clamp(1e-6, *USUAL_MOST);
                 cell.log_prior = (probability / (1.0 - probability)).ln();
@@ -87,9 +87,9 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             if !motions.contains(&term.motion()) {
                 motions.push(term.motion());
             }
-            for of in term.law().factors().map(|factor| factor.of) {
-                if of.is_single() && !variables.contains(&of) {
-                    variables.push(of);
+            for variable in term.law().factors().map(|factor| factor.variable) {
+                if variable.is_single() && !variables.contains(&variable) {
+                    variables.push(variable);
                 }
             }
         }
@@ -158,8 +158,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             return None;
         };
         Some(FreeShape {
-            of: law.first.of,
-            over: Over::Product(times.of),
+            variable: law.first.variable,
+            over: Over::Product(times.variable),
             ..*free
         })
     }
@@ -185,7 +185,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 .map(|free| generated::cell(free, log_prior, self.survey))
                 .filter(|cell| !without.contains(&cell.key));
             let frame = self.frame;
-            let values = |of: Variable| frame.values(of);
+            let values = |variable: Variable| frame.values(variable);
             for cell in siblings {
                 let known = self.cells.iter_mut();
                 let mut known = known.chain(fresh.iter_mut().map(|(cell, _)| cell));
@@ -215,7 +215,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             return &self.coarse[cell];
         }
         self.fine[cell].get_or_init(|| {
-            let values = |of: Variable| self.frame.values(of);
+            let values = |variable: Variable| self.frame.values(variable);
             CellColumns::of(
                 self.cells[cell].groups(self.survey, &values, true),
                 self.frame,
@@ -335,26 +335,26 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     /// Cells with a name at the place of a component, and of a curve those over its variable there or next to it: columns that are looked at
     /// coarsely do not show how alike fine curves are.
     pub(crate) fn near(&self, component: &Component) -> Vec<usize> {
-        let of = |cell: &CauseCell| match &cell.shapes {
+        let of_cell = |cell: &CauseCell| match &cell.shapes {
             Shapes::Free(FreeShape {
-                of,
+                variable: asked,
                 over: Over::Curve { .. },
                 ..
-            }) => Some(*of),
+            }) => Some(*asked),
             Shapes::Free(_) => None,
             Shapes::Listed(groups) => {
                 let form = groups.first().and_then(|group| group.forms.first());
                 form.and_then(|form| form.term())
                     .filter(|term| term.law().times.is_none())
-                    .map(|term| term.law().first.of)
+                    .map(|term| term.law().first.variable)
             }
         };
         let cell = &self.cells[component.cell];
         let free = matches!(cell.shapes, Shapes::Free(_));
-        let variable = of(cell).filter(|_| free);
+        let variable = of_cell(cell).filter(|_| free);
         let near = |other: &CauseCell| {
             variable.is_some()
-                && of(other) == variable
+                && of_cell(other) == variable
                 && generated::are_near(cell.place, other.place, 2, self.survey)
         };
         let named_here = |other: &CauseCell| other.is_named() && other.place == cell.place;
@@ -376,7 +376,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         };
         let is_curve = |over| matches!(over, Over::Curve { .. });
         let same = |cell: &CauseCell| match &cell.shapes {
-            Shapes::Free(other) => is_curve(other.over) && other.of.is_alike(free.of),
+            Shapes::Free(other) => is_curve(other.over) && other.variable.is_alike(free.variable),
             Shapes::Listed(_) => false,
         };
         if !is_curve(free.over) || free.near(0).is_empty() {

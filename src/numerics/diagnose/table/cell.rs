@@ -57,7 +57,7 @@ pub(super) struct CellShape {
 #[derive(Clone, Copy, PartialEq)]
 pub(super) struct FreeShape {
     pub(crate) motion: Motion,
-    pub(crate) of: Variable,
+    pub(crate) variable: Variable,
     pub(crate) over: Over,
 }
 
@@ -130,9 +130,9 @@ impl FreeShape {
 
     /// The same with other numbers in its variables (a time, a limit, a direction); steps halve with the level. Empty where they have none.
     pub(crate) fn near(&self, level: i32) -> Vec<Self> {
-        let first = near(self.of, level)
+        let first = near(self.variable, level)
             .into_iter()
-            .map(|of| Self { of, ..*self });
+            .map(|variable| Self { variable, ..*self });
         let Over::Product(other) = self.over else {
             return first.collect();
         };
@@ -147,12 +147,12 @@ impl FreeShape {
 
     /// Whether it is a product of one variable with itself.
     pub(super) fn is_square(&self) -> bool {
-        matches!(self.over, Over::Product(other) if is_square(self.of, other))
+        matches!(self.over, Over::Product(other) if is_square(self.variable, other))
     }
 
     /// Its curves at all correlation lengths.
     pub(crate) fn curves(&self, values: &dyn Fn(Variable) -> Option<Vec<f64>>) -> Vec<ShapeGroup> {
-        let (Over::Curve { count, lengths, .. }, Some(values)) = (self.over, values(self.of))
+        let (Over::Curve { count, lengths, .. }, Some(values)) = (self.over, values(self.variable))
         else {
             return Vec::new();
         };
@@ -163,7 +163,7 @@ impl FreeShape {
             is_bent: false,
         };
         vec![ShapeGroup {
-            forms: vec![self.term(Law::new(self.of, self.cosines([low, high], count)))],
+            forms: vec![self.term(Law::new(self.variable, self.cosines([low, high], count)))],
             shapes: self.smooth(count, lengths).into_iter().map(shape).collect(),
             positive: false,
             largest: f64::INFINITY,
@@ -175,7 +175,7 @@ impl FreeShape {
         matches!(
             self.motion,
             Motion::Instrument {
-                of: Polar::Elevation | Polar::Range,
+                reading: Polar::Elevation | Polar::Range,
                 ..
             }
         )
@@ -219,10 +219,10 @@ impl FreeShape {
 
     /// Shares of a smooth curve, one list a correlation length.
     pub(super) fn smooth(&self, count: usize, lengths: usize) -> Vec<Vec<f64>> {
-        let of = |length: &f64| self.shares(density(count, *length));
+        let of_length = |length: &f64| self.shares(density(count, *length));
         LENGTHS[..lengths.min(LENGTHS.len())]
             .iter()
-            .map(of)
+            .map(of_length)
             .collect()
     }
 
@@ -246,37 +246,40 @@ impl FreeShape {
                     survey.changes(*STEPS).collect()
                 };
                 let log_weight = -(times.len().max(1) as f64).ln();
-                let form = |at| self.term(Law::new(self.of, Basis::After { at }));
+                let form = |at| self.term(Law::new(self.variable, Basis::After { at }));
                 times
                     .into_iter()
                     .map(|at| ShapeGroup::of(form(at), log_weight))
                     .collect()
             }
             Over::Line => {
-                let Some(line) = values(self.of).and_then(|values| self.line(&values)) else {
+                let Some(line) = values(self.variable).and_then(|values| self.line(&values)) else {
                     return Vec::new();
                 };
-                vec![ShapeGroup::of(self.term(Law::new(self.of, line)), 0.0)]
+                vec![ShapeGroup::of(
+                    self.term(Law::new(self.variable, line)),
+                    0.0,
+                )]
             }
             Over::Curve {
                 count,
                 first,
                 lengths,
             } => {
-                let Some(values) = values(self.of) else {
+                let Some(values) = values(self.variable) else {
                     return Vec::new();
                 };
                 let Some(line) = self.line(&values) else {
                     return Vec::new();
                 };
                 let straight = fields * line.count();
-                let line = self.term(Law::new(self.of, line));
+                let line = self.term(Law::new(self.variable, line));
                 if has_few(&values) {
                     return vec![ShapeGroup::of(line, 0.0)];
                 }
                 let count = if closely { count } else { first };
                 let [low, high] = support(&values);
-                let curve = self.term(Law::new(self.of, self.cosines([low, high], count)));
+                let curve = self.term(Law::new(self.variable, self.cosines([low, high], count)));
                 let lengths = if closely { lengths } else { lengths.min(2) };
                 let rough = (closely && lengths > 3).then(|| self.rough(count));
                 vec![ShapeGroup {
@@ -287,8 +290,8 @@ impl FreeShape {
                 }]
             }
             Over::Product(other) => {
-                let factors = [self.of, other].map(|of| {
-                    values(of).and_then(|values| {
+                let factors = [self.variable, other].map(|variable| {
+                    values(variable).and_then(|values| {
                         factor(
                             &values,
                             if closely {
@@ -302,7 +305,7 @@ impl FreeShape {
                 let [Some(a), Some(b)] = factors else {
                     return Vec::new();
                 };
-                let form = self.term(Law::new(self.of, a).times(other, b));
+                let form = self.term(Law::new(self.variable, a).times(other, b));
                 let spectrum = |basis: Basis, length: f64| -> Vec<f64> {
                     match basis {
                         Basis::Straight { .. } => vec![0.5, 0.5],
@@ -356,7 +359,7 @@ pub(super) fn is_square(a: Variable, b: Variable) -> bool {
 }
 
 /// A variable with other numbers.
-fn near(of: Variable, level: i32) -> Vec<Variable> {
+fn near(variable: Variable, level: i32) -> Vec<Variable> {
     let step = libm::exp2(-f64::from(level));
     let scales = [libm::exp2(step), libm::exp2(-step)];
     let turned = |along: [f64; 3]| {
@@ -373,7 +376,7 @@ fn near(of: Variable, level: i32) -> Vec<Variable> {
                 })
             })
     };
-    match of {
+    match variable {
         Variable::Recent { joint, time } => scales
             .map(|scale| Variable::Recent {
                 joint,
@@ -437,7 +440,7 @@ fn with_all_steps(groups: &[ShapeGroup], survey: &Survey) -> Vec<ShapeGroup> {
 pub(super) fn not_quite_straight(
     line: Form,
     motion: Motion,
-    of: Variable,
+    variable: Variable,
     values: &[f64],
     log_weight: f64,
 ) -> Option<ShapeGroup> {
@@ -449,7 +452,7 @@ pub(super) fn not_quite_straight(
         &Unknown,
         motion,
         Law::new(
-            of,
+            variable,
             Basis::Cosines {
                 low,
                 high,
@@ -572,19 +575,19 @@ pub(super) fn over_fields(shares: Vec<f64>, motion: Motion, fields: usize) -> Ve
 
 /// Shares of cosines: the spectral density of a Matern kernel with smoothness 3/2 (Rasmussen and Williams, 2006, ch. 4).
 pub(super) fn density(count: usize, length: f64) -> Vec<f64> {
-    let of = |k: usize| {
+    let of_k = |k: usize| {
         let wave = PI * k as f64 * length / (1.0 + 2.0 * *MARGIN);
         (3.0 + wave * wave).powi(-2)
     };
-    let all: Vec<f64> = (1..=count).map(of).collect();
+    let all: Vec<f64> = (1..=count).map(of_k).collect();
     let sum: f64 = all.iter().sum();
     all.into_iter().map(|density| density / sum).collect()
 }
 
 /// The same of a curve with corners: the spectral density of an exponential kernel.
 pub(super) fn cornered(count: usize) -> Vec<f64> {
-    let of = |k: usize| 1.0 / (1.0 + (PI * k as f64 * 0.3).powi(2));
-    let all: Vec<f64> = (1..=count).map(of).collect();
+    let of_k = |k: usize| 1.0 / (1.0 + (PI * k as f64 * 0.3).powi(2));
+    let all: Vec<f64> = (1..=count).map(of_k).collect();
     let sum: f64 = all.iter().sum();
     all.into_iter().map(|density| density / sum).collect()
 }

@@ -123,7 +123,7 @@ fn tridiagonal(mut matrix: DMatrix<f64>, along: &mut [f64]) -> (Vec<f64>, Vec<f6
     let mut image = vec![0.0; count];
     for k in 0..count {
         diagonal.push(matrix[(k, k)]);
-        let (done, rest) = matrix.as_mut_slice().split_at_mut((k + 1) * count);
+        let (done, below) = matrix.as_mut_slice().split_at_mut((k + 1) * count);
         let (mirror, image) = (&mut done[k * (count + 1) + 1..], &mut image[k + 1..]);
         let Some(first) = mirror.first().copied() else {
             break;
@@ -135,7 +135,7 @@ fn tridiagonal(mut matrix: DMatrix<f64>, along: &mut [f64]) -> (Vec<f64>, Vec<f6
         }
         mirror[0] += length.copysign(first);
         let share = 2.0 / dot(mirror, mirror);
-        for (value, column) in image.iter_mut().zip(rest.chunks(count)) {
+        for (value, column) in image.iter_mut().zip(below.chunks(count)) {
             *value = share * dot(&column[k + 1..], mirror);
         }
         let along_mirror = 0.5 * share * dot(image, mirror);
@@ -143,7 +143,7 @@ fn tridiagonal(mut matrix: DMatrix<f64>, along: &mut [f64]) -> (Vec<f64>, Vec<f6
             .iter_mut()
             .zip(&*mirror)
             .for_each(|(value, by)| *value -= along_mirror * by);
-        for ((column, by), value) in rest.chunks_mut(count).zip(&*mirror).zip(&*image) {
+        for ((column, by), value) in below.chunks_mut(count).zip(&*mirror).zip(&*image) {
             let both = mirror.iter().zip(&*image);
             column[k + 1..]
                 .iter_mut()

@@ -52,8 +52,8 @@ impl Functions {
 }
 
 /// A column of a matrix.
-pub(super) fn column(of: &DMatrix<f64>, k: usize) -> &[f64] {
-    &of.as_slice()[k * of.nrows()..(k + 1) * of.nrows()]
+pub(super) fn column(matrix: &DMatrix<f64>, k: usize) -> &[f64] {
+    &matrix.as_slice()[k * matrix.nrows()..(k + 1) * matrix.nrows()]
 }
 
 /// Columns as directions of a motion times functions of a row: what is asked of them is had without writing them down.
@@ -107,7 +107,7 @@ impl MotionRows {
     /// Products of each direction with columns (columns x residual rows) row by row, columns x rows.
     pub(super) fn with(&self, columns: &DMatrix<f64>, row_of: &[usize]) -> Vec<DMatrix<f64>> {
         let count = columns.nrows();
-        let of = |direction: &WeighedDirection| {
+        let of_direction = |direction: &WeighedDirection| {
             let mut out = DMatrix::zeros(count, direction.square.len());
             for ((line, row), by) in row_of.iter().enumerate().zip(&direction.weighed) {
                 let sums = &mut out.as_mut_slice()[row * count..(row + 1) * count];
@@ -116,7 +116,7 @@ impl MotionRows {
             }
             out
         };
-        self.directions.iter().map(of).collect()
+        self.directions.iter().map(of_direction).collect()
     }
 
     /// Products of factored columns of this motion with each other and with the residual, the base projected off.
@@ -138,12 +138,12 @@ impl MotionRows {
         let share = |k: usize| &shares[base * k..base * (k + 1)];
         let mut gram = DMatrix::zeros(columns.len(), columns.len());
         let (mut weighed, mut before) = (Vec::new(), vec![0.0; columns.len()]);
-        for (j, (of, function, scale)) in columns.iter().enumerate() {
+        for (j, (variable, function, scale)) in columns.iter().enumerate() {
             let mut by = usize::MAX;
             for (i, (other, also, also_scale)) in columns[..=j].iter().enumerate() {
                 if *other != by {
                     by = *other;
-                    let products = &self.by_each_other[other * self.directions.len() + of];
+                    let products = &self.by_each_other[other * self.directions.len() + variable];
                     weighed.clear();
                     weighed.extend(function.iter().zip(products).map(|(a, b)| a * b));
                 }
@@ -202,9 +202,16 @@ impl FactoredColumns {
             .iter()
             .map(|by_row| {
                 let mut sums = Mat::zeros(count, functions);
-                let of = columns_of(by_row);
+                let columns = columns_of(by_row);
                 let functions = columns_of(&self.functions.values);
-                matmul(sums.as_mut(), Accum::Replace, of, functions, 1.0, Par::Seq);
+                matmul(
+                    sums.as_mut(),
+                    Accum::Replace,
+                    columns,
+                    functions,
+                    1.0,
+                    Par::Seq,
+                );
                 sums
             })
             .collect();

@@ -14,20 +14,20 @@ pub(crate) fn forms_of(
     survey: &Survey,
     problem: &WhitenedProblem,
 ) -> Result<Vec<Form>, BTreeSet<Place>> {
-    let values = |of| problem.values(of);
+    let values = |variable| problem.values(variable);
     let (cells, places): (Vec<CauseCell>, BTreeSet<Place>) = if name == names::UNKNOWN {
         (
             unnamed(place, survey),
             generated::places(survey).into_iter().collect(),
         )
     } else {
-        let own = if name == names::JOINT_HARDENING {
+        let class = if name == names::JOINT_HARDENING {
             names::JOINT_COMPLIANCE
         } else {
             name
         };
         let mut cells = listed::cells(survey, &values, question);
-        cells.retain(|cell| cell.name == own);
+        cells.retain(|cell| cell.name == class);
         let places = cells.iter().map(|cell| cell.place).collect();
         (cells, places)
     };
@@ -58,12 +58,16 @@ fn unnamed(place: Place, survey: &Survey) -> Vec<CauseCell> {
         .flatten()
         .filter(|motion| motion.place() == place)
     {
-        for (of, over) in generated::kinds(place, motion, survey)
+        for (variable, over) in generated::kinds(place, motion, survey)
             .into_iter()
             .flatten()
         {
-            if !generated::is_listed(motion, of, over, survey) {
-                let shapes = Shapes::Free(FreeShape { motion, of, over });
+            if !generated::is_listed(motion, variable, over, survey) {
+                let shapes = Shapes::Free(FreeShape {
+                    motion,
+                    variable,
+                    over,
+                });
                 out.push(CauseCell {
                     name: names::UNKNOWN,
                     place,

@@ -26,7 +26,7 @@ pub(super) struct UnitColumns {
 
 /// A variable at every row, none where some row does not tell it; and functions of it.
 struct VariableRows {
-    of: Variable,
+    variable: Variable,
     values: Option<Vec<f64>>,
     functions: Vec<(Basis, Arc<Functions>)>,
 }
@@ -132,10 +132,14 @@ impl<'a> SearchRows<'a> {
     }
 
     /// A variable at every row; none where some row does not tell it.
-    pub(crate) fn values(&self, of: Variable) -> Option<Vec<f64>> {
-        match self.variables.iter().find(|known| known.of == of) {
+    pub(crate) fn values(&self, variable: Variable) -> Option<Vec<f64>> {
+        match self
+            .variables
+            .iter()
+            .find(|known| known.variable == variable)
+        {
             Some(known) => known.values.clone(),
-            None => self.view.problem.values(of),
+            None => self.view.problem.values(variable),
         }
     }
 
@@ -148,13 +152,17 @@ impl<'a> SearchRows<'a> {
             .map(|motion| self.motion(*motion))
             .collect();
         self.motions.extend(fresh);
-        let is_fresh = |of: &&Variable| self.variables.iter().all(|known| known.of != **of);
+        let is_fresh = |variable: &&Variable| {
+            self.variables
+                .iter()
+                .all(|known| known.variable != **variable)
+        };
         let fresh: Vec<&Variable> = variables.iter().filter(is_fresh).collect();
         let problem = &self.view.problem;
         self.variables
-            .par_extend(fresh.into_par_iter().map(|of| VariableRows {
-                of: *of,
-                values: problem.values(*of),
+            .par_extend(fresh.into_par_iter().map(|variable| VariableRows {
+                variable: *variable,
+                values: problem.values(*variable),
                 functions: Vec::new(),
             }));
     }
@@ -165,7 +173,7 @@ impl<'a> SearchRows<'a> {
             let known = self
                 .variables
                 .iter()
-                .position(|known| known.of == factor.of);
+                .position(|known| known.variable == factor.variable);
             let Some(known) = known else { continue };
             let functions = &self.variables[known].functions;
             if functions.iter().all(|(basis, _)| *basis != factor.basis)
@@ -392,16 +400,19 @@ impl<'a> SearchRows<'a> {
 
     /// The functions of a law at every row; none of a variable of several numbers, or that some row does not tell.
     fn functions(&self, law: &Law) -> Option<Arc<Functions>> {
-        let of = |factor: &Factor| {
-            let known = self.variables.iter().find(|known| known.of == factor.of)?;
+        let of_factor = |factor: &Factor| {
+            let known = self
+                .variables
+                .iter()
+                .find(|known| known.variable == factor.variable)?;
             let mut functions = known.functions.iter();
             let known = functions.find(|(basis, _)| *basis == factor.basis)?;
             Some(&known.1)
         };
-        if let (Some(functions), None) = (of(&law.first), law.times) {
+        if let (Some(functions), None) = (of_factor(&law.first), law.times) {
             return Some(functions.clone());
         }
-        let factor = |factor: &Factor| match of(factor) {
+        let factor = |factor: &Factor| match of_factor(factor) {
             Some(functions) => Some(Cow::Borrowed(&functions.values)),
             None => Some(Cow::Owned(self.factor(factor)?)),
         };
@@ -419,12 +430,16 @@ impl<'a> SearchRows<'a> {
 
     /// The functions of one variable at every row, rows x functions.
     fn factor(&self, factor: &Factor) -> Option<DMatrix<f64>> {
-        if !factor.of.is_single() {
+        if !factor.variable.is_single() {
             return None;
         }
-        let values = match self.variables.iter().find(|known| known.of == factor.of) {
+        let values = match self
+            .variables
+            .iter()
+            .find(|known| known.variable == factor.variable)
+        {
             Some(known) => Cow::Borrowed(known.values.as_deref()?),
-            None => Cow::Owned(self.view.problem.values(factor.of)?),
+            None => Cow::Owned(self.view.problem.values(factor.variable)?),
         };
         let mut functions = DMatrix::zeros(values.len(), factor.basis.count());
         for (row, u) in values.iter().enumerate() {
@@ -481,6 +496,6 @@ pub(super) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
     products
 }
 
-pub(super) fn view(of: &DMatrix<f64>) -> MatRef<'_, f64> {
-    MatRef::from_column_major_slice(of.as_slice(), of.nrows(), of.ncols())
+pub(super) fn view(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
+    MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
 }

@@ -56,9 +56,9 @@ pub(super) fn cells(
 ) -> Vec<CauseCell> {
     let unnamed = super::listed::unnamed(question);
     let mut out = Vec::new();
-    let varies = |frame: &SearchRows, of: Variable| {
+    let varies = |frame: &SearchRows, variable: Variable| {
         frame
-            .values(of)
+            .values(variable)
             .is_some_and(|values| super::cell::line(&values).is_some())
     };
     // Where nothing but joints was recorded, an arm that is smaller closes as well, and whatever follows the place of the tool looks so.
@@ -69,13 +69,23 @@ pub(super) fn cells(
         let mut groups: Vec<Vec<(Motion, Variable, Over)>> = Vec::new();
         for motions in families {
             let kinds: Vec<Kind> = kinds(place, motions[0], survey);
-            let variables: Vec<Variable> = kinds.iter().flatten().map(|(of, _)| *of).collect();
+            let variables: Vec<Variable> = kinds
+                .iter()
+                .flatten()
+                .map(|(variable, _)| *variable)
+                .collect();
             frame.prepare(&[], &variables);
             for kind in kinds {
-                let kind = kind.into_iter().filter(|(of, _)| varies(frame, *of));
+                let kind = kind
+                    .into_iter()
+                    .filter(|(variable, _)| varies(frame, *variable));
                 let all: Vec<_> = kind
-                    .flat_map(|(of, over)| motions.iter().map(move |motion| (*motion, of, over)))
-                    .filter(|(motion, of, over)| !is_listed(*motion, *of, *over, survey))
+                    .flat_map(|(variable, over)| {
+                        motions.iter().map(move |motion| (*motion, variable, over))
+                    })
+                    .filter(|(motion, variable, over)| {
+                        !is_listed(*motion, *variable, *over, survey)
+                    })
                     .collect();
                 if !all.is_empty() {
                     groups.push(all);
@@ -85,11 +95,17 @@ pub(super) fn cells(
         let count = groups.len() as f64;
         for group in groups {
             let log_prior = (unnamed / count / group.len() as f64).ln();
-            out.extend(
-                group.into_iter().map(|(motion, of, over)| {
-                    cell(FreeShape { motion, of, over }, log_prior, survey)
-                }),
-            );
+            out.extend(group.into_iter().map(|(motion, variable, over)| {
+                cell(
+                    FreeShape {
+                        motion,
+                        variable,
+                        over,
+                    },
+                    log_prior,
+                    survey,
+                )
+            }));
         }
     }
     out
@@ -102,23 +118,26 @@ pub(super) fn products(
     frame: &mut SearchRows,
 ) -> Vec<CauseCell> {
     let mut out: Vec<CauseCell> = Vec::new();
-    for FreeShape { motion, of, .. } in shown {
+    for FreeShape {
+        motion, variable, ..
+    } in shown
+    {
         let kinds = kinds(motion.place(), *motion, survey);
         let others: Vec<Variable> = kinds
             .into_iter()
             .flatten()
             .map(|(other, _)| other)
-            .filter(|other| other != of)
+            .filter(|other| other != variable)
             .collect();
         frame.prepare(&[], &others);
         let mut seen: Vec<Variable> = Vec::new();
         for other in others {
             let free = FreeShape {
                 motion: *motion,
-                of: *of,
+                variable: *variable,
                 over: Over::Product(other),
             };
-            if seen.contains(&other) || free.is_square() || are_one(*of, other, survey) {
+            if seen.contains(&other) || free.is_square() || are_one(*variable, other, survey) {
                 continue;
             }
             seen.push(other);
@@ -138,27 +157,27 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
         for motion in families(place, survey).into_iter().flatten() {
             let kinds = kinds(place, motion, survey);
             let mut variables: Vec<Variable> = Vec::new();
-            for of in kinds
+            for variable in kinds
                 .into_iter()
                 .filter(|kind| kind.len() <= survey.joints())
                 .flatten()
-                .map(|(of, _)| of)
+                .map(|(variable, _)| variable)
             {
                 if frame
-                    .values(of)
+                    .values(variable)
                     .is_some_and(|values| super::cell::line(&values).is_some())
-                    && !variables.iter().any(|known| is_square(*known, of))
+                    && !variables.iter().any(|known| is_square(*known, variable))
                 {
-                    variables.push(of);
+                    variables.push(variable);
                 }
             }
             frame.prepare(&[motion], &variables);
-            for (i, of) in variables.iter().enumerate() {
+            for (i, variable) in variables.iter().enumerate() {
                 let others = variables.iter().skip(i + 1);
-                let others = others.filter(|other| !are_one(*of, **other, survey));
+                let others = others.filter(|other| !are_one(*variable, **other, survey));
                 out.extend(others.map(|other| FreeShape {
                     motion,
-                    of: *of,
+                    variable: *variable,
                     over: Over::Product(*other),
                 }));
             }
@@ -169,8 +188,8 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
 
 /// Cells of products that were seen among all pairs.
 pub(super) fn pair_cells(seen: &[FreeShape], survey: &Survey) -> Vec<CauseCell> {
-    let of = |free: &FreeShape| cell(*free, PAIR.ln(), survey);
-    seen.iter().map(of).collect()
+    let of_free = |free: &FreeShape| cell(*free, PAIR.ln(), survey);
+    seen.iter().map(of_free).collect()
 }
 
 /// Products that may do what one does: of the same variables at the places near it, where a motion that an axis does not turn is the same one,
@@ -186,8 +205,8 @@ pub(super) fn siblings(free: &FreeShape, survey: &Survey) -> Vec<FreeShape> {
         .flatten()
         .map(|motion| FreeShape { motion, ..*free });
     let slow = [Variable::Time, Variable::Temperature, Variable::Payload];
-    let like = |of: Variable| slow.into_iter().filter(move |_| slow.contains(&of));
-    let first = like(free.of).map(|of| FreeShape { of, ..*free });
+    let like = |variable: Variable| slow.into_iter().filter(move |_| slow.contains(&variable));
+    let first = like(free.variable).map(|variable| FreeShape { variable, ..*free });
     let second = like(other).map(|other| FreeShape {
         over: Over::Product(other),
         ..*free
@@ -199,7 +218,7 @@ pub(super) fn siblings(free: &FreeShape, survey: &Survey) -> Vec<FreeShape> {
             let Over::Product(other) = one.over else {
                 return false;
             };
-            one != free && other != one.of && !are_one(one.of, other, survey)
+            one != free && other != one.variable && !are_one(one.variable, other, survey)
         })
         .collect()
 }
@@ -226,12 +245,12 @@ pub(super) fn are_near(a: Place, b: Place, steps: usize, survey: &Survey) -> boo
 
 pub(super) fn cell(free: FreeShape, log_prior: f64, survey: &Survey) -> CauseCell {
     // Recordings of robots of one model travel differently far, and their cells are the same.
-    let named = |of: Variable| match of {
+    let named = |variable: Variable| match variable {
         Variable::Stretch { joint, limit } => {
             let share = limit / survey.travel(joint);
             format!("Stretch {{ joint: {joint}, share: {share:.4} }}")
         }
-        of => format!("{of:?}"),
+        variable => format!("{variable:?}"),
     };
     let times = if let Over::Product(other) = free.over {
         format!(" times {}", named(other))
@@ -242,7 +261,7 @@ pub(super) fn cell(free: FreeShape, log_prior: f64, survey: &Survey) -> CauseCel
     CauseCell {
         name: names::UNKNOWN,
         place: free.motion.place(),
-        key: format!("{:?} by {}{times}{step}", free.motion, named(free.of)),
+        key: format!("{:?} by {}{times}{step}", free.motion, named(free.variable)),
         log_prior,
         shapes: Shapes::Free(free),
         between: None,
@@ -299,7 +318,7 @@ pub(super) fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
             vec![Motion::Bend { link }],
         ],
         Place::Tracker => [Polar::Range, Polar::Azimuth, Polar::Elevation]
-            .map(|of| vec![Motion::Instrument { of }])
+            .map(|reading| vec![Motion::Instrument { reading }])
             .to_vec(),
         Place::Tool => vec![vec![Motion::Tool { axes: Axes::Place }]],
         _ => [Axes::Place, Axes::Rotation]
@@ -311,12 +330,12 @@ pub(super) fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
 /// What a motion of a place may follow, by kind.
 pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> {
     let joints = survey.joints();
-    let own = match place {
+    let seat = match place {
         Place::Joint(joint) | Place::Links(joint, _) => joint,
         Place::Tool => joints.saturating_sub(1),
         _ => 0,
     };
-    let others = || (0..joints).filter(move |joint| *joint != own);
+    let others = || (0..joints).filter(move |joint| *joint != seat);
     let turns = matches!(motion, Motion::Joint { .. });
     let arrows = ARROWS.map(|arrow| Vector3::from(arrow).map(f64::from).normalize().into());
     let stretch = |joint: usize| Variable::Stretch {
@@ -330,7 +349,8 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
     let mut out: Vec<Kind> = Vec::new();
     if let Motion::Instrument { .. } = motion {
         out.extend(
-            [Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| vec![(of, CURVE)]),
+            [Variable::Azimuth, Variable::Elevation, Variable::Range]
+                .map(|variable| vec![(variable, CURVE)]),
         );
         out.push(
             (0..joints)
@@ -358,7 +378,7 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
         }
     } else {
         out.push(vec![(
-            Variable::Angle { joint: own },
+            Variable::Angle { joint: seat },
             if turns { FINE } else { CURVE },
         )]);
         out.push(
@@ -366,13 +386,13 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
                 .map(|joint| (Variable::Angle { joint }, CURVE))
                 .collect(),
         );
-        out.push(vec![(Variable::Approach { joint: own }, Over::Line)]);
+        out.push(vec![(Variable::Approach { joint: seat }, Over::Line)]);
         out.push(
             others()
                 .map(|joint| (Variable::Approach { joint }, Over::Line))
                 .collect(),
         );
-        out.push(vec![(Variable::Move { joint: own }, CURVE)]);
+        out.push(vec![(Variable::Move { joint: seat }, CURVE)]);
         out.push(
             others()
                 .map(|joint| (Variable::Move { joint }, SLOW))
@@ -380,7 +400,7 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
         );
         let loaded = |joint: &usize| survey.is_loaded(*joint);
         out.push(
-            [own]
+            [seat]
                 .into_iter()
                 .filter(loaded)
                 .map(|joint| (Variable::Load { joint }, CURVE))
@@ -398,15 +418,15 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
                 .to_vec(),
         );
         let limits = LIMITS.map(|share| Variable::Stretch {
-            joint: own,
-            limit: share * survey.travel(own),
+            joint: seat,
+            limit: share * survey.travel(seat),
         });
-        out.push(limits.map(|of| (of, SLOW)).to_vec());
+        out.push(limits.map(|variable| (variable, SLOW)).to_vec());
         out.push(others().map(|joint| (stretch(joint), SLOW)).collect());
         if survey.data.has_clock() {
             out.push(
                 FADING
-                    .map(|time| (Variable::Recent { joint: own, time }, SLOW))
+                    .map(|time| (Variable::Recent { joint: seat, time }, SLOW))
                     .to_vec(),
             );
             out.push(others().map(|joint| (recent(joint), SLOW)).collect());
@@ -428,9 +448,9 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
 }
 
 /// Whether this motion over this variable, in all shapes, is the cell of a cause.
-pub(super) fn is_listed(motion: Motion, of: Variable, over: Over, survey: &Survey) -> bool {
+pub(super) fn is_listed(motion: Motion, variable: Variable, over: Over, survey: &Survey) -> bool {
     let last = survey.joints().saturating_sub(1);
-    match (motion, of, over) {
+    match (motion, variable, over) {
         // What the last joint carries is the tool.
         (Motion::Slide { joint, .. }, Variable::Time, Over::Step) => joint == last,
         (

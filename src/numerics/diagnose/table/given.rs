@@ -120,21 +120,21 @@ pub(crate) fn answers(
             let all: Vec<&Component> = components.iter().collect();
             let state = table.state(&all, None);
             let others: Vec<usize> = (0..table.cells.len())
-                .filter(|cell| components.iter().all(|own| own.cell != *cell))
+                .filter(|cell| components.iter().all(|component| component.cell != *cell))
                 .collect();
             let mut out = table.answers(&others, &state, &all, None);
-            for (i, own) in components.iter().enumerate() {
-                let rest = without(&components, &[i]);
-                let rest: Vec<&Component> = rest.iter().collect();
-                let state = table.state(&rest, Some(state.kappa));
-                let left_out = table.cells[own.cell].key.clone();
-                let mut alike = table.alike(own, 40);
+            for (i, component) in components.iter().enumerate() {
+                let without_it = without(&components, &[i]);
+                let next_to: Vec<&Component> = without_it.iter().collect();
+                let state = table.state(&next_to, Some(state.kappa));
+                let left_out = table.cells[component.cell].key.clone();
+                let mut alike = table.alike(component, 40);
                 alike.retain(|cell| components.iter().all(|other| other.cell != *cell));
-                alike.push(own.cell);
-                let mut rivals = table.answers(&alike, &state, &rest, Some(&left_out));
+                alike.push(component.cell);
+                let mut rivals = table.answers(&alike, &state, &next_to, Some(&left_out));
                 rivals.retain(|rival| rival.cell != left_out || rival.shape.is_some());
                 out.extend(rivals);
-                out.extend(table.of_given(own, &state, &rest, left_out));
+                out.extend(table.of_given(component, &state, &next_to, left_out));
             }
             out
         },
@@ -151,28 +151,28 @@ impl CauseTable<'_, '_> {
                     continue;
                 };
                 let others = out.iter().filter(|(other, _)| *other != i);
-                let others: Vec<&Component> = others.map(|(_, own)| own).collect();
+                let others: Vec<&Component> = others.map(|(_, component)| component).collect();
                 let state = self.state(&others, None);
                 let shape = one.shape.as_deref();
                 let Some(found) = self.closely_in(cell, &state, &others, shape) else {
                     continue;
                 };
-                let own = Component {
+                let component = Component {
                     amplitude: one.size,
                     ..self.as_found(cell, &found)
                 };
                 self.next += 1;
-                let own = own.with_part(self.next);
+                let component = component.with_part(self.next);
                 match out.iter_mut().find(|(other, _)| *other == i) {
-                    Some((_, before)) => *before = own,
-                    None => out.push((i, own)),
+                    Some((_, before)) => *before = component,
+                    None => out.push((i, component)),
                 }
             }
             if out.len() < 2 && turn == 0 {
                 break;
             }
         }
-        let out: Vec<Component> = out.into_iter().map(|(_, own)| own).collect();
+        let out: Vec<Component> = out.into_iter().map(|(_, component)| component).collect();
         self.know(&out);
         out
     }
@@ -186,7 +186,7 @@ impl CauseTable<'_, '_> {
         left_out: Option<&str>,
     ) -> Vec<CellAnswer> {
         let (across, first) = self.across_cells(cells, state);
-        let of = |k: usize| {
+        let of_k = |k: usize| {
             let (cell, block) = (&self.cells[cells[k]], &self.coarse[cells[k]]);
             let mut groups: Vec<Vec<f64>> = vec![Vec::new(); block.groups.len()];
             let mut best = (f64::NEG_INFINITY, 0.0, 0);
@@ -240,7 +240,7 @@ impl CauseTable<'_, '_> {
             (whole, shapes)
         };
         let mut out: Vec<(CellAnswer, Vec<CellAnswer>)> =
-            (0..cells.len()).into_par_iter().map(of).collect();
+            (0..cells.len()).into_par_iter().map(of_k).collect();
         let mut order: Vec<usize> = (0..out.len())
             .filter(|k| out[*k].0.log.is_finite())
             .collect();
@@ -269,24 +269,24 @@ impl CauseTable<'_, '_> {
     /// What a given cell says given the others, and its size.
     fn of_given(
         &self,
-        own: &Component,
+        component: &Component,
         state: &KnownState,
         others: &[&Component],
         key: String,
     ) -> Option<CellAnswer> {
-        let cell = &self.cells[own.cell];
-        let found = self.closely(own.cell, state, others)?;
+        let cell = &self.cells[component.cell];
+        let found = self.closely(component.cell, state, others)?;
         let log = self
-            .of_component(own, state, others)
+            .of_component(component, state, others)
             .map_or(found.log, |(log, _)| log.max(found.log));
-        let found_size = self.sized(own, state, others)?;
+        let found_size = self.sized(component, state, others)?;
         Some(CellAnswer {
             left_out: Some(key.clone()),
             cell: key,
             shape: None,
             effect: cell.name,
             place: cell.place,
-            follows: own.forms.first()?.follows(cell.place),
+            follows: component.forms.first()?.follows(cell.place),
             // A sum takes no less for what is less.
             log: log.max(*LEAST_EVIDENCE),
             log_prior: cell.log_prior,
@@ -299,18 +299,18 @@ impl CauseTable<'_, '_> {
     /// Rms motion of a component given others, m.
     fn sized(
         &self,
-        own: &Component,
+        component: &Component,
         state: &KnownState,
         others: &[&Component],
     ) -> Option<SizeEvidence> {
-        let block = CellColumns::of_component(own, self.frame);
+        let block = CellColumns::of_component(component, self.frame);
         let across = self.across_block(&block, state, others);
-        let whole = product(matrix(&own.values), matrix(&own.values));
-        let along = self.frame.along(matrix(&own.values));
+        let whole = product(matrix(&component.values), matrix(&component.values));
+        let along = self.frame.along(matrix(&component.values));
         let (gram, gradient) = state.see((&whole, &along), &across, 0);
-        let prior = own.shape.shares.iter();
+        let prior = component.shape.shares.iter();
         let prior: Vec<f64> = prior
-            .map(|share| own.amplitude * own.amplitude * share)
+            .map(|share| component.amplitude * component.amplitude * share)
             .collect();
         rms_size(&gram, &gradient, &prior)
     }

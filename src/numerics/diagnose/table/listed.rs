@@ -57,7 +57,7 @@ pub(super) fn cells(
 ) -> Vec<CauseCell> {
     let Question {
         without,
-        own: declared,
+        declared,
         prior_weight,
         ..
     } = *question;
@@ -229,8 +229,9 @@ fn curves(
             }]
         }
         names::AXIS_WOBBLE => {
-            let of = Variable::Angle { joint };
-            let Some(values) = values(of).filter(|values| !super::cell::has_few(values)) else {
+            let variable = Variable::Angle { joint };
+            let Some(values) = values(variable).filter(|values| !super::cell::has_few(values))
+            else {
                 return Vec::new();
             };
             let free = |turning| FreeShape {
@@ -240,7 +241,7 @@ fn curves(
                     turning,
                     at: AxisPoint::Own,
                 },
-                of,
+                variable,
                 over: Over::Curve {
                     count: 12,
                     first: 12,
@@ -262,7 +263,7 @@ fn curves(
             // About the middle of the link that the joint moves.
             let bent = |order| {
                 Law::new(
-                    of,
+                    variable,
                     Basis::Wave {
                         order,
                         overtone: false,
@@ -304,10 +305,11 @@ fn hoses(survey: &Survey, joint: usize) -> Vec<Hypothesis> {
                 count: 3,
             }
         };
-        let [own, other] = [joint, *other].map(|joint| (Variable::Angle { joint }, cosines(joint)));
+        let [here, other] =
+            [joint, *other].map(|joint| (Variable::Angle { joint }, cosines(joint)));
         [
-            Law::new(own.0, wave).times(other.0, wave),
-            Law::new(own.0, own.1).times(other.0, other.1),
+            Law::new(here.0, wave).times(other.0, wave),
+            Law::new(here.0, here.1).times(other.0, other.1),
         ]
     };
     let laws = neighbours.iter().flat_map(law);

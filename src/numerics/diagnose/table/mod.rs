@@ -300,7 +300,7 @@ fn is_kept(cell: &cell::CauseCell, view: &RoundView, survey: &Survey, fitter: &F
     let unseen = only_contacts(&fitter.data, fitter.question.fit)
         && (cell.place == Place::Base
             || cell.place == Place::Joint(0) && cell.name == names::ZERO_SHIFT);
-    let values = |of| view.problem.values(of);
+    let values = |variable| view.problem.values(variable);
     let is_slow = || {
         cell.groups(survey, &values, false)
             .iter()
@@ -399,7 +399,7 @@ fn without_idle_waves(
         .find(|wave| (0..fields).any(|field| seen(column(*wave, field))))
         .map_or(1, |last| last + 1);
     let law = Law::new(
-        term.law().first.of,
+        term.law().first.variable,
         Basis::Cosines {
             low,
             high,

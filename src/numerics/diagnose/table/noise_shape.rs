@@ -39,8 +39,8 @@ impl NoiseShape {
         let data = survey.data;
         let mut square = vec![0.0; data.rows()];
         for (form, size) in forms {
-            for of in form.variables() {
-                let shares = unrecorded(of, data);
+            for variable in form.variables() {
+                let shares = unrecorded(variable, data);
                 let rows: f64 = shares.iter().sum();
                 let is_brief = rows <= *UNRECORDED * data.rows() as f64;
                 for (row, share) in shares.into_iter().enumerate().filter(|_| is_brief) {
@@ -113,13 +113,13 @@ impl NoiseShape {
 
 /// How much of what a variable remembers is of moves before the first row, which nobody recorded: a share by row; none of a variable that
 /// remembers no moves.
-fn unrecorded(of: Variable, data: &Measurements) -> Vec<f64> {
+fn unrecorded(variable: Variable, data: &Measurements) -> Vec<f64> {
     let mut shares = vec![0.0; data.rows()];
     // The least and the most that it may be.
     let [mut least, mut most] = [-1.0, 1.0];
     for place in 1..data.rows() {
         let [before, row] = [place - 1, place].map(|place| data.at_place(place));
-        let (moved, passed) = match of {
+        let (moved, passed) = match variable {
             Variable::Recent { time, .. } => {
                 let kept = libm::exp((data.time(before) - data.time(row)) / time);
                 (0.0, kept)

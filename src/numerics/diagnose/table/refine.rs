@@ -123,16 +123,22 @@ impl CauseTable<'_, '_> {
         let start = self.of_component(&best, state, others)?;
         match (&self.cells[cell].shapes, &best.forms[..]) {
             (Shapes::Free(free), _) => {
-                let values = |of: Variable| self.frame.values(of);
+                let values = |variable: Variable| self.frame.values(variable);
                 let near = |free: &FreeShape, level| {
                     let forms = |free: FreeShape| {
                         let groups = free.groups(self.survey, &values, true);
                         let group = groups.get(found.shape.0)?;
                         Some((free, self.forms_of(group, found.shape.1)?))
                     };
-                    let known = self.numbers.iter().filter(|of| free.of.is_alike(**of));
-                    let known = known.filter(|of| level == 0 && **of != free.of);
-                    let known = known.map(|of| FreeShape { of: *of, ..*free });
+                    let known = self
+                        .numbers
+                        .iter()
+                        .filter(|variable| free.variable.is_alike(**variable));
+                    let known = known.filter(|variable| level == 0 && **variable != free.variable);
+                    let known = known.map(|variable| FreeShape {
+                        variable: *variable,
+                        ..*free
+                    });
                     free.near(level)
                         .into_iter()
                         .chain(known)
@@ -188,7 +194,9 @@ impl CauseTable<'_, '_> {
     fn is_over_numbers(&self, cell: usize) -> bool {
         match &self.cells[cell].shapes {
             Shapes::Free(free) => {
-                let other = |of: &Variable| free.of.is_alike(*of) && free.of != *of;
+                let other = |variable: &Variable| {
+                    free.variable.is_alike(*variable) && free.variable != *variable
+                };
                 self.numbers.iter().any(other)
             }
             Shapes::Listed(_) => false,
@@ -197,11 +205,11 @@ impl CauseTable<'_, '_> {
 
     /// Whether a shape is none of what sticks over so much of a joint's travel that it is the joint's angle.
     fn slips(&self, free: &FreeShape) -> bool {
-        let slips = |of: Variable| match of {
+        let slips = |variable: Variable| match variable {
             Variable::Stretch { joint, limit } => limit <= *STICKS * self.survey.travel(joint),
             _ => true,
         };
-        slips(free.of) && !matches!(free.over, Over::Product(other) if !slips(other))
+        slips(free.variable) && !matches!(free.over, Over::Product(other) if !slips(other))
     }
 
     /// The forms of a shape of a group: those that it gives a share; none where the group has fewer shapes with other numbers.

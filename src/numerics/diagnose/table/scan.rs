@@ -155,7 +155,7 @@ impl CauseTable<'_, '_> {
     pub(crate) fn log_prior(&self, cell: usize, mut others: impl Iterator<Item = usize>) -> f64 {
         let moves = |cell: usize| match &self.cells[cell].shapes {
             Shapes::Free(free) if matches!(free.over, Over::Curve { .. }) => {
-                Some((free.motion.place(), free.of))
+                Some((free.motion.place(), free.variable))
             }
             _ => None,
         };
@@ -322,7 +322,7 @@ impl CauseTable<'_, '_> {
             return None;
         };
         let product = self.product(component)?;
-        if free.of != product.of || free.over != product.over {
+        if free.variable != product.variable || free.over != product.over {
             return None;
         }
         let moved = |form: &Form| Some(free.term(*form.term()?.law()));
@@ -348,7 +348,7 @@ impl CauseTable<'_, '_> {
         state: &KnownState,
         components: &[&Component],
     ) -> Vec<FreeShape> {
-        let values = |of: Variable| self.frame.values(of);
+        let values = |variable: Variable| self.frame.values(variable);
         let log = |free: &FreeShape| {
             let block = CellColumns::of(free.groups(self.survey, &values, false), self.frame);
             let across = self.across_block(&block, state, components);
@@ -387,7 +387,7 @@ impl CauseTable<'_, '_> {
             return found_component.with_part(self.next);
         };
         let (forms, amplitude) = (refined.forms, refined.amplitude);
-        let new = |of: &Variable| !self.numbers.contains(of);
+        let new = |variable: &Variable| !self.numbers.contains(variable);
         let variables = forms.iter().flat_map(|form| form.variables()).filter(new);
         self.numbers.extend(variables.collect::<Vec<_>>());
         let mut found_component = Component {

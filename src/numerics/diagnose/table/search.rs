@@ -208,7 +208,7 @@ impl CauseTable<'_, '_> {
         let loads = |form: &Form| {
             form.variables()
                 .iter()
-                .any(|of| matches!(of, Variable::Load { .. } | Variable::ArmLoad))
+                .any(|variable| matches!(variable, Variable::Load { .. } | Variable::ArmLoad))
         };
         let by_load = |best: usize| {
             let found = self.as_found(best, &scan.closely[&best]);
@@ -279,17 +279,17 @@ impl CauseTable<'_, '_> {
             for i in order {
                 let cell = components[i].cell;
                 let others = without(&components, &[i]);
-                let rest: Vec<&Component> = others.iter().collect();
-                let state = self.state(&rest, Some(kappa));
+                let given: Vec<&Component> = others.iter().collect();
+                let state = self.state(&given, Some(kappa));
                 let alike = self.alike(&components[i], 24);
                 let near: Vec<usize> = std::iter::once(cell)
                     .chain(self.near(&components[i]))
-                    .chain(self.over_its_variable(&components[i], &state, &rest))
+                    .chain(self.over_its_variable(&components[i], &state, &given))
                     .collect();
-                let scan = self.scan_instead(&components[i], &alike, &state, &rest, 5, &near);
+                let scan = self.scan_instead(&components[i], &alike, &state, &given, 5, &near);
                 let Some(best) = scan.best() else { continue };
-                let prior = self.log_prior(cell, rest.iter().map(|other| other.cell));
-                let stays = prior + self.log_evidence(&components[i], &state, &rest);
+                let prior = self.log_prior(cell, given.iter().map(|other| other.cell));
+                let stays = prior + self.log_evidence(&components[i], &state, &given);
                 if best == cell || scan.log_odds[best] <= stays + *SWAPS {
                     continue;
                 }
@@ -380,9 +380,9 @@ impl CauseTable<'_, '_> {
             let mut next = without(&components, &[at]);
             for _ in 0..*WAVES {
                 self.know(&next);
-                let rest: Vec<&Component> = next.iter().collect();
-                let state = self.state(&rest, Some(kappa));
-                let scan = self.scan_some(&named, &state, &rest, 4, &[]);
+                let given: Vec<&Component> = next.iter().collect();
+                let state = self.state(&given, Some(kappa));
+                let scan = self.scan_some(&named, &state, &given, 4, &[]);
                 let Some(best) = scan.best().filter(|best| scan.log_odds[*best] > 0.0) else {
                     break;
                 };
@@ -407,7 +407,7 @@ impl CauseTable<'_, '_> {
                 .iter()
                 .filter_map(|component| match &self.cells[component.cell].shapes {
                     Shapes::Free(free) if matches!(free.over, Over::Product(_)) => {
-                        Some((free.motion, free.of))
+                        Some((free.motion, free.variable))
                     }
                     _ => None,
                 });
@@ -415,7 +415,7 @@ impl CauseTable<'_, '_> {
         let stays = |shown: &&FreeShape| {
             products
                 .iter()
-                .any(|(motion, of)| *motion == shown.motion && *of == shown.of)
+                .any(|(motion, variable)| *motion == shown.motion && *variable == shown.variable)
         };
         let mut out: Vec<FreeShape> = self.multiplied.iter().filter(stays).copied().collect();
         let most = components
@@ -431,28 +431,28 @@ impl CauseTable<'_, '_> {
                     let refined = component
                         .forms
                         .first()
-                        .and_then(|form| Some(form.term()?.law().first.of));
+                        .and_then(|form| Some(form.term()?.law().first.variable));
                     Some(FreeShape {
-                        of: refined.unwrap_or(free.of),
+                        variable: refined.unwrap_or(free.variable),
                         ..*free
                     })
                 }
                 Shapes::Free(_) => None,
                 Shapes::Listed(_) => component.forms.first().and_then(|form| {
                     let term = form.term().filter(|term| term.law().times.is_none())?;
-                    let of = term.law().first.of;
+                    let variable = term.law().first.variable;
                     Some(FreeShape {
                         motion: term.motion(),
-                        of,
+                        variable,
                         over: Over::Line,
                     })
-                    .filter(|_| of.is_single())
+                    .filter(|_| variable.is_single())
                 }),
             };
             if let Some(free) = free
                 && !out
                     .iter()
-                    .any(|other| other.motion == free.motion && other.of == free.of)
+                    .any(|other| other.motion == free.motion && other.variable == free.variable)
             {
                 out.push(free);
             }

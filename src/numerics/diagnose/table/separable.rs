@@ -42,14 +42,15 @@ impl CauseTable<'_, '_> {
         let mut free = *free;
         if let Some(refined) = &found.refined {
             let law = *refined.forms.first()?.term()?.law();
-            free.of = law.first.of;
-            free.over = Over::Product(law.times?.of);
+            free.variable = law.first.variable;
+            free.over = Over::Product(law.times?.variable);
         }
         let free = &free;
         let Over::Product(other) = free.over else {
             return None;
         };
-        let supports = [free.of, other].map(|of| Some(support(&self.frame.values(of)?)));
+        let supports =
+            [free.variable, other].map(|variable| Some(support(&self.frame.values(variable)?)));
         let [Some(first), Some(second)] = supports else {
             return None;
         };
@@ -102,10 +103,10 @@ impl CauseTable<'_, '_> {
                     } else {
                         [basis, curve]
                     };
-                    free.term(Law::new(free.of, bases[0]).times(other, bases[1]))
+                    free.term(Law::new(free.variable, bases[0]).times(other, bases[1]))
                 };
-                let of = [other, free.of][given];
-                if let Some(mut stepped) = self.with_steps(free, of, &form, state, others)
+                let variable = [other, free.variable][given];
+                if let Some(mut stepped) = self.with_steps(free, variable, &form, state, others)
                     && stepped.log + cost > best.log
                 {
                     stepped.log += cost;
@@ -129,7 +130,7 @@ impl CauseTable<'_, '_> {
         state: &KnownState,
         others: &[&Component],
     ) -> Option<Weights> {
-        let values = |of| self.frame.values(of);
+        let values = |variable| self.frame.values(variable);
         let block = CellColumns::of(free.groups(self.survey, &values, false), self.frame);
         let across = self.across_block(&block, state, others);
         let mut found = (f64::NEG_INFINITY, 0, 0.0);
@@ -187,7 +188,7 @@ impl CauseTable<'_, '_> {
                 }
             }
         };
-        let form = free.term(Law::new(free.of, basis(0)).times(other, basis(1)));
+        let form = free.term(Law::new(free.variable, basis(0)).times(other, basis(1)));
         let fields = fields(free.motion);
         let smooth = LENGTHS.iter().map(|length| density(functions - 1, *length));
         let spectra: Vec<Vec<f64>> = smooth.chain([cornered(functions - 1)]).collect();

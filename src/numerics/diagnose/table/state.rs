@@ -100,7 +100,7 @@ impl KnownState {
         frame: &SearchRows,
     ) -> Vec<Vec<f64>> {
         let left = DVector::from_vec(self.left(components, frame));
-        let of = |component: &&Component| {
+        let of_component = |component: &&Component| {
             let along = component
                 .values
                 .tr_mul(&left.rows(0, component.values.nrows()))
@@ -110,7 +110,7 @@ impl KnownState {
                 .map(|((root, sigma), along)| sigma * root * along)
                 .collect()
         };
-        components.iter().map(of).collect()
+        components.iter().map(of_component).collect()
     }
 
     /// What its components leave of the residual at their likeliest.
@@ -242,7 +242,7 @@ impl KnownState {
         };
         let (gram, _) = self.seen(group, across, 0);
         let inverse = gram.try_inverse();
-        let of = |k: usize| {
+        let of_k = |k: usize| {
             let variance = inverse
                 .as_ref()
                 .map_or(f64::INFINITY, |inverse| inverse[(k, k)]);
@@ -253,7 +253,7 @@ impl KnownState {
                 f64::INFINITY
             }
         };
-        (0..group.range.len()).map(of).collect()
+        (0..group.range.len()).map(of_k).collect()
     }
 
     /// ln of the largest evidence that any shape of a block could have, whatever its prior: that of its least squares fit.

@@ -39,17 +39,17 @@ impl CauseTable<'_, '_> {
             return None;
         };
         let refined = found.refined.as_ref();
-        let of = match refined {
-            Some(refined) => refined.forms.first()?.term()?.law().first.of,
-            None => free.of,
+        let variable = match refined {
+            Some(refined) => refined.forms.first()?.term()?.law().first.variable,
+            None => free.variable,
         };
-        let mut free = FreeShape { of, ..*free };
+        let mut free = FreeShape { variable, ..*free };
         if !matches!(free.over, Over::Curve { .. }) || !state.leaves_more_than_noise(found.fit) {
             return None;
         }
         let alone = |free: &FreeShape| {
-            let form = |basis| free.term(Law::new(free.of, basis));
-            self.with_steps(free, free.of, &form, state, others)
+            let form = |basis| free.term(Law::new(free.variable, basis));
+            self.with_steps(free, free.variable, &form, state, others)
         };
         let mut best = alone(&free)?;
         let is_stepped = |refined: &Refined| {
@@ -63,8 +63,12 @@ impl CauseTable<'_, '_> {
             0..0
         };
         for level in levels {
-            let of = |near: FreeShape| Some((alone(&near)?, near));
-            let tried: Vec<_> = free.near(level).into_par_iter().filter_map(of).collect();
+            let of_near = |near: FreeShape| Some((alone(&near)?, near));
+            let tried: Vec<_> = free
+                .near(level)
+                .into_par_iter()
+                .filter_map(of_near)
+                .collect();
             let next = tried.into_iter().max_by(|a, b| a.0.log.total_cmp(&b.0.log));
             if let Some((next, near)) = next.filter(|next| next.0.log > best.log) {
                 (best, free) = (next, near);
@@ -77,18 +81,21 @@ impl CauseTable<'_, '_> {
     pub(super) fn with_steps(
         &self,
         free: &FreeShape,
-        of: Variable,
+        variable: Variable,
         form: &dyn Fn(Basis) -> Form,
         state: &KnownState,
         others: &[&Component],
     ) -> Option<Refined> {
-        let values = self.frame.values(of).filter(|values| !has_few(values))?;
+        let values = self
+            .frame
+            .values(variable)
+            .filter(|values| !has_few(values))?;
         if !self.has_steps {
             return None;
         }
         let (line, [low, high]) = (free.line(&values)?, support(&values));
         let mut all = gaps(values);
-        if of == Variable::Time {
+        if variable == Variable::Time {
             all.retain(|at| !self.survey.is_payload_change(*at));
         }
         let fields = fields(free.motion);
@@ -183,14 +190,14 @@ impl Steps {
         let mut worse = 0;
         loop {
             let price = price(at.len(), all);
-            let of = |shape: usize| {
+            let of_shape = |shape: usize| {
                 let found = self.with(&shapes[shape], &at);
                 let log = found.log + shapes[shape].log_weight - price;
                 (shape, GroupEvidence { log, ..found })
             };
             let (shape, found) = (0..shapes.len())
                 .filter(|shape| !shapes[*shape].is_bent)
-                .map(of)
+                .map(of_shape)
                 .max_by(|a, b| a.1.log.total_cmp(&b.1.log))?;
             let next = self.next(&shapes[shape], &at, found.amplitude, some);
             if best.as_ref().is_none_or(|best| found.log > best.2.log) {

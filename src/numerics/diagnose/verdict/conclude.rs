@@ -74,7 +74,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     ];
     let signature = signature(&last, something_left, remarks);
     let mut not_observable = not_observable(last.survey, &last.view.problem.reach());
-    not_observable.extend(not_tried(last.survey, fitter.question.own));
+    not_observable.extend(not_tried(last.survey, fitter.question.declared));
     not_observable.extend(unseen(&last));
     not_observable.extend(fitter.correlated.map(slower_than_noise));
     let formulas = FormulaSearch {
@@ -106,7 +106,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
         after: ErrorLengths::of(&misfit.sizes, &misfit.figures),
         held_out: misfit.held_out,
         folds,
-        next_measurements: next(&findings, fitter.question.own),
+        next_measurements: next(&findings, fitter.question.declared),
         findings: within(findings, &model),
         formulas,
         clock: data.has_clock(),
@@ -142,13 +142,13 @@ fn sizes_before<'s>(
 /// The findings with their forms as the model has them.
 fn within(mut findings: Vec<Finding>, model: &Model) -> Vec<Finding> {
     for form in findings.iter_mut().flat_map(|finding| &mut finding.forms) {
-        let own = model
+        let form_of_cause = model
             .stack
             .effects()
             .filter_map(|(effect, _)| effect.form())
-            .find(|own| *own == form);
-        if let Some(own) = own {
-            *form = own.clone();
+            .find(|known| *known == form);
+        if let Some(known) = form_of_cause {
+            *form = known.clone();
         }
     }
     findings
@@ -166,10 +166,10 @@ fn basis(fitter: &Fitter, rows: &[usize]) -> NoiseBasis {
 
 /// The share, in what all findings gain, of those without a name or with one that is more probably wrong.
 fn nameless_share(findings: &[Finding]) -> f64 {
-    let gains = |of: &dyn Fn(&Finding) -> bool| -> f64 {
+    let gains = |value_of: &dyn Fn(&Finding) -> bool| -> f64 {
         findings
             .iter()
-            .filter(|finding| finding.is_physics() && of(finding))
+            .filter(|finding| finding.is_physics() && value_of(finding))
             .filter_map(|finding| finding.evidence)
             .map(|e| e.gain)
             .sum()
@@ -244,6 +244,6 @@ pub(super) fn unseen(last: &LastRound) -> Vec<String> {
     }
     causes
         .into_iter()
-        .map(|(name, (of, subjects, largest))| hidden(name, &subjects.join(", "), &of, largest))
+        .map(|(name, (size, subjects, largest))| hidden(name, &subjects.join(", "), &size, largest))
         .collect()
 }

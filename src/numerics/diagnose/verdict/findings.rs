@@ -36,7 +36,7 @@ pub(super) fn findings(
     let data = last.survey.data;
     let by_the_way_there = |form: &Form| match form.variables().first() {
         Some(Variable::LastMove) => true,
-        Some(of) => of.follows_the_way() && data.direction.is_none(),
+        Some(variable) => variable.follows_the_way() && data.direction.is_none(),
         None => false,
     };
     // Nobody knows from where the arm came to the first row.

@@ -90,7 +90,7 @@ fn closing(data: &Measurements, rows: &[usize]) -> f64 {
 }
 
 /// Effects of the user's own that were not tried, since the recording lacks a column.
-pub(super) fn not_tried(survey: &Survey, own: &[&'static DeclaredCause]) -> Vec<String> {
+pub(super) fn not_tried(survey: &Survey, causes: &[&'static DeclaredCause]) -> Vec<String> {
     let one = |declared: &&'static DeclaredCause| {
         let lacking = DeclaredForm::lacking(declared, survey)?;
         Some(format!(
@@ -98,7 +98,7 @@ pub(super) fn not_tried(survey: &Survey, own: &[&'static DeclaredCause]) -> Vec<
             declared.name()
         ))
     };
-    own.iter().filter_map(one).collect()
+    causes.iter().filter_map(one).collect()
 }
 
 /// Links whose weight the robot file does not give.
@@ -116,10 +116,10 @@ fn masses(survey: &Survey) -> Option<String> {
             Some("gravity effects: the robot file gives no link masses; wind-up shows as an angle, no stiffness".into())
         }
         some => {
-            let (own, all) = (all.len() - some, all.len());
+            let (named, all) = (all.len() - some, all.len());
             let bare = bare.join(", ");
             Some(format!(
-                "gravity effects: the robot file gives mass and centre of {own} of {all} links; {bare} counted as weightless"
+                "gravity effects: the robot file gives mass and centre of {named} of {all} links; {bare} counted as weightless"
             ))
         }
     }
@@ -137,7 +137,7 @@ fn is_one_motion(finding: &Finding, rival: &RivalCause) -> bool {
 }
 
 /// What would tell findings from their rivals, a sentence each.
-pub(super) fn next(findings: &[Finding], own: &[&'static DeclaredCause]) -> Vec<String> {
+pub(super) fn next(findings: &[Finding], causes: &[&'static DeclaredCause]) -> Vec<String> {
     let mut out = Vec::new();
     for finding in findings {
         for rival in finding.rivals.iter().take(2) {
@@ -145,7 +145,7 @@ pub(super) fn next(findings: &[Finding], own: &[&'static DeclaredCause]) -> Vec<
                 [finding.effect, rival.effect]
                     .into_iter()
                     .filter_map(|name| {
-                        let declared = own.iter().find(|declared| declared.name() == name);
+                        let declared = causes.iter().find(|declared| declared.name() == name);
                         declared.map_or_else(
                             || cause(name)?.measure,
                             |declared| declared.about().measure,
@@ -214,12 +214,13 @@ pub(super) fn faults(
     let screening = &last.state.screening;
     // What has no other explanation than that it is far out must be farther than this noise reaches.
     let far = |s: &Suspect| s.kind != SuspectKind::Outlier || s.statistic > screening.reach;
-    let of = |kinds: fn(SuspectKind) -> bool| -> Vec<usize> {
-        let own = screening
+    let of_kinds = |kinds: fn(SuspectKind) -> bool| -> Vec<usize> {
+        let counted = screening
             .suspects
             .iter()
             .filter(|s| !s.used() && kinds(s.kind) && Some(s.row) != unknown);
-        own.filter(|s| far(s) && !(something_left && is_by_the_model_alone(s)))
+        counted
+            .filter(|s| far(s) && !(something_left && is_by_the_model_alone(s)))
             .map(|s| s.row + 1)
             .collect()
     };
@@ -238,7 +239,8 @@ pub(super) fn faults(
         )
     };
     let mut out = Vec::new();
-    let swapped = of(|kind| matches!(kind, SuspectKind::Exchanged | SuspectKind::Mislabelled));
+    let swapped =
+        of_kinds(|kind| matches!(kind, SuspectKind::Exchanged | SuspectKind::Mislabelled));
     if !swapped.is_empty() {
         out.push(of_the_recording(
             names::MISLABELLED_POINT,
@@ -246,7 +248,7 @@ pub(super) fn faults(
             last,
         ));
     }
-    let shifted = of(|kind| matches!(kind, SuspectKind::ShiftedBlock(_)));
+    let shifted = of_kinds(|kind| matches!(kind, SuspectKind::ShiftedBlock(_)));
     if !shifted.is_empty() {
         let text = format!(
             "joints and points are rows apart in the recording: {}",
@@ -254,7 +256,7 @@ pub(super) fn faults(
         );
         out.push(of_the_recording(names::JOINT_LOG_LAG, text, last));
     }
-    let wrong = of(|kind| {
+    let wrong = of_kinds(|kind| {
         matches!(
             kind,
             SuspectKind::Outlier | SuspectKind::UnitSlip(_) | SuspectKind::Zero

@@ -87,7 +87,7 @@ fn groups(last: &LastRound, found: &FoundCell, joint: usize, count: usize) -> Ve
     rows.sort_by(|a, b| a.load.total_cmp(&b.load));
     let mean = |rows: &[LoadGroup]| {
         let share = 1.0 / rows.len() as f64;
-        let sum = |of: fn(&LoadGroup) -> f64| rows.iter().map(of).sum::<f64>() * share;
+        let sum = |value_of: fn(&LoadGroup) -> f64| rows.iter().map(value_of).sum::<f64>() * share;
         LoadGroup {
             load: sum(|row| row.load),
             turn: sum(|row| row.turn),

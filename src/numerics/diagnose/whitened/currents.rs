@@ -142,7 +142,7 @@ impl Currents {
 
     /// What the currents alone say of some parameters with whitened `columns` (of the residual rows of currents), now at `values`.
     pub(crate) fn priors(&self, columns: &[Vec<f64>], values: &[f64]) -> Option<Vec<Prior>> {
-        let (rows, own) = (self.residual_rows(), columns.len());
+        let (rows, count) = (self.residual_rows(), columns.len());
         let seen: Vec<f64> = self
             .whitened()
             .enumerate()
@@ -159,11 +159,11 @@ impl Currents {
             .iter()
             .map(|c| c.iter().map(|v| v * v).sum::<f64>().sqrt().max(1e-300))
             .collect();
-        let matrix = DMatrix::from_fn(rows, own + self.nuisances(), |row, k| {
-            if k < own {
+        let matrix = DMatrix::from_fn(rows, count + self.nuisances(), |row, k| {
+            if k < count {
                 columns[k][row] / scale[k]
             } else {
-                self.nuisance(row, k - own)
+                self.nuisance(row, k - count)
             }
         });
         let solution = solve(&matrix, &seen)?;
@@ -174,7 +174,7 @@ impl Currents {
             mean: solution[k] / scale[k],
             sigma: (scatter.max(1.0) * inverse[(k, k)]).sqrt().max(1e-12) / scale[k],
         };
-        Some((0..own).map(prior).collect())
+        Some((0..count).map(prior).collect())
     }
 }
 

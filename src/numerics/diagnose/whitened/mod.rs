@@ -296,9 +296,10 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// A variable of one number at every row; none where some row does not tell.
-    pub(crate) fn values(&self, of: Variable) -> Option<Vec<f64>> {
-        let one =
-            |(row, motion): (&usize, &PointMotion)| motion.value(self.robot, self.data, *row, of);
+    pub(crate) fn values(&self, variable: Variable) -> Option<Vec<f64>> {
+        let one = |(row, motion): (&usize, &PointMotion)| {
+            motion.value(self.robot, self.data, *row, variable)
+        };
         self.rows.iter().zip(&self.motions).map(one).collect()
     }
 
@@ -421,11 +422,11 @@ impl ReadingLines {
 
     /// Readings of a row, each with its first residual row.
     pub(crate) fn seen(&self, place: usize) -> impl Iterator<Item = (usize, &SeenReading)> {
-        let own = begin(&self.end, place)..self.end[place];
-        self.first[own.clone()]
+        let range = begin(&self.end, place)..self.end[place];
+        self.first[range.clone()]
             .iter()
             .copied()
-            .zip(&self.readings[own])
+            .zip(&self.readings[range])
     }
 
     /// Residual rows of a row.

@@ -5,11 +5,11 @@ use crate::effect::{HiddenSize, Summary, figure};
 use crate::observation::Dimension;
 
 /// A size in the small unit of its dimension, e.g. `31 um`.
-pub(crate) fn small(size: f64, of: Dimension) -> String {
+pub(crate) fn small(size: f64, dimension: Dimension) -> String {
     format!(
         "{} {}",
-        figure(of.small().from_si(size), 0),
-        of.small().symbol()
+        figure(dimension.small().from_si(size), 0),
+        dimension.small().symbol()
     )
 }
 
@@ -67,13 +67,13 @@ pub(crate) fn slower_than_noise(noise: AutocorrelatedNoise) -> String {
 }
 
 /// How large a cause may be that a path is too short or too slow to show; `limit` in SI.
-pub(crate) fn hidden(name: &str, subjects: &str, of: &HiddenSize, limit: f64) -> String {
+pub(crate) fn hidden(name: &str, subjects: &str, hides: &HiddenSize, limit: f64) -> String {
     let size = if limit.is_finite() {
-        format!("by up to {:.1} {}", of.unit.from_si(limit), of.unit)
+        format!("by up to {:.1} {}", hides.unit.from_si(limit), hides.unit)
     } else {
         "by any amount".into()
     };
     let advice =
         "geometry absorbs it on this path: measure longer, faster, over the joints' whole range";
-    format!("{name}: {subjects} {} {size}; {advice}", of.may)
+    format!("{name}: {subjects} {} {size}; {advice}", hides.may)
 }

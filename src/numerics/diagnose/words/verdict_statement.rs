@@ -221,22 +221,22 @@ mod tests {
 
     #[test]
     fn nothing_found_says_what_its_noise_rests_on() {
-        let said =
+        let statement_of =
             |basis, instrument| statement(VerdictKind::NothingMissing, &ground(basis, instrument));
         assert_eq!(
-            said(NoiseBasis::Repeats, Some(17e-6)),
+            statement_of(NoiseBasis::Repeats, Some(17e-6)),
             "nothing found; the residual agrees with the noise that 24 repeats show, 31 um"
         );
         assert_eq!(
-            said(NoiseBasis::Instrument, Some(17e-6)),
+            statement_of(NoiseBasis::Instrument, Some(17e-6)),
             "nothing found; the residual agrees with the noise that the instrument states, 31 um"
         );
         assert_eq!(
-            said(NoiseBasis::Inferred, Some(17e-6)),
+            statement_of(NoiseBasis::Inferred, Some(17e-6)),
             "nothing found; 31 um scatter at random, of which the instrument explains 17: measure ten poses twice"
         );
         assert_eq!(
-            said(NoiseBasis::Inferred, None),
+            statement_of(NoiseBasis::Inferred, None),
             "nothing found; 32 um scatter at random, and no instrument is stated that explains any of it: state `instrument` in \
              `ingest`, and measure ten poses twice"
         );
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn findings_and_what_they_leave_say_what_their_noise_rests_on() {
-        let said = |verdict, basis| statement(verdict, &ground(basis, Some(8.2e-6)));
+        let statement_of = |verdict, basis| statement(verdict, &ground(basis, Some(8.2e-6)));
         for (verdict, basis, sentence) in [
             (
                 VerdictKind::Explained,
@@ -279,7 +279,7 @@ mod tests {
                  measure ten poses twice",
             ),
         ] {
-            assert_eq!(said(verdict, basis), sentence);
+            assert_eq!(statement_of(verdict, basis), sentence);
         }
     }
 
@@ -338,10 +338,10 @@ mod tests {
             VerdictKind::Unexplained,
         ] {
             for instrument in [None, Some(17e-6)] {
-                let said = statement(verdict, &ground(NoiseBasis::Inferred, instrument));
+                let text = statement(verdict, &ground(NoiseBasis::Inferred, instrument));
                 assert!(
-                    said.contains("scatter at random") && !said.contains("nothing is missing"),
-                    "{said}"
+                    text.contains("scatter at random") && !text.contains("nothing is missing"),
+                    "{text}"
                 );
             }
         }

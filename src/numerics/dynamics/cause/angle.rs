@@ -98,11 +98,11 @@ const SPRING: TorqueCause = TorqueCause {
     lengths: &[2],
     forms: |cause, scene| {
         let joints = (0..scene.joints()).filter(|joint| *joint != BALANCED);
-        let of = |joint| {
+        let of_joint = |joint| {
             let ends = ends(scene, joint);
             SPRINGS.map(|width| TorqueForm::at_joint(cause, joint, width).shaped(&ends))
         };
-        joints.flat_map(of).collect()
+        joints.flat_map(of_joint).collect()
     },
     torque: ColumnTorque::Row(|column, row| match column.column {
         0 => column.angle(row),
@@ -142,7 +142,7 @@ pub(super) static SPRING_BALANCE: TorqueCause = TorqueCause {
     lengths: &[0, 3],
     forms: |cause, scene| {
         let joints = (0..scene.joints()).filter(|joint| *joint == BALANCED);
-        let of = |joint| {
+        let of_joint = |joint| {
             let [least, most] = ends(scene, joint);
             SPRINGS.map(|width| {
                 let form = TorqueForm::at_joint(cause, joint, width);
@@ -152,7 +152,7 @@ pub(super) static SPRING_BALANCE: TorqueCause = TorqueCause {
                 }
             })
         };
-        joints.flat_map(of).collect()
+        joints.flat_map(of_joint).collect()
     },
     ..SPRING
 };
@@ -184,11 +184,11 @@ pub(super) static BALANCER: TorqueCause = TorqueCause {
     lengths: &[2],
     forms: |cause, scene| {
         let joints = (0..scene.joints()).filter(|joint| *joint == BALANCED);
-        let of = |joint| {
+        let of_joint = |joint| {
             let ends = ends(scene, joint);
             BALANCERS.map(|width| TorqueForm::at_joint(cause, joint, width).shaped(&ends))
         };
-        joints.flat_map(of).collect()
+        joints.flat_map(of_joint).collect()
     },
     torque: ColumnTorque::Row(|column, row| waves(column.angle(row))[column.column]),
     // The second wave only bends the first: the remainder of two that cancel each other where the joint moves is another torque.
@@ -315,13 +315,13 @@ pub(super) static ONE_ANGLE: TorqueCause = TorqueCause {
     of_angle: true,
     lengths: &[4],
     forms: |cause, scene| {
-        let of = |joint: usize| {
+        let of_joint = |joint: usize| {
             let [least, most] = ends(scene, joint);
             let margin = *MARGIN * (most - least);
             let shape = [least - margin, most + margin, least, most];
             CURVES.map(|width| TorqueForm::at_joint(cause, joint, width).shaped(&shape))
         };
-        (0..scene.joints()).flat_map(of).collect()
+        (0..scene.joints()).flat_map(of_joint).collect()
     },
     torque: ColumnTorque::Row(|column, row| {
         let (from, to) = (column.form.shape[0], column.form.shape[1]);
@@ -351,7 +351,7 @@ pub(super) static TWO_ANGLES: TorqueCause = TorqueCause {
     lengths: &[0],
     forms: |cause, scene| {
         let n = scene.joints();
-        let of = |joint| {
+        let of_joint = |joint| {
             let pairs = (0..n * n).map(move |pair| [pair / n, pair % n]);
             pairs
                 .filter(|[first, second]| first != second)
@@ -360,7 +360,7 @@ pub(super) static TWO_ANGLES: TorqueCause = TorqueCause {
                     ..TorqueForm::at_joint(cause, joint, 4)
                 })
         };
-        (0..n).flat_map(of).collect()
+        (0..n).flat_map(of_joint).collect()
     },
     cell: |form| form.with,
     torque: ColumnTorque::Row(|column, row| {

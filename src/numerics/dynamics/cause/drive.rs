@@ -30,7 +30,7 @@ pub(super) static ROTOR_INERTIA: TorqueCause = TorqueCause {
 const HALVES: [f64; 2] = [0.25, 1.0];
 const HALF_SPAN: [f64; 2] = [0.1, 4.0];
 /// Share of the declared one: more is no error of a drive.
-const MOST: f64 = 0.6;
+const LARGEST: f64 = 0.6;
 
 /// A current that makes another torque than declared. With a shape (Nm, and the largest torque of the joint) the difference falls with
 /// torque, to half at so many Nm: iron saturates, and a table of a drive is right at its rated current.
@@ -59,7 +59,7 @@ pub(super) static WRONG_CONSTANT: TorqueCause = TorqueCause {
         let span = |largest: &f64| span("half_at", "Nm", HALF_SPAN.map(|share| share * largest));
         form.shape.get(1).map(span).into_iter().collect()
     },
-    is_possible: |_, values| values[0].abs() < MOST,
+    is_possible: |_, values| values[0].abs() < LARGEST,
     torque: ColumnTorque::Row(|column, row| {
         let (joint, scene) = (column.form.joint(), column.scene);
         match column.form.shape.first() {

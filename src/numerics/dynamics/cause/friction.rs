@@ -436,14 +436,14 @@ pub(super) static BY_ANGLE: TorqueCause = TorqueCause {
     may_repeat: true,
     lengths: &[2],
     forms: |cause, scene| {
-        let of = |joint: usize| {
+        let of_joint = |joint: usize| {
             let ends = ends(scene, joint);
             (1..=ORDERS).map(move |order| TorqueForm {
                 with: [order, 0],
                 ..TorqueForm::at_joint(cause, joint, 2).shaped(&ends)
             })
         };
-        (0..scene.joints()).flat_map(of).collect()
+        (0..scene.joints()).flat_map(of_joint).collect()
     },
     torque: ColumnTorque::Row(|column, row| {
         let turn = column.form.with[0] as f64 * column.angle(row);

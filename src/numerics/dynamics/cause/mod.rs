@@ -326,13 +326,13 @@ impl TorqueForm {
             column,
         };
         match self.cause.torque {
-            ColumnTorque::Row(of) => {
+            ColumnTorque::Row(function) => {
                 let rows = out.iter_mut().enumerate();
-                rows.for_each(|(row, value)| *value = of(&column, row));
+                rows.for_each(|(row, value)| *value = function(&column, row));
             }
-            ColumnTorque::Course(of) => {
+            ColumnTorque::Course(function) => {
                 out.fill(0.0);
-                of(&column, out);
+                function(&column, out);
             }
             ColumnTorque::Masses => out.fill(0.0),
         }
@@ -458,12 +458,12 @@ fn at_each_joint(
     width: usize,
     shapes: &[&[f64]],
 ) -> Vec<TorqueForm> {
-    let of = |joint| {
+    let of_joint = |joint| {
         shapes
             .iter()
             .map(move |shape| TorqueForm::at_joint(cause, joint, width).shaped(shape))
     };
-    (0..scene.joints()).flat_map(of).collect()
+    (0..scene.joints()).flat_map(of_joint).collect()
 }
 
 /// The forms of a cause that sits at each link of declared masses.

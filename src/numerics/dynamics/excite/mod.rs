@@ -118,7 +118,7 @@ pub fn excite(arm: &DynamicArm, request: &ExciteRequest) -> Result<ExcitingMotio
     };
     let rows = coarse.spread(COUNTED);
     let share = request.rate * request.seconds / rows.len() as f64;
-    let of = |x: &[f64]| information.of(&coarse, &scaled(&coarse, x, &limits), &rows, share);
+    let of_x = |x: &[f64]| information.of(&coarse, &scaled(&coarse, x, &limits), &rows, share);
     let bounds = SearchBox::cube(n * width, -1.0, 1.0);
     let budget = Budget {
         generations: request.generations,
@@ -127,10 +127,10 @@ pub fn excite(arm: &DynamicArm, request: &ExciteRequest) -> Result<ExcitingMotio
         seed: request.seed,
         jobs: request.jobs,
     };
-    let objective = |x: &[f64]| -of(x).log_determinant();
+    let objective = |x: &[f64]| -of_x(x).log_determinant();
     let found = Algorithm::Pso.minimise(40, &objective, &bounds, &budget, |_, _| ());
-    let best = of(&found.position);
-    let others: Vec<_> = draws.iter().map(|x| of(x)).collect();
+    let best = of_x(&found.position);
+    let others: Vec<_> = draws.iter().map(|x| of_x(x)).collect();
     let fine = SeriesBasis::new(request.seconds, request.rate, request.harmonics);
     let motion = fine.motion(&scaled(&fine, &found.position, &limits));
     let sigmas = best.sigmas();

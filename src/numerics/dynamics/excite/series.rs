@@ -119,9 +119,9 @@ impl SeriesBasis {
 /// meets first on the rows of a clock.
 pub(super) fn scaled(basis: &SeriesBasis, x: &[f64], limits: &[JointLimits]) -> JointSeries {
     let width = 1 + basis.terms;
-    let of = |(own, limit): (&[f64], &JointLimits)| {
+    let of_own = |(course, limit): (&[f64], &JointLimits)| {
         // Equal speeds of all harmonics are likelier than equal amplitudes.
-        let raw: Vec<f64> = own[1..]
+        let raw: Vec<f64> = course[1..]
             .iter()
             .enumerate()
             .map(|(term, value)| value / (1 + term / 2) as f64)
@@ -145,10 +145,10 @@ pub(super) fn scaled(basis: &SeriesBasis, x: &[f64], limits: &[JointLimits]) -> 
             limit.range[1] - scale * greatest,
         );
         let margin = 0.5 * (1.0 - USED) * (highest - lowest);
-        let middle = lowest + margin + 0.5 * (own[0] + 1.0) * (highest - lowest - 2.0 * margin);
+        let middle = lowest + margin + 0.5 * (course[0] + 1.0) * (highest - lowest - 2.0 * margin);
         (middle, raw.iter().map(|value| scale * value).collect())
     };
-    JointSeries(x.chunks_exact(width).zip(limits).map(of).collect())
+    JointSeries(x.chunks_exact(width).zip(limits).map(of_own).collect())
 }
 
 /// 0 at both ends, 1 between, with its derivatives.

@@ -111,7 +111,7 @@ impl DeclaredCause {
 
 /// What a mechanic is told of a finding that a declared effect is.
 fn sentence(summary: &Summary) -> String {
-    let Some(own) = summary
+    let Some(cause) = summary
         .forms
         .iter()
         .find_map(|form| form.declared())
@@ -119,7 +119,7 @@ fn sentence(summary: &Summary) -> String {
     else {
         return String::new();
     };
-    let per = own
+    let per = cause
         .declaration
         .per
         .as_ref()
@@ -149,25 +149,25 @@ fn sentence(summary: &Summary) -> String {
             .find(|(name, _)| name == other)
             .map_or_else(String::new, |(_, value)| figure(*value, 2)),
     };
-    let said = match &own.declaration.sentence {
+    let text = match &cause.declaration.sentence {
         Some(sentence) => filled(sentence, &known),
         None => {
-            let laws = own.about.formula;
+            let laws = cause.about.formula;
             format!(
                 "{} errs as {} says, {laws}: {}",
                 summary.place,
-                own.about.name,
+                cause.about.name,
                 known("values")
             )
         }
     };
     let ends = |(name, value): &(String, f64)| {
-        let range = own.declaration.shape.get(name)?;
+        let range = cause.declaration.shape.get(name)?;
         (*value <= range.from || *value >= range.to)
             .then(|| format!("; {name} ends at its bound {value}"))
     };
     let ends: Vec<String> = shape.iter().filter_map(ends).collect();
-    format!("{said}{}", ends.concat())
+    format!("{text}{}", ends.concat())
 }
 
 /// A form of a declared effect is read with its declaration, not by its name.

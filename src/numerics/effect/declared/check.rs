@@ -100,7 +100,7 @@ impl DeclarationFaults {
         for (name, range) in &declaration.shape {
             let path = format!("shape.{name}");
             let taken = RowQuantity::named(name).is_some()
-                || Function::NAMED.iter().any(|(own, _)| own == name);
+                || Function::NAMED.iter().any(|(known, _)| known == name);
             if taken || ["pi", "place", "value", "values"].contains(&name.as_str()) {
                 self.add(&path, format!("`{name}` has a meaning of its own in formulas or sentences; give it another name"));
             } else if !is_snake(name) {
@@ -215,7 +215,7 @@ impl DeclarationFaults {
         for (k, quantity) in laws
             .iter()
             .enumerate()
-            .flat_map(|(k, law)| law.quantities().into_iter().map(move |of| (k, of)))
+            .flat_map(|(k, law)| law.quantities().into_iter().map(move |named| (k, named)))
         {
             let path = if laws.len() == 1 {
                 "law".into()

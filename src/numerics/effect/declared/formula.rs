@@ -91,8 +91,8 @@ impl Operator {
 }
 
 impl Formula {
-    pub(crate) fn call(function: Function, of: Self) -> Self {
-        Self::Call(function, Box::new(of))
+    pub(crate) fn call(function: Function, argument: Self) -> Self {
+        Self::Call(function, Box::new(argument))
     }
 
     pub(crate) fn join(operator: Operator, a: Self, b: Self) -> Self {
@@ -109,7 +109,7 @@ impl Formula {
             Self::Number(number) => *number,
             Self::Shape(k) => *shape.get(*k)?,
             Self::Row(quantity) => row(quantity)?,
-            Self::Call(function, of) => function.value(of.value(shape, row)?),
+            Self::Call(function, argument) => function.value(argument.value(shape, row)?),
             Self::Join(operator, a, b) => {
                 operator.value(a.value(shape, row)?, b.value(shape, row)?)
             }
@@ -120,7 +120,7 @@ impl Formula {
     pub(crate) fn walk(&self, visit: &mut dyn FnMut(&Formula)) {
         visit(self);
         match self {
-            Self::Call(_, of) => of.walk(visit),
+            Self::Call(_, argument) => argument.walk(visit),
             Self::Join(_, a, b) => {
                 a.walk(visit);
                 b.walk(visit);

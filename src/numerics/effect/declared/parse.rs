@@ -185,15 +185,15 @@ impl FormulaReader<'_> {
             at: start + 1,
             message,
         };
-        if let Some((_, function)) = Function::NAMED.iter().find(|(own, _)| *own == name) {
+        if let Some((_, function)) = Function::NAMED.iter().find(|(name_of, _)| *name_of == name) {
             if !self.take('(') {
                 return Err(there(format!("`{name}` is a function: write {name}(...)")));
             }
-            let of = self.sum()?;
+            let argument = self.sum()?;
             self.close()?;
-            return Ok(Formula::call(*function, of));
+            return Ok(Formula::call(*function, argument));
         }
-        let Some((kind, of, remembers)) = RowQuantity::named(&name) else {
+        let Some((kind, whose, remembers)) = RowQuantity::named(&name) else {
             let known = quantity::names().chain(Function::NAMED.iter().map(|(name, _)| *name));
             let mut all: Vec<&str> = known.collect();
             all.extend(self.shape.iter().map(String::as_str));
@@ -217,7 +217,11 @@ impl FormulaReader<'_> {
         } else {
             None
         };
-        Ok(Formula::Row(RowQuantity { kind, of, constant }))
+        Ok(Formula::Row(RowQuantity {
+            kind,
+            whose,
+            constant,
+        }))
     }
 
     /// The constant of a memory: a positive number or a shape number, in brackets.

@@ -137,7 +137,7 @@ impl DeclaredPattern {
         match self.moves {
             Moves::Frame(_) => {
                 let all = (0..self.laws.len()).flat_map(of_frame);
-                all.map(|(name, own, _)| (name, self.unit.unwrap_or(own), sigma))
+                all.map(|(name, given, _)| (name, self.unit.unwrap_or(given), sigma))
                     .collect()
             }
             Moves::Axis { .. } => {

@@ -9,7 +9,7 @@ use crate::robot::{CircumstanceName, law_columns};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RowQuantity {
     pub(crate) kind: QuantityKind,
-    pub(crate) of: Whose,
+    pub(crate) whose: Whose,
     /// The constant of a memory: a travel, a cooling time, a lag.
     pub(crate) constant: Option<Constant>,
 }
@@ -138,7 +138,7 @@ impl RowQuantity {
             ));
         }
         let split = text.find(|c: char| c.is_ascii_digit());
-        let (name, of) = match (
+        let (name, whose) = match (
             text.strip_suffix("_next"),
             text.strip_suffix("_before"),
             split,
@@ -152,13 +152,13 @@ impl RowQuantity {
             _ => return None,
         };
         let (_, kind, _, constant) = all().find(|row| row.0 == name && row.2)?;
-        Some((kind, of, constant))
+        Some((kind, whose, constant))
     }
 
     /// As it is written, with these names of the shape numbers.
     pub fn text(&self, shape: &[String]) -> String {
         let name = all().find(|row| row.1 == self.kind).map_or("", |row| row.0);
-        let of = match self.of {
+        let subject = match self.whose {
             Whose::Own | Whose::Row => String::new(),
             Whose::Next => "_next".into(),
             Whose::Before => "_before".into(),
@@ -169,12 +169,12 @@ impl RowQuantity {
             Some(Constant::Number(number)) => format!("({number})"),
             Some(Constant::Shape(k)) => format!("({})", shape.get(k).map_or("?", String::as_str)),
         };
-        format!("{name}{of}{constant}")
+        format!("{name}{subject}{constant}")
     }
 
     /// Whether it is of the joint at which the effect acts, or of a neighbour of that.
     pub(crate) fn is_relative(&self) -> bool {
-        matches!(self.of, Whose::Own | Whose::Next | Whose::Before)
+        matches!(self.whose, Whose::Own | Whose::Next | Whose::Before)
     }
 
     /// The variable of an arm of so many joints, where the effect acts at `joint`; `None` where there is no such joint.
@@ -184,14 +184,14 @@ impl RowQuantity {
         joints: usize,
         shape: &[f64],
     ) -> Option<Variable> {
-        let of = match self.of {
+        let its_joint = match self.whose {
             Whose::Row => 0,
             Whose::Own => joint?,
             Whose::Next => joint? + 1,
             Whose::Before => joint?.checked_sub(1)?,
             Whose::Joint(joint) => joint,
         };
-        let joint = (of < joints).then_some(of)?;
+        let joint = (its_joint < joints).then_some(its_joint)?;
         let constant = || match self.constant? {
             Constant::Number(number) => Some(number),
             Constant::Shape(k) => shape.get(k).copied(),
@@ -224,7 +224,7 @@ impl RowQuantity {
             K::Range => Variable::Range,
             K::Circumstance(column) => Variable::Circumstance {
                 column,
-                joint: (self.of != Whose::Row).then_some(joint),
+                joint: (self.whose != Whose::Row).then_some(joint),
             },
         })
     }
@@ -244,7 +244,7 @@ impl RowQuantity {
 impl Variable {
     /// Its name in formulas of an effect at `joint`; `None` where formulas have none for it.
     pub fn in_formulas(self, joint: usize) -> Option<String> {
-        let (kind, of) = match self {
+        let (kind, its_joint) = match self {
             Self::Angle { joint } => (K::Angle, Some(joint)),
             Self::Load { joint } => (K::Load, Some(joint)),
             Self::Approach { joint } => (K::Approach, Some(joint)),
@@ -256,17 +256,17 @@ impl Variable {
             Self::Circumstance { column, joint } => (K::Circumstance(column), joint),
             _ => return None,
         };
-        let whose = |of| {
-            if of == joint {
+        let whose = |its_joint| {
+            if its_joint == joint {
                 Whose::Own
             } else {
-                Whose::Joint(of)
+                Whose::Joint(its_joint)
             }
         };
         Some(
             RowQuantity {
                 kind,
-                of: of.map_or(Whose::Row, whose),
+                whose: its_joint.map_or(Whose::Row, whose),
                 constant: None,
             }
             .text(&[]),
@@ -276,14 +276,14 @@ impl Variable {
     /// Whether it is a joint's own, or the whole row's.
     pub fn is_of(self, joint: usize) -> bool {
         match self {
-            Self::Angle { joint: of }
-            | Self::Load { joint: of }
-            | Self::Approach { joint: of }
-            | Self::Move { joint: of } => of == joint,
-            Self::Velocity { joint: of } => of == joint,
+            Self::Angle { joint: other }
+            | Self::Load { joint: other }
+            | Self::Approach { joint: other }
+            | Self::Move { joint: other } => other == joint,
+            Self::Velocity { joint: other } => other == joint,
             Self::Circumstance {
-                joint: Some(of), ..
-            } => of == joint,
+                joint: Some(other), ..
+            } => other == joint,
             Self::Payload
             | Self::Temperature
             | Self::Time

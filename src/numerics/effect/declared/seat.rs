@@ -95,7 +95,7 @@ impl Moves {
             (Self::Frame(axes), Place::Base) => Motion::Base { axes },
             (Self::Frame(axes), Place::Tool) => Motion::Tool { axes },
             (Self::Frame(axes), Place::Tracker) => Motion::Tracker { axes },
-            (Self::Reading(of), Place::Tracker) => Motion::Instrument { of },
+            (Self::Reading(reading), Place::Tracker) => Motion::Instrument { reading },
             _ => return None,
         })
     }

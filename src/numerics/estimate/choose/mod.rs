@@ -304,7 +304,11 @@ pub(super) fn subset(data: &Measurements, rows: &[usize]) -> Measurements {
             .target
             .as_ref()
             .map(|all| Named::of(rows.iter().map(|row| all.name(*row)))),
-        readings: data.readings.iter().map(|own| own.subset(rows)).collect(),
+        readings: data
+            .readings
+            .iter()
+            .map(|block| block.subset(rows))
+            .collect(),
         ..Measurements::default()
     }
 }

@@ -95,7 +95,7 @@ impl PointJacobian {
         }
         self.sized
             .iter()
-            .for_each(|(parameter, of)| size[*parameter] += of);
+            .for_each(|(parameter, part)| size[*parameter] += part);
         let mut scale = self.prior.clone();
         scale.extend((!self.sized.is_empty()).then_some(1.0));
         let p = scale.len();

@@ -69,7 +69,7 @@ const NOTHING: f64 = 1e-6;
 struct View {
     jacobian: PointJacobian,
     /// The same without the true one's column.
-    rest: PointJacobian,
+    others: PointJacobian,
     known: TriangularFactor,
 }
 
@@ -98,7 +98,7 @@ impl View {
         let known = factor(&stacked(&Mat::identity(seen.ncols(), seen.ncols()), &seen));
         Self {
             jacobian,
-            rest: PointJacobian::given(&problem.model, free, Vec::new()),
+            others: PointJacobian::given(&problem.model, free, Vec::new()),
             known,
         }
     }
@@ -116,10 +116,10 @@ impl View {
     /// The two terms whose sum is ln(1 + L).
     fn terms(&self) -> Option<[DesignTerm; 2]> {
         let all: Vec<usize> = (0..self.known.parameters() - 1).collect();
-        let rest = self.known.select(&all);
+        let others = self.known.select(&all);
         Some([
             DesignTerm::given(1.0, self.jacobian.clone(), &self.known)?,
-            DesignTerm::given(-1.0, self.rest.clone(), &rest)?,
+            DesignTerm::given(-1.0, self.others.clone(), &others)?,
         ])
     }
 }

@@ -54,7 +54,7 @@ impl Linear {
         let mut sums = Sums::new(samples, &rows, arm, &terms.0, &terms.1)?;
         let p = group.len();
         let counts: Vec<f64> = (0..groups.len())
-            .map(|g| group.iter().filter(|of| **of == g).count() as f64)
+            .map(|g| group.iter().filter(|group_of| **group_of == g).count() as f64)
             .collect();
         // In units of the residual: each column starts as a tenth of it, and half of it as noise.
         let (mut alpha, mut beta) = (vec![100.0; groups.len()], 4.0);

@@ -195,7 +195,7 @@ impl Loss<'_> {
 
     fn weight_squares(&self, parameters: &[f64]) -> f64 {
         let squares = |weights: &[f64]| {
-            let (whole, rest) = weights.as_chunks::<LANES>();
+            let (whole, tail) = weights.as_chunks::<LANES>();
             // As many sums as there are lanes: one would wait for itself.
             let mut sums = [0.0; LANES];
             for weights in whole {
@@ -203,7 +203,7 @@ impl Loss<'_> {
                     *sum += w * w;
                 }
             }
-            sums.iter().sum::<f64>() + rest.iter().map(|w| w * w).sum::<f64>()
+            sums.iter().sum::<f64>() + tail.iter().map(|w| w * w).sum::<f64>()
         };
         squares(&parameters[self.shape.hidden_weights()])
             + squares(&parameters[self.shape.output_weights()])

@@ -320,8 +320,8 @@ impl<'a> Prepared<'a> {
     fn member(&self, m: usize, start: Vec<f64>) -> (Vec<f64>, Vec<TrainingStep>) {
         let mut rng = self.rng(1 + m as u64);
         let back = (self.recipe.keep_back * self.y.len() as f64).round() as usize;
-        let (kept_back, rest) = draw(&mut rng, self.y.len(), back.min(self.y.len() - 1));
-        let batch = self.batch(&rest);
+        let (kept_back, trained) = draw(&mut rng, self.y.len(), back.min(self.y.len() - 1));
+        let batch = self.batch(&trained);
         let check = self.batch(&kept_back);
         let decay = self.recipe.decay;
         let train = Loss {
@@ -334,11 +334,11 @@ impl<'a> Prepared<'a> {
             batch: &check,
             decay,
         });
-        let (mut scratch, mut beside) =
+        let (mut scratch, mut checked) =
             (LossBuffers::new(self.shape), LossBuffers::new(self.shape));
         let descent = descend(
             |x, gradient| train.gradient(x, gradient, &mut scratch),
-            |x| check.map(|check| check.mean_squares(x, &mut beside)),
+            |x| check.map(|check| check.mean_squares(x, &mut checked)),
             start,
             self.recipe.iterations,
         );

@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Most rows that are tried either way.
-const MOST: i64 = 64;
+const FARTHEST: i64 = 64;
 
 /// For every row how many rows further on its joints are, where that is plain; zero elsewhere.
 pub(super) fn apart(data: &Measurements, predicted: &[Vector3<f64>]) -> Vec<i64> {
@@ -26,7 +26,7 @@ pub(super) fn apart(data: &Measurements, predicted: &[Vector3<f64>]) -> Vec<i64>
         else {
             continue;
         };
-        let tried = (1..=MOST).flat_map(|k| [k, -k]);
+        let tried = (1..=FARTHEST).flat_map(|k| [k, -k]);
         let tried = tried.filter_map(|k| {
             AlignedStretch::fit(data, predicted, rows.clone(), k).map(|stretch| (stretch, k))
         });
@@ -72,7 +72,7 @@ fn under_one_base(data: &Measurements, predicted: &[Vector3<f64>], apart: &mut [
         };
         let better = middle(claimed[run[0]])
             .zip(middle(0))
-            .is_some_and(|(there, own)| *TOGETHER * there < own);
+            .is_some_and(|(there, here)| *TOGETHER * there < here);
         if !better {
             run.iter().for_each(|row| apart[*row] = 0);
         }
@@ -89,14 +89,14 @@ fn beyond_the_log(apart: &mut [i64]) {
         .collect::<BTreeSet<i64>>()
     {
         let lost = offset.unsigned_abs() as usize;
-        let (past, beside) = if offset > 0 {
+        let (past, future) = if offset > 0 {
             let edge = rows.saturating_sub(lost);
             (edge..rows, edge.saturating_sub(*STEP)..edge)
         } else {
             let edge = lost.min(rows);
             (0..edge, edge..(edge + *STEP).min(rows))
         };
-        if apart[beside].contains(&offset) {
+        if apart[future].contains(&offset) {
             apart[past].fill(offset);
         }
     }
@@ -130,14 +130,14 @@ impl AlignedStretch {
             .iter()
             .map(|point| (point - centre).norm_squared())
             .sum::<f64>();
-        let rest = from
+        let remaining = from
             .iter()
             .zip(&to)
             .map(|(a, b)| (motion.point(a) - b).norm_squared())
             .sum::<f64>();
         (size > 0.0).then(|| Self {
             motion,
-            left: (rest / size).sqrt(),
+            left: (remaining / size).sqrt(),
         })
     }
 

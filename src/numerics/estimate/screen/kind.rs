@@ -405,11 +405,11 @@ fn distance(whitened: &Vector3<f64>, leverage: Matrix3<f64>, weight: f64) -> f64
     let along = eigen.eigenvectors.transpose() * whitened;
     let squares = (0..3).map(|k| {
         let h = eigen.eigenvalues[k].max(0.0);
-        let rest = 1.0 - weight * h;
-        if rest < 1.0 - *SOLE {
+        let weight_left = 1.0 - weight * h;
+        if weight_left < 1.0 - *SOLE {
             0.0
         } else {
-            along[k] * along[k] / (rest * (rest + h))
+            along[k] * along[k] / (weight_left * (weight_left + h))
         }
     });
     squares.sum::<f64>().sqrt()

@@ -344,14 +344,14 @@ fn measure_by_set(standings: &mut [LeaveOneOut], set: &[usize]) {
         let mut distances: Vec<f64> = standings
             .iter()
             .zip(set)
-            .filter(|(_, of)| **of == number)
+            .filter(|(_, set_of)| **set_of == number)
             .map(|(standing, _)| standing.distance)
             .collect();
         let spread = (nearest(&mut distances, 0.5).unwrap_or(0.0) / MEDIAN_CHI2[3].sqrt()).max(1.0);
         for (standing, _) in standings
             .iter_mut()
             .zip(set)
-            .filter(|(_, of)| **of == number)
+            .filter(|(_, set_of)| **set_of == number)
         {
             standing.distance /= spread;
             standing.sigma *= spread;
@@ -516,7 +516,8 @@ mod tests {
             let (a, b): (f64, f64) = (1.0 - dice.random::<f64>(), dice.random());
             (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
         };
-        let mut square = move |of: usize| (0..of).map(|_| normal().powi(2)).sum::<f64>();
+        let mut square =
+            move |dimensions: usize| (0..dimensions).map(|_| normal().powi(2)).sum::<f64>();
         let mut one = move || match freedom {
             None => square(3).sqrt(),
             Some(v) => (square(3) * v as f64 / square(v)).sqrt(),
