@@ -8,7 +8,7 @@ const MARK: &str = "CALIB_TEST_ALONE";
 /// True in a process that runs this test and no other: there the test does its work. Elsewhere it starts that process, `module::name`
 /// of the test, and fails where the test fails there.
 pub fn alone(test: &str) -> bool {
-    if std::env::var_os(MARK).is_some_and(|told| told == test) {
+    if std::env::var_os(MARK).is_some_and(|printed| printed == test) {
         return true;
     }
     let mut child = Command::new(std::env::current_exe().unwrap());
@@ -17,11 +17,11 @@ pub fn alone(test: &str) -> bool {
         .env(MARK, test)
         .output()
         .unwrap();
-    let said = String::from_utf8_lossy(&output.stdout);
+    let message = String::from_utf8_lossy(&output.stdout);
     let complaint = String::from_utf8_lossy(&output.stderr);
     assert!(
-        output.status.success() && said.contains("1 passed"),
-        "{said}{complaint}"
+        output.status.success() && message.contains("1 passed"),
+        "{message}{complaint}"
     );
     false
 }

@@ -67,7 +67,7 @@ fn states(is_big: bool, count: usize) -> Vec<Message> {
         let names: Vec<&str> = std::iter::once("finger_1")
             .chain(order.iter().map(|j| ARM[*j]))
             .collect();
-        let of = |factor: f64| {
+        let of_factor = |factor: f64| {
             std::iter::once(9.0)
                 .chain(order.iter().map(|j| factor * wave(k, *j)))
                 .collect::<Vec<f64>>()
@@ -77,7 +77,12 @@ fn states(is_big: bool, count: usize) -> Vec<Message> {
             "/joint_states",
             JOINTS,
             ns + 1000,
-            joint_state(is_big, ns, &names, [&of(1.0), &of(2.0), &of(3.0)]),
+            joint_state(
+                is_big,
+                ns,
+                &names,
+                [&of_factor(1.0), &of_factor(2.0), &of_factor(3.0)],
+            ),
         )
     };
     (0..count).map(state).collect()
@@ -396,16 +401,16 @@ fn each_message_that_is_not_used_has_its_reason() {
         ("blank", 29),
     ];
     assert_eq!(reasons, expected);
-    let of = |k: usize| rejected.0[k].detail.as_str();
+    let of_k = |k: usize| rejected.0[k].detail.as_str();
     assert_eq!(
-        of(0),
+        of_k(0),
         "the message has no `shoulder_pan_joint.position`; its joints: finger_1, finger_2"
     );
     assert_eq!(
-        of(1),
+        of_k(1),
         "message 20 has the same stamp, 1700000019.123456789 s"
     );
-    assert_eq!(of(4), "`position` has 5 numbers for 6 names");
+    assert_eq!(of_k(4), "`position` has 5 numbers for 6 names");
     for row in &intake.0 {
         assert_eq!(row.accepted + row.rejected, row.read, "{}", row.file);
     }
@@ -466,7 +471,7 @@ fn a_folder_of_parts_is_run_as_one_file_and_a_part_that_changed_is_read_again() 
 
 #[test]
 fn two_robots_in_one_topic_are_told_by_their_joints() {
-    let of = |arm: &str, k: i64, q: f64| {
+    let of_arm = |arm: &str, k: i64, q: f64| {
         let names: Vec<String> = ARM.iter().map(|joint| format!("{arm}{joint}")).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         (
@@ -482,7 +487,7 @@ fn two_robots_in_one_topic_are_told_by_their_joints() {
         )
     };
     let mut messages: Vec<Message> = (0..30)
-        .flat_map(|k| [of("left_", k, 0.3), of("", k, 0.01 * k as f64)])
+        .flat_map(|k| [of_arm("left_", k, 0.3), of_arm("", k, 0.01 * k as f64)])
         .collect();
     messages.extend((0..30).map(|k| {
         (

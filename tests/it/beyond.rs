@@ -266,7 +266,7 @@ fn beyond_the_library_arms_have_five_joints_too_and_come_from_near_by() {
 /// The set of the library is frozen: what a seed drew before there was another list it draws still.
 #[test]
 fn the_librarys_recordings_are_those_of_before() {
-    let told = |seed: u64, cases: usize, share: f64| -> Vec<String> {
+    let message_of = |seed: u64, cases: usize, share: f64| -> Vec<String> {
         let design = Design {
             seed,
             cases,
@@ -299,7 +299,7 @@ fn the_librarys_recordings_are_those_of_before() {
     };
     // Written by the version before.
     assert_eq!(
-        told(5, 6, 0.17),
+        message_of(5, 6, 0.17),
         [
             "seven7r, 15 held out: joint_compliance at joint 4, one joint, L 105.174",
             "sr210d, 14 held out: gear_cyclic at joint 5, one high order, L 120.275",
@@ -310,7 +310,7 @@ fn the_librarys_recordings_are_those_of_before() {
         ]
     );
     assert_eq!(
-        told(20_261_126, 5, 0.2),
+        message_of(20_261_126, 5, 0.2),
         [
             "compact6, 17 held out: joint_hardening at joint 4, progressive, quadratic, L 5.745 + joint_compliance at joint 4, progressive, quadratic, L 40.436",
             "compact6, 11 held out: unknown at joint 4, bump, L 1534.223",

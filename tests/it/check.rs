@@ -138,7 +138,7 @@ fn lines_that_init_marked_are_listed_and_are_no_faults() {
     let (code, out, err) = checked(&robot, &pipeline, ARM, POINTS);
     assert_eq!((code, err.as_str()), (0, ""));
     let lines: Vec<&str> = out.lines().collect();
-    let told = [
+    let printed = [
         "replace   1 line: put your value there and delete the mark",
         "          robot.yaml:2: name: arm   # REPLACE",
         "check     2 lines: check that it is right and delete the mark",
@@ -146,11 +146,11 @@ fn lines_that_init_marked_are_listed_and_are_no_faults() {
         "          pipeline.yaml:20: join: {by: id}   # CHECK: the points' names",
         "not yet   a line is left to fill in; 2 stages are wired",
     ];
-    assert_eq!(lines, told, "{out}");
+    assert_eq!(lines, printed, "{out}");
 }
 
 /// Exit code and stderr of a command on the pipeline, with a good robot and data of two days.
-fn told(command: &str, pipeline: &str, tuesday: &str) -> (i32, String) {
+fn message_of(command: &str, pipeline: &str, tuesday: &str) -> (i32, String) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("tue")).unwrap();
     let files = [
@@ -172,7 +172,7 @@ fn told(command: &str, pipeline: &str, tuesday: &str) -> (i32, String) {
 #[test]
 fn a_set_that_the_split_does_not_deal_to_is_a_fault_with_its_place() {
     let with = |split: &str, more: &str| {
-        told(
+        message_of(
             "check",
             &format!("{PIPELINE}  - uses: split\n    with: {split}\n{more}"),
             POINTS,
@@ -215,7 +215,7 @@ fn a_set_that_the_split_does_not_deal_to_is_a_fault_with_its_place() {
 fn a_setting_that_only_the_data_refute_is_named_with_its_line_and_stage() {
     let with = |split: &str| {
         let identify = "  - uses: identify\n    with: {effects: [base_frame], on: [Fit]}\n";
-        told(
+        message_of(
             "run",
             &format!("{PIPELINE}  - uses: split\n    with: {split}\n{identify}"),
             POINTS,
@@ -235,7 +235,7 @@ fn files_of_one_name_are_told_by_their_folder() {
         "join:",
         "later:\n        - files: [tue/arm.csv, tue/points.csv]\n      join:",
     );
-    let (code, err) = told("check", &pipeline, "id,x,y\nA,1,2\n");
+    let (code, err) = message_of("check", &pipeline, "id,x,y\nA,1,2\n");
     assert!(
         code == 10 && err.contains("tue/points.csv:1: no column `z`"),
         "{err}"
@@ -248,7 +248,7 @@ fn a_name_that_is_too_long_says_how_long_it_may_be() {
     let pipeline = PIPELINE
         .replace("name: two", &format!("name: {name}"))
         .replace("  - uses: robot", &format!("  - id: {id}\n    uses: robot"));
-    let (code, err) = told("check", &pipeline, POINTS);
+    let (code, err) = message_of("check", &pipeline, POINTS);
     assert!(
         code == 2 && err.contains(&format!("name: `{name}`: 65 letters; allowed: up to 64")),
         "{err}"
@@ -311,8 +311,8 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
     }
     assert!(folder.path().join("kept").exists() && !folder.path().join(".calib").exists());
     let run = calib(folder.path(), "run pipeline.yaml --store kept");
-    let told = run.err.clone();
-    has(&told, "geometry  cached");
+    let printed = run.err.clone();
+    has(&printed, "geometry  cached");
     let diagnosed =
         format!("{PIPELINE}  - uses: split\n    with: {{by: every, n: 4}}\n  - uses: diagnose\n");
     put(folder.path(), "diagnosed.yaml", diagnosed);
@@ -323,10 +323,10 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
     for what in ["diagnosed.yaml", "HEAD"] {
         let output = calib(folder.path(), &format!("diagnose {what} --store kept"));
         let out = output.out.clone();
-        let told = output.err;
+        let printed = output.err;
         assert!(
             out.contains("rejected  10 rows, each with its reason in kept/tables/"),
-            "{out}{told}"
+            "{out}{printed}"
         );
     }
 }

@@ -27,8 +27,8 @@ fn arrows(sources: &[Source]) -> Arrows<'_> {
     };
     let mut arrows = Arrows::new();
     for source in sources {
-        let own = source.uses.iter().filter(|one| !one.handed_on);
-        for (one, to) in own.filter_map(|one| Some((one, home(&one.path, &by_module)?))) {
+        let imported = source.uses.iter().filter(|one| !one.handed_on);
+        for (one, to) in imported.filter_map(|one| Some((one, home(&one.path, &by_module)?))) {
             if to.file != source.file && !lists(source, to) {
                 arrows
                     .entry(&source.file)

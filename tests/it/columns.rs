@@ -140,17 +140,21 @@ fn a_circumstance_that_is_declared_in_one_line_is_a_law_of_a_users_own_effect() 
     put(here, "p.yaml", pipeline);
     let calib = |words: &str| answer::calib(here, words).ok();
     calib("run p.yaml --quiet --store s");
-    let said: Value =
+    let answer: Value =
         serde_json::from_str(&calib("diagnose p.yaml --json --quiet --store s")).unwrap();
-    let findings = said["findings"].as_array().unwrap();
+    let findings = answer["findings"].as_array().unwrap();
     let named: Vec<[&Value; 2]> = findings
         .iter()
         .map(|finding| ["effect", "where"].map(|key| &finding[key]))
         .collect();
-    assert_eq!(named, [[&json!("swelling"), &json!("joint 3")]], "{said:#}");
+    assert_eq!(
+        named,
+        [[&json!("swelling"), &json!("joint 3")]],
+        "{answer:#}"
+    );
     // 4e-6 rad are 0.825 arcsec.
     let value = findings[0]["parameters"][0]["value"].as_f64().unwrap();
-    assert!((value - 0.825).abs() < 0.08, "{value} arcsec: {said:#}");
+    assert!((value - 0.825).abs() < 0.08, "{value} arcsec: {answer:#}");
     let stored = from_file::<Recording>(&here.join("s/tables/humid/ingest.recording.parquet"))
         .unwrap()
         .table;

@@ -195,8 +195,8 @@ fn what_is_known_of_a_target_stands_behind_it() {
     let input =
         "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n119.999,20,-30,5,40,179\n";
     let output = fed(cell(), "compensate pipeline.yaml -", input).code(0);
-    let said = output.out;
-    let mut lines = said.lines();
+    let printed = output.out;
+    let mut lines = printed.lines();
     assert!(
         lines
             .next()
@@ -216,7 +216,7 @@ fn what_is_known_of_a_target_stands_behind_it() {
     assert_eq!(first[11], "");
     assert!(
         lines.next().unwrap().contains("joint 6 beyond its limits"),
-        "{said}"
+        "{printed}"
     );
     has(&output.err, "1 of them leaves the joint limits");
 }
@@ -268,33 +268,39 @@ fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
         (output.code, output.err, output.out)
     };
     let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n";
-    let (code, said, _) = run(&format!("{header}1,2,3,4,5,6\n1,2,x,4,5,6\n1,2\n"));
+    let (code, printed, _) = run(&format!("{header}1,2,3,4,5,6\n1,2,x,4,5,6\n1,2\n"));
     assert_eq!(code, Some(10));
-    has(&said, "stdin:3: column 5: field 3 is `x`, no number");
-    has(&said, "stdin:4: has 2 fields, the header 6");
+    has(&printed, "stdin:3: column 5: field 3 is `x`, no number");
+    has(&printed, "stdin:4: has 2 fields, the header 6");
     // A quote inside a field is a letter of it; one that begins a field ends it.
     let open = header.replace("q6_deg", "q6_deg,note");
-    let (code, said, _) = run(&format!(
+    let (code, printed, _) = run(&format!(
         "{open}1,2,3,4,5,6,3\" bolt\n1,2,3,4,5,6,\"3, and 4\n"
     ));
     assert_eq!(code, Some(10));
-    assert_eq!(said.matches("stdin:").count(), 1, "{said}");
-    has(&said, "stdin:3: column 13: `\"` is not closed on its line");
-    let (code, said, _) = run(&format!("{header}1,2,3,4,5,\"0.25\"0\n"));
+    assert_eq!(printed.matches("stdin:").count(), 1, "{printed}");
+    has(
+        &printed,
+        "stdin:3: column 13: `\"` is not closed on its line",
+    );
+    let (code, printed, _) = run(&format!("{header}1,2,3,4,5,\"0.25\"0\n"));
     assert_eq!(code, Some(10));
     has(
-        &said,
+        &printed,
         "stdin:2: column 17: text behind the closing `\"` of a field; allowed:",
     );
-    let (code, said, _) = run(&header.replace("q6_deg", "\"q6_deg"));
+    let (code, printed, _) = run(&header.replace("q6_deg", "\"q6_deg"));
     assert_eq!(code, Some(10));
-    has(&said, "stdin:1: column 36: `\"` is not closed on its line");
-    let (code, said, _) = run("A1,A2,A3,A4,A5,A6\n1,2,3,4,5,6\n");
+    has(
+        &printed,
+        "stdin:1: column 36: `\"` is not closed on its line",
+    );
+    let (code, printed, _) = run("A1,A2,A3,A4,A5,A6\n1,2,3,4,5,6\n");
     assert_eq!(code, Some(2));
-    has(&said, ["`A1` has no unit", "--angle deg"]);
-    let (code, said, _) = run("foo,bar\n1,2\n");
+    has(&printed, ["`A1` has no unit", "--angle deg"]);
+    let (code, printed, _) = run("foo,bar\n1,2\n");
     assert_eq!(code, Some(2));
-    has(&said, "no targets found");
+    has(&printed, "no targets found");
 }
 
 #[test]
@@ -302,8 +308,11 @@ fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
     let input = "id,x_mm,y_mm,z_mm\nnear,800,40,900\nfar,7800,40,900\nnear,810,40,900\n";
     for more in ["", "--one-step"] {
         let output = fed(cell(), &format!("compensate latest --quiet {more}"), input).code(10);
-        let (said, told) = (output.out, output.err);
-        let rows: Vec<Vec<&str>> = said.lines().map(|line| line.split(',').collect()).collect();
+        let (message, printed) = (output.out, output.err);
+        let rows: Vec<Vec<&str>> = message
+            .lines()
+            .map(|line| line.split(',').collect())
+            .collect();
         assert_eq!(
             (rows.len(), rows[0][4], rows[0][9]),
             (4, "q1_deg", "q6_deg")
@@ -313,25 +322,26 @@ fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
                 row[4..10]
                     .iter()
                     .all(|cell| cell.parse::<f64>().is_ok_and(f64::is_finite)),
-                "{said}"
+                "{message}"
             );
         }
         assert_eq!(rows[2][4..10], [""; 6]);
         // The arm reaches 1.4 m from its second axis, which stands 0.4 m above the base.
         let off: f64 = rows[2][11].parse().unwrap();
-        assert!((6000.0..7000.0).contains(&off), "{said}");
+        assert!((6000.0..7000.0).contains(&off), "{message}");
         assert!(
-            said.lines()
+            message
+                .lines()
                 .nth(2)
                 .is_some_and(|row| row.contains(",\"not reached, 6") && row.ends_with(" mm off\"")),
-            "{said}"
+            "{message}"
         );
         has(
-            &told,
+            &printed,
             ["stdin:3: not reached, 6", " mm off: no joints are written"],
         );
         has(
-            &told,
+            &printed,
             "warning: 1 of them could not be reached and has no joints (column `remark`)",
         );
     }
@@ -344,13 +354,14 @@ fn a_pose_that_only_another_orientation_reaches_gets_no_joints() {
     // The wrist's limits do not bind the search: what is out of reach is the point 1.4 m away, with the tool turned back.
     let input = "x_mm,y_mm,z_mm,qw,qx,qy,qz\n1230,0,900,1,0,0,0\n1230,0,900,0,0,0,1\n";
     let output = fed(cell(), "compensate latest --quiet", input);
-    let (said, told) = (output.out, output.err);
-    assert_eq!(output.code, Some(10), "{said}{told}");
+    let (message, printed) = (output.out, output.err);
+    assert_eq!(output.code, Some(10), "{message}{printed}");
     assert!(
-        said.lines()
+        message
+            .lines()
             .nth(2)
             .is_some_and(|row| row.contains(",,,,,,") && row.contains("not reached")),
-        "{said}"
+        "{message}"
     );
 }
 
@@ -397,8 +408,8 @@ fn a_target_that_is_not_reached_is_null_in_parquet() {
 #[test]
 fn quiet_keeps_warnings_and_takes_the_summary() {
     let input = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n119.999,20,-30,5,40,179\n";
-    let told = |more: &str| fed(cell(), &format!("compensate latest {more}"), input).err;
-    let (loud, quiet) = (told(""), told("-q"));
+    let message_of = |more: &str| fed(cell(), &format!("compensate latest {more}"), input).err;
+    let (loud, quiet) = (message_of(""), message_of("-q"));
     has(&loud, ["model: ", "1 target; "]);
     let warnings: String = loud
         .lines()
@@ -424,34 +435,34 @@ fn partial_targets_of_a_program_stay_where_that_is_wished_and_nothing_is_written
         (output.code, output.err)
     };
     let whole = "a target is corrected whole or not at all";
-    let (code, told) = run("");
+    let (code, printed) = run("");
     assert_eq!(code, Some(10));
     has(
-        &told,
+        &printed,
         &format!("partial.src:2:5: the target has no Z, A, B, C; {whole}"),
     );
     has(
-        &told,
+        &printed,
         &format!("partial.src:3:5: the target has no A2, A3, A4, A5, A6; {whole}"),
     );
     has(
-        &told,
+        &printed,
         "partial.src: partial targets stay as they are with --leave-partial",
     );
     assert!(!cell().join("partial_c.src").exists());
-    let (code, told) = run("--leave-partial");
-    assert_eq!(code, Some(0), "{told}");
+    let (code, printed) = run("--leave-partial");
+    assert_eq!(code, Some(0), "{printed}");
     has(
-        &told,
+        &printed,
         &format!(
             "warning: partial.src:3:5: left as it is: the target has no A2, A3, A4, A5, A6; {whole}"
         ),
     );
     let written = read(cell().join("partial_c.src"));
-    let (mark, rest) = written.split_once('\n').unwrap();
+    let (mark, tail) = written.split_once('\n').unwrap();
     starts_with(mark, "; corrected by calib");
     assert!(
-        rest.starts_with("PTP {A1 10.") || rest.starts_with("PTP {A1 9."),
+        tail.starts_with("PTP {A1 10.") || tail.starts_with("PTP {A1 9."),
         "{written}"
     );
     ends_with(&written, "\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n");

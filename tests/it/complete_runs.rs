@@ -5,7 +5,7 @@ use crate::compensate::cell;
 use serde_json::Value;
 use std::path::Path;
 
-fn said(here: &Path, arguments: &str) -> (Option<i32>, String) {
+fn message_of(here: &Path, arguments: &str) -> (Option<i32>, String) {
     let output = fed(
         here,
         arguments,
@@ -14,9 +14,9 @@ fn said(here: &Path, arguments: &str) -> (Option<i32>, String) {
     (output.code, output.out + &output.err)
 }
 fn done(here: &Path, arguments: &str) -> String {
-    let (code, said) = said(here, arguments);
-    assert_eq!(code, Some(0), "{arguments:?}: {said}");
-    said
+    let (code, printed) = message_of(here, arguments);
+    assert_eq!(code, Some(0), "{arguments:?}: {printed}");
+    printed
 }
 fn json(here: &Path, arguments: &str) -> Value {
     serde_json::from_str(&done(here, &format!("{arguments} --json"))).unwrap()
@@ -42,14 +42,14 @@ fn kinds(here: &Path) -> Vec<String> {
 fn what_other_verbs_run_is_not_head_and_is_listed_as_what_it_is() {
     let folder = folder();
     let here = folder.path();
-    let (code, text) = said(here, "explain identify");
+    let (code, text) = message_of(here, "explain identify");
     assert_eq!(
         (code, text.contains("has no runs")),
         (Some(2), true),
         "{text}"
     );
     done(here, "compensate pipeline.yaml --quiet");
-    let (code, text) = said(here, "explain identify");
+    let (code, text) = message_of(here, "explain identify");
     assert_eq!(code, Some(2));
     let only = json(here, "log")[0]["run"].as_str().unwrap().to_string();
     has(&text, ["no complete run of `calib run`", &only]);
@@ -69,7 +69,7 @@ fn what_other_verbs_run_is_not_head_and_is_listed_as_what_it_is() {
     );
     done(here, "run pipeline.yaml --quiet --until split --set seed=7");
     assert_eq!(
-        said(
+        message_of(
             here,
             "run pipeline.yaml --quiet --set 'identify.on=[fit, none]'"
         )
@@ -77,7 +77,7 @@ fn what_other_verbs_run_is_not_head_and_is_listed_as_what_it_is() {
         Some(10)
     );
     assert_eq!(
-        said(
+        message_of(
             here,
             "compensate pipeline.yaml --quiet --set 'identify.on=[fit, none]'"
         )
@@ -95,7 +95,7 @@ fn what_other_verbs_run_is_not_head_and_is_listed_as_what_it_is() {
     assert!(done(here, "lineage HEAD/identify/parameters").contains(&runs[1]));
     let exported = |name: &str| done(here, &format!("export {name} --format json --quiet"));
     assert_eq!(exported("latest"), exported(&runs[1]));
-    let (code, text) = said(here, "show HEAD~2");
+    let (code, text) = message_of(here, "show HEAD~2");
     assert_eq!(
         (
             code,

@@ -42,7 +42,7 @@ tool: {point: [-1184.3, -340, -40]}
 ";
 
 /// What the run says on stderr where the column of x holds the nominal point and that of the difference `noise_mm` of noise.
-fn told(minus: &str, noise_mm: f64) -> String {
+fn message_of(minus: &str, noise_mm: f64) -> String {
     let robot = RobotModel::new(fixture::offset_wrist());
     let mut text = "q1,q2,q3,q4,q5,q6,x_t,y_t,z_t,x_dif\n".to_string();
     for row in 0..60 {
@@ -81,9 +81,9 @@ fn told(minus: &str, noise_mm: f64) -> String {
 fn a_target_taken_for_the_measured_point_is_a_warning_and_noise_is_none() {
     let warning = "they are probably computed (a target, a nominal point), not measured; check the column mapping";
     assert_eq!(
-        told("", 0.0).matches(warning).count(),
+        message_of("", 0.0).matches(warning).count(),
         2,
         "identify and validate say so"
     );
-    assert_eq!(told("x_dif", 0.03).matches(warning).count(), 0);
+    assert_eq!(message_of("x_dif", 0.03).matches(warning).count(), 0);
 }

@@ -17,10 +17,10 @@ fn is_a_place(place: &str) -> bool {
     };
     match place.split_once(' ') {
         None => ["base", "tool", "tracker", "recording"].contains(&place),
-        Some(("joint", rest)) => number(rest),
-        Some(("link", rest)) => rest
+        Some(("joint", tail)) => number(tail),
+        Some(("link", tail)) => tail
             .split_once('-')
-            .map_or_else(|| number(rest), |(a, b)| number(a) && number(b) && a < b),
+            .map_or_else(|| number(tail), |(a, b)| number(a) && number(b) && a < b),
         Some(_) => false,
     }
 }
@@ -323,12 +323,12 @@ fn one_changed_byte_breaks_the_seal() {
         after[last] = if after[last] == b'1' { b'2' } else { b'1' };
         std::fs::write(&path, after).unwrap();
         let done = calib(".", &reveal);
-        let said = done.err.clone();
-        assert_eq!(done.code, Some(10), "{said}");
+        let printed = done.err.clone();
+        assert_eq!(done.code, Some(10), "{printed}");
         assert!(
-            said.contains(&format!("{name}: was changed since it was sealed"))
+            printed.contains(&format!("{name}: was changed since it was sealed"))
                 && done.out.is_empty(),
-            "{said}"
+            "{printed}"
         );
         std::fs::write(&path, before).unwrap();
     }
@@ -357,10 +357,10 @@ fn an_interrupted_proof_goes_on_where_it_stood_and_only_with_the_same_set() {
         )
     };
     let done = prove("12");
-    let said = done.err.clone();
+    let printed = done.err.clone();
     assert!(
-        done.code == Some(0) && said.matches("diagnosed before").count() == 12,
-        "{said}"
+        done.code == Some(0) && printed.matches("diagnosed before").count() == 12,
+        "{printed}"
     );
     let board: Value = done.json();
     assert_eq!(

@@ -28,19 +28,19 @@ fn the_table_has_the_variances_of_the_parameters_and_every_pair_once() {
     assert!(free.len() > 20);
     assert_eq!(table.0.len(), free.len() * (free.len() + 1) / 2);
     for row in &free {
-        let own = table
+        let row_of = table
             .0
             .iter()
             .find(|pair| pair.parameter == row.name && pair.other == row.name)
             .unwrap();
         let sigma = row.sigma.unwrap();
         assert!(
-            (own.covariance.sqrt() / sigma - 1.0).abs() < 1e-9,
+            (row_of.covariance.sqrt() / sigma - 1.0).abs() < 1e-9,
             "{}: {} and {sigma}",
             row.name,
-            own.covariance.sqrt()
+            row_of.covariance.sqrt()
         );
-        assert_eq!(own.unit, format!("{0} {0}", row.unit));
+        assert_eq!(row_of.unit, format!("{0} {0}", row.unit));
     }
     for pair in &table.0 {
         let variance = |name: &str| {

@@ -97,15 +97,15 @@ fn no_number_decides_outside_the_tables() {
         ))
         .unwrap();
         for (at, line) in text.lines().enumerate() {
-            let Some((_, rest)) = line.split_once("const ") else {
+            let Some((_, tail)) = line.split_once("const ") else {
                 continue;
             };
-            let Some((name, kind)) = rest.split_once(": ") else {
+            let Some((name, kind)) = tail.split_once(": ") else {
                 continue;
             };
             let number = ["f64", "usize", "u64", "u32", "i64", "i32", "[f64", "[usize"]
                 .iter()
-                .any(|own| kind.starts_with(own));
+                .any(|ours| kind.starts_with(ours));
             if number && !MECHANICS.contains(&name) && name != "UNSEEN" {
                 faults.push(format!("{}:{}: {name}", source.file, at + 1));
             }

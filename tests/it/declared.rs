@@ -196,18 +196,18 @@ fn a_formula_moves_the_arm_as_the_same_law_of_the_library() {
         ),
     ];
     for (declared, library) in pairs {
-        let own = forms(&declared, &robot, &data);
-        let [own] = &own[..] else {
-            panic!("{} forms of {declared:?}", own.len())
+        let ours = forms(&declared, &robot, &data);
+        let [ours] = &ours[..] else {
+            panic!("{} forms of {declared:?}", ours.len())
         };
-        assert_eq!(own.place(), library.place(), "{declared:?}");
-        let (own, library) = (moved(&robot, &data, own), moved(&robot, &data, &library));
-        for (row, (own, library)) in own.iter().zip(&library).enumerate() {
+        assert_eq!(ours.place(), library.place(), "{declared:?}");
+        let (ours, library) = (moved(&robot, &data, ours), moved(&robot, &data, &library));
+        for (row, (own, library)) in ours.iter().zip(&library).enumerate() {
             assert_eq!(own.len(), library.len(), "{declared:?}");
-            for (own, library) in own.iter().zip(library) {
+            for (ours, library) in own.iter().zip(library) {
                 assert!(
-                    (own - library).norm() < 1e-12,
-                    "{declared:?} at row {row}: {own} instead of {library}"
+                    (ours - library).norm() < 1e-12,
+                    "{declared:?} at row {row}: {ours} instead of {library}"
                 );
             }
         }
@@ -240,7 +240,7 @@ fn a_form_carries_its_declaration_wherever_its_json_goes() {
         );
     }
     let text = serde_json::to_string(&all[0]).unwrap();
-    for (from, to, said) in [
+    for (from, to, printed) in [
         ("abs(q", "abs(p", "`p` is no name"),
         (
             "\"shape\":[-1.0]",
@@ -258,7 +258,7 @@ fn a_form_carries_its_declaration_wherever_its_json_goes() {
         let error = serde_json::from_str::<Form>(&text.replace(from, to))
             .expect_err("not a form")
             .to_string();
-        has(&error, said);
+        has(&error, printed);
     }
 }
 

@@ -5,8 +5,8 @@ mod foreign;
 mod kinds;
 mod left_out;
 mod possible;
-mod said;
 mod scrambled;
+mod sentences;
 mod setup;
 mod tool_mass;
 mod weight;
@@ -52,10 +52,10 @@ fn the_practice_cases_are_solved() {
         };
         let want: Value = serde_json::from_str(&want).unwrap();
         let example = Example::new("case", &[("case", &case.display().to_string())]);
-        let of = example.ingested();
-        let robot = RobotModel::new(of.robot.to_description().unwrap());
-        let data = of.recording.measurements();
-        let made = of.diagnose_by(&example.with("diagnose")).unwrap();
+        let recorded = example.ingested();
+        let robot = RobotModel::new(recorded.robot.to_description().unwrap());
+        let data = recorded.recording.measurements();
+        let made = recorded.diagnose_by(&example.with("diagnose")).unwrap();
         let (found, row) = (made.named(), made.verdict());
         // Held-out rows come down to what a complete model of so many parameters leaves.
         let (after, floor) = (row.after_rms_mm.unwrap(), row.noise_floor_mm.unwrap());
@@ -130,24 +130,24 @@ fn blind(family: &str, seed: &str) -> (Value, Value) {
     );
     let pipeline = root("pipelines/case/pipeline.yaml");
     let pipeline = pipeline.display();
-    let said = calib(
+    let printed = calib(
         &format!("diagnose {pipeline} --set case=sealed/recordings/c0001 --json --quiet"),
         folder.path(),
     );
     let truth = read(folder.path().join("sealed/sealed/c0001.json"));
     (
-        serde_json::from_str(&said).unwrap(),
+        serde_json::from_str(&printed).unwrap(),
         serde_json::from_str(&truth).unwrap(),
     )
 }
 
 #[test]
 fn a_recording_without_a_missing_effect_has_no_findings() {
-    let (said, _) = blind("nothing", "901");
-    assert_eq!(said["verdict"], "nothing_missing");
-    assert_eq!(said["findings"], serde_json::json!([]));
+    let (answer, _) = blind("nothing", "901");
+    assert_eq!(answer["verdict"], "nothing_missing");
+    assert_eq!(answer["findings"], serde_json::json!([]));
     assert!(
-        said["not_observable"]
+        answer["not_observable"]
             .as_array()
             .unwrap()
             .iter()
@@ -157,8 +157,8 @@ fn a_recording_without_a_missing_effect_has_no_findings() {
 
 #[test]
 fn a_tracker_that_wanders_is_no_cause() {
-    let (said, _) = blind("wandering", "2");
-    assert_eq!(said["findings"], serde_json::json!([]), "{said:#}");
+    let (answer, _) = blind("wandering", "2");
+    assert_eq!(answer["findings"], serde_json::json!([]), "{answer:#}");
 }
 
 #[test]
@@ -169,11 +169,11 @@ fn effects_of_the_twin_are_named_and_placed() {
         ("joint_log_lag", "922"),
         ("base_compliance", "925"),
     ] {
-        let (said, truth) = blind(family, seed);
-        let found = wanted(&said["findings"]);
-        assert_eq!(found, wanted(&truth["want"]), "{family}: {said:#}");
-        let rms = |when: &str| said[when]["validate_rms_mm"].as_f64().unwrap();
-        let floor = said["noise_floor_mm"].as_f64().unwrap();
+        let (answer, truth) = blind(family, seed);
+        let found = wanted(&answer["findings"]);
+        assert_eq!(found, wanted(&truth["want"]), "{family}: {answer:#}");
+        let rms = |when: &str| answer[when]["validate_rms_mm"].as_f64().unwrap();
+        let floor = answer["noise_floor_mm"].as_f64().unwrap();
         // What is hardly larger than the noise may gain nothing on some fifty points.
         let visible = rms("before") > 1.2 * floor;
         assert!(
@@ -219,16 +219,16 @@ stages:
 
 #[test]
 fn lost_motion_that_heavy_loads_decide_is_one_cause_with_its_gap_and_its_torque() {
-    let said = simulated(
+    let answer = simulated(
         "{backlash: {joint: 3, gap_arcsec: 60, closing_nm: 12}}",
         3,
         120,
     );
-    let findings = said["findings"].as_array().unwrap();
+    let findings = answer["findings"].as_array().unwrap();
     assert_eq!(
-        wanted(&said["findings"]),
+        wanted(&answer["findings"]),
         Named::from([("backlash".into(), "joint 3".into())]),
-        "{said:#}"
+        "{answer:#}"
     );
     let gap = &findings[0]["parameters"][0];
     let (value, sigma) = (
@@ -273,19 +273,19 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
     std::fs::write(&file, turned.join("\n")).unwrap();
     let pipeline = root("pipelines/case/pipeline.yaml").display().to_string();
     let asked = &format!("diagnose {pipeline} --set case=sealed/recordings/c0001 --json --quiet");
-    let (code, said) = ended(asked, folder.path());
-    assert_eq!(code, Some(10), "{said}");
-    let said: Value = serde_json::from_str(&said).unwrap();
-    let findings = said["findings"].as_array().unwrap();
-    assert_eq!(findings.len(), 1, "{said:#}");
+    let (code, printed) = ended(asked, folder.path());
+    assert_eq!(code, Some(10), "{printed}");
+    let answer: Value = serde_json::from_str(&printed).unwrap();
+    let findings = answer["findings"].as_array().unwrap();
+    assert_eq!(findings.len(), 1, "{answer:#}");
     assert_eq!(
-        (&said["verdict"], &findings[0]["effect"]),
+        (&answer["verdict"], &findings[0]["effect"]),
         (&"wrong_setup".into(), &"setup".into())
     );
     let sign = "sign: [1, 1, 1, -1, 1, 1]";
     assert!(
         findings[0]["statement"].as_str().unwrap().contains(sign),
-        "{said:#}"
+        "{answer:#}"
     );
     // The line of YAML mends it, and physics is asked.
     let here = folder.path();
@@ -315,13 +315,13 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
     );
     let case = folder.path().join("sealed/recordings/c0001");
     let example = Example::new("case", &[("case", &case.display().to_string())]);
-    let of = example.ingested();
-    let data = of.recording.measurements();
+    let recorded = example.ingested();
+    let data = recorded.recording.measurements();
     let diagnosed = |simulated: Option<Vec<[f64; 3]>>| {
-        let mut of = of.clone();
-        of.recording.simulated = simulated;
-        let made = of.diagnose_by(&example.with("diagnose")).unwrap();
-        let robot = RobotModel::new(of.robot.to_description().unwrap());
+        let mut recorded = recorded.clone();
+        recorded.recording.simulated = simulated;
+        let made = recorded.diagnose_by(&example.with("diagnose")).unwrap();
+        let robot = RobotModel::new(recorded.robot.to_description().unwrap());
         let parameters: Parameters = made.get();
         (
             Named::from_iter(made.named()),
@@ -335,10 +335,10 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
     // Beside a rigid arm in a frame of its own the same is missing.
     let rigid = |row: usize| model.robot.forward(data.q(row)).translation;
     let turned = |p: Vector3<f64>| [p.y + 3.0, -p.x, p.z - 1.0];
-    let (beside, ..) = diagnosed(Some(
+    let (with_neighbour, ..) = diagnosed(Some(
         (0..data.rows()).map(|row| turned(rigid(row))).collect(),
     ));
-    assert_eq!(beside, alone);
+    assert_eq!(with_neighbour, alone);
     // A simulation of the nominal geometry that knows the compliance leaves the errors of geometry alone.
     let specs = model.stack.specs().to_vec();
     for (x, _) in model
@@ -405,9 +405,9 @@ fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
         "  - {id: again, uses: diagnose}\n\n  - uses: validate\n",
     );
     case_with(here, &[]);
-    let told = calib(&format!("diagnose p.yaml --quiet {CASE}"), here);
+    let printed = calib(&format!("diagnose p.yaml --quiet {CASE}"), here);
     let made = [
-        told,
+        printed,
         calib(&format!("diagnose {} --json", newest(here)), here),
     ];
     let runs = std::fs::read_dir(here.join(".calib/runs")).unwrap().count();
@@ -426,30 +426,30 @@ fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
         &format!("run p.yaml --quiet --until geometry --set seed=9 {CASE}"),
         here,
     );
-    let (code, said) = refused(&format!("diagnose {}", newest(here)), here);
-    assert_eq!(code, Some(2), "{said}");
-    has(&said, "never came to its stage `diagnose`");
+    let (code, message) = refused(&format!("diagnose {}", newest(here)), here);
+    assert_eq!(code, Some(2), "{message}");
+    has(&message, "never came to its stage `diagnose`");
     has(
-        &said,
+        &message,
         "calib diagnose p.yaml --set seed=9 --set case=sealed/recordings/c0001",
     );
     assert_eq!(calib("diagnose found --json", here), made[1]);
     case_with(here, &[("  - uses: diagnose\n", "")]);
     calib(&format!("run p.yaml --quiet --until geometry {CASE}"), here);
-    let (code, said) = refused(&format!("diagnose {}", newest(here)), here);
-    assert_eq!(code, Some(2), "{said}");
+    let (code, message) = refused(&format!("diagnose {}", newest(here)), here);
+    assert_eq!(code, Some(2), "{message}");
     has(
-        &said,
+        &message,
         "has no stage `diagnose`: put `- uses: diagnose` after the split of p.yaml",
     );
     case_with(here, &[twice]);
     calib(&format!("run p.yaml --quiet --until again {CASE}"), here);
     let run = newest(here);
     for place in [run.clone(), format!("p.yaml {CASE}")] {
-        let (code, said) = refused(&format!("diagnose {place}"), here);
-        assert_eq!(code, Some(2), "{said}");
+        let (code, message) = refused(&format!("diagnose {place}"), here);
+        assert_eq!(code, Some(2), "{message}");
         has(
-            &said,
+            &message,
             "has several diagnoses; say which with --step: diagnose, again",
         );
     }
@@ -457,11 +457,11 @@ fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
         calib(&format!("diagnose {run}/again --json"), here),
         calib(&format!("diagnose {run} --step again --json"), here)
     );
-    let (code, said) = refused(&format!("diagnose {run} --set seed=2"), here);
+    let (code, message) = refused(&format!("diagnose {run} --set seed=2"), here);
     assert_eq!(
-        (code, said.contains("a finished run cannot be changed")),
+        (code, message.contains("a finished run cannot be changed")),
         (Some(2), true),
-        "{said}"
+        "{message}"
     );
 }
 
@@ -476,7 +476,7 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
         .next()
         .and_then(|head| head.split(',').position(|name| name == "x_mm"))
         .unwrap();
-    let beside = |(row, line): (usize, &str)| match row {
+    let with_more = |(row, line): (usize, &str)| match row {
         0 => format!("{line},sx,sy,sz\n"),
         _ => {
             let cells: Vec<&str> = line.split(',').collect();
@@ -489,7 +489,7 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
     };
     std::fs::write(
         &file,
-        text.lines().enumerate().map(beside).collect::<String>(),
+        text.lines().enumerate().map(with_more).collect::<String>(),
     )
     .unwrap();
     let z = "            z: {column: z_mm, unit: mm}\n";
@@ -507,10 +507,10 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
         format!("export {run} --format json"),
         format!("export {table} --robot {robot} --format json"),
     ] {
-        let (code, said) = refused(&verb, here);
-        assert_eq!(code, Some(2), "{said}");
+        let (code, printed) = refused(&verb, here);
+        assert_eq!(code, Some(2), "{printed}");
         has(
-            &said,
+            &printed,
             ["correct the simulation of sim_x, sim_y, sim_z", "--step"],
         );
     }
@@ -584,26 +584,26 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     let folder = concealed("base_compliance", "14", "60");
     let here = folder.path();
     case_with(here, &[]);
-    let said = calib(&format!("diagnose p.yaml --quiet {CASE}"), here);
+    let printed = calib(&format!("diagnose p.yaml --quiet {CASE}"), here);
     // The command is printed as it is to be typed.
-    let command = said
+    let command = printed
         .lines()
         .find_map(|line| line.trim_start().strip_prefix("calib "))
         .unwrap();
     assert!(
         command.ends_with("--separate 1 'link_compliance@link 1'"),
-        "{said}"
+        "{printed}"
     );
-    let told: Value =
+    let answer: Value =
         serde_json::from_str(&calib(&format!("{command} --count 50 --json"), here)).unwrap();
     let number = |value: &Value| value.as_f64().unwrap();
-    let sides = told["separation"].as_array().unwrap();
+    let sides = answer["separation"].as_array().unwrap();
     assert_eq!(sides[0]["if"], "base_compliance at base");
     for side in sides {
         assert!(
             number(&side["proposed"]) > 25.0
                 && number(&side["proposed"]) > number(&side["recorded"]),
-            "{told:#}"
+            "{answer:#}"
         );
     }
     // Measured: recordings without noise, made by the diagnosed model at these poses, and the rival fitted to them with all else.
@@ -619,15 +619,15 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     let rows: Vec<usize> = (0..data.rows())
         .filter(|row| !prediction.0[*row].held_out && !prediction.0[*row].suspect)
         .collect();
-    let form = told["rival"]["form"].to_string();
+    let form = answer["rival"]["form"].to_string();
     let parsed: Form = serde_json::from_str(&form).unwrap();
     let mut table = parameters.clone();
-    let own = table
+    let own_value = table
         .0
         .iter()
         .position(|row| row.effect == "base_compliance")
         .unwrap();
-    let row = table.0.remove(own);
+    let row = table.0.remove(own_value);
     table.0.retain(|row| row.effect != "base_compliance");
     for spec in parsed.parameters(&RobotModel::new(robot.clone())) {
         let more = ParameterRow {
@@ -654,14 +654,14 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     let free: Vec<usize> = (0..other.x.len())
         .filter(|k| estimated(&other.stack.specs()[*k].name))
         .collect();
-    let sigma = number(&told["sigma_mm"]) * 1e-3;
+    let sigma = number(&answer["sigma_mm"]) * 1e-3;
     let measured =
         |more: &Measurements| left(&truth, &other, &free, &joined(&data, &rows, more, sigma));
     let mut proposed = Measurements {
         joints: 6,
         ..Measurements::default()
     };
-    for pose in told["poses"].as_array().unwrap() {
+    for pose in answer["poses"].as_array().unwrap() {
         proposed
             .q
             .extend((1..=6).map(|joint| number(&pose[format!("q{joint}_deg")]).to_radians()));
@@ -711,7 +711,7 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     );
     assert!(
         (ours / number(&sides[0]["proposed"]) - 1.0).abs() < 0.2,
-        "{ours:.1}: {told:#}"
+        "{ours:.1}: {answer:#}"
     );
 }
 
@@ -721,15 +721,15 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
     let here = folder.path();
     case_with(here, &[]);
     let found = |here: &Path| -> Value {
-        let said = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), here);
-        serde_json::from_str(&said).unwrap()
+        let printed = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), here);
+        serde_json::from_str(&printed).unwrap()
     };
     // A balancer at a joint of unknown stiffness is a gear error of order 1.
     assert_eq!(
         found(here)["findings"][0]["rivals"][0]["effect"],
         "counterbalance"
     );
-    let said = calib(
+    let printed = calib(
         &format!(
             "poses --run {} --separate gear_cyclic counterbalance@j4",
             newest(here)
@@ -737,10 +737,10 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
         here,
     );
     has(
-        &said,
+        &printed,
         "no pose separates gear_cyclic at joint 4 from counterbalance at joint 4",
     );
-    has(&said, "instead: log motor currents at rest");
+    has(&printed, "instead: log motor currents at rest");
     let folder = concealed("zero_shift", "9", "60");
     let here = folder.path();
     case_with(here, &[]);
@@ -749,12 +749,12 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
         found(here)["findings"][0]["rivals"][0]["effect"],
         "base_shift"
     );
-    let said = calib(&format!("poses --run {} --separate", newest(here)), here);
+    let printed = calib(&format!("poses --run {} --separate", newest(here)), here);
     has(
-        &said,
+        &printed,
         "base_shift at base can imitate zero_shift at joint 1 completely",
     );
-    has(&said, "instead: return to a few anchor poses");
+    has(&printed, "instead: return to a few anchor poses");
     for (names, wanted) in [
         ("9", "`9` matches no finding of run"),
         ("'zero_shift@joint 7'", "matches no finding of run"),
@@ -765,11 +765,15 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
         ),
         ("1 gear_cyclic", "say where, e.g. 'gear_cyclic@"),
     ] {
-        let (code, said) = refused(
+        let (code, printed) = refused(
             &format!("poses --run {} --separate {names}", newest(here)),
             here,
         );
-        assert_eq!((code, said.contains(wanted)), (Some(2), true), "{said}");
+        assert_eq!(
+            (code, printed.contains(wanted)),
+            (Some(2), true),
+            "{printed}"
+        );
     }
 }
 
@@ -782,12 +786,12 @@ fn of_few_rows_no_law_takes_a_size_that_no_gear_has() {
         "case={}/tests/it/diagnose/few_rows",
         env!("CARGO_MANIFEST_DIR")
     );
-    let said = calib(
+    let printed = calib(
         &format!("diagnose p.yaml --set {rows} --json --quiet"),
         folder.path(),
     );
-    let said: Value = serde_json::from_str(&said).unwrap();
-    let findings = said["findings"]
+    let answer: Value = serde_json::from_str(&printed).unwrap();
+    let findings = answer["findings"]
         .as_array()
         .unwrap()
         .iter()
@@ -799,7 +803,7 @@ fn of_few_rows_no_law_takes_a_size_that_no_gear_has() {
     let of_loads = |name: &String| {
         ["\"joint_compliance", "\"link_mass"]
             .iter()
-            .any(|own| name.starts_with(own))
+            .any(|ours| name.starts_with(ours))
     };
     assert!(
         soft(2) && soft(3) && names.iter().all(of_loads),
@@ -807,10 +811,10 @@ fn of_few_rows_no_law_takes_a_size_that_no_gear_has() {
     );
     // The instrument's noise is 0.017 mm.
     assert!(
-        said["after"]["validate_rms_mm"]
+        answer["after"]["validate_rms_mm"]
             .as_f64()
             .is_some_and(|rms| rms < 0.03),
         "{}",
-        said["after"]
+        answer["after"]
     );
 }

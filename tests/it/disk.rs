@@ -39,8 +39,8 @@ fn a_full_disk_is_said_so_and_loses_nothing() {
             "{blocks} blocks: {}",
             text(&full.stderr)
         );
-        let said = text(&full.stderr);
-        has(&said, ["free some space there", "--store DIR"]);
+        let printed = text(&full.stderr);
+        has(&printed, ["free some space there", "--store DIR"]);
         let failure: serde_json::Value = serde_json::from_slice(&full.stdout).unwrap();
         assert_eq!(
             (&failure["status"], &failure["exit_code"]),
@@ -76,9 +76,9 @@ fn a_read_only_place_for_the_store_is_said_so() {
         .output()
         .unwrap();
     assert_eq!(refused.status.code(), Some(75));
-    let said = text(&refused.stderr);
+    let printed = text(&refused.stderr);
     has(
-        &said,
+        &printed,
         [
             "/sys/calib-store: cannot make the folder",
             "choose another with --store DIR",

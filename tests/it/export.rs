@@ -8,9 +8,9 @@ use serde_json::Value;
 
 fn exported(format: &str) -> String {
     let output = calib(cell(), &format!("export latest --format {format} --force"));
-    let said = output.err.clone();
-    assert!(output.code == Some(0), "{said}");
-    has(&said, "not carried: reduction_ratio at joint 3");
+    let printed = output.err.clone();
+    assert!(output.code == Some(0), "{printed}");
+    has(&printed, "not carried: reduction_ratio at joint 3");
     output.out
 }
 
@@ -41,14 +41,14 @@ fn by_json(model: &Value, q: &[f64]) -> [f64; 3] {
 fn tables_and_urdf_are_the_arm_that_was_identified() {
     let model: Value = serde_json::from_str(&exported("json")).unwrap();
     let urdf = exported("urdf");
-    let beside = "calib_robot: 1\nname: u\nunits: {length: mm, angle: deg}\nkinematics:\n  urdf: {base: base_link, tip: tool0}\n";
+    let urdf_units = "calib_robot: 1\nname: u\nunits: {length: mm, angle: deg}\nkinematics:\n  urdf: {base: base_link, tip: tool0}\n";
     let label = |text| RobotFileText {
         label: "robot.yaml",
         text,
     };
     let robots = [
         read_calib(
-            label(beside),
+            label(urdf_units),
             Some(RobotFileText {
                 label: "arm.urdf",
                 text: &urdf,
@@ -95,11 +95,11 @@ fn an_sdf_is_the_arm_that_was_identified_and_states_no_limit_that_is_not_known()
     };
     let joints: Vec<roxmltree::Node> = document.descendants().filter(moving).collect();
     let mut point = [0.0; 3];
-    for (joint, told) in joints.iter().zip(model["joints"].as_array().unwrap()) {
+    for (joint, answer) in joints.iter().zip(model["joints"].as_array().unwrap()) {
         point = [0, 1, 2].map(|k| point[k] + child(*joint, "pose")[k]);
         for k in 0..3 {
-            assert!((point[k] - told["point_m"][k].as_f64().unwrap()).abs() < 1e-12);
-            assert_eq!(child(*joint, "xyz")[k], told["axis"][k].as_f64().unwrap());
+            assert!((point[k] - answer["point_m"][k].as_f64().unwrap()).abs() < 1e-12);
+            assert_eq!(child(*joint, "xyz")[k], answer["axis"][k].as_f64().unwrap());
         }
     }
     let tool = document
@@ -136,10 +136,10 @@ fn a_file_says_whose_it_is_and_whether_it_was_edited() {
     };
     for format in ["urdf", "dh", "mdh", "json", "mjcf", "sdf", "controller"] {
         let text = exported(format);
-        let (code, said) = held(format, &text);
+        let (code, printed) = held(format, &text);
         assert!(
-            code == Some(0) && said.contains(": is the export of run"),
-            "{format}: {said}"
+            code == Some(0) && printed.contains(": is the export of run"),
+            "{format}: {printed}"
         );
         // One digit of one number.
         let at = text.rfind("0.").unwrap() + 2;
@@ -149,11 +149,11 @@ fn a_file_says_whose_it_is_and_whether_it_was_edited() {
             "7"
         };
         let edited = format!("{}{digit}{}", &text[..at], &text[at + 1..]);
-        let (code, said) = held(format, &edited);
+        let (code, printed) = held(format, &edited);
         let line = text[..at].lines().count();
         assert!(
-            code == Some(1) && said.contains(&format!("line {line} is not as run")),
-            "{format}: {said}"
+            code == Some(1) && printed.contains(&format!("line {line} is not as run")),
+            "{format}: {printed}"
         );
     }
     let text = exported("urdf");
@@ -162,23 +162,23 @@ fn a_file_says_whose_it_is_and_whether_it_was_edited() {
         "{start}, model 0123456789abcdef{}",
         &text[start.len() + 8 + 16..]
     );
-    let (code, said) = held("other", &other);
+    let (code, printed) = held("other", &other);
     assert!(
-        code == Some(1) && said.contains("is of the model 0123456789abcdef; that of run"),
-        "{said}"
+        code == Some(1) && printed.contains("is of the model 0123456789abcdef; that of run"),
+        "{printed}"
     );
-    let (code, said) = held(
+    let (code, printed) = held(
         "other",
         &text.replace("robot serial not stated", "robot serial 77"),
     );
     assert!(
-        code == Some(1) && said.contains("is of the robot with serial 77; that of run"),
-        "{said}"
+        code == Some(1) && printed.contains("is of the robot with serial 77; that of run"),
+        "{printed}"
     );
-    let (code, said) = held("none", "<robot/>");
+    let (code, printed) = held("none", "<robot/>");
     assert!(
-        code == Some(10) && said.contains("carries no mark of calib"),
-        "{said}"
+        code == Some(10) && printed.contains("carries no mark of calib"),
+        "{printed}"
     );
 }
 
@@ -329,7 +329,7 @@ fn by_mjcf(text: &str, q: &[f64]) -> ([f64; 3], Turn) {
     assert_eq!(joints.next(), None, "a joint for every angle");
     let site = document.get_node(child(body, "site").unwrap()).unwrap();
     let [w, x, y, z] = numbers(site, "quat");
-    let own = [
+    let ours = [
         [
             w * w + x * x - y * y - z * z,
             2.0 * (x * y - w * z),
@@ -347,7 +347,7 @@ fn by_mjcf(text: &str, q: &[f64]) -> ([f64; 3], Turn) {
         ],
     ];
     let step = turned(turn, numbers(site, "pos"));
-    ([0, 1, 2].map(|k| place[k] + step[k]), product(turn, own))
+    ([0, 1, 2].map(|k| place[k] + step[k]), product(turn, ours))
 }
 
 #[test]
@@ -454,8 +454,8 @@ fn without_numbers(text: &str, targets: &[usize]) -> Vec<String> {
 #[test]
 fn programs_differ_in_the_numbers_of_targets_and_nothing_else() {
     for (name, text, targets) in [("weld.src", KRL, [2, 3, 4]), ("m.mod", RAPID, [2, 3, 5])] {
-        let (code, corrected, said) = program(name, text);
-        assert_eq!(code, Some(0), "{said}");
+        let (code, corrected, printed) = program(name, text);
+        assert_eq!(code, Some(0), "{printed}");
         assert_ne!(corrected, text);
         // The second line is the mark of what was corrected.
         let mark = corrected.split('\n').nth(1).unwrap();
@@ -476,11 +476,11 @@ fn programs_differ_in_the_numbers_of_targets_and_nothing_else() {
             );
         }
     }
-    let (_, corrected, said) = program("weld.src", KRL);
+    let (_, corrected, printed) = program("weld.src", KRL);
     // The target stands at A1 0 and A6 0, and its correction takes both below: the turns say so, or they would go once round.
     has(&corrected, [",E1 0.0}", ",S 2,T 37,"]);
     has(
-        &said,
+        &printed,
         "posture S 2, T 37 of the corrected joints, was S 2, T 4",
     );
 }
@@ -488,10 +488,10 @@ fn programs_differ_in_the_numbers_of_targets_and_nothing_else() {
 #[test]
 fn malformed_programs_are_refused_with_line_and_column() {
     let refused = |name: &str, text: &str, wanted: &[&str]| {
-        let (code, out, said) = program(name, text);
+        let (code, out, printed) = program(name, text);
         assert_eq!((code, out.as_str()), (Some(10), ""));
         for part in wanted {
-            has(&said, part);
+            has(&printed, part);
         }
     };
     let krl = "DEF x()\n PTP {A1 10,A2 foo,A3 -30,A4 5,A5 40,A6 0}\nPTP {A1 10,A2 3\nLIN {E6POS: X 1,Y 2}\n";

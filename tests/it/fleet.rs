@@ -33,20 +33,20 @@ fn fleet(verb: &str, file: &Path, store: &Path) -> Command {
 
 fn output(command: &mut Command) -> (Output, String) {
     let output = command.output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    (output, said)
+    let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output, printed)
 }
 
 /// The document of a run that ends with a code.
 fn run(file: &Path, store: &Path, code: i32) -> Value {
-    let (output, said) = output(fleet("run", file, store).args(["--json", "--quiet"]));
-    assert_eq!(output.status.code(), Some(code), "{said}");
+    let (output, printed) = output(fleet("run", file, store).args(["--json", "--quiet"]));
+    assert_eq!(output.status.code(), Some(code), "{printed}");
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
 /// Recordings of different robots: `DIR/recordings/c0001`.
 fn recordings(folder: &Path, cases: usize) {
-    let (output, said) = output(
+    let (output, printed) = output(
         calib(&[
             "simulate", "conceal", "--points", "40", "--robot", "compact6", "--nulls", "1",
         ])
@@ -57,7 +57,7 @@ fn recordings(folder: &Path, cases: usize) {
             folder.to_str().unwrap(),
         ]),
     );
-    assert!(output.status.success(), "{said}");
+    assert!(output.status.success(), "{printed}");
 }
 
 fn write(path: PathBuf, text: &str) -> PathBuf {
@@ -67,9 +67,9 @@ fn write(path: PathBuf, text: &str) -> PathBuf {
 }
 
 /// A fleet file beside its recordings.
-fn file(folder: &Path, name: &str, rest: &str) -> PathBuf {
+fn file(folder: &Path, name: &str, tail: &str) -> PathBuf {
     let text = format!(
-        "calib: 1\nname: {name}\npipeline: {}\n{rest}",
+        "calib: 1\nname: {name}\npipeline: {}\n{tail}",
         pipeline().display()
     );
     write(folder.join(format!("{name}.yaml")), &text)
@@ -108,8 +108,8 @@ impl Line {
     }
     /// Robots that stand, and those that were computed for it, of a run that ends with a code.
     fn stand(&self, code: i32) -> [Option<u64>; 2] {
-        let told = self.run(code);
-        ["done", "computed"].map(|count| told[count].as_u64())
+        let answer = self.run(code);
+        ["done", "computed"].map(|count| answer[count].as_u64())
     }
 }
 
@@ -144,38 +144,38 @@ fn broken_robots_are_listed_with_their_reasons_and_the_others_finish() {
         "point_id,x_mm\n1,wrong\n",
     );
     std::fs::remove_file(line.recording("c0003").join("robot.json")).unwrap();
-    let (result, said) = output(&mut fleet("run", &line.file, &line.store));
-    assert_eq!(result.status.code(), Some(10), "{said}");
+    let (result, printed) = output(&mut fleet("run", &line.file, &line.store));
+    assert_eq!(result.status.code(), Some(10), "{printed}");
     let faults = [
         "error: 2 faults",
         "c0002: rejected: ",
         "c0003: rejected: ",
         "robot.json",
     ];
-    has(&said, faults);
-    let told = line.run(10);
+    has(&printed, faults);
+    let answer = line.run(10);
     assert_eq!(
         (
-            told["done"].as_u64(),
-            told["rejected"].as_u64(),
-            told["computed"].as_u64()
+            answer["done"].as_u64(),
+            answer["rejected"].as_u64(),
+            answer["computed"].as_u64()
         ),
         (Some(3), Some(2), Some(0))
     );
     assert!(
-        told["robots"][0]["after_rms_mm"].as_f64().unwrap()
-            < told["robots"][0]["before_rms_mm"].as_f64().unwrap()
+        answer["robots"][0]["after_rms_mm"].as_f64().unwrap()
+            < answer["robots"][0]["before_rms_mm"].as_f64().unwrap()
     );
 
     // Mended data are other data: the same command takes them up.
     copy(&line.recording("c0001"), &line.recording("c0003"));
     assert_eq!(line.stand(10), [Some(4), Some(1)]);
     // Asked for, what was rejected is tried again.
-    let (result, said) =
+    let (result, printed) =
         output(fleet("retry", &line.file, &line.store).args(["--failed", "--json", "--quiet"]));
-    assert_eq!(result.status.code(), Some(10), "{said}");
-    let told: Value = serde_json::from_slice(&result.stdout).unwrap();
-    assert_eq!(told["computed"].as_u64(), Some(1));
+    assert_eq!(result.status.code(), Some(10), "{printed}");
+    let answer: Value = serde_json::from_slice(&result.stdout).unwrap();
+    assert_eq!(answer["computed"].as_u64(), Some(1));
     let (result, _) = output(fleet("status", &line.file, &line.store).args(["--robot", "c0002"]));
     let text = String::from_utf8(result.stdout).unwrap();
     starts_with(&text, "c0002: rejected\n");
@@ -192,10 +192,10 @@ fn a_sweep_leaves_what_the_records_of_a_fleet_need() {
     let shorter = before.trim_end().rsplit_once('\n').unwrap().0;
     std::fs::write(&tracker, format!("{shorter}\n")).unwrap();
     assert_eq!(line.run(0)["computed"].as_u64(), Some(1));
-    let (result, said) = output(
+    let (result, printed) = output(
         calib(&["gc", "--keep-runs", "1", "--grace-hours", "0", "--store"]).arg(&line.store),
     );
-    assert!(result.status.success(), "{said}");
+    assert!(result.status.success(), "{printed}");
     std::fs::write(&tracker, before).unwrap();
     assert_eq!(
         line.run(0)["computed"].as_u64(),
@@ -225,8 +225,8 @@ fn a_cancelled_run_stops_and_the_next_goes_on() {
     let line = Line::new(12);
     // One robot that nobody can take, so that the run cannot be over before it is cancelled.
     let alone = line.folder.path().join("alone");
-    let (result, said) = output(fleet("run", &line.file, &alone).args(["--robot", "c0012"]));
-    assert!(result.status.success(), "{said}");
+    let (result, printed) = output(fleet("run", &line.file, &alone).args(["--robot", "c0012"]));
+    assert!(result.status.success(), "{printed}");
     let held = killed::hold(&alone, &line.store, "line", 1);
     let mut command = fleet("run", &line.file, &line.store);
     command
@@ -237,8 +237,8 @@ fn a_cancelled_run_stops_and_the_next_goes_on() {
     held_locks::until(&mut child, || {
         !killed::records(&line.store, "line").is_empty()
     });
-    let (result, said) = output(&mut fleet("cancel", &line.file, &line.store));
-    assert!(result.status.success(), "{said}");
+    let (result, printed) = output(&mut fleet("cancel", &line.file, &line.store));
+    assert!(result.status.success(), "{printed}");
     assert_eq!(child.wait().unwrap().code(), Some(75));
     drop(held);
     let stood = killed::records(&line.store, "line").len();
@@ -252,10 +252,10 @@ fn every_fault_of_a_fleet_file_comes_at_once_with_its_place() {
     let store = folder.path().join("store");
     let text = "calib: 2\nname: a b\npipeline: none.yaml\nrobots:\n  - folder: x\n  - {folders: 'y*', list: z.csv}\npriors: 1\n";
     let path = write(folder.path().join("FLEET.yaml"), text);
-    let (result, said) = output(&mut fleet("run", &path, &store));
+    let (result, printed) = output(&mut fleet("run", &path, &store));
     assert_eq!(result.status.code(), Some(2));
     has(
-        &said,
+        &printed,
         [
             "5:5: robots[0].folder: unknown key; did you mean `folders`?",
             "7:1: priors: unknown key; did you mean `prior`?",
@@ -265,9 +265,9 @@ fn every_fault_of_a_fleet_file_comes_at_once_with_its_place() {
         .replace("folder: x", "list: none.csv")
         .replace("priors: 1\n", "");
     let path = write(folder.path().join("FLEET.yaml"), &text);
-    let (_, said) = output(&mut fleet("run", &path, &store));
+    let (_, printed) = output(&mut fleet("run", &path, &store));
     has(
-        &said,
+        &printed,
         [
             "calib: format 2",
             "expected letters, digits, `-` and `_`",
@@ -279,9 +279,9 @@ fn every_fault_of_a_fleet_file_comes_at_once_with_its_place() {
         "sound",
         "robots:\n  - folders: nothing/*\noverrides:\n  - {robots: [r7]}\n",
     );
-    let (_, said) = output(&mut fleet("run", &file, &store));
+    let (_, printed) = output(&mut fleet("run", &file, &store));
     has(
-        &said,
+        &printed,
         [
             "robots[0].folders: no folder matches",
             "overrides[0].robots[0]: no robot",

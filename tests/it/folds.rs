@@ -145,9 +145,9 @@ fn any_number_of_threads_gives_the_same_folds() {
 
 #[test]
 fn statistics_have_the_folds_of_fitted_rows_and_of_no_others() {
-    let (of, _) = experiment("none", 5);
+    let (recorded, _) = experiment("none", 5);
     let stage: Identify = example("none").with("geometry");
-    let found = of.identify_by(&stage).unwrap();
+    let found = recorded.identify_by(&stage).unwrap();
     let prediction: Prediction = found.get();
     assert!(
         prediction
@@ -240,7 +240,7 @@ fn with_one_fold_a_pose_each_is_predicted_by_a_fit_to_all_others() {
 
 #[test]
 fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
-    let (of, _) = experiment("none", 5);
+    let (recorded, _) = experiment("none", 5);
     let yaml = |folds: &str| serde_json::from_str::<FoldSetting>(folds);
     assert_eq!(yaml("\"n\"").unwrap(), FoldSetting::EachPose);
     assert_eq!(yaml("5").unwrap(), FoldSetting::default());
@@ -254,7 +254,7 @@ fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
             folds,
             ..example("none").with("geometry")
         };
-        let made = of.identify_by(&stage).unwrap();
+        let made = recorded.identify_by(&stage).unwrap();
         let observability: Observability = made.get();
         let value = |quantity: &str| {
             observability

@@ -149,18 +149,18 @@ fn unnamed(survey: &Survey) -> Vec<Hypothesis> {
     let mut out = Vec::new();
     let mut add = |motion, law| out.push(Hypothesis::new(Term::new(&Unknown, motion, law), 1));
     for (motions, others) in [(&motions[..], &inside[..]), (&read[..], &outside[..])] {
-        for (motion, of) in motions.iter().flat_map(|motion| {
+        for (motion, variable) in motions.iter().flat_map(|motion| {
             everywhere
                 .iter()
                 .chain(others)
-                .map(move |of| (*motion, *of))
+                .map(move |variable| (*motion, *variable))
         }) {
             // Wide: what follows a load moves it a little by what it does.
             let (low, high) = (-300.0, 900.0);
             add(
                 motion,
                 Law::new(
-                    of,
+                    variable,
                     Basis::Linear {
                         zero: 0.2,
                         per: 300.0,
@@ -170,7 +170,7 @@ fn unnamed(survey: &Survey) -> Vec<Hypothesis> {
             add(
                 motion,
                 Law::new(
-                    of,
+                    variable,
                     Basis::Cosines {
                         low,
                         high,
@@ -181,7 +181,7 @@ fn unnamed(survey: &Survey) -> Vec<Hypothesis> {
             add(
                 motion,
                 Law::new(
-                    of,
+                    variable,
                     Basis::Series {
                         low,
                         high,
@@ -299,17 +299,17 @@ fn plausible(form: &Form, robot: &RobotModel) -> Vec<f64> {
 fn a_form_without_size_moves_nothing_and_its_partials_are_central_differences() {
     let count = over_all(|survey, hypothesis| {
         let (robot, form) = (survey.robot, &hypothesis.form);
-        let (stack, own) = stack(robot, form, false);
+        let (stack, range) = stack(robot, form, false);
         let without = EffectStack::new(robot, setting().base, {
             let names = ["joint_compliance", "joint_offset"];
             names
                 .map(|name| arm_effect(name, &setting()).unwrap())
                 .into()
         });
-        let none = at(&stack, &own, &vec![0.0; own.len()]);
-        let bare: Vec<f64> = none[..own.start].to_vec();
+        let none = at(&stack, &range, &vec![0.0; range.len()]);
+        let bare: Vec<f64> = none[..range.start].to_vec();
         let values = plausible(form, robot);
-        let x = at(&stack, &own, &values);
+        let x = at(&stack, &range, &values);
         let (mut scratch, mut other) = (stack.scratch(robot), without.scratch(robot));
         for row in LOOKED_AT {
             let nominal = without.point(robot, survey.data, row, &bare, &mut other);
@@ -322,7 +322,7 @@ fn a_form_without_size_moves_nothing_and_its_partials_are_central_differences() 
             stack.derivatives(robot, survey.data, row, &x, &mut scratch, |k, d| {
                 partials[k] += d
             });
-            for (k, value) in own.clone().zip(&values) {
+            for (k, value) in range.clone().zip(&values) {
                 let mut moved = x.clone();
                 moved[k] = x[k] + value;
                 let plus = stack.point(robot, survey.data, row, &moved, &mut scratch);
@@ -349,8 +349,8 @@ fn the_order_of_forms_is_irrelevant() {
         let (robot, form) = (survey.robot, &hypothesis.form);
         let values = plausible(form, robot);
         let ends = [false, true].map(|first| {
-            let (stack, own) = stack(robot, form, first);
-            let x = at(&stack, &own, &values);
+            let (stack, range) = stack(robot, form, first);
+            let x = at(&stack, &range, &values);
             stack.point(
                 robot,
                 survey.data,
@@ -468,7 +468,7 @@ fn without_numbers(sentence: &str) -> String {
 
 #[test]
 fn every_sentence_is_as_it_was_read() {
-    let mut said: BTreeSet<String> = BTreeSet::new();
+    let mut messages: BTreeSet<String> = BTreeSet::new();
     over_all(|survey, hypothesis| {
         let form = &hypothesis.form;
         let numbers = numbers_of(form, survey.robot);
@@ -479,20 +479,20 @@ fn every_sentence_is_as_it_was_read() {
                 parameters: &numbers,
                 clock,
             };
-            said.insert(format!(
+            messages.insert(format!(
                 "{}: {}",
                 form.name(),
                 without_numbers(&form.cause().sentence(&summary))
             ));
         }
     });
-    let said: String = said.into_iter().map(|line| line + "\n").collect();
+    let printed: String = messages.into_iter().map(|line| line + "\n").collect();
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/forms/sentences.txt");
     if std::env::var_os("CALIB_UPDATE").is_some() {
-        std::fs::write(path, &said).unwrap();
+        std::fs::write(path, &printed).unwrap();
     }
     assert!(
-        said == std::fs::read_to_string(path).unwrap(),
+        printed == std::fs::read_to_string(path).unwrap(),
         "CALIB_UPDATE=1 cargo test --test it forms writes {path}; read what is new there"
     );
 }
@@ -515,11 +515,11 @@ fn a_joint_that_slides_errs_at_millimetres_and_has_no_turns() {
         let all = unnamed(&survey)
             .into_iter()
             .map(|hypothesis| hypothesis.form);
-        let mut own = all.filter(move |form| {
+        let mut proposals = all.filter(move |form| {
             form.term()
                 .is_some_and(|term| term.motion() == Motion::Joint { joint })
         });
-        own.all(|form| {
+        proposals.all(|form| {
             form.parameters(&robot)
                 .iter()
                 .all(|spec| spec.unit == Unit::Millimetre)

@@ -109,11 +109,11 @@ impl Cell {
             }
             .predict(data)
         };
-        let (own, beside) = (self.truth.predict(data), [moved(0), moved(1), moved(2)]);
+        let (unmoved, shifted) = (self.truth.predict(data), [moved(0), moved(1), moved(2)]);
         (0..data.rows())
             .map(|row| {
                 Matrix3::from_columns(
-                    &[0, 1, 2].map(|axis: usize| (beside[axis][row] - own[row]) / 0.5),
+                    &[0, 1, 2].map(|axis: usize| (shifted[axis][row] - unmoved[row]) / 0.5),
                 )
             })
             .collect()
@@ -143,10 +143,11 @@ impl Cell {
 
     /// Adds measured distances from anchors in turn (m, tracker frame), with a sigma.
     fn reach(&self, data: &mut Measurements, anchors: &[(&str, Vector3<f64>)], sigma: f64) {
-        let own = self.truth.predict(data);
+        let unmoved = self.truth.predict(data);
         let rows = 0..data.rows();
         let length = |row: usize| {
-            (own[row] - anchors[row % anchors.len()].1).norm() + sigma * self.noise(900_000 + row)
+            (unmoved[row] - anchors[row % anchors.len()].1).norm()
+                + sigma * self.noise(900_000 + row)
         };
         data.readings.push(Readings {
             kind: "distance",

@@ -361,7 +361,7 @@ fn the_ur10_recordings_are_read_to_the_last_row() {
                 .sigma_source
                 .iter()
                 .flatten()
-                .filter(|own| **own == source)
+                .filter(|ours| **ours == source)
                 .count() as i64
                 > rows - 5
         );

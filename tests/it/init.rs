@@ -24,9 +24,9 @@ fn what_init_writes_is_understood_and_never_overwrites() {
     put(folder.path(), "tracker.csv", tracker);
     let arguments = "init . --data controller.csv tracker.csv";
     let output = calib(folder.path(), arguments);
-    let said = output.out.clone();
+    let printed = output.out.clone();
     assert!(output.code == Some(0), "{}", output.err);
-    has(&said, ["6 joints (A1 to A6)", "not used: remark"]);
+    has(&printed, ["6 joints (A1 to A6)", "not used: remark"]);
     let pipeline = read(folder.path().join("pipeline.yaml"));
     for part in [
         "file: \"controller.csv\"",
@@ -79,8 +79,8 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
         assert!(pipeline.contains(part), "{part} in\n{pipeline}");
     }
     let check = calib(folder.path(), "check pipeline.yaml").code(0);
-    let said = check.out.clone();
-    has(&said, ["replace   5 lines: ", "          robot.yaml:"]);
+    let printed = check.out.clone();
+    has(&printed, ["replace   5 lines: ", "          robot.yaml:"]);
     let identified = pipeline
         .replace("# limits:", "limits:")
         .replace("# identity:", "identity:");
@@ -89,9 +89,9 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
 
     put(folder.path(), "bare.csv", "a;b;c;d\n1;2;3;4\n");
     let output = calib(folder.path(), "init bare --data bare.csv");
-    let said = output.out.clone();
+    let printed = output.out.clone();
     has(
-        &said,
+        &printed,
         "name columns of joints and the measured point where it says REPLACE",
     );
     let check = calib(folder.path(), "check bare/pipeline.yaml");

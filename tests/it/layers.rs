@@ -153,14 +153,14 @@ fn stages_do_not_use_each_other() {
         .collect();
     let mut faults = Vec::new();
     for source in sources() {
-        let ["stage", own, ..] = source.module.iter().map(String::as_str).collect::<Vec<_>>()[..]
+        let ["stage", stage, ..] = source.module.iter().map(String::as_str).collect::<Vec<_>>()[..]
         else {
             continue;
         };
         for one in &source.uses {
             let (module, item) = leads_to(&one.path);
             let other = item.trim_start_matches("stage::");
-            if module == "stage" && other != own && names.iter().any(|name| name == other) {
+            if module == "stage" && other != stage && names.iter().any(|name| name == other) {
                 faults.push(format!("{}:{}: uses {item}", source.file, one.line));
             }
         }

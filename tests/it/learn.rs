@@ -99,9 +99,9 @@ fn quick() -> Value {
 fn on_the_twin_the_network_leaves_about_what_the_paper_s_leaves() {
     let mut ratios: Vec<f64> = (1..=3)
         .map(|seed| {
-            let (of, _) = experiment("all", seed);
-            let (_, prediction) = papers_sequence(&of);
-            let before = (of.recording, of.split, prediction);
+            let (recorded, _) = experiment("all", seed);
+            let (_, prediction) = papers_sequence(&recorded);
+            let before = (recorded.recording, recorded.split, prediction);
             let after = learn(
                 json!({"on": ["learn"], "rivals": ["mlp"], "starts": ["bso"], "hidden": 12, "generations": 20, "ensemble": 3}),
                 &before,

@@ -102,14 +102,14 @@ fn missing_physics_is_named_from_arrays() {
         notes: Vec::new(),
     };
     let found = diagnose::missing_physics(&robot, &recording).unwrap();
-    let said = found.summary.document("");
-    let finding = &said["findings"][0];
+    let answer = found.summary.document("");
+    let finding = &answer["findings"][0];
     assert_eq!(
         (
-            &said["verdict"],
+            &answer["verdict"],
             &finding["effect"],
             &finding["where"],
-            said["findings"].as_array().map(Vec::len)
+            answer["findings"].as_array().map(Vec::len)
         ),
         (
             &json!("explained"),
@@ -117,7 +117,7 @@ fn missing_physics_is_named_from_arrays() {
             &json!("joint 3"),
             Some(1)
         ),
-        "{said}"
+        "{answer}"
     );
     let statement = finding["statement"].as_str().unwrap_or_default();
     has(statement, "5 times a turn by 21 arcsec");

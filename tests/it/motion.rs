@@ -44,18 +44,18 @@ impl Case {
 
     /// `more` are lines of `ingest` beyond those of `pipelines/case`.
     fn diagnose(&self, more: &str) -> Value {
-        let own = root("pipelines/case/pipeline.yaml");
-        let text = read(own).replace(
+        let original = root("pipelines/case/pipeline.yaml");
+        let text = read(original).replace(
             "      join: {by: id}\n",
             &format!("      join: {{by: id}}\n{more}"),
         );
         std::fs::write(self.path("pipeline.yaml"), text).unwrap();
         let [pipeline, case, store] =
             ["pipeline.yaml", "case", "store"].map(|name| self.path(name).display().to_string());
-        let said = calib(&format!(
+        let printed = calib(&format!(
             "diagnose {pipeline} --set case={case} --store {store} --json --quiet"
         ));
-        serde_json::from_str(&said).unwrap()
+        serde_json::from_str(&printed).unwrap()
     }
 }
 
@@ -90,9 +90,9 @@ fn clocks_that_are_apart_are_named_with_their_milliseconds() {
         (value - 2.0).abs() < 3.0 * sigma && sigma < 0.05,
         "{value} +- {sigma} ms"
     );
-    let said = found["findings"][0]["statement"].as_str().unwrap();
-    starts_with(said, "the tracker's clock is ");
-    has(said, "ms late relative to the controller's");
+    let printed = found["findings"][0]["statement"].as_str().unwrap();
+    starts_with(printed, "the tracker's clock is ");
+    has(printed, "ms late relative to the controller's");
     assert_eq!(found["verdict"], "explained");
     // Told so, ingest carries the joints there and nothing is left.
     let cured = case.diagnose(&format!("      motion: {{later_s: {}}}\n", 1e-3 * value));
@@ -175,9 +175,10 @@ fn nothing_is_named_on_a_way_though_its_noise_lasts_from_row_to_row() {
 fn what_too_short_a_way_would_hide_is_said() {
     let hidden = |rate: &str| {
         let found = Case::record(&twin(18, "", rate, "")).diagnose("");
-        let said = found["not_observable"].as_array().unwrap().clone();
+        let entries = found["not_observable"].as_array().unwrap().clone();
         let about = |name: &str| {
-            said.iter()
+            entries
+                .iter()
                 .any(|line| line.as_str().is_some_and(|line| line.starts_with(name)))
         };
         (about("joint_log_lag"), about("viscous_windup"))

@@ -13,7 +13,7 @@ fn diagnosed(arguments: &str, folder: &Path) -> Value {
 }
 
 /// Findings as `effect at place`.
-fn found(said: &Value) -> Vec<String> {
+fn found(answer: &Value) -> Vec<String> {
     let one = |finding: &Value| {
         format!(
             "{} at {}",
@@ -21,7 +21,7 @@ fn found(said: &Value) -> Vec<String> {
             finding["where"].as_str().unwrap()
         )
     };
-    said["findings"]
+    answer["findings"]
         .as_array()
         .unwrap()
         .iter()
@@ -77,18 +77,18 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
     assert_eq!(bumps.len(), 3, "{bumps:?}");
     let case = |name: &str| format!("case=sealed/recordings/{name}");
     for (name, place) in &bumps {
-        let said = diagnosed(
+        let answer = diagnosed(
             &format!("diagnose p.yaml --json --quiet --set {}", case(name)),
             here,
         );
         assert_eq!(
-            found(&said),
+            found(&answer),
             [format!("worn_tooth at {place}")],
-            "{name}: {said:#}"
+            "{name}: {answer:#}"
         );
-        let statement = said["findings"][0]["statement"].as_str().unwrap();
+        let statement = answer["findings"][0]["statement"].as_str().unwrap();
         starts_with(statement, &format!("a tooth of {place} is worn near "));
-        assert_eq!(said["findings"][0]["parameters"][0]["unit"], "arcsec");
+        assert_eq!(answer["findings"][0]["parameters"][0]["unit"], "arcsec");
     }
 
     // From the store, and without the file.
@@ -147,12 +147,12 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
     pipeline(here, "");
     let bumps = bumps(here);
     let case = |name: &str| format!("case=sealed/recordings/{name}");
-    let said = diagnosed(
+    let answer = diagnosed(
         &format!("diagnose p.yaml --json --quiet --set {}", case(&bumps[2].0)),
         here,
     );
-    let finding = &said["findings"][0];
-    assert_eq!(finding["where"], bumps[2].1.as_str(), "{said:#}");
+    let finding = &answer["findings"][0];
+    assert_eq!(finding["where"], bumps[2].1.as_str(), "{answer:#}");
     let forms = finding["forms"].as_array().unwrap();
     assert!((1..=3).contains(&forms.len()), "{finding:#}");
     let proposed: Vec<&Value> = forms
@@ -167,7 +167,7 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
         "{forms:#?}"
     );
     let number = |name: &str| {
-        let of = |key: &str| {
+        let of_key = |key: &str| {
             let number = proposed["numbers"]
                 .as_array()
                 .unwrap()
@@ -176,7 +176,7 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
                 .expect(name);
             number[key].as_f64().unwrap()
         };
-        [of("value"), of("sigma")]
+        [of_key("value"), of_key("sigma")]
     };
     // The twin's own: -41 deg, 34 deg.
     let truth = read(here.join(format!("sealed/sealed/{}.json", bumps[2].0)));
@@ -213,14 +213,14 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
     put(here, "mine.yaml", text.replace("bump_of_q", "soft_spot"));
     pipeline(here, "mine.yaml");
     for (name, place) in &bumps {
-        let said = diagnosed(
+        let answer = diagnosed(
             &format!("diagnose p.yaml --json --quiet --set {}", case(name)),
             here,
         );
         assert_eq!(
-            found(&said)[0],
+            found(&answer)[0],
             format!("soft_spot at {place}"),
-            "{name}: {said:#}"
+            "{name}: {answer:#}"
         );
     }
 }
@@ -248,10 +248,10 @@ fn a_fleet_finds_an_effect_of_ones_own() {
             robots.concat()
         ),
     );
-    let said: Value =
+    let answer: Value =
         serde_json::from_str(&calib("fleet run f.yaml --json --quiet", here)).unwrap();
-    assert_eq!(said["done"], 3, "{said:#}");
-    for ((name, place), robot) in bumps.iter().zip(said["robots"].as_array().unwrap()) {
+    assert_eq!(answer["done"], 3, "{answer:#}");
+    for ((name, place), robot) in bumps.iter().zip(answer["robots"].as_array().unwrap()) {
         assert!(
             robot
                 .to_string()
@@ -286,10 +286,14 @@ unit: arcsec
         here,
     );
     let truth: Value = serde_json::from_str(&read(here.join("sealed/sealed/c0001.json"))).unwrap();
-    let said = diagnosed(
+    let answer = diagnosed(
         "diagnose p.yaml --json --quiet --set case=sealed/recordings/c0001",
         here,
     );
     let place = truth["want"][0]["where"].as_str().unwrap();
-    assert_eq!(found(&said), [format!("late_zero at {place}")], "{said:#}");
+    assert_eq!(
+        found(&answer),
+        [format!("late_zero at {place}")],
+        "{answer:#}"
+    );
 }

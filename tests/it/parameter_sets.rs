@@ -183,10 +183,11 @@ fn a_prior_and_the_data_meet_where_their_sigmas_say_and_the_data_alone_can_be_to
     let ParameterStatus::Free(sigma) = plain.statuses[k] else {
         panic!("not free")
     };
-    let (mean, own) = (free[k] + 3.0 * sigma, 0.7 * sigma);
-    let (both, fitted) = case.fit(&[(k, about(mean, own))], &[]);
+    let (mean, prior_sigma) = (free[k] + 3.0 * sigma, 0.7 * sigma);
+    let (both, fitted) = case.fit(&[(k, about(mean, prior_sigma))], &[]);
     let weight = |sigma: f64| sigma.powi(-2);
-    let expected = (free[k] * weight(sigma) + mean * weight(own)) / (weight(sigma) + weight(own));
+    let expected = (free[k] * weight(sigma) + mean * weight(prior_sigma))
+        / (weight(sigma) + weight(prior_sigma));
     assert!(
         (both[k] - expected).abs() < 0.02 * sigma,
         "{:e} for {expected:e}",
@@ -195,7 +196,7 @@ fn a_prior_and_the_data_meet_where_their_sigmas_say_and_the_data_alone_can_be_to
     let ParameterStatus::Free(narrow) = fitted.statuses[k] else {
         panic!("not free")
     };
-    assert!((narrow / (weight(sigma) + weight(own)).powf(-0.5) - 1.0).abs() < 0.02);
+    assert!((narrow / (weight(sigma) + weight(prior_sigma)).powf(-0.5) - 1.0).abs() < 0.02);
     let prior_check = fitted.prior_checks[&k];
     let (without, spread) = prior_check.without.unwrap();
     assert!((without - free[k]).abs() < 0.05 * sigma && (spread / sigma - 1.0).abs() < 0.03);
@@ -239,7 +240,7 @@ fn row<'a>(table: &'a Parameters, name: &str) -> &'a ParameterRow {
 
 #[test]
 fn settings_by_name_are_found_again_in_the_table_and_what_matches_nothing_is_said() {
-    let (of, _) = experiment("none", 5);
+    let (recorded, _) = experiment("none", 5);
     let effects = [
         "base_frame",
         "tool_offset",
@@ -252,7 +253,7 @@ fn settings_by_name_are_found_again_in_the_table_and_what_matches_nothing_is_sai
         all.as_object_mut()
             .unwrap()
             .extend(settings.as_object().cloned().unwrap());
-        let made = of.identify(all);
+        let made = recorded.identify(all);
         (made.get::<Parameters>(), made.warnings)
     };
     let free = ["base_frame.*", "tool_offset.*", "reduction_ratio.*"];
@@ -286,14 +287,15 @@ fn settings_by_name_are_found_again_in_the_table_and_what_matches_nothing_is_sai
         "free",
         "the longer pattern counts"
     );
-    let told = row(&parameters, "tool_offset.x");
-    assert!((told.value - 3.0).abs() < 0.5, "in mm: {}", told.value);
+    let answer = row(&parameters, "tool_offset.x");
+    assert!((answer.value - 3.0).abs() < 0.5, "in mm: {}", answer.value);
     assert!(
-        told.remark
+        answer
+            .remark
             .as_deref()
             .is_some_and(|remark| remark.contains("contradict each other")),
         "{:?}",
-        told.remark
+        answer.remark
     );
     has(
         &warnings,

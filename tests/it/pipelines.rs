@@ -113,10 +113,10 @@ fn every_pipeline_is_sound_and_runs_where_its_data_are() {
         );
         let made = store_files(store.path());
         let second = run();
-        let said = String::from_utf8_lossy(&second.stdout);
+        let printed = String::from_utf8_lossy(&second.stdout);
         assert!(
-            second.status.success() && said.contains("nothing to do: "),
-            "{name}:\n{said}"
+            second.status.success() && printed.contains("nothing to do: "),
+            "{name}:\n{printed}"
         );
         assert_eq!(
             store_files(store.path()),

@@ -220,13 +220,13 @@ fn simulated_fits_scatter_as_predicted_and_less_than_with_random_poses() {
         median(scatter(&robot, &random, free, &proposal.score.sigma, 2))
     });
     let theirs = mean.sum::<f64>() / 12.0;
-    let own = median(scattered);
+    let own_value = median(scattered);
     println!(
-        "scatter over predicted sigma: proposed {ours:.3}, median {own:.3}; random poses, median {theirs:.3}"
+        "scatter over predicted sigma: proposed {ours:.3}, median {own_value:.3}; random poses, median {theirs:.3}"
     );
     assert!(
-        own < 0.85 * theirs,
-        "{own:.3}, with random poses {theirs:.3}"
+        own_value < 0.85 * theirs,
+        "{own_value:.3}, with random poses {theirs:.3}"
     );
 }
 

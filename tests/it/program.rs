@@ -14,7 +14,7 @@ use calib::program::{
     Language, Literal, Note, Partial, PostureStatement, Program, SolvedLiteral, TargetKind,
 };
 
-fn told(notes: &[Note]) -> Vec<String> {
+fn message_of(notes: &[Note]) -> Vec<String> {
     notes
         .iter()
         .map(|note| format!("{}:{}: {}", note.line, note.column, note.message))
@@ -24,20 +24,20 @@ fn told(notes: &[Note]) -> Vec<String> {
 /// Targets and warnings of a program that is accepted.
 fn accepted(language: Language, text: &str) -> (Vec<(TargetKind, Vec<f64>)>, Vec<String>) {
     let program = Program::parse(text.as_bytes(), language, Partial::Refused)
-        .unwrap_or_else(|refusal| panic!("{text}\n{:#?}", told(&refusal.faults)));
+        .unwrap_or_else(|refusal| panic!("{text}\n{:#?}", message_of(&refusal.faults)));
     let targets = program
         .literals()
         .iter()
         .map(|literal| (literal.kind, literal.values.clone()))
         .collect();
-    (targets, told(program.warnings()))
+    (targets, message_of(program.warnings()))
 }
 
 /// The faults of a program that is refused.
 fn refused(language: Language, text: &str) -> Vec<String> {
     match Program::parse(text.as_bytes(), language, Partial::Refused) {
         Ok(program) => panic!("accepted: {text}\n{:?}", program.literals()),
-        Err(refusal) => told(&refusal.faults),
+        Err(refusal) => message_of(&refusal.faults),
     }
 }
 
@@ -92,7 +92,7 @@ fn a_program_with_one_target_without_an_answer_is_refused_whole() {
     let refusal = program
         .rewritten(vec![Ok(good), Err("not reached".into())])
         .expect_err("no answer");
-    assert_eq!(told(&refusal.faults), ["2:9: not reached"]);
+    assert_eq!(message_of(&refusal.faults), ["2:9: not reached"]);
 }
 
 #[test]
@@ -114,9 +114,14 @@ fn what_other_readers_may_take_for_the_end_of_a_line_is_refused() {
 
 #[test]
 fn a_language_is_known_by_the_ending_of_a_file() {
-    let of = |ending| Language::of_ending(ending);
+    let of_ending = |ending| Language::of_ending(ending);
     assert_eq!(
-        (of("SRC"), of("dat"), of("Mod"), of("csv")),
+        (
+            of_ending("SRC"),
+            of_ending("dat"),
+            of_ending("Mod"),
+            of_ending("csv")
+        ),
         (
             Some(Language::Krl),
             Some(Language::Krl),
@@ -174,12 +179,12 @@ fn configurations_and_turns_are_read_as_postures() {
         found,
         ["1:27: 0.5 is no quadrant of a joint, expected a whole number"]
     );
-    let of = |status, turn| PostureStatement::StatusTurn { status, turn };
-    let pos = |rest: &str| format!("LIN {{X 1,Y 2,Z 3,A 4,B 5,C 6{rest}}}");
+    let of_status = |status, turn| PostureStatement::StatusTurn { status, turn };
+    let pos = |tail: &str| format!("LIN {{X 1,Y 2,Z 3,A 4,B 5,C 6{tail}}}");
     for (text, bits) in [("T 10", 10), ("T 'B101010'", 42), ("T 'H2A'", 42)] {
         assert_eq!(
             postures(Language::Krl, &pos(&format!(",{text}"))),
-            [of(None, Some(bits))],
+            [of_status(None, Some(bits))],
             "{text}"
         );
     }
@@ -187,10 +192,13 @@ fn configurations_and_turns_are_read_as_postures() {
         postures(Language::Krl, &pos("")),
         [PostureStatement::Unstated]
     );
-    assert_eq!(postures(Language::Krl, &pos(",S 2")), [of(Some(2), None)]);
+    assert_eq!(
+        postures(Language::Krl, &pos(",S 2")),
+        [of_status(Some(2), None)]
+    );
     assert_eq!(
         postures(Language::Krl, &pos(",S 'B110',T 27")),
-        [of(Some(6), Some(27))]
+        [of_status(Some(6), Some(27))]
     );
     for text in ["T -1", "T 1.5", "T 'B12'", "T x"] {
         assert!(

@@ -58,16 +58,16 @@ fn prediction(stage: &str) -> Vec<PredictionRow> {
 
 #[test]
 fn without_sql_tables_are_listed_with_rows_columns_and_units() {
-    let told = ask(&[]);
+    let printed = ask(&[]);
     for line in [
         "  geometry_prediction  80 rows\n",
         "  nominal_prediction   80 rows\n",
         "  simulate_recording  80 rows, also `recording`\n",
         "  mm     Measured minus predicted, x in the tracker frame.\n",
     ] {
-        assert!(told.contains(line), "{line}: {told}");
+        assert!(printed.contains(line), "{line}: {printed}");
     }
-    assert!(!told.contains("also `prediction`"), "{told}");
+    assert!(!printed.contains("also `prediction`"), "{printed}");
     let one = ask(&["geometry.prediction"]);
     assert!(
         one.starts_with("prediction: ")
@@ -97,10 +97,10 @@ fn without_sql_tables_are_listed_with_rows_columns_and_units() {
 
 #[test]
 fn groups_hold_what_the_table_holds_in_the_order_of_its_rows() {
-    let own = prediction("geometry");
+    let ours = prediction("geometry");
     let mut order: Vec<&str> = Vec::new();
     let mut groups: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-    for row in &own {
+    for row in &ours {
         if !order.contains(&row.set.as_str()) {
             order.push(&row.set);
         }
@@ -109,14 +109,15 @@ fn groups_hold_what_the_table_holds_in_the_order_of_its_rows() {
     assert!(groups.len() > 1, "{groups:?}");
     let sql = "SELECT step, \"set\", count(*) AS points, avg(error_mm) AS mean_mm, max(error_mm) AS max_mm \
                FROM geometry.prediction GROUP BY step, \"set\"";
-    let told = rows(sql);
+    let entries = rows(sql);
     assert_eq!(
-        told.iter()
+        entries
+            .iter()
             .map(|row| row["set"].as_str().unwrap())
             .collect::<Vec<_>>(),
         order
     );
-    for row in &told {
+    for row in &entries {
         let errors = &groups[row["set"].as_str().unwrap()];
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;
         assert_eq!(
@@ -130,7 +131,7 @@ fn groups_hold_what_the_table_holds_in_the_order_of_its_rows() {
         );
     }
     // As many groups as rows, which threads would give in any order; the same of what is joined, distinct or left over.
-    let errors: Vec<f64> = own.iter().map(|row| row.error_mm).collect();
+    let errors: Vec<f64> = ours.iter().map(|row| row.error_mm).collect();
     for sql in [
         "SELECT error_mm FROM geometry_prediction GROUP BY error_mm",
         "SELECT DISTINCT error_mm FROM geometry_prediction",
@@ -138,15 +139,15 @@ fn groups_hold_what_the_table_holds_in_the_order_of_its_rows() {
         "SELECT error_mm FROM geometry_prediction EXCEPT SELECT error_mm FROM geometry_prediction WHERE error_mm < 0",
         "SELECT error_mm FROM geometry_prediction WHERE sequence IN (SELECT sequence FROM recording)",
     ] {
-        let told: Vec<f64> = rows(sql)
+        let answer: Vec<f64> = rows(sql)
             .iter()
             .map(|row| row["error_mm"].as_f64().unwrap())
             .collect();
-        assert_eq!(told, errors, "{sql}");
+        assert_eq!(answer, errors, "{sql}");
     }
     let grid = ask(&[sql]);
     assert!(
-        grid.starts_with("step ") && grid.lines().count() == 1 + told.len(),
+        grid.starts_with("step ") && grid.lines().count() == 1 + entries.len(),
         "{grid}"
     );
 }
@@ -158,30 +159,33 @@ fn tables_are_joined_by_their_points_in_the_order_of_the_first() {
         .iter()
         .map(|row| (row.sequence, row.error_mm))
         .collect();
-    let told = rows(
+    let entries = rows(
         "SELECT n.sequence, n.error_mm - g.error_mm AS gain_mm FROM nominal.prediction n \
          JOIN \"geometry/prediction\" AS g ON n.sequence = g.sequence",
     );
-    assert_eq!(told.len(), nominal.len());
-    for (row, own) in told.iter().zip(&nominal) {
-        assert_eq!(row["sequence"], own.sequence);
+    assert_eq!(entries.len(), nominal.len());
+    for (row, ours) in entries.iter().zip(&nominal) {
+        assert_eq!(row["sequence"], ours.sequence);
         assert_eq!(
             row["gain_mm"].as_f64().unwrap(),
-            own.error_mm - after[&own.sequence]
+            ours.error_mm - after[&ours.sequence]
         );
     }
     // Another kind of table, by its short name, and what has no pair.
     let recording: Recording = table("recording");
-    let told = rows(
+    let entries = rows(
         "SELECT recording.sequence FROM recording WHERE sequence NOT IN \
          (SELECT sequence FROM geometry_prediction WHERE error_mm >= 0)",
     );
-    assert_eq!((told.len(), recording.to_frame().unwrap().rows()), (0, 80));
-    let own = rows(
+    assert_eq!(
+        (entries.len(), recording.to_frame().unwrap().rows()),
+        (0, 80)
+    );
+    let ours = rows(
         "SELECT geometry.prediction.step AS s FROM geometry.prediction JOIN recording USING (sequence) LIMIT 3",
     );
     assert_eq!(
-        own.iter()
+        ours.iter()
             .map(|row| row["s"].as_str().unwrap())
             .collect::<Vec<_>>(),
         ["geometry"; 3]
@@ -190,25 +194,25 @@ fn tables_are_joined_by_their_points_in_the_order_of_the_first() {
 
 #[test]
 fn with_window_and_order_are_answered() {
-    let mut own = prediction("geometry");
-    own.sort_by(|a, b| b.error_mm.total_cmp(&a.error_mm));
-    let told = rows(
+    let mut ours = prediction("geometry");
+    ours.sort_by(|a, b| b.error_mm.total_cmp(&a.error_mm));
+    let entries = rows(
         "WITH worst AS (SELECT sequence, error_mm, ROW_NUMBER() OVER (PARTITION BY step ORDER BY error_mm DESC) AS place \
          FROM geometry_prediction) SELECT sequence FROM worst WHERE place <= 3 ORDER BY place",
     );
-    let worst: Vec<i64> = told
+    let worst: Vec<i64> = entries
         .iter()
         .map(|row| row["sequence"].as_i64().unwrap())
         .collect();
     assert_eq!(
         worst,
-        own[..3].iter().map(|row| row.sequence).collect::<Vec<_>>()
+        ours[..3].iter().map(|row| row.sequence).collect::<Vec<_>>()
     );
 }
 
 #[test]
 fn csv_and_json_hold_every_row_to_the_last_digit() {
-    let own = prediction("geometry");
+    let ours = prediction("geometry");
     let sql = "SELECT sequence, point_id, error_mm, turn_rad FROM (SELECT *, NULL AS turn_rad FROM geometry_prediction)";
     let text = ask(&[sql, "--csv"]);
     let mut reader = csv::Reader::from_reader(text.as_bytes());
@@ -217,9 +221,9 @@ fn csv_and_json_hold_every_row_to_the_last_digit() {
         vec!["sequence", "point_id", "error_mm", "turn_rad"]
     );
     let records: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
-    assert_eq!(records.len(), own.len());
+    assert_eq!(records.len(), ours.len());
     let objects = rows(sql);
-    for ((record, object), row) in records.iter().zip(&objects).zip(&own) {
+    for ((record, object), row) in records.iter().zip(&objects).zip(&ours) {
         assert_eq!(
             (record[2].parse::<f64>().unwrap(), &record[3]),
             (row.error_mm, "")
@@ -233,16 +237,16 @@ fn csv_and_json_hold_every_row_to_the_last_digit() {
             (row.error_mm, &Value::Null)
         );
     }
-    assert_eq!(objects.len(), own.len());
+    assert_eq!(objects.len(), ours.len());
 }
 
 #[test]
 fn fifty_rows_are_shown_and_the_others_counted() {
     let sql = "SELECT sequence, error_mm FROM geometry_prediction";
-    let told = ask(&[sql]);
-    assert_eq!(told.lines().count(), 52);
+    let printed = ask(&[sql]);
+    assert_eq!(printed.lines().count(), 52);
     ends_with(
-        &told,
+        &printed,
         "\n30 more rows: --rows N shows N of them, --csv and --json all\n",
     );
     assert_eq!(ask(&[sql, "--rows", "0"]).lines().count(), 81);
@@ -255,37 +259,37 @@ fn fifty_rows_are_shown_and_the_others_counted() {
 
 #[test]
 fn what_is_not_there_is_named_with_what_is() {
-    let told = refused("SELECT * FROM geometry_predicton");
+    let printed = refused("SELECT * FROM geometry_predicton");
     has(
-        &told,
+        &printed,
         "no table `geometry_predicton`; did you mean `geometry_prediction`? Its tables: ",
     );
-    has(&told, ["simulate_recording", "nominal_parameters"]);
-    let told = refused("SELECT eror_mm FROM geometry_prediction");
+    has(&printed, ["simulate_recording", "nominal_parameters"]);
+    let printed = refused("SELECT eror_mm FROM geometry_prediction");
     has(
-        &told,
+        &printed,
         "no column `eror_mm`; did you mean `error_mm`? Columns of geometry_prediction: sequence, ",
     );
-    let told =
+    let printed =
         refused("SELECT g.eror_mm FROM geometry_prediction g JOIN recording USING (sequence)");
     has(
-        &told,
+        &printed,
         [
             "no column `eror_mm`; did you mean `error_mm`?",
             "of recording: ",
         ],
     );
-    let told = refused("SELECT sequence FROM prediction");
+    let printed = refused("SELECT sequence FROM prediction");
     has(
-        &told,
+        &printed,
         "`prediction` is written by several stages; say which: nominal.prediction, geometry.prediction",
     );
-    let told = refused("SELECT step, sum(error_mm FROM geometry_prediction");
-    has(&told, ["SQL: Expected: ", "Line: 1, Column: "]);
-    let told = refused("SELECT step FROM geometry_prediction ORDER BY 0");
+    let printed = refused("SELECT step, sum(error_mm FROM geometry_prediction");
+    has(&printed, ["SQL: Expected: ", "Line: 1, Column: "]);
+    let printed = refused("SELECT step FROM geometry_prediction ORDER BY 0");
     assert!(
-        told.starts_with("error: SQL: ") && told.lines().count() == 1,
-        "{told}"
+        printed.starts_with("error: SQL: ") && printed.lines().count() == 1,
+        "{printed}"
     );
     assert!(refused("recordin").contains("did you mean `recording`?"));
 }
@@ -296,13 +300,13 @@ fn under_json_a_fault_is_a_document_too() {
         STORE.path(),
         &["query", "HEAD", "SELECT * FROM nosuch", "--json"],
     );
-    let said = output.json();
+    let answer = output.json();
     assert_eq!(
-        (output.code, &said["status"], &said["exit_code"]),
+        (output.code, &answer["status"], &answer["exit_code"]),
         (Some(2), &"failed".into(), &2.into())
     );
-    let message = said["faults"][0]["message"].as_str().unwrap();
-    assert!(message.contains("no table `nosuch`"), "{said}");
+    let message = answer["faults"][0]["message"].as_str().unwrap();
+    assert!(message.contains("no table `nosuch`"), "{answer}");
     has(&output.err, message);
 }
 
@@ -313,11 +317,11 @@ fn a_product_of_tables_that_no_memory_holds_is_refused_before_it_is_made() {
         "WITH p AS (SELECT a.sequence FROM recording a CROSS JOIN recording b) SELECT * FROM p x CROSS JOIN p y CROSS JOIN p z",
         "SELECT a.sequence FROM recording a, recording b, (SELECT x.sequence FROM recording x, recording y) c, recording d",
     ] {
-        let told = refused(sql);
+        let printed = refused(sql);
         assert!(
-            told.contains("every row of one table with every row of the other gives")
-                && told.contains("USING"),
-            "{sql}: {told}"
+            printed.contains("every row of one table with every row of the other gives")
+                && printed.contains("USING"),
+            "{sql}: {printed}"
         );
     }
     // 80 rows twice are no harm.
@@ -345,8 +349,8 @@ fn nothing_but_the_tables_of_the_run_is_read_and_nothing_changed() {
     ] {
         assert!(refused(sql).contains("expected one SELECT"), "{sql}");
     }
-    let told = refused("SELECT * FROM read_parquet('other.parquet')");
-    has(&told, "no table `read_parquet`");
+    let printed = refused("SELECT * FROM read_parquet('other.parquet')");
+    has(&printed, "no table `read_parquet`");
     assert_eq!(objects(STORE.path()), before);
     let output = calib(STORE.path(), &["query", "SELECT * FROM recording"]);
     has(&output.code(2).err, "the run comes before the SQL");

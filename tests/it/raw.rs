@@ -83,14 +83,14 @@ fn a_decoder_that_gives_up_is_a_fault_of_the_file() {
         ("run raw.yaml --quiet --store raw_store", 10),
         ("diff damaged.parquet robot.yaml --key q1_rad", 2),
     ] {
-        let told = run(folder, words).code(code).err;
+        let printed = run(folder, words).code(code).err;
         assert!(
-            code == 2 || told.contains("damaged.parquet") && told.contains("gives up"),
-            "{words}: {told}"
+            code == 2 || printed.contains("damaged.parquet") && printed.contains("gives up"),
+            "{words}: {printed}"
         );
         assert!(
-            !told.contains("panicked") && !told.contains("backtrace"),
-            "{words}: {told}"
+            !printed.contains("panicked") && !printed.contains("backtrace"),
+            "{words}: {printed}"
         );
     }
     assert!(!folder.join("raw_out.parquet").exists());

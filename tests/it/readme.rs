@@ -13,7 +13,7 @@ pub fn example(key: &str) -> String {
     let blocks = pages.iter().flat_map(|text| {
         text.split("```yaml\n")
             .skip(1)
-            .filter_map(|rest| rest.split_once("```"))
+            .filter_map(|tail| tail.split_once("```"))
     });
     let found: Vec<&str> = blocks
         .map(|(block, _)| block)

@@ -102,15 +102,21 @@ impl Recorded {
         self.identify_by(&settings(with)).unwrap()
     }
     pub fn identify_by(&self, stage: &Identify) -> Result<Made> {
-        let of = self.clone();
-        tried(stage, identify_reads(of.robot, of.recording, of.split))
+        let recorded = self.clone();
+        tried(
+            stage,
+            identify_reads(recorded.robot, recorded.recording, recorded.split),
+        )
     }
     pub fn diagnose(&self, with: Value) -> Made {
         self.diagnose_by(&settings(with)).unwrap()
     }
     pub fn diagnose_by(&self, stage: &Diagnose) -> Result<Made> {
-        let of = self.clone();
-        tried(stage, diagnose_reads(of.robot, of.recording, of.split))
+        let recorded = self.clone();
+        tried(
+            stage,
+            diagnose_reads(recorded.robot, recorded.recording, recorded.split),
+        )
     }
     /// What becomes of a model that was identified elsewhere, on these sets; and of other recordings and models, by their stages.
     pub fn carry(
@@ -120,12 +126,12 @@ impl Recorded {
         recordings: &[(&str, &Recording)],
         models: &[(&str, Parameters, Prediction)],
     ) -> Made {
-        let of = self.clone();
+        let recorded = self.clone();
         let others = recordings.iter();
         let reads = TransferReads {
-            robot: of.robot,
-            recording: of.recording,
-            split: of.split,
+            robot: recorded.robot,
+            recording: recorded.recording,
+            split: recorded.split,
             parameters: parameters.clone(),
             covariance: None,
             recordings: others
@@ -154,7 +160,7 @@ pub fn labelled<T>(stage: &str, table: T) -> Labelled<T> {
 /// What a twin records, without motor currents and what the tracker says of itself.
 pub fn recording_of(robot: &RobotDescription, shots: &[Shot]) -> Recording {
     let sliding = |joint: &JointDescription| joint.kind == JointKind::Prismatic;
-    let all = |of: fn(&Shot) -> &[f64]| shots.iter().flat_map(of).copied().collect();
+    let all = |value_of: fn(&Shot) -> &[f64]| shots.iter().flat_map(value_of).copied().collect();
     Recording {
         joints: robot.joints.len(),
         prismatic: robot.joints.iter().map(sliding).collect(),
@@ -189,13 +195,19 @@ pub fn rows_of(whole: &Recording, rows: &[usize]) -> Recording {
 }
 
 /// Mean error of some rows, mm.
-pub fn mean_mm(of: &Prediction, is: impl Fn(&PredictionRow) -> bool) -> f64 {
-    let errors = || of.0.iter().filter(|row| is(row)).map(|row| row.error_mm);
+pub fn mean_mm(prediction: &Prediction, is: impl Fn(&PredictionRow) -> bool) -> f64 {
+    let errors = || {
+        prediction
+            .0
+            .iter()
+            .filter(|row| is(row))
+            .map(|row| row.error_mm)
+    };
     errors().sum::<f64>() / errors().count() as f64
 }
 
-pub fn mean_mm_of(of: &Prediction, set: &str) -> f64 {
-    mean_mm(of, |row| row.set == set)
+pub fn mean_mm_of(prediction: &Prediction, set: &str) -> f64 {
+    mean_mm(prediction, |row| row.set == set)
 }
 
 /// A shipped pipeline with its variables put in.

@@ -198,13 +198,13 @@ fn what_a_model_leaves_at_a_pose_is_no_correlated_noise_for_being_measured_three
             Vector3::from_fn(|axis, _| 4.0 * SIGMA * normal(5_000_011 + 3 * (row / 3) + axis));
     }
     let found = diagnosed(&data, 1.0);
-    let said = found.not_observable.join("; ");
+    let printed = found.not_observable.join("; ");
     let names: Vec<&str> = found
         .findings
         .iter()
         .map(|finding| finding.statement.as_str())
         .collect();
-    assert!(!said.contains("correlated"), "{names:?} {said}");
+    assert!(!printed.contains("correlated"), "{names:?} {printed}");
 }
 
 /// Scatter over reported sigma of the ratios of so many robots, and their mean sigma.
@@ -260,7 +260,7 @@ fn known_repeatability_weighs_rows_better_than_one_figure_for_all() {
 
 #[test]
 fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
-    let (of, _) = experiment("none", 5);
+    let (recorded, _) = experiment("none", 5);
     let mut settings = json!({"on": ["unloaded_fit"], "effects": ["base_frame", "tool_offset"], "repeatability": {"arcsec": 4.0}});
     let value = |table: &Observability, quantity: &str| {
         table
@@ -269,22 +269,22 @@ fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
             .find(|row| row.quantity == quantity)
             .map(|row| row.value)
     };
-    let stated = of.identify(settings.clone()).get();
+    let stated = recorded.identify(settings.clone()).get();
     assert!(
         value(&stated, "joint_repeatability_rad")
             .is_some_and(|sigma| (sigma / (4.0 * ARCSEC) - 1.0).abs() < 1e-9)
     );
     assert_eq!(value(&stated, "repeated_poses"), None);
     // Every second of the first hundred rows takes the joints of the one before: fifty poses at rest.
-    let mut of = of;
-    let recording = &mut of.recording;
+    let mut recorded = recorded;
+    let recording = &mut recorded.recording;
     for row in (1..50).step_by(2) {
         let joints = recording.q(row - 1).to_vec();
         recording.q[row * recording.joints..(row + 1) * recording.joints].copy_from_slice(&joints);
         recording.position[row] = recording.position[row - 1].map(|value| value + 3e-6);
     }
     settings["repeatability"] = json!("measured");
-    let made = of.identify(settings);
+    let made = recorded.identify(settings);
     let (measured, notes): (Observability, _) = (made.get(), &made.notes);
     assert_eq!(value(&measured, "repeated_poses"), Some(25.0));
     assert_eq!(value(&measured, "clusters"), Some(25.0));

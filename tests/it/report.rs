@@ -205,7 +205,7 @@ fn a_report_stands_alone_and_its_pictures_are_sound() {
     for command in page
         .split("<code>calib ")
         .skip(1)
-        .filter_map(|rest| rest.split([' ', '<']).next())
+        .filter_map(|tail| tail.split([' ', '<']).next())
     {
         assert!(
             ["run", "check", "schema"].contains(&command),
@@ -333,7 +333,7 @@ fn reference_figures_stand_beside_ours_only_where_there_are_any() {
     let table = page
         .split("Compared with reference figures")
         .nth(1)
-        .and_then(|rest| rest.split("</table>").next())
+        .and_then(|tail| tail.split("</table>").next())
         .expect("a table");
     assert!(
         table.contains("Table 9 &lt;paper&gt;") && table.contains("held out"),
@@ -352,7 +352,7 @@ fn rivals_of_a_correction_stand_with_their_errors_and_why_they_were_not_kept() {
     let section = page
         .split("id=\"corrections\"")
         .nth(1)
-        .and_then(|rest| rest.split("</section>").next())
+        .and_then(|tail| tail.split("</section>").next())
         .expect("a section");
     assert!(
         section.contains("the mean error falls from 0.810 to 0.550 mm on rows that it did not see"),
@@ -457,9 +457,9 @@ fn one_point_without_error_still_draws() {
 
 #[test]
 fn the_certificate_is_green_only_where_the_error_is_explained_and_within_the_limits() {
-    let card = |said: &str, mean_mm: Option<f64>| {
+    let card = |printed: &str, mean_mm: Option<f64>| {
         let mut reads = tables("Heavy 6R, cell 4");
-        reads.verdict[0].table.0[0].verdict = said.into();
+        reads.verdict[0].table.0[0].verdict = printed.into();
         let limits = calib::stage::Accepted {
             mean_mm,
             ..Default::default()
@@ -486,7 +486,7 @@ fn the_certificate_is_green_only_where_the_error_is_explained_and_within_the_lim
         // What is not explained is not called accepted.
         assert_eq!(
             page.contains("Accepted: within"),
-            ["explained", "nothing_missing"].contains(&said) && mean_mm == Some(100.0)
+            ["explained", "nothing_missing"].contains(&printed) && mean_mm == Some(100.0)
         );
         card.trim_end_matches(['"', ' ']).to_string()
     };

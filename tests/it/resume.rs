@@ -246,6 +246,6 @@ fn the_log_counts_the_stages_that_a_killed_run_finished() {
         .arg(store)
         .output()
         .unwrap();
-    let said = String::from_utf8_lossy(&log.stdout).into_owned();
-    has(&said, "running or killed, 3 run, 0 cached");
+    let printed = String::from_utf8_lossy(&log.stdout).into_owned();
+    has(&printed, "running or killed, 3 run, 0 cached");
 }

@@ -373,14 +373,14 @@ fn a_number_that_no_robot_has_is_refused_at_its_place() {
     );
     let case =
         r#"{"axes": [[0, 0, 1]], "points": [[0, 0, 1e308]], "tool": [0, 0, 0], "mass": [1e9]}"#;
-    let told = read_case(RobotFileText {
+    let printed = read_case(RobotFileText {
         label: "robot.json",
         text: case,
     })
     .unwrap_err()
     .to_string();
     assert_eq!(
-        told.lines().collect::<Vec<_>>(),
+        printed.lines().collect::<Vec<_>>(),
         [
             "robot.json:1:41: points[0][2]: 1e305 m is more than 1000 m; is it in another unit?",
             "robot.json:1:78: mass[0]: 1e9 kg is more than 1e6 kg; is it in another unit?"

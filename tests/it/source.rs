@@ -150,14 +150,14 @@ fn code(text: &str) -> Vec<(usize, &str)> {
     let mut kept = Vec::new();
     let mut lines = (1..).zip(text.lines());
     while let Some((number, line)) = lines.next() {
-        let own = line.trim_start();
-        if own.starts_with("#[cfg(test)]") {
-            let end = format!("{}}}", &line[..line.len() - own.len()]);
+        let ours = line.trim_start();
+        if ours.starts_with("#[cfg(test)]") {
+            let end = format!("{}}}", &line[..line.len() - ours.len()]);
             if !lines.next().is_some_and(|(_, item)| item.ends_with(';')) {
                 lines.by_ref().find(|(_, line)| *line == end);
             }
-        } else if !own.starts_with("//") {
-            kept.push((number, own.split(" // ").next().unwrap_or(own)));
+        } else if !ours.starts_with("//") {
+            kept.push((number, ours.split(" // ").next().unwrap_or(ours)));
         }
     }
     kept
@@ -166,21 +166,21 @@ fn code(text: &str) -> Vec<(usize, &str)> {
 /// A path from the root of the crate; none for one into another crate.
 fn absolute(path: &[String], module: &[String], modules: &[Vec<String>]) -> Option<Vec<String>> {
     let mut base = module.to_vec();
-    let mut rest = path;
-    match rest.first()?.as_str() {
+    let mut remainder = path;
+    match remainder.first()?.as_str() {
         "crate" if module.first().is_some_and(|first| first == "twin") => {
             base.truncate(1);
-            rest = &rest[1..];
+            remainder = &remainder[1..];
         }
         "crate" | "calib" | "calib_foundation" | "calib_numerics" => {
             base.clear();
-            rest = &rest[1..];
+            remainder = &remainder[1..];
         }
         package @ ("calib_diagnose" | "calib_dynamics" | "calib_twin") => {
             base = vec![package.trim_start_matches("calib_").into()];
-            rest = &rest[1..];
+            remainder = &remainder[1..];
         }
-        "self" => rest = &rest[1..],
+        "self" => remainder = &remainder[1..],
         "super" => {}
         first => {
             // A module that is declared here.
@@ -188,14 +188,14 @@ fn absolute(path: &[String], module: &[String], modules: &[Vec<String>]) -> Opti
             if !modules.contains(&base) {
                 return None;
             }
-            rest = &rest[1..];
+            remainder = &remainder[1..];
         }
     }
-    while rest.first().is_some_and(|part| part == "super") {
+    while remainder.first().is_some_and(|part| part == "super") {
         base.pop();
-        rest = &rest[1..];
+        remainder = &remainder[1..];
     }
-    base.extend(rest.iter().cloned());
+    base.extend(remainder.iter().cloned());
     Some(base)
 }
 

@@ -14,19 +14,20 @@ pub fn experiment(remainder: &str, seed: u64) -> (Recorded, Truth) {
     example(remainder).simulated(json!({"seed": seed}))
 }
 
-fn identified(of: &Recorded, id: &str, remainder: &str) -> Made {
-    of.identify_by(&example(remainder).with::<Identify>(id))
+fn identified(recorded: &Recorded, id: &str, remainder: &str) -> Made {
+    recorded
+        .identify_by(&example(remainder).with::<Identify>(id))
         .unwrap()
 }
 
 /// What the paper's second step makes of its first one.
-fn stiffness(of: &Recorded, geometry: &Made) -> Prediction {
+fn stiffness(recorded: &Recorded, geometry: &Made) -> Prediction {
     let stage: Stiffness = example("all").with("stiffness");
-    let of = of.clone();
+    let recorded = recorded.clone();
     let reads = StiffnessReads {
-        robot: of.robot,
-        recording: of.recording,
-        split: of.split,
+        robot: recorded.robot,
+        recording: recorded.recording,
+        split: recorded.split,
         parameters: geometry.get(),
         covariance: None,
         prediction: geometry.get(),
@@ -35,9 +36,9 @@ fn stiffness(of: &Recorded, geometry: &Made) -> Prediction {
 }
 
 /// The paper's first two steps: after the unloaded fit, after the stiffness.
-pub fn papers_sequence(of: &Recorded) -> (Prediction, Prediction) {
-    let geometry = identified(of, "geometry", "all");
-    (geometry.get(), stiffness(of, &geometry))
+pub fn papers_sequence(recorded: &Recorded) -> (Prediction, Prediction) {
+    let geometry = identified(recorded, "geometry", "all");
+    (geometry.get(), stiffness(recorded, &geometry))
 }
 
 /// Tables 5, 7 and 9 of Wang et al. (2020), mean position error in mm, within 20 % either way whatever the seed.
@@ -131,8 +132,8 @@ fn where_gears_are_exact_and_only_the_arms_weight_bends_it_ratios_are_not_believ
     truth["ratio"] = json!([1, 1, 1, 1, 1, 1]);
     truth["couplings"] = json!([]);
     for seed in [1, 2, 3] {
-        let (of, _) = example.simulated(json!({"truth": truth, "seed": seed}));
-        let warned = identified(&of, "geometry", "none").warnings;
+        let (recorded, _) = example.simulated(json!({"truth": truth, "seed": seed}));
+        let warned = identified(&recorded, "geometry", "none").warnings;
         assert!(
             warned.contains("the data favour compliance"),
             "seed {seed}: {warned}"

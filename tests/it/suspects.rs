@@ -9,9 +9,9 @@ use calib::table::{Prediction, PredictionRow, Suspects};
 
 /// Suspects of each of these steps of a pipeline.
 fn suspects(example: &Example, steps: [&str; 3]) -> Vec<(Suspects, usize)> {
-    let of = example.ingested();
-    let step = |step| of.identify_by(&example.with(step)).unwrap();
-    let rows = of.recording.rows();
+    let recorded = example.ingested();
+    let step = |step| recorded.identify_by(&example.with(step)).unwrap();
+    let rows = recorded.recording.rows();
     steps.map(|name| (step(name).get(), rows)).into()
 }
 

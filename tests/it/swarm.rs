@@ -32,7 +32,7 @@ fn search(method: Algorithm, f: fn(&[f64]) -> f64, bounds: &SearchBox, seed: u64
 #[test]
 fn the_paper_s_table_2_over_seeds_shows_who_gets_there_and_who_gets_stuck() {
     let stage: Optimise = serde_json::from_value(json!({"seeds": 200})).unwrap();
-    let of = |jobs: usize| {
+    let of_jobs = |jobs: usize| {
         let desk = Desk::default();
         let context = Context {
             id: "table2",
@@ -42,7 +42,7 @@ fn the_paper_s_table_2_over_seeds_shows_who_gets_there_and_who_gets_stuck() {
         };
         stage.run(OptimiseReads {}, &context).unwrap()
     };
-    let tables = of(2);
+    let tables = of_jobs(2);
     let row = |method: &str| {
         tables
             .searches
@@ -65,7 +65,7 @@ fn the_paper_s_table_2_over_seeds_shows_who_gets_there_and_who_gets_stuck() {
         (15..60).contains(&lone.found) && lone.found + lone.stuck == 200,
         "{lone:?}"
     );
-    let one = of(1);
+    let one = of_jobs(1);
     assert_eq!(
         (&one.searches, &one.search_course),
         (&tables.searches, &tables.search_course)
@@ -153,8 +153,8 @@ fn the_landscapes_have_their_minima_where_the_literature_says() {
             "{function:?} {}",
             function.value(&x)
         );
-        let beside: Vec<f64> = x.iter().map(|x| x + 0.01).collect();
-        assert!(function.value(&beside) > minimum);
+        let nearby: Vec<f64> = x.iter().map(|x| x + 0.01).collect();
+        assert!(function.value(&nearby) > minimum);
     }
 }
 

@@ -285,8 +285,8 @@ fn duckdb_pandas_pyarrow_and_polars_read_every_table_with_its_units_and_key() {
     }
     let script = root("tests/reference/read_tables.py");
     let output = run(&[script.as_os_str(), folder.path().as_os_str()]).unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned()
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned()
         + &String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{said}");
-    has(&said, &format!("{} tables read alike", 2 * KINDS.len()));
+    assert!(output.status.success(), "{printed}");
+    has(&printed, &format!("{} tables read alike", 2 * KINDS.len()));
 }

@@ -92,11 +92,11 @@ fn torques_of_a_real_arm_are_predicted_on_rows_that_no_cause_was_fitted_to() {
 /// What of a diagnosis is missed, and what is named beside.
 struct Marks {
     missed: Vec<String>,
-    beside: Vec<Named>,
+    also: Vec<Named>,
 }
 
-fn mark(want: &Value, told: &Value) -> Marks {
-    let all: Vec<Named> = told["findings"]
+fn mark(want: &Value, answer: &Value) -> Marks {
+    let all: Vec<Named> = answer["findings"]
         .as_array()
         .unwrap()
         .iter()
@@ -104,7 +104,7 @@ fn mark(want: &Value, told: &Value) -> Marks {
         .collect();
     let mut marks = Marks {
         missed: Vec::new(),
-        beside: all.clone(),
+        also: all.clone(),
     };
     for entry in want["effects"].as_array().unwrap() {
         let pair = |pair: &Value| {
@@ -121,7 +121,7 @@ fn mark(want: &Value, told: &Value) -> Marks {
             .collect();
         // One name may stand for two effects that the data cannot separate.
         let hit = all.iter().any(|one| accepted.contains(one));
-        marks.beside.retain(|one| !accepted.contains(one));
+        marks.also.retain(|one| !accepted.contains(one));
         if !hit && entry["optional"].as_bool() != Some(true) {
             marks.missed.push(format!(
                 "{} at {} (L {:.0})",
@@ -158,15 +158,15 @@ fn the_practice_recordings_of_torques_are_solved() {
         .collect();
     cases.sort();
     for case in cases.iter().filter(|case| case.join("want.json").is_file()) {
-        let told = document(case, store.path());
+        let answer = document(case, store.path());
         let want = json(case.join("want.json"));
-        let marks = mark(&want, &told);
-        if !(marks.missed.is_empty() && marks.beside.is_empty()) {
+        let marks = mark(&want, &answer);
+        if !(marks.missed.is_empty() && marks.also.is_empty()) {
             wrong.push(format!(
                 "{}: missed {:?}, named beside {:?}",
                 case.display(),
                 marks.missed,
-                marks.beside
+                marks.also
             ));
         }
         // A push begins within 0.3 s of when it did.
@@ -177,7 +177,7 @@ fn the_practice_recordings_of_torques_are_solved() {
             .filter(|entry| entry["window"].is_array())
         {
             let began = entry["window"][0].as_f64().unwrap();
-            let findings = told["findings"].as_array().unwrap();
+            let findings = answer["findings"].as_array().unwrap();
             let contact = findings
                 .iter()
                 .filter(|finding| finding["effect"] == "contact");
@@ -200,8 +200,8 @@ fn the_example_of_torques_is_solved_and_reported() {
     let store = tempfile::tempdir().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let example = root.join("pipelines/dynamics/example");
-    let told = document(&example, store.path());
-    let found: Vec<Named> = told["findings"]
+    let answer = document(&example, store.path());
+    let found: Vec<Named> = answer["findings"]
         .as_array()
         .unwrap()
         .iter()
@@ -241,15 +241,15 @@ fn torques_of_the_twin_are_those_of_the_estimators_inverse_dynamics() {
         let mut dynamics = InverseDynamics::new(&arm);
         let gravity = arm.gravity;
         for (state, torque) in case.rigid() {
-            let mut own = vec![0.0; torque.len()];
+            let mut torque_of_joint = vec![0.0; torque.len()];
             let motion = MotionRow {
                 position: &state.q,
                 velocity: &state.v,
                 acceleration: &state.a,
             };
-            dynamics.torque(motion, &gravity, &theta, &mut own);
+            dynamics.torque(motion, &gravity, &theta, &mut torque_of_joint);
             let largest = torque.iter().fold(1.0, |most: f64, x| most.max(x.abs()));
-            for (one, other) in own.iter().zip(&torque) {
+            for (one, other) in torque_of_joint.iter().zip(&torque) {
                 assert!(
                     (one - other).abs() < 1e-9 * largest,
                     "{} Nm and {} Nm",

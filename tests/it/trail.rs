@@ -27,7 +27,7 @@ fn run(store: &Path, more: &str) {
 fn text(answer: &Answer) -> String {
     answer.both()
 }
-fn said(store: &Path, words: &str) -> String {
+fn message_of(store: &Path, words: &str) -> String {
     calib(store, words).code(0).both()
 }
 fn json(store: &Path, words: &str) -> Value {
@@ -70,30 +70,30 @@ fn a_changed_setting_is_told_with_its_stage_and_by_how_much() {
         "--set 'geometry.effects=[base_frame, tool_offset, joint_offset]'",
     );
     let output = calib(store, "diff HEAD~1 HEAD");
-    let told = text(&output);
-    assert_eq!(output.code, Some(1), "{told}");
-    assert!(told.lines().count() < 20, "{told}");
-    has(&told, "settings geometry.effects: ");
-    has(&told, ["geometry.parameters", "geometry.prediction"]);
+    let printed = text(&output);
+    assert_eq!(output.code, Some(1), "{printed}");
+    assert!(printed.lines().count() < 20, "{printed}");
+    has(&printed, "settings geometry.effects: ");
+    has(&printed, ["geometry.parameters", "geometry.prediction"]);
     has(
-        &told,
+        &printed,
         ["error_mm by ", " mm rms, at most ", " mm (", " sigma)"],
     );
     assert!(
-        !told.contains("nominal."),
-        "what is the same is not told: {told}"
+        !printed.contains("nominal."),
+        "what is the same is not told: {printed}"
     );
-    let explained = said(store, "explain geometry");
+    let explained = message_of(store, "explain geometry");
     has(
         &explained,
         "executed, because: settings changed: geometry.effects",
     );
-    let explained = said(store, "explain validate");
+    let explained = message_of(store, "explain validate");
     assert!(
         explained.contains("input prediction (geometry): ") && !explained.contains("(nominal)"),
         "{explained}"
     );
-    assert!(said(store, "explain nominal").contains("nothing that it depends on changed"));
+    assert!(message_of(store, "explain nominal").contains("nothing that it depends on changed"));
     assert_eq!(calib(store, "diff HEAD HEAD").code, Some(0));
     let table = json(
         store,
@@ -127,8 +127,8 @@ fn of_two_runs_tolerances_hold_in_every_table_that_has_the_column() {
     );
     let refused = |flag: &str, value: &str, why: &str| {
         let output = calib(store, &format!("diff HEAD~1 HEAD {flag} {value}"));
-        let said = text(&output);
-        assert!(output.code == Some(2) && said.contains(why), "{said}");
+        let printed = text(&output);
+        assert!(output.code == Some(2) && printed.contains(why), "{printed}");
     };
     refused(
         "--ignore",
@@ -166,12 +166,12 @@ fn a_limit_that_is_exceeded_is_said_and_ends_with_code_1() {
     };
     for _ in 0..2 {
         let beyond = with("{mean_mm: 0.000001, max_mm: 500}", "");
-        let said = text(&beyond);
-        assert_eq!(beyond.code, Some(1), "{said}");
-        let line = said
+        let printed = text(&beyond);
+        assert_eq!(beyond.code, Some(1), "{printed}");
+        let line = printed
             .lines()
             .find(|line| line.starts_with("limits    "))
-            .unwrap_or_else(|| panic!("{said}"));
+            .unwrap_or_else(|| panic!("{printed}"));
         starts_with(
             line,
             "limits    not accepted: beyond the limits at 20 held-out points of set validate, step geometry",
@@ -194,11 +194,11 @@ fn a_limit_that_is_exceeded_is_said_and_ends_with_code_1() {
         (&"report".into(), &false.into())
     );
     let kept = with("{mean_mm: 500}", "");
-    let said = text(&kept);
+    let printed = text(&kept);
     assert!(
         kept.code == Some(0)
-            && said.contains("limits    accepted: within the limits at 20 held-out points"),
-        "{said}"
+            && printed.contains("limits    accepted: within the limits at 20 held-out points"),
+        "{printed}"
     );
     let none = calib(store, &format!("run {} --quiet", file.display()));
     assert!(
@@ -214,8 +214,8 @@ fn runs_are_listed_shown_tagged_and_their_tables_traced() {
     let store = folder.path();
     run(store, "--set seed=12");
     run(store, "");
-    assert!(said(store, "tag HEAD~1 first").starts_with("first is run "));
-    let log = said(store, "log");
+    assert!(message_of(store, "tag HEAD~1 first").starts_with("first is run "));
+    let log = message_of(store, "log");
     assert_eq!(log.lines().count(), 2, "{log}");
     assert!(
         log.lines()
@@ -225,17 +225,17 @@ fn runs_are_listed_shown_tagged_and_their_tables_traced() {
             && log.contains("[first]"),
         "{log}"
     );
-    let shown = said(store, "show first");
+    let shown = message_of(store, "show first");
     has(
         &shown,
         ["set on the command line: seed = 12", "because: never run"],
     );
     assert!(
-        said(store, "show first/geometry")
+        message_of(store, "show first/geometry")
             .contains("reads   recording <- simulate.recording, 80 rows")
     );
     assert_eq!(
-        said(store, "show HEAD --yaml"),
+        message_of(store, "show HEAD --yaml"),
         std::fs::read_to_string(pipeline()).unwrap()
     );
     let manifest = json(store, "show HEAD");
@@ -243,17 +243,20 @@ fn runs_are_listed_shown_tagged_and_their_tables_traced() {
         manifest["previous"]["run"],
         json(store, "show first")["run_id"]
     );
-    let traced = said(store, "lineage HEAD/validate/statistics");
+    let traced = message_of(store, "lineage HEAD/validate/statistics");
     has(
         &traced,
         ["recording <- simulate.recording", "file robot.yaml"],
     );
     let table = store.join("tables/resume/validate.statistics.parquet");
-    assert_eq!(said(store, &format!("lineage {}", table.display())), traced);
+    assert_eq!(
+        message_of(store, &format!("lineage {}", table.display())),
+        traced
+    );
     let refused = calib(store, "show fisrt").code(2);
     has(&text(&refused), "did you mean the tag `first`?");
-    assert_eq!(said(store, "tag --delete first"), "");
-    assert_eq!(said(store, "tag"), "");
+    assert_eq!(message_of(store, "tag --delete first"), "");
+    assert_eq!(message_of(store, "tag"), "");
 }
 
 #[test]
@@ -281,15 +284,15 @@ fn a_tag_has_not_the_form_of_an_id_and_says_which_run_it_left() {
     }
     assert_eq!(json(store, &format!("show {old}"))["run_id"], old.as_str());
     assert_eq!(
-        said(store, "tag HEAD~1 first"),
+        message_of(store, "tag HEAD~1 first"),
         format!("first is run {old}\n")
     );
     assert_eq!(
-        said(store, "tag HEAD first"),
+        message_of(store, "tag HEAD first"),
         format!("first is run {new}, was run {old}\n")
     );
     assert_eq!(
-        said(store, "tag HEAD first"),
+        message_of(store, "tag HEAD first"),
         format!("first is run {new}\n")
     );
 }
@@ -325,7 +328,7 @@ fn folders_whose_names_are_no_text_are_used_all_the_same() {
     let manifest = json(&store, "show HEAD");
     let path = manifest["stages"][0]["files"][0]["path"].as_str().unwrap();
     ends_with(path, "/cell\u{fffd}\u{fffd}/robot.yaml");
-    assert!(said(&store, "log").contains("resume  done, 7 run, 0 cached"));
+    assert!(message_of(&store, "log").contains("resume  done, 7 run, 0 cached"));
 }
 
 #[test]
@@ -334,8 +337,8 @@ fn one_flipped_bit_in_any_file_is_found() {
     let store = folder.path();
     run(store, "");
     run(store, "--set split.by=every --set split.n=4");
-    said(store, "tag HEAD kept");
-    let clean = said(store, "verify");
+    message_of(store, "tag HEAD kept");
+    let clean = message_of(store, "verify");
     ends_with(&clean, "all as they were written\n");
     has(&clean, "2 runs, 1 tag,");
     let mut random = ChaCha8Rng::seed_from_u64(6);
@@ -353,7 +356,7 @@ fn one_flipped_bit_in_any_file_is_found() {
         calib(store, "verify").code(1);
         overwrite(&path, &whole);
     }
-    assert_eq!(said(store, "verify"), clean);
+    assert_eq!(message_of(store, "verify"), clean);
     // A manifest that was written anew, seal and all, is not the one that the next run saw.
     let runs: Vec<PathBuf> = self::files(&store.join("runs"))
         .into_iter()
@@ -381,7 +384,7 @@ fn a_sweep_leaves_what_tags_and_the_last_runs_need() {
     for seed in ["1", "2", "3"] {
         run(store, &format!("--set seed={seed}"));
     }
-    said(store, "tag HEAD~2 released");
+    message_of(store, "tag HEAD~2 released");
     let sweep = "gc --keep-runs 1 --grace-hours 0";
     assert_eq!(
         json(store, "gc --keep-runs 1")["actions"],
@@ -410,7 +413,7 @@ fn a_sweep_leaves_what_tags_and_the_last_runs_need() {
             .filter(|stage| stage["status"] == "executed")
             .count()
     };
-    said(store, "verify");
+    message_of(store, "verify");
     assert_eq!((executed("1"), executed("3"), executed("2")), (0, 0, 7));
 }
 

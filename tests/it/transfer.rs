@@ -19,28 +19,28 @@ use serde_json::{Value, json};
 
 /// One series, thinned, with the identified geometry and the correction learnt on top.
 struct Series {
-    of: Recorded,
+    recorded: Recorded,
     model: Model,
     geometry: Parameters,
     correction: Correction,
     /// Mean and largest error of rows that were not trained on, mm, without and with the correction.
-    own: [[f64; 2]; 2],
+    errors_before: [[f64; 2]; 2],
 }
 
 fn series(file: &str, every: usize) -> Result<Series> {
     let example = Example::new("ur10", &[]);
     let mut ingest: Value = example.with("ingest");
     ingest["files"][0]["file"] = json!(shared("data/ipa_ur10").unwrap().join(file));
-    let mut of = example.ingested_by(&settings(ingest), &example.with("split"));
-    let kept: Vec<usize> = (0..of.recording.rows()).step_by(every).collect();
-    of.recording = rows_of(&of.recording, &kept);
+    let mut recorded = example.ingested_by(&settings(ingest), &example.with("split"));
+    let kept: Vec<usize> = (0..recorded.recording.rows()).step_by(every).collect();
+    recorded.recording = rows_of(&recorded.recording, &kept);
     // A stretch at the end is held out: neighbours of its rows were not seen.
     let by = settings::<calib::stage::split::SplitBy>(
         json!({"by": "blocks", "count": 4, "sets": ["fit", "fit", "fit", "validate"]}),
     );
-    let recording = of.recording.clone();
-    of.split = made(&by, SplitReads { recording }).get();
-    let found = of.identify(json!({
+    let recording = recorded.recording.clone();
+    recorded.split = made(&by, SplitReads { recording }).get();
+    let found = recorded.identify(json!({
         "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry"], "folds": 0,
     }));
     let geometry: Parameters = found.get();
@@ -51,7 +51,7 @@ fn series(file: &str, every: usize) -> Result<Series> {
         robot,
         recording,
         split,
-    } = of.clone();
+    } = recorded.clone();
     let reads = LearnReads {
         robot: Some(robot),
         recording,
@@ -67,15 +67,15 @@ fn series(file: &str, every: usize) -> Result<Series> {
         let largest = held.map(|row| row.error_mm).fold(0.0, f64::max);
         [mean_mm_of(prediction, "validate"), largest]
     };
-    let own = [errors(&found.get()), errors(&table(&tables).remove(0))];
+    let ours = [errors(&found.get()), errors(&table(&tables).remove(0))];
     let network: Network = table(&tables).remove(0);
-    let robot = RobotModel::new(of.robot.to_description()?);
+    let robot = RobotModel::new(recorded.robot.to_description()?);
     Ok(Series {
         model: geometry.model(robot, &[], Load::GravityTorque)?,
-        correction: network.correction(&of.recording.prismatic)?.unwrap(),
-        of,
+        correction: network.correction(&recorded.recording.prismatic)?.unwrap(),
+        recorded,
         geometry,
-        own,
+        errors_before: ours,
     })
 }
 
@@ -106,7 +106,7 @@ fn after_base(points: &[Vector3<f64>], measured: &[[f64; 3]]) -> [f64; 2] {
 
 /// Mean and largest error on the rows of `to`, mm, without and with what was learnt on `from`.
 fn carried(from: &Series, to: &Series) -> [[f64; 2]; 2] {
-    let recording = &to.of.recording;
+    let recording = &to.recorded.recording;
     let plain = from.model.predict(&recording.measurements());
     let corrected: Vec<Vector3<f64>> = plain
         .iter()
@@ -122,7 +122,7 @@ fn carried(from: &Series, to: &Series) -> [[f64; 2]; 2] {
 /// Mean error on the rows of `to`, and that which one of a hundred exceeds, mm, of a model identified on another series.
 fn transferred(parameters: &Parameters, to: &Series) -> [f64; 2] {
     let with = json!({"on": ["fit", "validate"], "screen": false, "folds": 0});
-    let prediction: Prediction = to.of.carry(with, parameters, &[], &[]).get();
+    let prediction: Prediction = to.recorded.carry(with, parameters, &[], &[]).get();
     let mut errors: Vec<f64> = prediction.0.iter().map(|row| row.error_mm).collect();
     errors.sort_by(f64::total_cmp);
     // The largest of a thousand errors is that of one row.
@@ -141,7 +141,7 @@ fn between_two_series_of_a_real_robot_a_correction_is_never_worse_than_none() {
         || series("Series_C/measurements_random_poses.csv", 3).unwrap(),
     );
     for (name, series) in [("A", &a), ("C", &c)] {
-        let [before, after] = series.own;
+        let [before, after] = series.errors_before;
         println!(
             "{name}, held-out stretch: mean {:.3} -> {:.3}, max {:.3} -> {:.3} mm",
             before[0], after[0], before[1], after[1]
@@ -160,7 +160,7 @@ fn between_two_series_of_a_real_robot_a_correction_is_never_worse_than_none() {
     let errors = |(_, from, to): &(_, &Series, &Series)| {
         (
             transferred(&from.geometry, to),
-            transferred(&from.of.diagnose(json!({})).get(), to),
+            transferred(&from.recorded.diagnose(json!({})).get(), to),
         )
     };
     let found: Vec<([f64; 2], [f64; 2])> = ways.par_iter().map(errors).collect();
@@ -193,7 +193,7 @@ fn a_model_holds_on_a_later_recording_from_where_the_tracker_stands_then() {
     let found = measured(1).identify(json!({"effects": effects, "folds": 0}));
     let parameters: Parameters = found.get();
     let unseen = |made: &Made| mean_mm_of(&made.get(), "check");
-    let own = unseen(&found);
+    let ours = unseen(&found);
     let mut later = measured(2);
     let moved =
         Pose::from_rotation_vector(Vector3::new(0.02, -0.01, 2.0), Vector3::new(3.0, -1.5, 0.2));
@@ -203,8 +203,8 @@ fn a_model_holds_on_a_later_recording_from_where_the_tracker_stands_then() {
     let carried = later.carry(json!({"folds": 0}), &parameters, &[], &[]);
     let mean = unseen(&carried);
     assert!(
-        mean < 1.2 * own,
-        "{mean} mm, {own} mm in the recording it was identified by"
+        mean < 1.2 * ours,
+        "{mean} mm, {ours} mm in the recording it was identified by"
     );
     let carried: Parameters = carried.get();
     for (before, after) in parameters.0.iter().zip(&carried.0) {
@@ -238,16 +238,16 @@ fn wound(parameters: &Parameters, change: impl Fn(f64) -> f64) -> Parameters {
 
 #[test]
 fn a_carried_model_says_that_its_geometry_alone_is_better() {
-    let of = measured(3);
-    let parameters: Parameters = of.identify(json!({"folds": 0})).get();
+    let recorded = measured(3);
+    let parameters: Parameters = recorded.identify(json!({"folds": 0})).get();
     // Where the first joint stood on its negative side, as if nothing else had been measured.
-    let there: Vec<usize> = (0..of.recording.rows())
-        .filter(|row| of.recording.q(*row)[0] < 0.0)
+    let there: Vec<usize> = (0..recorded.recording.rows())
+        .filter(|row| recorded.recording.q(*row)[0] < 0.0)
         .collect();
-    let earlier = rows_of(&of.recording, &there);
+    let earlier = rows_of(&recorded.recording, &there);
     let carry = |parameters: &Parameters| {
-        let recordings = [("ingest", &earlier), ("later", &of.recording)];
-        of.carry(json!({"folds": 0}), parameters, &recordings, &[])
+        let recordings = [("ingest", &earlier), ("later", &recorded.recording)];
+        recorded.carry(json!({"folds": 0}), parameters, &recordings, &[])
     };
     let worse = "what was identified besides it does not hold here";
     let right = carry(&parameters);
@@ -340,9 +340,9 @@ fn the_closing_lines_state_the_carried_figure() {
              blocks: [{{usage: fit, points: 40}}, {{usage: check, points: 30}}]\n      seed: {seed}\n"
         )
     };
-    let split = |id: &str, of: &str| {
+    let split = |id: &str, subject: &str| {
         format!(
-            "  - id: {id}\n    uses: split\n    reads: {{recording: {of}}}\n    with: {{by: usage}}\n"
+            "  - id: {id}\n    uses: split\n    reads: {{recording: {subject}}}\n    with: {{by: usage}}\n"
         )
     };
     let pipeline = format!(
@@ -356,14 +356,14 @@ fn the_closing_lines_state_the_carried_figure() {
         split("placed", "there")
     );
     put(folder.path(), "p.yaml", pipeline);
-    let told = calib(folder.path(), "run p.yaml --quiet").ok();
-    let carried = told
+    let printed = calib(folder.path(), "run p.yaml --quiet").ok();
+    let carried = printed
         .lines()
         .find(|line| line.starts_with("carried"))
         .unwrap_or_default();
     assert!(
         carried.contains("step carried, ") && carried.contains("30 held-out points"),
-        "{told}"
+        "{printed}"
     );
-    assert!(!told.contains("step found"), "{told}");
+    assert!(!printed.contains("step found"), "{printed}");
 }

@@ -267,10 +267,10 @@ fn errors_along_z(scatter: Scatter) -> Vec<[f64; 3]> {
     (0..20_000).map(|_| error()).collect()
 }
 
-fn mean_product(errors: &[[f64; 3]], of: impl Fn(&[f64; 3], &[f64; 3]) -> f64) -> f64 {
+fn mean_product(errors: &[[f64; 3]], value_of: impl Fn(&[f64; 3], &[f64; 3]) -> f64) -> f64 {
     errors
         .windows(2)
-        .map(|pair| of(&pair[0], &pair[1]))
+        .map(|pair| value_of(&pair[0], &pair[1]))
         .sum::<f64>()
         / (errors.len() - 1) as f64
 }

@@ -29,7 +29,7 @@ stages:
 ";
 
 /// The cell's arm at joints of a row (deg), each point displaced along x by a creep, mm.
-fn told(
+fn message_of(
     folder: &Path,
     uses: &str,
     joints: impl Fn(usize) -> [f64; 6],
@@ -67,31 +67,31 @@ fn told(
 fn one_pose_measured_fifty_times_is_no_geometry_and_its_creep_is_told() {
     for uses in ["identify", "diagnose"] {
         let folder = tempfile::tempdir().unwrap();
-        let (code, said) = told(
+        let (code, printed) = message_of(
             folder.path(),
             uses,
             |_| [10.0, 20.0, -30.0, 40.0, 50.0, 60.0],
             |row| 0.2 * row as f64 / 49.0,
         );
-        assert_eq!(code, Some(10), "{said}");
+        assert_eq!(code, Some(10), "{printed}");
         has(
-            &said,
+            &printed,
             "all 40 rows to fit are of one pose: geometry needs poses in which every joint moves",
         );
-        let drift = said
+        let drift = printed
             .split("the point drifts by ")
             .nth(1)
             .and_then(|text| text.split(" mm").next());
         let drift = drift
             .and_then(|mm| mm.parse::<f64>().ok())
-            .unwrap_or_else(|| panic!("{said}"));
-        assert!((drift - 0.2).abs() < 0.01, "{said}");
+            .unwrap_or_else(|| panic!("{printed}"));
+        assert!((drift - 0.2).abs() < 0.01, "{printed}");
     }
     let folder = tempfile::tempdir().unwrap();
-    let (code, said) = told(folder.path(), "identify", |_| [10.0; 6], |_| 0.0);
+    let (code, printed) = message_of(folder.path(), "identify", |_| [10.0; 6], |_| 0.0);
     assert!(
-        code == Some(10) && said.contains("the point does not drift beyond noise"),
-        "{said}"
+        code == Some(10) && printed.contains("the point does not drift beyond noise"),
+        "{printed}"
     );
 }
 
@@ -102,10 +102,10 @@ fn a_joint_that_never_moves_is_said() {
     let joints = |row: usize| {
         [0, 1, 2, 3, 4, 5].map(|joint| if joint == 3 { 12.5 } else { swing(row, joint) })
     };
-    let (code, said) = told(folder.path(), "identify", joints, |_| 0.0);
-    assert_eq!(code, Some(0), "{said}");
+    let (code, printed) = message_of(folder.path(), "identify", joints, |_| 0.0);
+    assert_eq!(code, Some(0), "{printed}");
     has(
-        &said,
+        &printed,
         "never moves in the 40 rows to fit: joint 4 (at 12.500 deg)",
     );
 }

@@ -25,7 +25,7 @@ fn verbs(above: &[String]) -> Vec<Vec<String>> {
         _ => text
             .split("\nCommands:\n")
             .nth(1)
-            .and_then(|rest| rest.split("\n\n").next()),
+            .and_then(|tail| tail.split("\n\n").next()),
     };
     let list = list.unwrap_or_default();
     let names = list

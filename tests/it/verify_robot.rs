@@ -14,8 +14,8 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &str| {
         let output = calib(folder.path(), arguments);
-        let told = output.err.clone();
-        assert!(output.code == Some(0), "{arguments:?}: {told}");
+        let printed = output.err.clone();
+        assert!(output.code == Some(0), "{arguments:?}: {printed}");
         output.out.clone()
     };
     put(
@@ -84,19 +84,19 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
         .unwrap();
     }
     put(folder.path(), "second.csv", second);
-    let told: Value =
+    let answer: Value =
         serde_json::from_str(&run("verify-robot cell/pipeline.yaml second.csv --json")).unwrap();
-    let figure = |row: &str, name: &str| told[row][name].as_f64().unwrap();
-    assert!(figure("before", "mean_mm") > 0.5, "{told:#}");
-    assert!(figure("achieved", "max_mm") < 0.02, "{told:#}");
-    assert!(figure("predicted_u95", "mean_mm") < 0.05, "{told:#}");
+    let figure = |row: &str, name: &str| answer[row][name].as_f64().unwrap();
+    assert!(figure("before", "mean_mm") > 0.5, "{answer:#}");
+    assert!(figure("achieved", "max_mm") < 0.02, "{answer:#}");
+    assert!(figure("predicted_u95", "mean_mm") < 0.05, "{answer:#}");
     assert_eq!(
         (
-            told["points"].as_u64(),
-            told["iso_9283"][0]["cycles"].as_u64()
+            answer["points"].as_u64(),
+            answer["iso_9283"][0]["cycles"].as_u64()
         ),
         (Some(42), Some(30)),
-        "{told:#}"
+        "{answer:#}"
     );
     let text =
         run("verify-robot cell/pipeline.yaml second.csv --new-base --quiet --html verified.html");

@@ -95,15 +95,15 @@ fn a_changed_bit_of_a_table_is_refused_or_changes_no_number() {
 fn the_verb_refuses_a_changed_table_with_code_10_and_writes_no_target() {
     let folder = taken_along();
     let path = folder.path().join(PARAMETERS);
-    let (code, sound, said) = compensated(folder.path(), "");
-    assert_eq!(code, Some(0), "{said}");
+    let (code, sound, printed) = compensated(folder.path(), "");
+    assert_eq!(code, Some(0), "{printed}");
     for (bit, flipped) in flips(&path, 40, 6) {
         std::fs::write(&path, flipped).unwrap();
-        let (code, written, said) = compensated(folder.path(), "");
+        let (code, written, printed) = compensated(folder.path(), "");
         let kept = code == Some(0) && written == sound;
         assert!(
-            kept || (code == Some(10) && written.is_empty() && said.contains(PARAMETERS)),
-            "bit {bit}: {code:?} {written} {said}"
+            kept || (code == Some(10) && written.is_empty() && printed.contains(PARAMETERS)),
+            "bit {bit}: {code:?} {written} {printed}"
         );
     }
 }
@@ -157,22 +157,22 @@ fn a_table_of_another_program_is_taken_only_where_that_is_said() {
     );
     let whole = std::fs::read(&path).unwrap();
     written_anew(&path, 0.0, false);
-    let (code, written, said) = compensated(folder.path(), "");
+    let (code, written, printed) = compensated(folder.path(), "");
     assert_eq!((code, written), (Some(10), String::new()));
     has(
-        &said,
+        &printed,
         [PARAMETERS, "carries no content hash", "--unchecked"],
     );
-    let (code, written, said) = compensated(folder.path(), "--unchecked");
+    let (code, written, printed) = compensated(folder.path(), "--unchecked");
     assert_eq!((code, written), (Some(0), sound));
-    starts_with(&said, "warning: ");
-    has(&said, "its numbers cannot be verified");
+    starts_with(&printed, "warning: ");
+    has(&printed, "its numbers cannot be verified");
     std::fs::write(&path, whole).unwrap();
     written_anew(&path, 1e-4, true);
     for more in ["", "--unchecked"] {
-        let (code, written, said) = compensated(folder.path(), more);
+        let (code, written, printed) = compensated(folder.path(), more);
         assert_eq!((code, written), (Some(10), String::new()));
-        has(&said, ["does not match its numbers", "calib run"]);
+        has(&printed, ["does not match its numbers", "calib run"]);
     }
 }
 
@@ -217,12 +217,12 @@ fn a_changed_bit_in_the_store_is_refused_or_changes_no_number() {
             match IdentifiedModel::of_run(&store, &manifest, None) {
                 Ok(found) => assert_eq!(numbers(&found), sound, "bit {bit} of {}", path.display()),
                 Err(error) => {
-                    let said = error.to_string();
-                    assert_eq!(error.exit_code(), 10, "{said}");
+                    let printed = error.to_string();
+                    assert_eq!(error.exit_code(), 10, "{printed}");
                     assert!(
-                        said.contains(path.to_str().unwrap())
-                            && said.contains("calib run pipeline.yaml"),
-                        "{said}"
+                        printed.contains(path.to_str().unwrap())
+                            && printed.contains("calib run pipeline.yaml"),
+                        "{printed}"
                     );
                 }
             }

@@ -105,11 +105,11 @@ fn gravity_torques_of_any_masses_are_made_of_the_moments_of_the_bodies_outwards(
             .iter()
             .fold(0.0, |most: f64, torque| most.max(torque.abs()));
         for joint in 0..weighed.joints() {
-            let own = DVector::from_iterator(
+            let ours = DVector::from_iterator(
                 ROWS,
                 torque.iter().skip(joint).step_by(weighed.joints()).copied(),
             );
-            let size = own.amax();
+            let size = ours.amax();
             let here = forms
                 .iter()
                 .filter(|form| form.place() == Place::Joint(joint));
@@ -122,8 +122,8 @@ fn gravity_torques_of_any_masses_are_made_of_the_moments_of_the_bodies_outwards(
                 continue;
             };
             let turns = turns(&bare, &data, widest);
-            let solved = turns.clone().svd(true, true).solve(&own, 1e-10).unwrap();
-            let left = (turns * solved - &own).amax();
+            let solved = turns.clone().svd(true, true).solve(&ours, 1e-10).unwrap();
+            let left = (turns * solved - &ours).amax();
             assert!(
                 left < 1e-9 * most,
                 "joint {}: {left} of {size} Nm",
@@ -185,9 +185,9 @@ fn with_a_payload_the_stiffness_is_said_beside_the_weight() {
             .unwrap()
     };
     let (weight, load) = (at(&bare(fixture::spherical())), at(&robot));
-    let said = |forms: &[Form]| {
-        let own = |(form, of): (usize, &Form)| {
-            let specs = of.parameters(&robot).into_iter();
+    let message_of = |forms: &[Form]| {
+        let specs_of = |(form, one_form): (usize, &Form)| {
+            let specs = one_form.parameters(&robot).into_iter();
             let number = |spec: ParameterSpec| {
                 let (unit, symbol) = people(spec.unit);
                 ParameterEstimate {
@@ -200,7 +200,8 @@ fn with_a_payload_the_stiffness_is_said_beside_the_weight() {
             };
             specs.map(number).collect::<Vec<_>>()
         };
-        let parameters: Vec<ParameterEstimate> = forms.iter().enumerate().flat_map(own).collect();
+        let parameters: Vec<ParameterEstimate> =
+            forms.iter().enumerate().flat_map(specs_of).collect();
         let summary = Summary {
             place: Place::Joint(2),
             forms,
@@ -210,7 +211,7 @@ fn with_a_payload_the_stiffness_is_said_beside_the_weight() {
         forms[0].cause().sentence(&summary)
     };
     // 1e-4 rad are 20.6 arcsec.
-    let alone = said(std::slice::from_ref(&weight));
+    let alone = message_of(std::slice::from_ref(&weight));
     has(
         &alone,
         [
@@ -218,7 +219,7 @@ fn with_a_payload_the_stiffness_is_said_beside_the_weight() {
             "cannot be separated from the links' weight",
         ],
     );
-    let both = said(&[weight, load]);
+    let both = message_of(&[weight, load]);
     has(
         &both,
         [

@@ -17,7 +17,7 @@ use std::path::Path;
 const PARAMETERS: &str = "identify.parameters.parquet";
 const TARGETS: &str = "A1_deg,A2_deg,A3_deg,A4_deg,A5_deg,A6_deg\n10,20,-30,5,40,0\n";
 
-fn said(folder: &Path, verb: &str) -> (Option<i32>, String, String) {
+fn message_of(folder: &Path, verb: &str) -> (Option<i32>, String, String) {
     let output = fed(folder, verb, TARGETS);
     (output.code, output.out, output.err)
 }
@@ -56,8 +56,8 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
     ];
     for verb in verbs {
         // Limits are no part of what a model is of.
-        let (code, _, told) = said(here, &format!("{verb} --robot own.yaml"));
-        assert_eq!(code, Some(0), "{told}");
+        let (code, _, printed) = message_of(here, &format!("{verb} --robot own.yaml"));
+        assert_eq!(code, Some(0), "{printed}");
         for (robot, sentence) in [
             (
                 "other.yaml",
@@ -72,9 +72,9 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
                 "is the model of the robot `small`, and this robot file is of `large`, whose axes are the same",
             ),
         ] {
-            let (code, out, told) = said(here, &format!("{verb} --robot {robot}"));
-            assert_eq!((code, out.as_str()), (Some(10), ""), "{robot}: {told}");
-            assert!(told.contains(sentence), "{robot}: {told}");
+            let (code, out, printed) = message_of(here, &format!("{verb} --robot {robot}"));
+            assert_eq!((code, out.as_str()), (Some(10), ""), "{robot}: {printed}");
+            assert!(printed.contains(sentence), "{robot}: {printed}");
         }
     }
     // As an earlier calib wrote it, without a content hash.
@@ -91,14 +91,15 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
     writer.write(frame.batch()).unwrap();
     writer.close().unwrap();
     for verb in ["compensate", "export --format urdf"] {
-        let (code, out, told) = said(here, &format!("{verb} older.parquet --robot renamed.yaml"));
-        assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
-        let (code, _, told) = said(
+        let (code, out, printed) =
+            message_of(here, &format!("{verb} older.parquet --robot renamed.yaml"));
+        assert_eq!((code, out.as_str()), (Some(10), ""), "{printed}");
+        let (code, _, printed) = message_of(
             here,
             &format!("{verb} older.parquet --robot renamed.yaml --unchecked"),
         );
-        assert_eq!(code, Some(0), "{told}");
-        has(&told, "does not say which robot it is the model of");
+        assert_eq!(code, Some(0), "{printed}");
+        has(&printed, "does not say which robot it is the model of");
     }
 }
 
@@ -112,16 +113,16 @@ fn a_table_that_does_not_say_whose_model_it_is_is_refused_for_either_robot_unles
     let [table, targets] = ["parameters.parquet", "tg.csv"].map(path);
     for robot in ["irb.yaml", "kr6.yaml"].map(path) {
         let ask = &format!("compensate {table} --robot {robot} {targets}");
-        let (code, out, told) = said(&fault, ask);
-        assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
+        let (code, out, printed) = message_of(&fault, ask);
+        assert_eq!((code, out.as_str()), (Some(10), ""), "{printed}");
         has(
-            &told,
+            &printed,
             ["does not say which robot it is the model of", "--unchecked"],
         );
-        let (code, _, told) = said(&fault, &format!("{ask} --unchecked"));
+        let (code, _, printed) = message_of(&fault, &format!("{ask} --unchecked"));
         assert!(
-            code == Some(0) && told.contains("does not say which robot it is the model of"),
-            "{told}"
+            code == Some(0) && printed.contains("does not say which robot it is the model of"),
+            "{printed}"
         );
     }
 }
@@ -144,21 +145,21 @@ fn inertias_of_no_body_are_named_by_their_links_and_refused_for_torques_alone() 
     put(here, "arm.urdf", URDF);
     let first = "arm.urdf:2: link `Link1`: no body has a principal moment of inertia of 408.868 times the sum of the other two";
     let second = "arm.urdf:3: link `Link2`: no body has a principal moment of inertia that is zero";
-    let (code, _, told) = said(here, "init cell --urdf arm.urdf");
-    assert_eq!(code, Some(0), "{told}");
-    has(&told, [first, second]);
+    let (code, _, printed) = message_of(here, "init cell --urdf arm.urdf");
+    assert_eq!(code, Some(0), "{printed}");
+    has(&printed, [first, second]);
     let pipeline = "calib: 1\nname: u\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml, urdf: arm.urdf}\n";
     put(here, "pipeline.yaml", pipeline);
     let robot = "calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {urdf: {base: base_link, tip: tool0}}\n";
     put(here, "robot.yaml", robot);
-    let (code, out, told) = said(here, "check pipeline.yaml");
-    let all = format!("{out}{told}");
+    let (code, out, printed) = message_of(here, "check pipeline.yaml");
+    let all = format!("{out}{printed}");
     assert_eq!(code, Some(0), "{all}");
     has(&all, [first, second, "positions do not depend on it"]);
-    let (code, _, told) = said(here, "excite robot.yaml --urdf arm.urdf");
-    assert_eq!(code, Some(10), "{told}");
+    let (code, _, printed) = message_of(here, "excite robot.yaml --urdf arm.urdf");
+    assert_eq!(code, Some(10), "{printed}");
     has(
-        &told,
+        &printed,
         "table robot: link 1: no body has a principal moment of inertia of 408.868 times",
     );
 }
@@ -236,24 +237,25 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
                 MEASURED.replace("ORIENTATION", orientation),
             );
             let export = "export pipeline.yaml --step geometry --format json";
-            let (code, out, told) = said(here, export);
+            let (code, out, printed) = message_of(here, export);
             if is_refused {
                 assert_eq!(
                     (code, out.as_str()),
                     (Some(10), ""),
-                    "{orientation}: {told}"
+                    "{orientation}: {printed}"
                 );
-                assert!(told.contains("tool is 101."), "{orientation}: {told}");
-                let (code, _, told) = said(here, "compensate pipeline.yaml --step geometry");
+                assert!(printed.contains("tool is 101."), "{orientation}: {printed}");
+                let (code, _, printed) =
+                    message_of(here, "compensate pipeline.yaml --step geometry");
                 assert!(
-                    code == Some(10) && told.contains("tool is 101."),
-                    "{orientation}: {told}"
+                    code == Some(10) && printed.contains("tool is 101."),
+                    "{orientation}: {printed}"
                 );
             } else {
-                assert_eq!(code, Some(0), "{orientation}: {told}");
+                assert_eq!(code, Some(0), "{orientation}: {printed}");
             }
-            let (code, out, told) = said(here, &format!("{export} --force"));
-            assert_eq!(code, Some(0), "{orientation}: {told}");
+            let (code, out, printed) = message_of(here, &format!("{export} --force"));
+            assert_eq!(code, Some(0), "{orientation}: {printed}");
             let model: Value = serde_json::from_str(&out).unwrap();
             let found =
                 Vector3::from([0, 1, 2].map(|k| model["tool"]["point_m"][k].as_f64().unwrap()));
@@ -263,11 +265,11 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
                 "{orientation}: {found} instead of {tool}"
             );
             assert_eq!(
-                told.contains("the tool is the identified point"),
+                printed.contains("the tool is the identified point"),
                 !orientation.is_empty(),
-                "{told}"
+                "{printed}"
             );
-            let apart = told
+            let apart = printed
                 .split("rigid geometry alone stands ")
                 .nth(1)
                 .and_then(|text| text.split(" mm").next());
@@ -275,7 +277,7 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
                 apart
                     .and_then(|mm| mm.parse::<f64>().ok())
                     .is_some_and(|mm| mm < 0.05),
-                "{told}"
+                "{printed}"
             );
         }
     }
@@ -319,11 +321,11 @@ stages:
 ";
     put(here, "pipeline.yaml", pipeline);
     let exported = |format: &str| {
-        let (code, out, told) = said(
+        let (code, out, printed) = message_of(
             here,
             &format!("export pipeline.yaml --format {format} --force"),
         );
-        assert_eq!(code, Some(0), "{told}");
+        assert_eq!(code, Some(0), "{printed}");
         out
     };
     let file = |text: &str, urdf: Option<&str>| {
@@ -343,8 +345,8 @@ stages:
             .robot,
         )
     };
-    let beside = "calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics:\n  urdf: {base: base_link, tip: tool0}\n";
-    let urdf = file(beside, Some(&exported("urdf")));
+    let urdf_units = "calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics:\n  urdf: {base: base_link, tip: tool0}\n";
+    let urdf = file(urdf_units, Some(&exported("urdf")));
     for format in ["dh", "mdh"] {
         let table = file(&exported(format), None);
         for k in 0..200 {
@@ -360,10 +362,10 @@ stages:
 
 #[test]
 fn a_run_knows_its_robot() {
-    let (code, out, told) = said(cell(), "compensate HEAD --robot other.yaml");
-    assert_eq!((code, out.as_str()), (Some(2), ""), "{told}");
+    let (code, out, printed) = message_of(cell(), "compensate HEAD --robot other.yaml");
+    assert_eq!((code, out.as_str()), (Some(2), ""), "{printed}");
     has(
-        &told,
+        &printed,
         "--robot: is of tables of parameters alone; a run or a pipeline knows its robot",
     );
 }

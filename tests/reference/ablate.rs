@@ -69,9 +69,9 @@ fn diagnosed(case: &Case, data: &Measurements, without: &[String]) -> Diagnosis 
         .iter()
         .map(|shot| usize::from(shot.block != FIT))
         .collect();
-    let rows = |of: usize| {
+    let rows = |count: usize| {
         (0..data.rows())
-            .filter(|row| set[*row] == of)
+            .filter(|row| set[*row] == count)
             .collect::<Vec<usize>>()
     };
     let (fit, validate) = (rows(0), rows(1));
@@ -116,30 +116,30 @@ fn score(case: &Case, found: &Diagnosis, is_listed: bool) -> serde_json::Value {
         })
         .collect();
     let same =
-        |want: &(&str, String), own: &(&str, String, f64)| want.0 == own.0 && want.1 == own.1;
+        |want: &(&str, String), ours: &(&str, String, f64)| want.0 == ours.0 && want.1 == ours.1;
     let (want, all) = (case.want(), case.want_all());
-    let accepted = |own: &(&str, String, f64)| {
-        all.iter().any(|want| same(want, own))
+    let accepted = |ours: &(&str, String, f64)| {
+        all.iter().any(|want| same(want, ours))
             || case
                 .accepted
                 .iter()
-                .any(|(effect, place)| *effect == own.0 && *place == own.1)
+                .any(|(effect, place)| *effect == ours.0 && *place == ours.1)
     };
     let exact = is_listed
         && want
             .iter()
-            .all(|want| named.iter().any(|own| same(want, own)))
+            .all(|want| named.iter().any(|ours| same(want, ours)))
         && named.iter().all(&accepted);
     let wrong = named
         .iter()
-        .any(|own| own.0 != "unknown" && own.2 >= 0.5 && !accepted(own));
+        .any(|ours| ours.0 != "unknown" && ours.2 >= 0.5 && !accepted(ours));
     let placed = case.concealed.first().is_none_or(|one| {
         let places = || {
             std::iter::once(&one.cause.place).chain(case.accepted.iter().map(|(_, place)| place))
         };
         named
             .iter()
-            .any(|own| places().any(|place| own.1 == *place))
+            .any(|ours| places().any(|place| ours.1 == *place))
     });
     let floor = 3f64.sqrt() * case.noise_mm[1];
     let held_out = found

@@ -41,15 +41,15 @@ impl Cdr {
             .put(((ns % 1_000_000_000) as u32).to_le_bytes())
     }
     pub fn text(self, text: &str) -> Self {
-        let mut own = self.count(text.len() + 1);
-        own.bytes.extend(text.as_bytes());
-        own.bytes.push(0);
-        own
+        let mut ours = self.count(text.len() + 1);
+        ours.bytes.extend(text.as_bytes());
+        ours.bytes.push(0);
+        ours
     }
     pub fn numbers(self, numbers: &[f64]) -> Self {
         numbers
             .iter()
-            .fold(self, |own, number| own.put(number.to_le_bytes()))
+            .fold(self, |ours, number| ours.put(number.to_le_bytes()))
     }
     pub fn list(self, numbers: &[f64]) -> Self {
         self.count(numbers.len()).numbers(numbers)
@@ -69,7 +69,7 @@ pub fn joint_state(
         .stamp(ns)
         .text("base_link")
         .count(names.len());
-    let named = names.iter().fold(head, |own, name| own.text(name));
+    let named = names.iter().fold(head, |ours, name| ours.text(name));
     named.list(position).list(velocity).list(effort).done()
 }
 
@@ -84,8 +84,8 @@ pub fn point(is_big: bool, ns: i64, point: [f64; 3]) -> Vec<u8> {
 pub fn frames(ns: i64, all: &[(&str, &str, [f64; 7])]) -> Vec<u8> {
     let head = Cdr::new(false).count(all.len());
     all.iter()
-        .fold(head, |own, (parent, child, pose)| {
-            own.stamp(ns).text(parent).text(child).numbers(pose)
+        .fold(head, |ours, (parent, child, pose)| {
+            ours.stamp(ns).text(parent).text(child).numbers(pose)
         })
         .done()
 }

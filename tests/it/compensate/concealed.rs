@@ -68,7 +68,7 @@ pub fn outcomes_at(
     case: &Case,
     (targets, outside): (Vec<Point>, Vec<bool>),
 ) -> (Vec<Outcome>, String) {
-    let mut of = recorded(case);
+    let mut recording = recorded(case);
     let mut robot = case.robot.clone();
     if case.bare {
         robot
@@ -76,11 +76,11 @@ pub fn outcomes_at(
             .iter_mut()
             .for_each(|joint| (joint.mass, joint.centre) = (None, None));
     }
-    of.robot = Robot::from_description(&robot);
-    let geometry = of.identify(json!({"effects": GEOMETRY}));
+    recording.robot = Robot::from_description(&robot);
+    let geometry = recording.identify(json!({"effects": GEOMETRY}));
     let plain = IdentifiedArm::new(model(&robot, &geometry.get()), None);
 
-    let made = of.diagnose(json!({}));
+    let made = recording.diagnose(json!({}));
     let model = model(&robot, &made.get());
     let covariance = made.get::<CovarianceTable>().of_model(&model);
     let verdict = made.verdict();
@@ -104,7 +104,7 @@ pub fn outcomes_at(
         repeatability: verdict.repeatability_rad,
     };
     let arm = IdentifiedArm::new(model, None);
-    let data = of.recording.measurements();
+    let data = recording.recording.measurements();
 
     let options = || CorrectionOptions {
         clock: data.has_clock(),
@@ -309,11 +309,11 @@ fn print(case: &Case, floor: f64, outcomes: &[Outcome], named: &str) {
         .map(|(effect, place)| format!("{effect} at {place}"))
         .collect();
     let harm = outcomes.iter().filter(|one| is_harmed(one, floor)).count();
-    let rms = |outside: bool, of: fn(&Outcome) -> f64| {
+    let rms = |outside: bool, value_of: fn(&Outcome) -> f64| {
         let values: Vec<f64> = outcomes
             .iter()
             .filter(|one| one.outside == outside && !one.refused)
-            .map(of)
+            .map(value_of)
             .collect();
         (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
     };
@@ -397,13 +397,13 @@ pub fn upright(seed: u64) -> Case {
     let case = nothing(seed, true);
     let mut draw = Noise::new(seed, Purpose::Design);
     let (limits, room) = (limits(&case), Room::of(&case));
-    let mut own = Noise::new(seed ^ 7, Purpose::Design);
+    let mut ours = Noise::new(seed ^ 7, Purpose::Design);
     let q_of = |_: &Shot| loop {
-        let mut q = room.pose(&limits, &mut own);
-        let turned = if own.chance(0.5) { 90.0f64 } else { -90.0 };
+        let mut q = room.pose(&limits, &mut ours);
+        let turned = if ours.chance(0.5) { 90.0f64 } else { -90.0 };
         q[3] = turned.to_radians() - q[1] - q[2];
         q[3] -= std::f64::consts::TAU * (q[3] / std::f64::consts::TAU).round();
-        q[4] = if own.chance(0.5) { 90.0f64 } else { -90.0 }.to_radians();
+        q[4] = if ours.chance(0.5) { 90.0f64 } else { -90.0 }.to_radians();
         if (limits[3][0]..=limits[3][1]).contains(&q[3]) {
             return q;
         }
@@ -524,7 +524,9 @@ fn what_no_row_shows_moves_no_robot() {
         let (outcomes, named) = outcomes(&case);
         print(&case, floor, &outcomes, &named);
         let kept = || outcomes.iter().filter(|one| !one.refused);
-        let square = |of: fn(&Outcome) -> f64| kept().map(of).map(|miss| miss * miss).sum::<f64>();
+        let square = |value_of: fn(&Outcome) -> f64| {
+            kept().map(value_of).map(|miss| miss * miss).sum::<f64>()
+        };
         assert!(
             square(|one| one.miss) < 0.25 * square(|one| one.plain),
             "seed {}: {named}",

@@ -34,25 +34,25 @@ fn true_joints(list: &ControllerList, commanded: &[f64]) -> Vec<f64> {
         list.get(&(quantity.to_string(), place))
             .map_or(0.0, |(value, _)| *value)
     };
-    let of = |joint: usize| {
-        let own = (1.0 + value("factor - 1", format!("joint {joint}"))) * commanded[joint - 1];
+    let of_joint = |joint: usize| {
+        let ours = (1.0 + value("factor - 1", format!("joint {joint}"))) * commanded[joint - 1];
         let coupled: f64 = (1..=6)
             .map(|by| value("coupling", format!("joint {by}->{joint}")) * commanded[by - 1])
             .sum();
-        own + value("zero", format!("joint {joint}")) + coupled
+        ours + value("zero", format!("joint {joint}")) + coupled
     };
-    (1..=6).map(of).collect()
+    (1..=6).map(of_joint).collect()
 }
 
 /// The list as a maker counts that moves joints as the list of the robot file's counting does: read off at zero and at each joint alone.
-fn counted(maker: &Maker, own: &ControllerList) -> ControllerList {
+fn counted(maker: &Maker, ours: &ControllerList) -> ControllerList {
     let off = |numbers: &[f64]| -> Vec<f64> {
         let q: Vec<f64> = maker
             .driven(numbers)
             .iter()
             .map(|q| q.to_degrees())
             .collect();
-        let real: Vec<f64> = true_joints(own, &q)
+        let real: Vec<f64> = true_joints(ours, &q)
             .iter()
             .map(|q| q.to_radians())
             .collect();
@@ -156,14 +156,14 @@ fn numbers_for_the_controller_move_its_joints_as_the_model_does() {
         };
         let list = export("latest");
         // A table of parameters alone does not know the controller: its numbers are in the robot file's counting.
-        let own = export(".calib/tables/counted/identify.parameters.parquet --robot robot.yaml");
+        let ours = export(".calib/tables/counted/identify.parameters.parquet --robot robot.yaml");
         let mut apart = 0f64;
         for k in 0..200 {
             let q: Vec<f64> = (0..6)
                 .map(|j| 2.0 * (1.3 * f64::from(k) + 0.7 * f64::from(j)).sin())
                 .collect();
             let degrees: Vec<f64> = q.iter().map(|q| q.to_degrees()).collect();
-            let real: Vec<f64> = true_joints(&own, &degrees)
+            let real: Vec<f64> = true_joints(&ours, &degrees)
                 .iter()
                 .map(|q| q.to_radians())
                 .collect();

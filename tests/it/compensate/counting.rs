@@ -44,7 +44,8 @@ fn compensated(
     let folder = recorded(maker, cell, points, ROBOT, IDENTIFY);
     let here = folder.path();
     let robot = RobotModel::new(cell.robot.clone());
-    let each = |of: &dyn Fn(&Point) -> String| targets.iter().map(of).collect::<String>();
+    let each =
+        |value_of: &dyn Fn(&Point) -> String| targets.iter().map(value_of).collect::<String>();
     let counted = |target: &Point| -> Vec<String> {
         let numbers = maker.counted(&target.q).into_iter();
         numbers.map(|number| format!("{number:.9}")).collect()
@@ -53,11 +54,11 @@ fn compensated(
     let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg";
     let input = format!("{header}\n{}", each(&|target| list(target) + "\n"));
     let table = ran(here, "compensate latest --plain", &input);
-    let said = fed(here, "compensate latest", &input).err;
+    let printed = fed(here, "compensate latest", &input).err;
     assert_eq!(
-        said.contains("joints are counted as at the controller: "),
+        printed.contains("joints are counted as at the controller: "),
         maker.name != PLAIN.name,
-        "{said}"
+        "{printed}"
     );
     let posed = each(&|target| {
         let pose = robot.forward(&target.q);
@@ -199,13 +200,13 @@ fn commands_are_counted_as_the_controller_counts() {
         );
     }
     for maker in makers() {
-        for ((output, misses), (_, own)) in compensated(&maker, &cell, &points, &targets)
+        for ((output, misses), (_, ours)) in compensated(&maker, &cell, &points, &targets)
             .iter()
             .zip(&plain)
         {
             let apart = misses
                 .iter()
-                .zip(own)
+                .zip(ours)
                 .map(|(a, b)| (a - b).abs())
                 .fold(0.0, f64::max);
             println!(

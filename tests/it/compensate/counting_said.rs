@@ -152,7 +152,7 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
             );
         }
 
-        let said = format!(
+        let printed = format!(
             "joints stand in the robot file's counting; both controllers count otherwise ({difference})"
         );
         let tables = ["latest/ingest/recording", "latest/ingest/recording"]
@@ -160,7 +160,7 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         for pair in [["HEAD", "HEAD"], [tables[0].as_str(), tables[1].as_str()]] {
             let text = ran(here, &format!("diff {} {}", pair[0], pair[1]), "");
             assert_eq!(
-                text.lines().filter(|line| **line == said).count(),
+                text.lines().filter(|line| **line == printed).count(),
                 usize::from(otherwise),
                 "{text}"
             );
@@ -173,7 +173,7 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
             .unwrap();
             assert_eq!(
                 document["counting"].as_str(),
-                otherwise.then_some(said.as_str())
+                otherwise.then_some(printed.as_str())
             );
         }
         let parameters = calib(

@@ -170,9 +170,9 @@ fn asked_beyond_small_loads(
         }),
     ];
     let case = again(case, effects, seed, pose);
-    let of = recorded(&case);
-    let data = of.recording.measurements();
-    let made = of.diagnose(json!({}));
+    let recording = recorded(&case);
+    let data = recording.recording.measurements();
+    let made = recording.diagnose(json!({}));
     let arm = IdentifiedArm::new(model(&case.robot, &made.get()), None);
     let (mut reach, mut nominal) = (arm.reach(), Nominal::new(&robot));
     let instrument = case.noise_mm[0] * 3f64.sqrt();

@@ -87,7 +87,7 @@ impl Target {
 }
 
 fn targets(trip: &Trip, maker: &Maker) -> Vec<Target> {
-    let of = |(k, q): (usize, Vec<f64>)| Target {
+    let of_k = |(k, q): (usize, Vec<f64>)| Target {
         q,
         base: k % 3,
         gun: k % 5 < 2,
@@ -95,7 +95,7 @@ fn targets(trip: &Trip, maker: &Maker) -> Vec<Target> {
     poses(trip, maker, 24)
         .into_iter()
         .enumerate()
-        .map(of)
+        .map(of_k)
         .collect()
 }
 
@@ -166,11 +166,11 @@ fn programs(trip: &Trip, maker: &Maker, targets: &[Target]) -> Vec<Written> {
         .enumerate()
         .map(|(k, base)| {
             let user = frame([5.0, -7.0, 9.0, 10.0, 0.0, 0.0]);
-            let own = user.inverse() * frame(*base);
+            let ours = user.inverse() * frame(*base);
             format!(
                 "PERS wobjdata bench{k}:=[FALSE,TRUE,\"\",{},{}];\n",
                 list(&user),
-                list(&own)
+                list(&ours)
             )
         })
         .collect();
@@ -225,13 +225,18 @@ fn programs(trip: &Trip, maker: &Maker, targets: &[Target]) -> Vec<Written> {
 #[test]
 fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
     let trip = Trip::new();
-    let of = |name: &str| {
+    let of_name = |name: &str| {
         makers()
             .into_iter()
             .find(|maker| maker.name == name)
             .unwrap()
     };
-    for maker in [PLAIN, of("KUKA"), of("signs 1, 4, 6"), of("zeros")] {
+    for maker in [
+        PLAIN,
+        of_name("KUKA"),
+        of_name("signs 1, 4, 6"),
+        of_name("zeros"),
+    ] {
         let targets = targets(&trip, &maker);
         let wanted: Vec<Vec<f64>> = targets.iter().map(|target| target.q.clone()).collect();
         let joints = |q: &[f64]| {
@@ -247,12 +252,12 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
             .iter()
             .map(|q| format!("PTP {{{}}}\n", joints(q)))
             .collect();
-        let own = trip.compensated(&maker, Language::Krl, &joints).unwrap();
-        let own: Vec<Vec<f64>> = read(Language::Krl, &own.bytes)
+        let ours = trip.compensated(&maker, Language::Krl, &joints).unwrap();
+        let ours: Vec<Vec<f64>> = read(Language::Krl, &ours.bytes)
             .iter()
             .map(|one| maker.driven(&one.values))
             .collect();
-        let own = trip.misses(&wanted, &own);
+        let ours = trip.misses(&wanted, &ours);
         for (name, language, text, others) in programs(&trip, &maker, &targets) {
             let companions: Vec<Companion> = others
                 .iter()
@@ -279,7 +284,7 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
             let misses = trip.misses(&wanted, &driven.collect::<Vec<_>>());
             let apart = misses
                 .iter()
-                .zip(&own)
+                .zip(&ours)
                 .map(|(a, b)| (a - b).abs())
                 .fold(0.0, f64::max);
             println!(
@@ -431,7 +436,7 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
     );
     for faulty in ["", "1,2,3", "a b", "1,2,3,4,5,x"] {
         assert!(
-            RobotTool::parse(faulty).is_err_and(|said| said.contains("X,Y,Z,A,B,C")),
+            RobotTool::parse(faulty).is_err_and(|printed| printed.contains("X,Y,Z,A,B,C")),
             "{faulty}"
         );
     }

@@ -45,9 +45,9 @@ fn a_correction_above_its_limit_has_no_joints_and_one_who_insists_is_told() {
 #[test]
 fn what_calib_corrected_is_not_corrected_once_more() {
     let (_, once, err) = run("compensate latest", HEADER);
-    let (code, out, said) = run("compensate latest", &once);
+    let (code, out, printed) = run("compensate latest", &once);
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-    has(&said, ["was compensated by calib already", "--force"]);
+    has(&printed, ["was compensated by calib already", "--force"]);
     for (name, head, target, second) in [
         (
             "twice.src",
@@ -79,8 +79,8 @@ fn what_calib_corrected_is_not_corrected_once_more() {
 
 #[test]
 fn a_cartesian_program_in_a_frame_that_is_not_applied_is_refused_by_line() {
-    let rest = "[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
-    let text = format!("MODULE m\nMoveL [[900,40,930],{rest},v1,z1,t\\WObj:=fixture;\nENDMODULE\n");
+    let tail = "[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
+    let text = format!("MODULE m\nMoveL [[900,40,930],{tail},v1,z1,t\\WObj:=fixture;\nENDMODULE\n");
     put(cell(), "wobj.mod", text);
     let (code, out, err) = run("compensate latest wobj.mod", "");
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
@@ -95,7 +95,7 @@ fn a_cartesian_program_in_a_frame_that_is_not_applied_is_refused_by_line() {
 
 #[test]
 fn a_target_in_a_work_object_is_corrected_where_it_stands() {
-    let rest = "[9E9,9E9,9E9,9E9,9E9,9E9]]";
+    let tail = "[9E9,9E9,9E9,9E9,9E9,9E9]]";
     let numbers = |text: &str| -> Vec<f64> {
         let line = text.lines().find(|line| line.starts_with("MoveL")).unwrap();
         let cut = |c: char| !(c.is_ascii_digit() || "+-.".contains(c));
@@ -106,7 +106,7 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
             .collect()
     };
     let plain = format!(
-        "MODULE m\nMoveL [[900,40,930],[1,0,0,0],[9E9,9E9,9E9,9E9],{rest},v1,z1,t;\nENDMODULE\n"
+        "MODULE m\nMoveL [[900,40,930],[1,0,0,0],[9E9,9E9,9E9,9E9],{tail},v1,z1,t;\nENDMODULE\n"
     );
     put(cell(), "plain.mod", plain);
     let (code, plain, err) = run("compensate latest plain.mod", "");
@@ -115,7 +115,7 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
     let object =
         "PERS wobjdata fixture:=[FALSE,TRUE,\"\",[[100,0,0],[0,0,0,1]],[[0,-20,-30],[1,0,0,0]]];\n";
     let program = format!(
-        "MODULE m\n{object}MoveL [[-800,-20,960],[0,0,0,1],[9E9,9E9,9E9,9E9],{rest},v1,z1,t\\WObj:=fixture;\nENDMODULE\n"
+        "MODULE m\n{object}MoveL [[-800,-20,960],[0,0,0,1],[9E9,9E9,9E9,9E9],{tail},v1,z1,t\\WObj:=fixture;\nENDMODULE\n"
     );
     put(cell(), "object.mod", program);
     let (code, within, err) = run("compensate latest object.mod", "");
@@ -147,11 +147,11 @@ fn a_table_of_parameters_without_a_verdict_is_held_to_the_same_limits() {
         let bare = here.join("bare.parquet");
         std::fs::copy(table, &bare).unwrap();
         let given = "compensate bare.parquet --robot robot.yaml --angle deg";
-        let said = |more: &str| {
+        let message_of = |more: &str| {
             let output = fed(here, &format!("{given} {more}"), HEADER);
             (output.code, output.err.clone(), output.out.len())
         };
-        let (code, err, bytes) = said("");
+        let (code, err, bytes) = message_of("");
         if refused {
             assert_eq!((code, bytes), (Some(10), 0), "{err}");
             has(
@@ -161,15 +161,15 @@ fn a_table_of_parameters_without_a_verdict_is_held_to_the_same_limits() {
                     "from the robot file's",
                 ],
             );
-            let (code, err, _) = said("--force");
+            let (code, err, _) = message_of("--force");
             assert!(
                 code != Some(2) && err.contains("used because of --force: joint_offset at joint 2"),
                 "{err}"
             );
         } else {
             assert_eq!(code, Some(0), "{err}");
-            assert_eq!(said("--max-correction 0.01").0, Some(10));
-            assert_eq!(said("--max-shift 0.001").0, Some(10));
+            assert_eq!(message_of("--max-correction 0.01").0, Some(10));
+            assert_eq!(message_of("--max-shift 0.001").0, Some(10));
         }
     }
 }
@@ -211,9 +211,9 @@ fn an_output_never_takes_the_place_of_a_file_that_was_read() {
             folder.path(),
             &format!("export pipeline.yaml --format json --out {file}"),
         );
-        let said = output.err.clone();
-        assert_eq!(output.code, Some(2), "{said}");
-        has(&said, "that the model was made from");
+        let printed = output.err.clone();
+        assert_eq!(output.code, Some(2), "{printed}");
+        has(&printed, "that the model was made from");
         assert_eq!(std::fs::read(folder.path().join(file)).unwrap(), before);
     }
 }
@@ -230,10 +230,10 @@ fn an_arm_far_from_the_robot_file_is_refused_before_anything_is_written() {
         "export pipeline.yaml --format json",
     ] {
         let output = fed(here, verb, HEADER);
-        let said = output.err.clone();
-        assert_eq!((output.code, output.out.len()), (Some(10), 0), "{said}");
+        let printed = output.err.clone();
+        assert_eq!((output.code, output.out.len()), (Some(10), 0), "{printed}");
         has(
-            &said,
+            &printed,
             [
                 " from the robot file's",
                 "refused: the set-up is wrong",
@@ -269,9 +269,9 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
             &format!("compensate pipeline.yaml {file} --quiet"),
             HEADER,
         );
-        let said = output.err.clone();
-        assert_eq!((output.code, output.out.len()), (Some(10), 0), "{said}");
-        has(&said, ["states no payload", "measured up to 50 kg"]);
+        let printed = output.err.clone();
+        assert_eq!((output.code, output.out.len()), (Some(10), 0), "{printed}");
+        has(&printed, ["states no payload", "measured up to 50 kg"]);
         fed(
             here,
             &format!("compensate pipeline.yaml {file} --quiet --payload 0"),
@@ -290,7 +290,7 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
             "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n",
         ),
     ] {
-        let said = |text: &str, more: &str| {
+        let message_of = |text: &str, more: &str| {
             put(here, file, text);
             let output = calib(here, &format!("compensate pipeline.yaml {file} {more}"));
             let (code, out, err) = output.parts();
@@ -302,13 +302,13 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
                 err,
             )
         };
-        let (code, out, err) = said(target, "");
+        let (code, out, err) = message_of(target, "");
         assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-        let (code, by_program, err) = said(&format!("{stating}{target}"), "");
+        let (code, by_program, err) = message_of(&format!("{stating}{target}"), "");
         assert_eq!(code, Some(0), "{err}");
         has(&err, "payload 50 kg, as");
-        assert_eq!(by_program, said(target, "--payload 50").1);
-        let (_, other, err) = said(&format!("{stating}{target}"), "--payload 0");
+        assert_eq!(by_program, message_of(target, "--payload 50").1);
+        let (_, other, err) = message_of(&format!("{stating}{target}"), "--payload 0");
         has(
             &err,
             "the program states a payload of 50 kg, --payload 0 kg, which is used",
@@ -388,15 +388,15 @@ fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
     // Heights with bumps over three joints that no cause has.
     let log = read(here.join("log.csv"));
     let bumpy = |line: &str| {
-        let (rest, z) = line.rsplit_once(',').unwrap();
-        let cells: Vec<f64> = rest
+        let (tail, z) = line.rsplit_once(',').unwrap();
+        let cells: Vec<f64> = tail
             .split(',')
             .skip(1)
             .map(|cell| cell.parse().unwrap())
             .collect();
         let bumps = (cells[0] / 7.0).sin() * (cells[1] / 5.0).sin()
             + (cells[2] / 6.0 + cells[0] / 9.0).cos();
-        format!("{rest},{:.6}\n", z.parse::<f64>().unwrap() + 0.3 * bumps)
+        format!("{tail},{:.6}\n", z.parse::<f64>().unwrap() + 0.3 * bumps)
     };
     let (header, rows) = log.split_once('\n').unwrap();
     let rows: String = rows.lines().map(bumpy).collect();

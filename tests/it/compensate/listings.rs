@@ -162,21 +162,22 @@ fn a_script_of_universal_robots_leads_the_true_robot_to_its_targets() {
             .compensated(&maker, Language::UrScript, &text)
             .unwrap_or_else(|message| panic!("{message}\n{text}"));
         let literals = read(Language::UrScript, &corrected.bytes);
-        let of = |kind: TargetKind| literals.iter().filter(move |literal| literal.kind == kind);
+        let of_kind =
+            |kind: TargetKind| literals.iter().filter(move |literal| literal.kind == kind);
         let pose = |v: &[f64]| {
             Pose::from_rotation_vector(
                 Vector3::new(v[3], v[4], v[5]),
                 Vector3::new(v[0], v[1], v[2]),
             )
         };
-        let driven = of(TargetKind::RotationVector)
+        let driven = of_kind(TargetKind::RotationVector)
             .zip(&wanted)
             .map(|(literal, q)| trip.driven(pose(&literal.values), q));
         let of_poses = trip.misses(&wanted, &driven.collect::<Vec<_>>());
         let degrees = |literal: &calib::program::Literal| -> Vec<f64> {
             literal.values.iter().map(|q| q.to_degrees()).collect()
         };
-        let driven: Vec<Vec<f64>> = of(TargetKind::Radians)
+        let driven: Vec<Vec<f64>> = of_kind(TargetKind::Radians)
             .map(|literal| maker.driven(&degrees(literal)))
             .collect();
         near(&of_poses, &trip.misses(&wanted, &driven), maker.name);

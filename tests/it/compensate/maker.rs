@@ -82,14 +82,14 @@ pub fn makers() -> Vec<Maker> {
 
 impl Maker {
     pub fn counted(&self, q: &[f64]) -> Vec<f64> {
-        let own: Vec<f64> = q.iter().map(|q| q.to_degrees()).collect();
+        let ours: Vec<f64> = q.iter().map(|q| q.to_degrees()).collect();
         let held = |joint: usize| {
             self.parts(joint)
-                .map(|(by, ratio)| ratio * own[by])
+                .map(|(by, ratio)| ratio * ours[by])
                 .sum::<f64>()
         };
         (0..6)
-            .map(|joint| self.sign[joint] * (own[joint] + held(joint)) + self.zero[joint])
+            .map(|joint| self.sign[joint] * (ours[joint] + held(joint)) + self.zero[joint])
             .collect()
     }
 

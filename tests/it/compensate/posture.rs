@@ -164,13 +164,13 @@ fn programs_state_postures_and_are_told_once_where_they_do_not() {
             at.join(",")
         )
     };
-    let (code, own, err) = run("own.mod", &rapid("0,0,0,0"));
+    let (code, ours, err) = run("own.mod", &rapid("0,0,0,0"));
     assert_eq!(code, Some(0), "{err}");
     assert!(!err.contains("posture"), "{err}");
     // The wrist turned over: another posture, another error, another correction.
     let (code, over, err) = run("over.mod", &rapid("0,-2,-2,1"));
     assert_eq!(code, Some(0), "{err}");
-    assert_ne!(own, over);
+    assert_ne!(ours, over);
     let (code, out, err) = run("none.mod", &rapid("1,0,0,0"));
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
     has(

@@ -55,7 +55,7 @@ pub fn poses(trip: &Trip, maker: &Maker, count: usize) -> Vec<Vec<f64>> {
     };
     // A turn more of a joint has another sign, or is beyond its limits.
     let limits = |joint: usize| trip.robot.description().joints[joint].limits.unwrap();
-    let told = |q: &Vec<f64>, joint: usize, more: f64| {
+    let result_of = |q: &Vec<f64>, joint: usize, more: f64| {
         let (turned, [low, high], c) = (
             q[joint] + more * TAU,
             limits(joint),
@@ -63,7 +63,8 @@ pub fn poses(trip: &Trip, maker: &Maker, count: usize) -> Vec<Vec<f64>> {
         );
         !(low..=high).contains(&turned) || (c + maker.sign[joint] * more * 360.0 < 0.0) != (c < 0.0)
     };
-    let is_told = |q: &Vec<f64>| (0..6).all(|joint| told(q, joint, 1.0) && told(q, joint, -1.0));
+    let is_told =
+        |q: &Vec<f64>| (0..6).all(|joint| result_of(q, joint, 1.0) && result_of(q, joint, -1.0));
     (1..20000)
         .map(pose)
         .filter(|q| is_clear(maker, q) && is_told(q))
@@ -155,11 +156,11 @@ fn every_posture_that_a_program_states_is_reached_as_its_joints_are() {
                 .collect()
         };
         let by_joints = trip.compensated(&maker, Language::Krl, &joints).unwrap();
-        let own: Vec<Vec<f64>> = read(Language::Krl, &by_joints.bytes)
+        let ours: Vec<Vec<f64>> = read(Language::Krl, &by_joints.bytes)
             .iter()
             .map(|one| maker.driven(&one.values))
             .collect();
-        let own = trip.misses(&poses, &own);
+        let ours = trip.misses(&poses, &ours);
         let status_turn = placed(|maker, q, at| {
             krl(at, &format!(",S {},T {}", status(maker, q), turn(maker, q)))
         });
@@ -200,7 +201,7 @@ fn every_posture_that_a_program_states_is_reached_as_its_joints_are() {
             let apart = trip
                 .misses(&poses, &driven)
                 .iter()
-                .zip(&own)
+                .zip(&ours)
                 .map(|(a, b)| (a - b).abs())
                 .collect::<Vec<_>>();
             println!(
@@ -210,7 +211,7 @@ fn every_posture_that_a_program_states_is_reached_as_its_joints_are() {
             );
             assert!(largest(apart) < 1e-3, "{} {name}", maker.name);
         }
-        assert!(largest(own) < 0.1, "{}", maker.name);
+        assert!(largest(ours) < 0.1, "{}", maker.name);
     }
 }
 
@@ -223,13 +224,13 @@ fn a_posture_that_no_joints_have_is_refused_with_its_line() {
         (status(&PLAIN, &q), turn(&PLAIN, &q), confdata(&PLAIN, &q)),
         (2, 4, [0, 0, 0, 0])
     );
-    let said = |language: Language, text: String| {
+    let message_of = |language: Language, text: String| {
         trip.compensated(&PLAIN, language, &text)
             .expect_err("refused")
     };
     let sound = krl(&at, ",S 2,T 4");
     // Joint 5 below 0 by S, above by T.
-    let refused = said(Language::Krl, format!("{sound}{}", krl(&at, ",S 6,T 4")));
+    let refused = message_of(Language::Krl, format!("{sound}{}", krl(&at, ",S 6,T 4")));
     has(
         &refused,
         [
@@ -237,7 +238,7 @@ fn a_posture_that_no_joints_have_is_refused_with_its_line() {
             "not reached in the posture that is stated (S 6, T 4)",
         ],
     );
-    let refused = said(Language::Rapid, rapid(&at, [0, 0, 0, 1]));
+    let refused = message_of(Language::Rapid, rapid(&at, [0, 0, 0, 1]));
     has(
         &refused,
         "not reached in the posture that is stated ([0,0,0,1])",

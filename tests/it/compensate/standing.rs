@@ -15,19 +15,19 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     let here = folder.path();
     put(here, "robot.yaml", ROBOT);
     put(here, "pipeline.yaml", format!("{PIPELINE}{POOR}"));
-    let said = |arguments: &str, input: &str| -> (String, String) {
+    let message_of = |arguments: &str, input: &str| -> (String, String) {
         let output = fed(here, arguments, input);
         let (code, out, err) = output.parts();
         assert!(code == Some(0), "{arguments:?}: {err}");
         (out, err)
     };
-    let (out, err) = said("run pipeline.yaml --details", "");
+    let (out, err) = message_of("run pipeline.yaml --details", "");
     has(&out, "\nwarning   poor withdrawn, identify used: ");
     has(&out, " at 60 points unseen by either fit\n");
     has(&out, "  poor (withdrawn)  validate");
     has(&err, "`poor` is withdrawn and `identify` used instead: ");
     let document: Value =
-        serde_json::from_str(&said("run pipeline.yaml --json --quiet", "").0).unwrap();
+        serde_json::from_str(&message_of("run pipeline.yaml --json --quiet", "").0).unwrap();
     assert_eq!(
         (
             &document["standing"]["step"],
@@ -84,17 +84,17 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     );
     for model in ["pipeline.yaml", "HEAD"] {
         let targets = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n";
-        let (taken, err) = said(&format!("compensate {model} --quiet"), targets);
+        let (taken, err) = message_of(&format!("compensate {model} --quiet"), targets);
         has(
             &err,
             "warning: `poor` is withdrawn and `identify` used instead",
         );
-        let (asked, err) = said(
+        let (asked, err) = message_of(
             &format!("compensate {model} --quiet --step identify"),
             targets,
         );
         assert_eq!((taken, err.as_str()), (asked, ""));
-        let (out, err) = said(&format!("export {model} --format json"), "");
+        let (out, err) = message_of(&format!("export {model} --format json"), "");
         assert!(
             out.contains("stage identify\"") && err.contains("warning: `poor` is withdrawn"),
             "{err}"

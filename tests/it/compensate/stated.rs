@@ -31,25 +31,25 @@ fn what_no_target_can_state_is_a_fault_with_row_and_column_and_nothing_is_writte
             "expected a direction: 1, -1, or 0 where it is not known, found 7",
         ),
     ] {
-        let (code, said, written) = corrected(
+        let (code, printed, written) = corrected(
             &format!("{HEADER},{name}\n10,20,-30,5,40,0,1\n10,20,-30,5,40,0,{value}\n"),
             "",
         );
-        assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
-        has(&said, &format!("stdin:3: column 18: field 7: {allowed}"));
-        let (code, said, _) = corrected(
+        assert_eq!((code, written.as_str()), (Some(10), ""), "{printed}");
+        has(&printed, &format!("stdin:3: column 18: field 7: {allowed}"));
+        let (code, printed, _) = corrected(
             &format!("{HEADER},{name}\n10,20,-30,5,40,0,0\n10,20,-30,5,40,0,\n"),
             "",
         );
-        assert_eq!(code, Some(0), "{said}");
+        assert_eq!(code, Some(0), "{printed}");
     }
     for (option, allowed) in [
         ("--payload=-5", "--payload: expected a mass"),
         ("--temperature=-500", "--temperature: expected a temp"),
     ] {
-        let (code, said, _) = corrected(&format!("{HEADER}\n10,20,-30,5,40,0\n"), option);
-        assert_eq!(code, Some(2), "{said}");
-        has(&said, allowed);
+        let (code, printed, _) = corrected(&format!("{HEADER}\n10,20,-30,5,40,0\n"), option);
+        assert_eq!(code, Some(2), "{printed}");
+        has(&printed, allowed);
     }
 }
 
@@ -71,10 +71,10 @@ fn a_column_of_parquet_is_held_to_the_same() {
         .write(&batch)
         .and_then(|()| writer.close().map(|_| ()))
         .unwrap();
-    let (code, said, _) = corrected("", "loads.parquet --out loads_c.parquet");
-    assert_eq!(code, Some(10), "{said}");
+    let (code, printed, _) = corrected("", "loads.parquet --out loads_c.parquet");
+    assert_eq!(code, Some(10), "{printed}");
     has(
-        &said,
+        &printed,
         "loads.parquet: row 1: column `payload_kg`: expected a mass of 0 or more, kg, found -5",
     );
     assert!(!cell().join("loads_c.parquet").exists());
@@ -82,30 +82,32 @@ fn a_column_of_parquet_is_held_to_the_same() {
 
 #[test]
 fn a_quaternion_of_zeros_is_no_orientation() {
-    let (code, said, written) = corrected("x_mm,y_mm,z_mm,qw,qx,qy,qz\n800,40,900,0,0,0,0\n", "");
-    assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
+    let (code, printed, written) =
+        corrected("x_mm,y_mm,z_mm,qw,qx,qy,qz\n800,40,900,0,0,0,0\n", "");
+    assert_eq!((code, written.as_str()), (Some(10), ""), "{printed}");
     has(
-        &said,
+        &printed,
         "stdin:2: columns qw, qx, qy, qz: the quaternion has length 0.0000, expected 1",
     );
     // Angles of zero are one.
-    let (_, said, written) = corrected("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n800,40,900,0,0,0\n", "");
-    assert_eq!(written.lines().count(), 2, "{said}");
+    let (_, printed, written) =
+        corrected("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n800,40,900,0,0,0\n", "");
+    assert_eq!(written.lines().count(), 2, "{printed}");
 }
 
 #[test]
 fn degrees_under_a_header_in_rad_are_found_by_the_turns_of_most_rows() {
     let header = HEADER.replace("deg", "rad");
-    let (code, said, written) = corrected(&format!("{header}\n10,20,30,40,50,60\n"), "");
-    assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
+    let (code, printed, written) = corrected(&format!("{header}\n10,20,30,40,50,60\n"), "");
+    assert_eq!((code, written.as_str()), (Some(10), ""), "{printed}");
     let turned = "stdin:2: in 1 of 1 row a joint is beyond one and a half turns, here joint 1 at 10 rad; allowed: up to 9.42 rad";
-    has(&said, [turned, "if these are degrees"]);
+    has(&printed, [turned, "if these are degrees"]);
     let sound = "0.1,0.2,-0.3,0.1,0.4,0\n";
-    let (code, said, _) = corrected(
+    let (code, printed, _) = corrected(
         &format!("{header}\n{sound}{sound}0.1,0.2,-0.3,0.1,0.4,10\n"),
         "",
     );
-    assert_eq!(code, Some(0), "one row of three may be odd: {said}");
+    assert_eq!(code, Some(0), "one row of three may be odd: {printed}");
 }
 
 #[test]
@@ -128,9 +130,9 @@ fn files_that_cannot_be_read_or_written_are_named_before_a_pipeline_is_run_for_t
         assert!(!folder.path().join(".calib").exists(), "{arguments:?}");
         output.err
     };
-    let said = refused("nofile.csv --out nodir/x.csv");
+    let printed = refused("nofile.csv --out nodir/x.csv");
     has(
-        &said,
+        &printed,
         [
             "nofile.csv: cannot be read: ",
             "--out: nodir/x.csv: there is no folder nodir;",
@@ -150,9 +152,9 @@ fn one_of_the_targets_is_told_as_one() {
         beyond_measured: 1,
         ..CorrectionTotals::default()
     };
-    let said: Vec<String> = totals.warnings().collect();
+    let messages: Vec<String> = totals.warnings().collect();
     assert_eq!(
-        said,
+        messages,
         [
             "2 of them are reached in position but not in orientation: the wrist is singular there",
             "2 of them leave the joint limits",

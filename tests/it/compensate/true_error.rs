@@ -133,32 +133,32 @@ impl Cell {
     }
 
     /// With the geometry alone: the model, its table, its prediction.
-    fn rigid(&self, of: &Recorded) -> (Model, Parameters, Prediction) {
+    fn rigid(&self, recorded: &Recorded) -> (Model, Parameters, Prediction) {
         let geometry = json!({
             "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"], "folds": 0,
         });
-        let made = of.identify(geometry);
+        let made = recorded.identify(geometry);
         let parameters = made.get();
         (model(&self.robot, &parameters), parameters, made.get())
     }
 
     /// What `diagnose` makes of it: the model, its findings, the noise of a measured point, mm.
-    fn diagnosed(&self, of: Recorded) -> (Model, Findings, f64) {
-        let made = of.diagnose(json!({}));
+    fn diagnosed(&self, recorded: Recorded) -> (Model, Findings, f64) {
+        let made = recorded.diagnose(json!({}));
         let floor = made.verdict().noise_floor_mm.unwrap();
         (model(&self.robot, &made.get()), made.get(), floor)
     }
 
     /// The rigid model, and the joint curves that are learned on top of it.
-    fn learned(&self, of: Recorded) -> (Model, Option<Correction>) {
-        let (model, parameters, prediction) = self.rigid(&of);
+    fn learned(&self, recorded: Recorded) -> (Model, Option<Correction>) {
+        let (model, parameters, prediction) = self.rigid(&recorded);
         let learn = json!({"rivals": ["curves"], "folds": 2});
         let learn: Learn = settings(learn);
-        let prismatic = of.recording.prismatic.clone();
+        let prismatic = recorded.recording.prismatic.clone();
         let reads = LearnReads {
-            robot: Some(of.robot),
-            recording: of.recording,
-            split: of.split,
+            robot: Some(recorded.robot),
+            recording: recorded.recording,
+            split: recorded.split,
             parameters: Some(parameters),
             prediction,
         };

@@ -85,8 +85,8 @@ fn of_500_targets_95_of_100_are_hit_within_the_stated_radius_of_a_loaded_arm() {
 #[test]
 fn a_finding_by_what_no_target_states_is_named_and_one_without_a_size_is_not() {
     let robot = RobotModel::new(Kind::Compact6.description([60.0, -45.0, 35.0]));
-    let arm = |of: Variable, size: f64| {
-        let form: Form = Term::new(&Unknown, Motion::Joint { joint: 2 }, Law::of(of)).into();
+    let arm = |variable: Variable, size: f64| {
+        let form: Form = Term::new(&Unknown, Motion::Joint { joint: 2 }, Law::of(variable)).into();
         let stack = EffectStack::new(&robot, Pose::identity(), vec![Box::new(form)]);
         let mut model = Model::nominal(robot.clone(), stack);
         model.x[0] = size;

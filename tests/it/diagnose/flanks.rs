@@ -5,17 +5,17 @@ use crate::answer::has;
 
 #[test]
 fn flanks_that_err_differently_are_named_with_their_order_and_amplitude() {
-    let said = simulated(
+    let answer = simulated(
         "{gear_flank: {joint: 2, order: 5, amplitude_arcsec: 35, phase_deg: 40}}",
         8,
         160,
     );
     assert_eq!(
-        wanted(&said["findings"]),
+        wanted(&answer["findings"]),
         Named::from([("gear_flank".into(), "joint 2".into())]),
-        "{said:#}"
+        "{answer:#}"
     );
-    let finding = &said["findings"][0];
+    let finding = &answer["findings"][0];
     let number = |k: usize, name: &str| finding["parameters"][k][name].as_f64().unwrap();
     // sin(5 q + 40 deg) = cos(40 deg) sin(5 q) + sin(40 deg) cos(5 q)
     let (sine, cosine) = 40f64.to_radians().sin_cos();

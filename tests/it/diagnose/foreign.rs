@@ -2,7 +2,7 @@
 //!
 //! `CALIB_RECORDINGS=100 cargo test --test it -- diagnose::foreign --nocapture` prints every recording.
 
-use super::left_out::said;
+use super::left_out::diagnosed;
 use crate::compensate::concealed::from_environment;
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
@@ -53,22 +53,22 @@ fn what_is_in_no_list_is_diagnosed_and_counted() {
         assert_eq!(content, Content::Foreign);
         let case = Case::make(&design, number, content).unwrap();
         let one = &case.concealed[0];
-        let said = said(&case, &[]);
+        let diagnosed = diagnosed(&case, &[]);
         let places: Vec<&str> = std::iter::once(&one.cause.place)
             .chain(case.accepted.iter().map(|(_, place)| place))
             .map(String::as_str)
             .collect();
-        let first = said.found.iter().max_by(|a, b| a.3.total_cmp(&b.3));
+        let first = diagnosed.found.iter().max_by(|a, b| a.3.total_cmp(&b.3));
         let right = first.map(|(_, place, ..)| places.iter().any(|wanted| is_there(place, wanted)));
-        let named = said
+        let named = diagnosed
             .found
             .iter()
             .any(|(name, _, probability, _)| name != "unknown" && *probability >= 0.5);
         let floor = 3f64.sqrt() * case.noise_mm[1];
         let (within, is_worse, is_harmed) = (
-            said.after < 1.15 * floor,
-            said.after > said.before,
-            said.after > 1.2 * said.before,
+            diagnosed.after < 1.15 * floor,
+            diagnosed.after > diagnosed.before,
+            diagnosed.after > 1.2 * diagnosed.before,
         );
         match right {
             None => silent += 1,
@@ -76,7 +76,7 @@ fn what_is_in_no_list_is_diagnosed_and_counted() {
             Some(false) => misplaced += 1,
         }
         wrong += usize::from(named);
-        sound += usize::from(said.verdict != "unexplained");
+        sound += usize::from(diagnosed.verdict != "unexplained");
         bound += usize::from(within);
         worse += usize::from(is_worse);
         harmed += usize::from(is_harmed);
@@ -93,14 +93,14 @@ fn what_is_in_no_list_is_diagnosed_and_counted() {
             one.strength,
             case.fit,
             one.raw_mm,
-            said.before,
-            said.after,
-            said.verdict,
+            diagnosed.before,
+            diagnosed.after,
+            diagnosed.verdict,
             if right == Some(true) { " PLACED" } else { "" },
             if named { " NAMED" } else { "" },
             if within { " WITHIN" } else { "" },
             if is_worse { " WORSE" } else { "" },
-            said.found,
+            diagnosed.found,
             numbers.collect::<String>()
         );
     }
@@ -124,20 +124,20 @@ fn a_product_of_which_neither_variable_is_of_its_joint_or_shows_by_itself_is_fou
     let cause = &case.concealed[0].cause;
     // Joint 3 turns by jumps over the angle of joint 1, to one side without the payload and to the other with it.
     assert_eq!((&*case.name, &*cause.place), ("c0048", "joint 3"));
-    let said = said(&case, &[]);
+    let diagnosed = diagnosed(&case, &[]);
     // Part of it may be called by link 3, which joint 3 turns.
-    let found = found(&said);
+    let found = found(&diagnosed);
     assert!(found.contains(&("unknown", "joint 3")), "{found:?}");
-    halves_the_error(&said);
+    halves_the_error(&diagnosed);
 }
 
 /// Held-out points are predicted twice as well as before.
-fn halves_the_error(said: &super::left_out::Said) {
+fn halves_the_error(diagnosed: &super::left_out::Diagnosed) {
     assert!(
-        said.after < 0.5 * said.before,
+        diagnosed.after < 0.5 * diagnosed.before,
         "{} -> {}",
-        said.before,
-        said.after
+        diagnosed.before,
+        diagnosed.after
     );
 }
 
@@ -158,8 +158,8 @@ fn recorded_of(seed: u64, number: usize) -> Case {
 }
 
 /// Names and places that were found.
-fn found(said: &super::left_out::Said) -> Vec<(&str, &str)> {
-    let found = said.found.iter();
+fn found(diagnosed: &super::left_out::Diagnosed) -> Vec<(&str, &str)> {
+    let found = diagnosed.found.iter();
     found.map(|(name, place, ..)| (&**name, &**place)).collect()
 }
 
@@ -168,7 +168,7 @@ fn a_curve_of_its_own_load_that_turns_back_is_no_windup_of_a_joint() {
     // Joint 4 turns by corners over its load, to and fro.
     let case = recorded(31);
     assert_eq!(case.concealed[0].cause.place, "joint 4");
-    assert_eq!(found(&said(&case, &[])), [("unknown", "joint 4")]);
+    assert_eq!(found(&diagnosed(&case, &[])), [("unknown", "joint 4")]);
 }
 
 #[test]
@@ -176,25 +176,25 @@ fn a_cause_that_moves_few_rows_far_is_found_in_all_rows() {
     // Elevations jump at one move in eight of joint 1: 44 rows stand out.
     let case = recorded(24);
     assert_eq!(case.concealed[0].cause.place, "tracker");
-    let said = said(&case, &[]);
-    assert_eq!(found(&said), [("unknown", "tracker")]);
-    halves_the_error(&said);
+    let diagnosed = diagnosed(&case, &[]);
+    assert_eq!(found(&diagnosed), [("unknown", "tracker")]);
+    halves_the_error(&diagnosed);
 }
 
 #[test]
 fn elevations_that_err_with_the_place_of_the_target_have_a_mean() {
     let case = recorded(112);
     assert_eq!(case.concealed[0].cause.place, "tracker");
-    assert_eq!(found(&said(&case, &[])), [("unknown", "tracker")]);
+    assert_eq!(found(&diagnosed(&case, &[])), [("unknown", "tracker")]);
 }
 
 #[test]
 fn what_is_more_probable_at_a_closer_look_takes_the_place_of_a_finding() {
     // Ranges follow the temperature, which time follows: a base that moved once was taken up before other causes were asked.
     let case = recorded(48);
-    let said = said(&case, &[]);
-    assert_eq!(found(&said), [("unknown", "tracker")]);
-    halves_the_error(&said);
+    let diagnosed = diagnosed(&case, &[]);
+    assert_eq!(found(&diagnosed), [("unknown", "tracker")]);
+    halves_the_error(&diagnosed);
 }
 
 #[test]
@@ -202,9 +202,13 @@ fn a_curve_that_jumps_is_found_and_predicts() {
     // The base turns by jumps over the last move of joint 1: cosines alone left 0.216 mm of 0.524.
     let case = recorded_of(1_795_836_322, 38);
     assert_eq!(case.concealed[0].cause.place, "base");
-    let said = said(&case, &[]);
-    assert_eq!(found(&said), [("unknown", "base")]);
-    assert!(said.after < 0.1 * said.before, "{}", said.after);
+    let diagnosed = diagnosed(&case, &[]);
+    assert_eq!(found(&diagnosed), [("unknown", "base")]);
+    assert!(
+        diagnosed.after < 0.1 * diagnosed.before,
+        "{}",
+        diagnosed.after
+    );
 }
 
 #[test]
@@ -212,7 +216,7 @@ fn rows_that_are_set_aside_and_taken_back_in_turns_come_to_an_end() {
     // Where free forms move a row as far as it is off, it was readmitted in every second fit, for ever.
     let case = recorded_of(1_795_856_227, 5);
     assert_eq!(case.concealed[0].cause.place, "joint 3");
-    let said = said(&case, &[]);
-    assert_eq!(found(&said), [("unknown", "joint 3")]);
-    halves_the_error(&said);
+    let diagnosed = diagnosed(&case, &[]);
+    assert_eq!(found(&diagnosed), [("unknown", "joint 3")]);
+    halves_the_error(&diagnosed);
 }

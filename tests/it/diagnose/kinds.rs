@@ -157,28 +157,33 @@ fn recorded(
             ..drawn.clone()
         })
         .collect();
-    let [own, x, y, z] = [None, Some(0), Some(1), Some(2)].map(|axis: Option<usize>| {
+    let [plain, x, y, z] = [None, Some(0), Some(1), Some(2)].map(|axis: Option<usize>| {
         let mut moved = robot.clone();
         axis.iter().for_each(|axis| moved.tool[*axis] += APART);
         seen(&moved, &again)
     });
     let at = |shots: &[Shot], row: usize| Vector3::from(shots[row].position);
     let turn = |row: usize| {
-        Matrix3::from_columns(&[&x, &y, &z].map(|moved| (at(moved, row) - at(&own, row)) / APART))
+        Matrix3::from_columns(&[&x, &y, &z].map(|moved| (at(moved, row) - at(&plain, row)) / APART))
     };
-    let rows = own.len();
+    let rows = plain.len();
     Recorded {
         rows: Measurements {
             joints,
-            q: own.iter().flat_map(|shot| shot.q.clone()).collect(),
+            q: plain.iter().flat_map(|shot| shot.q.clone()).collect(),
             points: PointReadings::none(rows),
-            payload: own.iter().map(|shot| shot.payload_kg).collect(),
-            time: Some(own.iter().map(|shot| shot.time_s).collect()),
-            direction: Some(own.iter().flat_map(|shot| shot.direction.clone()).collect()),
+            payload: plain.iter().map(|shot| shot.payload_kg).collect(),
+            time: Some(plain.iter().map(|shot| shot.time_s).collect()),
+            direction: Some(
+                plain
+                    .iter()
+                    .flat_map(|shot| shot.direction.clone())
+                    .collect(),
+            ),
             noise_basis: NoiseBasis::Instrument,
             ..Measurements::default()
         },
-        point: (0..rows).map(|row| at(&own, row)).collect(),
+        point: (0..rows).map(|row| at(&plain, row)).collect(),
         turn: (0..rows).map(turn).collect(),
         robot,
     }
@@ -300,8 +305,8 @@ impl Recorded {
 }
 
 /// Names and places found are those concealed, and what is left is noise.
-fn explains(said: &Diagnosis, concealed: &Named) {
-    let found: Named = said
+fn explains(diagnosis: &Diagnosis, concealed: &Named) {
+    let found: Named = diagnosis
         .findings
         .iter()
         .map(|finding| (finding.effect.to_string(), finding.place.to_string()))
@@ -310,25 +315,26 @@ fn explains(said: &Diagnosis, concealed: &Named) {
         &found,
         concealed,
         "{}: {:#?}",
-        said.statement,
-        said.findings
+        diagnosis.statement,
+        diagnosis
+            .findings
             .iter()
             .map(|f| &f.statement)
             .collect::<Vec<_>>()
     );
     // A noise that is taken from what is left explains nothing.
-    let inferred = said.noise_basis == NoiseBasis::Inferred;
+    let inferred = diagnosis.noise_basis == NoiseBasis::Inferred;
     let verdict = if inferred {
         VerdictKind::Unexplained
     } else {
         VerdictKind::Explained
     };
-    assert_eq!(said.verdict, verdict, "{}", said.statement);
-    let (before, after) = (said.before.unwrap().rms, said.after.unwrap().rms);
+    assert_eq!(diagnosis.verdict, verdict, "{}", diagnosis.statement);
+    let (before, after) = (diagnosis.before.unwrap().rms, diagnosis.after.unwrap().rms);
     assert!(
-        after < 0.5 * before && (0.7..1.3).contains(&(after / said.noise_floor)),
+        after < 0.5 * before && (0.7..1.3).contains(&(after / diagnosis.noise_floor)),
         "{before:e} {after:e} {:e}",
-        said.noise_floor
+        diagnosis.noise_floor
     );
 }
 
@@ -385,13 +391,14 @@ fn causes_are_named_from_every_kind_of_measurement() {
             angle,
         ),
     ] {
-        let said = seen(recorded(&causes.physics(), count, given, play_arcsec)).diagnosed();
-        explains(&said, &causes.named());
-        assert!(dimension.is_none_or(|dimension| said.dimension == dimension));
-        let in_angles = said.statement.contains("arcsec") && !said.statement.contains(" um");
-        assert!(count < 700 || in_angles, "{}", said.statement);
+        let diagnosis = seen(recorded(&causes.physics(), count, given, play_arcsec)).diagnosed();
+        explains(&diagnosis, &causes.named());
+        assert!(dimension.is_none_or(|dimension| diagnosis.dimension == dimension));
+        let in_angles =
+            diagnosis.statement.contains("arcsec") && !diagnosis.statement.contains(" um");
+        assert!(count < 700 || in_angles, "{}", diagnosis.statement);
         // How well joints repeat is seen, too.
-        let repeatability = said.repeatability.sigma.to_degrees() * 3600.0;
+        let repeatability = diagnosis.repeatability.sigma.to_degrees() * 3600.0;
         assert!(
             play_arcsec < 3.0 || (3.0..5.2).contains(&repeatability),
             "{repeatability} arcsec"

@@ -10,7 +10,7 @@ use serde_json::json;
 
 /// Found: name, place, probability and loss without it each; verdict; rms (mm) at held-out rows before and after; squared residual per
 /// degree of freedom.
-pub struct Said {
+pub struct Diagnosed {
     pub found: Vec<(String, String, f64, f64)>,
     pub verdict: String,
     pub before: f64,
@@ -23,7 +23,7 @@ pub struct Said {
 struct Bins([(usize, f64, usize); 3]);
 
 impl Bins {
-    fn add(&mut self, said: &Said, case: &Case) {
+    fn add(&mut self, diagnosed: &Diagnosed, case: &Case) {
         let true_names = |name: &str, place: &str| {
             let true_places = case
                 .want_all()
@@ -33,8 +33,10 @@ impl Bins {
                 .into_iter()
                 .any(|(effect, there)| effect == name && there == place)
         };
-        for (name, place, probability, _) in
-            said.found.iter().filter(|(name, ..)| name != "unknown")
+        for (name, place, probability, _) in diagnosed
+            .found
+            .iter()
+            .filter(|(name, ..)| name != "unknown")
         {
             let bin =
                 &mut self.0[usize::from(*probability >= 0.5) + usize::from(*probability >= 0.9)];
@@ -44,13 +46,13 @@ impl Bins {
         }
     }
 
-    fn print(&self, of: &str) {
+    fn print(&self, subject: &str) {
         for (bin, (count, stated, right)) in
             ["0 to 0.5", "0.5 to 0.9", "0.9 to 1"].iter().zip(&self.0)
         {
             let share = |sum: f64| sum / (*count).max(1) as f64;
             println!(
-                "{of}, {bin}: {count} names, stated {:.2}, right {:.2}",
+                "{subject}, {bin}: {count} names, stated {:.2}, right {:.2}",
                 share(*stated),
                 share(*right as f64)
             );
@@ -58,11 +60,11 @@ impl Bins {
     }
 }
 
-pub fn said(case: &Case, without: &[&str]) -> Said {
+pub fn diagnosed(case: &Case, without: &[&str]) -> Diagnosed {
     let made = recorded(case).diagnose(json!({"without": without}));
     let (verdict, findings): (_, Findings) = (made.verdict(), made.get());
     let found = findings.0.iter().filter(|row| row.forms != "[]");
-    Said {
+    Diagnosed {
         found: found
             .map(|row| {
                 (
@@ -113,7 +115,7 @@ fn what_is_left_out_is_never_named() {
             continue;
         }
         let cause = one.cause.effect;
-        let whole = said(&case, &[]);
+        let whole = diagnosed(&case, &[]);
         if !whole.found.iter().any(|(name, ..)| name == cause) {
             continue;
         }
@@ -125,7 +127,7 @@ fn what_is_left_out_is_never_named() {
                 .iter()
                 .any(|(name, _, probability, _)| name == cause && *probability >= 0.5),
         );
-        let left_out = said(&case, &[cause]);
+        let left_out = diagnosed(&case, &[cause]);
         let named: Vec<_> = left_out
             .found
             .iter()

@@ -37,8 +37,8 @@ fn why(form: Value, numbers: &[f64], error: f64, torque: f64) -> Option<String> 
     form.impossible(numbers, &|_| error, &survey)
 }
 
-fn law(motion: Value, of: Value, basis: Value) -> Value {
-    json!({ "motion": motion, "law": { "of": of, "basis": basis } })
+fn law(motion: Value, title: Value, basis: Value) -> Value {
+    json!({ "motion": motion, "law": { "of": title, "basis": basis } })
 }
 
 #[test]
@@ -47,9 +47,9 @@ fn a_bend_lies_within_the_loads_that_were_recorded() {
     for shape in ["knee", "soft_zone", "saturating"] {
         // The model's loads reach 5 Nm, and those of the robot file more.
         assert_eq!(why(bent(shape, 4.9), &[1e-6, 1e-6], 0.0, 5.0), None);
-        let said = why(bent(shape, 14.0), &[1e-6, 1e-6], 0.0, 5.0).unwrap();
+        let printed = why(bent(shape, 14.0), &[1e-6, 1e-6], 0.0, 5.0).unwrap();
         assert_eq!(
-            said,
+            printed,
             "its bend at 14 Nm lies beyond the largest recorded load of 5.0 Nm"
         );
         // A load that only a model makes is not recorded.
@@ -62,7 +62,7 @@ fn a_bend_lies_within_the_loads_that_were_recorded() {
     assert_eq!(why(pushed(4.0), &[1e-5], 0.0, 5.0), None);
     assert!(
         why(pushed(-6.0), &[1e-5], 0.0, 5.0)
-            .is_some_and(|said| said.contains("threshold of 6.0 Nm"))
+            .is_some_and(|printed| printed.contains("threshold of 6.0 Nm"))
     );
     assert_eq!(
         why(pushed(4.0), &[-1e-5], 4e-6, 5.0).as_deref(),
@@ -77,9 +77,9 @@ fn a_time_constant_is_less_than_ten_recordings() {
         json!({ "links": { "first": 1, "last": 1 } }), json!("time"), json!({ "settling": { "start": 0.0, "constant": constant } })) })
     };
     assert_eq!(why(growing(5000.0), &[3e-4], 0.0, 5.0), None);
-    let said = why(growing(10_000.0), &[3e-4], 0.0, 5.0).unwrap();
+    let printed = why(growing(10_000.0), &[3e-4], 0.0, 5.0).unwrap();
     assert_eq!(
-        said,
+        printed,
         "its time constant of 10000 s is ten times as long as the recording (1000 s)"
     );
 }
@@ -89,9 +89,9 @@ fn nothing_grows_by_more_than_its_material_and_nothing_lags_by_less_than_nothing
     let linear = json!({ "linear": { "zero": 20.0, "per": 1.0 } });
     let link = json!({ "thermal_growth": law(json!({ "links": { "first": 1, "last": 1 } }), json!("temperature"), linear.clone()) });
     assert_eq!(why(link.clone(), &[24e-6], 1e-6, 5.0), None);
-    let said = why(link.clone(), &[85e-6], 1e-6, 5.0).unwrap();
+    let printed = why(link.clone(), &[85e-6], 1e-6, 5.0).unwrap();
     assert_eq!(
-        said,
+        printed,
         "85 um/m for each kelvin is more than the 70 of any material of links"
     );
     assert_eq!(
@@ -103,8 +103,9 @@ fn nothing_grows_by_more_than_its_material_and_nothing_lags_by_less_than_nothing
         json!({ "of": "range", "basis": { "linear": { "zero": 0.0, "per": 1.0 } } });
     assert_eq!(why(air.clone(), &[-1.2e-6], 1e-7, 5.0), None);
     assert!(
-        why(air, &[-76e-6], 1e-6, 5.0)
-            .is_some_and(|said| said.starts_with("76 um/m for each kelvin is more than the 5"))
+        why(air, &[-76e-6], 1e-6, 5.0).is_some_and(
+            |printed| printed.starts_with("76 um/m for each kelvin is more than the 5")
+        )
     );
     let lag = |by: &str| json!({ "joint_log_lag": { "each": false, "by": by } });
     assert_eq!(why(lag("move"), &[1e-3], 1e-4, 5.0), None);
@@ -118,12 +119,12 @@ fn nothing_grows_by_more_than_its_material_and_nothing_lags_by_less_than_nothing
 
 #[test]
 fn joints_that_lag_by_less_than_nothing_have_no_name_and_the_model_is_the_same() {
-    let said = simulated("{joint_log_lag: {share: -0.002}}", 3, 120);
-    let finding = &said["findings"][0];
+    let answer = simulated("{joint_log_lag: {share: -0.002}}", 3, 120);
+    let finding = &answer["findings"][0];
     assert_eq!(
         (&finding["effect"], &finding["where"]),
         (&"unknown".into(), &"recording".into()),
-        "{said:#}"
+        "{answer:#}"
     );
     let statement = finding["statement"].as_str().unwrap();
     starts_with(statement, "something unknown acts at recording");
@@ -133,13 +134,13 @@ fn joints_that_lag_by_less_than_nothing_have_no_name_and_the_model_is_the_same()
         rivals
             .iter()
             .all(|rival| rival["effect"] != "joint_log_lag"),
-        "{said:#}"
+        "{answer:#}"
     );
     // What has no name still reproduces the error.
-    let rms = |when: &str| said[when]["validate_rms_mm"].as_f64().unwrap();
+    let rms = |when: &str| answer[when]["validate_rms_mm"].as_f64().unwrap();
     assert!(
-        rms("after") < 0.5 * rms("before") && said["verdict"] == "unexplained",
-        "{said:#}"
+        rms("after") < 0.5 * rms("before") && answer["verdict"] == "unexplained",
+        "{answer:#}"
     );
     let same = simulated("{joint_log_lag: {share: 0.002}}", 3, 120);
     assert!(

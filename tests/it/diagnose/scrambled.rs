@@ -51,9 +51,9 @@ fn every_choice_of_a_diagnosis_is_the_same_whatever_held_out_rows_say() {
         let example = Example::new("case", &[("case", &case)]);
         let recorded = example.ingested();
         let diagnosed = |change: fn(&mut Recorded)| {
-            let mut of = recorded.clone();
-            change(&mut of);
-            of.diagnose_by(&example.with("diagnose")).unwrap()
+            let mut recording = recorded.clone();
+            change(&mut recording);
+            recording.diagnose_by(&example.with("diagnose")).unwrap()
         };
         let (sound, other, mixed) = (
             diagnosed(|_| ()),

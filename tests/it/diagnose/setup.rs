@@ -81,19 +81,19 @@ fn recorded(robot: &RobotDescription, seed: u64, effects: Value) -> Inputs {
     }
 }
 
-struct Said {
+struct Diagnosed {
     verdict: String,
     statement: String,
     findings: Vec<FindingRow>,
     warnings: Vec<String>,
 }
 
-fn diagnosed(inputs: &Inputs) -> Result<Said, Error> {
+fn diagnosed(inputs: &Inputs) -> Result<Diagnosed, Error> {
     let (robot, recording) = (Robot::from_description(&inputs.robot), &inputs.recording);
     let set = |row: usize| recording.usage[row].as_deref().unwrap_or("fit");
     let made = Recorded::dealt(robot, recording.clone(), set).diagnose_by(&settings(json!({})))?;
     let verdict = made.verdict();
-    Ok(Said {
+    Ok(Diagnosed {
         verdict: verdict.verdict,
         statement: verdict.statement.unwrap_or_default(),
         findings: made.get::<Findings>().0,
@@ -245,11 +245,11 @@ fn twenty_wrong_set_ups_of_three_arms_are_named_before_any_physics() {
         for (name, text, make) in &WRONG {
             let mut inputs = sound.clone();
             make(&mut inputs);
-            let said = diagnosed(&inputs);
-            let first = said
+            let diagnosis = diagnosed(&inputs);
+            let first = diagnosis
                 .as_ref()
                 .ok()
-                .and_then(|said| said.findings.first())
+                .and_then(|diagnosis| diagnosis.findings.first())
                 .filter(|first| first.effect == "setup");
             let forms: Option<Value> =
                 first.map(|first| serde_json::from_str(&first.forms).unwrap());
@@ -262,28 +262,30 @@ fn twenty_wrong_set_ups_of_three_arms_are_named_before_any_physics() {
             });
             let named = said_first.is_some_and(|statement| statement.contains(text));
             // Whatever is said first: nothing physical has a size, and nothing is explained.
-            if let Ok(said) = &said {
-                assert_eq!(said.verdict, "wrong_setup", "{}: {name}", robot.name);
+            if let Ok(diagnosis) = &diagnosis {
+                assert_eq!(diagnosis.verdict, "wrong_setup", "{}: {name}", robot.name);
                 assert!(
-                    said.findings
+                    diagnosis
+                        .findings
                         .iter()
                         .all(|finding| finding.effect == "setup"),
                     "{}: {name}",
                     robot.name
                 );
                 assert!(
-                    said.warnings
+                    diagnosis
+                        .warnings
                         .iter()
                         .any(|warning| warning.contains("set-up")),
                     "{:?}",
-                    said.warnings
+                    diagnosis.warnings
                 );
-                has(&said.statement, "set-up");
+                has(&diagnosis.statement, "set-up");
             }
             assert_eq!(forms.unwrap_or_else(|| json!([])), json!([]));
             right += usize::from(named);
-            let heard = match &said {
-                Ok(said) => said
+            let heard = match &diagnosis {
+                Ok(diagnosis) => diagnosis
                     .findings
                     .first()
                     .map_or("-", |first| &first.statement)
@@ -320,21 +322,26 @@ fn sound_recordings_say_nothing_of_the_set_up() {
         ("wind-up", recorded(&heavy, 104, wound_up)),
         ("outliers", outliers(recorded(&small, 105, json!([])))),
     ] {
-        let said = diagnosed(&inputs).expect(name);
-        assert_ne!(said.verdict, "wrong_setup", "{name}: {}", said.statement);
+        let diagnosis = diagnosed(&inputs).expect(name);
+        assert_ne!(
+            diagnosis.verdict, "wrong_setup",
+            "{name}: {}",
+            diagnosis.statement
+        );
         assert!(
-            said.findings
+            diagnosis
+                .findings
                 .iter()
                 .all(|finding| finding.effect != "setup"),
             "{name}"
         );
         assert!(
-            !said
+            !diagnosis
                 .warnings
                 .iter()
                 .any(|line| line.contains("rounded") || line.contains("payload")),
             "{:?}",
-            said.warnings
+            diagnosis.warnings
         );
     }
 }
@@ -347,8 +354,8 @@ fn a_rounded_log_is_named_with_its_step_and_what_it_makes() {
         q.iter_mut()
             .for_each(|q| *q = rounded(q.to_degrees(), 0.1).to_radians())
     });
-    let said = diagnosed(&coarse).unwrap();
-    let line = said
+    let diagnosis = diagnosed(&coarse).unwrap();
+    let line = diagnosis
         .warnings
         .iter()
         .find(|line| line.starts_with("joint positions are rounded to 0.1 deg, which makes up to"));
@@ -364,17 +371,17 @@ fn a_rounded_log_is_named_with_its_step_and_what_it_makes() {
     assert!(
         up_to.is_some_and(|mm| (1.0..15.0).contains(&mm)),
         "{:?}",
-        said.warnings
+        diagnosis.warnings
     );
-    has(&said.statement, "rounded to 0.1 deg");
+    has(&diagnosis.statement, "rounded to 0.1 deg");
     let mut coarse = recorded(&fixture::spherical(), 49, json!([]));
     points(&mut coarse, |p| p.map(|x| rounded(x, 1e-3)));
-    let said = diagnosed(&coarse).unwrap();
+    let diagnosis = diagnosed(&coarse).unwrap();
     let line = "measured points are rounded to 1 mm, which makes up to 0.87 mm";
     assert!(
-        said.warnings.iter().any(|own| own.starts_with(line)),
+        diagnosis.warnings.iter().any(|ours| ours.starts_with(line)),
         "{:?}",
-        said.warnings
+        diagnosis.warnings
     );
     // Digits that are finer than the noise cost nothing.
     let mut fine = recorded(&fixture::spherical(), 50, json!([]));
@@ -383,42 +390,45 @@ fn a_rounded_log_is_named_with_its_step_and_what_it_makes() {
             .for_each(|q| *q = rounded(q.to_degrees(), 1e-4).to_radians())
     });
     points(&mut fine, |p| p.map(|x| rounded(x, 1e-6)));
-    let said = diagnosed(&fine).unwrap();
+    let diagnosis = diagnosed(&fine).unwrap();
     assert!(
-        !said.warnings.iter().any(|line| line.contains("rounded")),
+        !diagnosis
+            .warnings
+            .iter()
+            .any(|line| line.contains("rounded")),
         "{:?}",
-        said.warnings
+        diagnosis.warnings
     );
 }
 
 #[test]
 fn a_payload_column_that_is_never_or_seldom_filled_is_said() {
     let sound = recorded(&fixture::spherical(), 51, json!([]));
-    let said = |filled: fn(usize) -> f64| {
+    let message_of = |filled: fn(usize) -> f64| {
         let mut inputs = sound.clone();
         inputs.recording.payload = Some((0..72).map(filled).collect());
         diagnosed(&inputs).unwrap().warnings.join("\n")
     };
-    let empty = said(|_| f64::NAN);
+    let empty = message_of(|_| f64::NAN);
     has(&empty, "the payload column is empty in all 72 rows");
-    let half = said(|row| if row % 2 == 0 { 10.0 } else { f64::NAN });
+    let half = message_of(|row| if row % 2 == 0 { 10.0 } else { f64::NAN });
     has(&half, "the payload column is empty in 36 of 72 rows");
-    assert!(!said(|_| 0.0).contains("payload column"));
+    assert!(!message_of(|_| 0.0).contains("payload column"));
 }
 
 #[test]
 fn two_set_up_errors_are_named_together_and_two_reflectors_hide_none() {
     let mut both = recorded(&fixture::offset_wrist(), 44, json!([]));
     joints(&mut both, |q| (q[1], q[3]) = (-q[1], -q[3]));
-    let said = diagnosed(&both).unwrap();
-    let statement = &said.findings[0].statement;
+    let diagnosis = diagnosed(&both).unwrap();
+    let statement = &diagnosis.findings[0].statement;
     starts_with(statement, "joints 2, 4 turn the other way");
     has(statement, "sign: [1, -1, 1, -1, 1, 1]");
     // Two of different kinds.
     let mut both = recorded(&fixture::offset_wrist(), 44, json!([]));
     joints(&mut both, |q| (q[2], q[4]) = (-q[2], q[4] + FRAC_PI_2));
-    let said = diagnosed(&both).unwrap();
-    let statement = &said.findings[0].statement;
+    let diagnosis = diagnosed(&both).unwrap();
+    let statement = &diagnosis.findings[0].statement;
     has(
         statement,
         [
@@ -434,13 +444,13 @@ fn two_set_up_errors_are_named_together_and_two_reflectors_hide_none() {
             .collect(),
     );
     joints(&mut named, |q| q[2] = -q[2]);
-    let said = diagnosed(&named).unwrap();
+    let diagnosis = diagnosed(&named).unwrap();
     assert!(
-        said.findings[0]
+        diagnosis.findings[0]
             .statement
             .starts_with("joint 3 turns the other way"),
         "{}",
-        said.findings[0].statement
+        diagnosis.findings[0].statement
     );
 }
 
@@ -452,9 +462,9 @@ fn a_length_by_which_no_arm_is_made_is_an_error_of_the_robot_file() {
         .iter_mut()
         .for_each(|joint| joint.point[2] -= by);
     short.robot.tool[2] -= by;
-    let said = diagnosed(&short).unwrap();
-    assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
-    let statement = &said.findings[0].statement;
+    let diagnosis = diagnosed(&short).unwrap();
+    assert_eq!(diagnosis.verdict, "wrong_setup", "{}", diagnosis.statement);
+    let statement = &diagnosis.findings[0].statement;
     starts_with(
         statement,
         "a length in the robot file from joint 2 to joint 3 is wrong",
@@ -465,14 +475,15 @@ fn a_length_by_which_no_arm_is_made_is_an_error_of_the_robot_file() {
         .iter_mut()
         .for_each(|joint| joint.point[0] -= by);
     short.robot.tool[0] -= by;
-    let said = diagnosed(&short).unwrap();
-    assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
+    let diagnosis = diagnosed(&short).unwrap();
+    assert_eq!(diagnosis.verdict, "wrong_setup", "{}", diagnosis.statement);
     assert!(
-        said.findings
+        diagnosis
+            .findings
             .iter()
             .all(|finding| finding.effect == "setup")
     );
-    has(&said.findings[0].statement, "link_geometry.l");
+    has(&diagnosis.findings[0].statement, "link_geometry.l");
 }
 
 #[test]
@@ -483,8 +494,8 @@ fn a_robot_file_in_another_unit_is_blamed_and_not_the_points() {
         (joint.point, joint.centre) = (small(joint.point), joint.centre.map(small))
     });
     inputs.robot.tool = small(inputs.robot.tool);
-    let said = diagnosed(&inputs).unwrap();
-    let statement = &said.findings[0].statement;
+    let diagnosis = diagnosed(&inputs).unwrap();
+    let statement = &diagnosis.findings[0].statement;
     starts_with(
         statement,
         "the lengths of the robot file are in metres and were read in millimetres",
@@ -506,8 +517,8 @@ fn a_robot_file_of_another_arm_is_refused_with_what_to_look_at() {
     inputs.robot = fixture::spherical();
     let error = diagnosed(&inputs).err().unwrap();
     assert_eq!(error.exit_code(), 10, "{error}");
-    let said = error.to_string();
-    has(&said, ["% of its reach", "REPLACE", "robot file"]);
+    let printed = error.to_string();
+    has(&printed, ["% of its reach", "REPLACE", "robot file"]);
 }
 
 #[test]
@@ -529,37 +540,38 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     )
     .unwrap();
     case_with(here, &[]);
-    let (code, told) = ended(&format!("run p.yaml {CASE}"), here);
-    assert_eq!(code, Some(10), "{told}");
+    let (code, printed) = ended(&format!("run p.yaml {CASE}"), here);
+    assert_eq!(code, Some(10), "{printed}");
     has(
-        &told,
+        &printed,
         ["verdict   wrong set-up", "the points are in inches"],
     );
     assert!(
-        !told.lines().any(|line| line.starts_with("after")),
-        "{told}"
+        !printed.lines().any(|line| line.starts_with("after")),
+        "{printed}"
     );
-    let (code, said) = refused("compensate HEAD p.yaml", here);
+    let (code, message) = refused("compensate HEAD p.yaml", here);
     assert!(
-        code == Some(10) && said.contains("the set-up is wrong: the points are in inches"),
-        "{code:?} {said}"
+        code == Some(10) && message.contains("the set-up is wrong: the points are in inches"),
+        "{code:?} {message}"
     );
     // A step that is asked for by its name is refused as well; one who insists is told what it warned of when it ran.
     let step = "export HEAD --step joint --format json --quiet";
-    let (code, said) = refused(step, here);
+    let (code, message) = refused(step, here);
     assert!(
-        code == Some(10) && said.contains("refused: the set-up is wrong: the points are in inches"),
-        "{code:?} {said}"
+        code == Some(10)
+            && message.contains("refused: the set-up is wrong: the points are in inches"),
+        "{code:?} {message}"
     );
-    let (code, said) = refused(&format!("{step} --force"), here);
+    let (code, message) = refused(&format!("{step} --force"), here);
     assert!(
         code == Some(0)
-            && said.contains("warning: joint: the set-up is wrong: the points are in inches"),
-        "{code:?} {said}"
+            && message.contains("warning: joint: the set-up is wrong: the points are in inches"),
+        "{code:?} {message}"
     );
-    let said: Value = serde_json::from_str(&ended("diagnose HEAD --json", here).1).unwrap();
+    let answer: Value = serde_json::from_str(&ended("diagnose HEAD --json", here).1).unwrap();
     assert_eq!(
-        (&said["verdict"], &said["findings"][0]["effect"]),
+        (&answer["verdict"], &answer["findings"][0]["effect"]),
         (&"wrong_setup".into(), &"setup".into())
     );
     let (code, run) = ended(&format!("run p.yaml --json --quiet {CASE}"), here);
@@ -606,22 +618,23 @@ fn without_link_masses_a_loaded_recording_says_what_is_lost() {
             .map(|row| if row % 2 == 0 { 10.0 } else { 0.0 })
             .collect(),
     );
-    let said = diagnosed(&inputs).unwrap();
+    let diagnosis = diagnosed(&inputs).unwrap();
     let lost = "the robot file gives no link masses, yet gravity loads joints in these poses (24 rows of 48 carry a payload)";
-    has(&said.statement, lost);
+    has(&diagnosis.statement, lost);
     assert!(
-        said.warnings
+        diagnosis
+            .warnings
             .iter()
             .any(|warning| warning.starts_with(lost)),
         "{:?}",
-        said.warnings
+        diagnosis.warnings
     );
 }
 
 #[test]
 fn two_set_ups_in_one_recording_are_named_with_the_rows_of_each() {
     let sound = recorded(&fixture::spherical(), 52, json!([]));
-    let said = |other: fn(usize) -> bool, first: &str, second: &str| {
+    let message_of = |other: fn(usize) -> bool, first: &str, second: &str| {
         let mut inputs = sound.clone();
         for (row, point) in inputs
             .recording
@@ -639,19 +652,20 @@ fn two_set_ups_in_one_recording_are_named_with_the_rows_of_each() {
                 point[2],
             ];
         }
-        let said = diagnosed(&inputs).unwrap();
-        assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
-        let statement = &said.findings[0].statement;
+        let diagnosis = diagnosed(&inputs).unwrap();
+        assert_eq!(diagnosis.verdict, "wrong_setup", "{}", diagnosis.statement);
+        let statement = &diagnosis.findings[0].statement;
         starts_with(statement, "two set-ups are in one recording");
         has(statement, [first, second]);
         assert!(
-            said.findings
+            diagnosis
+                .findings
                 .iter()
                 .all(|finding| finding.effect == "setup")
         );
     };
-    said(|row| row >= 30, "1 to 30 (30 rows)", "31 to 72 (42 rows)");
-    said(
+    message_of(|row| row >= 30, "1 to 30 (30 rows)", "31 to 72 (42 rows)");
+    message_of(
         |row| row % 2 == 1,
         "1, 3, 5, 7, ... (36 rows)",
         "2, 4, 6, 8, ... (36 rows)",
@@ -713,14 +727,14 @@ fn a_makers_counting_is_found_whole_and_no_healthy_joint_is_mastered_again() {
             // Two wrong points of 72 change nothing.
             inputs.recording.position[5][0] += 0.4;
             inputs.recording.position[30][2] -= 0.9;
-            let said =
+            let diagnosis =
                 diagnosed(&inputs).unwrap_or_else(|error| panic!("{} {name}: {error}", robot.name));
             assert_eq!(
-                said.verdict, "wrong_setup",
+                diagnosis.verdict, "wrong_setup",
                 "{} {name}: {}",
-                robot.name, said.statement
+                robot.name, diagnosis.statement
             );
-            let statement = &said.findings[0].statement;
+            let statement = &diagnosis.findings[0].statement;
             println!("{} {name}: {statement}", robot.name);
             assert!(
                 !statement.contains("master"),
@@ -780,8 +794,8 @@ fn a_wrong_unit_does_not_hide_how_a_controller_counts_its_joints() {
             .iter_mut()
             .flatten()
             .for_each(|x| *x *= length);
-        let said = diagnosed(&inputs).unwrap_or_else(|error| panic!("{unit}: {error}"));
-        let statement = &said.findings[0].statement;
+        let diagnosis = diagnosed(&inputs).unwrap_or_else(|error| panic!("{unit}: {error}"));
+        let statement = &diagnosis.findings[0].statement;
         for text in [
             unit,
             "sign: [1, -1, -1, 1, -1, 1]",

@@ -12,9 +12,9 @@ fn an_unstated_tool_is_named_beside_the_compliance_that_shows_it() {
         "--family joint_compliance --robot sr210d --natural 1 --other-forms 0 --tool-mass 40";
     calib(&format!("{design} {effects}"), here);
     case_with(here, &[]);
-    let said = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), here);
-    let said: Value = serde_json::from_str(&said).unwrap();
-    let findings = said["findings"].as_array().unwrap();
+    let printed = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), here);
+    let answer: Value = serde_json::from_str(&printed).unwrap();
+    let findings = answer["findings"].as_array().unwrap();
     let names: Vec<&str> = findings
         .iter()
         .filter_map(|finding| finding["effect"].as_str())

@@ -14,7 +14,7 @@ fn bare(robot: &str, family: &str, forms: &str, seed: &str) -> (Value, Value) {
         "case={}",
         folder.path().join("set/recordings/c0001").display()
     );
-    let said = calib(
+    let printed = calib(
         folder.path(),
         &format!("diagnose {pipeline} --set {case} --json --quiet --store store"),
     )
@@ -26,7 +26,7 @@ fn bare(robot: &str, family: &str, forms: &str, seed: &str) -> (Value, Value) {
         "{robot}"
     );
     (
-        serde_json::from_str(&said).unwrap(),
+        serde_json::from_str(&printed).unwrap(),
         serde_json::from_str(&truth).unwrap(),
     )
 }
@@ -34,8 +34,8 @@ fn bare(robot: &str, family: &str, forms: &str, seed: &str) -> (Value, Value) {
 #[test]
 fn gravity_is_found_where_nobody_knows_the_masses_and_no_hose_is() {
     for robot in ["sr210d", "compact6", "seven7r"] {
-        let (said, truth) = bare(robot, "joint_compliance", "1", "61");
-        let findings = said["findings"].as_array().unwrap();
+        let (answer, truth) = bare(robot, "joint_compliance", "1", "61");
+        let findings = answer["findings"].as_array().unwrap();
         let found: Vec<&str> = findings
             .iter()
             .filter_map(|finding| finding["where"].as_str())
@@ -61,8 +61,8 @@ fn gravity_is_found_where_nobody_knows_the_masses_and_no_hose_is() {
             plain.len() > 1 && plain.iter().all(|place| found.contains(place)),
             "{robot}: {plain:?}, found {found:?}"
         );
-        let rms = |when: &str| said[when]["validate_rms_mm"].as_f64().unwrap();
-        let floor = said["noise_floor_mm"].as_f64().unwrap();
+        let rms = |when: &str| answer[when]["validate_rms_mm"].as_f64().unwrap();
+        let floor = answer["noise_floor_mm"].as_f64().unwrap();
         assert!(
             rms("after") < 1.2 * floor && rms("before") > 2.0 * rms("after"),
             "{robot}: {} to {}",

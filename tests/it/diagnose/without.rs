@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// What the pipeline of cases says without some causes.
-fn said(without: &str, folder: &Path) -> Value {
+fn answer_of(without: &str, folder: &Path) -> Value {
     case_with(
         folder,
         &[(
@@ -15,19 +15,19 @@ fn said(without: &str, folder: &Path) -> Value {
             &format!("  - uses: diagnose\n    with: {{without: [{without}]}}\n"),
         )],
     );
-    let said = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), folder);
-    serde_json::from_str(&said).unwrap()
+    let printed = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), folder);
+    serde_json::from_str(&printed).unwrap()
 }
 
 #[test]
 fn an_excluded_cause_is_not_named_by_another_form_of_it() {
     for (family, seed) in [("cable_drag", "5"), ("backlash", "32")] {
         let folder = concealed(family, seed, "120");
-        let said = said(family, folder.path());
-        let findings = said["findings"].as_array().unwrap();
-        assert!(!findings.is_empty(), "{family}: {said:#}");
+        let answer = answer_of(family, folder.path());
+        let findings = answer["findings"].as_array().unwrap();
+        assert!(!findings.is_empty(), "{family}: {answer:#}");
         // Neither as a name, nor as a rival, nor in a sentence.
-        assert!(!said.to_string().contains(family), "{family}: {said:#}");
+        assert!(!answer.to_string().contains(family), "{family}: {answer:#}");
         let table: Findings = table_of(folder.path(), "diagnose.findings.parquet");
         assert!(table.0.iter().all(|row| row.effect != family));
     }
@@ -37,8 +37,8 @@ fn an_excluded_cause_is_not_named_by_another_form_of_it() {
 fn what_an_excluded_cause_explains_takes_no_neighbours_name() {
     for (seed, place) in [("1", "link 2"), ("2", "link 4"), ("6", "link 2")] {
         let folder = concealed("link_compliance", seed, "120");
-        let said = said("link_compliance", folder.path());
-        let found: Vec<(&str, &str)> = said["findings"]
+        let answer = answer_of("link_compliance", folder.path());
+        let found: Vec<(&str, &str)> = answer["findings"]
             .as_array()
             .unwrap()
             .iter()
@@ -47,7 +47,7 @@ fn what_an_excluded_cause_explains_takes_no_neighbours_name() {
                 (text("effect"), text("where"))
             })
             .collect();
-        assert_eq!(found, [("unknown", place)], "seed {seed}: {said:#}");
+        assert_eq!(found, [("unknown", place)], "seed {seed}: {answer:#}");
     }
 }
 
@@ -56,7 +56,7 @@ fn an_excluded_correction_of_geometry_leaves_the_robot_file_as_it_is() {
     let folder = concealed("zero_shift", "923", "120");
     let here = folder.path();
     let ratios = |without: &str| {
-        said(without, here);
+        answer_of(without, here);
         let parameters: Parameters = table_of(here, "diagnose.parameters.parquet");
         parameters
             .0
@@ -77,7 +77,10 @@ fn nothing_is_diagnosed_without_the_frame_of_the_base() {
             "  - uses: diagnose\n    with: {without: [base_frame]}\n",
         )],
     );
-    let (code, said) = refused(&format!("diagnose p.yaml --quiet {CASE}"), folder.path());
-    assert_eq!(code, Some(2), "{said}");
-    has(&said, "`base_frame` places the robot before the instrument");
+    let (code, printed) = refused(&format!("diagnose p.yaml --quiet {CASE}"), folder.path());
+    assert_eq!(code, Some(2), "{printed}");
+    has(
+        &printed,
+        "`base_frame` places the robot before the instrument",
+    );
 }

@@ -74,13 +74,13 @@ fn robots_that_need_a_technician_come_first_with_the_reason() {
         page.find(text)
             .unwrap_or_else(|| panic!("{text} is not there"))
     };
-    let told = [
+    let printed = [
         "<li>robot 3: was not calibrated: tracker.csv:4: not a number</li>",
         "<li>robot 5: the calibration did not make it more accurate</li>",
         "<li>robot 4: changed beyond its limits since the last calibration: zero of joint 2</li>",
         "<li>robot 2: its error is not explained: gear_cyclic at joint 2</li>",
     ];
-    assert!(told.windows(2).all(|pair| at(pair[0]) < at(pair[1])));
+    assert!(printed.windows(2).all(|pair| at(pair[0]) < at(pair[1])));
     let rows = [
         "robot 3", "robot 5", "robot 4", "robot 2", "robot 0", "robot 1",
     ]

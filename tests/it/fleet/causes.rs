@@ -47,12 +47,12 @@ pub fn twins(folder: &Path, name: &str, effects: impl Fn(usize) -> String) -> st
 }
 
 fn diagnose(file: &Path, store: &Path, more: &[&str]) -> Value {
-    let (result, said) = output(
+    let (result, printed) = output(
         fleet("diagnose", file, store)
             .args(["--json", "--quiet"])
             .args(more),
     );
-    assert!(result.status.success(), "{said}");
+    assert!(result.status.success(), "{printed}");
     serde_json::from_slice(&result.stdout).unwrap()
 }
 
@@ -102,9 +102,9 @@ fn robots_together_name_a_weak_cause_its_order_and_the_robot_that_lacks_it() {
     let text = text.replace("name: shared", "name: next")
         + "prior: {fleet: shared, stage: diagnose, by: causes}\n";
     let next = write(folder.join("next.yaml"), &text);
-    let (result, said) =
+    let (result, printed) =
         output(fleet("run", &next, &store).args(["--json", "--quiet", "--robot", "robot 3"]));
-    assert!(result.status.success(), "{said}");
+    assert!(result.status.success(), "{printed}");
     let answer: Value = serde_json::from_slice(&result.stdout).unwrap();
     let causes = |answer: &Value| answer["robots"][3]["causes"].as_str().map(str::to_string);
     assert_eq!(
@@ -120,15 +120,15 @@ fn a_prior_of_causes_of_a_fleet_that_was_not_diagnosed_is_a_fault_of_the_file() 
     let (folder, store) = (folder.path(), folder.path().join("store"));
     let file = twins(folder, "first", |_| "[]".into());
     let text = read(&file);
-    let with = |rest: &str| write(folder.join("next.yaml"), &format!("{text}prior: {rest}\n"));
-    let said = |rest: &str| {
-        let (result, said) = output(fleet("run", &with(rest), &store).arg("--quiet"));
-        assert_eq!(result.status.code(), Some(2), "{said}");
-        said
+    let with = |tail: &str| write(folder.join("next.yaml"), &format!("{text}prior: {tail}\n"));
+    let message_of = |tail: &str| {
+        let (result, printed) = output(fleet("run", &with(tail), &store).arg("--quiet"));
+        assert_eq!(result.status.code(), Some(2), "{printed}");
+        printed
     };
-    let lacks = said("{fleet: other, stage: diagnose, by: causes}");
+    let lacks = message_of("{fleet: other, stage: diagnose, by: causes}");
     has(&lacks, "no fleet `other` was diagnosed");
-    let named = said("{fleet: other, stage: diagnose, by: causes, effects: [backlash]}");
+    let named = message_of("{fleet: other, stage: diagnose, by: causes, effects: [backlash]}");
     has(&named, "prior.effects");
 }
 

@@ -30,8 +30,8 @@ fn one_worker_two_processes_after_a_kill_and_tasks_of_a_cluster_give_equal_table
         command
     };
     let one = folder.join("one");
-    let (result, said) = output(&mut diagnose(&one, &[]));
-    assert!(result.status.success(), "{said}");
+    let (result, printed) = output(&mut diagnose(&one, &[]));
+    assert!(result.status.success(), "{printed}");
     let document: serde_json::Value = serde_json::from_slice(&result.stdout).unwrap();
     assert_eq!(document["findings"][0]["cell"], "backlash@joint 3");
 
@@ -62,8 +62,8 @@ fn one_worker_two_processes_after_a_kill_and_tasks_of_a_cluster_give_equal_table
     std::fs::set_permissions(&sbatch, Permissions::from_mode(0o755)).unwrap();
     let path = std::env::var("PATH").unwrap_or_default();
     let path = format!("{}:{path}", folder.join("bin").display());
-    let (result, said) = output(diagnose(&cluster, &["--engine", "slurm"]).env("PATH", path));
-    assert!(result.status.success(), "{said}");
+    let (result, printed) = output(diagnose(&cluster, &["--engine", "slurm"]).env("PATH", path));
+    assert!(result.status.success(), "{printed}");
 
     let undisturbed = tables(&one, "line");
     assert_eq!(undisturbed.len(), 3, "{undisturbed:?}");

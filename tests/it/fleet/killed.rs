@@ -75,9 +75,9 @@ fn a_fleet_killed_three_times_ends_as_an_undisturbed_one() {
         );
     }
     drop(held);
-    let told = line.run(10);
+    let answer = line.run(10);
     assert_eq!(
-        told["computed"].as_u64(),
+        answer["computed"].as_u64(),
         Some((ROBOTS - stood.len()) as u64)
     );
     for (path, modified) in &stood {
@@ -106,8 +106,8 @@ fn two_runs_at_once_share_the_robots() {
             output.status,
             String::from_utf8_lossy(&output.stderr)
         );
-        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-        told["computed"].as_u64().unwrap()
+        let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        answer["computed"].as_u64().unwrap()
     });
     assert_eq!(computed[0] + computed[1], 8, "{computed:?}");
 }

@@ -40,20 +40,20 @@ fn names_never_become_paths_commands_or_markup() {
     }
     let file = file(folder.path(), "line", "robots:\n  - folders: robots/*\n");
     // Rendered before any is done, so that all are in it.
-    let (result, said) = output(fleet("render", &file, &store).args([
+    let (result, printed) = output(fleet("render", &file, &store).args([
         "--engine",
         "slurm",
         "--robots-per-task",
         "3",
     ]));
-    assert!(result.status.success(), "{said}");
+    assert!(result.status.success(), "{printed}");
     let script = String::from_utf8(result.stdout).unwrap();
     has(&script, "#SBATCH --array=0-3\n");
     for part in ["pwned", "-rf", "blank", "onerror", "quoted"] {
         assert!(!script.contains(part), "{part}: {script}");
     }
-    let told = run(&file, &store, 0);
-    let mut names: Vec<&str> = told["robots"]
+    let answer = run(&file, &store, 0);
+    let mut names: Vec<&str> = answer["robots"]
         .as_array()
         .unwrap()
         .iter()
@@ -71,7 +71,7 @@ fn names_never_become_paths_commands_or_markup() {
             .all(|c| c.is_ascii_alphanumeric() || "._-".contains(c))),
         "{files:?}"
     );
-    let page = read(told["page"].as_str().unwrap());
+    let page = read(answer["page"].as_str().unwrap());
     assert!(
         !page.contains("<img") && page.contains("&lt;img src=x"),
         "the name is markup"
@@ -81,9 +81,9 @@ fn names_never_become_paths_commands_or_markup() {
     assert!(!String::from_utf8(result.stdout).unwrap().contains('\u{1b}'));
     assert!(!Path::new("pwned").exists() && !folder.path().join("pwned").exists());
 
-    let (result, said) = output(fleet("render", &file, &store).args(["--engine", "slurm"]));
+    let (result, printed) = output(fleet("render", &file, &store).args(["--engine", "slurm"]));
     assert_eq!(result.status.code(), Some(2));
-    has(&said, "every robot is recorded");
+    has(&printed, "every robot is recorded");
 }
 
 #[test]
@@ -96,17 +96,17 @@ fn what_would_need_quoting_in_a_job_file_is_refused() {
         "robots:\n  - folders: cases/recordings/*\n",
     );
     let store = folder.path().join("a store");
-    let (result, said) = output(fleet("render", &file, &store).args([
+    let (result, printed) = output(fleet("render", &file, &store).args([
         "--engine",
         "slurm",
         "--partition",
         "main\n#SBATCH x",
     ]));
     assert_eq!(result.status.code(), Some(2));
-    has(&said, ["--partition: ", "--store: "]);
-    let (result, said) =
+    has(&printed, ["--partition: ", "--store: "]);
+    let (result, printed) =
         output(fleet("render", &file, &store).args(["--engine", "k8s", "--image", "calib:0.1"]));
-    assert!(result.status.success(), "{said}");
+    assert!(result.status.success(), "{printed}");
     let text = String::from_utf8(result.stdout).unwrap();
     has(&text, ["completionMode: Indexed", "completions: 1\n"]);
 }

@@ -58,14 +58,14 @@ fn pipeline(folder: &Path) {
     write(folder.join("twins.yaml"), &text);
 }
 
-fn campaign(folder: &Path, name: &str, date: &str, rest: &str) -> Value {
+fn campaign(folder: &Path, name: &str, date: &str, tail: &str) -> Value {
     let text = format!(
-        "calib: 1\nname: {name}\npipeline: twins.yaml\ngroups: {{campaign: {date}}}\nrobots:\n  - list: {name}.csv\n{rest}"
+        "calib: 1\nname: {name}\npipeline: twins.yaml\ngroups: {{campaign: {date}}}\nrobots:\n  - list: {name}.csv\n{tail}"
     );
     let file = write(folder.join(format!("{name}.yaml")), &text);
-    let (result, said) =
+    let (result, printed) =
         output(fleet("run", &file, &folder.join("store")).args(["--json", "--quiet"]));
-    assert!(result.status.success(), "{said}");
+    assert!(result.status.success(), "{printed}");
     serde_json::from_slice(&result.stdout).unwrap()
 }
 
@@ -83,14 +83,14 @@ fn changed_robots_are_flagged_with_the_joint_and_the_others_are_not() {
             .sum()
     });
     campaign(folder, "spring", "2026-04-01", "");
-    let told = campaign(
+    let answer = campaign(
         folder,
         "autumn",
         "2026-10-01",
         "previous: {fleet: spring}\n",
     );
     let flags: Vec<(usize, String)> = (0..)
-        .zip(told["robots"].as_array().unwrap())
+        .zip(answer["robots"].as_array().unwrap())
         .filter_map(|(k, robot)| Some((k, robot["flags"].as_str()?.to_string())))
         .collect();
     assert_eq!(flags.len(), CHANGED.len(), "{flags:?}");
@@ -139,17 +139,21 @@ fn a_robot_whose_diagnosis_changed_is_flagged_with_the_reason() {
     let gear = "{gear_cyclic: {joint: 3, order: 1, amplitude_arcsec: 60, phase_deg: 40}}";
     let worn =
         format!("overrides:\n  - {{robots: [robot 1], set: {{simulate.effects: [{gear}]}}}}\n");
-    let told = campaign(
+    let answer = campaign(
         folder,
         "autumn",
         "2026-10-01",
         &format!("previous: {{fleet: spring}}\n{worn}"),
     );
-    let flags = |robot: usize| told["robots"][robot]["flags"].as_str().unwrap_or_default();
-    assert_eq!(flags(0), "", "{told}");
+    let flags = |robot: usize| {
+        answer["robots"][robot]["flags"]
+            .as_str()
+            .unwrap_or_default()
+    };
+    assert_eq!(flags(0), "", "{answer}");
     assert!(
         flags(1).contains("gear_cyclic joint 3 since 2026-04-01: diagnosed, it was not before"),
-        "{told}"
+        "{answer}"
     );
 }
 
@@ -164,8 +168,8 @@ fn robots_with_few_points_borrow_from_those_of_their_model() {
     campaign(folder, "many", "2026-04-01", "");
     let few = "set: {simulate.blocks: [{usage: fit, points: 20}, {usage: validate, points: 40}]}\n";
     let prior = "prior: {fleet: many, stage: joint, by: model, effects: [joint_offset, link_geometry, tool_offset]}\n";
-    let rms = |told: Value| -> Vec<f64> {
-        told["robots"]
+    let rms = |answer: Value| -> Vec<f64> {
+        answer["robots"]
             .as_array()
             .unwrap()
             .iter()

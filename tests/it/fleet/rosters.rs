@@ -10,24 +10,24 @@ fn a_list_names_robots_their_folders_groups_and_settings() {
         \"r;1\";cases/recordings/c0001;c6;Linz;\n\
         r2;cases/recordings/c0002;c6;Graz;\"[base_frame, joint_offset]\"\n\
         r3;cases/recordings/none;c6;;\n";
-    let rest = "groups: {plant: Wien, campaign: 2026-10-01}\nrobots:\n  - list: robots.csv\n\
+    let tail = "groups: {plant: Wien, campaign: 2026-10-01}\nrobots:\n  - list: robots.csv\n\
         overrides:\n  - robots: ['r;*']\n    set: {joint.effects: [base_frame, tool_offset], joint.screen: false}\n    groups: {model: other}\n";
-    let line = Line::of(3, rest);
+    let line = Line::of(3, tail);
     write(line.folder.path().join("robots.csv"), list);
-    let told = line.run(10);
+    let answer = line.run(10);
     assert_eq!(
-        (told["done"].as_u64(), told["rejected"].as_u64()),
+        (answer["done"].as_u64(), answer["rejected"].as_u64()),
         (Some(2), Some(1))
     );
     assert!(
-        told["robots"][2]["reason"]
+        answer["robots"][2]["reason"]
             .as_str()
             .unwrap()
             .contains("no such file"),
-        "{told}"
+        "{answer}"
     );
     let manifest = |robot: usize| -> serde_json::Value {
-        let run = told["robots"][robot]["run"].as_str().unwrap();
+        let run = answer["robots"][robot]["run"].as_str().unwrap();
         serde_json::from_slice(
             &std::fs::read(line.store.join("runs").join(run).join("manifest.json")).unwrap(),
         )
@@ -49,7 +49,7 @@ fn a_list_names_robots_their_folders_groups_and_settings() {
         effects(1),
         serde_json::json!(["base_frame", "joint_offset"])
     );
-    let page = read(told["page"].as_str().unwrap());
+    let page = read(answer["page"].as_str().unwrap());
     for group in [
         "other, Linz, 2026-10-01",
         "c6, Graz, 2026-10-01",
@@ -131,8 +131,8 @@ fn one_big_table_is_parted_by_robot_once() {
     write(here.join("one.yaml"), &text);
     let text = read(&line.file).replace(&super::pipeline().display().to_string(), "one.yaml");
     std::fs::write(&line.file, text).unwrap();
-    let told = line.run(0);
-    let names: Vec<&str> = told["robots"]
+    let answer = line.run(0);
+    let names: Vec<&str> = answer["robots"]
         .as_array()
         .unwrap()
         .iter()
@@ -141,8 +141,8 @@ fn one_big_table_is_parted_by_robot_once() {
     assert_eq!(names, ["../a", "b, c", "d"]);
     // The same as the robot's own files give.
     assert!(
-        told["robots"][0]["after_rms_mm"].as_f64().unwrap() < 0.2,
-        "{told}"
+        answer["robots"][0]["after_rms_mm"].as_f64().unwrap() < 0.2,
+        "{answer}"
     );
     assert_eq!(line.run(0)["computed"].as_u64(), Some(0));
     // A row more of one robot is another recording of that one alone.

@@ -16,7 +16,7 @@ fn cell(seed: usize) -> (Cell, Measurements) {
     (cell, data)
 }
 
-fn said(cell: &Cell, mut data: Measurements) -> Diagnosis {
+fn diagnosis_of(cell: &Cell, mut data: Measurements) -> Diagnosis {
     cell.disturb(&mut data);
     diagnosed(&cell.description, &data)
 }
@@ -29,8 +29,8 @@ fn a_holder_that_turns_about_the_flange_is_one_step_with_two_names() {
         (STEP..ROWS).for_each(|row| data.q[row * joints + joints - 1] += f64::to_radians(degrees));
         data.points.position = cell.truth.predict(&data);
         data.q = logged;
-        let said = said(&cell, data);
-        let statements: Vec<&str> = said
+        let diagnosis = diagnosis_of(&cell, data);
+        let statements: Vec<&str> = diagnosis
             .findings
             .iter()
             .map(|finding| finding.statement.as_str())
@@ -42,7 +42,7 @@ fn a_holder_that_turns_about_the_flange_is_one_step_with_two_names() {
         );
         starts_with(statements[0], &size);
         has(statements[0], "from row 71");
-        let found = &said.findings[0];
+        let found = &diagnosis.findings[0];
         let mut names: Vec<(&str, Place)> = found
             .rivals
             .iter()
@@ -70,13 +70,13 @@ fn a_target_that_moves_along_the_last_axis_has_not_turned() {
         let turn = cell.truth.stack.base().rotation * robot.last_body(data.q(row)).rotation;
         data.points.position[row] += turn * robot.axis(data.joints - 1) * 3e-4;
     }
-    let said = said(&cell, data);
-    assert_eq!(said.findings.len(), 1, "{}", said.statement);
+    let diagnosis = diagnosis_of(&cell, data);
+    assert_eq!(diagnosis.findings.len(), 1, "{}", diagnosis.statement);
     assert!(
-        said.findings[0]
+        diagnosis.findings[0]
             .statement
             .starts_with("the target on the tool has moved"),
         "{}",
-        said.findings[0].statement
+        diagnosis.findings[0].statement
     );
 }

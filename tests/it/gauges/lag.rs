@@ -11,7 +11,7 @@ use calib::robot::{Measurements, Named, Sequence};
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
 /// Poses with all three targets, 20 s apart; every joint has `rest` of what it last moved to go, as a share of the largest move or in all.
-fn lagging(poses: usize, rest: impl Fn(f64, f64) -> f64) -> (Cell, Measurements) {
+fn lagging(poses: usize, others: impl Fn(f64, f64) -> f64) -> (Cell, Measurements) {
     let cell = Cell::new(fixture::offset_wrist(), &THREE, 17);
     let mut data = cell.rows(poses, 0);
     let (logged, joints) = (data.q.clone(), data.joints);
@@ -24,7 +24,7 @@ fn lagging(poses: usize, rest: impl Fn(f64, f64) -> f64) -> (Cell, Measurements)
         let largest = moves.iter().map(|moved| moved.abs()).fold(0.0, f64::max);
         for row in 3 * pose..3 * (pose + 1) {
             (0..joints)
-                .for_each(|joint| data.q[row * joints + joint] += rest(moves[joint], largest));
+                .for_each(|joint| data.q[row * joints + joint] += others(moves[joint], largest));
         }
     }
     data.points.position = cell.truth.predict(&data);
@@ -39,21 +39,26 @@ fn lagging(poses: usize, rest: impl Fn(f64, f64) -> f64) -> (Cell, Measurements)
     (cell, data)
 }
 
-fn lag_alone(said: &Diagnosis, what: &str) -> (String, f64) {
-    let named: Vec<&str> = said.findings.iter().map(|finding| finding.effect).collect();
+fn lag_alone(diagnosis: &Diagnosis, what: &str) -> (String, f64) {
+    let named: Vec<&str> = diagnosis
+        .findings
+        .iter()
+        .map(|finding| finding.effect)
+        .collect();
     assert_eq!(
         named,
         ["joint_log_lag"],
         "{what}: {}",
-        said.findings
+        diagnosis
+            .findings
             .iter()
             .map(|f| f.statement.as_str())
             .collect::<Vec<_>>()
             .join(" ")
     );
     (
-        said.findings[0].statement.clone(),
-        said.findings[0].parameters[0].value,
+        diagnosis.findings[0].statement.clone(),
+        diagnosis.findings[0].parameters[0].value,
     )
 }
 
@@ -68,8 +73,8 @@ fn a_lag_of_the_last_move_is_found_with_three_targets_a_pose() {
 #[test]
 fn a_lag_of_a_synchronous_motion_is_shared_out_as_the_moves_are() {
     let (cell, data) = lagging(60, |moved, largest| 90.0 * ARCSEC * moved / largest);
-    let (statement, rest) = lag_alone(&diagnosed(&cell.description, &data), "in order");
-    assert!((rest / 90.0 - 1.0).abs() < 0.05, "{statement}");
+    let (statement, remaining) = lag_alone(&diagnosed(&cell.description, &data), "in order");
+    assert!((remaining / 90.0 - 1.0).abs() < 0.05, "{statement}");
     has(
         &statement,
         "the joint that moved most had 90 arcsec still to come",
@@ -93,21 +98,21 @@ fn rows_in_another_order_than_their_times_lag_by_their_times() {
             .map(|time| order.iter().map(|row| time[*row]).collect());
         let times = sorted.time.clone().unwrap();
         sorted.sequence = Sequence::by_time(&times, |a, b| sorted.near_pose(a, b));
-        for (row, own) in order.iter().enumerate() {
+        for (row, ours) in order.iter().enumerate() {
             for joint in 0..data.joints {
                 assert_eq!(
                     sorted.last_move(row, joint),
-                    data.last_move(*own, joint),
+                    data.last_move(*ours, joint),
                     "{what}, row {row}, joint {joint}"
                 );
                 assert_eq!(
                     sorted.direction(row, joint),
-                    data.direction(*own, joint),
+                    data.direction(*ours, joint),
                     "{what}, row {row}, joint {joint}"
                 );
             }
         }
-        let (statement, rest) = lag_alone(&diagnosed(&cell.description, &sorted), what);
-        assert!((rest / 90.0 - 1.0).abs() < 0.05, "{what}: {statement}");
+        let (statement, remaining) = lag_alone(&diagnosed(&cell.description, &sorted), what);
+        assert!((remaining / 90.0 - 1.0).abs() < 0.05, "{what}: {statement}");
     }
 }

@@ -92,7 +92,7 @@ impl Truth {
     /// How the target is turned in every row, by differences of points.
     fn rotations(&self, data: &Measurements) -> Vec<Matrix3<f64>> {
         let seat = self.model.robot.setup().targets[0].mounting;
-        let beside = [0, 1, 2].map(|axis: usize| {
+        let nearby = [0, 1, 2].map(|axis: usize| {
             let mut setup = self.model.robot.setup().clone();
             setup.targets[0].mounting.translation += seat.rotation.column(axis) * 0.5;
             Model {
@@ -104,7 +104,7 @@ impl Truth {
         let rows = 0..data.rows();
         rows.map(|row| {
             Matrix3::from_columns(
-                &[0, 1, 2].map(|axis: usize| (beside[axis][row] - data.points.position[row]) / 0.5),
+                &[0, 1, 2].map(|axis: usize| (nearby[axis][row] - data.points.position[row]) / 0.5),
             )
         })
         .collect()
@@ -225,7 +225,7 @@ fn every_kind_leaves_nothing_at_the_truth_and_its_derivatives_are_central_differ
                 },
                 Weight::uniform(1.0),
             );
-            sensitivity.derivatives(&mut placed, |k, own| partials[k] += own);
+            sensitivity.derivatives(&mut placed, |k, ours| partials[k] += ours);
             for (k, partial) in partials.iter().enumerate() {
                 let moved = |step: f64| {
                     let mut x = model.x.clone();
@@ -246,13 +246,13 @@ fn every_kind_leaves_nothing_at_the_truth_and_its_derivatives_are_central_differ
 /// The data with one kind alone.
 fn alone(data: &Measurements, kind: &dyn MeasurementKind) -> Measurements {
     let name = kind.about().name;
-    let mut own = data.clone();
-    own.readings.retain(|readings| readings.kind == name);
+    let mut ours = data.clone();
+    ours.readings.retain(|readings| readings.kind == name);
     if name != KINDS[0].about().name {
-        own.points.position.fill(Vector3::zeros());
-        own.points.sigma.fill(Vector3::repeat(f64::INFINITY));
+        ours.points.position.fill(Vector3::zeros());
+        ours.points.sigma.fill(Vector3::repeat(f64::INFINITY));
     }
-    own
+    ours
 }
 
 #[test]

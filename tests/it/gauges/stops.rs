@@ -151,7 +151,7 @@ fn a_pose_with_wrong_joints_is_set_aside_with_all_its_targets_and_no_event() {
         candidates: &candidates,
     };
     let (_, _, screening) = fit_screened(&model, &data, &options, &vec![0; all.len()]);
-    let of = |kind: SuspectKind| -> Vec<usize> {
+    let of_kind = |kind: SuspectKind| -> Vec<usize> {
         screening
             .suspects
             .iter()
@@ -160,12 +160,15 @@ fn a_pose_with_wrong_joints_is_set_aside_with_all_its_targets_and_no_event() {
             .collect()
     };
     assert_eq!(
-        of(SuspectKind::Outlier),
+        of_kind(SuspectKind::Outlier),
         wrong.collect::<Vec<_>>(),
         "{:?}",
         screening.suspects
     );
-    assert_eq!(of(SuspectKind::Event), (3 * 40..3 * 44).collect::<Vec<_>>());
+    assert_eq!(
+        of_kind(SuspectKind::Event),
+        (3 * 40..3 * 44).collect::<Vec<_>>()
+    );
     assert_eq!(screening.kept.len(), all.len() - 3);
 }
 
@@ -211,12 +214,12 @@ fn near_repeats_count_less_the_known_motion() {
         None
     );
     let (robot, fit) = (RobotModel::new(cell.description.clone()), all_rows(&data));
-    let said = diagnose(&question(&robot, &data, &fit), |_| ());
+    let diagnosis = diagnose(&question(&robot, &data, &fit), |_| ());
     assert!(
-        said.repeatability.repeats >= 30 && said.noise_basis == NoiseBasis::Repeats,
+        diagnosis.repeatability.repeats >= 30 && diagnosis.noise_basis == NoiseBasis::Repeats,
         "{:?}",
-        said.repeatability
+        diagnosis.repeatability
     );
-    let ratio = said.repeatability.sigma / (5.0 * ARCSEC);
+    let ratio = diagnosis.repeatability.sigma / (5.0 * ARCSEC);
     assert!((0.75..1.3).contains(&ratio), "{ratio} of the truth");
 }

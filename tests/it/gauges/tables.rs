@@ -93,8 +93,8 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
         data.points.sigma[row] = Vector3::repeat(f64::INFINITY);
         data.points.position[row] = Vector3::zeros();
     }
-    let of = tables(&cell, &data);
-    let made = of.identify(json!({"targets": {"A": [119.0, 1.0, 30.0]}, "screen": false}));
+    let recorded = tables(&cell, &data);
+    let made = recorded.identify(json!({"targets": {"A": [119.0, 1.0, 30.0]}, "screen": false}));
     let parameters: Parameters = made.get();
     let placed = |name: &str| {
         parameters
@@ -121,8 +121,8 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
             Load::GravityTorque,
         )
         .unwrap();
-    let own = of.recording.measurements();
-    let errors = model.row_errors(&own);
+    let ours = recorded.recording.measurements();
+    let errors = model.row_errors(&ours);
     let prediction: Prediction = made.get();
     for (row, error) in prediction.0.iter().zip(&errors) {
         assert!(

@@ -58,9 +58,9 @@ fn what_is_no_clock_time_is_a_rejected_row_and_a_clock_without_its_unit_says_how
         ["`8 o'clock` is no clock time", "08:15:03.25"],
     );
     let seconds = CLOCK.replace("unit: clock", "unit: s");
-    let said = refusal(&rows(&["08:15:03", "08:15:04", "08:15:05"]), &seconds, rr());
+    let printed = refusal(&rows(&["08:15:03", "08:15:04", "08:15:05"]), &seconds, rr());
     has(
-        &said,
+        &printed,
         "`08:15:03` is a clock time, not a number; `unit: clock` reads such times",
     );
 }

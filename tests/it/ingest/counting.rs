@@ -56,17 +56,17 @@ fn ways_of_counting_that_no_robot_has_are_faults() {
         "      x:",
         "      current: {column: \"i{j}\", unit: A, zero: [1, 2]}\n      x:",
     );
-    let said = faults_of(&current).join("\n");
+    let printed = faults_of(&current).join("\n");
     assert_eq!(
-        said,
+        printed,
         "files[0].columns.current: `zero` and `coupled` are for positions; say them at `q`"
     );
     let desk = rows("P1,30,-60,1000,200,3\n");
-    let said = refusal(&desk, &with("sign: [1, 1, -1]"), rr());
-    has(&said, "`q.sign` lists 3 numbers; the robot has 2 joints");
-    let said = refusal(&desk, &with("coupled: [{joint: 3, by: 2, ratio: 1}]"), rr());
+    let printed = refusal(&desk, &with("sign: [1, 1, -1]"), rr());
+    has(&printed, "`q.sign` lists 3 numbers; the robot has 2 joints");
+    let printed = refusal(&desk, &with("coupled: [{joint: 3, by: 2, ratio: 1}]"), rr());
     has(
-        &said,
+        &printed,
         "`q.coupled` names a joint beyond the last; the robot has 2 joints",
     );
 }

@@ -25,11 +25,11 @@ fn desk(header: &str, axis: impl Fn(usize) -> String) -> Desk {
 #[test]
 fn an_axis_that_moves_and_that_the_robot_file_does_not_have_is_refused() {
     for (header, name) in [("eax_a", "eax_a"), ("E1", "E1"), ("track_mm", "track_mm")] {
-        let said = refusal(&desk(header, |row| format!("{}", 100 * row)), YAML, rr());
+        let printed = refusal(&desk(header, |row| format!("{}", 100 * row)), YAML, rr());
         let sentence = format!(
             "a.csv: column `{name}` is an external axis, in addition to the robot's 2 joints, and moves from 0 to 1100"
         );
-        starts_with(&said, &sentence);
+        starts_with(&printed, &sentence);
     }
     for (header, value) in [("eax_a", "9E9"), ("E1", "0.004"), ("rail", "")] {
         take(&desk(header, |_| value.into()), YAML, rr())

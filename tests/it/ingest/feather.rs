@@ -64,7 +64,7 @@ fn case(here: &Path, written: impl Fn(&str) -> Vec<u8>) {
 
 #[test]
 fn a_recording_in_feather_files_is_diagnosed_as_its_text_is() {
-    let said = |compression: Option<Option<CompressionType>>| {
+    let answer_of = |compression: Option<Option<CompressionType>>| {
         let folder = tempfile::tempdir().unwrap();
         case(folder.path(), |text| {
             compression.map_or_else(|| text.into(), |compression| feather(text, compression))
@@ -75,10 +75,10 @@ fn a_recording_in_feather_files_is_diagnosed_as_its_text_is() {
                 .unwrap()
                 .table;
         let output = calib(folder.path(), "diagnose p.yaml --json").code(0);
-        let mut said: Value = output.json();
-        (recording, said["findings"].take())
+        let mut answer: Value = output.json();
+        (recording, answer["findings"].take())
     };
-    let (text, plain) = (said(None), said(Some(None)));
+    let (text, plain) = (answer_of(None), answer_of(Some(None)));
     assert!(
         text.1
             .as_array()
@@ -86,7 +86,7 @@ fn a_recording_in_feather_files_is_diagnosed_as_its_text_is() {
         "{:#}",
         text.1
     );
-    assert!(text == plain && text == said(Some(Some(CompressionType::ZSTD))));
+    assert!(text == plain && text == answer_of(Some(Some(CompressionType::ZSTD))));
 }
 
 #[test]
@@ -99,13 +99,16 @@ fn a_feather_file_that_cannot_be_read_is_refused_with_a_reason() {
         output.err
     };
     let refused = |written: &dyn Fn(Vec<u8>) -> Vec<u8>| refused_of(None, written);
-    let said = refused(&|bytes| bytes[..bytes.len() / 2].to_vec());
+    let printed = refused(&|bytes| bytes[..bytes.len() / 2].to_vec());
     has(
-        &said,
+        &printed,
         "controller.feather: is a Feather file that cannot be read: ",
     );
-    let said = refused(&|bytes| [b"FEA1", &bytes[4..]].concat());
-    has(&said, "is a Feather file of version 1; allowed: version 2");
+    let printed = refused(&|bytes| [b"FEA1", &bytes[4..]].concat());
+    has(
+        &printed,
+        "is a Feather file of version 1; allowed: version 2",
+    );
     // Before each frame of zstd stands how many bytes it unpacks to: numbers that no machine can hold, and none can have.
     // The message before them may be damaged, too: the end of the file says where its columns are.
     for (length, is_alone) in [
@@ -114,7 +117,7 @@ fn a_feather_file_that_cannot_be_read_is_refused_with_a_reason() {
         (i64::MIN, true),
         (1 << 40, false),
     ] {
-        let said = refused_of(Some(CompressionType::ZSTD), &|mut bytes| {
+        let printed = refused_of(Some(CompressionType::ZSTD), &|mut bytes| {
             let frame = bytes
                 .windows(4)
                 .position(|at| at == 0xfd2f_b528_u32.to_le_bytes());
@@ -126,7 +129,7 @@ fn a_feather_file_that_cannot_be_read_is_refused_with_a_reason() {
             bytes
         });
         has(
-            &said,
+            &printed,
             "is a Feather file that cannot be read: a column unpacks to ",
         );
     }

@@ -58,10 +58,10 @@ fn all_conventions_of_orientation_are_one_rotation() {
         Vector3::from_column_slice(&taken.recording.readings["orientation"])
     };
     let rpy = by("{rpy: [a, b, c], unit: deg}", "30,-20,100,");
-    let own = Rotation3::new(rpy) * Vector3::new(1.0, 0.0, 0.0);
+    let ours = Rotation3::new(rpy) * Vector3::new(1.0, 0.0, 0.0);
     // Rz(100) Ry(-20) Rx(30) takes x to cos(20) (cos 100, sin 100) and up by sin 20.
     let expected = Vector3::new(-0.163_175_911, 0.925_416_578, 0.342_020_143);
-    assert!((own - expected).norm() < 1e-8, "{own}");
+    assert!((ours - expected).norm() < 1e-8, "{ours}");
     assert!(
         (by(
             "{rotation_vector: [a, b, c], unit: rad}",

@@ -111,8 +111,8 @@ fn what_a_later_measurement_lacks_is_said_with_its_place() {
         ]
     );
     let without = desk().with("points2.csv", "id,x,y\nP1,7,8\n");
-    let said = refusal(&without, DAYS, rr());
-    has(&said, ["points2.csv", "`z`"]);
+    let printed = refusal(&without, DAYS, rr());
+    has(&printed, ["points2.csv", "`z`"]);
 }
 
 #[test]
@@ -145,10 +145,10 @@ fn the_files_of_an_earlier_measurement_again_are_a_fault_of_the_settings() {
 #[test]
 fn points_that_would_be_used_twice_are_refused_whatever_their_file_is_called() {
     let copied = desk().with("points2.csv", "id,x,y,z\r\nP2,4,5,6\r\nP1,1,2,3.0\r\n");
-    let said = refusal(&copied, DAYS, rr());
+    let printed = refusal(&copied, DAYS, rr());
     let expected = "with.later[0].files[1]: `points2.csv` measured what `points1.csv` of `files[1].file` did, and 2 rows would be used \
                     twice";
-    starts_with(&said, expected);
+    starts_with(&printed, expected);
 }
 
 #[test]

@@ -81,9 +81,9 @@ fn velocities_follow_from_the_joints_over_time_but_never_across_gaps() {
             }
         }
     }
-    let said = desk.notes.lock().unwrap().join("\n");
+    let printed = desk.notes.lock().unwrap().join("\n");
     has(
-        &said,
+        &printed,
         [
             "10.0 ms apart, never across gaps above 50 ms",
             "none for 1 row between gaps",
@@ -183,9 +183,9 @@ fn two_clocks_become_one_recording_with_the_joints_at_the_moment_of_the_point() 
                 );
             }
         }
-        let said = desk.notes.lock().unwrap().join("\n");
+        let printed = desk.notes.lock().unwrap().join("\n");
         has(
-            &said,
+            &printed,
             "extrapolated by their velocity to the time of their point",
         );
     }

@@ -214,12 +214,12 @@ fn a_coordinate_of_exactly_zero_keeps_its_stated_uncertainty() {
         );
         let data = recording.measurements();
         assert_eq!(data.noise_basis, NoiseBasis::Instrument);
-        let own: Vec<[f64; 3]> = data
+        let ours: Vec<[f64; 3]> = data
             .points
             .sigma
             .iter()
             .map(|sigma| (sigma * 1e6).into())
             .collect();
-        is_near(&own, &expected);
+        is_near(&ours, &expected);
     }
 }

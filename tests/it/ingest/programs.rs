@@ -97,11 +97,11 @@ fn positions_of_one_line_that_no_point_was_measured_at_are_rejected_together() {
         .into_iter()
         .flat_map(|chunk| chunk.0)
         .collect();
-    let told: Vec<(i64, usize)> = rejected
+    let answer: Vec<(i64, usize)> = rejected
         .iter()
         .map(|row| (row.line, row.detail.matches("no usable row").count()))
         .collect();
-    assert_eq!(told, [(6, 2)], "{rejected:?}");
+    assert_eq!(answer, [(6, 2)], "{rejected:?}");
     assert_eq!(
         table::<Intake>(&tables)[0]
             .0

@@ -91,17 +91,17 @@ fn a_file_whose_lines_end_in_cr_alone_says_how_to_convert_it() {
 #[test]
 fn a_column_of_two_measured_quantities_or_joints_is_a_fault() {
     let faults = |yaml: &str| faults_of(yaml);
-    let own = "allowed: a column for each";
+    let ours = "allowed: a column for each";
     assert_eq!(
         faults(&TWO.replace("column: y", "column: \" x\"")),
         [format!(
-            "files[0].columns.y.column: column ` x` is mapped to `x` and `y`; {own}"
+            "files[0].columns.y.column: column ` x` is mapped to `x` and `y`; {ours}"
         )]
     );
     assert_eq!(
         faults(&TWO.replace("column: \"q{j}\"", "columns: [q1, q1]")),
         [format!(
-            "files[0].columns.q.columns[1]: column `q1` is mapped to joint 1 of `q` and joint 2 of `q`; {own}"
+            "files[0].columns.q.columns[1]: column `q1` is mapped to joint 1 of `q` and joint 2 of `q`; {ours}"
         )]
     );
     let target = TWO
@@ -110,7 +110,7 @@ fn a_column_of_two_measured_quantities_or_joints_is_a_fault() {
     assert_eq!(
         faults(&target),
         [format!(
-            "files[0].columns.y.minus: column `xd` is mapped to `x` and `y`; {own}"
+            "files[0].columns.y.minus: column `xd` is mapped to `x` and `y`; {ours}"
         )]
     );
     // A target is also the simulated point; one uncertainty is that of all axes.
@@ -266,9 +266,9 @@ fn files_that_do_not_fit_together_are_faults_of_the_settings() {
     let (id, time) = ("point_id: {column: id}, ", "time: {column: t, unit: s}, ");
     let q = "q: {column: \"q{j}\", unit: deg}";
     let xyz = "x: {column: x, unit: mm}, y: {column: y, unit: mm}, z: {column: z, unit: mm}";
-    let faults = |first: &str, second: &str, rest: &str| {
+    let faults = |first: &str, second: &str, tail: &str| {
         let yaml = format!(
-            "files:\n{}{}{rest}",
+            "files:\n{}{}{tail}",
             file(first),
             if second.is_empty() {
                 String::new()

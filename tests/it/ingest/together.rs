@@ -62,17 +62,17 @@ fn ids_without_a_partner_are_shown_with_an_example_of_each_file() {
         .replace("LEFT", "")
         .replace("RIGHT", "")
         + "join: {by: id}\n";
-    let said = |ids: [&str; 2]| {
+    let message_of = |ids: [&str; 2]| {
         let points = format!("k,x,y,z\n{},1,1,1\n{},2,2,2\n", ids[0], ids[1]);
         let desk = Desk::default()
             .with("run/z_arm.csv", "k,q1\nP1,1\nP2,2\n")
             .with("run/b_tracker.csv", points);
         refusal(&desk, &yaml, robot("r", 2.0))
     };
-    let other = said(["XP1", "XP2"]);
+    let other = message_of(["XP1", "XP2"]);
     let expected = "2 unmatched (no partner in run/b_tracker.csv, e.g. `P1` here and `XP1` there: ids must be the same in both files)";
     has(&other, expected);
-    let lower = said(["q7", "p2"]);
+    let lower = message_of(["q7", "p2"]);
     let expected =
         "e.g. `P2` here and `p2` there: ids that differ in upper and lower case are different ids";
     has(&lower, expected);

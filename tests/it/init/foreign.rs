@@ -55,10 +55,10 @@ fn the_only_sheet_with_numbers_is_read_and_among_many_one_is_asked_for() {
     )]);
     assert!(
         found
-            .said
+            .printed
             .contains("has numbers in several sheets; say which, `sheet: NAME`"),
         "{}",
-        found.said
+        found.printed
     );
     found.says(&["# REPLACE"]);
 }

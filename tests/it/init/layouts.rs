@@ -49,7 +49,7 @@ fn latin(text: &str) -> Vec<u8> {
 pub(super) struct Made {
     pub folder: TempDir,
     pub pipeline: String,
-    pub said: String,
+    pub printed: String,
 }
 
 pub(super) fn made(files: &[(&str, Vec<u8>)]) -> Made {
@@ -69,7 +69,7 @@ pub(super) fn made(files: &[(&str, Vec<u8>)]) -> Made {
     Made {
         folder,
         pipeline,
-        said: output.out.clone(),
+        printed: output.out.clone(),
     }
 }
 
@@ -119,8 +119,8 @@ impl Made {
     /// `check` finds nothing wrong, and the recording has so many rows.
     pub fn runs(&self, rows: usize) -> &Self {
         let check = calib(self.path(), "check pipeline.yaml");
-        let told = check.err.clone();
-        assert!(check.code == Some(0), "{told}\n{}", self.pipeline);
+        let printed = check.err.clone();
+        assert!(check.code == Some(0), "{printed}\n{}", self.pipeline);
         let run = calib(
             self.path(),
             "run pipeline.yaml --until split --json --quiet",
@@ -301,8 +301,8 @@ fn rows_of_unequal_number_are_never_joined_by_order_in_silence() {
     let made = two(controller.clone(), tracker);
     made.says(&["join: {by: order}", "REPLACE", "30 and 31 rows"]);
     let check = calib(made.path(), "run pipeline.yaml --until split --quiet").code(10);
-    let told = check.err.clone();
-    has(&told, "31 data rows, controller.csv has 30");
+    let printed = check.err.clone();
+    has(&printed, "31 data rows, controller.csv has 30");
     let equal = two(controller, table("x,y,z", |k| point(k, ",")));
     equal.says(&["join: {by: order}", "CHECK"]).runs(30);
 }
@@ -349,10 +349,10 @@ fn goals_and_urdf_joints_are_told_from_what_was_measured() {
         "temperature: {column: \"measurement_temperature\", unit: C}",
     ]);
     made.lacks(&["Goal", "point_id", "time:"]).runs(30);
-    let beside = one(table("Goal x,Goal y,Goal z,x,y,z,J1,J2,J3,J4,J5,J6", |k| {
+    let in_order = one(table("Goal x,Goal y,Goal z,x,y,z,J1,J2,J3,J4,J5,J6", |k| {
         format!("{},{},{}", point(k + 1, ","), point(k, ","), joints(k, ","))
     }));
-    beside
+    in_order
         .has(&["x: {column: \"x\", unit: mm}"])
         .lacks(&["Goal"])
         .runs(30);
@@ -444,7 +444,7 @@ fn a_file_without_a_header_gets_both_files_with_what_was_seen() {
     sheet.says(&["REPLACE", "saved as CSV"]);
     let prose = one("nothing\nto see\n");
     prose.says(&["REPLACE", "nothing", "to see"]);
-    has(&prose.said, "no header found");
+    has(&prose.printed, "no header found");
 }
 
 #[test]
@@ -549,6 +549,6 @@ fn the_identity_that_init_comments_out_is_nobodys() {
     let identified = made.pipeline.replace("# identity:", "identity:");
     put(made.path(), "pipeline.yaml", identified);
     let check = calib(made.path(), "check pipeline.yaml").code(0);
-    let said = check.out.clone();
-    has(&said, ["replace   ", "          pipeline.yaml:"]);
+    let printed = check.out.clone();
+    has(&printed, ["replace   ", "          pipeline.yaml:"]);
 }

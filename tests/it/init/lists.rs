@@ -64,20 +64,20 @@ fn what_cannot_be_told_ends_with_code_1_and_a_sentence_and_too_many_files_with_2
         "day,weather,mood\nmon,rain,good\ntue,sun,good\n",
     );
     let output = calib(folder.path(), "init . --data notes.csv");
-    let told = output.err.clone();
-    assert_eq!(output.code, Some(1), "{told}");
+    let printed = output.err.clone();
+    assert_eq!(output.code, Some(1), "{printed}");
     starts_with(
-        &told,
+        &printed,
         "error: neither joints nor a measured point were recognised in notes.csv",
     );
     let output = calib(
         folder.path(),
         "init more --data notes.csv notes.csv notes.csv",
     );
-    let told = output.err.clone();
-    assert_eq!(output.code, Some(2), "{told}");
+    let printed = output.err.clone();
+    assert_eq!(output.code, Some(2), "{printed}");
     has(
-        &told,
+        &printed,
         "--data: 3 files; allowed: one recording, the controller's and the tracker's, the controller's and a list of points in one layout for each of several reflectors, or recordings that have joints and points each",
     );
     assert!(!folder.path().join("more").exists());
@@ -161,12 +161,15 @@ fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
     });
     put(folder.path(), "data.csv", data);
     put(folder.path(), "cell.urdf", CELL);
-    let told = |arguments: &str| {
+    let message_of = |arguments: &str| {
         let output = calib(folder.path(), arguments);
         (output.code, output.err.clone())
     };
     let start = "init . --data data.csv --urdf cell.urdf --tip";
-    assert_eq!(told(&format!("{start} holder")), (Some(0), String::new()));
+    assert_eq!(
+        message_of(&format!("{start} holder")),
+        (Some(0), String::new())
+    );
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert!(
         read("robot.yaml").contains("urdf: {base: \"world\", tip: \"holder\"}"),
@@ -180,18 +183,18 @@ fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
     );
     std::fs::remove_file(folder.path().join("robot.yaml")).unwrap();
     std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
-    let (code, said) = told(&format!("{start} carriage"));
+    let (code, printed) = message_of(&format!("{start} carriage"));
     assert_eq!(code, Some(2));
     has(
-        &said,
+        &printed,
         "--tip: the chain from `world` to `carriage` has 1 joint, the recording 2",
     );
-    let (code, said) = told(&format!("{start} tool0"));
+    let (code, printed) = message_of(&format!("{start} tool0"));
     assert!(
         code == Some(2)
-            && said.contains("no link `tool0`")
-            && said.contains("carriage, holder, world"),
-        "{said}"
+            && printed.contains("no link `tool0`")
+            && printed.contains("carriage, holder, world"),
+        "{printed}"
     );
 }
 

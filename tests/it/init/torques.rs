@@ -73,9 +73,9 @@ fn torques_under_any_name_make_a_pipeline_that_reads_torques() {
 
 #[test]
 fn joint_states_of_ros_are_told_by_their_names_and_an_effort_may_be_a_current() {
-    let of = |what: &str| ARM.map(|joint| format!("{joint}_{what}")).join(",");
+    let of_what = |what: &str| ARM.map(|joint| format!("{joint}_{what}")).join(",");
     // Efforts before positions: the first column of a joint is not its position.
-    let header = [of("effort"), of("velocity"), of("position")].join(",");
+    let header = [of_what("effort"), of_what("velocity"), of_what("position")].join(",");
     let made = made(&[("log.csv", log(&header, 18, wave).into())]);
     made.has(&[
         "q: {columns: [\"shoulder_pan_joint_position\"",
@@ -103,7 +103,11 @@ fn columns_that_are_no_joints_are_not_taken_for_joints() {
             )
         };
         let made = made(&[("data.csv", table(&format!("{header},X,Y,Z"), row).into())]);
-        assert!(!made.said.contains("joints ("), "{header}: {}", made.said);
+        assert!(
+            !made.printed.contains("joints ("),
+            "{header}: {}",
+            made.printed
+        );
         made.has(&[
             "q: {column: \"A{j}\", unit: deg}   # REPLACE: no columns of joints were recognised",
         ]);
@@ -118,7 +122,7 @@ fn columns_that_are_no_joints_are_not_taken_for_joints() {
         )
     };
     let made = made(&[("data.csv", table("q1,q2,q3,q4,X,Y,Z", turned).into())]);
-    assert!(!made.said.contains("joints ("), "{}", made.said);
+    assert!(!made.printed.contains("joints ("), "{}", made.printed);
 }
 
 /// A file of columns: times, a list of the state with so many numbers, and a point as a list.
@@ -188,7 +192,7 @@ fn lists_of_a_parquet_file_are_columns_of_which_the_first_are_the_joints() {
 
 #[test]
 fn programs_and_bags_are_named_as_what_they_are_by_init_and_by_check() {
-    for (name, content, said) in [
+    for (name, content, printed) in [
         (
             "measure.txt",
             &b"/PROG  MEASURE\n/ATTR\nOWNER = MNEDITOR;\n/POS\nP[1]{\n"[..],
@@ -211,12 +215,12 @@ fn programs_and_bags_are_named_as_what_they_are_by_init_and_by_check() {
         ),
     ] {
         let made = made(&[(name, content.to_vec())]);
-        assert!(made.said.contains(said), "{name}: {}", made.said);
+        assert!(made.printed.contains(printed), "{name}: {}", made.printed);
         let check = calib(made.path(), "check pipeline.yaml");
-        let told = check.err.clone();
+        let message = check.err.clone();
         assert!(
-            check.code == Some(10) && told.contains(said),
-            "{name}: {told}"
+            check.code == Some(10) && message.contains(printed),
+            "{name}: {message}"
         );
     }
 }
@@ -224,7 +228,7 @@ fn programs_and_bags_are_named_as_what_they_are_by_init_and_by_check() {
 #[test]
 fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
     let folder = tempfile::tempdir().unwrap();
-    let told = |arguments: &str| {
+    let message_of = |arguments: &str| {
         let output = calib(folder.path(), arguments);
         (output.code, output.both())
     };
@@ -235,18 +239,19 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
             format!("{},{}", joints(k, ","), point(k, ","))
         }),
     );
-    let robot = told("robots lrmate_200id").1;
+    let robot = message_of("robots lrmate_200id").1;
     put(folder.path(), "robot.yaml", &robot);
-    let (code, said) = told("init . --data data.csv --robot ur10e");
+    let (code, printed) = message_of("init . --data data.csv --robot ur10e");
     assert!(
-        code == Some(2) && said.contains("robot.yaml: is already there and would be used"),
-        "{said}"
+        code == Some(2) && printed.contains("robot.yaml: is already there and would be used"),
+        "{printed}"
     );
-    let (code, said) = told("init . --data data.csv");
+    let (code, printed) = message_of("init . --data data.csv");
     assert!(
         code == Some(0)
-            && said.contains("wrote ./pipeline.yaml next to ./robot.yaml, which is used as it is"),
-        "{said}"
+            && printed
+                .contains("wrote ./pipeline.yaml next to ./robot.yaml, which is used as it is"),
+        "{printed}"
     );
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert_eq!(read("robot.yaml"), robot);
@@ -256,13 +261,14 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
         "{}",
         read("pipeline.yaml")
     );
-    assert_eq!(told("check pipeline.yaml").0, Some(0));
+    assert_eq!(message_of("check pipeline.yaml").0, Some(0));
     std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
-    put(folder.path(), "robot.yaml", told("robots panda").1);
-    let (code, said) = told("init . --data data.csv");
+    put(folder.path(), "robot.yaml", message_of("robots panda").1);
+    let (code, printed) = message_of("init . --data data.csv");
     assert!(
         code == Some(2)
-            && said.contains("has 7 joints, the recording 6; put the robot of the recording there"),
-        "{said}"
+            && printed
+                .contains("has 7 joints, the recording 6; put the robot of the recording there"),
+        "{printed}"
     );
 }

@@ -72,8 +72,8 @@ pub fn replaced(page: &str, name: &str, text: &str) -> Option<String> {
         format!("<!-- generated: {name} -->\n"),
         format!("<!-- end of {name} -->"),
     );
-    let (before, rest) = page.split_once(&open)?;
-    let (_, after) = rest.split_once(&close)?;
+    let (before, tail) = page.split_once(&open)?;
+    let (_, after) = tail.split_once(&close)?;
     Some(format!("{before}{open}\n{}\n\n{close}{after}", text.trim()))
 }
 

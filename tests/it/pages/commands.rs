@@ -14,19 +14,19 @@ pub static GOLDEN: LazyLock<String> = LazyLock::new(|| {
 /// The cases under a heading, as they stand there; empty where there is no such heading.
 fn section(name: &str) -> &'static str {
     let heading = format!("\n## {name}\n");
-    GOLDEN.split_once(&heading).map_or("", |(_, rest)| {
-        rest.split("\n## ").next().unwrap_or_default().trim()
+    GOLDEN.split_once(&heading).map_or("", |(_, tail)| {
+        tail.split("\n## ").next().unwrap_or_default().trim()
     })
 }
 
 /// The example of a command, with what it answers.
 pub fn example(name: &str) -> String {
-    let own = section(name);
+    let ours = section(name);
     assert!(
-        !own.is_empty(),
+        !ours.is_empty(),
         "tests/cmd/commands.trycmd has no example `## {name}`"
     );
-    own.replace("\n\n```", "\n```")
+    ours.replace("\n\n```", "\n```")
         .replace("\n```console\n", "\n\n```console\n")
         .replace("\n\n\n", "\n\n")
 }

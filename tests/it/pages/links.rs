@@ -43,9 +43,9 @@ fn targets(text: &str) -> Vec<(usize, String)> {
             continue;
         }
         let prose: String = line.split('`').step_by(2).collect::<Vec<_>>().join("code");
-        for rest in prose.split("](").skip(1) {
+        for tail in prose.split("](").skip(1) {
             out.extend(
-                rest.split_once(')')
+                tail.split_once(')')
                     .map(|(target, _)| (number + 1, target.to_string())),
             );
         }

@@ -5,14 +5,14 @@ use clap::Command;
 
 /// Every command that does something, with the words that lead to it.
 pub fn leaves(command: &Command, words: &[String]) -> Vec<(Vec<String>, Command)> {
-    let own: Vec<&Command> = command
+    let ours: Vec<&Command> = command
         .get_subcommands()
         .filter(|verb| verb.get_name() != "help" && !verb.is_hide_set())
         .collect();
-    if own.is_empty() {
+    if ours.is_empty() {
         return vec![(words.to_vec(), command.clone())];
     }
-    own.into_iter()
+    ours.into_iter()
         .flat_map(|verb| leaves(verb, &[words, &[verb.get_name().to_string()]].concat()))
         .collect()
 }

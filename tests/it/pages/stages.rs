@@ -38,8 +38,8 @@ pub fn text() -> String {
             ports(&(stage.reads)()),
             ports(&(stage.writes)())
         ));
-        let own = &definitions[name];
-        text.push_str(&settings(own, definitions));
+        let ours = &definitions[name];
+        text.push_str(&settings(ours, definitions));
     }
     text
 }

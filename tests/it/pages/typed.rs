@@ -45,8 +45,8 @@ fn words(line: &str) -> Vec<Vec<String>> {
 fn fault(line: &str, whole: bool) -> Option<String> {
     words(line).into_iter().find_map(|mut words| {
         if words.starts_with(&["cargo".into(), "run".into()]) {
-            let own = words.iter().position(|word| word == "--")?;
-            words.drain(..=own);
+            let ours = words.iter().position(|word| word == "--")?;
+            words.drain(..=ours);
             words.insert(0, "calib".into());
         }
         if words.first().map(String::as_str) != Some("calib") {
@@ -148,18 +148,18 @@ fn examples_of_the_help_are_understood() {
 
 #[test]
 fn a_line_of_a_shell_is_split_as_a_shell_splits_it() {
-    let own = |line: &str| {
+    let is_ours = |line: &str| {
         words(line)
             .into_iter()
             .map(|words| words.join("|"))
             .collect::<Vec<_>>()
     };
     assert_eq!(
-        own("calib query HEAD 'SELECT a, b' > x.csv  # why"),
+        is_ours("calib query HEAD 'SELECT a, b' > x.csv  # why"),
         ["calib|query|HEAD|SELECT a, b"]
     );
     assert_eq!(
-        own("calib tag HEAD released && calib verify"),
+        is_ours("calib tag HEAD released && calib verify"),
         ["calib|tag|HEAD|released", "", "calib|verify"]
     );
     assert!(fault("calib run pipeline.yaml --frce", true).is_some());

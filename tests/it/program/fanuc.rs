@@ -34,7 +34,7 @@ P[2:\"left, {up}\"]{\r
 /END\r
 ";
 
-fn told(text: &str) -> Vec<String> {
+fn message_of(text: &str) -> Vec<String> {
     refused(Language::Fanuc, text)
 }
 
@@ -110,7 +110,7 @@ fn a_turn_that_changes_is_written_where_it_stands() {
 
 #[test]
 fn what_is_not_understood_is_refused_with_its_line() {
-    let changed = |from: &str, to: &str| told(&LISTING.replacen(from, to, 1));
+    let changed = |from: &str, to: &str| message_of(&LISTING.replacen(from, to, 1));
     for (from, to, line, wanted) in [
         (
             "J2=   -20.000 deg",
@@ -176,21 +176,22 @@ fn what_is_not_understood_is_refused_with_its_line() {
         ),
         ("J1=     -.500 deg", "J1= 9999999.0 deg", "16:", ""),
     ] {
-        let told = changed(from, to);
+        let messages = changed(from, to);
         assert!(
-            told.iter()
+            messages
+                .iter()
                 .any(|one| one.starts_with(line) && one.contains(wanted)),
-            "{to}: {told:?}"
+            "{to}: {messages:?}"
         );
     }
-    assert!(told("a,b\n1,2\n")[0].contains("no listing of a TP program"));
+    assert!(message_of("a,b\n1,2\n")[0].contains("no listing of a TP program"));
 }
 
 #[test]
 fn frames_and_displacements_that_a_listing_does_not_hold_are_said() {
     let frames = |text: &str| {
         let program = Program::parse(text.as_bytes(), Language::Fanuc, Partial::Refused).unwrap();
-        super::told(program.frames())
+        super::message_of(program.frames())
     };
     let posture = "CONFIG: calib assumed that N is a wrist with J5 below zero, and F one above; confirm it at one pose of the controller";
     let behind = |text: &str| {

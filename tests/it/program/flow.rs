@@ -197,14 +197,14 @@ fn routines_of_other_files_leave_frames_as_they_are_or_are_read() {
     let one = base(100.0);
     let text = format!("DEF MAIN()\n{one}\nGRIP(1)\nGRIP(2)\n{MOTION}\nEND\n");
     let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).unwrap();
-    let told: Vec<&str> = program
+    let messages: Vec<&str> = program
         .warnings()
         .iter()
         .map(|note| note.message.as_str())
-        .filter(|told| told.contains("GRIP"))
+        .filter(|printed| printed.contains("GRIP"))
         .collect();
     assert_eq!(
-        told,
+        messages,
         [
             "calls GRIP of a file that was not read: calib assumed that it leaves $BASE, $TOOL and $LOAD as they are"
         ]

@@ -1,6 +1,6 @@
 //! KUKA KRL: numbers are strict, fields are known, types are stated.
 
-use super::{TargetKind, accepted, refused, told};
+use super::{TargetKind, accepted, message_of, refused};
 use calib::program::{Language, Partial, Program};
 
 fn faults(text: &str) -> Vec<String> {
@@ -118,7 +118,7 @@ fn the_operands_of_the_geometric_operator_are_no_absolute_poses() {
 fn partial_targets_are_listed_and_left_where_that_is_wished() {
     let text = "LIN {X 10,Y 20}\nPTP {A1 20}\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nDECL E6POS XP1\nXP1.Z = 50\nPTP {E1 500}\n";
     let whole = "; a target is corrected whole or not at all";
-    let said = [
+    let printed = [
         format!("the target has no Z, A, B, C{whole}"),
         format!("the target has no A2, A3, A4, A5, A6{whole}"),
         format!("sets Z of the target `XP1` alone{whole}"),
@@ -127,24 +127,24 @@ fn partial_targets_are_listed_and_left_where_that_is_wished() {
     let places = ["1:5", "2:5", "5:1", "6:5"];
     let listed: Vec<String> = places
         .iter()
-        .zip(&said)
-        .map(|(place, said)| format!("{place}: {said}"))
+        .zip(&printed)
+        .map(|(place, printed)| format!("{place}: {printed}"))
         .collect();
     let refusal = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused)
         .expect_err("partial targets");
-    assert_eq!((told(&refusal.faults), refusal.partial), (listed, 4));
+    assert_eq!((message_of(&refusal.faults), refusal.partial), (listed, 4));
     let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Left).unwrap();
     assert_eq!(program.literals().len(), 1);
     let mut warned: Vec<String> = places
         .iter()
-        .zip(&said)
-        .map(|(place, said)| format!("{place}: left as it is: {said}"))
+        .zip(&printed)
+        .map(|(place, printed)| format!("{place}: left as it is: {printed}"))
         .collect();
     warned.push(
         "6:9: E1 is 500: calib assumed that external axes stand at 0 and do not move the robot"
             .into(),
     );
-    assert_eq!(told(program.warnings()), warned);
+    assert_eq!(message_of(program.warnings()), warned);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Listings of FANUC's and scripts of Universal Robots with bytes changed: refused, or nothing but numbers of targets changes.
 
-use super::random::rest;
+use super::random::unchanged;
 use super::{Program, moved};
 use calib::program::{Language, Partial};
 use rand::rngs::ChaCha8Rng;
@@ -110,7 +110,11 @@ fn a_listing_or_a_script_with_bytes_changed_is_refused_or_read_as_it_stands() {
                 let out = moved(&program, 1e-3);
                 let again = Program::parse(&out, language, Partial::Refused)
                     .unwrap_or_else(|refusal| panic!("{shown}\n{:?}", refusal.faults));
-                assert_eq!(rest(&out, &again), rest(&changed, &program), "{shown}");
+                assert_eq!(
+                    unchanged(&out, &again),
+                    unchanged(&changed, &program),
+                    "{shown}"
+                );
                 assert_eq!(again.literals().len(), program.literals().len(), "{shown}");
                 for (new, old) in again.literals().iter().zip(program.literals()) {
                     let near = |(new, old): (&f64, &f64)| {

@@ -18,8 +18,8 @@ struct Writer {
 }
 
 impl Writer {
-    fn pick<'a>(&mut self, of: &[&'a str]) -> &'a str {
-        of[self.rng.random_range(0..of.len())]
+    fn pick<'a>(&mut self, choices: &[&'a str]) -> &'a str {
+        choices[self.rng.random_range(0..choices.len())]
     }
 
     fn say(&mut self, text: &str) {
@@ -281,7 +281,7 @@ fn found(program: &Program) -> Targets {
 }
 
 /// The bytes outside of the numbers of targets, and of the blank between a name and a number.
-pub fn rest(text: &[u8], program: &Program) -> Vec<u8> {
+pub fn unchanged(text: &[u8], program: &Program) -> Vec<u8> {
     let mut spans: Vec<_> = program
         .literals()
         .iter()
@@ -326,7 +326,7 @@ fn check(language: Language, text: &[u8], program: &Program) {
         }
     }
     let again = Program::parse(&out, language, Partial::Refused).unwrap();
-    assert_eq!(rest(&out, &again), rest(text, program), "{shown}");
+    assert_eq!(unchanged(&out, &again), unchanged(text, program), "{shown}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! ABB RAPID: numbers are strict, literals have the shape of their type, and what may be a target is not passed over.
 
-use super::{TargetKind, accepted, refused, told};
+use super::{TargetKind, accepted, message_of, refused};
 use calib::program::{Language, Partial, Program};
 
 const REST: &str = "[1,0,0,0],[0,0,-1,0],[9E9,9E+09,9e9,9000000000,9E9,9E9]]";
@@ -13,7 +13,7 @@ fn targets(text: &str) -> Vec<(TargetKind, Vec<f64>)> {
     accepted(Language::Rapid, text).0
 }
 
-/// Said of targets to which no motion goes.
+/// Diagnosed of targets to which no motion goes.
 const NOWHERE: &str = "{}: is moved to in none of the files that were read, which would state its frame and tool; --with names others";
 
 #[test]
@@ -153,18 +153,18 @@ fn a_part_of_a_target_is_listed_and_left_where_that_is_wished() {
     );
     let refusal = Program::parse(text.as_bytes(), Language::Rapid, Partial::Refused)
         .expect_err("a partial target");
-    let said =
+    let printed =
         "`p.trans.z` sets a part of a target alone; a target is corrected whole or not at all";
     assert_eq!(
-        (told(&refusal.faults), refusal.partial),
-        (vec![format!("3:1: {said}")], 1)
+        (message_of(&refusal.faults), refusal.partial),
+        (vec![format!("3:1: {printed}")], 1)
     );
     let program = Program::parse(text.as_bytes(), Language::Rapid, Partial::Left).unwrap();
     assert_eq!(
-        told(program.warnings()),
+        message_of(program.warnings()),
         [
             NOWHERE.replace("{}", "1:22"),
-            format!("3:1: left as it is: {said}"),
+            format!("3:1: left as it is: {printed}"),
             "4:1: left as it is: `q.trans`, of a type that this file does not state".into(),
         ]
     );

@@ -97,8 +97,8 @@ pub fn krl(program: &[u8]) -> Option<Targets> {
             let inner = group.split('}').next()?;
             let (prefix, inner) = inner
                 .split_once(':')
-                .map_or((None, inner), |(prefix, rest)| {
-                    (Some(prefix.trim_matches(blank)), rest)
+                .map_or((None, inner), |(prefix, tail)| {
+                    (Some(prefix.trim_matches(blank)), tail)
                 });
             let wanted = match prefix {
                 Some(prefix) => TYPES.contains(&prefix),
@@ -121,11 +121,11 @@ fn fields(inner: &str) -> Option<(TargetKind, Vec<f64>)> {
             .chars()
             .take_while(char::is_ascii_alphanumeric)
             .collect();
-        let rest = &field[name.len()..];
+        let tail = &field[name.len()..];
         if given.iter().any(|(known, _)| *known == name) {
             return None;
         }
-        given.push((name, rest));
+        given.push((name, tail));
     }
     let take = |names: [&str; 6]| -> Option<Vec<f64>> {
         names
@@ -240,15 +240,15 @@ pub fn rapid(program: &[u8]) -> Option<Targets> {
         } else {
             1
         };
-        let mut rest = statement[open..].chars().peekable();
+        let mut others = statement[open..].chars().peekable();
         for position in 0..count {
             // The second position of a circle may be a variable.
-            if position > 0 && rest.peek() != Some(&'[') {
+            if position > 0 && others.peek() != Some(&'[') {
                 break;
             }
-            collect(&piece(&mut rest)?, pose, &mut out)?;
+            collect(&piece(&mut others)?, pose, &mut out)?;
             // To the next position.
-            while rest.next_if(|c| blank(*c) || *c == ',').is_some() {}
+            while others.next_if(|c| blank(*c) || *c == ',').is_some() {}
         }
     }
     Some(out)

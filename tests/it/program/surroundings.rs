@@ -126,14 +126,14 @@ fn a_work_object_that_moves_or_changes_is_not_applied() {
         refused(OBJECT, &format!("bench.oframe.trans.x:=5;\n{once}"))
             .contains("work object `bench`")
     );
-    let said = refused(OBJECT, &format!("{once}\nMoveL p,v1,z1,gun;"));
+    let printed = refused(OBJECT, &format!("{once}\nMoveL p,v1,z1,gun;"));
     has(
-        &said,
+        &printed,
         "its work object differs between the ways to this target: work object `bench` and wobj0",
     );
-    let said = refused(OBJECT, "MoveL p,v1,z1,gun;\nMoveL p,v1,z1,bare;");
+    let printed = refused(OBJECT, "MoveL p,v1,z1,gun;\nMoveL p,v1,z1,bare;");
     has(
-        &said,
+        &printed,
         "its tool differs between the ways to this target: `gun` and `bare`",
     );
 }
@@ -184,7 +184,7 @@ fn joints_are_the_same_in_every_frame() {
 #[test]
 fn the_targets_of_a_file_are_reached_with_one_tool() {
     let robot = RobotModel::new(Kind::Sr210d.description([0.0; 3]));
-    let said = |tool: &str| {
+    let message_of = |tool: &str| {
         let targets = format!(
             "{TOOLS}CONST robtarget p:=[[1,2,3],{REST};\nCONST robtarget r:=[[4,5,6],{REST};\n"
         );
@@ -199,8 +199,8 @@ fn the_targets_of_a_file_are_reached_with_one_tool() {
             .collect::<Vec<_>>()
             .join("\n")
     };
-    assert_eq!(said("gun"), "");
-    let two = said("bare");
+    assert_eq!(message_of("gun"), "");
+    let two = message_of("bare");
     has(
         &two,
         "is reached with the tool BARE, another target with GUN: --tool says which",

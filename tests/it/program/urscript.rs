@@ -21,7 +21,7 @@ const SCRIPT: &str = "def weld():
 end
 ";
 
-fn told(text: &str) -> Vec<String> {
+fn message_of(text: &str) -> Vec<String> {
     refused(Language::UrScript, text)
 }
 
@@ -105,10 +105,10 @@ fn what_may_or_may_not_be_a_target_is_refused_with_its_line() {
             1,
         );
         let text = text.replace("end2", "end\n  movec");
-        let told = told(&text);
+        let messages = message_of(&text);
         assert!(
-            told.iter().any(|one| one.contains(wanted)),
-            "{line}: {told:?}"
+            messages.iter().any(|one| one.contains(wanted)),
+            "{line}: {messages:?}"
         );
     }
     let frames = SCRIPT.replace(
@@ -116,5 +116,5 @@ fn what_may_or_may_not_be_a_target_is_refused_with_its_line() {
         "  set_tcp(p[0, 0, 0.2, 0, 0, 0])\n  movej(home)\n",
     );
     let program = Program::parse(frames.as_bytes(), Language::UrScript, Partial::Refused).unwrap();
-    assert!(super::told(program.frames())[0].contains("set_tcp sets several tools"));
+    assert!(super::message_of(program.frames())[0].contains("set_tcp sets several tools"));
 }

@@ -110,7 +110,7 @@ fn seen(chromium: &Path, folder: &Path, widths: &[u32], scheme: &[&str]) -> Vec<
         let texts = dom
             .split("<pre class=\"seen\">")
             .skip(1)
-            .filter_map(|rest| rest.split("</pre>").next());
+            .filter_map(|tail| tail.split("</pre>").next());
         texts
             .map(|text| {
                 serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))

@@ -265,10 +265,10 @@ fn what_is_made_of_several_sentences_is_translated_as_a_whole() {
             "{german}"
         );
     }
-    let said = PageLanguage::German
+    let printed = PageLanguage::German
         .stored("the zero of joint 2 steps by 15.5 arcsec from row 40 (31 um rms at the tool)");
     assert_eq!(
-        said.as_deref(),
+        printed.as_deref(),
         Some(
             "der Nullpunkt von Gelenk 2 springt um 15,5 \u{2033} ab Zeile 40 (RMS am Werkzeug: 31 \u{b5}m)"
         )
@@ -330,7 +330,7 @@ fn the_page_is_german_throughout_but_for_names() {
     let stored = |page: &str| {
         let cells = page.split("class=\"stored\"").skip(1);
         cells
-            .map(|rest| rest.split('<').next().map(str::to_owned))
+            .map(|tail| tail.split('<').next().map(str::to_owned))
             .collect::<Vec<_>>()
     };
     assert_eq!(stored(&german), stored(&english));

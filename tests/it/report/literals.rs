@@ -71,10 +71,11 @@ pub(crate) fn sentences() -> BTreeSet<(String, String)> {
             .to_string_lossy()
             .replace('\\', "/");
         let text = fs::read_to_string(&path).expect("a source");
-        let said = literals(&text)
+        let result_of = literals(&text)
             .into_iter()
             .filter(|literal| literal.split(' ').filter(|word| word.len() > 1).count() >= WORDS);
-        said.map(|literal| (name.clone(), literal))
+        result_of
+            .map(|literal| (name.clone(), literal))
             .collect::<Vec<_>>()
     });
     // Units and sources of criteria are read in their tables, and appear nowhere else.

@@ -124,12 +124,12 @@ fn parameter(
 fn parameters() -> Parameters {
     let mut rows = Vec::new();
     let mut add = |effect: &str,
-                   of: &str,
+                   stage_id: &str,
                    [place, unit]: [&str; 2],
                    numbers: [f64; 3],
                    [status, remark]: [&str; 2]| {
         let remark = Some(remark).filter(|remark| !remark.is_empty());
-        let name = format!("{effect}.{of}");
+        let name = format!("{effect}.{stage_id}");
         rows.push(parameter(
             &name, effect, place, unit, numbers, status, remark,
         ));

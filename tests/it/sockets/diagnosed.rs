@@ -117,9 +117,9 @@ fn a_ball_that_was_put_back_elsewhere_is_found() {
     let half = 90 * recording.joints;
     recording.q[half..].copy_from_slice(&second.q[half..]);
     let (named, verdict, warnings) = diagnosed(&robot, recording);
-    let told = warnings.contains("sits elsewhere on the tool")
+    let is_stated = warnings.contains("sits elsewhere on the tool")
         || named.iter().any(|name| name.starts_with("tool_shift"));
-    assert!(told, "{named:?}, {:?}, {warnings}", verdict.statement);
+    assert!(is_stated, "{named:?}, {:?}, {warnings}", verdict.statement);
 }
 
 #[test]
@@ -128,13 +128,13 @@ fn rows_of_a_plate_that_slipped_are_named_in_the_verdict() {
     let mut recording = touched(&robot, &truth(&robot, 34), &cell(30), 34);
     let moved: Vec<Fixture> = cell(30)
         .into_iter()
-        .map(|own| Fixture {
+        .map(|ours| Fixture {
             centre_mm: [
-                own.centre_mm[0] + 1.5,
-                own.centre_mm[1],
-                own.centre_mm[2] + 1.0,
+                ours.centre_mm[0] + 1.5,
+                ours.centre_mm[1],
+                ours.centre_mm[2] + 1.0,
             ],
-            ..own
+            ..ours
         })
         .collect();
     let slipped = touched(&robot, &truth(&robot, 34), &moved, 35);
@@ -142,9 +142,9 @@ fn rows_of_a_plate_that_slipped_are_named_in_the_verdict() {
     let joints = recording.joints;
     recording.q[79 * joints..85 * joints].copy_from_slice(&slipped.q[79 * joints..85 * joints]);
     let (named, verdict, warnings) = diagnosed(&robot, recording);
-    let told = warnings.contains("6 rows do not close")
+    let is_stated = warnings.contains("6 rows do not close")
         && warnings.contains("b/0-0020 to b/0-0025 (6 rows)");
-    assert!(told, "{named:?}, {warnings}");
+    assert!(is_stated, "{named:?}, {warnings}");
     assert!(
         verdict
             .statement

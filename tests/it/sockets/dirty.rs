@@ -26,7 +26,11 @@ pub fn cell(points: usize) -> [calib::twin::touch::Fixture; 4] {
 }
 
 /// All that an identification says, and its parameters.
-fn said(robot: &RobotDescription, recording: Recording, settings: &str) -> (String, Parameters) {
+fn message_of(
+    robot: &RobotDescription,
+    recording: Recording,
+    settings: &str,
+) -> (String, Parameters) {
     let stage: Identify = serde_saphyr::from_str(settings).unwrap();
     let made = Recorded::fitted(robot, recording)
         .identify_by(&stage)
@@ -42,7 +46,7 @@ fn rows_of_another_hole_are_named_with_the_hole() {
     for row in [30, 31] {
         names[row] = Some("b/0".into());
     }
-    let (text, parameters) = said(&robot, recording, SETTINGS);
+    let (text, parameters) = message_of(&robot, recording, SETTINGS);
     has(
         &text,
         [
@@ -58,11 +62,11 @@ fn rows_of_another_hole_are_named_with_the_hole() {
             "by the lengths that were given",
         ],
     );
-    let told = parameters
+    let result_of = parameters
         .0
         .iter()
         .filter(|row| row.name.starts_with("link_geometry") && row.status == "free");
-    let silent: Vec<&str> = told
+    let silent: Vec<&str> = result_of
         .filter(|row| !row.remark.as_deref().unwrap_or("").contains("prior"))
         .map(|row| row.name.as_str())
         .collect();
@@ -85,12 +89,12 @@ fn a_ball_that_was_put_back_elsewhere_is_said_with_the_row() {
     let mut recording = first.clone();
     let half = 40 * first.joints;
     recording.q[half..].copy_from_slice(&second.q[half..]);
-    let (text, _) = said(&robot, recording, SETTINGS);
+    let (text, _) = message_of(&robot, recording, SETTINGS);
     has(
         &text,
         ["on the ball sits elsewhere on the tool", "from b/0-000"],
     );
-    let (clean, _) = said(&robot, first, SETTINGS);
+    let (clean, _) = message_of(&robot, first, SETTINGS);
     assert!(
         !clean.contains("sits elsewhere") && !clean.contains("do not close"),
         "{clean}"
@@ -107,7 +111,7 @@ fn five_rows_and_no_length_are_said_to_be_too_little() {
         5,
     );
     let bare = "{effects: [anchor, base_frame, tool_offset, joint_offset, link_geometry]}";
-    let (text, _) = said(&robot, recording, bare);
+    let (text, _) = message_of(&robot, recording, bare);
     has(&text, "only 5 points for");
     has(
         &text,
@@ -124,7 +128,7 @@ fn names_that_the_recording_does_not_have_are_refused() {
         &[socket("a/0", [480.0, 120.0, 300.0], 9, 60.0)],
         5,
     );
-    let of = Recorded::fitted(&robot, recording);
+    let recorded = Recorded::fitted(&robot, recording);
     for (more, expected) in [
         (
             "distances: [{between: [a/0, a/7], mm: 50, sigma: 0.1}]",
@@ -136,7 +140,7 @@ fn names_that_the_recording_does_not_have_are_refused() {
         ),
     ] {
         let stage: Identify = serde_saphyr::from_str(more).unwrap();
-        let message = of.identify_by(&stage).err().unwrap().to_string();
+        let message = recorded.identify_by(&stage).err().unwrap().to_string();
         has(&message, expected);
     }
 }
@@ -175,7 +179,7 @@ fn derivatives_of_sockets_planes_and_spheres_are_central_differences() {
             checked += 1;
             let mut partials = vec![Vector3::zeros(); model.x.len()];
             let sensitivity = kind.sensitivity(at, Weight::uniform(1.0));
-            sensitivity.derivatives(&mut placed, |k, own| partials[k] += own);
+            sensitivity.derivatives(&mut placed, |k, ours| partials[k] += ours);
             for (k, partial) in partials.iter().enumerate() {
                 let moved = |step: f64| {
                     let mut x = model.x.clone();

@@ -20,13 +20,13 @@ fn split(yaml: &str, recording: &Recording) -> Result<Split, String> {
 
 /// Predictions of an identification by the rows that a split says.
 fn predicted(robot: &RobotDescription, recording: Recording, yaml: &str) -> Vec<PredictionRow> {
-    let of = Recorded {
+    let recorded = Recorded {
         robot: Robot::from_description(robot),
         split: split(yaml, &recording).unwrap(),
         recording,
     };
     let stage: Identify = serde_saphyr::from_str(SETTINGS).unwrap();
-    of.identify_by(&stage).unwrap().get::<Prediction>().0
+    recorded.identify_by(&stage).unwrap().get::<Prediction>().0
 }
 
 #[test]
@@ -51,10 +51,10 @@ fn a_place_that_no_row_was_fitted_to_closes_as_well_as_the_others() {
         (0.9..1.35).contains(&(out / noise)),
         "{out:.4} mm held out, {noise:.4} mm of noise"
     );
-    let own = mean(&fitted, |row| Some(row.error_mm));
+    let ours = mean(&fitted, |row| Some(row.error_mm));
     assert!(
-        (0.8..1.1).contains(&(own / noise)),
-        "{own:.4} mm fitted, {noise:.4} mm of noise"
+        (0.8..1.1).contains(&(ours / noise)),
+        "{ours:.4} mm fitted, {noise:.4} mm of noise"
     );
 }
 
@@ -66,15 +66,15 @@ fn blocks_of_a_cross_validation_are_whole_places() {
     let mean = |error: fn(&PredictionRow) -> Option<f64>| {
         rows.iter().filter_map(error).sum::<f64>() / rows.len() as f64
     };
-    let (own, random, places) = (
+    let (ours, random, places) = (
         mean(|row| Some(row.error_mm)),
         mean(|row| row.fold_error_mm),
         mean(|row| row.block_error_mm),
     );
     // Of two places, one alone tells the arm worse, but never millimetres off as where its sockets stood at nominal.
     assert!(
-        own < random && random < places && places < 3.0 * own,
-        "{own:.4}, {random:.4}, {places:.4} mm"
+        ours < random && random < places && places < 3.0 * ours,
+        "{ours:.4}, {random:.4}, {places:.4} mm"
     );
 }
 

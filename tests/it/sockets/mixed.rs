@@ -13,16 +13,16 @@ use nalgebra::Vector3;
 const SIGMA: f64 = 2e-5;
 
 /// Rows with points of a tracker in front of those of sockets.
-fn beside(points: Measurements, sockets: &Measurements) -> Measurements {
+fn joined(points: Measurements, sockets: &Measurements) -> Measurements {
     let (rows, more) = (points.rows(), sockets.rows());
-    let own = &sockets.readings[0];
+    let ours = &sockets.readings[0];
     let names: Vec<&str> = std::iter::repeat_n("", rows)
-        .chain((0..more).map(|row| own.row(row).unwrap().anchor))
+        .chain((0..more).map(|row| ours.row(row).unwrap().anchor))
         .collect();
     let readings = Readings {
-        kind: own.kind,
+        kind: ours.kind,
         sigma: std::iter::repeat_n(f64::NAN, rows)
-            .chain(own.sigma.iter().copied())
+            .chain(ours.sigma.iter().copied())
             .collect(),
         anchor: Some(Named::of(names.iter().copied())),
         ..Readings::default()
@@ -71,7 +71,7 @@ fn points_of_a_tracker_tell_the_scale_of_sockets() {
             })
             .collect();
         points.points.sigma = vec![Vector3::repeat(SIGMA); points.rows()];
-        let data = beside(points, &touched(&robot, &truth, &cell, 21).measurements());
+        let data = joined(points, &touched(&robot, &truth, &cell, 21).measurements());
         let rows: Vec<usize> = (0..data.rows()).collect();
         let (model, fitted) = calibrated(&robot, &data, &[], &[]);
         assert_eq!(

@@ -277,12 +277,12 @@ fn against_holes(model: &Model, hole: impl Fn(&str) -> Vector3<f64>) -> f64 {
         .filter(|(a, b)| a.0 < b.0);
     let (mut cross, mut square) = (0.0f64, 0.0f64);
     for ((a, p), (b, q)) in pairs {
-        let (own, table): (f64, f64) = ((p - q).norm(), (hole(a) - hole(b)).norm());
+        let (ours, table): (f64, f64) = ((p - q).norm(), (hole(a) - hole(b)).norm());
         assert!(
-            (own - table).abs() < 5e-3,
-            "{a} and {b} are {own:.4} m apart, their holes {table:.4} m"
+            (ours - table).abs() < 5e-3,
+            "{a} and {b} are {ours:.4} m apart, their holes {table:.4} m"
         );
-        (cross, square) = (cross + own * table, square + table * table);
+        (cross, square) = (cross + ours * table, square + table * table);
     }
     cross / square - 1.0
 }

@@ -38,15 +38,15 @@ fn request(places: &[[f64; 3]]) -> ContactRequest {
 #[test]
 fn the_ball_lies_in_a_socket_at_every_posture_and_limits_hold() {
     let robot = panda();
-    let (own, sockets) = (
+    let (ours, sockets) = (
         RobotModel::new(robot.clone()),
         [[0.4, 0.1, 0.05], [0.4, 0.15, 0.05]],
     );
-    let found = propose_contacts(&own, &site(&robot), &request(&sockets)).unwrap();
+    let found = propose_contacts(&ours, &site(&robot), &request(&sockets)).unwrap();
     assert_eq!(found.poses.rows(), 40);
     for (row, socket) in found.socket.iter().enumerate() {
         let q = found.poses.q(row);
-        assert!((own.forward(q).translation - Vector3::from(sockets[*socket])).norm() < 1e-8);
+        assert!((ours.forward(q).translation - Vector3::from(sockets[*socket])).norm() < 1e-8);
         assert!(q.iter().zip(&robot.joints).all(|(q, joint)| {
             joint
                 .limits
@@ -57,7 +57,7 @@ fn the_ball_lies_in_a_socket_at_every_posture_and_limits_hold() {
         found
             .without
             .iter()
-            .all(|own| own.count > 0 && own.growth >= 1.0),
+            .all(|ours| ours.count > 0 && ours.growth >= 1.0),
         "{:?}",
         found.without
     );
@@ -65,10 +65,10 @@ fn the_ball_lies_in_a_socket_at_every_posture_and_limits_hold() {
     let gain: f64 = found
         .sigma
         .iter()
-        .map(|(_, _, own, random)| (random / own).ln())
+        .map(|(_, _, ours, random)| (random / ours).ln())
         .sum();
     assert!(gain > 0.0, "{gain}");
-    let again = propose_contacts(&own, &site(&robot), &request(&sockets)).unwrap();
+    let again = propose_contacts(&ours, &site(&robot), &request(&sockets)).unwrap();
     assert_eq!(again.poses.q, found.poses.q);
 }
 
@@ -81,7 +81,7 @@ fn a_ball_on_the_last_axis_hides_two_directions_that_one_beside_it_shows() {
         &request(&[[0.4, 0.1, 0.05]]),
     )
     .unwrap();
-    let (on_axis, beside) = (found.offsets[0], found.offsets[found.offsets.len() - 1]);
+    let (on_axis, nearby) = (found.offsets[0], found.offsets[found.offsets.len() - 1]);
     assert!(on_axis.off < 1e-9);
     assert_eq!(on_axis.directions, 4 * 7 - 4);
     assert!(
@@ -89,8 +89,8 @@ fn a_ball_on_the_last_axis_hides_two_directions_that_one_beside_it_shows() {
         "{on_axis:?}"
     );
     assert!(
-        beside.known > on_axis.known && beside.weakest.is_finite(),
-        "{beside:?}"
+        nearby.known > on_axis.known && nearby.weakest.is_finite(),
+        "{nearby:?}"
     );
 }
 

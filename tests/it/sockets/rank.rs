@@ -19,7 +19,7 @@ fn seen(
     let data = touched(robot, &truth(robot, 1), fixtures, 7).measurements();
     let (model, fitted) = calibrated(robot, &data, lengths, effects);
     let setup = model.robot.setup();
-    let own = setup.first_of_anchor(setup.anchors.len());
+    let ours = setup.first_of_anchor(setup.anchors.len());
     if effects.is_empty() {
         let rows: Vec<usize> = (0..data.rows()).collect();
         assert_eq!(
@@ -27,7 +27,7 @@ fn seen(
             Some(free(&fitted))
         );
     }
-    free(&fitted) - own
+    free(&fitted) - ours
 }
 
 fn arms() -> [RobotDescription; 2] {

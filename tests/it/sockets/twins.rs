@@ -170,7 +170,7 @@ fn the_scale_that_priors_tell_scatters_as_stated_where_links_err_on_their_own() 
                 .tool,
             )
         };
-        let [own, real] = [points, rows.iter().map(|row| there(*row)).collect()].map(|points| {
+        let [ours, real] = [points, rows.iter().map(|row| there(*row)).collect()].map(|points| {
             let middle = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
             points
                 .iter()
@@ -179,7 +179,7 @@ fn the_scale_that_priors_tell_scatters_as_stated_where_links_err_on_their_own() 
                 .sqrt()
         });
         // The factor by which links are off more than their priors say is by chance here.
-        scores.push((own / real - 1.0) * stated.beyond / apart);
+        scores.push((ours / real - 1.0) * stated.beyond / apart);
     }
     let scatter =
         (scores.iter().map(|score| score * score).sum::<f64>() / scores.len() as f64).sqrt();

@@ -78,11 +78,11 @@ fn an_exciting_motion_holds_its_limits_and_tells_more_than_random_ones() {
 /// A case recorded on a proposed motion.
 fn recorded(case: &TorqueCase, proposal: &MotionProposal) -> TorqueRecording {
     let (motion, n) = (&proposal.motion, case.robot.joints.len());
-    let of = |list: &[f64], row: usize| list[n * row..n * (row + 1)].to_vec();
+    let of_list = |list: &[f64], row: usize| list[n * row..n * (row + 1)].to_vec();
     let state = |row: usize| JointState {
-        q: of(&motion.position, row),
-        v: of(&motion.velocity, row),
-        a: of(&motion.acceleration, row),
+        q: of_list(&motion.position, row),
+        v: of_list(&motion.velocity, row),
+        a: of_list(&motion.acceleration, row),
     };
     let case = case
         .clone()
@@ -221,8 +221,8 @@ fn the_file_of_a_motion_is_one_that_compensate_takes() {
         robot.display(),
         file.display()
     );
-    let told = calib(".", &words).ok();
-    has(&told, ["condition number", "will not determine"]);
+    let printed = calib(".", &words).ok();
+    has(&printed, ["condition number", "will not determine"]);
     let text = read(&file);
     let robot = calib::identified::robot_file(&robot, None).unwrap();
     let trajectory = calib::targets::Trajectory::read("motion.csv", &text, &robot, false).unwrap();

@@ -14,7 +14,7 @@ fn fed(solved: &Solved, file: &Path, more: &str) -> Answer {
     )
 }
 
-fn told(answer: &Answer) -> String {
+fn message_of(answer: &Answer) -> String {
     answer.err.clone()
 }
 
@@ -53,14 +53,14 @@ fn covered(solved: &Solved, seed: u64) -> Vec<f64> {
         let file = solved.path(&format!("fresh_{seed}_{stretch}.csv"));
         std::fs::write(&file, motion(&rows, stretch, true)).unwrap();
         let text = answer(&fed(solved, &file, "--quiet --force"));
-        let own: Vec<usize> = (0..rows.time.len())
+        let ours: Vec<usize> = (0..rows.time.len())
             .filter(|row| rows.trajectory[*row] == stretch)
             .collect();
         for (joint, (inside, all)) in within.iter_mut().enumerate() {
             let found = column(&text, &format!("tau{}_nm", joint + 1));
             let u95 = column(&text, &format!("u95_{}_nm", joint + 1));
             let off = super::results::rms(
-                own.iter()
+                ours.iter()
                     .zip(&found)
                     .map(|(row, found)| rows.torque[n * row + joint] - found),
             );
@@ -69,7 +69,7 @@ fn covered(solved: &Solved, seed: u64) -> Vec<f64> {
                 joint + 1,
                 super::results::rms(u95.iter().copied())
             );
-            for (row, (found, u95)) in own.iter().zip(found.iter().zip(&u95)) {
+            for (row, (found, u95)) in ours.iter().zip(found.iter().zip(&u95)) {
                 *inside += usize::from((rows.torque[n * row + joint] - found).abs() <= *u95);
                 *all += 1;
             }
@@ -122,10 +122,10 @@ fn torques_less_certain_than_allowed_are_refused_and_written_only_with_force() {
     let file = fresh("doubtful.csv");
     let rows = read(&file).lines().count() - 1;
     let refused = fed(solved(), &file, "--max-uncertainty 1e-6").code(10);
-    let said = told(&refused);
-    has(&said, ["doubtful.csv:2: ", "no torques are written"]);
+    let printed = message_of(&refused);
+    has(&printed, ["doubtful.csv:2: ", "no torques are written"]);
     has(
-        &said,
+        &printed,
         &format!("{rows} of {rows} rows are less certain than allowed"),
     );
     let text = refused.out;
@@ -159,9 +159,9 @@ fn torques_that_were_fed_forward_already_are_no_motion() {
     std::fs::write(&twice, &once).unwrap();
     let refused = fed(solved(), &twice, "").code(10);
     assert!(
-        told(&refused).contains("carries the torques that calib wrote already"),
+        message_of(&refused).contains("carries the torques that calib wrote already"),
         "{}",
-        told(&refused)
+        message_of(&refused)
     );
     let again = answer(&fed(solved(), &twice, "--quiet --force"));
     assert_eq!(again, once);
@@ -191,9 +191,9 @@ fn a_motion_beyond_the_recording_is_remarked_row_by_row_with_what_it_exceeds() {
     std::fs::write(&file, fast).unwrap();
     let output = fed(solved(), &file, "--force");
     assert!(
-        told(&output).contains("beyond the motion that the model was seen in"),
+        message_of(&output).contains("beyond the motion that the model was seen in"),
         "{}",
-        told(&output)
+        message_of(&output)
     );
     let fast = answer(&output);
     for what in [

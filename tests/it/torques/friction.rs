@@ -105,13 +105,13 @@ fn a_gap_whose_side_the_loads_seem_to_decide_is_left_to_approach_below_the_frict
         "friction {friction:.2} Nm; alone: {alone} {before:.2?}; together: {together} {after:.2?}"
     );
     assert!(!alone.contains("approach"), "{alone}");
-    let said = together
+    let printed = together
         .split(" Nm")
         .next()
         .and_then(|text| text.rsplit(' ').next())
         .unwrap();
     assert!(
-        (said.parse::<f64>().unwrap() / friction - 1.0).abs() < 0.03,
+        (printed.parse::<f64>().unwrap() / friction - 1.0).abs() < 0.03,
         "{together}"
     );
     let [half, sigma] = after;
@@ -124,7 +124,7 @@ fn a_gap_whose_side_the_loads_seem_to_decide_is_left_to_approach_below_the_frict
 #[test]
 fn each_page_of_a_pipeline_says_what_its_own_diagnosis_says() {
     let store = solved().path("store");
-    let said = |stage: &str| -> Vec<String> {
+    let message_of = |stage: &str| -> Vec<String> {
         let VerdictSentences(rows) = table(&store, &format!("{stage}/sentences"));
         assert!(rows.iter().all(|row| row.step == stage), "{stage}");
         rows.into_iter().map(|row| row.sentence).collect()
@@ -144,7 +144,7 @@ fn each_page_of_a_pipeline_says_what_its_own_diagnosis_says() {
         .iter()
         .fold(page.content, |text, (a, b)| text.replace(a, b))
     };
-    let (points, torques) = (said("together"), said("diagnose_torques"));
+    let (points, torques) = (message_of("together"), message_of("diagnose_torques"));
     println!("points: {points:#?}\ntorques: {torques:#?}");
     assert!(!points.is_empty() && !torques.is_empty());
     let (of_points, of_torques) = (page("report"), page("report_torques"));

@@ -28,10 +28,10 @@ impl Sheet {
         self.rows[row][column].parse().unwrap()
     }
     /// The numbers of a column of each joint, or of one.
-    fn change(&mut self, pattern: &str, of: impl Fn(f64) -> f64) {
+    fn change(&mut self, pattern: &str, changed: impl Fn(f64) -> f64) {
         for column in self.columns(pattern) {
             for row in 0..self.rows.len() {
-                self.rows[row][column] = format!("{:.6}", of(self.number(row, column)));
+                self.rows[row][column] = format!("{:.6}", changed(self.number(row, column)));
             }
         }
     }
@@ -100,7 +100,7 @@ fn case(robot: &str) -> (TorqueCase, Sheet) {
 }
 
 /// What calib says of a changed recording; the exit code too.
-fn told(robot: &str, change: impl FnOnce(&mut Sheet)) -> (i32, String) {
+fn message_of(robot: &str, change: impl FnOnce(&mut Sheet)) -> (i32, String) {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let (case, mut sheet) = case(robot);
@@ -229,9 +229,9 @@ const SPOILED: [Spoiled; 22] = [
 fn spoiled_recordings_are_refused_with_a_code_and_a_sentence() {
     let mut wrong = Vec::new();
     for (robot, change, words) in SPOILED {
-        let (code, said) = told(robot, change);
-        if code != 10 || !words.split('|').all(|word| said.contains(word)) {
-            wrong.push(format!("code {code}, wanted {words}: {said}"));
+        let (code, printed) = message_of(robot, change);
+        if code != 10 || !words.split('|').all(|word| printed.contains(word)) {
+            wrong.push(format!("code {code}, wanted {words}: {printed}"));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -239,8 +239,8 @@ fn spoiled_recordings_are_refused_with_a_code_and_a_sentence() {
 
 #[test]
 fn a_few_rows_that_cannot_be_read_are_left_out() {
-    let (code, said) = told("compact6", |s| s.lose(400));
-    assert_eq!(code, 0, "{said}");
+    let (code, printed) = message_of("compact6", |s| s.lose(400));
+    assert_eq!(code, 0, "{printed}");
 }
 
 #[test]
@@ -254,8 +254,8 @@ fn a_row_that_is_missing_at_a_low_rate_is_bridged_and_no_row_is_told_twice() {
                 .is_some_and(|number: usize| number.is_multiple_of(2) && number != 196)
         });
     };
-    let (code, said) = told("compact6", holed);
-    assert_eq!(code, 0, "{said}");
+    let (code, printed) = message_of("compact6", holed);
+    assert_eq!(code, 0, "{printed}");
 }
 
 #[test]

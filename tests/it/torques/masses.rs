@@ -69,10 +69,10 @@ fn ratios(inertials: &str, share: f64) -> ([f64; 2], [f64; 2]) {
     std::fs::write(&pipeline, PIPELINE.replace("INERTIALS", inertials)).unwrap();
     calib(&format!("run --quiet {}", pipeline.display()), &at("store")).code(0);
     let found = |stage: &str| compliances(&at("store"), stage);
-    let of = |found: [f64; 2]| [found[0] / TRULY[0], found[1] / TRULY[1]];
+    let of_found = |found: [f64; 2]| [found[0] / TRULY[0], found[1] / TRULY[1]];
     let masses: Robot = table(&at("store"), "masses/robot");
     assert_eq!(masses.to_description().unwrap().joints.len(), 6);
-    (of(found("before")), of(found("after")))
+    (of_found(found("before")), of_found(found("after")))
 }
 
 pub(super) fn table<T: Table>(store: &Path, name: &str) -> T {

@@ -255,17 +255,17 @@ fn files_say_nothing_of_friction_that_was_not_found() {
         let file = roxmltree::Document::parse(&text).unwrap();
         for (index, joint) in found["joints"].as_array().unwrap().iter().enumerate() {
             let name = joint["name"].as_str().unwrap();
-            let own = file
+            let ours = file
                 .descendants()
                 .find(|node| node.has_tag_name("joint") && node.attribute("name") == Some(name));
-            let own = own.unwrap();
-            let own = if element == "joint" {
-                Some(own)
+            let ours = ours.unwrap();
+            let ours = if element == "joint" {
+                Some(ours)
             } else {
-                own.children().find(|node| node.has_tag_name(element))
+                ours.children().find(|node| node.has_tag_name(element))
             };
             for (attribute, number) in names.iter().zip([&joint["viscous"], &joint["coulomb"]]) {
-                let written = own.and_then(|node| node.attribute(*attribute));
+                let written = ours.and_then(|node| node.attribute(*attribute));
                 assert_eq!(
                     written.is_some(),
                     !number.is_null(),
@@ -308,9 +308,9 @@ fn what_a_format_does_not_hold_of_torques_is_said_with_its_size() {
         has(&text, "not carried: stribeck_friction at joint 2, ");
     }
     let refused = calib("export HEAD --format dh", &solved().path("store"));
-    let told = refused.err.clone();
-    assert_eq!(refused.code, Some(2), "{told}");
-    has(&told, "allowed: urdf, json, mjcf, sdf, dynamics");
+    let printed = refused.err.clone();
+    assert_eq!(refused.code, Some(2), "{printed}");
+    has(&printed, "allowed: urdf, json, mjcf, sdf, dynamics");
 }
 
 /// A motion as its user has it, of one stretch of rows.
@@ -378,11 +378,11 @@ fn torques_fed_forward_are_those_of_the_twin_on_fresh_motions() {
     for (stretch, derivatives) in [(1, false), (1, true), (2, true)] {
         let file = solved.path(&format!("motion_{stretch}_{derivatives}.csv"));
         std::fs::write(&file, motion(&rows, stretch, derivatives)).unwrap();
-        let told = text(calib(
+        let printed = text(calib(
             &format!("compensate HEAD {} --torque --quiet", file.display()),
             &solved.path("store"),
         ));
-        let own: Vec<usize> = (0..rows.time.len())
+        let ours: Vec<usize> = (0..rows.time.len())
             .filter(|row| rows.trajectory[*row] == stretch)
             .collect();
         let drives = fresh
@@ -391,13 +391,13 @@ fn torques_fed_forward_are_those_of_the_twin_on_fresh_motions() {
             .iter()
             .map(|joint| joint.reduction_ratio.zip(joint.motor_constant).unwrap());
         for (joint, (ratio, constant)) in drives.enumerate() {
-            let found = column(&told, &format!("tau{}_nm", joint + 1));
-            assert_eq!(found.len(), own.len());
-            let error = rms(own
+            let found = column(&printed, &format!("tau{}_nm", joint + 1));
+            assert_eq!(found.len(), ours.len());
+            let error = rms(ours
                 .iter()
                 .zip(&found)
                 .map(|(row, found)| rows.torque[n * row + joint] - found));
-            let nominal = rms(own
+            let nominal = rms(ours
                 .iter()
                 .map(|row| rows.torque[n * row + joint] - rigid[*row][joint]));
             let noise = fresh.white_noise()[joint];
@@ -416,7 +416,7 @@ fn torques_fed_forward_are_those_of_the_twin_on_fresh_motions() {
                 joint + 1
             );
             let factor = ratio * constant;
-            let currents = column(&told, &format!("i{}_a", joint + 1));
+            let currents = column(&printed, &format!("i{}_a", joint + 1));
             assert!(
                 found
                     .iter()
@@ -444,11 +444,11 @@ fn a_motion_that_cannot_be_fed_forward_is_refused_at_its_line() {
             &format!("compensate HEAD {} --torque", file.display()),
             &solved.path("store"),
         );
-        let told = output.err.clone();
-        assert!([Some(2), Some(10)].contains(&output.code), "{told}");
+        let printed = output.err.clone();
+        assert!([Some(2), Some(10)].contains(&output.code), "{printed}");
         words
             .iter()
-            .for_each(|word| assert!(told.contains(word), "no `{word}` in: {told}"));
+            .for_each(|word| assert!(printed.contains(word), "no `{word}` in: {printed}"));
     };
     changed(
         &|lines| lines[0] = lines[0].replace("q3_deg", "angle3"),

@@ -60,22 +60,26 @@ fn columns_of_the_regressor_are_those_of_mujoco_and_pinocchio() {
     let document: Value = serde_json::from_str(include_str!("rigid_arms.json")).unwrap();
     let mut compared = 0;
     let mut largest: [f64; 2] = [0.0; 2];
-    for told in document["arms"].as_array().unwrap() {
-        let of = |name: &str| -> Vec<[f64; 3]> {
-            told["links"]
+    for answer in document["arms"].as_array().unwrap() {
+        let of_name = |name: &str| -> Vec<[f64; 3]> {
+            answer["links"]
                 .as_array()
                 .unwrap()
                 .iter()
                 .map(|link| numbers(&link[name]))
                 .collect()
         };
-        let arm = bare(&of("axis"), &of("point"), numbers(&told["gravity"]));
+        let arm = bare(
+            &of_name("axis"),
+            &of_name("point"),
+            numbers(&answer["gravity"]),
+        );
         let mut dynamics = InverseDynamics::new(&arm);
-        for (row, columns) in told["rows"]
+        for (row, columns) in answer["rows"]
             .as_array()
             .unwrap()
             .iter()
-            .zip(told["columns"].as_array().unwrap())
+            .zip(answer["columns"].as_array().unwrap())
         {
             let [q, v, a] = ["q", "v", "a"].map(|name| list(&row[name]));
             let motion = MotionRow {
@@ -83,9 +87,9 @@ fn columns_of_the_regressor_are_those_of_mujoco_and_pinocchio() {
                 velocity: &v,
                 acceleration: &a,
             };
-            dynamics.regressor(motion, &arm.gravity, |joint, link, own| {
+            dynamics.regressor(motion, &arm.gravity, |joint, link, ours| {
                 for (engine, off) in ["mujoco", "pinocchio"].into_iter().zip(&mut largest) {
-                    for (number, value) in own.iter().enumerate() {
+                    for (number, value) in ours.iter().enumerate() {
                         let other = columns[engine][link][number][joint].as_f64().unwrap();
                         *off = off.max((value - other).abs());
                         compared += 1;
@@ -109,9 +113,9 @@ fn inverse_dynamics_of_estimator_and_twin_are_those_of_mujoco_and_pinocchio() {
     let document: Value = serde_json::from_str(text).unwrap();
     let arms = document["arms"].as_array().unwrap();
     assert_eq!(arms.len(), 3);
-    for told in arms {
-        let links = told["links"].as_array().unwrap();
-        let gravity: [f64; 3] = numbers(&told["gravity"]);
+    for answer in arms {
+        let links = answer["links"].as_array().unwrap();
+        let gravity: [f64; 3] = numbers(&answer["gravity"]);
         let axes: Vec<[f64; 3]> = links.iter().map(|link| numbers(&link["axis"])).collect();
         let points: Vec<[f64; 3]> = links.iter().map(|link| numbers(&link["point"])).collect();
         let body = |link: &Value| Body {
@@ -136,7 +140,7 @@ fn inverse_dynamics_of_estimator_and_twin_are_those_of_mujoco_and_pinocchio() {
             gravity,
         };
         let mut dynamics = InverseDynamics::new(&arm);
-        for row in told["rows"].as_array().unwrap() {
+        for row in answer["rows"].as_array().unwrap() {
             let [q, v, a, mujoco, pinocchio] =
                 ["q", "v", "a", "mujoco", "pinocchio"].map(|name| list(&row[name]));
             let mut estimator = vec![0.0; q.len()];
@@ -154,9 +158,9 @@ fn inverse_dynamics_of_estimator_and_twin_are_those_of_mujoco_and_pinocchio() {
             let largest = mujoco
                 .iter()
                 .fold(1.0, |most: f64, torque| most.max(torque.abs()));
-            for own in [&estimator, &twin] {
+            for ours in [&estimator, &twin] {
                 for other in [&mujoco, &pinocchio] {
-                    let off = own
+                    let off = ours
                         .iter()
                         .zip(other)
                         .map(|(a, b)| (a - b).abs())

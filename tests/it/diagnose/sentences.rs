@@ -20,8 +20,8 @@ fn rewritten(folder: &Path, mut change: impl FnMut(usize, &mut Vec<String>)) {
 }
 
 fn diagnosed(folder: &Path) -> Value {
-    let said = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), folder);
-    serde_json::from_str(&said).unwrap()
+    let printed = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), folder);
+    serde_json::from_str(&printed).unwrap()
 }
 
 #[test]
@@ -73,18 +73,18 @@ fn without_a_clock_nothing_is_said_in_seconds() {
     );
     calib(&format!("run p.yaml --quiet {CASE}"), here);
     let curves: Curves = table_of(here, "report.curves.parquet");
-    let own: Vec<_> = curves.0.iter().filter(|point| point.rank == 1).collect();
-    assert!(!own.is_empty());
-    for point in own {
+    let ours: Vec<_> = curves.0.iter().filter(|point| point.rank == 1).collect();
+    assert!(!ours.is_empty());
+    for point in ours {
         let named = (point.over.as_str(), point.x_unit.as_str());
         assert_eq!(named, ("place in the recording", "row"));
         assert!(point.x >= 1.0 && point.x.fract() == 0.0, "{}", point.x);
     }
     put(here, "t.csv", "x_mm,y_mm,z_mm\n600,0,700\n");
-    let (code, said) = refused("compensate HEAD t.csv --time 100", here);
+    let (code, printed) = refused("compensate HEAD t.csv --time 100", here);
     assert!(
-        code == Some(2) && said.contains("--time: the recording of the model has no clock"),
-        "{said}"
+        code == Some(2) && printed.contains("--time: the recording of the model has no clock"),
+        "{printed}"
     );
 }
 
@@ -116,11 +116,11 @@ fn a_diagnosis_that_cannot_make_up_for_missing_masses_does_not_stand_for_the_run
         rms(standing),
         rms(&"joint".into())
     );
-    let (_, said) = refused("compensate HEAD --quiet p.yaml", here);
+    let (_, printed) = refused("compensate HEAD --quiet p.yaml", here);
     assert_eq!(
-        said.contains("warning: `diagnose` is withdrawn"),
+        printed.contains("warning: `diagnose` is withdrawn"),
         *standing != "diagnose",
-        "{said}"
+        "{printed}"
     );
 }
 
@@ -141,14 +141,14 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
     });
     case_with(here, &[]);
     calib(&format!("run p.yaml --quiet {CASE}"), here);
-    let said = diagnosed(here);
+    let answer = diagnosed(here);
     assert_eq!(
-        (&said["verdict"], &said["findings"]),
+        (&answer["verdict"], &answer["findings"]),
         (&"not_asked".into(), &serde_json::json!([]))
     );
-    assert_eq!(said["leftover"]["p_value"], Value::Null);
+    assert_eq!(answer["leftover"]["p_value"], Value::Null);
     assert_eq!(
-        said["not_observable"][0],
+        answer["not_observable"][0],
         "what the simulation lacks: 12 rows were fitted, at least 15 are needed to separate it from geometry"
     );
     let text = calib("diagnose HEAD --details", here);
