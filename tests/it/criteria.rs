@@ -22,16 +22,17 @@ const ROOMS: [&str; 3] = [
 ];
 
 /// Numbers of those rooms that decide nothing: how work is dealt out, steps and bounds of solvers and of grids, roundings, units.
-const MECHANICS: [&str; 39] = [
+const MECHANICS: [&str; 40] = [
     "AMPLITUDES",
     "ANGLE",
+    "AR1_COEFFICIENTS",
     "ARCSEC",
     "ARROWS",
-    "AR1_COEFFICIENTS",
     "BATCH",
     "BLOCK",
     "CHUNK",
     "COLUMNS",
+    "FARTHEST",
     "FINE",
     "FITTED",
     "FOLDS",
@@ -40,10 +41,10 @@ const MECHANICS: [&str; 39] = [
     "HIGHEST",
     "INVISIBLE",
     "LARGEST",
+    "LIMIT",
     "LISTED",
     "LOWEST",
     "MIN_SEPARATION_L",
-    "MOST",
     "NEVER",
     "NOTHING",
     "OUTSIDE",

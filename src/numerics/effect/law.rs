@@ -11,6 +11,7 @@ const FURTHER: f64 = 0.5;
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Factor {
     /// What they are functions of.
+    #[serde(rename = "of")]
     pub variable: Variable,
     /// Which functions of it.
     pub basis: Basis,

@@ -73,6 +73,7 @@ pub enum Motion {
     /// What the instrument reads.
     Instrument {
         /// What is misread.
+        #[serde(rename = "of")]
         reading: Polar,
     },
 }

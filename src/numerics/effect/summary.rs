@@ -61,7 +61,7 @@ impl<'a> Summary<'a> {
     }
 
     /// The forms under a cause's name, each with its fitted numbers.
-    fn skip(
+    fn forms_of(
         &self,
         name: &'static str,
     ) -> impl Iterator<Item = (&'a Form, Vec<&'a ParameterEstimate>)> {
@@ -77,13 +77,13 @@ impl<'a> Summary<'a> {
 
     /// What the first form under a cause's name that has words of its own says: see [`Placed::words`](super::Placed::words).
     pub(super) fn words(&self, name: &'static str) -> Option<String> {
-        self.skip(name)
+        self.forms_of(name)
             .find_map(|(form, numbers)| form.words(&numbers))
     }
 
     /// The fitted numbers of the first form under a cause's name that has none.
     pub(super) fn wordless(&self, name: &'static str) -> Vec<&'a ParameterEstimate> {
-        self.skip(name)
+        self.forms_of(name)
             .find(|(form, numbers)| form.words(numbers).is_none())
             .map(|(_, numbers)| numbers)
             .unwrap_or_default()
@@ -91,7 +91,7 @@ impl<'a> Summary<'a> {
 
     /// What the forms under a cause's name depend on.
     pub(super) fn variables(&self, name: &'static str) -> Vec<Variable> {
-        self.skip(name)
+        self.forms_of(name)
             .flat_map(|(form, _)| form.variables())
             .collect()
     }
@@ -106,7 +106,7 @@ impl<'a> Summary<'a> {
         &self,
         name: &'static str,
     ) -> impl Iterator<Item = (&'a Term, Vec<&'a ParameterEstimate>)> {
-        self.skip(name)
+        self.forms_of(name)
             .filter_map(|(form, numbers)| Some((form.term()?, numbers)))
     }
 

@@ -102,8 +102,8 @@ pub(super) fn variant(term: &Term) -> String {
         Basis::After { at } => format!("_after_{at:.0}"),
         _ => String::new(),
     };
-    if let Motion::Instrument { reading: of } = term.motion() {
-        return format!("{of:?}_{}{shape}", names.join("_")).to_lowercase();
+    if let Motion::Instrument { reading } = term.motion() {
+        return format!("{reading:?}_{}{shape}", names.join("_")).to_lowercase();
     }
     let curve = term.law().factors().any(|factor| factor.basis.is_curve());
     let moves = match term.motion() {

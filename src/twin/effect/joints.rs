@@ -491,12 +491,12 @@ effect! {
 effect! {
     /// `slope q_first q_second`, angles in rad.
     JointProduct "unknown" at joint ".product" {
-        joints: [usize; 2] = "The two joints that cause it, from 1.",
+        of: [usize; 2] = "The two joints that cause it, from 1.",
         arcsec_per_rad2: f64 = "arcsec per rad2.",
     }
     scaled by arcsec_per_rad2;
     truth |self| [("slope", "arcsec/rad2", self.arcsec_per_rad2)];
-    turns |self, at| self.arcsec_per_rad2 * ARCSEC * angle_of(at.state, self.joints[0]) * angle_of(at.state, self.joints[1]);
+    turns |self, at| self.arcsec_per_rad2 * ARCSEC * angle_of(at.state, self.of[0]) * angle_of(at.state, self.of[1]);
 }
 
 // Joint positions logged before the arm has settled, or by a clock that is behind: the log holds part of the last move.

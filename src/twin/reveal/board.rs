@@ -47,7 +47,7 @@ fn outcomes<'a>(causes: impl IntoIterator<Item = &'a Marked>) -> Value {
     let all: Vec<Outcome> = causes.into_iter().map(|cause| cause.outcome).collect();
     let count = |outcome: &Outcome| all.iter().filter(|one| *one == outcome).count();
     let exact = Share::of(all.iter().map(|one| *one == Outcome::Exact));
-    let mut out = json!({ "n": exact.index, "exact_wilson_95": exact.limits() });
+    let mut out = json!({ "n": exact.total, "exact_wilson_95": exact.limits() });
     for outcome in &OUTCOMES {
         out[outcome.name()] = json!(count(outcome));
     }

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Share {
     pub(crate) count: usize,
-    pub(crate) index: usize,
+    pub(crate) total: usize,
 }
 
 impl Share {
@@ -22,7 +22,7 @@ impl Share {
     }
     fn add(&mut self, holds: bool) {
         self.count += usize::from(holds);
-        self.index += 1;
+        self.total += 1;
     }
     /// What holds by kind.
     pub(super) fn by_kind<'a>(
@@ -34,10 +34,10 @@ impl Share {
     }
     /// E. B. Wilson, 1927.
     pub(crate) fn limits(&self) -> [f64; 2] {
-        if self.index == 0 {
+        if self.total == 0 {
             return [0.0, 1.0];
         }
-        let (n, z) = (self.index as f64, 1.959_964f64);
+        let (n, z) = (self.total as f64, 1.959_964f64);
         let p = self.count as f64 / n;
         let middle = p + z * z / (2.0 * n);
         let wide = z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
@@ -48,7 +48,7 @@ impl Share {
 impl Serialize for Share {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         let limits = self.limits();
-        json!({ "count": self.count, "of": self.index, "wilson_95": limits }).serialize(to)
+        json!({ "count": self.count, "of": self.total, "wilson_95": limits }).serialize(to)
     }
 }
 

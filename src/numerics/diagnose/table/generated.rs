@@ -258,10 +258,15 @@ pub(super) fn cell(free: FreeShape, log_prior: f64, survey: &Survey) -> CauseCel
         String::new()
     };
     let step = if free.over == Over::Step { " step" } else { "" };
+    // As the tables of fleets have it.
+    let motion = match free.motion {
+        Motion::Instrument { reading } => format!("Instrument {{ of: {reading:?} }}"),
+        motion => format!("{motion:?}"),
+    };
     CauseCell {
         name: names::UNKNOWN,
         place: free.motion.place(),
-        key: format!("{:?} by {}{times}{step}", free.motion, named(free.variable)),
+        key: format!("{motion} by {}{times}{step}", named(free.variable)),
         log_prior,
         shapes: Shapes::Free(free),
         between: None,
