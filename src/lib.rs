@@ -36,7 +36,7 @@
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, targets, table, numerics |
 //! | `export` | the identified model for other programs, one file per format | compensate, criteria, dynamics, effect, estimate, identified, raw, robot, spatial, table, text, yaml |
-//! | `init` | what a folder of files is, and the pipeline that reads it | program, raw, robot, stage, yaml |
+//! | `init` | what given files are, and the pipeline that reads them | program, raw, robot, stage, yaml |
 //! | [`excitation`] | which motion to record for torques, for a robot file | identified, numerics, stage |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, causes, tables | criteria, effect, estimate, pipeline, raw, report, shell, stage, store, table, yaml |
 //! | [`audit`] | runs shown, explained, compared, asked, traced, swept | diff, pipeline, raw, shell, stage, store |
@@ -74,15 +74,15 @@
 //! # Adding things
 //! | add | new | touch |
 //! |---|---|---|
-//! | effect | a row of [`effect::CAUSES`] in `src/numerics/effect/table.rs` | the German of its sentence in `src/report/language/de_stored.po` |
+//! | effect | a row of [`effect::CAUSES`] in `src/numerics/effect/table.rs`; what no row follows yet is a variant of `Follows` in `law_row.rs` | its short sentence in `src/summary/text/phrases.txt`, the German of the long one in `src/report/language/de_stored.po`; then `CALIB_UPDATE=1 cargo test --test it forms pages language` |
 //! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose` |
 //! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; with `.in_laws()` declared effects read it by its name |
-//! | kind of raw file | `src/raw/<name>.rs`, which hands out records | its `mod`, and a line each in `FileKind` and `records` of `src/stage/ingest/reading.rs`; `init` follows |
+//! | kind of raw file | `src/raw/<name>.rs`, which hands out records, the header first | its `mod` in `src/raw.rs`; in `src/stage/ingest/reading.rs` a variant of `FileKind`, how a file is known to be one (`of`, the first that fits), and a line in `records`; `init` follows |
 //! | number that decides | a row of `src/numerics/criteria/<class>.rs` | the code that says `*NAME` |
 //! | stage | `src/stage/<name>.rs`, declared with its ports by `stage!` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, of which its rows are made; `src/table/<kind>.rs` for what fills them | one line in [`table::TABLES`] |
-//! | export format | `src/export/<name>.rs`, which declares an `export::Format` and how its comments begin | its `mod`, and one line in `export::FORMATS` |
+//! | export format | `src/export/<name>.rs`, which declares an `export::Format`; the file begins with `Export::head`, by which `check-export` knows it | its `mod` and one line in `FORMATS`, both in `src/export/mod.rs` |
 //! | figure of a page | - | the template in `src/report`: it has the rows of tables with all their columns, and the filters `mm`, `count`, `fixed`, `significant` |
 //! | sentence of a page | - | `_("...", name=...)` in its template, or `say!` in `src/report`; its German in `src/report/language/de.po`, of sentences in tables in `de_stored.po` |
 //! | line of `calib show`, `explain`, `diagnose --details` | - | the template in `src/summary/text` |

@@ -113,11 +113,42 @@ fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
     {
         std::fs::write(path, text).map_err(refused(path))?;
     }
-    for note in &start.notes {
+    let unread = if data.is_empty() {
+        tables_in(folder)
+    } else {
+        Vec::new()
+    };
+    let unread = (!unread.is_empty()).then(|| {
+        let (folder, pipeline) = (folder.display(), files[1].display());
+        let names = unread.join(" and ");
+        format!("{names} in {folder} were not looked at; delete {pipeline} and name them after --data for a pipeline that reads their columns")
+    });
+    for note in start.notes.iter().chain(&unread) {
         let _ = writeln!(std::io::stderr(), "warning: {note}");
     }
     emit(&closing(arguments, &start, &files))?;
     Ok(start)
+}
+
+/// Names of files that look like recordings, in their order.
+fn tables_in(folder: &Path) -> Vec<String> {
+    const ENDINGS: [&str; 8] = [
+        "csv", "tsv", "txt", "xlsx", "parquet", "feather", "mcap", "db3",
+    ];
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<String> = names
+        .filter(|name| {
+            let ending = Path::new(name).extension();
+            ending.is_some_and(|ending| {
+                ENDINGS
+                    .iter()
+                    .any(|known| ending.eq_ignore_ascii_case(known))
+            })
+        })
+        .collect();
+    names.sort();
+    names
 }
 
 fn closing(arguments: &InitArguments, start: &StarterFiles, files: &[PathBuf; 2]) -> String {

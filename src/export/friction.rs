@@ -129,12 +129,6 @@ pub(super) fn gear(torques: &IdentifiedTorques, joint: usize) -> Option<f64> {
 }
 
 impl Export {
-    /// The same as comments at the head of a file of text.
-    pub(super) fn head(&self, format: &Format) -> String {
-        let line = |line: String| format!("{} {line}\n", format.comment);
-        self.remarks_in(format).into_iter().map(line).collect()
-    }
-
     /// What the reader of a format must know, a sentence a line: of torques, each cause that it leaves out, with its size.
     pub(crate) fn remarks_in(&self, format: &Format) -> Vec<String> {
         let mut lines = vec![self.mark(format.name).to_string()];

@@ -101,6 +101,12 @@ impl Export {
         hasher.finalize().to_hex().chars().take(DIGITS).collect()
     }
 
+    /// The mark, and what the reader of a format must know, as comments at the head of a file of text.
+    pub(super) fn head(&self, format: &Format) -> String {
+        let line = |line: String| format!("{} {line}\n", format.comment);
+        self.remarks_in(format).into_iter().map(line).collect()
+    }
+
     /// Whether a file is this model's export. Fails where it carries no mark.
     pub(crate) fn check(&self, label: &str, text: &str) -> Result<Belonging> {
         let none = || {

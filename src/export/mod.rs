@@ -27,7 +27,7 @@ pub(crate) struct Format {
     pub(crate) comment: &'static str,
     /// What it holds of identified torques.
     pub(crate) carries: CarriedTorques,
-    /// The whole file. Fails where the format cannot hold this arm at all.
+    /// The whole file, which begins with `Export::head` or has its mark elsewhere. Fails where the format cannot hold this arm at all.
     pub(crate) text: fn(&Export) -> Result<String>,
 }
 

@@ -365,7 +365,7 @@ impl<R: BufRead + Send> RecordReader for TextRows<R> {
     fn bytes(&self) -> u64 {
         self.bytes
     }
-    fn is_text(&self) -> bool {
+    fn obeys_layout(&self) -> bool {
         true
     }
     fn skip(&mut self, lines: u64) -> Result<()> {

@@ -1,6 +1,4 @@
-//! One row of a file as it stands, and what hands rows out.
-//!
-//! Where the bytes of an input lie: in a regular file, or in a folder with the parts of a split bag, read one behind the other.
+//! One row of a file as it stands, what hands rows out, and where the bytes of an input lie.
 
 use super::{ending, open};
 use crate::error::{Error, Result};
@@ -89,7 +87,7 @@ pub trait RecordReader: Send {
     /// Bytes read so far.
     fn bytes(&self) -> u64;
     /// Whether the settings say if names stand above the data, and how numbers are written; other files say it themselves.
-    fn is_text(&self) -> bool {
+    fn obeys_layout(&self) -> bool {
         false
     }
     /// Skips lines below the header, where the file has lines.

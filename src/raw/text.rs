@@ -1,7 +1,5 @@
 //! Bytes of others as text: UTF-16 by its byte-order mark, else UTF-8, else Windows-1252, which German, French and Spanish spreadsheets and
-//! controllers write.
-//!
-//! Files that are known and not read, by how they begin, and what to do with each.
+//! controllers write; and files that are known and not read, by how they begin.
 
 use encoding_rs::WINDOWS_1252;
 use encoding_rs_io::DecodeReaderBytesBuilder;

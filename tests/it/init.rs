@@ -22,6 +22,13 @@ fn what_init_writes_is_understood_and_never_overwrites() {
     }
     put(folder.path(), "controller.csv", controller);
     put(folder.path(), "tracker.csv", tracker);
+    let unread = calib(folder.path(), "init .").code(0);
+    has(
+        &unread.err,
+        ["controller.csv and tracker.csv in . were not looked at"],
+    );
+    std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
+    std::fs::remove_file(folder.path().join("robot.yaml")).unwrap();
     let arguments = "init . --data controller.csv tracker.csv";
     let output = calib(folder.path(), arguments);
     let printed = output.out.clone();

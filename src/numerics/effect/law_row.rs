@@ -36,7 +36,7 @@ pub struct LawRow {
     pub sigma: f64,
     /// What distinguishes it from other laws of its cause in one model; empty: the order of a wave, else nothing.
     pub variant: &'static str,
-    /// The sentence for it: words with holes such as `{value}`.
+    /// The sentence for it, in the place of the cause's own unless that has `{each}`: words with holes, see `sentence.rs`.
     pub says: &'static str,
 }
 
@@ -78,10 +78,10 @@ pub enum At {
 /// What a law follows, in which shapes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Follows {
-    /// Waves of whole orders, from and to, perhaps with twice the order.
+    /// Waves of whole orders, from and to, perhaps with twice the order. A search moves the order of a lone wave by up to a quarter (`near`).
     Waves(Turning, [u32; 2], bool),
-    /// Waves of the joint's angle of orders between whole ones, below one.
-    HalfWaves(u32),
+    /// Waves of the joint's angle of orders 1.5, 2.5 and so on below this one.
+    HalfOrders(u32),
     /// The side of approach.
     Approach,
     /// The side to which the load pushes.
@@ -207,7 +207,7 @@ impl LawRow {
                     .map(|(_, name)| named(name.into()))
                     .collect()
             }
-            (_, Follows::Waves(..) | Follows::HalfWaves(_)) => {
+            (_, Follows::Waves(..) | Follows::HalfOrders(_)) => {
                 let names = ["sin", "cos", "sin_overtone", "cos_overtone"]
                     .into_iter()
                     .take(term.basis().count());
@@ -443,7 +443,7 @@ fn tilts(joint: usize, survey: &Survey) -> Vec<(Motion, Option<usize>, f64)> {
 impl Follows {
     /// The laws of a motion, each with how many like it are tried, and how much rarer it is than others.
     fn laws(self, motion: Motion, joint: Option<usize>, survey: &Survey) -> Vec<(Law, usize, f64)> {
-        let of_of = |variable, basis| vec![(Law::new(variable, basis), 1, 0.0)];
+        let one_law = |variable, basis| vec![(Law::new(variable, basis), 1, 0.0)];
         let [start, end] = survey.time;
         match (self, joint) {
             (Self::Waves(turning, [from, to], overtone), joint) => {
@@ -463,7 +463,7 @@ impl Follows {
                     .map(|order| (law(order), 1, 0.0))
                     .collect()
             }
-            (Self::HalfWaves(below), Some(joint)) => {
+            (Self::HalfOrders(below), Some(joint)) => {
                 let halves = (1..below).map(|order| f64::from(order) + 0.5);
                 let seen = halves.filter(|order| orders::is_within(*order, survey.travel(joint)));
                 seen.map(|order| {
@@ -476,12 +476,12 @@ impl Follows {
                 .collect()
             }
             (Self::Approach, Some(joint)) if survey.both_directions(joint) => {
-                of_of(Variable::Approach { joint }, Basis::PROPORTIONAL)
+                one_law(Variable::Approach { joint }, Basis::PROPORTIONAL)
             }
             (Self::Side, Some(joint)) => lost_motion::by_load(joint, survey),
             (Self::Push, Some(joint)) => lost_motion::mixed(joint, survey),
             (Self::Slip, Some(joint)) => lost_motion::slip(joint, survey),
-            (Self::Angle, Some(joint)) => of_of(Variable::Angle { joint }, Basis::PROPORTIONAL),
+            (Self::Angle, Some(joint)) => one_law(Variable::Angle { joint }, Basis::PROPORTIONAL),
             (Self::Velocity, Some(joint)) => {
                 let moves = survey.moves()
                     && survey
@@ -489,7 +489,7 @@ impl Follows {
                         .iter()
                         .any(|row| survey.data.velocity(*row, joint) != 0.0);
                 if moves {
-                    of_of(
+                    one_law(
                         Variable::Velocity { joint },
                         Basis::Linear {
                             zero: 0.0,
@@ -501,8 +501,8 @@ impl Follows {
                 }
             }
             // 1 at any range.
-            (Self::Constant, _) => of_of(Variable::Range, Basis::After { at: 0.0 }),
-            (Self::Payload, _) if survey.payload_changes() => of_of(
+            (Self::Constant, _) => one_law(Variable::Range, Basis::After { at: 0.0 }),
+            (Self::Payload, _) if survey.payload_changes() => one_law(
                 Variable::Payload,
                 Basis::Linear {
                     zero: 0.0,
@@ -510,7 +510,7 @@ impl Follows {
                 },
             ),
             (Self::Step, _) => change::laws(motion, survey),
-            (Self::Steady, _) => of_of(
+            (Self::Steady, _) => one_law(
                 Variable::Time,
                 Basis::Power {
                     start,
@@ -518,7 +518,7 @@ impl Follows {
                     exponent: 1.0,
                 },
             ),
-            (Self::Slow, _) => of_of(
+            (Self::Slow, _) => one_law(
                 Variable::Time,
                 Basis::Cosines {
                     low: start,
@@ -545,7 +545,7 @@ impl Follows {
                 turning.is(variable)
                     && matches!(basis, Basis::Wave { overtone: is_overtone, .. } if is_overtone == overtone)
             }
-            Self::HalfWaves(_) => {
+            Self::HalfOrders(_) => {
                 Turning::Joint.is(variable) && matches!(basis, Basis::Sway { .. })
             }
             Self::Approach => matches!(variable, Variable::Approach { .. }),
@@ -596,14 +596,16 @@ impl Turning {
 impl Times {
     /// The factor at a joint; none where the recording cannot tell.
     fn factor(self, joint: Option<usize>, survey: &Survey) -> Option<Factor> {
-        let of_of = |variable| Some(Factor::new(variable, Basis::PROPORTIONAL));
+        let in_proportion = |variable| Some(Factor::new(variable, Basis::PROPORTIONAL));
         match (self, joint) {
             (Self::Approach, Some(joint)) if survey.both_directions(joint) => {
-                of_of(Variable::Approach { joint })
+                in_proportion(Variable::Approach { joint })
             }
-            (Self::Load, Some(joint)) if survey.is_loaded(joint) => of_of(Variable::Load { joint }),
-            (Self::Angle, Some(joint)) => of_of(Variable::Angle { joint }),
-            (Self::Range, _) => of_of(Variable::Range),
+            (Self::Load, Some(joint)) if survey.is_loaded(joint) => {
+                in_proportion(Variable::Load { joint })
+            }
+            (Self::Angle, Some(joint)) => in_proportion(Variable::Angle { joint }),
+            (Self::Range, _) => in_proportion(Variable::Range),
             (Self::Time, _) if survey.length() > 0.0 => {
                 let [start, end] = survey.time;
                 Some(Factor::new(

@@ -5,7 +5,7 @@
 //! pages and `calib effects` are made from it. Motions with physics of their own stand in files of theirs, with a [`OwnMotion`](super::OwnMotion).
 
 use super::Follows::{
-    Angle, Constant, HalfWaves, Push, Side, Slip, Slow, Steady, Step, Velocity, Waves,
+    Angle, Constant, HalfOrders, Push, Side, Slip, Slow, Steady, Step, Velocity, Waves,
 };
 use super::Warmth::{Temperature, WarmUp, Work};
 use super::geometry::{DeclaredCouplings, JointOffset, LinkGeometry, ReductionRatio};
@@ -186,7 +186,7 @@ pub static CAUSES: &[&Cause] = &[
             },
             // Gears with a fraction of a turn.
             LawRow {
-                follows: HalfWaves(20),
+                follows: HalfOrders(20),
                 tried: || 48,
                 rarity: || *UNCOMMON,
                 ..GEAR

@@ -126,13 +126,13 @@ impl<'t> Aggregate<'t> {
     /// Whether its fields are those of a target.
     pub(crate) fn may_be_target(&self) -> bool {
         let names: Vec<String> = self.names().collect();
-        let made =
+        let is_of =
             |sets: &[&[&str]], name: &String| sets.iter().any(|set| set.contains(&name.as_str()));
-        names.iter().any(|name| made(&[&AXES, &FRAME[..3]], name))
+        names.iter().any(|name| is_of(&[&AXES, &FRAME[..3]], name))
             || (!names.is_empty()
                 && names
                     .iter()
-                    .all(|name| made(&[&FRAME, &STATUS, &EXTERNALS], name)))
+                    .all(|name| is_of(&[&FRAME, &STATUS, &EXTERNALS], name)))
     }
 
     /// The number of a field, in capitals, where it is one.

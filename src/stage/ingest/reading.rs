@@ -1,6 +1,4 @@
-//! One reading of one file from top to bottom, row by row.
-//!
-//! Joint positions that a controller's program declares, as the rows of a table: `name`, the six joints, the external axes.
+//! One reading of one file from top to bottom, row by row: what kind of file it is, and who hands out its rows.
 
 use crate::error::{Error, Fault, Result, counted};
 use crate::program::{JointList, Language, MOST_BYTES, joint_list, listing as language};
@@ -150,7 +148,7 @@ impl<'a> OpenedFile<'a> {
             decimal: layout.decimal,
         };
         let (label, mut reader) = records(source.reader, &source.label, table)?;
-        let (header, decimal) = if reader.is_text() {
+        let (header, decimal) = if reader.obeys_layout() {
             (layout.header, layout.decimal)
         } else {
             (true, DecimalMark::Point)
@@ -307,7 +305,7 @@ fn axis(language: Language, k: usize) -> String {
     }
 }
 
-/// The joints that a program declares, row by row, in deg.
+/// The joints that a controller's program declares, row by row, in deg: `name`, the six joints, the external axes.
 pub(super) struct ListedRows {
     /// `name` and the axes, then the positions, each with the line at which it stands.
     rows: Vec<(u64, Vec<String>)>,

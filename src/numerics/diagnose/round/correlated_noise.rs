@@ -80,11 +80,11 @@ pub(crate) fn correlation_left_by(
 }
 
 /// -2 ln of the prior odds of some findings.
-fn price_of(found: &[FoundCell], value_of: &dyn Fn(usize) -> bool) -> f64 {
-    let made = found
+fn price_of(found: &[FoundCell], has: &dyn Fn(usize) -> bool) -> f64 {
+    let priced = found
         .iter()
-        .filter(|found| found.members.iter().any(|i| value_of(*i)));
-    -2.0 * made.map(|found| found.log_prior).sum::<f64>()
+        .filter(|found| found.members.iter().any(|i| has(*i)));
+    -2.0 * priced.map(|found| found.log_prior).sum::<f64>()
 }
 
 /// Points by the base model and some causes, in a linear picture.

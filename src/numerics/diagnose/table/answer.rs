@@ -129,22 +129,21 @@ impl CauseTable<'_, '_> {
         kappa: f64,
     ) -> (FoundCell, Option<(usize, CellEvidence)>) {
         let others = without(components, members);
-        let next_to: Vec<&Component> = others.iter().collect();
-        let state = self.state(&next_to, Some(kappa));
+        let other_components: Vec<&Component> = others.iter().collect();
+        let state = self.state(&other_components, Some(kappa));
         let with = self.state(&components.iter().collect::<Vec<_>>(), Some(kappa));
         // The strongest of several stands for its finding; further ones of its cell add to it.
-        let log_of = |i: usize, state: &KnownState, next_to: &[&Component]| {
-            self.log_evidence(&components[i], state, next_to)
+        let log_of = |i: usize, state: &KnownState, other_components: &[&Component]| {
+            self.log_evidence(&components[i], state, other_components)
         };
-        let strongest = members
-            .iter()
-            .copied()
-            .max_by(|a, b| log_of(*a, &state, &next_to).total_cmp(&log_of(*b, &state, &next_to)));
+        let strongest = members.iter().copied().max_by(|a, b| {
+            log_of(*a, &state, &other_components).total_cmp(&log_of(*b, &state, &other_components))
+        });
         let main = strongest.unwrap_or(members[0]);
         let cell = components[main].cell;
-        let log_main = log_of(main, &state, &next_to);
+        let log_main = log_of(main, &state, &other_components);
         let mut log = log_main;
-        let mut known = next_to.clone();
+        let mut known = other_components.clone();
         known.push(&components[main]);
         for i in members.iter().copied().filter(|i| *i != main) {
             let given = self.state(&known, Some(kappa));
@@ -152,10 +151,17 @@ impl CauseTable<'_, '_> {
             known.push(&components[i]);
         }
         let also: Vec<usize> = std::iter::once(cell)
-            .chain(self.over_its_variable(&components[main], &state, &next_to))
+            .chain(self.over_its_variable(&components[main], &state, &other_components))
             .collect();
         let alike = self.alike(&components[main], 60);
-        let mut scan = self.scan_instead(&components[main], &alike, &state, &next_to, 8, &also);
+        let mut scan = self.scan_instead(
+            &components[main],
+            &alike,
+            &state,
+            &other_components,
+            8,
+            &also,
+        );
         let log_prior = members
             .iter()
             .map(|i| self.cells[components[*i].cell].log_prior)

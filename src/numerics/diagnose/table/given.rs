@@ -125,16 +125,16 @@ pub(crate) fn answers(
             let mut out = table.answers(&others, &state, &all, None);
             for (i, component) in components.iter().enumerate() {
                 let without_it = without(&components, &[i]);
-                let next_to: Vec<&Component> = without_it.iter().collect();
-                let state = table.state(&next_to, Some(state.kappa));
+                let other_components: Vec<&Component> = without_it.iter().collect();
+                let state = table.state(&other_components, Some(state.kappa));
                 let left_out = table.cells[component.cell].key.clone();
                 let mut alike = table.alike(component, 40);
                 alike.retain(|cell| components.iter().all(|other| other.cell != *cell));
                 alike.push(component.cell);
-                let mut rivals = table.answers(&alike, &state, &next_to, Some(&left_out));
+                let mut rivals = table.answers(&alike, &state, &other_components, Some(&left_out));
                 rivals.retain(|rival| rival.cell != left_out || rival.shape.is_some());
                 out.extend(rivals);
-                out.extend(table.of_given(component, &state, &next_to, left_out));
+                out.extend(table.of_given(component, &state, &other_components, left_out));
             }
             out
         },

@@ -119,7 +119,7 @@ impl SeriesBasis {
 /// meets first on the rows of a clock.
 pub(super) fn scaled(basis: &SeriesBasis, x: &[f64], limits: &[JointLimits]) -> JointSeries {
     let width = 1 + basis.terms;
-    let of_own = |(course, limit): (&[f64], &JointLimits)| {
+    let of_course = |(course, limit): (&[f64], &JointLimits)| {
         // Equal speeds of all harmonics are likelier than equal amplitudes.
         let raw: Vec<f64> = course[1..]
             .iter()
@@ -148,7 +148,7 @@ pub(super) fn scaled(basis: &SeriesBasis, x: &[f64], limits: &[JointLimits]) -> 
         let middle = lowest + margin + 0.5 * (course[0] + 1.0) * (highest - lowest - 2.0 * margin);
         (middle, raw.iter().map(|value| scale * value).collect())
     };
-    JointSeries(x.chunks_exact(width).zip(limits).map(of_own).collect())
+    JointSeries(x.chunks_exact(width).zip(limits).map(of_course).collect())
 }
 
 /// 0 at both ends, 1 between, with its derivatives.
