@@ -6,6 +6,7 @@ use super::left_out::diagnosed;
 use crate::compensate::concealed::from_environment;
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
+use calib::twin::conceal::family::Collection;
 
 /// Whether a finding's place is, or spans, the one given: `link 2-4` is link 3, too.
 fn is_there(found: &str, place: &str) -> bool {
@@ -219,4 +220,19 @@ fn rows_that_are_set_aside_and_taken_back_in_turns_come_to_an_end() {
     let diagnosed = diagnosed(&case, &[]);
     assert_eq!(found(&diagnosed), [("unknown", "joint 3")]);
     halves_the_error(&diagnosed);
+}
+
+#[test]
+fn waves_over_the_range_of_a_tracker_are_found() {
+    // 10 um at every 378 mm of ranges over metres: a coarse look at a curve sees none of it.
+    let design = Design {
+        seed: 1_795_861_284,
+        cases: 300,
+        collection: Collection::Beyond,
+        ..Design::default()
+    };
+    let content = design.contents().remove(91);
+    let case = Case::make(&design, 91, content).unwrap();
+    assert_eq!(case.concealed[0].cause.effect, "tracker_offset");
+    assert_eq!(found(&diagnosed(&case, &[])), [("unknown", "tracker")]);
 }

@@ -38,6 +38,12 @@ const CURVE: Over = Over::Curve {
     first: 5,
     lengths: 3,
 };
+/// A wave of a dozen periods has no slow part that a coarse look would see.
+const WAVY: Over = Over::Curve {
+    count: 40,
+    first: 40,
+    lengths: 5,
+};
 const SLOW: Over = Over::Curve {
     count: 8,
     first: 4,
@@ -352,10 +358,19 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
         time: FADING[1],
     };
     let mut out: Vec<Kind> = Vec::new();
-    if let Motion::Instrument { .. } = motion {
+    if let Motion::Instrument { reading } = motion {
+        // What counts fractions of a wave errs by them.
+        let range = match reading {
+            Polar::Range => WAVY,
+            _ => CURVE,
+        };
         out.extend(
-            [Variable::Azimuth, Variable::Elevation, Variable::Range]
-                .map(|variable| vec![(variable, CURVE)]),
+            [
+                (Variable::Azimuth, CURVE),
+                (Variable::Elevation, CURVE),
+                (Variable::Range, range),
+            ]
+            .map(|one| vec![one]),
         );
         out.push(
             (0..joints)
