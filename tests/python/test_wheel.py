@@ -255,6 +255,8 @@ def test_a_callable_that_fails_and_ctrl_c_end_the_work_at_once(arm, arrays):
         arm.diagnose(joints, points, 0.01, held_out=held_out, progress=failing)
     # Many rows: seconds of work.
     many = [np.concatenate([array + 1e-4 * k for k in range(30)]) for array in (joints, points)]
+    # What a shell starts in the background ignores it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     begun = time.monotonic()
     threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
