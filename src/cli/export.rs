@@ -85,12 +85,12 @@ impl ExportArguments {
             None => emit(&text)?,
         }
         if !self.model.quiet {
-            let names: String = export
+            let remarks: String = export
                 .remarks_in(self.format.0)
                 .iter()
                 .map(|line| format!("{line}\n"))
                 .collect();
-            let _ = std::io::stderr().write_all(names.as_bytes());
+            let _ = std::io::stderr().write_all(remarks.as_bytes());
         }
         Ok(())
     }

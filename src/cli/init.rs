@@ -3,6 +3,7 @@
 use super::emit;
 use crate::error::{Error, Result};
 use crate::init::{InitRequest, RobotFileKind, StarterFiles, TYPICAL, start};
+use crate::raw::ending;
 use crate::robot::LIBRARY;
 use crate::text::filled;
 use clap::Args;
@@ -36,6 +37,9 @@ pub(super) struct InitArguments {
     #[arg(long, value_name = "LINK", requires = "urdf", default_value = "tool0")]
     tip: String,
 }
+
+/// Unread files that are named at most.
+const NAMED: usize = 3;
 
 const EXAMPLES: &str = "Examples:
   calib init cell7 --data cell7/controller.csv cell7/tracker.csv --robot spherical6
@@ -119,9 +123,21 @@ fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
         Vec::new()
     };
     let unread = (!unread.is_empty()).then(|| {
-        let (folder, pipeline) = (folder.display(), files[1].display());
-        let names = unread.join(" and ");
-        format!("{names} in {folder} were not looked at; delete {pipeline} and name them after --data for a pipeline that reads their columns")
+        let written: Vec<String> = files
+            .iter()
+            .zip(texts)
+            .filter_map(|(path, text)| text.map(|_| path.display().to_string()))
+            .collect();
+        let more = match unread.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        format!(
+            "not looked at in {}: {}{more}; delete {} and name the recording after --data",
+            folder.display(),
+            unread[..unread.len().min(NAMED)].join(", "),
+            written.join(" and ")
+        )
     });
     for note in start.notes.iter().chain(&unread) {
         let _ = writeln!(std::io::stderr(), "warning: {note}");
@@ -136,16 +152,9 @@ fn tables_in(folder: &Path) -> Vec<String> {
         "csv", "tsv", "txt", "xlsx", "parquet", "feather", "mcap", "db3",
     ];
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
-    let mut names: Vec<String> = names
-        .filter(|name| {
-            let ending = Path::new(name).extension();
-            ending.is_some_and(|ending| {
-                ENDINGS
-                    .iter()
-                    .any(|known| ending.eq_ignore_ascii_case(known))
-            })
-        })
+    let mut names: Vec<String> = entries
+        .filter(|entry| ENDINGS.contains(&&*ending(&entry.path())))
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
         .collect();
     names.sort();
     names

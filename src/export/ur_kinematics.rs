@@ -80,16 +80,16 @@ fn text(export: &Export) -> Result<String> {
     let mut out: String = export.head(&UR_KINEMATICS);
     let (mut before, mut links) = (base, String::new());
     for (index, (link, frame)) in LINKS.iter().zip(&nominal).enumerate() {
-        let inverse = moved(
+        let placed = moved(
             frame,
             &frame.rotation.column(2).into(),
             &corrected.joints[index],
         );
-        let ([x, y, z], [roll, pitch, yaw]) = origin(&before, &inverse);
+        let ([x, y, z], [roll, pitch, yaw]) = origin(&before, &placed);
         links.push_str(&format!(
             "  {link}:\n    x: {x:?}\n    y: {y:?}\n    z: {z:?}\n    roll: {roll:?}\n    pitch: {pitch:?}\n    yaw: {yaw:?}\n"
         ));
-        before = inverse;
+        before = placed;
     }
     let ([x, y, z], [roll, pitch, yaw]) =
         origin(&before, &tool(corrected.tool, &corrected.tool_rotation));

@@ -162,19 +162,19 @@ fn origins(export: &Export, document: &Document, base: &str) -> Option<Origins> 
             corrected = corrected * joint.origin;
             continue;
         };
-        let inverse = moved(
+        let placed = moved(
             &nominal,
             &(nominal.rotation * joint.axis),
             &robot.joints[at],
         );
-        let (place, turn) = origin(&corrected, &inverse);
+        let (place, turn) = origin(&corrected, &placed);
         // Names stand in an expression between quotes.
         let plain = joint
             .name
             .chars()
             .all(|c| c.is_ascii_alphanumeric() || "_-./ ".contains(c));
         joints.push((plain.then(|| joint.name.to_string())?, [place, turn]));
-        corrected = inverse;
+        corrected = placed;
     }
     let (place, turn) = origin(&corrected, &tool(robot.tool, &robot.tool_rotation));
     let tool = format!(

@@ -411,11 +411,11 @@ impl CovarianceTable {
     /// The covariance of a fit. Parameters that it kept are taken over from `earlier`: what was estimated on top is held to be independent.
     pub fn of(model: &Model, fitted: &Fitted, earlier: Option<&Self>) -> Self {
         let specs = model.stack.specs();
-        let blocks = fitted
+        let pairs = fitted
             .covariance
             .iter()
             .flat_map(|covariance| covariance.pairs());
-        let mut rows: Vec<CovarianceRow> = blocks
+        let mut rows: Vec<CovarianceRow> = pairs
             .map(|(a, b, value, correlation)| row(&specs[a], &specs[b], value, correlation))
             .collect();
         let new: BTreeSet<String> = rows.iter().map(|row| row.parameter.clone()).collect();

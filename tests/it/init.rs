@@ -25,7 +25,9 @@ fn what_init_writes_is_understood_and_never_overwrites() {
     let unread = calib(folder.path(), "init .").code(0);
     has(
         &unread.err,
-        ["controller.csv and tracker.csv in . were not looked at"],
+        [
+            "not looked at in .: controller.csv, tracker.csv; delete ./robot.yaml and ./pipeline.yaml",
+        ],
     );
     std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
     std::fs::remove_file(folder.path().join("robot.yaml")).unwrap();

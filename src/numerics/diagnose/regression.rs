@@ -143,7 +143,7 @@ impl<'p, 'a> FormRegression<'p, 'a> {
 
 impl ModelledRows {
     /// The fit of columns, one after another.
-    fn solve(&self, mut gradient: Vec<f64>) -> Solution {
+    fn solve(&self, mut stacked: Vec<f64>) -> Solution {
         let rows = self.residual.len().max(1);
         let weighed = |column: &[f64]| match &self.square {
             Some(square) => column
@@ -153,7 +153,7 @@ impl ModelledRows {
                 .collect(),
             None => column.to_vec(),
         };
-        let scales: Vec<f64> = gradient
+        let scales: Vec<f64> = stacked
             .chunks_mut(rows)
             .map(|column| {
                 let length = dot(column, &weighed(column)).sqrt().max(1e-300);
@@ -161,7 +161,7 @@ impl ModelledRows {
                 length
             })
             .collect();
-        let columns: Vec<&[f64]> = gradient.chunks(rows).collect();
+        let columns: Vec<&[f64]> = stacked.chunks(rows).collect();
         let absorbed: Vec<Vec<f64>> = columns
             .iter()
             .map(|column| self.basis.iter().map(|other| dot(other, column)).collect())

@@ -180,7 +180,7 @@ impl TorqueColumns {
     }
 
     fn rms(&self, column: usize, unit: impl Fn(usize) -> f64) -> f64 {
-        let column_of = &self.columns[column];
+        let torque_column = &self.columns[column];
         let of_joint = |(joint, course): (&usize, &Vec<f64>)| {
             let unit = unit(*joint);
             course
@@ -189,12 +189,12 @@ impl TorqueColumns {
                 .sum::<f64>()
                 / course.len().max(1) as f64
         };
-        let squares = column_of
+        let squares = torque_column
             .joints
             .iter()
-            .zip(&column_of.courses)
+            .zip(&torque_column.courses)
             .map(of_joint);
-        (squares.sum::<f64>() / column_of.joints.len().max(1) as f64).sqrt()
+        (squares.sum::<f64>() / torque_column.joints.len().max(1) as f64).sqrt()
     }
 
     /// Columns of a form.

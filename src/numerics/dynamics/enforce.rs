@@ -63,15 +63,15 @@ pub(super) fn nearest_bodies(theta: &[f64], covariance: &DMatrix<f64>) -> Option
     let back = to.lu();
     let theta = back.solve(&found)?.as_slice().to_vec();
     let moved = &found - &start;
-    let (roots, vectors) = {
+    let (eigenvalues, vectors) = {
         let eigen = metric.symmetric_eigen();
         (eigen.eigenvalues, eigen.eigenvectors)
     };
-    let least = 1e-14 * roots.max();
+    let least = 1e-14 * eigenvalues.max();
     let along = vectors.transpose() * moved;
     let cost = along
         .iter()
-        .zip(roots.iter())
+        .zip(eigenvalues.iter())
         .filter(|(_, size)| **size > least)
         .map(|(value, size)| value * value / size)
         .sum();
@@ -237,13 +237,13 @@ pub(super) fn with_bodies(
     }
     let theta = problem.inertials(set, solution);
     let with = &covariance * shares.transpose();
-    let spread = &shares * &with;
-    let found = nearest_bodies(&theta, &spread)?;
+    let variance = &shares * &with;
+    let found = nearest_bodies(&theta, &variance)?;
     let moved = DVector::from_iterator(
         theta.len(),
         found.theta.iter().zip(&theta).map(|(new, old)| new - old),
     );
-    let change = with * solved(&spread, &moved);
+    let change = with * solved(&variance, &moved);
     let solution = solution
         .iter()
         .zip(change.iter())
@@ -260,13 +260,9 @@ pub(super) fn with_bodies(
 
 /// What a matrix of numbers in many units takes to a vector; directions that it does not have are left out.
 fn solved(matrix: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
-    let scale = matrix.diagonal().map(|eigenvalue| {
-        if eigenvalue > 0.0 {
-            1.0 / eigenvalue.sqrt()
-        } else {
-            0.0
-        }
-    });
+    let scale = matrix
+        .diagonal()
+        .map(|entry| if entry > 0.0 { 1.0 / entry.sqrt() } else { 0.0 });
     let scaled = DMatrix::from_fn(right.len(), right.len(), |a, b| {
         scale[a] * matrix[(a, b)] * scale[b]
     });

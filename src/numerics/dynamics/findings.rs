@@ -320,10 +320,10 @@ fn number_of_line(
     if !form.cause.brakes {
         return None;
     }
-    let is_power = |is_of_power: &TorqueForm| {
-        is_of_power.place == form.place
-            && is_of_power.cause.name == VISCOUS
-            && !is_of_power.shape_numbers().is_empty()
+    let is_power = |other: &TorqueForm| {
+        other.place == form.place
+            && other.cause.name == VISCOUS
+            && !other.shape_numbers().is_empty()
     };
     let power = *set
         .iter()

@@ -97,15 +97,15 @@ impl TorqueModel {
         let mut laws: Vec<Vec<FrictionLaw>> = (0..self.joints()).map(|_| Vec::new()).collect();
         for term in &self.terms {
             let form = term.form()?;
-            let (count, numbers) = (first, shapes);
+            let (coefficient, number) = (first, shapes);
             first += term.coefficients.len();
             shapes += form.shape_numbers().len();
             if let (Place::Joint(joint), Some(_)) = (form.place, form.friction(0, 0.0, 0.0)) {
                 laws[joint].push(FrictionLaw {
                     form,
                     coefficients: &term.coefficients,
-                    first: count,
-                    shapes: numbers,
+                    first: coefficient,
+                    shapes: number,
                 });
             }
         }

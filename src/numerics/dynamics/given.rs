@@ -52,17 +52,17 @@ pub(super) fn answers(solved: &mut SolvedTorques, given: &[GivenCell]) -> Vec<Ce
 impl TorqueTable<'_, '_> {
     /// Key of a cell: its name and place, and of what has no name what it depends on.
     fn key(&self, cell: usize) -> String {
-        let cell_of = &self.cells[cell];
-        let form = self.choice.form(cell_of.forms[0]);
+        let torque_cell = &self.cells[cell];
+        let form = self.choice.form(torque_cell.forms[0]);
         let kind = form.cause.coefficients.first();
-        let kind = kind.filter(|_| cell_of.name == UNKNOWN);
+        let kind = kind.filter(|_| torque_cell.name == UNKNOWN);
         let kind = kind.map_or(String::new(), |(kind, _)| format!(":{kind}"));
         let [one, two] = (form.cause.cell)(form);
         let with = match [one, two] {
             [0, 0] => String::new(),
             _ => format!(":{},{}", one + 1, two + 1),
         };
-        format!("{}@{}{kind}{with}", cell_of.name, cell_of.place)
+        format!("{}@{}{kind}{with}", torque_cell.name, torque_cell.place)
     }
 
     /// Nm of a form's torque at unit amplitude.
@@ -111,24 +111,24 @@ impl TorqueTable<'_, '_> {
         let Some(posterior) = self.cell(cell, state) else {
             return Vec::new();
         };
-        let cell_of = &self.cells[cell];
+        let torque_cell = &self.cells[cell];
         let best = posterior.best;
         let whole = CellAnswer {
             left_out: left_out.map(Into::into),
             cell: self.key(cell),
             shape: None,
-            effect: cell_of.name,
-            place: cell_of.place,
+            effect: torque_cell.name,
+            place: torque_cell.place,
             follows: follows(self.choice.form(best.form)),
-            log: posterior.log_odds - cell_of.log_prior,
-            log_prior: cell_of.log_prior,
+            log: posterior.log_odds - torque_cell.log_prior,
+            log_prior: torque_cell.log_prior,
             size: best.amplitude * self.newton_metres(best.form),
             sigma: None,
             log_ratio: None,
         };
         // Forms of each shape, and ln of the evidence of those that may be.
         let mut shapes: BTreeMap<String, (usize, Vec<f64>)> = BTreeMap::new();
-        for form in cell_of
+        for form in torque_cell
             .forms
             .iter()
             .filter(|form| **form < self.choice.open)

@@ -227,7 +227,7 @@ mod consistency_tests {
     #[test]
     fn numbers_of_no_body_become_those_of_the_nearest_with_the_same_mass_and_centre() {
         // A rod along x of 3 kg whose moment about its own axis is negative.
-        let (body, is_consistent) = nearest(&[
+        let (body, is_given) = nearest(&[
             3.0,
             0.3,
             0.0,
@@ -242,7 +242,7 @@ mod consistency_tests {
         assert!(
             (body.centre - Point3::new(0.1, 0.0, 0.0)).norm() < 1e-15
                 && body.mass == 3.0
-                && !is_consistent
+                && !is_given
         );
         let [xx, yy, zz] = [0, 1, 2].map(|k| body.inertia[(k, k)]);
         assert!(
@@ -250,10 +250,9 @@ mod consistency_tests {
             "{}",
             body.inertia
         );
-        let (right, is_consistent) =
-            nearest(&[3.0, 0.3, 0.0, 0.0, 0.01, 0.0, 0.0, 0.08, 0.0, 0.08]);
+        let (right, is_given) = nearest(&[3.0, 0.3, 0.0, 0.0, 0.01, 0.0, 0.0, 0.08, 0.0, 0.08]);
         assert!(
-            is_consistent
+            is_given
                 && (right.inertia[(0, 0)] - 0.01).abs() < 1e-12
                 && (right.inertia[(1, 1)] - 0.05).abs() < 1e-12
         );

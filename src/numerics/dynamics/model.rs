@@ -339,15 +339,15 @@ fn covariance(
         let first = columns.len();
         columns.extend(changes.iter().map(|(column, _)| *column));
         for number in 0..INERTIAL_NUMBERS {
-            let shared = changes
+            let shares = changes
                 .iter()
                 .enumerate()
                 .map(|(place, (_, ten))| (first + place, ten[number]));
-            let shared: Vec<(usize, f64)> = shared.filter(|(_, share)| *share != 0.0).collect();
-            let known = problem.scene.declared.is_some() || !shared.is_empty();
+            let shares: Vec<(usize, f64)> = shares.filter(|(_, share)| *share != 0.0).collect();
+            let known = problem.scene.declared.is_some() || !shares.is_empty();
             identified.push(known);
             if known {
-                sums.push(shared);
+                sums.push(shares);
             }
         }
     }

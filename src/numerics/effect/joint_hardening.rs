@@ -146,8 +146,8 @@ impl BentWindup {
     fn bend(&self, torque: f64) -> (f64, f64) {
         match self.law {
             HardeningLaw::Saturating { at_nm } => {
-                let share_of = 1.0 + torque.abs() / at_nm;
-                (torque / share_of, 1.0 / (share_of * share_of))
+                let denominator = 1.0 + torque.abs() / at_nm;
+                (torque / denominator, 1.0 / (denominator * denominator))
             }
             HardeningLaw::SoftZone { at_nm } => {
                 let t = libm::tanh(torque / at_nm);

@@ -249,15 +249,15 @@ impl Variable {
             (
                 Self::Stretch { joint, .. },
                 Self::Stretch {
-                    joint: joint_of, ..
+                    joint: other_joint, ..
                 },
             )
             | (
                 Self::Recent { joint, .. },
                 Self::Recent {
-                    joint: joint_of, ..
+                    joint: other_joint, ..
                 },
-            ) => joint == joint_of,
+            ) => joint == other_joint,
             (Self::Position { .. }, Self::Position { .. })
             | (Self::Sighted { .. }, Self::Sighted { .. }) => true,
             _ => self == other,

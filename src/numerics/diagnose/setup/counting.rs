@@ -337,8 +337,8 @@ impl AffineImage<'_, '_> {
             }
             out
         };
-        let columns_of: [DMatrix<f64>; 3] = [0, 1, 2].map(columns);
-        let projected = columns_of
+        let blocks: [DMatrix<f64>; 3] = [0, 1, 2].map(columns);
+        let projected = blocks
             .each_ref()
             .map(|block| block - &basis * basis.tr_mul(block));
         let normal = projected
@@ -356,7 +356,7 @@ impl AffineImage<'_, '_> {
                 .map(|row| (x[row] * x[row] + y[row] * y[row] + z[row] * z[row]).sqrt())
                 .collect()
         };
-        let centred = columns_of.map(|block| {
+        let centred = blocks.map(|block| {
             let mean = block.row_mean();
             DMatrix::from_fn(count, width + 1, |row, column| {
                 block[(row, column)] - mean[column]

@@ -21,13 +21,13 @@ pub(crate) fn forms_of(
             generated::places(survey).into_iter().collect(),
         )
     } else {
-        let class = if name == names::JOINT_HARDENING {
+        let cell_name = if name == names::JOINT_HARDENING {
             names::JOINT_COMPLIANCE
         } else {
             name
         };
         let mut cells = listed::cells(survey, &values, question);
-        cells.retain(|cell| cell.name == class);
+        cells.retain(|cell| cell.name == cell_name);
         let places = cells.iter().map(|cell| cell.place).collect();
         (cells, places)
     };

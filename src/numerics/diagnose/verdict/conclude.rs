@@ -166,10 +166,10 @@ fn basis(fitter: &Fitter, rows: &[usize]) -> NoiseBasis {
 
 /// The share, in what all findings gain, of those without a name or with one that is more probably wrong.
 fn nameless_share(findings: &[Finding]) -> f64 {
-    let gains = |value_of: &dyn Fn(&Finding) -> bool| -> f64 {
+    let gains = |counts: &dyn Fn(&Finding) -> bool| -> f64 {
         findings
             .iter()
-            .filter(|finding| finding.is_physics() && value_of(finding))
+            .filter(|finding| finding.is_physics() && counts(finding))
             .filter_map(|finding| finding.evidence)
             .map(|e| e.gain)
             .sum()

@@ -334,11 +334,11 @@ impl<'a> Prepared<'a> {
             batch: &check,
             decay,
         });
-        let (mut scratch, mut checked) =
+        let (mut scratch, mut check_scratch) =
             (LossBuffers::new(self.shape), LossBuffers::new(self.shape));
         let descent = descend(
             |x, gradient| train.gradient(x, gradient, &mut scratch),
-            |x| check.map(|check| check.mean_squares(x, &mut checked)),
+            |x| check.map(|check| check.mean_squares(x, &mut check_scratch)),
             start,
             self.recipe.iterations,
         );

@@ -89,15 +89,15 @@ fn beyond_the_log(apart: &mut [i64]) {
         .collect::<BTreeSet<i64>>()
     {
         let lost = offset.unsigned_abs() as usize;
-        let (past, future) = if offset > 0 {
+        let (lost_rows, next_rows) = if offset > 0 {
             let edge = rows.saturating_sub(lost);
             (edge..rows, edge.saturating_sub(*STEP)..edge)
         } else {
             let edge = lost.min(rows);
             (0..edge, edge..(edge + *STEP).min(rows))
         };
-        if apart[future].contains(&offset) {
-            apart[past].fill(offset);
+        if apart[next_rows].contains(&offset) {
+            apart[lost_rows].fill(offset);
         }
     }
 }
