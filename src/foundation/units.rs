@@ -4,77 +4,6 @@
 
 use std::fmt;
 
-/// A unit that a stored column, a parameter or a column of a recording may have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Unit {
-    /// A plain number.
-    One,
-    /// mm.
-    Millimetre,
-    /// um.
-    Micrometre,
-    /// m.
-    Metre,
-    /// in, 25.4 mm.
-    Inch,
-    /// rad.
-    Radian,
-    /// deg.
-    Degree,
-    /// mrad.
-    Milliradian,
-    /// arcsec, 1/3600 deg.
-    Arcsecond,
-    /// s.
-    Second,
-    /// ms.
-    Millisecond,
-    /// min.
-    Minute,
-    /// h.
-    Hour,
-    /// kg.
-    Kilogram,
-    /// A.
-    Ampere,
-    /// mA.
-    Milliampere,
-    /// Nm.
-    NewtonMetre,
-    /// kg m, of a first moment.
-    KilogramMetre,
-    /// kg m2, of an inertia.
-    KilogramSquareMetre,
-    /// N.
-    Newton,
-    /// Hz.
-    Hertz,
-    /// Degrees Celsius.
-    Celsius,
-    /// K.
-    Kelvin,
-    /// Nm/A, of a motor.
-    NewtonMetrePerAmpere,
-    /// rad/Nm, of a joint that yields.
-    RadianPerNewtonMetre,
-    /// rad/A, of a joint that yields to its motor current.
-    RadianPerAmpere,
-    /// m/s2.
-    MetrePerSecondSquared,
-    /// rad/s.
-    RadianPerSecond,
-    /// deg/s.
-    DegreePerSecond,
-    /// mm/s.
-    MillimetrePerSecond,
-    /// m/s.
-    MetrePerSecond,
-    /// How far a joint trails behind for its speed.
-    RadianPerRadianPerSecond,
-    /// arcsec per deg/s, as people read a trailing joint.
-    ArcsecondPerDegreePerSecond,
-}
-
 /// What a unit measures; only units of one quantity convert into each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
@@ -118,98 +47,59 @@ pub enum Quantity {
     Trailing,
 }
 
-use Quantity as Q;
-/// Unit, symbol, quantity, factor to SI, offset to SI (added after the factor); in the order of the units.
-const UNITS: &[(Unit, &str, Quantity, f64, f64)] = &[
-    (Unit::One, "1", Q::Number, 1.0, 0.0),
-    (Unit::Millimetre, "mm", Q::Length, 1e-3, 0.0),
-    (Unit::Micrometre, "um", Q::Length, 1e-6, 0.0),
-    (Unit::Metre, "m", Q::Length, 1.0, 0.0),
-    (Unit::Inch, "in", Q::Length, 25.4e-3, 0.0),
-    (Unit::Radian, "rad", Q::Angle, 1.0, 0.0),
-    (
-        Unit::Degree,
-        "deg",
-        Q::Angle,
-        std::f64::consts::PI / 180.0,
-        0.0,
-    ),
-    (Unit::Milliradian, "mrad", Q::Angle, 1e-3, 0.0),
-    (
-        Unit::Arcsecond,
-        "arcsec",
-        Q::Angle,
-        std::f64::consts::PI / 648_000.0,
-        0.0,
-    ),
-    (Unit::Second, "s", Q::Time, 1.0, 0.0),
-    (Unit::Millisecond, "ms", Q::Time, 1e-3, 0.0),
-    (Unit::Minute, "min", Q::Time, 60.0, 0.0),
-    (Unit::Hour, "h", Q::Time, 3600.0, 0.0),
-    (Unit::Kilogram, "kg", Q::Mass, 1.0, 0.0),
-    (Unit::Ampere, "A", Q::Current, 1.0, 0.0),
-    (Unit::Milliampere, "mA", Q::Current, 1e-3, 0.0),
-    (Unit::NewtonMetre, "Nm", Q::Torque, 1.0, 0.0),
-    (Unit::KilogramMetre, "kg m", Q::FirstMoment, 1.0, 0.0),
-    (Unit::KilogramSquareMetre, "kg m2", Q::Inertia, 1.0, 0.0),
-    (Unit::Newton, "N", Q::Force, 1.0, 0.0),
-    (Unit::Hertz, "Hz", Q::Frequency, 1.0, 0.0),
+/// Declares the units, each with its symbol, its quantity, its factor to SI, and what is added after that.
+macro_rules! units {
+    ($($unit:ident $symbol:literal $quantity:ident $factor:expr $(, $offset:expr)?;)+) => {
+        /// A unit that a stored column, a parameter or a column of a recording may have.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum Unit {
+            $(#[doc = concat!("`", $symbol, "`, of the quantity ", stringify!($quantity), ".")] $unit,)+
+        }
+
+        /// Unit, symbol, quantity, factor to SI, offset to SI; in the order of the units.
+        const UNITS: &[(Unit, &str, Quantity, f64, f64)] =
+            &[$((Unit::$unit, $symbol, Quantity::$quantity, $factor, 0.0 $(+ $offset)?)),+];
+    };
+}
+
+units! {
+    One "1" Number 1.0;
+    Millimetre "mm" Length 1e-3;
+    Micrometre "um" Length 1e-6;
+    Metre "m" Length 1.0;
+    Inch "in" Length 25.4e-3;
+    Radian "rad" Angle 1.0;
+    Degree "deg" Angle std::f64::consts::PI / 180.0;
+    Milliradian "mrad" Angle 1e-3;
+    Arcsecond "arcsec" Angle std::f64::consts::PI / 648_000.0;
+    Second "s" Time 1.0;
+    Millisecond "ms" Time 1e-3;
+    Minute "min" Time 60.0;
+    Hour "h" Time 3600.0;
+    Kilogram "kg" Mass 1.0;
+    Ampere "A" Current 1.0;
+    Milliampere "mA" Current 1e-3;
+    NewtonMetre "Nm" Torque 1.0;
+    KilogramMetre "kg m" FirstMoment 1.0;
+    KilogramSquareMetre "kg m2" Inertia 1.0;
+    Newton "N" Force 1.0;
+    Hertz "Hz" Frequency 1.0;
     // Celsius is kept as the base of temperature: effects need differences, people need degrees.
-    (Unit::Celsius, "C", Q::Temperature, 1.0, 0.0),
-    (Unit::Kelvin, "K", Q::Temperature, 1.0, -273.15),
-    (
-        Unit::NewtonMetrePerAmpere,
-        "Nm/A",
-        Q::TorqueConstant,
-        1.0,
-        0.0,
-    ),
-    (
-        Unit::RadianPerNewtonMetre,
-        "rad/Nm",
-        Q::Compliance,
-        1.0,
-        0.0,
-    ),
-    (
-        Unit::RadianPerAmpere,
-        "rad/A",
-        Q::CurrentCompliance,
-        1.0,
-        0.0,
-    ),
-    (
-        Unit::MetrePerSecondSquared,
-        "m/s2",
-        Q::Acceleration,
-        1.0,
-        0.0,
-    ),
-    (Unit::RadianPerSecond, "rad/s", Q::AngularRate, 1.0, 0.0),
-    (
-        Unit::DegreePerSecond,
-        "deg/s",
-        Q::AngularRate,
-        std::f64::consts::PI / 180.0,
-        0.0,
-    ),
-    (Unit::MillimetrePerSecond, "mm/s", Q::LinearRate, 1e-3, 0.0),
-    (Unit::MetrePerSecond, "m/s", Q::LinearRate, 1.0, 0.0),
-    (
-        Unit::RadianPerRadianPerSecond,
-        "rad/(rad/s)",
-        Q::Trailing,
-        1.0,
-        0.0,
-    ),
-    (
-        Unit::ArcsecondPerDegreePerSecond,
-        "arcsec/(deg/s)",
-        Q::Trailing,
-        1.0 / 3600.0,
-        0.0,
-    ),
-];
+    Celsius "C" Temperature 1.0;
+    Kelvin "K" Temperature 1.0, -273.15;
+    NewtonMetrePerAmpere "Nm/A" TorqueConstant 1.0;
+    // Of a joint that yields: to its load, to its motor current.
+    RadianPerNewtonMetre "rad/Nm" Compliance 1.0;
+    RadianPerAmpere "rad/A" CurrentCompliance 1.0;
+    MetrePerSecondSquared "m/s2" Acceleration 1.0;
+    RadianPerSecond "rad/s" AngularRate 1.0;
+    DegreePerSecond "deg/s" AngularRate std::f64::consts::PI / 180.0;
+    MillimetrePerSecond "mm/s" LinearRate 1e-3;
+    MetrePerSecond "m/s" LinearRate 1.0;
+    // How far a joint trails behind for its speed; the second as people read it.
+    RadianPerRadianPerSecond "rad/(rad/s)" Trailing 1.0;
+    ArcsecondPerDegreePerSecond "arcsec/(deg/s)" Trailing 1.0 / 3600.0;
+}
 
 impl Unit {
     #[inline]

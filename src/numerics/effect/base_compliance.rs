@@ -102,10 +102,6 @@ impl Placed for TiltingBase {
         *STIFFNESS_BEYOND
     }
 
-    fn needs_torque(&self) -> bool {
-        true
-    }
-
     fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
         let step = STEP * libm::exp2(-0.7 * f64::from(level));
         let depths = [self.below - step, self.below + step].map(|below| below.clamp(0.0, DEEPEST));

@@ -33,7 +33,7 @@ pub trait Placed: Send + Sync {
     fn body(&self) -> serde_json::Value;
     /// See [`Effect::needs_torque`].
     fn needs_torque(&self) -> bool {
-        false
+        self.is_of_torque_model() || self.variables().into_iter().any(Variable::needs_torque)
     }
     /// See [`Effect::needs_current`]; a law of a motor current needs it in any case.
     fn needs_current(&self) -> bool {

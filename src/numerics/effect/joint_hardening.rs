@@ -227,10 +227,6 @@ impl Placed for BentWindup {
         Some(variable)
     }
 
-    fn needs_torque(&self) -> bool {
-        true
-    }
-
     /// Both near no load and far out.
     fn is_against_load(&self, p: &[f64], error: &dyn Fn(usize) -> f64) -> bool {
         let per = if let HardeningLaw::Curve { most_nm } = self.law {

@@ -177,8 +177,4 @@ impl Placed for BentLink {
     fn doubt(&self) -> f64 {
         *STIFFNESS_BEYOND
     }
-
-    fn needs_torque(&self) -> bool {
-        true
-    }
 }

@@ -79,10 +79,6 @@ impl Placed for WrongLinkMass {
         }
     }
 
-    fn needs_torque(&self) -> bool {
-        true
-    }
-
     fn load_correction(&self, _q: &[f64], _payload: f64, p: &[f64], out: &mut LoadCorrection) {
         out.body[self.link] += p[0];
         if self.centre {

@@ -140,10 +140,6 @@ impl Placed for WrongPayload {
         }
     }
 
-    fn needs_torque(&self) -> bool {
-        true
-    }
-
     fn load_correction(&self, _q: &[f64], payload: f64, p: &[f64], out: &mut LoadCorrection) {
         out.payload += p[0] * if self.tool { 1.0 } else { payload };
         if self.centre {

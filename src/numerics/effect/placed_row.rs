@@ -136,17 +136,9 @@ impl PlacedRow<'_> {
     /// Derivatives of the point, m.
     pub(crate) fn partials(&mut self, mut emit: impl FnMut(usize, Vector3<f64>)) {
         self.scratch.velocities(self.robot, &self.point);
-        let PlacementBuffers {
-            deflection,
-            by_station,
-            by_joint,
-            ..
-        } = &*self.scratch;
-        for (parameter, direction) in &deflection.partials {
-            emit(
-                *parameter,
-                along(direction, by_joint, by_station, &deflection.compliance),
-            );
+        let rates = self.scratch.rates();
+        for (parameter, direction) in &self.scratch.deflection.partials {
+            emit(*parameter, rates.along(direction));
         }
     }
 
@@ -169,23 +161,9 @@ impl PlacedRow<'_> {
         mut emit: impl FnMut(usize, Vector3<f64>),
     ) {
         self.scratch.velocities(self.robot, &self.point);
-        let PlacementBuffers {
-            deflection,
-            by_station,
-            by_joint,
-            ..
-        } = &*self.scratch;
-        for (parameter, direction) in &deflection.partials {
-            emit(
-                *parameter,
-                anchor_reach(
-                    direction,
-                    reach,
-                    by_joint,
-                    by_station,
-                    &deflection.compliance,
-                ),
-            );
+        let rates = self.scratch.rates();
+        for (parameter, direction) in &self.scratch.deflection.partials {
+            emit(*parameter, rates.from_anchor(direction, reach));
         }
     }
 }
@@ -221,17 +199,16 @@ impl PlacementBuffers {
             };
         }
     }
-}
 
-/// How the target turns with every joint and station, rad per rad of each, tracker frame.
-#[derive(Clone)]
-pub(super) struct Turns {
-    by_joint: Vec<Vector3<f64>>,
-    /// The frame of each station, and the rotation in it by the station's twist.
-    by_station: Vec<(Matrix3<f64>, Matrix3x6<f64>)>,
-}
+    /// How the point moves, of the row whose velocities were asked for last.
+    fn rates(&self) -> Rates<'_> {
+        Rates {
+            by_joint: &self.by_joint,
+            by_station: &self.by_station,
+            compliance: &self.deflection.compliance,
+        }
+    }
 
-impl PlacementBuffers {
     /// How the target turns, of the row that was placed last.
     pub(super) fn turns(&self, robot: &RobotModel) -> Turns {
         let joint = |joint: usize| {
@@ -255,6 +232,14 @@ impl PlacementBuffers {
     }
 }
 
+/// How the target turns with every joint and station, rad per rad of each, tracker frame.
+#[derive(Clone)]
+pub(super) struct Turns {
+    by_joint: Vec<Vector3<f64>>,
+    /// The frame of each station, and the rotation in it by the station's twist.
+    by_station: Vec<(Matrix3<f64>, Matrix3x6<f64>)>,
+}
+
 impl Turns {
     /// rad per unit of a parameter; none of what turns nothing.
     pub(super) fn along(&self, direction: &Direction, yielding: &[f64]) -> Option<Vector3<f64>> {
@@ -275,38 +260,40 @@ impl Turns {
     }
 }
 
-/// Derivative of the vector from the row's anchor to the point, which is `reach`.
-pub(super) fn anchor_reach(
-    direction: &Direction,
-    reach: &Vector3<f64>,
-    by_joint: &[Vector3<f64>],
-    by_station: &[Matrix3x6<f64>],
-    yielding: &[f64],
-) -> Vector3<f64> {
-    match direction {
-        Direction::Anchor(rate) => -rate,
-        Direction::AnchorTilt(normal, turn) => normal * turn.dot(reach),
-        Direction::AnchorGrowth(rate) => reach
-            .try_normalize(0.0)
-            .map_or_else(Vector3::zeros, |along| along * -*rate),
-        Direction::Instrument(_) => Vector3::zeros(),
-        other => along(other, by_joint, by_station, yielding),
-    }
+/// How a row's point moves by the travel of each joint and the twist at each station, and how far each joint yields.
+#[derive(Clone, Copy)]
+pub(super) struct Rates<'a> {
+    pub(super) by_joint: &'a [Vector3<f64>],
+    pub(super) by_station: &'a [Matrix3x6<f64>],
+    pub(super) compliance: &'a [f64],
 }
 
-pub(super) fn along(
-    direction: &Direction,
-    by_joint: &[Vector3<f64>],
-    by_station: &[Matrix3x6<f64>],
-    yielding: &[f64],
-) -> Vector3<f64> {
-    match direction {
-        Direction::Joint(joint, rate) => by_joint[*joint] * *rate,
-        Direction::Station(station, rate) => by_station[*station] * rate,
-        Direction::Torque(joint, rate) => by_joint[*joint] * (yielding[*joint] * *rate),
-        Direction::Anchor(_) | Direction::AnchorTilt(..) | Direction::AnchorGrowth(_) => {
-            Vector3::zeros()
+impl Rates<'_> {
+    /// Derivative of the point as the tracker reads it, m per unit of a parameter that acts there.
+    pub(super) fn along(&self, direction: &Direction) -> Vector3<f64> {
+        match direction {
+            Direction::Joint(joint, rate) => self.by_joint[*joint] * *rate,
+            Direction::Station(station, rate) => self.by_station[*station] * rate,
+            Direction::Torque(joint, rate) => {
+                self.by_joint[*joint] * (self.compliance[*joint] * *rate)
+            }
+            Direction::Anchor(_) | Direction::AnchorTilt(..) | Direction::AnchorGrowth(_) => {
+                Vector3::zeros()
+            }
+            Direction::Instrument(rate) => *rate,
         }
-        Direction::Instrument(rate) => *rate,
+    }
+
+    /// Derivative of the vector from the row's anchor to the point, which is `reach`, m per unit.
+    pub(super) fn from_anchor(&self, direction: &Direction, reach: &Vector3<f64>) -> Vector3<f64> {
+        match direction {
+            Direction::Anchor(rate) => -rate,
+            Direction::AnchorTilt(normal, turn) => normal * turn.dot(reach),
+            Direction::AnchorGrowth(rate) => reach
+                .try_normalize(0.0)
+                .map_or_else(Vector3::zeros, |along| along * -*rate),
+            Direction::Instrument(_) => Vector3::zeros(),
+            other => self.along(other),
+        }
     }
 }

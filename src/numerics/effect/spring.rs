@@ -173,10 +173,6 @@ impl Placed for Spring {
         Some(variable)
     }
 
-    fn needs_torque(&self) -> bool {
-        true
-    }
-
     fn load_correction(&self, q: &[f64], _payload: f64, p: &[f64], out: &mut LoadCorrection) {
         out.torque[self.shape.joint] += self.waves(q).zip(p).map(|(wave, p)| wave * p).sum::<f64>();
     }

@@ -2,7 +2,7 @@
 //!
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
-use super::placed_row::{PlacedRow, PlacementBuffers, Station, Turns, along, anchor_reach};
+use super::placed_row::{PlacedRow, PlacementBuffers, Rates, Station, Turns};
 use super::{ArmState, BeyondRange, Deflection, Direction, Effect, Law, ParameterSpec, Variable};
 use crate::robot::{Measurements, Posture, RobotModel, Travel};
 use crate::spatial::Pose;
@@ -12,11 +12,30 @@ use std::sync::Arc;
 
 /// Effects in a fixed order with their parameters numbered through.
 pub struct EffectStack {
-    effects: Vec<(Arc<dyn Effect>, Range<usize>)>,
+    effects: Vec<Member>,
     specs: Vec<ParameterSpec>,
     base: Pose,
-    needs_torque: bool,
-    needs_sight: bool,
+}
+
+/// An effect, the range of its parameters, and what it asks for.
+struct Member {
+    effect: Arc<dyn Effect>,
+    range: Range<usize>,
+    torque: bool,
+    sight: bool,
+    constant: bool,
+}
+
+impl Member {
+    fn new(effect: Arc<dyn Effect>, range: Range<usize>) -> Self {
+        Self {
+            torque: effect.needs_torque(),
+            sight: effect.needs_sight(),
+            constant: effect.is_constant(),
+            effect,
+            range,
+        }
+    }
 }
 
 impl EffectStack {
@@ -25,27 +44,19 @@ impl EffectStack {
         let mut specs = Vec::new();
         let mut numbered = Vec::new();
         for effect in effects {
-            let numbers = effect.parameters(robot);
-            numbered.push((Arc::from(effect), specs.len()..specs.len() + numbers.len()));
-            specs.extend(numbers);
+            let first = specs.len();
+            specs.extend(effect.parameters(robot));
+            numbered.push(Member::new(Arc::from(effect), first..specs.len()));
         }
-        Self::numbered(numbered, specs, base)
-    }
-
-    fn numbered(
-        numbered: Vec<(Arc<dyn Effect>, Range<usize>)>,
-        specs: Vec<ParameterSpec>,
-        base: Pose,
-    ) -> Self {
-        let needs_torque = numbered.iter().any(|(effect, _)| effect.needs_torque());
-        let needs_sight = numbered.iter().any(|(effect, _)| effect.needs_sight());
         Self {
             effects: numbered,
             specs,
             base,
-            needs_torque,
-            needs_sight,
         }
+    }
+
+    fn needs_torque(&self) -> bool {
+        self.effects.iter().any(|member| member.torque)
     }
 
     /// The same stack with the laws of its forms held at the ends of what some rows have of their variables.
@@ -63,8 +74,8 @@ impl EffectStack {
             let point = self.place(robot, data, *row, x, &mut scratch).point;
             let state = ArmState::new(data, *row, &scratch.posture, point);
             let kept = ranges.iter_mut().zip(&mut pairs);
-            for ((effect, _), (ranges, pairs)) in self.effects.iter().zip(kept) {
-                let sizes = effect
+            for (member, (ranges, pairs)) in self.effects.iter().zip(kept) {
+                let sizes = (member.effect)
                     .form()
                     .map_or_else(Vec::new, |form| form.sizes(robot, &state));
                 ranges.resize(sizes.len(), None);
@@ -80,20 +91,19 @@ impl EffectStack {
                 }
             }
         }
-        let held = |effect: &Arc<dyn Effect>,
-                    ranges: Vec<Option<[f64; 2]>>,
-                    pairs: &[[f64; 2]]|
-         -> Arc<dyn Effect> {
-            effect.form().map_or_else(
-                || effect.clone(),
-                |form| Arc::new(form.fitted_within(ranges, pairs)),
-            )
+        let kept = ranges.into_iter().zip(&pairs);
+        let held = |(member, (ranges, pairs)): (&Member, (Vec<_>, &Vec<[f64; 2]>))| {
+            let held: Arc<dyn Effect> = match member.effect.form() {
+                Some(form) => Arc::new(form.fitted_within(ranges, pairs)),
+                None => member.effect.clone(),
+            };
+            Member::new(held, member.range.clone())
         };
-        let effects =
-            self.effects.iter().zip(ranges.into_iter().zip(&pairs)).map(
-                |((effect, span), (ranges, pairs))| (held(effect, ranges, pairs), span.clone()),
-            );
-        Self::numbered(effects.collect(), self.specs.clone(), self.base)
+        Self {
+            effects: self.effects.iter().zip(kept).map(held).collect(),
+            specs: self.specs.clone(),
+            base: self.base,
+        }
     }
 
     /// What forms may be off in a row, of which `motion` is, that is beyond the rows that they were fitted to: the first parameter of each,
@@ -105,10 +115,10 @@ impl EffectStack {
         x: &[f64],
         motion: &PointMotion,
     ) -> Vec<(usize, Variable, Matrix3<f64>)> {
-        let state = ArmState::new(data, motion.row, &motion.posture, motion.point);
+        let state = motion.state(data, motion.row);
         let mut beyond = BeyondRange::new(robot.joints());
         let mut out = Vec::new();
-        for (effect, range) in &self.effects {
+        for Member { effect, range, .. } in &self.effects {
             let (Some(form), p) = (effect.form(), &x[range.clone()]) else {
                 continue;
             };
@@ -142,7 +152,7 @@ impl EffectStack {
     pub fn effects(&self) -> impl Iterator<Item = (&dyn Effect, Range<usize>)> {
         self.effects
             .iter()
-            .map(|(effect, range)| (effect.as_ref(), range.clone()))
+            .map(|member| (member.effect.as_ref(), member.range.clone()))
     }
 
     /// Positions of the parameters of an effect by its canonical name, at all of its places.
@@ -170,11 +180,7 @@ impl EffectStack {
         scratch.deflection.bare = true;
         scratch.constant = None;
         let state = ArmState::new(data, 0, &scratch.posture, Vector3::zeros());
-        for (effect, range) in self
-            .effects
-            .iter()
-            .filter(|(effect, _)| effect.is_constant())
-        {
+        for Member { effect, range, .. } in self.effects.iter().filter(|member| member.constant) {
             effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
         }
         scratch.constant = Some((
@@ -210,10 +216,10 @@ impl EffectStack {
         scratch.target = robot.setup().target(data.target(row));
         self.deflect(Needs::Nothing, robot, (data, row), x, scratch);
         let mut point = self.chain(robot, scratch);
-        if self.needs_torque {
+        if self.needs_torque() {
             scratch.deflection.keep();
             scratch.load_correction.clear();
-            for (effect, range) in &self.effects {
+            for Member { effect, range, .. } in &self.effects {
                 effect.load_correction(
                     data.q(row),
                     data.payload[row],
@@ -230,7 +236,7 @@ impl EffectStack {
                 point = self.chain(robot, scratch);
             }
         }
-        if self.needs_sight {
+        if self.effects.iter().any(|member| member.sight) {
             self.deflect(Needs::Sight(point), robot, (data, row), x, scratch);
             point += scratch.deflection.reading;
         }
@@ -278,7 +284,7 @@ impl EffectStack {
         scratch: &mut PlacementBuffers,
     ) -> PointMotion {
         let point = self.point(robot, data, row, x, scratch);
-        if !self.needs_torque {
+        if !self.needs_torque() {
             scratch
                 .posture
                 .gravity_torques(robot, data.payload[row], &scratch.load_correction);
@@ -327,18 +333,12 @@ impl EffectStack {
         };
         let state = ArmState::new(data, row, &scratch.posture, point);
         let summed = scratch.constant.is_some();
-        let due = |effect: &dyn Effect| match needs {
-            Needs::Nothing => {
-                !(effect.needs_torque() || effect.needs_sight() || summed && effect.is_constant())
-            }
-            Needs::Torque => effect.needs_torque(),
-            Needs::Sight(_) => effect.needs_sight(),
+        let due = |member: &&Member| match needs {
+            Needs::Nothing => !(member.torque || member.sight || summed && member.constant),
+            Needs::Torque => member.torque,
+            Needs::Sight(_) => member.sight,
         };
-        for (effect, range) in self
-            .effects
-            .iter()
-            .filter(|(effect, _)| due(effect.as_ref()))
-        {
+        for Member { effect, range, .. } in self.effects.iter().filter(due) {
             scratch.deflection.start(range.start);
             effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
         }
@@ -389,6 +389,10 @@ pub struct PointMotion {
 }
 
 impl PointMotion {
+    fn state<'a>(&'a self, data: &'a Measurements, row: usize) -> ArmState<'a> {
+        ArmState::new(data, row, &self.posture, self.point)
+    }
+
     /// A variable of one number in this row; none where the row does not tell.
     pub fn value(
         &self,
@@ -397,11 +401,7 @@ impl PointMotion {
         row: usize,
         variable: Variable,
     ) -> Option<f64> {
-        variable.value(
-            0,
-            robot,
-            &ArmState::new(data, row, &self.posture, self.point),
-        )
+        variable.value(0, robot, &self.state(data, row))
     }
 
     /// Puts into `buffer` where each parameter of an effect acts at zero.
@@ -415,22 +415,20 @@ impl PointMotion {
     ) {
         buffer.clear();
         buffer.start(0);
-        effect.deflect(
-            robot,
-            &ArmState::new(data, self.row, &self.posture, self.point),
-            zeros,
-            buffer,
-        );
+        effect.deflect(robot, &self.state(data, self.row), zeros, buffer);
+    }
+
+    fn rates(&self) -> Rates<'_> {
+        Rates {
+            by_joint: &self.by_joint,
+            by_station: &self.by_station,
+            compliance: &self.compliance,
+        }
     }
 
     /// Derivative of the point as the tracker reads it, m per unit of a parameter that acts there.
     pub(crate) fn point_along(&self, direction: &Direction) -> Vector3<f64> {
-        along(
-            direction,
-            &self.by_joint,
-            &self.by_station,
-            &self.compliance,
-        )
+        self.rates().along(direction)
     }
 
     /// Derivative of the vector from the row's anchor to the point, which is `reach`, m per unit.
@@ -439,13 +437,7 @@ impl PointMotion {
         direction: &Direction,
         reach: &Vector3<f64>,
     ) -> Vector3<f64> {
-        anchor_reach(
-            direction,
-            reach,
-            &self.by_joint,
-            &self.by_station,
-            &self.compliance,
-        )
+        self.rates().from_anchor(direction, reach)
     }
 
     /// Rotation of the target about the tracker's axes, rad per unit; zero where turns were not asked for.
@@ -464,11 +456,7 @@ impl PointMotion {
         law: &Law,
         mut each: impl FnMut(usize, f64),
     ) {
-        law.values(
-            robot,
-            &ArmState::new(data, self.row, &self.posture, self.point),
-            &mut each,
-        );
+        law.values(robot, &self.state(data, self.row), &mut each);
     }
 }
 

@@ -125,12 +125,6 @@ impl Placed for Term {
         });
     }
 
-    fn needs_torque(&self) -> bool {
-        self.law
-            .factors()
-            .any(|factor| factor.variable.needs_torque())
-    }
-
     fn needs_sight(&self) -> bool {
         matches!(self.motion, Motion::Instrument { .. })
     }

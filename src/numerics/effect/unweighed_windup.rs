@@ -291,10 +291,6 @@ impl Placed for UnweighedWindup {
         }
     }
 
-    fn needs_torque(&self) -> bool {
-        true
-    }
-
     fn missing(&self, robot: &RobotModel, _data: &Measurements) -> Option<String> {
         (Vector3::from(robot.description().gravity) == Vector3::zeros())
             .then(|| "the robot file gives no gravity".into())

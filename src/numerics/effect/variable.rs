@@ -159,6 +159,46 @@ impl Variable {
         }
     }
 
+    /// The joint that it is of; none of what the whole row has.
+    pub(super) fn joint_mut(&mut self) -> Option<&mut usize> {
+        match self {
+            Self::Angle { joint }
+            | Self::Motor { joint }
+            | Self::Load { joint }
+            | Self::Push { joint, .. }
+            | Self::Current { joint }
+            | Self::Approach { joint }
+            | Self::Move { joint }
+            | Self::Velocity { joint }
+            | Self::Slip { joint, .. }
+            | Self::Stretch { joint, .. }
+            | Self::Recent { joint, .. }
+            | Self::Work { joint, .. } => Some(joint),
+            Self::Circumstance { joint, .. } => joint.as_mut(),
+            _ => None,
+        }
+    }
+
+    /// What its memory of the rows before is measured by: a travel, a limit, a time.
+    pub(super) fn constant_mut(&mut self) -> Option<&mut f64> {
+        match self {
+            Self::Slip { travel: it, .. }
+            | Self::Stretch { limit: it, .. }
+            | Self::Recent { time: it, .. }
+            | Self::Work { cooling: it, .. }
+            | Self::Lagging { lag: it } => Some(it),
+            _ => None,
+        }
+    }
+
+    pub(super) fn joint(mut self) -> Option<usize> {
+        self.joint_mut().copied()
+    }
+
+    pub(super) fn constant(mut self) -> Option<f64> {
+        self.constant_mut().copied()
+    }
+
     /// How many numbers it is.
     pub(super) fn components(self) -> usize {
         if self == (Self::Gravity { axis: None }) {
@@ -246,18 +286,8 @@ impl Variable {
     /// Whether both are one quantity, with other numbers (a limit, a time, a direction) or the same.
     pub fn is_alike(self, other: Self) -> bool {
         match (self, other) {
-            (
-                Self::Stretch { joint, .. },
-                Self::Stretch {
-                    joint: other_joint, ..
-                },
-            )
-            | (
-                Self::Recent { joint, .. },
-                Self::Recent {
-                    joint: other_joint, ..
-                },
-            ) => joint == other_joint,
+            (Self::Stretch { .. }, Self::Stretch { .. })
+            | (Self::Recent { .. }, Self::Recent { .. }) => self.joint() == other.joint(),
             (Self::Position { .. }, Self::Position { .. })
             | (Self::Sighted { .. }, Self::Sighted { .. }) => true,
             _ => self == other,

@@ -3,10 +3,10 @@
 use super::declaration::EffectDeclaration;
 use super::formula::{Formula, Function};
 use super::parse::parse;
-use super::quantity::{Constant, QuantityKind, RowQuantity};
+use super::quantity::{Constant, RowQuantity};
 use super::seat::{Moves, PLACES, Seat};
-use crate::effect::cause;
 use crate::effect::sentence::holes;
+use crate::effect::{Variable, cause};
 use crate::error::nearest;
 use crate::units::Unit;
 
@@ -209,7 +209,6 @@ impl DeclarationFaults {
 
     /// Whether the formulas ask for what there is at the place.
     pub(crate) fn agreement(&mut self, seat: Seat, moves: Moves, laws: &[Formula]) {
-        use QuantityKind as K;
         let jointed = seat.is_joint();
         let read = matches!(moves, Moves::Reading(_));
         for (k, quantity) in laws
@@ -223,11 +222,12 @@ impl DeclarationFaults {
                 format!("law[{k}]")
             };
             let name = quantity.text(&[]);
-            let sighted = matches!(quantity.kind, K::Azimuth | K::Elevation | K::Range);
-            let hanging = matches!(
-                quantity.kind,
-                K::Load | K::GravityX | K::GravityY | K::GravityZ
+            let variable = quantity.asked.1;
+            let sighted = matches!(
+                variable,
+                Variable::Azimuth | Variable::Elevation | Variable::Range
             );
+            let hanging = variable.needs_torque();
             if quantity.is_relative() && !jointed {
                 let bare = name.trim_end_matches("_next").trim_end_matches("_before");
                 self.add(path, format!("`{name}` is of the joint at which an effect acts; here say which joint, e.g. {bare}2"));

@@ -3,7 +3,7 @@
 use super::cause::DeclaredCause;
 use super::declaration::{EffectDeclaration, ShapeRange};
 use super::formula::Formula;
-use super::quantity::{QuantityKind, RowQuantity};
+use super::quantity::RowQuantity;
 use crate::effect::{
     ArmState, Cause, Deflection, Form, Hypothesis, Motion, NumberSpec, Place, Placed, Survey,
     Variable,
@@ -68,11 +68,11 @@ impl DeclaredForm {
 
     /// The column that the recording lacks for a declaration, if any.
     pub fn lacking(cause: &DeclaredCause, survey: &Survey) -> Option<&'static str> {
-        let there = |quantity: &RowQuantity| match quantity.kind {
-            QuantityKind::Current => survey.data.current.is_some(),
-            QuantityKind::Velocity => survey.data.velocity.is_some(),
-            QuantityKind::Temperature | QuantityKind::Lagging => survey.reference_c.is_some(),
-            QuantityKind::Circumstance(column) => {
+        let there = |quantity: &RowQuantity| match quantity.asked.1 {
+            Variable::Current { .. } => survey.data.current.is_some(),
+            Variable::Velocity { .. } => survey.data.velocity.is_some(),
+            Variable::Temperature | Variable::Lagging { .. } => survey.reference_c.is_some(),
+            Variable::Circumstance { column, .. } => {
                 survey.data.circumstances.contains_key(column.text())
             }
             _ => true,
@@ -147,14 +147,6 @@ impl DeclaredForm {
             _ => None,
         };
         quantity.variable(joint, joints, &self.shape)
-    }
-
-    /// The variables of an arm that has all of its joints.
-    fn all_variables(&self) -> Vec<Variable> {
-        self.quantities()
-            .iter()
-            .filter_map(|quantity| self.variable(quantity, usize::MAX))
-            .collect()
     }
 
     /// Small steps of its shape numbers, by a share of their ranges, or of themselves where these go in ratios.
@@ -238,8 +230,12 @@ impl Placed for DeclaredForm {
         self.motion.place()
     }
 
+    /// Those of an arm that has all of its joints.
     fn variables(&self) -> Vec<Variable> {
-        self.all_variables()
+        self.quantities()
+            .iter()
+            .filter_map(|quantity| self.variable(quantity, usize::MAX))
+            .collect()
     }
 
     fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
@@ -264,10 +260,6 @@ impl Placed for DeclaredForm {
         }
     }
 
-    fn needs_torque(&self) -> bool {
-        self.all_variables().into_iter().any(Variable::needs_torque)
-    }
-
     fn needs_sight(&self) -> bool {
         matches!(self.motion, Motion::Instrument { .. })
     }
@@ -276,7 +268,7 @@ impl Placed for DeclaredForm {
         let moving = self
             .quantities()
             .iter()
-            .any(|quantity| quantity.kind == QuantityKind::Velocity);
+            .any(|quantity| matches!(quantity.asked.1, Variable::Velocity { .. }));
         (moving && data.velocity.is_none()).then(|| "the recording has no joint velocities".into())
     }
 

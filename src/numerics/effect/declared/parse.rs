@@ -193,7 +193,7 @@ impl FormulaReader<'_> {
             self.close()?;
             return Ok(Formula::call(*function, argument));
         }
-        let Some((kind, whose, remembers)) = RowQuantity::named(&name) else {
+        let Some((asked, whose)) = RowQuantity::named(&name) else {
             let known = quantity::names().chain(Function::NAMED.iter().map(|(name, _)| *name));
             let mut all: Vec<&str> = known.collect();
             all.extend(self.shape.iter().map(String::as_str));
@@ -212,13 +212,10 @@ impl FormulaReader<'_> {
                 functions.join(", ")
             )));
         };
-        let constant = if remembers {
-            Some(self.constant(&name)?)
-        } else {
-            None
-        };
+        let remembers = asked.1.constant().is_some();
+        let constant = remembers.then(|| self.constant(&name)).transpose()?;
         Ok(Formula::Row(RowQuantity {
-            kind,
+            asked,
             whose,
             constant,
         }))

@@ -8,7 +8,7 @@ use crate::robot::{CircumstanceName, law_columns};
 /// A number of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RowQuantity {
-    pub(crate) kind: QuantityKind,
+    pub(crate) asked: Asked,
     pub(crate) whose: Whose,
     /// The constant of a memory: a travel, a cooling time, a lag.
     pub(crate) constant: Option<Constant>,
@@ -33,109 +33,84 @@ pub(crate) enum Whose {
     Row,
 }
 
-/// What is asked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum QuantityKind {
-    Angle,
-    Motor,
-    Load,
-    Current,
-    Approach,
-    Move,
-    Velocity,
-    Slip,
-    Work,
-    Payload,
-    Temperature,
-    Lagging,
-    Time,
-    GravityX,
-    GravityY,
-    GravityZ,
-    Azimuth,
-    Elevation,
-    Range,
-    /// A circumstance that the recording declares.
-    Circumstance(CircumstanceName),
-}
+/// What is asked: its name, and the variable that it is, of the first joint and with no constant.
+pub(crate) type Asked = (&'static str, Variable);
 
-use QuantityKind as K;
+use Variable as V;
 
-/// Name, kind, whether it is of a joint, whether it takes a constant in brackets.
-const NAMES: [(&str, QuantityKind, bool, bool); 19] = [
-    ("q", K::Angle, true, false),
-    ("motor", K::Motor, true, false),
-    ("load", K::Load, true, false),
-    ("current", K::Current, true, false),
-    ("approach", K::Approach, true, false),
-    ("move", K::Move, true, false),
-    ("velocity", K::Velocity, true, false),
-    ("slip", K::Slip, true, true),
-    ("work", K::Work, true, true),
-    ("payload", K::Payload, false, false),
-    ("temperature", K::Temperature, false, false),
-    ("lagging", K::Lagging, false, true),
-    ("time", K::Time, false, false),
-    ("gravity_x", K::GravityX, false, false),
-    ("gravity_y", K::GravityY, false, false),
-    ("gravity_z", K::GravityZ, false, false),
-    ("azimuth", K::Azimuth, false, false),
-    ("elevation", K::Elevation, false, false),
-    ("range", K::Range, false, false),
+/// All that is asked of rows, but for circumstances.
+const NAMED: [Asked; 19] = [
+    ("q", V::Angle { joint: 0 }),
+    ("motor", V::Motor { joint: 0 }),
+    ("load", V::Load { joint: 0 }),
+    ("current", V::Current { joint: 0 }),
+    ("approach", V::Approach { joint: 0 }),
+    ("move", V::Move { joint: 0 }),
+    ("velocity", V::Velocity { joint: 0 }),
+    (
+        "slip",
+        V::Slip {
+            joint: 0,
+            travel: 0.0,
+        },
+    ),
+    (
+        "work",
+        V::Work {
+            joint: 0,
+            cooling: 0.0,
+        },
+    ),
+    ("payload", V::Payload),
+    ("temperature", V::Temperature),
+    ("lagging", V::Lagging { lag: 0.0 }),
+    ("time", V::Time),
+    ("gravity_x", V::Gravity { axis: Some(0) }),
+    ("gravity_y", V::Gravity { axis: Some(1) }),
+    ("gravity_z", V::Gravity { axis: Some(2) }),
+    ("azimuth", V::Azimuth),
+    ("elevation", V::Elevation),
+    ("range", V::Range),
 ];
 
 /// The same with every circumstance that the recording declares for laws.
-fn all() -> impl Iterator<Item = (&'static str, QuantityKind, bool, bool)> {
+fn all() -> impl Iterator<Item = Asked> {
     let declared = law_columns().filter_map(|column| {
-        let name = CircumstanceName::of(column.setting)?;
-        Some((
-            column.setting,
-            K::Circumstance(name),
-            column.is_of_joints(),
-            false,
-        ))
+        let joint = column.is_of_joints().then_some(0);
+        let column = CircumstanceName::of(column.setting)?;
+        Some((column.text(), V::Circumstance { column, joint }))
     });
-    NAMES.into_iter().chain(declared)
+    NAMED.into_iter().chain(declared)
 }
 
 /// All names, for "allowed: ...".
 pub(crate) fn known() -> String {
-    let word = |(name, _, _, constant): (&str, K, bool, bool)| {
-        if constant {
-            format!("{name}(constant)")
-        } else {
-            name.into()
-        }
+    let words = |of_joints: bool| {
+        let asked = all().filter(|(_, variable)| variable.joint().is_some() == of_joints);
+        let word = |(name, variable): Asked| match variable.constant() {
+            Some(_) => format!("{name}(constant)"),
+            None => name.into(),
+        };
+        asked.map(word).collect::<Vec<String>>().join(", ")
     };
-    let of_joints = all()
-        .filter(|row| row.2)
-        .map(word)
-        .collect::<Vec<_>>()
-        .join(", ");
-    let of_rows = all()
-        .filter(|row| !row.2)
-        .map(word)
-        .collect::<Vec<_>>()
-        .join(", ");
     format!(
-        "{of_joints} of this joint, of joint 3 as q3, of a neighbour as q_next or q_before; {of_rows}"
+        "{} of this joint, of joint 3 as q3, of a neighbour as q_next or q_before; {}",
+        words(true),
+        words(false)
     )
 }
 
 /// All names without what may follow them.
 pub(crate) fn names() -> impl Iterator<Item = &'static str> {
-    all().map(|row| row.0)
+    all().map(|(name, _)| name)
 }
 
 impl RowQuantity {
-    /// The quantity of a name, and whether it takes a constant.
-    pub(crate) fn named(text: &str) -> Option<(QuantityKind, Whose, bool)> {
-        if let Some((_, kind, jointed, constant)) = all().find(|row| row.0 == text) {
-            return Some((
-                kind,
-                if jointed { Whose::Own } else { Whose::Row },
-                constant,
-            ));
+    /// What a name asks for, and whose.
+    pub(crate) fn named(text: &str) -> Option<(Asked, Whose)> {
+        if let Some(asked) = all().find(|(name, _)| *name == text) {
+            let of_joint = asked.1.joint().is_some();
+            return Some((asked, if of_joint { Whose::Own } else { Whose::Row }));
         }
         let split = text.find(|c: char| c.is_ascii_digit());
         let (name, whose) = match (
@@ -151,13 +126,12 @@ impl RowQuantity {
             ),
             _ => return None,
         };
-        let (_, kind, _, constant) = all().find(|row| row.0 == name && row.2)?;
-        Some((kind, whose, constant))
+        let mut of_joints = all().filter(|(_, variable)| variable.joint().is_some());
+        Some((of_joints.find(|asked| asked.0 == name)?, whose))
     }
 
     /// As it is written, with these names of the shape numbers.
     pub fn text(&self, shape: &[String]) -> String {
-        let name = all().find(|row| row.1 == self.kind).map_or("", |row| row.0);
         let subject = match self.whose {
             Whose::Own | Whose::Row => String::new(),
             Whose::Next => "_next".into(),
@@ -169,7 +143,7 @@ impl RowQuantity {
             Some(Constant::Number(number)) => format!("({number})"),
             Some(Constant::Shape(k)) => format!("({})", shape.get(k).map_or("?", String::as_str)),
         };
-        format!("{name}{subject}{constant}")
+        format!("{}{subject}{constant}", self.asked.0)
     }
 
     /// Whether it is of the joint at which the effect acts, or of a neighbour of that.
@@ -192,103 +166,72 @@ impl RowQuantity {
             Whose::Joint(joint) => joint,
         };
         let joint = (its_joint < joints).then_some(its_joint)?;
-        let constant = || match self.constant? {
-            Constant::Number(number) => Some(number),
-            Constant::Shape(k) => shape.get(k).copied(),
-        };
-        Some(match self.kind {
-            K::Angle => Variable::Angle { joint },
-            K::Motor => Variable::Motor { joint },
-            K::Load => Variable::Load { joint },
-            K::Current => Variable::Current { joint },
-            K::Approach => Variable::Approach { joint },
-            K::Move => Variable::Move { joint },
-            K::Velocity => Variable::Velocity { joint },
-            K::Slip => Variable::Slip {
-                joint,
-                travel: constant()?,
-            },
-            K::Work => Variable::Work {
-                joint,
-                cooling: constant()?,
-            },
-            K::Payload => Variable::Payload,
-            K::Temperature => Variable::Temperature,
-            K::Lagging => Variable::Lagging { lag: constant()? },
-            K::Time => Variable::Time,
-            K::GravityX => Variable::Gravity { axis: Some(0) },
-            K::GravityY => Variable::Gravity { axis: Some(1) },
-            K::GravityZ => Variable::Gravity { axis: Some(2) },
-            K::Azimuth => Variable::Azimuth,
-            K::Elevation => Variable::Elevation,
-            K::Range => Variable::Range,
-            K::Circumstance(column) => Variable::Circumstance {
-                column,
-                joint: (self.whose != Whose::Row).then_some(joint),
-            },
-        })
+        let mut variable = self.asked.1;
+        if let Some(its) = variable.joint_mut() {
+            *its = joint;
+        }
+        if let Some(its) = variable.constant_mut() {
+            *its = match self.constant? {
+                Constant::Number(number) => number,
+                Constant::Shape(k) => *shape.get(k)?,
+            };
+        }
+        Some(variable)
     }
 
     /// The column that a recording must have for it, where it must have one.
     pub(crate) fn needs(&self) -> Option<&'static str> {
-        match self.kind {
-            K::Current => Some("motor currents"),
-            K::Velocity => Some("joint velocities"),
-            K::Temperature | K::Lagging => Some("temperature"),
-            K::Circumstance(column) => Some(column.text()),
+        match self.asked.1 {
+            V::Current { .. } => Some("motor currents"),
+            V::Velocity { .. } => Some("joint velocities"),
+            V::Temperature | V::Lagging { .. } => Some("temperature"),
+            V::Circumstance { column, .. } => Some(column.text()),
             _ => None,
         }
     }
 }
 
 impl Variable {
-    /// Its name in formulas of an effect at `joint`; `None` where formulas have none for it.
-    pub fn in_formulas(self, joint: usize) -> Option<String> {
-        let (kind, its_joint) = match self {
-            Self::Angle { joint } => (K::Angle, Some(joint)),
-            Self::Load { joint } => (K::Load, Some(joint)),
-            Self::Approach { joint } => (K::Approach, Some(joint)),
-            Self::Move { joint } => (K::Move, Some(joint)),
-            Self::Velocity { joint } => (K::Velocity, Some(joint)),
-            Self::Payload => (K::Payload, None),
-            Self::Temperature => (K::Temperature, None),
-            Self::Time => (K::Time, None),
-            Self::Circumstance { column, joint } => (K::Circumstance(column), joint),
-            _ => return None,
+    /// Whether formulas are proposed in it.
+    fn is_plain(self) -> bool {
+        let of_joint = matches!(
+            self,
+            V::Angle { .. }
+                | V::Load { .. }
+                | V::Approach { .. }
+                | V::Move { .. }
+                | V::Velocity { .. }
+        );
+        of_joint
+            || matches!(
+                self,
+                V::Payload | V::Temperature | V::Time | V::Circumstance { .. }
+            )
+    }
+
+    /// Its name in formulas of an effect at `joint`; `None` where none are proposed in it.
+    pub fn in_formulas(mut self, joint: usize) -> Option<String> {
+        let whose = match self.joint_mut() {
+            None => Whose::Row,
+            Some(its) => match std::mem::take(its) {
+                its if its == joint => Whose::Own,
+                its => Whose::Joint(its),
+            },
         };
-        let whose = |its_joint| {
-            if its_joint == joint {
-                Whose::Own
-            } else {
-                Whose::Joint(its_joint)
-            }
-        };
+        let asked = all().find(|(_, variable)| self.is_plain() && *variable == self)?;
+        let constant = None;
         Some(
             RowQuantity {
-                kind,
-                whose: its_joint.map_or(Whose::Row, whose),
-                constant: None,
+                asked,
+                whose,
+                constant,
             }
             .text(&[]),
         )
     }
 
-    /// Whether it is a joint's own, or the whole row's.
+    /// Whether it is a joint's own, or the whole row's, and formulas are proposed in it.
     pub fn is_of(self, joint: usize) -> bool {
-        match self {
-            Self::Angle { joint: other }
-            | Self::Load { joint: other }
-            | Self::Approach { joint: other }
-            | Self::Move { joint: other } => other == joint,
-            Self::Velocity { joint: other } => other == joint,
-            Self::Circumstance {
-                joint: Some(other), ..
-            } => other == joint,
-            Self::Payload
-            | Self::Temperature
-            | Self::Time
-            | Self::Circumstance { joint: None, .. } => true,
-            _ => false,
-        }
+        self.is_plain() && self.joint().is_none_or(|its| its == joint)
     }
 }
