@@ -1,9 +1,226 @@
-//! Effects of the whole arm that every calibration identifies: joint zeros, ratios and couplings (Eq. 14), and geometry of the links.
+//! Effects of the whole arm that every calibration identifies: where base, targets and anchors are, joint zeros, ratios and couplings
+//! (Eq. 14), and geometry of the links.
 
 use super::{ArmState, Deflection, Effect, ParameterSpec, Place, names};
-use crate::robot::{Measurements, RobotModel};
-use crate::spatial::{Twist, screw};
+use crate::robot::{Anchor, Measurements, RobotModel, Shape, Target};
+use crate::spatial::{Pose, Twist, screw};
 use crate::units::Unit;
+use nalgebra::Vector3;
+
+/// The numbers of a displacement and of a turn.
+const AXES: [(&str, Unit); 6] = [
+    ("x", Unit::Millimetre),
+    ("y", Unit::Millimetre),
+    ("z", Unit::Millimetre),
+    ("rx", Unit::Radian),
+    ("ry", Unit::Radian),
+    ("rz", Unit::Radian),
+];
+
+/// `anchor`: what is measured from is elsewhere: the far end of a draw-wire or ballbar, a socket, a plane, a sphere. It moves no point.
+///
+/// Parameters of a point are x, y, z, tracker axes; of a plane `offset` along its normal and the turns `rx`, `ry` of that; of a sphere its
+/// centre and `radius`.
+#[derive(Debug, Clone, Copy)]
+pub struct AnchorShift;
+
+impl AnchorShift {
+    /// What the names of an anchor's parameters begin with, dot included.
+    pub fn prefix(anchor: &str) -> String {
+        if anchor.is_empty() {
+            format!("{}.", names::ANCHOR)
+        } else {
+            format!("{}.{anchor}.", names::ANCHOR)
+        }
+    }
+
+    /// Endings of the names of an anchor's parameters.
+    pub(crate) fn endings(shape: &Shape) -> &'static [&'static str] {
+        match shape {
+            Shape::Point => &["x", "y", "z"],
+            Shape::Plane(_) => &["offset", "rx", "ry"],
+            Shape::Sphere(_) => &["x", "y", "z", "radius"],
+        }
+    }
+}
+
+impl Effect for AnchorShift {
+    fn name(&self) -> &'static str {
+        names::ANCHOR
+    }
+
+    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
+        let anchors = robot.setup().anchors.iter();
+        let all = anchors.flat_map(|anchor| {
+            Self::endings(&anchor.shape)
+                .iter()
+                .map(move |ending| ParameterSpec {
+                    name: format!("{}{ending}", Self::prefix(&anchor.name)),
+                    place: Place::Anchor,
+                    unit: if matches!(*ending, "rx" | "ry") {
+                        Unit::Radian
+                    } else {
+                        Unit::Millimetre
+                    },
+                    prior_sigma: 1.0,
+                })
+        });
+        all.collect()
+    }
+
+    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let setup = robot.setup();
+        let Some((number, anchor)) = state
+            .anchor(robot)
+            .and_then(|number| Some((number, setup.anchors.get(number)?)))
+        else {
+            return;
+        };
+        let first = setup.first_of_anchor(number);
+        if let Shape::Plane(normal) = &anchor.shape {
+            out.move_anchor(first, p, *normal);
+            out.tilt_anchor(first + 1, p, normal, &Anchor::across(normal));
+            return;
+        }
+        for axis in 0..3 {
+            out.move_anchor(first + axis, p, Vector3::ith(axis, 1.0));
+        }
+        if let Shape::Sphere(_) = anchor.shape {
+            out.grow_anchor(first + 3, p);
+        }
+    }
+}
+
+/// `base_frame`: where the robot's base stands in the tracker's frame; six parameters about the base origin, tracker axes.
+///
+/// Corrections to a starting pose: exp of the twist, given in tracker axes, applied in the base frame.
+#[derive(Debug, Clone, Copy)]
+pub struct BasePlacement {
+    start: Pose,
+}
+
+impl BasePlacement {
+    /// Corrections from a start; all zero there.
+    pub fn new(start: Pose) -> Self {
+        Self { start }
+    }
+
+    /// The base pose after corrections `p` (m, rad).
+    pub(crate) fn pose(&self, p: &[f64]) -> Pose {
+        let mut twist = Twist::zeros();
+        for (parameter, value) in p.iter().enumerate() {
+            twist += self.direction(parameter) * *value;
+        }
+        self.start * Pose::exp(&twist)
+    }
+
+    fn direction(&self, parameter: usize) -> Twist {
+        let local: Vector3<f64> = self.start.rotation.row(parameter % 3).transpose();
+        let mut twist = Twist::zeros();
+        twist
+            .fixed_rows_mut::<3>(if parameter < 3 { 0 } else { 3 })
+            .copy_from(&local);
+        twist
+    }
+}
+
+impl Effect for BasePlacement {
+    fn name(&self) -> &'static str {
+        names::BASE_FRAME
+    }
+
+    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
+        let axes = AXES.into_iter().map(|(axis, unit)| ParameterSpec {
+            name: format!("base_frame.{axis}"),
+            place: Place::Base,
+            unit,
+            prior_sigma: if unit == Unit::Radian { 1.0 } else { 10.0 },
+        });
+        axes.collect()
+    }
+
+    fn is_constant(&self) -> bool {
+        true
+    }
+
+    fn deflect(&self, _robot: &RobotModel, _state: &ArmState, p: &[f64], out: &mut Deflection) {
+        for parameter in 0..6 {
+            out.shift(parameter, p, 0, self.direction(parameter));
+        }
+    }
+}
+
+/// `tool_offset`: the measured point sits elsewhere on the tool; three parameters a target, base axes at the zero pose.
+///
+/// Where its orientation is measured too, three more turn a target about where it is mounted.
+#[derive(Debug, Clone, Copy)]
+pub struct ToolOffset;
+
+/// How many parameters a target has.
+fn width(target: &Target) -> usize {
+    if target.oriented { 6 } else { 3 }
+}
+
+impl ToolOffset {
+    /// What the names of a target's parameters begin with, dot included.
+    pub fn prefix(target: &str) -> String {
+        if target.is_empty() {
+            format!("{}.", names::TOOL_OFFSET)
+        } else {
+            format!("{}.{target}.", names::TOOL_OFFSET)
+        }
+    }
+}
+
+impl Effect for ToolOffset {
+    fn name(&self) -> &'static str {
+        names::TOOL_OFFSET
+    }
+
+    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
+        let targets: Vec<(&str, usize)> = match robot.setup().targets.as_slice() {
+            [] => vec![("", 3)],
+            targets => targets
+                .iter()
+                .map(|target| (target.name.as_str(), width(target)))
+                .collect(),
+        };
+        let all = targets.into_iter().flat_map(|(name, width)| {
+            AXES[..width].iter().map(move |(axis, unit)| ParameterSpec {
+                name: format!("{}{axis}", Self::prefix(name)),
+                place: Place::Tool,
+                unit: *unit,
+                prior_sigma: 0.05,
+            })
+        });
+        all.collect()
+    }
+
+    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let targets = &robot.setup().targets;
+        let number = state.target(robot);
+        if number.is_none() && !targets.is_empty() {
+            return;
+        }
+        let first: usize = targets
+            .iter()
+            .take(number.unwrap_or_default())
+            .map(width)
+            .sum();
+        for axis in 0..3 {
+            out.shift(first + axis, p, robot.joints(), Twist::ith(axis, 1.0));
+        }
+        if let Some(target) = number
+            .and_then(|number| targets.get(number))
+            .filter(|target| target.oriented)
+        {
+            for axis in 0..3 {
+                let turn = screw(&Vector3::ith(axis, 1.0), &target.mounting.translation);
+                out.shift(first + 3 + axis, p, robot.joints(), turn);
+            }
+        }
+    }
+}
 
 /// Zero error of joint N, theta_i0 of Eq. 14; one parameter a joint.
 pub(super) struct JointOffset;

@@ -1,11 +1,11 @@
 //! Columns of the table of causes: where a law acts, what it follows, in which shapes, and what its numbers are called.
 
 use super::basis::around;
+use super::law_shapes::{self, RatedLaws, Warmth};
 use super::motion::{SHORT, extent};
-use super::warmth::Warmth;
 use super::{
     Axes, AxisPoint, Basis, Cause, Factor, Hypothesis, Law, Motion, NumberSpec, Polar, Survey,
-    Term, Variable, change, figure, lost_motion, orders, warmth,
+    Term, Variable, figure,
 };
 use crate::criteria::effect::{RARE, RARER};
 use crate::robot::RobotModel;
@@ -253,7 +253,7 @@ impl LawRow {
         if !self.variant.is_empty() {
             return self.variant.into();
         }
-        let Some(order) = orders::order(term.basis()) else {
+        let Some(order) = law_shapes::order(term.basis()) else {
             return String::new();
         };
         let tail = match (term.basis(), term.motion()) {
@@ -267,7 +267,7 @@ impl LawRow {
             (_, Motion::Axis { turning: false, .. }) => "_fixed".into(),
             _ => String::new(),
         };
-        format!("order{}{tail}", orders::in_name(order))
+        format!("order{}{tail}", law_shapes::in_name(order))
     }
 
     /// Why a term of it with coefficients `p` cannot be its cause: see [`Placed::impossible`](super::Placed::impossible).
@@ -305,8 +305,10 @@ impl LawRow {
             },
         );
         beyond.or_else(|| match self.follows {
-            Follows::Side | Follows::Push => lost_motion::impossible(term, value, error(0), survey),
-            Follows::Warmth(_) => warmth::impossible(term, survey),
+            Follows::Side | Follows::Push => {
+                law_shapes::impossible_play(term, value, error(0), survey)
+            }
+            Follows::Warmth(_) => law_shapes::impossible_warmth(term, survey),
             _ => None,
         })
     }
@@ -315,7 +317,7 @@ impl LawRow {
 /// Terms with other shapes around that of a term, closer with every level: see [`Placed::near`](super::Placed::near).
 pub(super) fn near(term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
     match (term.law().first.variable, term.basis()) {
-        (Variable::Time, Basis::After { .. }) => change::near(term, survey),
+        (Variable::Time, Basis::After { .. }) => law_shapes::near_change(term, survey),
         (
             _,
             Basis::Power {
@@ -331,16 +333,16 @@ pub(super) fn near(term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
                 exponent,
             }))
         }
-        (Variable::Push { .. }, _) => lost_motion::near(term, survey, level),
-        (Variable::Slip { .. }, _) => lost_motion::near_slip(term, level),
+        (Variable::Push { .. }, _) => law_shapes::near_push(term, survey, level),
+        (Variable::Slip { .. }, _) => law_shapes::near_slip(term, level),
         (
             Variable::Angle { .. },
             Basis::Wave {
                 overtone: false, ..
             }
             | Basis::Sway { .. },
-        ) => orders::near(term, survey, level),
-        _ => warmth::near(term, survey, level),
+        ) => law_shapes::near_order(term, survey, level),
+        _ => law_shapes::near_warmth(term, survey, level),
     }
 }
 
@@ -442,7 +444,7 @@ fn tilts(joint: usize, survey: &Survey) -> Vec<(Motion, Option<usize>, f64)> {
 
 impl Follows {
     /// The laws of a motion, each with how many like it are tried, and how much rarer it is than others.
-    fn laws(self, motion: Motion, joint: Option<usize>, survey: &Survey) -> Vec<(Law, usize, f64)> {
+    fn laws(self, motion: Motion, joint: Option<usize>, survey: &Survey) -> RatedLaws {
         let one_law = |variable, basis| vec![(Law::new(variable, basis), 1, 0.0)];
         let [start, end] = survey.time;
         match (self, joint) {
@@ -453,7 +455,7 @@ impl Follows {
                 // An axis tilts whether its joint travels far or not.
                 let is_seen = |order: &u32| match (motion, variable) {
                     (Motion::Joint { .. }, Variable::Angle { joint }) => {
-                        orders::is_within(f64::from(*order), survey.travel(joint))
+                        law_shapes::is_within(f64::from(*order), survey.travel(joint))
                     }
                     _ => true,
                 };
@@ -465,10 +467,11 @@ impl Follows {
             }
             (Self::HalfOrders(below), Some(joint)) => {
                 let halves = (1..below).map(|order| f64::from(order) + 0.5);
-                let seen = halves.filter(|order| orders::is_within(*order, survey.travel(joint)));
+                let seen =
+                    halves.filter(|order| law_shapes::is_within(*order, survey.travel(joint)));
                 seen.map(|order| {
                     (
-                        Law::new(Variable::Angle { joint }, orders::of_order(order)),
+                        Law::new(Variable::Angle { joint }, law_shapes::of_order(order)),
                         1,
                         0.0,
                     )
@@ -478,9 +481,9 @@ impl Follows {
             (Self::Approach, Some(joint)) if survey.both_directions(joint) => {
                 one_law(Variable::Approach { joint }, Basis::PROPORTIONAL)
             }
-            (Self::Side, Some(joint)) => lost_motion::by_load(joint, survey),
-            (Self::Push, Some(joint)) => lost_motion::mixed(joint, survey),
-            (Self::Slip, Some(joint)) => lost_motion::slip(joint, survey),
+            (Self::Side, Some(joint)) => law_shapes::by_load(joint, survey),
+            (Self::Push, Some(joint)) => law_shapes::mixed(joint, survey),
+            (Self::Slip, Some(joint)) => law_shapes::slip(joint, survey),
             (Self::Angle, Some(joint)) => one_law(Variable::Angle { joint }, Basis::PROPORTIONAL),
             (Self::Velocity, Some(joint)) => {
                 let moves = survey.moves()
@@ -509,7 +512,7 @@ impl Follows {
                     per: 2.0 * survey.heavy_payload(),
                 },
             ),
-            (Self::Step, _) => change::laws(motion, survey),
+            (Self::Step, _) => law_shapes::changes(motion, survey),
             (Self::Steady, _) => one_law(
                 Variable::Time,
                 Basis::Power {

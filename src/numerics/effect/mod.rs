@@ -5,77 +5,57 @@
 //! a place, effect = sum_k c_k * direction(place) * law_k(variables of the row), a [`Term`]; the others are motions with physics of their
 //! own. Both are [`Placed`], and that is all that a form has to be.
 
-mod anchor;
-mod base_compliance;
-mod base_frame;
 mod basis;
 mod cause;
-mod change;
+mod compliance;
 mod declared;
 mod deflection;
 mod form;
 mod geometry;
-mod holder;
-mod joint_compliance;
 mod joint_hardening;
 mod joint_log_lag;
 mod law;
 mod law_row;
-mod link_compliance;
-mod link_mass;
-mod lost_motion;
+mod law_shapes;
 mod motion;
 pub mod names;
-mod orders;
-mod parts;
-mod payload_error;
 mod place;
 mod placed_row;
 mod sentence;
-mod sight;
-mod skeleton;
-mod spring;
 mod stack;
 mod summary;
 mod survey;
 mod table;
-mod term;
-mod tool_offset;
+mod torque_model;
 mod unknown;
 mod unweighed_windup;
 mod variable;
 mod volume;
-mod warmth;
 mod words;
 
-pub use anchor::AnchorShift;
-pub use base_frame::BasePlacement;
 pub use basis::Basis;
 pub use cause::{ArmEffectOf, Cause, Measure, OwnMotion, arm_effect, cause, identified};
-pub use change::moved_with_the_payload;
 pub use declared::{
     DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclaration, Laws, ShapeRange, Starts,
 };
 pub use deflection::{BeyondRange, Deflection, Direction};
-pub use form::{Form, NumberSpec, Placed};
-pub use holder::turned_holder;
+pub use form::{Form, NumberSpec, Placed, Term};
+pub use geometry::{AnchorShift, BasePlacement, ToolOffset};
 pub use law::{Factor, Law};
 pub use law_row::{At, Follows, LawRow, Limit, Times, Turning};
-pub use motion::{Axes, AxisPoint, Motion};
-pub use parts::{FittedForms, HiddenSize, ModelledFinding};
+pub use law_shapes::{Warmth, moved_with_the_payload};
+pub use motion::{Axes, AxisPoint, Motion, Polar, Sight};
 pub use place::Place;
 pub use placed_row::{PlacedRow, PlacementBuffers};
-pub use sight::{Polar, Sight};
 pub use stack::{EffectStack, PointMotion};
-pub use summary::{ParameterEstimate, Summary, people};
+pub use summary::{
+    FittedForms, HiddenSize, ModelledFinding, ParameterEstimate, Summary, people, turned_holder,
+};
 pub use survey::{Hypothesis, Survey};
 pub use table::CAUSES;
-pub use term::Term;
-pub use tool_offset::ToolOffset;
 pub use unknown::Unknown;
 pub use variable::Variable;
 pub use volume::Closing;
-pub use warmth::Warmth;
 pub use words::{Clock, figure};
 
 use crate::robot::{LoadCorrection, Measurements, Memory, Posture, RobotModel, RowTime};

@@ -1,8 +1,7 @@
 //! What a mechanic is told of a finding: words with holes.
 
 use super::{
-    Basis, Cause, Clock, ParameterEstimate, Summary, Term, Variable, figure, orders, unknown,
-    warmth,
+    Basis, Cause, Clock, ParameterEstimate, Summary, Term, Variable, figure, law_shapes, unknown,
 };
 
 /// The words in the holes of a sentence; `None` for one that is not closed.
@@ -63,8 +62,8 @@ pub(super) fn hole(
 ) -> String {
     let (first, clock) = (numbers.first(), summary.clock);
     let known = |text: Option<String>| text.unwrap_or_default();
-    let order = || orders::order(term?.basis());
-    let span = || warmth::time_constant(term?).map(|time| clock.span(time));
+    let order = || law_shapes::order(term?.basis());
+    let span = || law_shapes::time_constant(term?).map(|time| clock.span(time));
     let variable = term.map(|term| term.law().first.variable);
     match word {
         "place" => summary.place.to_string(),

@@ -11,9 +11,8 @@ use super::Warmth::{Temperature, WarmUp, Work};
 use super::geometry::{DeclaredCouplings, JointOffset, LinkGeometry, ReductionRatio};
 use super::{
     AnchorShift, At, Axes, BasePlacement, Basis, Cause, Follows, HiddenSize, LawRow, Limit,
-    Measure, Place, Polar, Times, ToolOffset, Turning, base_compliance, change, joint_compliance,
-    joint_hardening, joint_log_lag, link_compliance, link_mass, names, payload_error, spring,
-    unknown,
+    Measure, Place, Polar, Times, ToolOffset, Turning, compliance, joint_hardening, joint_log_lag,
+    law_shapes, names, torque_model, unknown,
 };
 use crate::criteria::effect::{LOW_ORDERS, RARE, UNCOMMON, WOBBLES};
 use crate::units::Unit;
@@ -153,10 +152,10 @@ pub static CAUSES: &[&Cause] = &[
         arm_effect: Some(|_| Box::new(DeclaredCouplings)),
         ..Cause::PLAIN
     },
-    &joint_compliance::CAUSE,
+    &compliance::JOINT,
     &joint_hardening::CAUSE,
-    &link_compliance::CAUSE,
-    &base_compliance::CAUSE,
+    &compliance::LINK,
+    &compliance::BASE,
     &Cause {
         name: names::GEAR_CYCLIC,
         place: "joint",
@@ -406,10 +405,10 @@ pub static CAUSES: &[&Cause] = &[
         separable_by_poses: false,
         ..Cause::PLAIN
     },
-    &spring::BALANCER,
-    &spring::HOSE,
-    &link_mass::CAUSE,
-    &payload_error::CAUSE,
+    &torque_model::BALANCER,
+    &torque_model::HOSE,
+    &torque_model::LINK_MASS,
+    &torque_model::PAYLOAD,
     &Cause {
         name: names::AXIS_WOBBLE,
         place: "joint",
@@ -475,7 +474,7 @@ pub static CAUSES: &[&Cause] = &[
             sigma: 0.1,
             ..PLAIN
         }],
-        measure: Some(change::MEASURE),
+        measure: Some(law_shapes::RETURN),
         separable_by_poses: false,
         same: |term| {
             (term.motion().place() == Place::Joint(0)).then_some((names::BASE_SHIFT, Place::Base))
@@ -495,7 +494,7 @@ pub static CAUSES: &[&Cause] = &[
             follows: Step,
             ..PLAIN
         }],
-        measure: Some(change::MEASURE),
+        measure: Some(law_shapes::RETURN),
         separable_by_poses: false,
         ..Cause::PLAIN
     },
@@ -512,7 +511,7 @@ pub static CAUSES: &[&Cause] = &[
             follows: Step,
             ..PLAIN
         }],
-        measure: Some(change::MEASURE),
+        measure: Some(law_shapes::RETURN),
         of_the_measurement: true,
         separable_by_poses: false,
         ..Cause::PLAIN
