@@ -115,31 +115,16 @@ impl Placed for Windup {
 impl Windup {
     /// Every joint that gravity loads; where the robot file has no masses to make a torque from, by motor currents and by gravity alone.
     fn propose(survey: &Survey) -> Vec<Hypothesis> {
-        let by_gravity = survey.revolute().filter(|joint| survey.is_loaded(*joint));
-        let by_gravity = by_gravity.map(|joint| {
-            Hypothesis::new(
-                Windup {
-                    joint,
-                    load: Load::GravityTorque,
-                },
-                1,
-            )
-            .positive()
-        });
+        let of = |load: Load, tried| move |joint| Hypothesis::new(Windup { joint, load }, tried);
+        let loaded = survey.revolute().filter(|joint| survey.is_loaded(*joint));
+        let by_gravity = loaded
+            .map(of(Load::GravityTorque, 1))
+            .map(Hypothesis::positive);
         let by_current = !survey.robot.has_masses() && survey.data.current.is_some();
         // The sign of a current is the controller's.
         let currents = survey.revolute().filter(|_| by_current);
-        let currents = currents.map(|joint| {
-            Hypothesis::new(
-                Windup {
-                    joint,
-                    load: Load::MotorCurrent,
-                },
-                2,
-            )
-        });
         by_gravity
-            .chain(currents)
+            .chain(currents.map(of(Load::MotorCurrent, 2)))
             .chain(UnweighedWindup::propose(&JOINT, survey))
             .collect()
     }
@@ -214,6 +199,12 @@ impl Effect for Windups {
     }
 }
 
+/// Compliances of what the arm's moment bends, by their names.
+fn compliances(names: &[&str]) -> Vec<NumberSpec> {
+    let one = |name: &&str| (name.to_string(), Unit::RadianPerNewtonMetre, 1e-3);
+    names.iter().map(one).collect()
+}
+
 /// Which moments bend the link.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -279,11 +270,10 @@ impl BentLink {
             }
         };
         forms
-            .map(|form| (odds(&form), form))
-            .map(|(odds, form)| {
-                Hypothesis::new(form, bendings.len())
-                    .positive()
-                    .penalised(odds)
+            .map(|form| Hypothesis {
+                positive: true,
+                prior_penalty: odds(&form),
+                ..Hypothesis::new(form, bendings.len())
             })
             .collect()
     }
@@ -326,15 +316,10 @@ impl Placed for BentLink {
     }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
-        let names: &[&str] = if self.bending == Bending::TwoDirections {
-            &["first", "second"]
-        } else {
-            &[""]
-        };
-        names
-            .iter()
-            .map(|name| (name.to_string(), Unit::RadianPerNewtonMetre, 1e-3))
-            .collect()
+        compliances(match self.bending {
+            Bending::TwoDirections => &["first", "second"],
+            _ => &[""],
+        })
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
@@ -342,34 +327,20 @@ impl Placed for BentLink {
         let station = self.link + 1;
         let (middle, moment) = self.moment(robot, state, 0.5);
         let without = |direction: &Vector3<f64>| moment - direction * direction.dot(&moment);
-        match self.bending {
-            Bending::AcrossLink => {
-                out.shift(0, p, station, screw(&without(&along.normalize()), &middle))
-            }
-            Bending::Beam => out.shift(
-                0,
-                p,
-                station,
-                self.beam(robot, state, Some(&along.normalize())),
-            ),
-            Bending::Tube => out.shift(0, p, station, self.beam(robot, state, None)),
-            Bending::AcrossAxis => out.shift(
-                0,
-                p,
-                station,
-                screw(&without(robot.axis(self.link)), &middle),
-            ),
+        let bent = match self.bending {
+            Bending::AcrossLink => screw(&without(&along.normalize()), &middle),
+            Bending::Beam => self.beam(robot, state, Some(&along.normalize())),
+            Bending::Tube => self.beam(robot, state, None),
+            Bending::AcrossAxis => screw(&without(robot.axis(self.link)), &middle),
             Bending::TwoDirections => {
                 for (k, (_, normal)) in robot.normals(self.link).iter().enumerate() {
-                    out.shift(
-                        k,
-                        p,
-                        station,
-                        screw(&(normal * normal.dot(&moment)), &middle),
-                    );
+                    let across = screw(&(normal * normal.dot(&moment)), &middle);
+                    out.shift(k, p, station, across);
                 }
+                return;
             }
-        }
+        };
+        out.shift(0, p, station, bent);
     }
 
     fn sizes(&self, robot: &RobotModel, state: &ArmState) -> Vec<Option<f64>> {
@@ -441,11 +412,7 @@ impl Placed for TiltingBase {
     }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
-        let names: &[&str] = if self.two { &["x", "y"] } else { &[""] };
-        names
-            .iter()
-            .map(|name| (name.to_string(), Unit::RadianPerNewtonMetre, 1e-3))
-            .collect()
+        compliances(if self.two { &["x", "y"] } else { &[""] })
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {

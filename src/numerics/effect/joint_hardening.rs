@@ -66,32 +66,25 @@ fn propose(survey: &Survey) -> Vec<Hypothesis> {
     for joint in survey.revolute().filter(|joint| survey.is_loaded(*joint)) {
         let most = survey.load(joint);
         let least = least_bend(survey, joint);
-        let seen = move |share: &f64| share * most >= least;
-        let shares = [0.05, 0.15, 0.5, BENDS[1]].into_iter().filter(seen);
-        let laws = shares.map(|share| HardeningLaw::Saturating {
-            at_nm: share * most,
-        });
-        let laws = laws.chain(
-            [0.2]
-                .into_iter()
-                .filter(seen)
-                .map(|share| HardeningLaw::SoftZone {
-                    at_nm: share * most,
-                }),
-        );
-        let laws =
-            laws.chain(
-                [0.1, 0.3, 0.6]
-                    .into_iter()
-                    .filter(seen)
-                    .map(|share| HardeningLaw::Knee {
-                        at_nm: share * most,
-                    }),
-            );
-        let laws = laws.chain([2.0, 3.0].map(|exponent| HardeningLaw::Power {
+        let saturating: fn(f64) -> HardeningLaw = |at_nm| HardeningLaw::Saturating { at_nm };
+        let soft_zone: fn(f64) -> HardeningLaw = |at_nm| HardeningLaw::SoftZone { at_nm };
+        let knee: fn(f64) -> HardeningLaw = |at_nm| HardeningLaw::Knee { at_nm };
+        let bends = [
+            (saturating, 0.05),
+            (saturating, 0.15),
+            (saturating, 0.5),
+            (saturating, BENDS[1]),
+            (soft_zone, 0.2),
+            (knee, 0.1),
+            (knee, 0.3),
+            (knee, 0.6),
+        ];
+        let bends = bends.into_iter().filter(|(_, share)| share * most >= least);
+        let powers = [2.0, 3.0].map(|exponent| HardeningLaw::Power {
             exponent,
             at_nm: most,
-        }));
+        });
+        let laws = bends.map(|(law, share)| law(share * most)).chain(powers);
         out.extend(laws.map(|law| {
             Hypothesis::new(BentWindup { joint, law }, *effect::BENDS).penalised(*RARE)
         }));
@@ -287,23 +280,21 @@ impl Placed for BentWindup {
         let step = libm::pow(1.5, libm::exp2(-0.5 * f64::from(level)));
         let most = survey.load(self.joint);
         let least = least_bend(survey, self.joint);
-        let within =
-            |at_nm: f64, largest: f64| at_nm.clamp(least.min(largest * most), largest * most);
-        let scaled = |factor: f64| match self.law {
-            HardeningLaw::Saturating { at_nm } => Some(HardeningLaw::Saturating {
-                at_nm: within(at_nm * factor, BENDS[1]),
-            }),
-            HardeningLaw::SoftZone { at_nm } => Some(HardeningLaw::SoftZone {
-                at_nm: within(at_nm * factor, BENDS[1]),
-            }),
-            HardeningLaw::Knee { at_nm } => Some(HardeningLaw::Knee {
-                at_nm: within(at_nm * factor, BENDS[1]),
-            }),
-            HardeningLaw::Power { exponent, at_nm } => Some(HardeningLaw::Power {
-                exponent: (exponent * factor).clamp(0.2, 6.0),
-                at_nm,
-            }),
-            HardeningLaw::Curve { .. } => None,
+        let largest = BENDS[1] * most;
+        let scaled = |factor: f64| {
+            let mut law = self.law;
+            match &mut law {
+                HardeningLaw::Saturating { at_nm }
+                | HardeningLaw::SoftZone { at_nm }
+                | HardeningLaw::Knee { at_nm } => {
+                    *at_nm = (*at_nm * factor).clamp(least.min(largest), largest)
+                }
+                HardeningLaw::Power { exponent, .. } => {
+                    *exponent = (*exponent * factor).clamp(0.2, 6.0)
+                }
+                HardeningLaw::Curve { .. } => return None,
+            }
+            Some(law)
         };
         let laws = [step, 1.0 / step]
             .into_iter()

@@ -62,45 +62,27 @@ pub(super) static CAUSE: Cause = Cause {
 };
 
 fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    let one_of = |tried: usize, each: bool, by: Behind, only: Option<usize>| {
+        Hypothesis::new(Lag { each, by, only }, tried)
+    };
     if survey.moves() {
         // What a joint moves from one row to the next is its velocity: a share of it is a time, too.
-        return vec![
-            Hypothesis::new(
-                Lag {
-                    each: false,
-                    by: Behind::Clock,
-                    only: None,
-                },
-                1,
-            )
-            .within(LARGEST),
-        ];
+        return vec![one_of(1, false, Behind::Clock, None).within(LARGEST)];
     }
-    let laws = [
-        (false, Behind::Move),
-        (true, Behind::Move),
-        (false, Behind::Synchronous),
-    ]
-    .map(|(each, by)| (each, by, None));
     let turning: Vec<usize> = survey
         .revolute()
         .filter(|joint| survey.travel(*joint) > 0.0)
         .collect();
-    let all = laws
-        .into_iter()
-        .map(|(each, by, only)| Hypothesis::new(Lag { each, by, only }, laws.len()));
-    let one = |joint: &usize| {
-        Hypothesis::new(
-            Lag {
-                each: false,
-                by: Behind::Move,
-                only: Some(*joint),
-            },
-            turning.len(),
-        )
-    };
-    let one = turning.iter().map(one);
-    all.chain(one).collect()
+    let all = [
+        (false, Behind::Move),
+        (true, Behind::Move),
+        (false, Behind::Synchronous),
+    ];
+    let all = all.map(|(each, by)| one_of(3, each, by, None)).into_iter();
+    let single = turning
+        .iter()
+        .map(|joint| one_of(turning.len(), false, Behind::Move, Some(*joint)));
+    all.chain(single).collect()
 }
 
 fn sentence(summary: &Summary) -> String {

@@ -173,15 +173,12 @@ impl LawRow {
                     times: factor,
                     ..law
                 };
-                let hypothesis =
-                    Hypothesis::new(Term::new(cause, motion, law), tried * (self.tried)());
-                let hypothesis = hypothesis
-                    .penalised((self.rarity)() + rarer + rare)
-                    .within(self.largest);
-                out.push(if self.positive {
-                    hypothesis.positive()
-                } else {
-                    hypothesis
+                let tried = tried * (self.tried)();
+                out.push(Hypothesis {
+                    prior_penalty: (self.rarity)() + rarer + rare,
+                    positive: self.positive,
+                    largest: self.largest,
+                    ..Hypothesis::new(Term::new(cause, motion, law), tried)
                 });
             }
         }

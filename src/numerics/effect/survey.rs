@@ -195,7 +195,8 @@ impl<'a> Survey<'a> {
 
     /// Half of the largest payload, kg.
     pub fn heavy_payload(&self) -> f64 {
-        heavy_payload(self.data, self.rows)
+        let payloads = self.rows.iter().map(|row| self.data.payload[*row]);
+        0.5 * payloads.fold(0.0, f64::max)
     }
 }
 
@@ -204,14 +205,6 @@ fn near(boundaries: &[f64], time: f64) -> &[f64] {
     let at = boundaries.partition_point(|other| *other < time);
     let reach = boundaries.len().div_ceil(40).max(1) + 1;
     &boundaries[at.saturating_sub(reach)..(at + reach).min(boundaries.len())]
-}
-
-/// Half of the largest payload of some rows, kg.
-fn heavy_payload(data: &Measurements, rows: &[usize]) -> f64 {
-    0.5 * rows
-        .iter()
-        .map(|row| data.payload[*row])
-        .fold(0.0, f64::max)
 }
 
 /// When the payload of some rows changes (s), where it does so once.

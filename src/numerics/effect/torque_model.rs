@@ -235,8 +235,11 @@ impl WrongLinkMass {
         // What is off by more than half of a link is no error of its mass.
         let half = |form: &WrongLinkMass| 0.5 * body(&form.link).mass.unwrap_or(f64::INFINITY);
         forms
-            .map(|form| (half(&form), form))
-            .map(|(half, form)| Hypothesis::new(form, 2).penalised(*RARE).within(half))
+            .map(|form| Hypothesis {
+                prior_penalty: *RARE,
+                largest: half(&form),
+                ..Hypothesis::new(form, 2)
+            })
             .collect()
     }
 }
@@ -245,26 +248,18 @@ impl Placed for WrongLinkMass {
     placed! { self: Place::Links(self.link, self.link), &LINK_MASS, [Variable::ArmLoad], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
-        let mass = ("mass".into(), Unit::Kilogram, 1e4);
-        let moments = ["x", "y", "z"].map(|axis| (axis.into(), Unit::KilogramMetre, 1e4));
-        std::iter::once(mass)
-            .chain(moments.into_iter().filter(|_| self.centre))
-            .collect()
+        mass_and_centre(
+            (Unit::Kilogram, 1e4),
+            (Unit::KilogramMetre, 1e4),
+            self.centre,
+        )
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
         for joint in 0..=self.link {
-            out.load(
-                0,
-                joint,
-                state.posture.torque_of_mass(robot, joint, self.link),
-            );
-            if self.centre {
-                let torque = state.posture.torque_of_moment(robot, joint, self.link);
-                for axis in 0..3 {
-                    out.load(axis + 1, joint, torque[axis]);
-                }
-            }
+            let mass = state.posture.torque_of_mass(robot, joint, self.link);
+            let moment = || state.posture.torque_of_moment(robot, joint, self.link);
+            load(joint, mass, self.centre.then(moment), out);
         }
     }
 
@@ -285,6 +280,23 @@ impl Placed for WrongLinkMass {
 
     fn is_of_torque_model(&self) -> bool {
         true
+    }
+}
+
+/// The numbers of a wrong mass and, where that is wrong too, of its centre: unit and one sigma of each.
+fn mass_and_centre(mass: (Unit, f64), of_axis: (Unit, f64), centre: bool) -> Vec<NumberSpec> {
+    let spec = |name: &str, (unit, sigma): (Unit, f64)| (name.into(), unit, sigma);
+    let axes = ["x", "y", "z"].map(|axis| spec(axis, of_axis));
+    std::iter::once(spec("mass", mass))
+        .chain(axes.into_iter().filter(|_| centre))
+        .collect()
+}
+
+/// Loads a joint by a mass, Nm per unit of it, and perhaps by its first moments.
+fn load(joint: usize, mass: f64, moment: Option<Vector3<f64>>, out: &mut Deflection) {
+    out.load(0, joint, mass);
+    for (axis, rate) in moment.iter().flatten().enumerate() {
+        out.load(axis + 1, joint, *rate);
     }
 }
 
@@ -323,35 +335,12 @@ impl WrongPayload {
         let forms = [false, true]
             .into_iter()
             .filter(|_| yields && survey.heavy_payload() > 0.0);
-        let mut out: Vec<Hypothesis> = forms
-            .map(|centre| {
-                Hypothesis::new(
-                    WrongPayload {
-                        centre,
-                        tool: false,
-                    },
-                    2,
-                )
-            })
-            .collect();
+        let of = |centre, tool| Hypothesis::new(WrongPayload { centre, tool }, 2);
+        let mut out: Vec<Hypothesis> = forms.map(|centre| of(centre, false)).collect();
         // Without any mass of the links nothing says how much of a wind-up is the tool's.
-        let weighs = survey
-            .robot
-            .description()
-            .joints
-            .iter()
-            .any(|joint| joint.mass.is_some());
-        if yields && weighs {
-            out.push(
-                Hypothesis::new(
-                    WrongPayload {
-                        centre: false,
-                        tool: true,
-                    },
-                    2,
-                )
-                .penalised(*RARE),
-            );
+        let joints = &survey.robot.description().joints;
+        if yields && joints.iter().any(|joint| joint.mass.is_some()) {
+            out.push(of(false, true).penalised(*RARE));
         }
         out
     }
@@ -394,28 +383,16 @@ impl Placed for WrongPayload {
                 TOOL.max(robot.description().payload_mass),
             )];
         }
-        let mass = ("mass".into(), Unit::One, 1.0);
-        let centre = ["x", "y", "z"].map(|axis| (axis.into(), Unit::Millimetre, 1.0));
-        std::iter::once(mass)
-            .chain(centre.into_iter().filter(|_| self.centre))
-            .collect()
+        mass_and_centre((Unit::One, 1.0), (Unit::Millimetre, 1.0), self.centre)
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
         let last = robot.joints() - 1;
         for joint in 0..=last {
             let carried = if self.tool { 1.0 } else { state.payload() };
-            out.load(
-                0,
-                joint,
-                state.posture.torque_of_payload(robot, joint) * carried,
-            );
-            if self.centre {
-                let torque = state.posture.torque_of_moment(robot, joint, last) * state.payload();
-                for axis in 0..3 {
-                    out.load(axis + 1, joint, torque[axis]);
-                }
-            }
+            let mass = state.posture.torque_of_payload(robot, joint) * carried;
+            let moment = || state.posture.torque_of_moment(robot, joint, last) * state.payload();
+            load(joint, mass, self.centre.then(moment), out);
         }
     }
 

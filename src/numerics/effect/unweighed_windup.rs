@@ -130,11 +130,9 @@ impl UnweighedWindup {
             if out.iter().any(|other| other.form == form) {
                 continue;
             }
-            let hypothesis = Hypothesis::new(form, FORMS).within(LARGEST);
-            out.push(if positive {
-                hypothesis.positive()
-            } else {
-                hypothesis
+            out.push(Hypothesis {
+                positive,
+                ..Hypothesis::new(form, FORMS).within(LARGEST)
             });
         }
         out

@@ -1,28 +1,22 @@
-//! Kinds of measurement: each owns in a file of its own its columns, residual, noise, derivatives and rank; one line each in [`KINDS`].
+//! Kinds of measurement: each owns in one place its columns, residual, noise, derivatives and rank; one line each in [`KINDS`].
 //!
 //! A kind predicts from where the target is: its derivative by a parameter is a linear map of how the parameter moves the point, turns
 //! the target or moves the vector from the anchor (a [`Sensitivity`]), which the effect stack says of every parameter.
 
-mod distance;
+mod anchored;
 mod inclination;
 mod orientation;
 mod planar;
-mod plane;
 mod point;
 mod residual;
-mod socket;
-mod sphere;
 
 pub use crate::robot::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
-pub use distance::Distance;
+pub use anchored::{Distance, PlaneKind, SocketKind, SphereKind};
 pub use inclination::Inclination;
 pub use orientation::Orientation;
 pub use planar::Planar;
-pub use plane::PlaneKind;
 pub use point::PointKind;
 pub use residual::{ExcessSigma, Residual, Weight};
-pub use socket::SocketKind;
-pub use sphere::SphereKind;
 
 use crate::effect::{Closing, Direction, PlacedRow, PointMotion};
 use crate::robot::{Anchor, Measurements, Named, Reading, Readings, RobotModel, Shape};

@@ -1,16 +1,186 @@
-//! A declared effect at a place with its shape numbers; it carries its declaration wherever it is kept.
+//! A declared effect: as a cause beside those of the library, and as a form at a place with its shape numbers, which carries its declaration
+//! wherever it is kept.
 
-use super::cause::DeclaredCause;
 use super::declaration::{EffectDeclaration, ShapeRange};
 use super::formula::Formula;
+use super::pattern::{DeclarationFault, DeclaredPattern, Seat, combinations};
 use super::quantity::RowQuantity;
+use crate::effect::sentence::filled;
 use crate::effect::{
-    ArmState, Cause, Deflection, Form, Hypothesis, Motion, NumberSpec, Place, Placed, Survey,
-    Variable,
+    ArmState, Cause, Deflection, Form, Hypothesis, Measure, Motion, NumberSpec, OwnMotion, Place,
+    Placed, Summary, Survey, Variable, figure,
 };
 use crate::robot::{Measurements, RobotModel};
 use serde::de::Error as _;
 use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Mutex, PoisonError};
+
+/// A declared effect as a cause beside those of the library. Causes live as long as the program, as those of the library do: each declaration
+/// is kept once, by its content.
+pub struct DeclaredCause {
+    about: &'static Cause,
+    declaration: EffectDeclaration,
+    pattern: DeclaredPattern,
+}
+
+/// Every declaration so far, by its content.
+static KEPT: Mutex<BTreeMap<String, &'static DeclaredCause>> = Mutex::new(BTreeMap::new());
+
+/// What a declaration advises is asked for after what the library knows of its own causes.
+const RANK: u8 = 9;
+
+impl DeclaredCause {
+    /// The cause that is declared. Fails with everything that is wrong with it.
+    pub fn of(declaration: &EffectDeclaration) -> Result<&'static Self, Vec<DeclarationFault>> {
+        let pattern = DeclaredPattern::of(declaration)?;
+        let content = serde_json::to_string(declaration).expect("numbers and texts serialise");
+        let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+        Ok(kept
+            .entry(content)
+            .or_insert_with(|| Box::leak(Box::new(Self::new(declaration.clone(), pattern)))))
+    }
+
+    fn new(declaration: EffectDeclaration, pattern: DeclaredPattern) -> Self {
+        let kept = |text: String| -> &'static str { Box::leak(text.into_boxed_str()) };
+        let stated = |text: &Option<String>, otherwise: &str| {
+            kept(text.clone().unwrap_or_else(|| otherwise.into()))
+        };
+        let columns: BTreeSet<&str> = pattern
+            .laws
+            .iter()
+            .flat_map(|law| law.quantities())
+            .filter_map(|quantity| quantity.needs())
+            .collect();
+        let columns: Vec<&str> = columns.into_iter().collect();
+        let needs = if columns.is_empty() {
+            "-".to_string()
+        } else {
+            columns.join(", ")
+        };
+        let size = match (declaration.size, &declaration.unit) {
+            (Some(size), Some(unit)) => format!("{size} {unit}"),
+            (Some(size), None) => size.to_string(),
+            (None, _) => "any".into(),
+        };
+        Self {
+            about: Box::leak(Box::new(Cause {
+                name: kept(declaration.name.clone()),
+                place: kept(declaration.place.clone()),
+                formula: kept(declaration.law.0.join("; ")),
+                size: kept(size),
+                confounded: stated(&declaration.confounded, "-"),
+                needs: stated(&declaration.needs, &needs),
+                of_the_measurement: pattern.seat == Seat::Fixed(Place::Tracker),
+                measure: declaration.advice.clone().map(|advice| Measure {
+                    rank: RANK,
+                    advice: kept(advice),
+                }),
+                motion: Some(OwnMotion {
+                    propose: |_| Vec::new(),
+                    sentence: Some(sentence),
+                    read: undeclared,
+                }),
+                ..Cause::PLAIN
+            })),
+            declaration,
+            pattern,
+        }
+    }
+
+    /// Its row of the table of causes.
+    pub fn about(&self) -> &'static Cause {
+        self.about
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        self.about.name
+    }
+
+    /// What the user wrote.
+    pub fn declaration(&self) -> &EffectDeclaration {
+        &self.declaration
+    }
+
+    /// What it costs a reader: the parts of its formulas and a coefficient each.
+    pub fn price(&self) -> usize {
+        self.pattern.laws.iter().map(|law| law.parts() + 1).sum()
+    }
+
+    /// Its formulas, parsed.
+    pub fn pattern(&self) -> &DeclaredPattern {
+        &self.pattern
+    }
+}
+
+/// What a mechanic is told of a finding that a declared effect is.
+fn sentence(summary: &Summary) -> String {
+    let Some(cause) = summary
+        .forms
+        .iter()
+        .find_map(|form| form.declared())
+        .map(|form| form.declaration())
+    else {
+        return String::new();
+    };
+    let per = cause
+        .declaration
+        .per
+        .as_ref()
+        .map(|per| format!(" per {per}"))
+        .unwrap_or_default();
+    let numbers: Vec<String> = (summary.parameters.iter())
+        .map(|number| {
+            let unit = if number.unit == "1" {
+                String::new()
+            } else {
+                format!(" {}", number.unit)
+            };
+            format!("{}{unit}{per}", figure(number.value, 1))
+        })
+        .collect();
+    let shape: Vec<(String, f64)> = summary
+        .forms
+        .iter()
+        .flat_map(|form| form.shape_numbers())
+        .collect();
+    let known = |word: &str| match word {
+        "place" => summary.place.to_string(),
+        "value" => numbers.first().cloned().unwrap_or_default(),
+        "values" => numbers.join(", "),
+        other => shape
+            .iter()
+            .find(|(name, _)| name == other)
+            .map_or_else(String::new, |(_, value)| figure(*value, 2)),
+    };
+    let text = match &cause.declaration.sentence {
+        Some(sentence) => filled(sentence, &known),
+        None => {
+            let laws = cause.about.formula;
+            format!(
+                "{} errs as {} says, {laws}: {}",
+                summary.place,
+                cause.about.name,
+                known("values")
+            )
+        }
+    };
+    let ends = |(name, value): &(String, f64)| {
+        let range = cause.declaration.shape.get(name)?;
+        (*value <= range.from || *value >= range.to)
+            .then(|| format!("; {name} ends at its bound {value}"))
+    };
+    let ends: Vec<String> = shape.iter().filter_map(ends).collect();
+    format!("{text}{}", ends.concat())
+}
+
+/// A form of a declared effect is read with its declaration, not by its name.
+fn undeclared(_: &serde_json::Value) -> serde_json::Result<Form> {
+    Err(serde_json::Error::custom(
+        "a declared effect without its declaration",
+    ))
+}
 
 /// The laws of a declaration at one place.
 #[derive(Clone)]
@@ -34,7 +204,7 @@ impl DeclaredForm {
         if Self::lacking(cause, survey).is_some() {
             return Vec::new();
         }
-        let pattern = cause.pattern();
+        let pattern = &cause.pattern;
         let starts = pattern.starts();
         // Shape numbers are fitted, too: as much as so many numbers in the criterion.
         let values = 3.0 * survey.rows.len() as f64;
@@ -54,11 +224,9 @@ impl DeclaredForm {
                     .iter()
                     .all(|quantity| form.variable(quantity, survey.joints()).is_some())
                 {
-                    let hypothesis = Hypothesis::new(form, tried);
-                    out.push(if cause.declaration().positive {
-                        hypothesis.positive()
-                    } else {
-                        hypothesis
+                    out.push(Hypothesis {
+                        positive: cause.declaration.positive,
+                        ..Hypothesis::new(form, tried)
                     });
                 }
             }
@@ -77,7 +245,7 @@ impl DeclaredForm {
             }
             _ => true,
         };
-        let quantities = cause.pattern().laws.iter().flat_map(Formula::quantities);
+        let quantities = cause.pattern.laws.iter().flat_map(Formula::quantities);
         quantities
             .filter(|quantity| !there(quantity))
             .find_map(|quantity| quantity.needs())
@@ -103,7 +271,7 @@ impl DeclaredForm {
                 faults.join("; ")
             ))
         })?;
-        let pattern = cause.pattern();
+        let pattern = &cause.pattern;
         if declared.name != name
             || shape.len() != pattern.shape.len()
             || pattern.moves.at(motion.place()) != Some(motion)
@@ -127,13 +295,7 @@ impl DeclaredForm {
 
     fn quantities(&self) -> Vec<RowQuantity> {
         let mut out: Vec<RowQuantity> = Vec::new();
-        for quantity in self
-            .cause
-            .pattern()
-            .laws
-            .iter()
-            .flat_map(Formula::quantities)
-        {
+        for quantity in self.cause.pattern.laws.iter().flat_map(Formula::quantities) {
             if !out.contains(&quantity) {
                 out.push(quantity);
             }
@@ -157,24 +319,24 @@ impl DeclaredForm {
         };
         self.shape
             .iter()
-            .zip(&self.cause.pattern().shape)
+            .zip(&self.cause.pattern.shape)
             .map(step)
             .collect()
     }
 
     /// The same with other shape numbers.
     pub fn shifted(&self, by: &[f64]) -> Form {
-        let shape = self
-            .shape
-            .iter()
-            .zip(by)
-            .map(|(value, by)| value + by)
-            .collect();
-        Self {
+        let shifted = self.shape.iter().zip(by).map(|(value, by)| value + by);
+        self.with(shifted.collect())
+    }
+
+    fn with(&self, shape: Vec<f64>) -> Form {
+        let Self { cause, motion, .. } = *self;
+        Form::from(Self {
+            cause,
+            motion,
             shape,
-            ..self.clone()
-        }
-        .into()
+        })
     }
 
     /// Shapes around its own, closer with every level.
@@ -188,24 +350,11 @@ impl DeclaredForm {
                 ],
                 false => [-STEP, STEP].map(|share| value + share * step * (range.to - range.from)),
             };
-            [*value, less.max(range.from), more.min(range.to)]
+            vec![*value, less.max(range.from), more.min(range.to)]
         };
-        let each = self
-            .shape
-            .iter()
-            .zip(&self.cause.pattern().shape)
-            .map(around);
-        let all = each.fold(vec![Vec::new()], |all, choices| {
-            let with = |begun: &Vec<f64>, choice: f64| {
-                begun.iter().copied().chain([choice]).collect::<Vec<f64>>()
-            };
-            all.iter()
-                .flat_map(|begun| choices.map(|choice| with(begun, choice)))
-                .collect()
-        });
-        all.into_iter()
-            .filter(|shape| *shape != self.shape)
-            .collect()
+        let each = self.shape.iter().zip(&self.cause.pattern.shape).map(around);
+        let others = combinations(each).into_iter();
+        others.filter(|shape| *shape != self.shape).collect()
     }
 }
 
@@ -239,12 +388,12 @@ impl Placed for DeclaredForm {
     }
 
     fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
-        self.cause.pattern().numbers(self.motion, robot)
+        self.cause.pattern.numbers(self.motion, robot)
     }
 
     /// A row in which a law is no number is left alone by it.
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let laws = &self.cause.pattern().laws;
+        let laws = &self.cause.pattern.laws;
         let row = |quantity: &RowQuantity| {
             self.variable(quantity, robot.joints())?
                 .value(0, robot, state)
@@ -275,13 +424,7 @@ impl Placed for DeclaredForm {
     fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
         self.shapes(level)
             .into_iter()
-            .map(|shape| {
-                Self {
-                    shape,
-                    ..self.clone()
-                }
-                .into()
-            })
+            .map(|shape| self.with(shape))
             .collect()
     }
 

@@ -3,17 +3,12 @@
 //! effect = sum_k c_k * direction(place) * law_k(row; shape), as a [`Term`](super::Term), with any formula for a law. A form keeps its
 //! declaration, so that whatever keeps the form needs no file.
 
-mod cause;
-mod check;
 mod declaration;
 mod form;
 mod formula;
-mod parse;
 mod pattern;
 mod quantity;
-mod seat;
 
-pub use cause::DeclaredCause;
-pub use check::DeclarationFault;
 pub use declaration::{EffectDeclaration, Laws, ShapeRange, Starts};
-pub use form::DeclaredForm;
+pub use form::{DeclaredCause, DeclaredForm};
+pub use pattern::DeclarationFault;
