@@ -20,7 +20,7 @@
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
 //! | [`robot`] | import of robots, their screws, their gravity torques; rows as measured | description, spatial, yaml |
 //! | [`effect`] | the library of physical effects, a row of the table of causes each, and their composition | criteria, robot, spatial |
-//! | [`observation`] | the kinds of measurement, one file each: columns, residual, noise, derivatives, rank | effect, robot, spatial |
+//! | [`observation`] | the kinds of measurement: columns, residual, noise, derivatives, rank | effect, robot, spatial |
 //! | [`estimate`] | least squares, observability, swarm, network | criteria, effect, observation, robot, spatial |
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
 //! | [`program`] | programs of controllers (KRL, RAPID), read strictly: rewritten in the numbers of their targets, or as lists of joints | compensate, robot, spatial |

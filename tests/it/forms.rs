@@ -43,16 +43,6 @@ fn data(robot: &RobotModel, moving: bool) -> Measurements {
     }
 }
 
-fn survey_of<'a>(
-    robot: &'a RobotModel,
-    data: &'a Measurements,
-    rows: &'a [usize],
-    torque: &'a [f64],
-    compliance: &'a [f64],
-) -> Survey<'a> {
-    Survey::new(robot, data, rows, torque, compliance)
-}
-
 fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
     let mut posture = Posture::new(robot.joints());
     let mut out = Vec::new();
@@ -234,7 +224,7 @@ fn over_all(mut law: impl FnMut(&Survey, &Hypothesis)) -> usize {
             let data = data(&robot, moving);
             let (rows, torque) = ((0..data.rows()).collect::<Vec<_>>(), torques(&robot, &data));
             let compliance = vec![COMPLIANCE; robot.joints()];
-            let survey = survey_of(&robot, &data, &rows, &torque, &compliance);
+            let survey = Survey::new(&robot, &data, &rows, &torque, &compliance);
             let all: Vec<Hypothesis> = CAUSES
                 .iter()
                 .flat_map(|cause| cause.propose(&survey))
@@ -503,7 +493,7 @@ fn a_joint_that_slides_errs_at_millimetres_and_has_no_turns() {
     let data = data(&robot, false);
     let (rows, torque) = ((0..data.rows()).collect::<Vec<_>>(), torques(&robot, &data));
     let compliance = vec![COMPLIANCE; robot.joints()];
-    let survey = survey_of(&robot, &data, &rows, &torque, &compliance);
+    let survey = Survey::new(&robot, &data, &rows, &torque, &compliance);
     let named: BTreeSet<&str> = CAUSES
         .iter()
         .flat_map(|cause| cause.propose(&survey))

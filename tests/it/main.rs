@@ -11,7 +11,6 @@
 mod alone;
 mod answer;
 mod api;
-mod arms;
 mod bags;
 mod beyond;
 mod bucket;

@@ -1,8 +1,8 @@
 //! Robot files: every description of one arm is the same arm, and the same as another program's.
 
 use crate::answer::root;
-use crate::arms::{ARMS, Arm};
 use crate::desk::{Desk, shared};
+use crate::fixture::robot_of;
 use calib::description::{Coupling, JointKind, RobotDescription};
 use calib::robot::RobotModel;
 use calib::robot::import::{Imported, RobotFileText, read_calib, read_case};
@@ -24,57 +24,31 @@ fn reference(file: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-fn read(text: &str) -> RobotDescription {
-    read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text,
-        },
-        None,
-    )
-    .unwrap_or_else(|e| panic!("{text}\n{e}"))
-    .robot
-}
+/// Arms of which there is a file of each kind, and poses and masses by Pinocchio.
+const ARMS: [&str; 4] = ["ur10", "spherical", "seven", "track"];
 
 fn read_urdf(name: &str) -> RobotDescription {
     let text = format!("{HEAD}kinematics: {{urdf: {{base: world_base, tip: tool0}}}}\n");
     let urdf = reference(&format!("{name}.urdf"));
-    let urdf = RobotFileText {
-        label: "arm.urdf",
-        text: &urdf,
-    };
-    read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: &text,
-        },
-        Some(urdf),
-    )
-    .unwrap_or_else(|e| panic!("{name}: {e}"))
-    .robot
+    let urdf = RobotFileText::new("arm.urdf", &urdf);
+    read_calib(RobotFileText::new("robot.yaml", &text), Some(urdf))
+        .unwrap_or_else(|e| panic!("{name}: {e}"))
+        .robot
 }
 
-fn all_forms(arm: &Arm) -> Vec<(&'static str, RobotDescription)> {
-    let file = |kinematics: &str, tool: &str| {
-        read(&format!(
-            "{HEAD}kinematics:\n  {kinematics}\ntool: {tool}\n"
-        ))
-    };
-    vec![
-        (
-            "screws",
-            file(&format!("screws:{}", arm.screws), arm.screws_tool),
-        ),
-        ("dh", file(&format!("dh:{}", arm.dh), arm.dh_tool)),
-        ("mdh", file(&format!("mdh:{}", arm.mdh), arm.dh_tool)),
-        ("urdf", read_urdf(arm.name)),
-    ]
+fn all_forms(arm: &str) -> Vec<(&'static str, RobotDescription)> {
+    let file = |form| robot_of(&reference(&format!("{arm}.{form}.yaml")));
+    let forms = ["screws", "dh", "mdh"].map(|form| (form, file(form)));
+    forms
+        .into_iter()
+        .chain([("urdf", read_urdf(arm))])
+        .collect()
 }
 
 #[test]
 fn every_description_of_an_arm_moves_alike() {
     let mut random = ChaCha8Rng::seed_from_u64(20200116);
-    for arm in &ARMS {
+    for arm in ARMS {
         let models: Vec<_> = all_forms(arm)
             .into_iter()
             .map(|(form, robot)| (form, RobotModel::new(robot)))
@@ -97,15 +71,11 @@ fn every_description_of_an_arm_moves_alike() {
                     (found.translation - expected.translation).norm(),
                     (found.rotation - expected.rotation).norm(),
                 );
-                assert!(
-                    away < EXACT,
-                    "{} as {form}: {away} m away at {q:?}",
-                    arm.name
-                );
+                assert!(away < EXACT, "{} as {form}: {away} m away at {q:?}", arm);
                 assert!(
                     turned < EXACT,
                     "{} as {form}: turned by {turned} at {q:?}",
-                    arm.name
+                    arm
                 );
             }
         }
@@ -124,8 +94,8 @@ fn numbers(value: &Value) -> Vec<f64> {
 /// Numbers by Pinocchio: `tests/reference/kinematics.py`.
 #[test]
 fn forward_kinematics_and_link_masses_agree_with_pinocchio() {
-    for arm in &ARMS {
-        let file: Value = serde_json::from_str(&reference(&format!("{}.json", arm.name))).unwrap();
+    for arm in ARMS {
+        let file: Value = serde_json::from_str(&reference(&format!("{arm}.json"))).unwrap();
         for (form, robot) in all_forms(arm) {
             let model = RobotModel::new(robot);
             for pose in file["poses"].as_array().unwrap() {
@@ -139,30 +109,30 @@ fn forward_kinematics_and_link_masses_agree_with_pinocchio() {
                         .iter()
                         .flat_map(numbers),
                 );
-                assert!(away < EXACT, "{} as {form}: {away} m away", arm.name);
+                assert!(away < EXACT, "{} as {form}: {away} m away", arm);
                 assert!(
                     (found.rotation - rotation).norm() < EXACT,
                     "{} as {form}: turned",
-                    arm.name
+                    arm
                 );
             }
         }
         let bodies = file["bodies"].as_array().unwrap();
-        let robot = read_urdf(arm.name);
+        let robot = read_urdf(arm);
         assert_eq!(robot.joints.len(), bodies.len());
         for (joint, body) in robot.joints.iter().zip(bodies) {
             let mass = joint.mass.unwrap();
             assert!(
                 (mass - body["mass"].as_f64().unwrap()).abs() < 1e-12,
                 "{} {}: {mass} kg",
-                arm.name,
+                arm,
                 joint.name
             );
             let centre = Vector3::from(joint.centre.unwrap());
             assert!(
                 (centre - Vector3::from_vec(numbers(&body["centre"]))).norm() < EXACT,
                 "{} {}",
-                arm.name,
+                arm,
                 joint.name
             );
         }
@@ -193,7 +163,7 @@ gravity: [0.6, 0, -9.79]
 
 #[test]
 fn axes_that_are_nearly_parallel_stand_at_the_arm_whose_kinematics_they_keep() {
-    let robot = read(crate::whose_model::FACTORY);
+    let robot = robot_of(crate::whose_model::FACTORY);
     // The common normal of axes 2 and 3 is 574 m away.
     assert!(
         robot
@@ -250,7 +220,7 @@ fn axes_that_are_nearly_parallel_stand_at_the_arm_whose_kinematics_they_keep() {
 
 #[test]
 fn a_robot_file_gives_what_it_says() {
-    let robot = read(FULL);
+    let robot = robot_of(FULL);
     assert_eq!(robot.name, "gantry arm");
     assert_eq!(robot.joints[0].kind, JointKind::Prismatic);
     assert_eq!(robot.joints[0].axis, [0.6, 0.0, 0.8]);
@@ -297,7 +267,7 @@ fn a_link_frame_carries_its_centre() {
         "{HEAD}kinematics: {{dh: [{{d: 100, a: 200, alpha: 90}}]}}\nlinks: [{{mass: 1, centre: [10, 20, 30], frame: link}}]\n"
     );
     // Frame 1 stands at (200, 0, 100) with y up and z along -y of the base.
-    let found = Vector3::from(read(&text).joints[0].centre.unwrap());
+    let found = Vector3::from(robot_of(&text).joints[0].centre.unwrap());
     assert!(
         (found - Vector3::new(0.210, -0.030, 0.120)).norm() < 1e-15,
         "{found}"
@@ -346,9 +316,9 @@ fn distance(a: &RobotDescription, b: &RobotDescription) -> f64 {
 #[test]
 fn the_table_keeps_the_description() {
     let forms = ARMS
-        .iter()
+        .into_iter()
         .flat_map(|arm| all_forms(arm).into_iter().map(|(_, robot)| robot));
-    for robot in forms.chain([read(FULL)]) {
+    for robot in forms.chain([robot_of(FULL)]) {
         let frame = Robot::from_description(&robot).to_frame().unwrap();
         let again = Robot::from_frame(&frame)
             .and_then(|table| table.to_description())
@@ -370,11 +340,7 @@ fn a_practice_robot_is_read_in_its_units() {
     let text = r#"{"name": "two", "axes": [[0, 0, 1], [0, -2, 0]], "points": [[0, 0, 0], [312.0, 0, 0]], "tool": [1854, 0, 1310],
 	"mass": [350, null], "com": [[150, 0, -120], null], "ratio": [213, 214], "kt": [1.3, 1.3], "payload": 210.0,
 	"payload_com": [180, 40, 60], "coupling": [[1, 0]], "colour": "orange"}"#;
-    let Imported { robot, notes, .. } = read_case(RobotFileText {
-        label: "robot.json",
-        text,
-    })
-    .unwrap();
+    let Imported { robot, notes, .. } = read_case(RobotFileText::new("robot.json", text)).unwrap();
     assert_eq!(robot.joints[1].axis, [0.0, -1.0, 0.0]);
     assert_eq!(robot.joints[1].point, [0.312, 0.0, 0.0]);
     assert_eq!(

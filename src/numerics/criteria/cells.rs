@@ -1,7 +1,6 @@
 //! The table of causes: prior odds of its cells, shapes of their curves, when a search ends.
 
-use super::CriterionValue;
-use super::table::criteria;
+use super::criterion::{CriterionValue, criteria};
 
 criteria! {
     "cells";

@@ -1,7 +1,6 @@
 //! Poses that are proposed.
 
-use super::CriterionValue;
-use super::table::criteria;
+use super::criterion::{CriterionValue, criteria};
 
 criteria! {
     "choose";

@@ -1,7 +1,6 @@
 //! Formulas that are proposed for what has no name.
 
-use super::CriterionValue;
-use super::table::criteria;
+use super::criterion::{CriterionValue, criteria};
 
 criteria! {
     "closed_form";

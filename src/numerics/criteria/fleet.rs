@@ -1,7 +1,6 @@
 //! What the robots of a model have in common: when a cause of a group joins, and which robots are not like their siblings.
 
-use super::CriterionValue;
-use super::table::criteria;
+use super::criterion::{CriterionValue, criteria};
 
 criteria! {
     "fleet";

@@ -1,7 +1,6 @@
 //! How explanations are judged by folds.
 
-use super::CriterionValue;
-use super::table::criteria;
+use super::criterion::{CriterionValue, criteria};
 
 criteria! {
     "judge";

@@ -9,9 +9,6 @@
 //! With the feature `ablate` a program may scale each of them while it runs; without it they are constants.
 
 mod criterion;
-#[cfg(feature = "ablate")]
-mod scaled;
-mod table;
 
 pub mod cells;
 pub mod choose;
@@ -26,10 +23,9 @@ pub mod setup;
 pub mod torque;
 pub mod words;
 
-pub use criterion::CriterionValue;
 #[cfg(feature = "ablate")]
-pub use scaled::{CriterionFactor, Scaled};
-pub use table::CriterionRow;
+pub use criterion::ablate::{CriterionFactor, Scaled};
+pub use criterion::{CriterionRow, CriterionValue};
 
 /// All tables.
 pub const TABLES: &[&[CriterionRow]] = &[
@@ -49,40 +45,23 @@ pub const TABLES: &[&[CriterionRow]] = &[
 
 /// Whether something came by a criterion since the last call, by the names of rooms and criteria.
 #[cfg(feature = "ablate")]
-pub(crate) fn reached() -> Vec<String> {
-    all()
-        .filter(|(_, criterion)| criterion.was_reached())
-        .map(|(name, _)| name.to_string())
-        .collect()
+pub fn reached() -> Vec<String> {
+    let reached = all().filter(|(_, row)| row.criterion.was_reached());
+    reached.map(|(name, _)| name).collect()
 }
 
 /// Scales one criterion (`room::NAME`) and leaves all others as they are; `false` where there is none of that name.
 #[cfg(feature = "ablate")]
 pub fn scale(name: &str, factor: CriterionFactor) -> bool {
-    all().for_each(|(_, criterion)| criterion.scale(CriterionFactor::One));
-    all()
-        .find(|(own, _)| *own == name)
-        .is_some_and(|(_, criterion)| {
-            criterion.scale(factor);
-            true
-        })
+    all().for_each(|(_, row)| row.criterion.scale(CriterionFactor::One));
+    let found = all().find(|(other, _)| other == name);
+    found
+        .inspect(|(_, row)| row.criterion.scale(factor))
+        .is_some()
 }
 
 #[cfg(feature = "ablate")]
-fn all() -> impl Iterator<Item = (&'static str, &'static dyn criterion::Scalable)> {
-    let rooms = [
-        cells::SCALABLE,
-        choose::SCALABLE,
-        closed_form::SCALABLE,
-        effect::SCALABLE,
-        fleet::SCALABLE,
-        judge::SCALABLE,
-        noise::SCALABLE,
-        screen::SCALABLE,
-        search::SCALABLE,
-        setup::SCALABLE,
-        torque::SCALABLE,
-        words::SCALABLE,
-    ];
-    rooms.into_iter().flatten().copied()
+fn all() -> impl Iterator<Item = (String, &'static CriterionRow)> {
+    let rows = TABLES.iter().copied().flatten();
+    rows.map(|row| (format!("{}::{}", row.room, row.name), row))
 }

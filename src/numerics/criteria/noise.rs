@@ -1,7 +1,6 @@
 //! What is noise: repeats, stated sigma, autocorrelation, sizes that causes share.
 
-use super::CriterionValue;
-use super::table::criteria;
+use super::criterion::{CriterionValue, criteria};
 
 criteria! {
     "noise";

@@ -1,7 +1,6 @@
 //! Rows that no smooth model can follow.
 
-use super::CriterionValue;
-use super::table::criteria;
+use super::criterion::{CriterionValue, criteria};
 
 criteria! {
     "screen";

@@ -1,7 +1,6 @@
 //! When what is left is more than noise, how shapes of formulas are refined, and how few rows are searched at all.
 
-use super::CriterionValue;
-use super::table::criteria;
+use super::criterion::{CriterionValue, criteria};
 
 criteria! {
     "search";

@@ -1,7 +1,6 @@
 //! Set-up errors: what is wrong between files and robot file before any physics.
 
-use super::CriterionValue;
-use super::table::criteria;
+use super::criterion::{CriterionValue, criteria};
 
 criteria! {
     "setup";

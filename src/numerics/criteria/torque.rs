@@ -1,7 +1,6 @@
 //! Torques of moving arms: what a recording is refused for, and what of its laws is named.
 
-use super::CriterionValue;
-use super::table::criteria;
+use super::criterion::{CriterionValue, criteria};
 
 criteria! {
     "torque";

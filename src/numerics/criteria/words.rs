@@ -1,7 +1,6 @@
 //! What is said: verdicts, names, probabilities, what is worth a word.
 
-use super::CriterionValue;
-use super::table::criteria;
+use super::criterion::{CriterionValue, criteria};
 
 criteria! {
     "words";

@@ -4,108 +4,45 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 /// A function of one variable, or a few.
+#[expect(missing_docs, reason = "a field is said with its function")]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Basis {
     /// (u - zero) / per.
-    Linear {
-        /// Variable at which it is zero.
-        zero: f64,
-        /// Change of the variable that makes it one.
-        per: f64,
-    },
+    Linear { zero: f64, per: f64 },
     /// 1, and (u - zero) / per.
-    Straight {
-        /// Variable at which it is zero.
-        zero: f64,
-        /// Change of the variable that makes it one.
-        per: f64,
-    },
+    Straight { zero: f64, per: f64 },
     /// sin(order u) and cos(order u), and with an overtone those of twice the order.
-    Wave {
-        /// Periods per turn.
-        order: u32,
-        /// Whether twice the order belongs to it.
-        overtone: bool,
-    },
+    Wave { order: u32, overtone: bool },
     /// Sine and cosine of a period.
-    Sway {
-        /// In the unit of the variable.
-        period: f64,
-    },
+    Sway { period: f64 },
     /// cos(k pi (u - low) / (high - low)), k = 1..=count, held at either end: a curve without its mean.
-    Cosines {
-        /// Lower end of the support.
-        low: f64,
-        /// Upper end of the support.
-        high: f64,
-        /// How many cosines.
-        count: usize,
-    },
+    Cosines { low: f64, high: f64, count: usize },
     /// The same with its mean: k = 0..count.
-    Series {
-        /// Lower end of the support.
-        low: f64,
-        /// Upper end of the support.
-        high: f64,
-        /// How many functions, the constant among them.
-        count: usize,
-    },
+    Series { low: f64, high: f64, count: usize },
     /// One function: the sum of `weights` times those of a [`Basis::Series`] of as many.
     Curve {
-        /// Lower end of the support.
         low: f64,
-        /// Upper end of the support.
         high: f64,
-        /// Of the constant first.
         weights: [f64; Self::CURVE],
     },
     /// tanh((u - centre) / width): one level below, another above.
-    Rise {
-        /// Its middle.
-        centre: f64,
-        /// Its scale.
-        width: f64,
-    },
+    Rise { centre: f64, width: f64 },
     /// 1 above `at`, else 0.
-    After {
-        /// Where it steps.
-        at: f64,
-    },
+    After { at: f64 },
     /// 1 above each of the first `count` of these, else 0: what jumps between levels.
     Steps {
-        /// Where it steps.
         at: [f64; Self::STEPS],
-        /// How many steps.
         count: usize,
     },
     /// -1 or 1.
     Sign,
     /// The power of the share of the way from `start` to `end`, odd about `start`.
-    Power {
-        /// Where it is zero.
-        start: f64,
-        /// Where it is one.
-        end: f64,
-        /// Exponent of the power.
-        exponent: f64,
-    },
+    Power { start: f64, end: f64, exponent: f64 },
     /// The same from `start` on; 1 later than `CREEPING` times the way.
-    Creep {
-        /// Where it is zero.
-        start: f64,
-        /// Where it is one.
-        end: f64,
-        /// Exponent of the power.
-        exponent: f64,
-    },
+    Creep { start: f64, end: f64, exponent: f64 },
     /// 1 - exp(-(u - start) / constant) from `start` on.
-    Settling {
-        /// Where it is zero.
-        start: f64,
-        /// Time constant.
-        constant: f64,
-    },
+    Settling { start: f64, constant: f64 },
 }
 
 /// Lengths of the recording, from its start, over which a creep is believed to go on.

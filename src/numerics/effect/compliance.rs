@@ -132,7 +132,7 @@ impl Windup {
     /// Nm or A.
     fn load_of(&self, state: &ArmState) -> f64 {
         match self.load {
-            Load::GravityTorque => state.torque()[self.joint],
+            Load::GravityTorque => state.posture.torque[self.joint],
             Load::MotorCurrent => match state.current().map(|all| all[self.joint]) {
                 Some(current) if current.is_finite() => current,
                 _ => 0.0,

@@ -1,21 +1,20 @@
 //! Effects of the whole arm that every calibration identifies: where base, targets and anchors are, joint zeros, ratios and couplings
 //! (Eq. 14), and geometry of the links.
 
+use super::motion::MOTION;
 use super::{ArmState, Deflection, Effect, ParameterSpec, Place, names};
 use crate::robot::{Anchor, Measurements, RobotModel, Shape, Target};
 use crate::spatial::{Pose, Twist, screw};
 use crate::units::Unit;
 use nalgebra::Vector3;
 
-/// The numbers of a displacement and of a turn.
-const AXES: [(&str, Unit); 6] = [
-    ("x", Unit::Millimetre),
-    ("y", Unit::Millimetre),
-    ("z", Unit::Millimetre),
-    ("rx", Unit::Radian),
-    ("ry", Unit::Radian),
-    ("rz", Unit::Radian),
-];
+/// What the names of parameters of an effect begin with, of something that has a name or not.
+fn prefix(effect: &str, name: &str) -> String {
+    match name {
+        "" => format!("{effect}."),
+        name => format!("{effect}.{name}."),
+    }
+}
 
 /// `anchor`: what is measured from is elsewhere: the far end of a draw-wire or ballbar, a socket, a plane, a sphere. It moves no point.
 ///
@@ -27,11 +26,7 @@ pub struct AnchorShift;
 impl AnchorShift {
     /// What the names of an anchor's parameters begin with, dot included.
     pub fn prefix(anchor: &str) -> String {
-        if anchor.is_empty() {
-            format!("{}.", names::ANCHOR)
-        } else {
-            format!("{}.{anchor}.", names::ANCHOR)
-        }
+        prefix(names::ANCHOR, anchor)
     }
 
     /// Endings of the names of an anchor's parameters.
@@ -130,7 +125,7 @@ impl Effect for BasePlacement {
     }
 
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        let axes = AXES.into_iter().map(|(axis, unit)| ParameterSpec {
+        let axes = MOTION.into_iter().map(|(axis, unit, _)| ParameterSpec {
             name: format!("base_frame.{axis}"),
             place: Place::Base,
             unit,
@@ -164,11 +159,7 @@ fn width(target: &Target) -> usize {
 impl ToolOffset {
     /// What the names of a target's parameters begin with, dot included.
     pub fn prefix(target: &str) -> String {
-        if target.is_empty() {
-            format!("{}.", names::TOOL_OFFSET)
-        } else {
-            format!("{}.{target}.", names::TOOL_OFFSET)
-        }
+        prefix(names::TOOL_OFFSET, target)
     }
 }
 
@@ -186,12 +177,14 @@ impl Effect for ToolOffset {
                 .collect(),
         };
         let all = targets.into_iter().flat_map(|(name, width)| {
-            AXES[..width].iter().map(move |(axis, unit)| ParameterSpec {
-                name: format!("{}{axis}", Self::prefix(name)),
-                place: Place::Tool,
-                unit: *unit,
-                prior_sigma: 0.05,
-            })
+            MOTION[..width]
+                .iter()
+                .map(move |(axis, unit, _)| ParameterSpec {
+                    name: format!("{}{axis}", Self::prefix(name)),
+                    place: Place::Tool,
+                    unit: *unit,
+                    prior_sigma: 0.05,
+                })
         });
         all.collect()
     }
@@ -222,6 +215,22 @@ impl Effect for ToolOffset {
     }
 }
 
+/// A parameter of each joint.
+fn of_joints(
+    effect: &str,
+    robot: &RobotModel,
+    prior_sigma: f64,
+    unit: impl Fn(usize) -> Unit,
+) -> Vec<ParameterSpec> {
+    let spec = |joint: usize| ParameterSpec {
+        name: format!("{effect}.j{}", joint + 1),
+        place: Place::Joint(joint),
+        unit: unit(joint),
+        prior_sigma,
+    };
+    (0..robot.joints()).map(spec).collect()
+}
+
 /// Zero error of joint N, theta_i0 of Eq. 14; one parameter a joint.
 pub(super) struct JointOffset;
 
@@ -231,18 +240,13 @@ impl Effect for JointOffset {
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        (0..robot.joints())
-            .map(|j| ParameterSpec {
-                name: format!("joint_offset.j{}", j + 1),
-                place: Place::Joint(j),
-                unit: if robot.is_revolute(j) {
-                    Unit::Radian
-                } else {
-                    Unit::Millimetre
-                },
-                prior_sigma: 0.02,
-            })
-            .collect()
+        of_joints(names::JOINT_OFFSET, robot, 0.02, |joint| {
+            if robot.is_revolute(joint) {
+                Unit::Radian
+            } else {
+                Unit::Millimetre
+            }
+        })
     }
 
     fn is_constant(&self) -> bool {
@@ -268,14 +272,7 @@ impl Effect for ReductionRatio {
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        (0..robot.joints())
-            .map(|j| ParameterSpec {
-                name: format!("reduction_ratio.j{}", j + 1),
-                place: Place::Joint(j),
-                unit: Unit::One,
-                prior_sigma: 0.01,
-            })
-            .collect()
+        of_joints(names::REDUCTION_RATIO, robot, 0.01, |_| Unit::One)
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {

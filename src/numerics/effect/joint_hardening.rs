@@ -176,7 +176,7 @@ impl Placed for BentWindup {
     }
 
     fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let torque = state.torque()[self.joint];
+        let torque = state.posture.torque[self.joint];
         self.rates(torque)
             .into_iter()
             .enumerate()
@@ -200,7 +200,7 @@ impl Placed for BentWindup {
     ) -> Option<Variable> {
         let (variable, share) = self.most_beyond(robot, state, within)?;
         let (torque, [low, high]) = (
-            state.torque()[self.joint],
+            state.posture.torque[self.joint],
             within.first().copied().flatten()?,
         );
         let [end, now] =

@@ -167,7 +167,7 @@ impl Placed for Lag {
             match self.by {
                 Behind::Synchronous if largest == 0.0 => out.turn(0, p, joint, 0.0),
                 Behind::Synchronous => out.turn(0, p, joint, state.last_move(joint) / largest),
-                Behind::Clock => out.turn(0, p, joint, state.velocity(joint)),
+                Behind::Clock => out.turn(0, p, joint, state.data.velocity(state.row, joint)),
                 Behind::Move => out.turn(
                     if self.each { joint } else { 0 },
                     p,

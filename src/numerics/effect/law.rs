@@ -336,28 +336,26 @@ impl Law {
             times.variable
         };
         let inner = times.count();
-        let mut groups = Vec::new();
-        for (i, off) in first.into_iter().flat_map(|(off, _)| off).enumerate() {
-            let others = times.all(robot, state, of_times).into_iter().enumerate();
-            groups.push(
-                others
-                    .map(|(k, value)| (inner * i + k, off * value))
-                    .collect(),
-            );
+        if !(a + b > 0.0) {
+            return None;
         }
-        for (k, off) in second.into_iter().flat_map(|(off, _)| off).enumerate() {
-            let others = self
-                .first
-                .all(robot, state, of_first)
-                .into_iter()
-                .enumerate();
-            groups.push(
-                others
-                    .map(|(i, value)| (inner * i + k, off * value))
-                    .collect(),
-            );
-        }
-        (a + b > 0.0).then_some((most, groups))
+        let of_first = self.first.all(robot, state, of_first);
+        let of_times = times.all(robot, state, of_times);
+        let by_first = first.into_iter().flat_map(|(off, _)| off).enumerate();
+        let by_first = by_first.map(|(i, off)| {
+            let others = of_times.iter().enumerate();
+            others
+                .map(|(k, value)| (inner * i + k, off * value))
+                .collect()
+        });
+        let by_times = second.into_iter().flat_map(|(off, _)| off).enumerate();
+        let by_times = by_times.map(|(k, off)| {
+            let others = of_first.iter().enumerate();
+            others
+                .map(|(i, value)| (inner * i + k, off * value))
+                .collect()
+        });
+        Some((most, by_first.chain(by_times).collect()))
     }
 
     /// The values of its functions in a row, numbered; zeros where the row does not tell.
@@ -396,23 +394,8 @@ impl From<Factor> for Law {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::import::{RobotFileText, read_calib};
-    use crate::robot::{Measurements, PointReadings, Posture};
+    use crate::robot::{Measurements, PointReadings, Posture, small_arm};
     use nalgebra::Vector3;
-
-    const ROBOT: &str = "calib_robot: 1
-name: small
-units: {length: mm, angle: deg}
-kinematics:
-  screws:
-    - {axis: [0, 0, 1], point: [0, 0, 0]}
-    - {axis: [0, 1, 0], point: [0, 0, 400]}
-tool: {point: [500, 0, 400]}
-joints: [{name: A1}, {name: A2}]
-links:
-  - {mass: 10, centre: [0, 0, 200]}
-  - {mass: 5, centre: [250, 0, 400]}
-";
 
     /// What is asked at one row.
     fn at_row<T>(
@@ -420,17 +403,7 @@ links:
         [payload, temperature, time]: [f64; 3],
         ask: impl FnOnce(&RobotModel, &ArmState) -> T,
     ) -> T {
-        let robot = RobotModel::new(
-            read_calib(
-                RobotFileText {
-                    label: "robot.yaml",
-                    text: ROBOT,
-                },
-                None,
-            )
-            .expect("a robot")
-            .robot,
-        );
+        let robot = small_arm();
         let data = Measurements {
             joints: 2,
             q: vec![angle; 2],

@@ -276,31 +276,24 @@ impl LawRow {
         survey: &Survey,
     ) -> Option<String> {
         let value = *p.first()?;
-        let beyond = self.limit.and_then(
-            |Limit {
-                 most,
-                 subject: of,
-                 negative,
-             }| {
-                let per = if matches!(term.basis(), Basis::Settling { .. }) {
-                    "in all"
-                } else {
-                    "for each kelvin"
-                };
-                let size = if negative.is_some() {
-                    value
-                } else {
-                    value.abs()
-                };
-                match negative {
-                    Some(why) if value < -error(0) => Some(why.to_string()),
-                    _ => (size > most).then(|| {
-                        let [size, largest] = [size, most].map(|share| figure(1e6 * share, 0));
-                        format!("{size} um/m {per} is more than the {largest} {of}")
-                    }),
-                }
-            },
-        );
+        let beyond = self.limit.and_then(|limit| {
+            let per = match term.basis() {
+                Basis::Settling { .. } => "in all",
+                _ => "for each kelvin",
+            };
+            let size = match limit.negative {
+                Some(why) if value < -error(0) => return Some(why.to_string()),
+                Some(_) => value,
+                None => value.abs(),
+            };
+            (size > limit.most).then(|| {
+                let [size, largest] = [size, limit.most].map(|share| figure(1e6 * share, 0));
+                format!(
+                    "{size} um/m {per} is more than the {largest} {}",
+                    limit.subject
+                )
+            })
+        });
         beyond.or_else(|| match self.follows {
             Follows::Side | Follows::Push => {
                 law_shapes::impossible_play(term, value, error(0), survey)

@@ -58,7 +58,7 @@ pub use variable::Variable;
 pub use volume::Closing;
 pub use words::{Clock, figure};
 
-use crate::robot::{LoadCorrection, Measurements, Memory, Posture, RobotModel, RowTime};
+use crate::robot::{LoadCorrection, Measurements, Posture, RobotModel, RowTime};
 use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -111,16 +111,6 @@ impl<'a> ArmState<'a> {
         Sight::of(&self.point)
     }
 
-    /// What of the rows before this one remembers.
-    pub(crate) fn memory(&self, memory: Memory) -> f64 {
-        self.data.memory(memory, self.row)
-    }
-
-    /// Load torque about each joint, Nm.
-    pub(crate) fn torque(&self) -> &'a [f64] {
-        &self.posture.torque
-    }
-
     /// The number of the target that the row measured; none where the robot knows no such target.
     pub(crate) fn target(&self, robot: &RobotModel) -> Option<usize> {
         robot.setup().target(self.data.target(self.row))
@@ -144,21 +134,6 @@ impl<'a> ArmState<'a> {
         }
     }
 
-    /// C, where recorded.
-    pub(crate) fn temperature(&self) -> Option<f64> {
-        self.data.temperature(self.row)
-    }
-
-    /// A recorded circumstance, of a joint or of the whole row, SI.
-    pub(crate) fn circumstance(&self, column: &str, joint: Option<usize>) -> Option<f64> {
-        self.data.circumstance(column, self.row, joint)
-    }
-
-    /// Declared payload, kg.
-    pub(crate) fn payload(&self) -> f64 {
-        self.data.payload[self.row]
-    }
-
     /// Direction from which a joint came to rest, +1 or -1; 0 if it never moved.
     pub fn direction(&self, joint: usize) -> f64 {
         self.data.direction(self.row, joint)
@@ -175,11 +150,6 @@ impl<'a> ArmState<'a> {
         turns
             .map(|joint| self.last_move(joint).abs())
             .fold(0.0, f64::max)
-    }
-
-    /// Velocity of a joint, rad/s or m/s; 0 where the arm stood.
-    pub(crate) fn velocity(&self, joint: usize) -> f64 {
-        self.data.velocity(self.row, joint)
     }
 }
 

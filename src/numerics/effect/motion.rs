@@ -8,71 +8,37 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// Joints and links count from 0.
+#[expect(missing_docs, reason = "a field is said with its motion")]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Motion {
     /// A joint travels.
-    Joint {
-        /// From 0.
-        joint: usize,
-    },
+    Joint { joint: usize },
     /// Joint `moved` travels because of joint `by`.
-    Coupled {
-        /// From 0.
-        by: usize,
-        /// From 0.
-        moved: usize,
-    },
+    Coupled { by: usize, moved: usize },
     /// The axis of a joint tilts about the directions across it, or about one of them (0 or 1). It stands in the link before, or turns
-    /// with the joint.
+    /// with the joint; about which point of it.
     Axis {
-        /// From 0.
         joint: usize,
-        /// Direction across the axis; none for both.
         about: Option<usize>,
-        /// Whether it turns with the joint.
         turning: bool,
-        /// About which point of the axis.
         #[serde(default, skip_serializing_if = "AxisPoint::is_own")]
         at: AxisPoint,
     },
-    /// A joint is displaced along its axis or across it, the link before carrying the directions.
-    Slide {
-        /// From 0.
-        joint: usize,
-        /// Along the axis, or in both directions across it.
-        along: bool,
-    },
+    /// A joint is displaced along its axis, or in both directions across it, the link before carrying the directions.
+    Slide { joint: usize, along: bool },
     /// A link bends in its middle, about both directions across it.
-    Bend {
-        /// From 0.
-        link: usize,
-    },
+    Bend { link: usize },
     /// Neighbouring links grow along themselves, each in proportion to its length.
-    Links {
-        /// Link, from 0.
-        first: usize,
-        /// Link, from 0.
-        last: usize,
-    },
-    /// The base.
-    Base {
-        /// Which of its six directions.
-        axes: Axes,
-    },
-    /// The measuring frame.
-    Tracker {
-        /// Which of its six directions.
-        axes: Axes,
-    },
-    /// The tool, axes of the base at the zero pose.
-    Tool {
-        /// Which of its six directions.
-        axes: Axes,
-    },
+    Links { first: usize, last: usize },
+    /// The base, in some of its six directions.
+    Base { axes: Axes },
+    /// The measuring frame, in some of its six directions.
+    Tracker { axes: Axes },
+    /// The tool, in some of its six directions, axes of the base at the zero pose.
+    Tool { axes: Axes },
     /// What the instrument reads.
     Instrument {
-        /// What is misread.
         #[serde(rename = "of")]
         reading: Polar,
     },
@@ -144,7 +110,7 @@ impl Axes {
 }
 
 /// The numbers of a rigid motion.
-const MOTION: [(&str, Unit, f64); 6] = [
+pub(super) const MOTION: [(&str, Unit, f64); 6] = [
     ("x", Unit::Millimetre, 0.1),
     ("y", Unit::Millimetre, 0.1),
     ("z", Unit::Millimetre, 0.1),

@@ -1,7 +1,7 @@
 //! What a recording offers to hypotheses: ranges, loads, times, and which columns it has.
 
 use super::Form;
-use crate::robot::{Measurements, Posture, RobotModel};
+use crate::robot::{Measurements, Posture, RobotModel, range};
 use nalgebra::Vector3;
 
 /// The fitted rows of a recording as seen from the present model.
@@ -40,14 +40,7 @@ impl<'a> Survey<'a> {
         torque: &'a [f64],
         compliance: &'a [f64],
     ) -> Self {
-        let range = (0..robot.joints())
-            .map(|joint| {
-                let values = rows.iter().map(|row| data.q(*row)[joint]);
-                values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
-                    [low.min(q), high.max(q)]
-                })
-            })
-            .collect();
+        let of_joint = |joint: usize| range(rows.iter().map(|row| data.q(*row)[joint]));
         let mut times: Vec<f64> = rows.iter().map(|row| data.time(*row)).collect();
         times.sort_by(f64::total_cmp);
         times.dedup();
@@ -74,7 +67,7 @@ impl<'a> Survey<'a> {
             rows,
             torque,
             compliance,
-            range,
+            range: (0..robot.joints()).map(of_joint).collect(),
             boundaries,
             time,
             reference_c,

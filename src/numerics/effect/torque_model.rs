@@ -389,9 +389,15 @@ impl Placed for WrongPayload {
     fn deflect(&self, robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
         let last = robot.joints() - 1;
         for joint in 0..=last {
-            let carried = if self.tool { 1.0 } else { state.payload() };
+            let carried = if self.tool {
+                1.0
+            } else {
+                state.data.payload[state.row]
+            };
             let mass = state.posture.torque_of_payload(robot, joint) * carried;
-            let moment = || state.posture.torque_of_moment(robot, joint, last) * state.payload();
+            let moment = || {
+                state.posture.torque_of_moment(robot, joint, last) * state.data.payload[state.row]
+            };
             load(joint, mass, self.centre.then(moment), out);
         }
     }

@@ -7,67 +7,37 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A scalar of a row; joints count from 0 here and from 1 in words.
+#[expect(missing_docs, reason = "a field is said with its variable")]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Variable {
     /// Commanded position of a joint, rad or m.
-    Angle {
-        /// From 0.
-        joint: usize,
-    },
+    Angle { joint: usize },
     /// Angle of a joint's motor, rad: the joint's angle times its reduction ratio.
-    Motor {
-        /// From 0.
-        joint: usize,
-    },
+    Motor { joint: usize },
     /// Load torque about a joint, Nm.
-    Load {
-        /// From 0.
-        joint: usize,
-    },
+    Load { joint: usize },
     /// Load torque plus so much friction (Nm) to the side from which the joint came, Nm.
-    Push {
-        /// From 0.
-        joint: usize,
-        /// Nm.
-        friction_nm: f64,
-    },
+    Push { joint: usize, friction_nm: f64 },
     /// Motor current of a joint, A, where recorded.
-    Current {
-        /// From 0.
-        joint: usize,
-    },
+    Current { joint: usize },
     /// Side from which a joint came to rest, +1 or -1; 0 if it never moved.
-    Approach {
-        /// From 0.
-        joint: usize,
-    },
+    Approach { joint: usize },
     /// What a joint moved from the stop before, rad or m.
-    Move {
-        /// From 0.
-        joint: usize,
-    },
+    Move { joint: usize },
     /// Velocity of a joint, rad/s or m/s; 0 where the arm stood.
-    Velocity {
-        /// From 0.
-        joint: usize,
-    },
+    Velocity { joint: usize },
     /// Declared payload, kg.
     Payload,
     /// Direction of gravity as the tool sees it: one component (0 to 2, axes of the tool at the zero pose), or all three.
-    Gravity {
-        /// Component, 0 to 2; none for all.
-        axis: Option<usize>,
-    },
+    Gravity { axis: Option<usize> },
     /// C, where recorded.
     Temperature,
     /// s, or the number of the row where the recording has no clock: see `ArmState::time`.
     Time,
     /// A circumstance that the recording declares and laws read by name, SI.
     Circumstance {
-        /// Its setting.
         column: CircumstanceName,
-        /// From 0; none of one that the whole row has.
         joint: Option<usize>,
     },
     /// Moments of all that the arm carries: of effects that are no law of one scalar.
@@ -83,48 +53,19 @@ pub enum Variable {
     /// Distance from the instrument, m.
     Range,
     /// Side to which pre-sliding friction has brought a joint that fades in over a travel (rad or m) after each reversal, -1 to 1.
-    Slip {
-        /// From 0.
-        joint: usize,
-        /// rad or m.
-        travel: f64,
-    },
+    Slip { joint: usize, travel: f64 },
     /// How far what sticks beside a joint is stretched by its travel until it slips at a limit (rad or m), rad or m.
-    Stretch {
-        /// From 0.
-        joint: usize,
-        /// rad or m.
-        limit: f64,
-    },
+    Stretch { joint: usize, limit: f64 },
     /// Travel of a joint of late (rad or m), which fades with a time (s).
-    Recent {
-        /// From 0.
-        joint: usize,
-        /// s.
-        time: f64,
-    },
+    Recent { joint: usize, time: f64 },
     /// Where the tool is along a direction of the base frame, m.
-    Position {
-        /// Unit vector.
-        along: [f64; 3],
-    },
+    Position { along: [f64; 3] },
     /// Where the target is along a direction of the instrument's frame, m.
-    Sighted {
-        /// Unit vector.
-        along: [f64; 3],
-    },
+    Sighted { along: [f64; 3] },
     /// How fast a joint has moved of late (rad/s or m/s), forgotten with a cooling time (s).
-    Work {
-        /// From 0.
-        joint: usize,
-        /// s.
-        cooling: f64,
-    },
+    Work { joint: usize, cooling: f64 },
     /// The recorded temperature as something feels it that follows it with a time constant (s), C.
-    Lagging {
-        /// s.
-        lag: f64,
-    },
+    Lagging { lag: f64 },
 }
 
 impl Variable {
@@ -220,6 +161,7 @@ impl Variable {
         robot: &RobotModel,
         state: &ArmState,
     ) -> Option<f64> {
+        let remembered = |memory| state.data.memory(memory, state.row);
         match self {
             Self::Angle { joint } => Some(state.q[joint]),
             Self::Motor { joint } => Some(
@@ -228,9 +170,9 @@ impl Variable {
                     .unwrap_or(0.0)
                     * state.q[joint],
             ),
-            Self::Load { joint } => Some(state.torque()[joint]),
+            Self::Load { joint } => Some(state.posture.torque[joint]),
             Self::Push { joint, friction_nm } => {
-                Some(state.torque()[joint] + friction_nm * state.direction(joint))
+                Some(state.posture.torque[joint] + friction_nm * state.direction(joint))
             }
             Self::Current { joint } => state
                 .current()
@@ -238,27 +180,29 @@ impl Variable {
                 .filter(|current| current.is_finite()),
             Self::Approach { joint } => Some(state.direction(joint)),
             Self::Move { joint } => Some(state.last_move(joint)),
-            Self::Velocity { joint } => Some(state.velocity(joint)),
-            Self::Payload => Some(state.payload()),
+            Self::Velocity { joint } => Some(state.data.velocity(state.row, joint)),
+            Self::Payload => Some(state.data.payload[state.row]),
             Self::Gravity { axis } => state
                 .posture
                 .down(state.q.len())
                 .map(|down| down[axis.unwrap_or(component)]),
-            Self::Temperature => state.temperature(),
+            Self::Temperature => state.data.temperature(state.row),
             Self::Time => Some(state.time()),
-            Self::Circumstance { column, joint } => state.circumstance(column.text(), joint),
+            Self::Circumstance { column, joint } => {
+                state.data.circumstance(column.text(), state.row, joint)
+            }
             Self::Azimuth => Some(state.sight().azimuth),
             Self::Elevation => Some(state.sight().elevation),
             Self::Range => Some(state.sight().range),
-            Self::Slip { joint, travel } => Some(state.memory(Memory::Slip { joint, travel })),
-            Self::Stretch { joint, limit } => Some(state.memory(Memory::Stretch { joint, limit })),
-            Self::Recent { joint, time } => Some(state.memory(Memory::Recent { joint, time })),
+            Self::Slip { joint, travel } => Some(remembered(Memory::Slip { joint, travel })),
+            Self::Stretch { joint, limit } => Some(remembered(Memory::Stretch { joint, limit })),
+            Self::Recent { joint, time } => Some(remembered(Memory::Recent { joint, time })),
             Self::Position { along } => Some(Vector3::from(along).dot(&state.posture.tool(robot))),
             Self::Sighted { along } => Some(Vector3::from(along).dot(&state.point)),
-            Self::Work { joint, cooling } => Some(state.memory(Memory::Work { joint, cooling })),
-            Self::Lagging { lag } => state
-                .temperature()
-                .map(|_| state.memory(Memory::Temperature { lag })),
+            Self::Work { joint, cooling } => Some(remembered(Memory::Work { joint, cooling })),
+            Self::Lagging { lag } => {
+                (state.data.temperature(state.row)).map(|_| remembered(Memory::Temperature { lag }))
+            }
             Self::ArmLoad | Self::LastMove | Self::Speed => None,
         }
     }

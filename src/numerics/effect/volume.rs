@@ -199,10 +199,7 @@ tool: {point: [20, 10, 60]}
 
     #[test]
     fn derivatives_of_the_volume_are_central_differences() {
-        let text = RobotFileText {
-            label: "arm.yaml",
-            text: ARM,
-        };
+        let text = RobotFileText::new("arm.yaml", ARM);
         let robot = RobotModel::new(read_calib(text, None).expect("sound").robot);
         let shapes = [
             Shape::Point,

@@ -12,6 +12,23 @@ use crate::units::Quantity::Length;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::collections::BTreeMap;
 
+/// What contacts have in common.
+const CONTACT: KindDescription = KindDescription {
+    name: "",
+    word: "",
+    dimension: Dimension::Length,
+    axes: 1,
+    columns: &[],
+    own_sigma: true,
+    rank: Rank {
+        places: true,
+        rotations: false,
+        scale: false,
+        blind: [3, 3],
+    },
+    is_screened: false,
+};
+
 /// What a row measured along a line from its anchor.
 struct Line {
     /// Measured - predicted, m.
@@ -228,7 +245,6 @@ pub struct SocketKind;
 static SOCKET: KindDescription = KindDescription {
     name: "socket",
     word: "socket",
-    dimension: Dimension::Length,
     axes: 3,
     columns: &[
         DeclaredColumn::text(
@@ -242,14 +258,7 @@ static SOCKET: KindDescription = KindDescription {
             "Standard deviation per axis with which the ball comes back to a socket.",
         ),
     ],
-    own_sigma: true,
-    rank: Rank {
-        places: true,
-        rotations: false,
-        scale: false,
-        blind: [3, 3],
-    },
-    is_screened: false,
+    ..CONTACT
 };
 
 impl MeasurementKind for SocketKind {
@@ -320,8 +329,6 @@ const FEWEST_OF_PLANE: usize = 3;
 static PLANE: KindDescription = KindDescription {
     name: "plane",
     word: "plane",
-    dimension: Dimension::Length,
-    axes: 1,
     columns: &[
         DeclaredColumn::text(
             "plane",
@@ -334,14 +341,7 @@ static PLANE: KindDescription = KindDescription {
             "Standard deviation, along its normal, with which a plane is touched.",
         ),
     ],
-    own_sigma: true,
-    rank: Rank {
-        places: true,
-        rotations: false,
-        scale: false,
-        blind: [3, 3],
-    },
-    is_screened: false,
+    ..CONTACT
 };
 
 impl PlaneKind {
@@ -418,8 +418,6 @@ const FEWEST_OF_SPHERE: usize = 4;
 static SPHERE: KindDescription = KindDescription {
     name: "sphere",
     word: "sphere",
-    dimension: Dimension::Length,
-    axes: 1,
     columns: &[
         DeclaredColumn::text(
             "sphere",
@@ -428,9 +426,7 @@ static SPHERE: KindDescription = KindDescription {
         .as_part(Part::Anchor),
         DeclaredColumn::sigma(&["sigma_sphere"], Length, "Standard deviation, along its normal, with which a sphere is touched."),
     ],
-    own_sigma: true,
-    rank: Rank { places: true, rotations: false, scale: false, blind: [3, 3] },
-    is_screened: false,
+    ..CONTACT
 };
 
 impl SphereKind {

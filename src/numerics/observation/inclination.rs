@@ -81,8 +81,7 @@ impl MeasurementKind for Inclination {
                 .unwrap_or_else(Vector3::zeros)
         };
         let lines = Matrix3::from_columns(&[line(0), line(1), Vector3::zeros()]).transpose();
-        let weighted = [0, 1, 2].map(|axis: usize| weight.apply(&lines.column(axis).into_owned()));
-        Sensitivity::Rotation(Weight::Full(Matrix3::from_columns(&weighted)))
+        Sensitivity::Rotation(weight.after(&lines))
     }
 
     /// What is up to the target is up to the last body.

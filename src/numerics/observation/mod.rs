@@ -278,15 +278,11 @@ impl dyn MeasurementKind + '_ {
 
     /// Columns that say that a row measured it: its values or, of a kind that reads none, the name of what holds the target.
     pub fn telling(&self) -> impl Iterator<Item = &'static DeclaredColumn> {
-        let part = if self.is_contact() {
+        self.columns(if self.is_contact() {
             Part::Anchor
         } else {
             Part::Value
-        };
-        self.about()
-            .columns
-            .iter()
-            .filter(move |column| column.part == part)
+        })
     }
 
     /// Whether a contact holds the target, and nothing is read but the joints.

@@ -71,8 +71,7 @@ impl MeasurementKind for Planar {
             line
         };
         let lines = Matrix3::from_rows(&[line(0), line(1), RowVector3::zeros()]) * CAMERA;
-        let weighted = [0, 1, 2].map(|axis: usize| weight.apply(&lines.column(axis).into_owned()));
-        Sensitivity::Point(Weight::Full(Matrix3::from_columns(&weighted)))
+        Sensitivity::Point(weight.after(&lines))
     }
 
     /// The camera's pose by the direct linear transform (Hartley and Zisserman, 2004, 7.1): the nominal arm's points against their images.

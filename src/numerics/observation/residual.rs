@@ -138,6 +138,12 @@ impl Weight {
         }
     }
 
+    /// The same of what is a matrix times the motion that it is applied to.
+    pub(super) fn after(&self, lines: &Matrix3<f64>) -> Self {
+        let weighted = [0, 1, 2].map(|axis: usize| self.apply(&lines.column(axis).into_owned()));
+        Self::Full(Matrix3::from_columns(&weighted))
+    }
+
     /// An error or a derivative in standard deviations.
     pub fn apply(&self, error: &Vector3<f64>) -> Vector3<f64> {
         match self {

@@ -16,13 +16,7 @@ pub struct LibraryArm {
 impl LibraryArm {
     /// The robot, and what its file says of itself. Fails with the faults of the file.
     pub fn read(&self) -> Result<Imported> {
-        read_calib(
-            RobotFileText {
-                label: self.name,
-                text: self.text,
-            },
-            None,
-        )
+        read_calib(RobotFileText::new(self.name, self.text), None)
     }
 
     /// The same, or which name is near.

@@ -7,41 +7,19 @@ use std::fmt;
 use std::sync::Arc;
 
 /// A state that follows the rows.
+#[expect(missing_docs, reason = "a field is said with its state")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Memory {
     /// Side to which pre-sliding friction has brought a joint: it fades in over a travel (rad or m) after each reversal, -1 to 1 (Dahl).
-    Slip {
-        /// From 0.
-        joint: usize,
-        /// rad or m.
-        travel: f64,
-    },
+    Slip { joint: usize, travel: f64 },
     /// How far what sticks beside a joint is stretched by its travel, until it slips at a limit (rad or m): a stop of Prandtl's.
-    Stretch {
-        /// From 0.
-        joint: usize,
-        /// rad or m.
-        limit: f64,
-    },
+    Stretch { joint: usize, limit: f64 },
     /// Travel of a joint of late (rad or m), which fades with a time (s), as what is viscous yields.
-    Recent {
-        /// From 0.
-        joint: usize,
-        /// s.
-        time: f64,
-    },
+    Recent { joint: usize, time: f64 },
     /// Speed of a joint of late (rad/s or m/s), forgotten with a cooling time (s).
-    Work {
-        /// From 0.
-        joint: usize,
-        /// s.
-        cooling: f64,
-    },
+    Work { joint: usize, cooling: f64 },
     /// The recorded temperature (C) behind a time constant (s).
-    Temperature {
-        /// s.
-        lag: f64,
-    },
+    Temperature { lag: f64 },
 }
 
 impl Memory {
@@ -263,7 +241,8 @@ pub fn numbered(joints: &[usize]) -> String {
         .join(", ")
 }
 
-fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+/// The least and the greatest of some values; upside down of none.
+pub(crate) fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold(
         [f64::INFINITY, f64::NEG_INFINITY],
         |[lower, upper], value| [lower.min(value), upper.max(value)],
@@ -325,31 +304,67 @@ mod tests {
     }
 
     #[test]
-    fn friction_before_sliding_fades_in_over_a_travel_after_each_reversal() {
-        let data = recording(
-            &[0.0, 10.0, 9.9, 9.9, 9.7],
-            &[0.0, 1.0, 2.0, 3.0, 4.0],
-            &[20.0; 5],
+    fn what_is_remembered_of_travel_follows_the_way_from_row_to_row() {
+        // Friction before sliding fades in over a travel after each reversal; what sticks is stretched to its limit and relaxes only by the way
+        // back; travel of late fades with time.
+        let (slip, stretch, recent) = (
+            Memory::Slip {
+                joint: 0,
+                travel: 0.2,
+            },
+            Memory::Stretch {
+                joint: 0,
+                limit: 0.3,
+            },
+            Memory::Recent {
+                joint: 0,
+                time: 10.0,
+            },
         );
-        let slip = |row| {
-            data.memory(
-                Memory::Slip {
-                    joint: 0,
-                    travel: 0.2,
-                },
-                row,
-            )
-        };
         let after = |travelled: f64| -1.0 + 2.0 * (-travelled / 0.2).exp();
-        for (row, expected) in [0.0, 1.0, after(0.1), after(0.1), after(0.3)]
-            .into_iter()
-            .enumerate()
-        {
-            assert!(
-                (slip(row) - expected).abs() < 1e-9,
-                "{row}: {} {expected}",
-                slip(row)
-            );
+        let faded = [(-1.0f64).exp(), (-2.0f64).exp() - 0.5];
+        let cases: [(Memory, &[[f64; 3]]); 3] = [
+            (
+                slip,
+                &[
+                    [0.0, 0.0, 0.0],
+                    [1.0, 10.0, 1.0],
+                    [2.0, 9.9, after(0.1)],
+                    [3.0, 9.9, after(0.1)],
+                    [4.0, 9.7, after(0.3)],
+                ],
+            ),
+            (
+                stretch,
+                &[
+                    [0.0, 0.0, 0.0],
+                    [1.0, 0.2, 0.2],
+                    [2.0, 1.0, 0.3],
+                    [3.0, 0.9, 0.2],
+                    [4.0, 0.9, 0.2],
+                    [5.0, 0.0, -0.3],
+                ],
+            ),
+            (
+                recent,
+                &[
+                    [0.0, 0.0, 0.0],
+                    [1.0, 1.0, 1.0],
+                    [11.0, 1.0, faded[0]],
+                    [21.0, 0.5, faded[1]],
+                ],
+            ),
+        ];
+        for (memory, rows) in cases {
+            let column = |k: usize| rows.iter().map(|row| row[k]).collect::<Vec<f64>>();
+            let data = recording(&column(1), &column(0), &vec![20.0; rows.len()]);
+            for (row, [.., expected]) in rows.iter().enumerate() {
+                let found = data.memory(memory, row);
+                assert!(
+                    (found - expected).abs() < 1e-12,
+                    "{memory:?} at {row}: {found} {expected}"
+                );
+            }
         }
     }
 
@@ -360,53 +375,6 @@ mod tests {
         let data = recording(&[0.0; 200], &time, &rising);
         let late = data.memory(Memory::Temperature { lag: 10.0 }, 199);
         assert!((late - (rising[199] - 1.0)).abs() < 1e-6, "{late}");
-    }
-
-    #[test]
-    fn what_sticks_is_stretched_to_its_limit_and_relaxes_only_by_the_way_back() {
-        let data = recording(
-            &[0.0, 0.2, 1.0, 0.9, 0.9, 0.0],
-            &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0],
-            &[20.0; 6],
-        );
-        let stretch = |row| {
-            data.memory(
-                Memory::Stretch {
-                    joint: 0,
-                    limit: 0.3,
-                },
-                row,
-            )
-        };
-        for (row, expected) in [0.0, 0.2, 0.3, 0.2, 0.2, -0.3].into_iter().enumerate() {
-            assert!(
-                (stretch(row) - expected).abs() < 1e-12,
-                "{row}: {} {expected}",
-                stretch(row)
-            );
-        }
-    }
-
-    #[test]
-    fn travel_of_late_fades_with_time() {
-        let data = recording(&[0.0, 1.0, 1.0, 0.5], &[0.0, 1.0, 11.0, 21.0], &[20.0; 4]);
-        let recent = |row| {
-            data.memory(
-                Memory::Recent {
-                    joint: 0,
-                    time: 10.0,
-                },
-                row,
-            )
-        };
-        let expected = [0.0, 1.0, (-1.0f64).exp(), (-2.0f64).exp() - 0.5];
-        for (row, expected) in expected.into_iter().enumerate() {
-            assert!(
-                (recent(row) - expected).abs() < 1e-12,
-                "{row}: {} {expected}",
-                recent(row)
-            );
-        }
     }
 
     #[test]

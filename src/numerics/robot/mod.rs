@@ -24,6 +24,7 @@ pub use instrument::{
 pub use joint_convention::{CountedCoupling, JointConvention};
 pub use library::{LIBRARY, LibraryArm};
 pub use measurements::{Measurements, Memories, RowTime};
+pub(crate) use memory::range;
 pub use memory::{Memory, Unmeasured, Visited, numbered};
 pub use model::{Bound, ONE_AND_A_HALF_TURNS, RobotModel, Travel, too_far};
 pub use pose_groups::Sequence;
@@ -54,15 +55,9 @@ joints: [{name: A1}, {name: A2}]
     /// The arm: about the vertical, then about a level axis 400 mm up; the point 500 mm out.
     pub(crate) fn small_arm() -> RobotModel {
         RobotModel::new(
-            read_calib(
-                RobotFileText {
-                    label: "robot.yaml",
-                    text: FILE,
-                },
-                None,
-            )
-            .expect("a robot")
-            .robot,
+            read_calib(RobotFileText::new("robot.yaml", FILE), None)
+                .expect("a robot")
+                .robot,
         )
     }
 }

@@ -108,7 +108,10 @@ impl Tree {
     fn node(spanned: Spanned<Tree>) -> Node {
         let span = spanned.defined.span();
         let bytes = span.byte_offset().zip(span.byte_len());
-        Node::parsed(spanned.value.value, mark(spanned.referenced), bytes)
+        Node {
+            bytes,
+            ..Node::new(spanned.value.value, mark(spanned.referenced))
+        }
     }
 }
 

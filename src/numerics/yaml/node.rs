@@ -61,15 +61,6 @@ impl Node {
             bytes: None,
         }
     }
-    pub(super) fn parsed(value: YamlValue, mark: Mark, bytes: Option<(u64, u64)>) -> Self {
-        Self {
-            value,
-            mark,
-            raw: None,
-            overridden: false,
-            bytes,
-        }
-    }
     /// A map without entries.
     pub fn empty_map(mark: Mark) -> Self {
         Self::new(YamlValue::Map(Vec::new()), mark)
@@ -96,15 +87,14 @@ impl Node {
 
     /// A scalar as text, as it was spelt; nothing for lists, blocks and null.
     pub fn text(&self) -> Option<String> {
-        match &self.value {
-            YamlValue::Text(text) => Some(text.clone()),
-            YamlValue::Bool(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
-            YamlValue::Integer(value) => {
-                Some(self.raw.clone().unwrap_or_else(|| value.to_string()))
-            }
-            YamlValue::Float(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
-            YamlValue::Null | YamlValue::List(_) | YamlValue::Map(_) => None,
-        }
+        let plain = match &self.value {
+            YamlValue::Text(text) => return Some(text.clone()),
+            YamlValue::Bool(value) => value.to_string(),
+            YamlValue::Integer(value) => value.to_string(),
+            YamlValue::Float(value) => value.to_string(),
+            YamlValue::Null | YamlValue::List(_) | YamlValue::Map(_) => return None,
+        };
+        Some(self.raw.clone().unwrap_or(plain))
     }
 
     /// Entries of a map, each with the place of its key; none of anything else.

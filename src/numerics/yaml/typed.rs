@@ -281,9 +281,7 @@ impl<'de> VariantAccess<'de> for Variant<'de> {
         _length: usize,
         visitor: V,
     ) -> Result<V::Value, Trouble> {
-        self.node
-            .deserialize_any(visitor)
-            .map_err(|trouble| trouble.below(self.key))
+        self.struct_variant(&[], visitor)
     }
     fn struct_variant<V: Visitor<'de>>(
         self,

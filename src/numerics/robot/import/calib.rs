@@ -1,8 +1,8 @@
 //! calib's own robot file: YAML with units, one kinematic format, and what is known of joints, links, payload and gravity.
 
-use super::dh::{self, DhConvention};
+use super::kinematics::{self, DhConvention};
 use super::place::{DocumentNode, Faults};
-use super::{ChainBody, FrameChain, Imported, RobotFileText, about, inertia, screws, urdf};
+use super::{ChainBody, FrameChain, Imported, RobotFileText, about, inertia, urdf};
 use crate::description::{
     Coupling, DeclaredInertias, JointDescription, JointKind, RobotDescription,
 };
@@ -55,7 +55,7 @@ pub fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<Imported
         .map(|chain| chain.notes.clone())
         .unwrap_or_default();
     let robot = chain.map(|chain| describe(&root, chain, units));
-    let about = about::read(
+    let about = about(
         root.get("about"),
         robot.as_ref().map_or(0, |robot| robot.joints.len()),
         units.length,
@@ -95,7 +95,7 @@ fn chain(
 ) -> Result<Option<FrameChain>> {
     let mut given = FORMATS
         .into_iter()
-        .filter(|format| value.get(format).given().is_some());
+        .filter(|format| value.opt(format).is_some());
     let chain = match (given.next(), given.next()) {
         (Some(_), Some(_)) => {
             value.fault(format!(
@@ -104,14 +104,14 @@ fn chain(
             ));
             return Ok(None);
         }
-        (Some("screws"), _) => screws::read(&value.get("screws"), units.length),
-        (Some("dh"), _) => dh::read(
+        (Some("screws"), _) => kinematics::screws(&value.get("screws"), units.length),
+        (Some("dh"), _) => kinematics::dh(
             &value.get("dh"),
             DhConvention::Standard,
             units.length,
             units.angle,
         ),
-        (Some("mdh"), _) => dh::read(
+        (Some("mdh"), _) => kinematics::dh(
             &value.get("mdh"),
             DhConvention::Modified,
             units.length,
@@ -153,8 +153,7 @@ fn chain(
 fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDescription {
     let tool = tool(root.get("tool"), &chain, units);
     let name = root
-        .get("name")
-        .given()
+        .opt("name")
         .map_or_else(|| "robot".into(), |name| name.text());
     let mut joints: Vec<JointDescription> = (chain.joints.iter().enumerate())
         .map(|(i, joint)| JointDescription {
@@ -170,7 +169,7 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
             coulomb: None,
         })
         .collect();
-    if let Some(list) = root.get("joints").given() {
+    if let Some(list) = root.opt("joints") {
         for (joint, value) in joints.iter_mut().zip(list.per_joint(chain.joints.len())) {
             drive(joint, value, units);
         }
@@ -182,7 +181,7 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
         .iter()
         .map(|joint| joint.body.as_ref().and_then(|body| body.inertia))
         .collect();
-    if let Some(list) = root.get("links").given() {
+    if let Some(list) = root.opt("links") {
         for (i, value) in list
             .per_joint(joints.len())
             .into_iter()
@@ -197,14 +196,12 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
             }
         }
     }
-    let tolerance = root.get("mass_tolerance");
-    let tolerance = tolerance
-        .given()
+    let tolerance = root
+        .opt("mass_tolerance")
         .map(|value| inertia::tolerance(value, ["mass", "centre", "inertia"], units.length));
-    let couplings = root.get("couplings");
-    let couplings = couplings
-        .given()
-        .map_or_else(Vec::new, |list| self::couplings(list, joints.len()));
+    let couplings = root
+        .opt("couplings")
+        .map_or_else(Vec::new, |list| couplings(list, joints.len()));
     let ChainBody {
         mass: payload_mass,
         centre: payload_centre,
@@ -218,10 +215,7 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
         couplings,
         payload_mass,
         payload_centre: payload_centre.into(),
-        gravity: root
-            .get("gravity")
-            .given()
-            .map_or(super::GRAVITY, super::gravity),
+        gravity: root.opt("gravity").map_or(super::GRAVITY, super::gravity),
         inertias: DeclaredInertias {
             links: inertias,
             payload: payload_inertia,
@@ -260,15 +254,14 @@ fn tool(value: DocumentNode, chain: &FrameChain, units: FileUnits) -> Isometry3<
             .sized_vector::<3>(Bound::Length, units.length),
     );
     let orientation = value
-        .get("orientation")
-        .given()
+        .opt("orientation")
         .map_or_else(UnitQuaternion::identity, |o| orientation(o, units.angle));
     chain.tip * Isometry3::from_parts(Translation3::from(point), orientation)
 }
 
-fn orientation(value: &DocumentNode, angle: Unit) -> UnitQuaternion<f64> {
-    let value = value.clone().map(&["rpy", "quaternion"]);
-    match (value.get("rpy").given(), value.get("quaternion").given()) {
+fn orientation(value: DocumentNode, angle: Unit) -> UnitQuaternion<f64> {
+    let value = value.map(&["rpy", "quaternion"]);
+    match (value.opt("rpy"), value.opt("quaternion")) {
         (Some(rpy), None) => {
             let [roll, pitch, yaw] = rpy.sized_vector(Bound::Angle, angle);
             UnitQuaternion::from_euler_angles(roll, pitch, yaw)
@@ -302,14 +295,13 @@ fn drive(joint: &mut JointDescription, value: DocumentNode, units: FileUnits) {
         return;
     }
     let value = value.map(&["name", "limits", "reduction_ratio", "motor_constant"]);
-    if let Some(name) = value.get("name").given() {
+    if let Some(name) = value.opt("name") {
         joint.name = name.text();
     }
-    if let Some(limits) = value.get("limits").given() {
-        let unit = if joint.kind == JointKind::Revolute {
-            units.angle
-        } else {
-            units.length
+    if let Some(limits) = value.opt("limits") {
+        let (unit, bound) = match joint.kind {
+            JointKind::Revolute => (units.angle, Bound::Angle),
+            JointKind::Prismatic => (units.length, Bound::Length),
         };
         let travel = limits.vector::<2>();
         let [lower, upper] = travel.map(|x| unit.to_si(x));
@@ -319,19 +311,13 @@ fn drive(joint: &mut JointDescription, value: DocumentNode, units: FileUnits) {
                 travel[0], travel[1]
             ));
         } else {
-            let bound = if joint.kind == JointKind::Revolute {
-                Bound::Angle
-            } else {
-                Bound::Length
-            };
             let beyond = [lower, upper].into_iter().find_map(|end| bound.fault(end));
             beyond.into_iter().for_each(|message| limits.fault(message));
         }
         joint.limits = Some([lower, upper]);
     }
     let nonzero = |key: &str| {
-        let value = value.get(key);
-        value.given().map(|value| {
+        value.opt(key).map(|value| {
             let number = value.sized(Bound::Factor, Unit::One);
             if number == 0.0 {
                 value.fault("expected a number other than 0");
@@ -351,9 +337,8 @@ fn distinct(root: &DocumentNode, joints: &[JointDescription]) {
             .position(|other| other.name == joint.name)
         {
             let places = root
-                .get("joints")
-                .given()
-                .map_or_else(Vec::new, DocumentNode::items);
+                .opt("joints")
+                .map_or_else(Vec::new, |joints| joints.items());
             let column = |k: usize| {
                 places
                     .get(k)
@@ -372,6 +357,14 @@ fn distinct(root: &DocumentNode, joints: &[JointDescription]) {
     }
 }
 
+/// Whether numbers are in a frame of that name, and not in that of the base.
+fn is_in(frame: &str, value: &DocumentNode) -> bool {
+    let frame = value
+        .opt("frame")
+        .and_then(|f| f.choice(&[("base", false), (frame, true)]));
+    frame.unwrap_or(false)
+}
+
 fn link(value: DocumentNode, frame: Option<Isometry3<f64>>, units: FileUnits) -> ChainBody {
     let value = value.map(&["mass", "centre", "inertia", "frame"]);
     let centre = Point3::from(
@@ -380,10 +373,7 @@ fn link(value: DocumentNode, frame: Option<Isometry3<f64>>, units: FileUnits) ->
             .sized_vector::<3>(Bound::Length, units.length),
     );
     let of_link = value.get("frame");
-    let in_link = of_link
-        .given()
-        .and_then(|f| f.choice(&[("base", false), ("link", true)]))
-        .unwrap_or(false);
+    let in_link = is_in("link", &value);
     let centre = match frame {
         Some(frame) if in_link => frame * centre,
         None if in_link => {
@@ -392,7 +382,7 @@ fn link(value: DocumentNode, frame: Option<Isometry3<f64>>, units: FileUnits) ->
         }
         _ => centre,
     };
-    let moments = value.get("inertia").given().map(inertia::moments);
+    let moments = value.opt("inertia").map(inertia::moments);
     let moments = match frame {
         Some(frame) if in_link => {
             moments.map(|moments| inertia::turned(&moments, &frame.rotation.to_rotation_matrix()))
@@ -406,13 +396,12 @@ fn link(value: DocumentNode, frame: Option<Isometry3<f64>>, units: FileUnits) ->
     }
 }
 
-fn couplings(list: &DocumentNode, joints: usize) -> Vec<Coupling> {
+fn couplings(list: DocumentNode, joints: usize) -> Vec<Coupling> {
     let mut couplings: Vec<Coupling> = Vec::new();
     for value in list.items() {
         let value = value.map(&["moved", "by", "ratio"]);
         let ratio = value
-            .get("ratio")
-            .given()
+            .opt("ratio")
             .map_or(0.0, |ratio| ratio.sized(Bound::Factor, Unit::One));
         if let (Some(moved), Some(by)) = (
             value.get("moved").joint(joints),
@@ -446,23 +435,18 @@ fn payload(value: DocumentNode, tool: &Isometry3<f64>, units: FileUnits) -> Chai
         };
     }
     let value = value.map(&["mass", "offset", "inertia", "frame"]);
-    let offset = value.get("offset").given().map_or([0.0; 3], |offset| {
+    let offset = value.opt("offset").map_or([0.0; 3], |offset| {
         offset.sized_vector(Bound::Length, units.length)
     });
     let offset = Vector3::from(offset);
-    let in_tool = value
-        .get("frame")
-        .given()
-        .and_then(|f| f.choice(&[("base", false), ("tool", true)]))
-        .unwrap_or(false);
+    let in_tool = is_in("tool", &value);
     let rotation = if in_tool {
         tool.rotation.to_rotation_matrix()
     } else {
         Rotation3::identity()
     };
     let moments = value
-        .get("inertia")
-        .given()
+        .opt("inertia")
         .map(|value| inertia::turned(&inertia::moments(value), &rotation));
     ChainBody {
         mass: value.get("mass").not_negative(),

@@ -1,7 +1,7 @@
 //! The practice layout `robot.json`: axes, points, masses and centres at the zero pose in the base frame, in mm, kg, kg m2 and Nm/A.
 
+use super::kinematics::direction;
 use super::place::{DocumentNode, Faults};
-use super::screws::direction;
 use super::{Imported, RobotFileText, inertia};
 use crate::description::{
     Coupling, DeclaredInertias, JointDescription, JointKind, RobotDescription,
@@ -40,15 +40,14 @@ pub fn read(file: RobotFileText) -> Result<Imported> {
     let (node, faults) = Faults::parse(file)?;
     let root = DocumentNode::root(&node, &faults).open_map(&KEYS);
     let axes = root.get("axes").items();
-    if root.get("axes").given().is_some() && axes.is_empty() {
+    if root.opt("axes").is_some() && axes.is_empty() {
         root.get("axes")
             .fault("no joints; expected at least one axis");
     }
     let n = axes.len();
     let points = root.get("points").per_joint(n);
     let per_joint = |key: &str| {
-        root.get(key)
-            .given()
+        root.opt(key)
             .map(|list| list.per_joint(n))
             .unwrap_or_default()
     };
@@ -87,39 +86,29 @@ pub fn read(file: RobotFileText) -> Result<Imported> {
         .collect();
     let tool = metres(&root.get("tool"));
     let offset = root
-        .get("payload_com")
-        .given()
-        .map_or_else(Vector3::zeros, |offset| metres(offset).coords);
+        .opt("payload_com")
+        .map_or_else(Vector3::zeros, |offset| metres(&offset).coords);
     let robot = RobotDescription {
         name: root
-            .get("name")
-            .given()
-            .map_or_else(|| "robot".into(), DocumentNode::text),
+            .opt("name")
+            .map_or_else(|| "robot".into(), |name| name.text()),
         joints,
         tool: tool.into(),
         tool_rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         couplings: root
-            .get("coupling")
-            .given()
+            .opt("coupling")
             .map_or_else(Vec::new, |list| couplings(list, n)),
-        payload_mass: root
-            .get("payload")
-            .given()
-            .map_or(0.0, DocumentNode::not_negative),
+        payload_mass: root.opt("payload").map_or(0.0, |mass| mass.not_negative()),
         payload_centre: (tool + offset).into(),
-        gravity: root
-            .get("gravity")
-            .given()
-            .map_or(super::GRAVITY, super::gravity),
+        gravity: root.opt("gravity").map_or(super::GRAVITY, super::gravity),
         inertias: DeclaredInertias {
             links: per_joint("inertia")
                 .iter()
-                .map(|value| value.given().map(inertia::moments))
+                .map(|value| value.given().cloned().map(inertia::moments))
                 .collect(),
-            payload: root.get("payload_inertia").given().map(inertia::moments),
+            payload: root.opt("payload_inertia").map(inertia::moments),
             tolerance: root
-                .get("inertia_tolerance")
-                .given()
+                .opt("inertia_tolerance")
                 .map(|value| inertia::tolerance(value, TOLERANCE, Unit::Millimetre)),
         },
     };
@@ -140,7 +129,7 @@ fn metres(value: &DocumentNode) -> Point3<f64> {
 }
 
 /// Pairs (moved, by) of joints from 0. The layout states no ratio: the controller is taken to add none.
-fn couplings(list: &DocumentNode, joints: usize) -> Vec<Coupling> {
+fn couplings(list: DocumentNode, joints: usize) -> Vec<Coupling> {
     let index = |value: f64| (0..joints).find(|j| *j as f64 == value);
     let mut couplings: Vec<_> = (list.items().iter())
         .filter_map(|pair| {

@@ -12,7 +12,7 @@ const NONE: f64 = 1e-6;
 const ROUNDING: f64 = 0.01;
 
 /// `[xx, xy, xz, yy, yz, zz]` of a file, kg m2, with a note where no body can have them.
-pub(super) fn moments(value: &DocumentNode) -> InertiaMoments {
+pub(super) fn moments(value: DocumentNode) -> InertiaMoments {
     let moments = value.sized_vector::<6>(Bound::Inertia, Unit::KilogramSquareMetre);
     if let Some(message) = impossible_inertia(&moments) {
         value.note(message + UNUSED);
@@ -80,8 +80,8 @@ pub(super) fn offset(mass: f64, arm: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// One standard deviation of declared masses, by three keys; the centre in `length`.
-pub(super) fn tolerance(value: &DocumentNode, keys: [&str; 3], length: Unit) -> MassTolerance {
-    let value = value.clone().map(&keys);
+pub(super) fn tolerance(value: DocumentNode, keys: [&str; 3], length: Unit) -> MassTolerance {
+    let value = value.map(&keys);
     let above = |key: &str, unit: Unit, bound: Bound| {
         let value = value.get(key);
         let number = value.sized(bound, unit);

@@ -3,22 +3,21 @@
 //! Every format ends in one chain at the zero pose in the base frame. All faults of a file are reported at once, each with
 //! its line and its path (`robot.yaml:12:5: joints[2].limits`, counted from 0 as in the YAML), a URDF with its line alone.
 
-pub use about::About;
 pub use calib::read as read_calib;
 pub use case::read as read_case;
 pub use inertia::impossible_inertia;
 pub use urdf::{UrdfOutline, outline as urdf_outline};
 
 use crate::description::{InertiaMoments, JointKind, RobotDescription};
+use crate::robot::{Bound, CountedCoupling};
+use crate::units::Unit;
 use nalgebra::{Isometry3, Point3, Vector3};
 
-mod about;
 mod calib;
 mod case;
-mod dh;
 mod inertia;
+mod kinematics;
 mod place;
-mod screws;
 mod urdf;
 
 use place::DocumentNode;
@@ -30,6 +29,13 @@ pub struct RobotFileText<'a> {
     pub label: &'a str,
     /// YAML, URDF or JSON.
     pub text: &'a str,
+}
+
+impl<'a> RobotFileText<'a> {
+    /// A content under the name by which messages call it.
+    pub fn new(label: &'a str, text: &'a str) -> Self {
+        Self { label, text }
+    }
 }
 
 /// A robot and what its reader wants to tell the person, e.g. keys that were not used.
@@ -78,7 +84,7 @@ const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 const GRAVITY_RANGE: std::ops::Range<f64> = 1.0..30.0;
 
 /// Gravity of a file, m/s2, base frame.
-fn gravity(value: &DocumentNode) -> [f64; 3] {
+fn gravity(value: DocumentNode) -> [f64; 3] {
     let gravity = value.vector();
     let size = Vector3::from(gravity).norm();
     if size != 0.0 && !size.is_nan() && !GRAVITY_RANGE.contains(&size) {
@@ -87,4 +93,70 @@ fn gravity(value: &DocumentNode) -> [f64; 3] {
         ));
     }
     gravity
+}
+
+/// The map `about` of a robot file: where its numbers are from, and how its maker's controller counts joints. Nothing is computed from it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct About {
+    /// As the maker publishes it, m.
+    pub reach: Option<f64>,
+    /// Where the numbers are from.
+    pub(crate) sources: Vec<String>,
+    /// What is left out or differs between sources, a sentence each.
+    pub(crate) notes: Vec<String>,
+    /// Joints that the controller reports with a part of another one, as `coupled` of `ingest` has them.
+    pub coupled: Vec<CountedCoupling>,
+}
+
+impl About {
+    /// What `ingest` must be told of the controller's counting, as settings of `q`; none where it counts as the robot file does.
+    pub fn counting(&self) -> Option<String> {
+        let one = |c: &CountedCoupling| {
+            format!(
+                "{{joint: {}, by: {}, ratio: {}}}",
+                c.joint + 1,
+                c.by + 1,
+                c.ratio
+            )
+        };
+        let all: Vec<String> = self.coupled.iter().map(one).collect();
+        (!all.is_empty()).then(|| format!("coupled: [{}]", all.join(", ")))
+    }
+}
+
+fn about(value: DocumentNode, joints: usize, length: Unit) -> About {
+    if value.given().is_none() {
+        return About::default();
+    }
+    let value = value.map(&["reach", "sources", "notes", "counting"]);
+    let texts = |key: &str| {
+        let list = value.opt(key);
+        let texts = list.iter().flat_map(DocumentNode::items);
+        texts.map(|text| text.text()).collect()
+    };
+    let coupled = value.opt("counting").map_or_else(Vec::new, |counting| {
+        let list = counting.map(&["coupled"]).get("coupled").items();
+        list.into_iter()
+            .filter_map(|one| coupling(one, joints))
+            .collect()
+    });
+    let reach = value
+        .opt("reach")
+        .map(|reach| reach.sized(Bound::Length, length));
+    About {
+        reach,
+        sources: texts("sources"),
+        notes: texts("notes"),
+        coupled,
+    }
+}
+
+fn coupling(value: DocumentNode, joints: usize) -> Option<CountedCoupling> {
+    let value = value.map(&["joint", "by", "ratio"]);
+    let ratio = value.get("ratio").sized(Bound::Factor, Unit::One);
+    Some(CountedCoupling {
+        joint: value.get("joint").joint(joints)?,
+        by: value.get("by").joint(joints)?,
+        ratio,
+    })
 }

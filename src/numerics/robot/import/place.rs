@@ -183,6 +183,11 @@ impl<'a> DocumentNode<'a> {
             Content::Missing => self.child(None, path),
         }
     }
+    /// The value of a key, if there is something other than null.
+    pub(crate) fn opt(&self, key: &str) -> Option<Self> {
+        let value = self.get(key);
+        value.node().is_some().then_some(value)
+    }
     pub(crate) fn items(&self) -> Vec<Self> {
         match self.value() {
             Some(YamlValue::List(items)) => items

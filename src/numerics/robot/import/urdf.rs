@@ -2,7 +2,7 @@
 //! `origin` from the parent link's frame, its `axis` in its own. What hangs rigidly on a moved link adds to that link's mass;
 //! branches that move by themselves (a gripper) add as they are at their zero. Mimic, floating and planar joints are refused.
 
-use super::screws::unit;
+use super::kinematics::unit;
 use super::{ChainBody, ChainJoint, FrameChain, RobotFileText, inertia};
 use crate::description::JointKind;
 use crate::error::{Error, Fault, Result, did_you_mean};
@@ -37,10 +37,14 @@ struct Reader<'a> {
     notes: Vec<String>,
 }
 
+fn parse(file: RobotFileText<'_>) -> Result<Document<'_>> {
+    Document::parse(file.text)
+        .map_err(|e| Error::spec(file.label, format!("not readable as XML: {e}")))
+}
+
 /// Reads the chain from `base` to `tip`; fails with every fault found, each with its line.
 pub(super) fn read(file: RobotFileText, base: &str, tip: &str) -> Result<FrameChain> {
-    let document = Document::parse(file.text)
-        .map_err(|e| Error::spec(file.label, format!("not readable as XML: {e}")))?;
+    let document = parse(file)?;
     let mut reader = Reader {
         label: file.label,
         document: &document,
@@ -57,16 +61,13 @@ pub(super) fn read(file: RobotFileText, base: &str, tip: &str) -> Result<FrameCh
 /// The first link of the chain of a URDF that ends at `tip`, and which of its joints slide: the link `base_link` where it stands on the way,
 /// else the one that nothing carries. Fails with every fault of the file.
 pub fn outline(file: RobotFileText, tip: &str) -> Result<UrdfOutline> {
-    let document = Document::parse(file.text)
-        .map_err(|e| Error::spec(file.label, format!("not readable as XML: {e}")))?;
+    let document = parse(file)?;
     let joints = document
         .root_element()
         .children()
         .filter(|node| node.has_tag_name("joint"));
     let end = |joint: &Node, name: &str| {
-        joint
-            .children()
-            .find(|node| node.has_tag_name(name))
+        element(*joint, name)
             .and_then(|node| node.attribute("link"))
             .map(String::from)
     };
@@ -93,6 +94,11 @@ pub fn outline(file: RobotFileText, tip: &str) -> Result<UrdfOutline> {
         sliding,
         notes: chain.notes,
     })
+}
+
+/// The first element of that name in another one.
+fn element<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
+    node.children().find(|child| child.has_tag_name(name))
 }
 
 impl<'a> Reader<'a> {
@@ -257,7 +263,7 @@ impl<'a> Reader<'a> {
             let Some(kind) = self.kind(joint) else {
                 continue;
             };
-            let axis = match joint.node.children().find(|node| node.has_tag_name("axis")) {
+            let axis = match element(joint.node, "axis") {
                 None => Vector3::x(),
                 Some(node) => Vector3::from(self.numbers(node, "xyz", [1.0, 0.0, 0.0], None)),
             };
@@ -291,11 +297,7 @@ impl<'a> Reader<'a> {
 
     fn kind(&mut self, joint: &UrdfJoint) -> Option<JointKind> {
         let name = joint.name;
-        if let Some(mimic) = joint
-            .node
-            .children()
-            .find(|node| node.has_tag_name("mimic"))
-        {
+        if let Some(mimic) = element(joint.node, "mimic") {
             self.fault(mimic, format!("joint `{name}` mimics another joint; expected a serial chain of independent joints"));
             return None;
         }
@@ -314,10 +316,7 @@ impl<'a> Reader<'a> {
     }
 
     fn limits(&mut self, joint: &UrdfJoint<'a>) -> Option<[f64; 2]> {
-        let node = joint
-            .node
-            .children()
-            .find(|node| node.has_tag_name("limit"))?;
+        let node = element(joint.node, "limit")?;
         if joint.node.attribute("type") == Some("continuous")
             || !node.has_attribute("lower") && !node.has_attribute("upper")
         {
@@ -355,10 +354,7 @@ impl<'a> Reader<'a> {
         // Every link has one parent and lies below `link`, so this ends.
         let mut open = vec![(link, frame)];
         while let Some((link, frame)) = open.pop() {
-            if let Some(inertial) = links[link]
-                .children()
-                .find(|node| node.has_tag_name("inertial"))
-            {
+            if let Some(inertial) = element(links[link], "inertial") {
                 parts.push(self.part(link, inertial, frame));
             }
             for joint in joints.values().filter(|joint| joint.parent == link) {
@@ -406,9 +402,7 @@ impl<'a> Reader<'a> {
                 format!("link `{link}`: expected a mass in kg, not less than 0, found {mass}"),
             );
         }
-        let tensor = inertial
-            .children()
-            .find(|node| node.has_tag_name("inertia"));
+        let tensor = element(inertial, "inertia");
         let moments = tensor.map(|node| {
             let moments = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"].map(|name| {
                 self.numbers(
@@ -435,7 +429,7 @@ impl<'a> Reader<'a> {
     }
 
     fn child(&mut self, node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
-        let found = node.children().find(|child| child.has_tag_name(name));
+        let found = element(node, name);
         if found.is_none() {
             self.fault(
                 node,
@@ -457,7 +451,7 @@ impl<'a> Reader<'a> {
     }
 
     fn origin(&mut self, node: Node<'a, 'a>) -> Isometry3<f64> {
-        let Some(origin) = node.children().find(|child| child.has_tag_name("origin")) else {
+        let Some(origin) = element(node, "origin") else {
             return Isometry3::identity();
         };
         let [roll, pitch, yaw] = self.numbers(origin, "rpy", [0.0; 3], Some(Bound::Angle));
