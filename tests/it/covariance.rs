@@ -4,7 +4,7 @@ use crate::fixture::{self, fit_all};
 use crate::identify::{GEOMETRY, model, recording};
 use calib::compensate::{Circumstance, IdentifiedArm, Scatter, Uncertainty};
 use calib::effect::Load;
-use calib::estimate::{FitOptions, Fitted, Model, align, fit};
+use calib::estimate::{Fitted, Model, align, fit};
 use calib::robot::Measurements;
 use calib::table::{CovarianceTable, Parameters, Table};
 
@@ -107,14 +107,7 @@ fn what_an_earlier_step_estimated_stays_in_the_table_of_a_later_one() {
     let joints: Vec<usize> = (0..model.x.len())
         .filter(|k| model.stack.specs()[*k].name.starts_with("joint_offset"))
         .collect();
-    let (model, again) = fit(
-        &model,
-        &data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &joints,
-        },
-    );
+    let (model, again) = fit(&model, &data, &rows, &joints);
     let second = CovarianceTable::of(&model, &again, Some(&first));
     let is_offset = |name: &str| name.starts_with("joint_offset");
     let mixed = |table: &CovarianceTable| {

@@ -2,7 +2,7 @@
 
 use calib::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use calib::diagnose::{Diagnosis, Question, diagnose};
-use calib::estimate::{FitOptions, Fitted, Model, fit, gauge};
+use calib::estimate::{Fitted, Model, fit, gauge};
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::robot::{Measurements, RobotModel};
 use std::collections::BTreeMap;
@@ -173,7 +173,7 @@ pub fn robot_of(text: &str) -> RobotDescription {
 pub fn fit_all(start: &Model, data: &Measurements, rows: &[usize]) -> (Model, Fitted) {
     let candidates: Vec<usize> = (0..start.x.len()).collect();
     let candidates = &candidates;
-    fit(start, data, &FitOptions { rows, candidates })
+    fit(start, data, rows, candidates)
 }
 
 pub fn all_rows(data: &Measurements) -> Vec<usize> {

@@ -10,7 +10,7 @@ mod tables;
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
-use calib::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, fit, gauge};
+use calib::estimate::{Fitted, Known, Model, ParameterStatus, Prior, fit, gauge};
 use calib::robot::{
     MeasurementSetup, Measurements, Named, PointReadings, Readings, RobotModel, Target,
 };
@@ -179,14 +179,7 @@ impl Cell {
         let mut model = model(&robot, base, &effects);
         model.known = known(&model);
         let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
-        fit(
-            &model,
-            data,
-            &FitOptions {
-                rows: &rows,
-                candidates: &candidates,
-            },
-        )
+        fit(&model, data, &rows, &candidates)
     }
 }
 
@@ -285,14 +278,7 @@ fn targets_known_from_elsewhere_show_the_zero_of_the_last_joint() {
         );
     }
     let candidates: Vec<usize> = (0..specs.len()).collect();
-    let (_, fitted) = fit(
-        &model,
-        &data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        },
-    );
+    let (_, fitted) = fit(&model, &data, &rows, &candidates);
     let zero = specs
         .iter()
         .position(|spec| spec.name == "joint_offset.j6")

@@ -3,7 +3,7 @@
 use crate::fixture;
 use calib::description::RobotDescription;
 use calib::effect::{EffectContext, EffectStack, Load, arm_effect};
-use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Stop, align, fit};
+use calib::estimate::{Fitted, Model, ParameterStatus, Stop, align, fit};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
@@ -124,14 +124,7 @@ fn identify(
     let base = align(&robot, data, rows);
     let model = model(&robot, base, effects);
     let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
-    fit(
-        &model,
-        data,
-        &FitOptions {
-            rows,
-            candidates: &candidates,
-        },
-    )
+    fit(&model, data, rows, &candidates)
 }
 
 fn rms(model: &Model, data: &Measurements, rows: impl Iterator<Item = usize>) -> f64 {

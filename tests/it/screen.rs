@@ -3,7 +3,7 @@
 use crate::fixture;
 use calib::description::RobotDescription;
 use calib::effect::{EffectContext, EffectStack, Load, arm_effect};
-use calib::estimate::{FitOptions, Model, Screening, SuspectKind, align, fit, fit_screened};
+use calib::estimate::{Model, Screening, SuspectKind, align, fit, fit_screened};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
@@ -115,15 +115,8 @@ impl Trial {
             .map(|row| usize::from(row % 4 == 3))
             .collect();
         let rows = self.fit_rows();
-        let (model, _, screening) = fit_screened(
-            &start,
-            &self.data,
-            &FitOptions {
-                rows: &rows,
-                candidates: &candidates,
-            },
-            &set,
-        );
+        let (model, _, screening) =
+            fit_screened(&start, &self.data, &rows, &candidates, Some(&set));
         (model, screening)
     }
 
@@ -142,15 +135,7 @@ impl Trial {
         let start = self.start();
         let candidates: Vec<usize> = (0..start.x.len()).collect();
         let rows = self.fit_rows();
-        fit(
-            &start,
-            &self.data,
-            &FitOptions {
-                rows: &rows,
-                candidates: &candidates,
-            },
-        )
-        .0
+        fit(&start, &self.data, &rows, &candidates).0
     }
 
     /// `count` different rows.

@@ -16,9 +16,7 @@ use crate::identify::{GEOMETRY, model, normal};
 use crate::recorded::made;
 use calib::description::RobotDescription;
 use calib::effect::names;
-use calib::estimate::{
-    FitOptions, Fitted, Known, KnownLength, Model, ParameterStatus, Prior, fit, gauge,
-};
+use calib::estimate::{Fitted, Known, KnownLength, Model, ParameterStatus, Prior, fit, gauge};
 use calib::robot::{Measurements, Named, RobotModel};
 use calib::stage::{Simulate, SimulateReads, Stage};
 use calib::table::{Recording, Robot};
@@ -263,14 +261,7 @@ fn fitted_with(
         })
         .collect();
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(
-        &model,
-        data,
-        &FitOptions {
-            rows,
-            candidates: &candidates,
-        },
-    )
+    fit(&model, data, rows, &candidates)
 }
 
 /// Where a fit has the sockets, m.

@@ -25,7 +25,7 @@ pub mod threads;
 pub use change::{ParameterChange, changes};
 pub use contacts::{Reseat, placed_by_left_out, reseated};
 pub use covariance::{Covariance, tail};
-pub use fit::{CLEARLY, FitOptions, Fitted, ParameterStatus, Session, fit, seen};
+pub use fit::{CLEARLY, Fitted, ParameterStatus, Session, fit, seen};
 pub use folds::{
     FoldKind, Folds, NearbyFits, cross_validate, dealt, fold_poses, gather, leave_one_out,
 };

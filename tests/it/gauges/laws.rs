@@ -4,7 +4,7 @@ use super::{SIGMA, THREE};
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
-use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
+use calib::estimate::{Fitted, Model, ParameterStatus, fit, gauge};
 use calib::observation::{KINDS, MeasurementKind, RowView, Weight, rank};
 use calib::robot::{
     Anchor, MeasurementSetup, Measurements, PointReadings, Readings, RobotModel, Target,
@@ -79,14 +79,7 @@ impl Truth {
         let candidates: Vec<usize> = (0..model.x.len())
             .filter(|k| asked(&model.stack.specs()[*k].name))
             .collect();
-        fit(
-            &model,
-            data,
-            &FitOptions {
-                rows: &rows,
-                candidates: &candidates,
-            },
-        )
+        fit(&model, data, &rows, &candidates)
     }
 
     /// How the target is turned in every row, by differences of points.

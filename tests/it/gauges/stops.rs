@@ -6,9 +6,7 @@ use crate::answer::has;
 use crate::fixture::{self, all_rows, diagnosed, question};
 use crate::identify::{GEOMETRY, model, normal};
 use calib::diagnose::diagnose;
-use calib::estimate::{
-    FitOptions, Poses, Session, SuspectKind, cross_validate, fit_screened, gauge,
-};
+use calib::estimate::{Poses, Session, SuspectKind, cross_validate, fit_screened, gauge};
 use calib::robot::{Measurements, Named, NoiseBasis, RobotModel};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -146,11 +144,8 @@ fn a_pose_with_wrong_joints_is_set_aside_with_all_its_targets_and_no_event() {
     .unwrap();
     let model = model(&robot, base, &GEOMETRY);
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    let options = FitOptions {
-        rows: &all,
-        candidates: &candidates,
-    };
-    let (_, _, screening) = fit_screened(&model, &data, &options, &vec![0; all.len()]);
+    let set = vec![0; all.len()];
+    let (_, _, screening) = fit_screened(&model, &data, &all, &candidates, Some(&set));
     let of_kind = |kind: SuspectKind| -> Vec<usize> {
         screening
             .suspects
