@@ -33,6 +33,7 @@ pub use gauge::{align, align_points, gauge};
 pub use levenberg::{Iteration, Stop};
 pub use model::{Bounds, CONFLICT, Known, KnownLength, Model, Prior, PriorCheck, RowError};
 pub use observe::Visibility;
+pub(crate) use problem::columns;
 pub use remedy::{Remedy, remedies};
 pub use repeats::{Poses, Repeated, autocorrelation_time, spread};
 pub use scale::{ArmScale, ErrorScale, known_places, noise, scale};
