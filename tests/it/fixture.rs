@@ -176,6 +176,25 @@ pub fn fit_all(start: &Model, data: &Measurements, rows: &[usize]) -> (Model, Fi
     fit(start, data, rows, candidates)
 }
 
+/// Root mean square.
+pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, count) = values.into_iter().fold((0.0, 0.0), |(sum, count), value| {
+        (sum + value * value, count + 1.0)
+    });
+    f64::sqrt(sum / count)
+}
+
+/// The largest of sizes.
+pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, f64::max)
+}
+
+/// How far each predicted point is from those of the rows, m.
+pub fn misses(model: &Model, data: &Measurements) -> Vec<f64> {
+    let pairs = model.predict(data).into_iter().zip(&data.points.position);
+    pairs.map(|(a, b)| (a - b).norm()).collect()
+}
+
 pub fn all_rows(data: &Measurements) -> Vec<usize> {
     (0..data.rows()).collect()
 }

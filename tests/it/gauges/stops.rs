@@ -3,7 +3,7 @@
 use super::laws::select;
 use super::{Cell, SIGMA, THREE};
 use crate::answer::has;
-use crate::fixture::{self, all_rows, diagnosed, question};
+use crate::fixture::{self, all_rows, diagnosed, question, rms};
 use crate::identify::{GEOMETRY, model, normal};
 use calib::diagnose::diagnose;
 use calib::estimate::{Poses, Session, SuspectKind, cross_validate, fit_screened, gauge};
@@ -107,10 +107,7 @@ fn folds_never_part_the_targets_of_a_pose() {
             fitted: &fitted,
         };
         let folds = cross_validate(&session, 5, 3).unwrap();
-        let rms = |errors: &[f64]| {
-            (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
-        };
-        [rms(&folds.random), rms(&folds.blocks)]
+        [rms(folds.random), rms(folds.blocks)]
     };
     // Rows of a pose share what its joints missed: seen beside the row, it would be predicted better. Logs that differ in the last
     // digits part none.
