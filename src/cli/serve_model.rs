@@ -227,7 +227,7 @@ fn predicted(robot: &Robot, asked: &[Result<Asked, String>], model: &Model) -> V
                 let mut answer = json!({ "point_mm": place(&circumstance, &mut q) });
                 let beyond = coverage
                     .iter()
-                    .flat_map(|all| all.beyond(&q, &circumstance));
+                    .flat_map(|all| all.beyond(&q, circumstance.payload, circumstance.temperature));
                 let remarks: Vec<String> = beyond.map(|beyond| beyond.to_string()).collect();
                 if !remarks.is_empty() {
                     answer["remark"] = json!(remarks.join("; "));

@@ -10,9 +10,7 @@ pub use standing::{
 };
 pub use torques::IdentifiedTorques;
 
-use crate::compensate::{
-    Coverage, Gate, GateLimits, IdentifiedArm, Scatter, Uncertainty, load_matters,
-};
+use crate::compensate::{Gate, GateLimits, IdentifiedArm, Scatter, Uncertainty, load_matters};
 use crate::description::RobotDescription;
 use crate::effect::Load;
 use crate::error::{Error, Fault, Result, instead};
@@ -20,7 +18,7 @@ use crate::estimate::network::Correction;
 use crate::estimate::{Covariance, Model};
 use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
 use crate::raw::ending;
-use crate::robot::{JointConvention, Measurements, RobotModel};
+use crate::robot::{JointConvention, Measurements, RobotModel, Visited};
 use crate::stage::{DeclaredStage, Diagnose};
 use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
@@ -458,11 +456,9 @@ impl IdentifiedModel {
     }
 
     /// What the uncertainty of a target is made of; none where a table alone was given.
-    pub(crate) fn coverage(&self) -> Option<Coverage> {
-        self.data
-            .as_ref()
-            .filter(|data| data.rows() > 0)
-            .map(Coverage::of)
+    pub(crate) fn coverage(&self) -> Option<Visited> {
+        let data = self.data.as_ref().filter(|data| data.rows() > 0)?;
+        Some(Visited::of(data, &(0..data.rows()).collect::<Vec<_>>()))
     }
 
     /// How far a commanded position may be off, from the rows that the model was fitted to; none for a table of parameters alone.

@@ -2,7 +2,7 @@
 
 use crate::effect::{Load, names};
 use crate::error::{Place, Result};
-use crate::estimate::{FitOptions, Prior, align, changes};
+use crate::estimate::{Prior, align, changes};
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::doubtful::{FittedRows, fit_rows};
 use crate::stage::settings::Repeatability;
@@ -208,18 +208,7 @@ impl Compare {
         }
         let candidates: Vec<usize> = (0..model.x.len()).collect();
         self.repeatability.apply(&model, &mut data, &rows, context);
-        let whole = Split::default();
-        let options = FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        };
-        let fit = fit_rows(
-            &model,
-            &data,
-            &options,
-            split.unwrap_or(&whole),
-            split.is_some(),
-        );
+        let fit = fit_rows(&model, &data, &rows, &candidates, split);
         Ok(FittedRecording { data, fit })
     }
 }

@@ -6,8 +6,8 @@
 use crate::compensate::{IdentifiedArm, Scatter, Uncertainty, doubts};
 use crate::error::{counted, first_of};
 use crate::estimate::{
-    Covariance, FitOptions, Fitted, Model, ParameterStatus, Remedy, Screening, Session, Suspect,
-    SuspectKind, fit, fit_screened, remedies,
+    Covariance, Fitted, Model, ParameterStatus, Remedy, Screening, Session, Suspect, SuspectKind,
+    fit_screened, remedies,
 };
 use crate::robot::Measurements;
 use crate::stage::Context;
@@ -189,28 +189,16 @@ impl FittedRows {
     }
 }
 
-/// Fits, and with `screen` sets aside what does not belong.
+/// Fits, and with a split whose sets are `screened` sets aside what does not belong.
 pub(crate) fn fit_rows(
     start: &Model,
     data: &Measurements,
-    options: &FitOptions,
-    split: &Split,
-    screen: bool,
+    rows: &[usize],
+    candidates: &[usize],
+    screened: Option<&Split>,
 ) -> FittedRows {
-    let (model, fitted, screening) = if screen {
-        fit_screened(start, data, options, &numbered(split))
-    } else {
-        let (model, fitted) = fit(start, data, options);
-        let kept = options.rows.to_vec();
-        (
-            model,
-            fitted,
-            Screening {
-                kept,
-                ..Screening::default()
-            },
-        )
-    };
+    let set = screened.map(numbered);
+    let (model, fitted, screening) = fit_screened(start, data, rows, candidates, set.as_deref());
     FittedRows {
         model,
         fitted,

@@ -94,8 +94,8 @@ macro_rules! identification {
             ) -> crate::stage::doubtful::FittedRows {
                 let crate::stage::identified::RowsToFit { data, rows, .. } = asked;
                 asked.repeatability = self.repeatability.apply(model, data, rows, context);
-                let options = crate::estimate::FitOptions { rows, candidates };
-                crate::stage::doubtful::fit_rows(model, data, &options, asked.split, self.screen)
+                let screened = self.screen.then_some(asked.split);
+                crate::stage::doubtful::fit_rows(model, data, rows, candidates, screened)
             }
 
             /// Faults of the settings that all identifications share; `example` names a set.

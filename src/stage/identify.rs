@@ -8,8 +8,7 @@ use crate::diagnose::{Question, wrong_setup};
 use crate::effect::{Effect, EffectContext, EffectStack, arm_effect, identified, names};
 use crate::error::{Error, Place, Result, instead, listed};
 use crate::estimate::{
-    FitOptions, Fitted, Model, ParameterStatus, Session, fit, gauge, known_places,
-    placed_by_left_out,
+    Fitted, Model, ParameterStatus, Session, fit, gauge, known_places, placed_by_left_out,
 };
 use crate::observation;
 use crate::robot::{Measurements, RobotModel};
@@ -354,14 +353,7 @@ fn question_ratios(fitting: &Fitting, setting: &EffectContext, context: &Context
     let candidates: Vec<usize> = (0..rival.stack.specs().len())
         .filter(|k| !fitting.held.contains(k))
         .collect();
-    let (rival, refitted) = fit(
-        &rival,
-        data,
-        &FitOptions {
-            rows,
-            candidates: &candidates,
-        },
-    );
+    let (rival, refitted) = fit(&rival, data, rows, &candidates);
     let gain = evidence(fitted, data, rows) - evidence(&refitted, data, rows);
     if gain > DECISIVE {
         context.warn(format!(

@@ -5,7 +5,7 @@
 use crate::diagnose::BASE;
 use crate::effect::{Load, names};
 use crate::error::{Place, Result, counted};
-use crate::estimate::{FitOptions, Model, Screening, align_points, fit};
+use crate::estimate::{Model, Screening, align_points, fit};
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::doubtful::{FittedRows, fit_rows};
 use crate::stage::identified::{Fitting, Identified, RowsToFit};
@@ -153,11 +153,8 @@ impl Transfer {
         } = asked;
         let start = self.placed(&geometry, reads, asked)?;
         let candidates: Vec<usize> = start.stack.parameters_of(names::BASE_FRAME).collect();
-        let options = FitOptions {
-            rows,
-            candidates: &candidates,
-        };
-        let fit = fit_rows(&start, data, &options, split, self.screen);
+        let screened = self.screen.then_some(*split);
+        let fit = fit_rows(&start, data, rows, &candidates, screened);
         let sides = sides(data, rows, [&carried.fit.screening, &fit.screening]);
         let visited =
             source.map(|source| VisitedCells::of(&source.recording.measurements(), &source.rows));
@@ -282,11 +279,8 @@ impl<'a> CarriedFrom<'a> {
             load,
         )?;
         let candidates: Vec<usize> = (0..start.x.len()).collect();
-        let options = FitOptions {
-            rows: &self.rows,
-            candidates: &candidates,
-        };
-        let (model, fitted) = fit(&start, &self.recording.measurements(), &options);
+        let data = self.recording.measurements();
+        let (model, fitted) = fit(&start, &data, &self.rows, &candidates);
         Ok(Parameters::of(&self.stage, &model, &fitted, &[], None))
     }
 }

@@ -88,6 +88,13 @@ impl Answer {
     pub fn ok(self) -> String {
         self.code(0).out
     }
+    /// Why a run that was refused wrote nothing.
+    #[track_caller]
+    pub fn refused(self) -> String {
+        let refused = self.code(10);
+        assert_eq!(refused.out, "", "{}", refused.err);
+        refused.err
+    }
     /// The document that it printed, whatever its code.
     #[track_caller]
     pub fn json(&self) -> Value {

@@ -1,15 +1,15 @@
 //! The covariance of a fit as a table: the same numbers on the way to and from it, and what `compensate` makes of it.
 
-use crate::fixture::{self, fit_all};
+use crate::fixture::{self, all_rows, fit_all};
 use crate::identify::{GEOMETRY, model, recording};
 use calib::compensate::{Circumstance, IdentifiedArm, Scatter, Uncertainty};
 use calib::effect::Load;
-use calib::estimate::{FitOptions, Fitted, Model, align, fit};
+use calib::estimate::{Fitted, Model, align, fit};
 use calib::robot::Measurements;
-use calib::table::{CovarianceTable, Parameters, Table};
+use calib::table::{CovarianceRow, CovarianceTable, Parameters, Table};
 
 fn fitted(data: &Measurements, robot: &calib::robot::RobotModel) -> (Model, Fitted) {
-    let rows: Vec<usize> = (0..data.rows()).collect();
+    let rows = all_rows(data);
     let model = model(robot, align(robot, data, &rows), &GEOMETRY);
     fit_all(&model, data, &rows)
 }
@@ -27,12 +27,12 @@ fn the_table_has_the_variances_of_the_parameters_and_every_pair_once() {
         .collect();
     assert!(free.len() > 20);
     assert_eq!(table.0.len(), free.len() * (free.len() + 1) / 2);
+    let same = |name: &str| {
+        let is = |pair: &&CovarianceRow| pair.parameter == name && pair.other == name;
+        table.0.iter().find(is).unwrap()
+    };
     for row in &free {
-        let row_of = table
-            .0
-            .iter()
-            .find(|pair| pair.parameter == row.name && pair.other == row.name)
-            .unwrap();
+        let row_of = same(&row.name);
         let sigma = row.sigma.unwrap();
         assert!(
             (row_of.covariance.sqrt() / sigma - 1.0).abs() < 1e-9,
@@ -43,15 +43,8 @@ fn the_table_has_the_variances_of_the_parameters_and_every_pair_once() {
         assert_eq!(row_of.unit, format!("{0} {0}", row.unit));
     }
     for pair in &table.0 {
-        let variance = |name: &str| {
-            table
-                .0
-                .iter()
-                .find(|row| row.parameter == name && row.other == name)
-                .unwrap()
-                .covariance
-        };
-        let bound = (variance(&pair.parameter) * variance(&pair.other)).sqrt();
+        let [one, other] = [same(&pair.parameter), same(&pair.other)];
+        let bound = (one.covariance * other.covariance).sqrt();
         assert!(
             (pair.covariance - pair.correlation * bound).abs() <= 1e-9 * bound,
             "{pair:?}"
@@ -103,26 +96,16 @@ fn what_an_earlier_step_estimated_stays_in_the_table_of_a_later_one() {
     let (data, truth) = recording(&fixture::spherical(), &GEOMETRY, 60, 5);
     let (model, fitted) = fitted(&data, &truth.robot);
     let first = CovarianceTable::of(&model, &fitted, None);
-    let rows: Vec<usize> = (0..data.rows()).collect();
     let joints: Vec<usize> = (0..model.x.len())
         .filter(|k| model.stack.specs()[*k].name.starts_with("joint_offset"))
         .collect();
-    let (model, again) = fit(
-        &model,
-        &data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &joints,
-        },
-    );
+    let (model, again) = fit(&model, &data, &all_rows(&data), &joints);
     let second = CovarianceTable::of(&model, &again, Some(&first));
     let is_offset = |name: &str| name.starts_with("joint_offset");
+    let offsets = |row: &CovarianceRow| [&row.parameter, &row.other].map(|name| is_offset(name));
     let mixed = |table: &CovarianceTable| {
-        table
-            .0
-            .iter()
-            .filter(|row| is_offset(&row.parameter) != is_offset(&row.other))
-            .count()
+        let rows = table.0.iter().map(offsets);
+        rows.filter(|[one, other]| one != other).count()
     };
     assert!(mixed(&first) > 0);
     assert_eq!(
@@ -131,12 +114,8 @@ fn what_an_earlier_step_estimated_stays_in_the_table_of_a_later_one() {
         "steps of their own are held to be independent"
     );
     let others = |table: &CovarianceTable| {
-        table
-            .0
-            .iter()
-            .filter(|row| !is_offset(&row.parameter) && !is_offset(&row.other))
-            .cloned()
-            .collect::<Vec<_>>()
+        let rows = table.0.iter().filter(|row| offsets(row) == [false; 2]);
+        rows.cloned().collect::<Vec<_>>()
     };
     assert_eq!(others(&first), others(&second));
     assert!(second.of_model(&model).is_some());

@@ -17,7 +17,7 @@ use crate::desk::shared;
 use crate::recorded::Example;
 use calib::effect::{Form, Load};
 use calib::estimate::choose::{Site, median};
-use calib::estimate::{FitOptions, Model, fit};
+use calib::estimate::{Model, fit};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::table::{ParameterRow, Parameters, Prediction, Recording, Robot};
 use nalgebra::Vector3;
@@ -537,14 +537,7 @@ fn left(truth: &Model, other: &Model, free: &[usize], data: &Measurements) -> f6
     let mut data = data.clone();
     data.points.position = truth.predict(&data);
     let rows: Vec<usize> = (0..data.rows()).collect();
-    let (fitted, _) = fit(
-        other,
-        &data,
-        &FitOptions {
-            rows: &rows,
-            candidates: free,
-        },
-    );
+    let (fitted, _) = fit(other, &data, &rows, free);
     let off = fitted
         .predict(&data)
         .into_iter()

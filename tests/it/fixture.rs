@@ -2,7 +2,7 @@
 
 use calib::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use calib::diagnose::{Diagnosis, Question, diagnose};
-use calib::estimate::{FitOptions, Fitted, Model, fit, gauge};
+use calib::estimate::{Fitted, Model, fit, gauge};
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::robot::{Measurements, RobotModel};
 use std::collections::BTreeMap;
@@ -173,7 +173,26 @@ pub fn robot_of(text: &str) -> RobotDescription {
 pub fn fit_all(start: &Model, data: &Measurements, rows: &[usize]) -> (Model, Fitted) {
     let candidates: Vec<usize> = (0..start.x.len()).collect();
     let candidates = &candidates;
-    fit(start, data, &FitOptions { rows, candidates })
+    fit(start, data, rows, candidates)
+}
+
+/// Root mean square.
+pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, count) = values.into_iter().fold((0.0, 0.0), |(sum, count), value| {
+        (sum + value * value, count + 1.0)
+    });
+    f64::sqrt(sum / count)
+}
+
+/// The largest of sizes.
+pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, f64::max)
+}
+
+/// How far each predicted point is from those of the rows, m.
+pub fn misses(model: &Model, data: &Measurements) -> Vec<f64> {
+    let pairs = model.predict(data).into_iter().zip(&data.points.position);
+    pairs.map(|(a, b)| (a - b).norm()).collect()
 }
 
 pub fn all_rows(data: &Measurements) -> Vec<usize> {

@@ -1,35 +1,38 @@
 //! Cross-validation: as honest as held-out points, repeats together, and the same on any number of threads.
 
-use crate::answer::has;
-use crate::fixture::{self, fit_all};
+use crate::answer::{has, starts_with};
+use crate::fixture::{self, all_rows, fit_all, misses, rms};
 use crate::identify::{GEOMETRY, SIGMA, model, recording};
 use crate::recorded::{labelled, made};
 use crate::sr210d::{example, experiment};
 use calib::estimate::{Fitted, Folds, Model, Session, align, cross_validate, leave_one_out};
 use calib::robot::{Measurements, RobotModel};
 use calib::stage::{FoldSetting, Identify, Stage, Validate, ValidateReads};
-use calib::table::{Observability, Prediction, Statistics};
+use calib::table::{Prediction, Statistics};
 
 fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
+    identify_rows(data, effects, &all_rows(data))
+}
+
+fn identify_rows(data: &Measurements, effects: &[&str], rows: &[usize]) -> (Model, Fitted) {
     let robot = RobotModel::new(fixture::offset_wrist());
-    let rows: Vec<usize> = (0..data.rows()).collect();
-    let model = model(&robot, align(&robot, data, &rows), effects);
-    fit_all(&model, data, &rows)
+    let model = model(&robot, align(&robot, data, rows), effects);
+    fit_all(&model, data, rows)
+}
+
+/// What is made of a fit of these effects to all rows.
+fn of_session<T>(data: &Measurements, effects: &[&str], make: impl Fn(&Session) -> T) -> T {
+    let (model, fitted) = identify(data, effects);
+    make(&Session {
+        data,
+        rows: &all_rows(data),
+        model: &model,
+        fitted: &fitted,
+    })
 }
 
 fn folds(data: &Measurements, effects: &[&str], count: usize) -> Option<Folds> {
-    let (model, fitted) = identify(data, effects);
-    let rows: Vec<usize> = (0..data.rows()).collect();
-    cross_validate(
-        &Session {
-            data,
-            rows: &rows,
-            model: &model,
-            fitted: &fitted,
-        },
-        count,
-        7,
-    )
+    of_session(data, effects, |session| cross_validate(session, count, 7))
 }
 
 /// Every row, and every row again.
@@ -42,10 +45,6 @@ fn twice(once: &Measurements) -> Measurements {
     twice
 }
 
-fn rms(errors: &[f64]) -> f64 {
-    (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
-}
-
 #[test]
 fn folds_of_a_complete_model_show_the_noise_and_what_its_parameters_cost() {
     let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
@@ -55,25 +54,18 @@ fn folds_of_a_complete_model_show_the_noise_and_what_its_parameters_cost() {
         let found = folds(&data, &effects, 5).unwrap();
         random.extend(found.random);
         blocks.extend(found.blocks);
-        let (model, _) = identify(&data, &effects);
-        training.extend(
-            model
-                .predict(&data)
-                .iter()
-                .zip(&data.points.position)
-                .map(|(predicted, measured)| (measured - predicted).norm()),
-        );
+        training.extend(misses(&identify(&data, &effects).0, &data));
     }
     // 33 parameters from 64 points of three values.
     let expected = SIGMA * 3f64.sqrt() * f64::sqrt(1.0 + 33.0 / (192.0 - 34.0));
-    for (name, errors) in [("random", &random), ("blocks", &blocks)] {
+    for (name, errors) in [("random", random), ("blocks", blocks)] {
         let ratio = rms(errors) / expected;
         assert!(
             (0.96..1.06).contains(&ratio),
             "{name}: {ratio:.3} of what is expected"
         );
     }
-    assert!(rms(&training) < 0.95 * SIGMA * 3f64.sqrt());
+    assert!(rms(training) < 0.95 * SIGMA * 3f64.sqrt());
 }
 
 /// One step from the whole fit is as good as ten more fits: to 1 % of the noise, outliers among the rows or not.
@@ -84,19 +76,14 @@ fn a_fold_is_what_a_fit_without_its_rows_says() {
         let (mut data, _) = recording(&fixture::offset_wrist(), &effects, 80, seed);
         data.points.position[33].x += outlier;
         let found = folds(&data, &effects, 5).unwrap().blocks;
-        let robot = RobotModel::new(fixture::offset_wrist());
         let mut differences = Vec::new();
         for block in 0..5 {
             let kept: Vec<usize> = (0..80).filter(|row| row / 16 != block).collect();
-            let start = model(&robot, align(&robot, &data, &kept), &effects);
-            let (model, _) = fit_all(&start, &data, &kept);
-            let predicted = model.predict(&data);
-            differences.extend(
-                (16 * block..16 * (block + 1))
-                    .map(|row| found[row] - (data.points.position[row] - predicted[row]).norm()),
-            );
+            let refitted = misses(&identify_rows(&data, &effects, &kept).0, &data);
+            let rows = 16 * block..16 * (block + 1);
+            differences.extend(rows.map(|row| found[row] - refitted[row]));
         }
-        let off = rms(&differences) / (SIGMA * 3f64.sqrt());
+        let off = rms(differences) / (SIGMA * 3f64.sqrt());
         println!("folds against refits: {off:.1e} of the noise");
         assert!(off < 0.01, "outlier {outlier}: {off:.4} of the noise");
     }
@@ -112,12 +99,8 @@ fn rows_of_one_pose_are_never_on_both_sides() {
     );
     // A row whose twin was fitted would be predicted far better.
     for (one, two) in [(one.random, two.random), (one.blocks, two.blocks)] {
-        assert!(
-            (rms(&two) / rms(&one) - 1.0).abs() < 0.05,
-            "{:e} and {:e}",
-            rms(&two),
-            rms(&one)
-        );
+        let (one, two) = (rms(one), rms(two));
+        assert!((two / one - 1.0).abs() < 0.05, "{two:e} and {one:e}");
     }
 }
 
@@ -173,20 +156,11 @@ fn statistics_have_the_folds_of_fitted_rows_and_of_no_others() {
         .iter()
         .find(|row| row.set == "unloaded_fit")
         .unwrap();
-    let errors: Vec<f64> = prediction
-        .0
-        .iter()
-        .filter_map(|row| row.fold_error_mm)
-        .collect();
-    assert!(
-        row.fold_rms_mm
-            .is_some_and(|found| (found / rms(&errors) - 1.0).abs() < 1e-12)
-    );
-    assert!(row.fold_rms_mm > Some(row.rms_mm));
-    assert!(
-        row.fold_expected_mm
-            .is_some_and(|expected| (1.02..1.4).contains(&(expected / row.noise_rms_mm)))
-    );
+    let errors = prediction.0.iter().filter_map(|row| row.fold_error_mm);
+    let found = row.fold_rms_mm.unwrap();
+    assert!((found / rms(errors) - 1.0).abs() < 1e-12 && found > row.rms_mm);
+    let expected = row.fold_expected_mm.unwrap() / row.noise_rms_mm;
+    assert!((1.02..1.4).contains(&expected));
     let wrong = Identify {
         folds: FoldSetting::Parts(1),
         ..stage
@@ -204,24 +178,12 @@ fn statistics_have_the_folds_of_fitted_rows_and_of_no_others() {
 #[test]
 fn with_one_fold_a_pose_each_is_predicted_by_a_fit_to_all_others() {
     let (data, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 40, 240);
-    let one_out = |data: &Measurements| {
-        let (model, fitted) = identify(data, &GEOMETRY);
-        let rows: Vec<usize> = (0..data.rows()).collect();
-        leave_one_out(&Session {
-            data,
-            rows: &rows,
-            model: &model,
-            fitted: &fitted,
-        })
-    };
+    let one_out = |data: &Measurements| of_session(data, &GEOMETRY, leave_one_out);
     let found = one_out(&data).unwrap();
     assert_eq!((found.count, &found.random), (40, &found.blocks));
-    let robot = RobotModel::new(fixture::offset_wrist());
     for left in [0, 17, 39] {
         let kept: Vec<usize> = (0..40).filter(|row| *row != left).collect();
-        let start = model(&robot, align(&robot, &data, &kept), &GEOMETRY);
-        let (model, _) = fit_all(&start, &data, &kept);
-        let error = (data.points.position[left] - model.predict(&data)[left]).norm();
+        let error = misses(&identify_rows(&data, &GEOMETRY, &kept).0, &data)[left];
         assert!(
             (found.random[left] - error).abs() < 0.02 * SIGMA,
             "{left}: {:e} for {error:e}",
@@ -255,30 +217,19 @@ fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
             ..example("none").with("geometry")
         };
         let made = recorded.identify_by(&stage).unwrap();
-        let observability: Observability = made.get();
-        let value = |quantity: &str| {
-            observability
-                .0
-                .iter()
-                .find(|row| row.quantity == quantity)
-                .map(|row| row.value)
-        };
         let warned = made.warnings.lines().filter(|line| line.contains("cross"));
         let warned: Vec<String> = warned.map(Into::into).collect();
-        (value("folds"), value("unfolded"), warned)
+        (made.quantity("folds"), made.quantity("unfolded"), warned)
     };
     let each = run(FoldSetting::EachPose);
     let poses = each.0.unwrap();
     assert_eq!((each.1, each.2.len()), (None, 0));
     let (folds, unfolded, warned) = run(FoldSetting::Parts(100));
     assert_eq!((folds, unfolded), (None, Some(poses)));
-    assert!(
-        warned[0].starts_with(&format!("not cross-validated: {poses} poses in ")),
-        "{warned:?}"
+    starts_with(
+        &warned[0],
+        &format!("not cross-validated: {poses} poses in "),
     );
-    assert!(
-        warned[0].contains("allowed: two poses for each of 100 folds"),
-        "{warned:?}"
-    );
+    has(&warned[0], "allowed: two poses for each of 100 folds");
     assert_eq!(run(FoldSetting::Parts(0)), (None, None, Vec::new()));
 }

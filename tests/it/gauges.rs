@@ -2,15 +2,16 @@
 
 mod holder;
 mod lag;
-mod laws;
+pub mod laws;
 mod level;
 mod stops;
 mod tables;
 
-use crate::fixture;
+use crate::fixture::{self, fit_all, largest, misses, rms};
 use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
-use calib::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, fit, gauge};
+use calib::effect::ParameterSpec;
+use calib::estimate::{Fitted, Known, Model, ParameterStatus, Prior, gauge};
 use calib::robot::{
     MeasurementSetup, Measurements, Named, PointReadings, Readings, RobotModel, Target,
 };
@@ -178,15 +179,7 @@ impl Cell {
         let effects = [&["anchor"][..], &GEOMETRY].concat();
         let mut model = model(&robot, base, &effects);
         model.known = known(&model);
-        let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
-        fit(
-            &model,
-            data,
-            &FitOptions {
-                rows: &rows,
-                candidates: &candidates,
-            },
-        )
+        fit_all(&model, data, &rows)
     }
 }
 
@@ -194,28 +187,10 @@ fn nothing(_: &Model) -> BTreeMap<usize, Known> {
     BTreeMap::new()
 }
 
-fn free(fitted: &Fitted) -> usize {
-    fitted
-        .statuses
-        .iter()
-        .filter(|status| matches!(status, ParameterStatus::Free(_)))
-        .count()
-}
-
 /// Mean square of what predictions miss the truth by over what their sigma says.
 fn honesty(model: &Model, fitted: &Fitted, at: &Measurements) -> f64 {
-    let off: f64 = model
-        .predict(at)
-        .iter()
-        .zip(&at.points.position)
-        .map(|(a, b)| (a - b).norm_squared())
-        .sum();
-    let sigma = fitted
-        .covariance
-        .as_ref()
-        .unwrap()
-        .of_predictions(model, at);
-    off / sigma.iter().map(|sigma| sigma * sigma).sum::<f64>()
+    let covariance = fitted.covariance.as_ref().unwrap();
+    (rms(misses(model, at)) / rms(covariance.of_predictions(model, at))).powi(2)
 }
 
 const THREE: [(&str, [f64; 3]); 3] = [
@@ -232,19 +207,14 @@ fn every_target_adds_three_to_the_rank_and_their_places_come_out() {
         cell.disturb(&mut data);
         let (model, fitted) = cell.fit(&data, nothing);
         let name = &cell.description.name;
-        assert_eq!(free(&fitted), axes + 9, "{name}");
+        assert_eq!(fitted.free().len(), axes + 9, "{name}");
         assert!(
             fitted.clusters == 60,
             "{name}: rows of a pose stay together, {} clusters",
             fitted.clusters
         );
         let fresh = cell.rows(60, 1);
-        let off = model
-            .predict(&fresh)
-            .iter()
-            .zip(&fresh.points.position)
-            .map(|(a, b)| (a - b).norm())
-            .fold(0.0, f64::max);
+        let off = largest(misses(&model, &fresh));
         assert!(off < 5.0 * SIGMA, "{name}: new poses are off by {off:e} m");
     }
 }
@@ -268,43 +238,20 @@ fn targets_known_from_elsewhere_show_the_zero_of_the_last_joint() {
     .unwrap();
     let mut model = model(&robot, base, &GEOMETRY);
     let specs = model.stack.specs().to_vec();
-    for (k, _) in specs
-        .iter()
-        .enumerate()
-        .filter(|(_, spec)| spec.name.starts_with("tool_offset"))
-    {
-        model.known.insert(
-            k,
-            Known {
-                prior: Some(Prior {
-                    mean: 0.0,
-                    sigma: 1e-5,
-                }),
-                bounds: None,
-            },
-        );
+    for k in model.stack.parameters_of("tool_offset") {
+        let (mean, sigma) = (0.0, 1e-5);
+        model.known.entry(k).or_default().prior = Some(Prior { mean, sigma });
     }
-    let candidates: Vec<usize> = (0..specs.len()).collect();
-    let (_, fitted) = fit(
-        &model,
-        &data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        },
-    );
-    let zero = specs
-        .iter()
-        .position(|spec| spec.name == "joint_offset.j6")
-        .unwrap();
+    let (_, fitted) = fit_all(&model, &data, &rows);
+    let is_zero = |spec: &ParameterSpec| spec.name == "joint_offset.j6";
+    let zero = specs.iter().position(is_zero).unwrap();
     let ParameterStatus::Free(sigma) = fitted.statuses[zero] else {
         panic!("{:?}", fitted.statuses[zero])
     };
     assert!(sigma < 1e-4, "{sigma:e} rad");
     // What a turn of the last joint cannot be told from without the targets' places stays where it is.
     let (_, blind) = cell.fit(&data, nothing);
-    let offset = |fitted: &Fitted, k: usize| matches!(fitted.statuses[k], ParameterStatus::Free(_));
-    assert!(offset(&fitted, zero) && free(&fitted) > free(&blind));
+    assert!(fitted.free().len() > blind.free().len());
 }
 
 #[test]
@@ -317,7 +264,7 @@ fn poses_add_the_orientation_of_the_tool_to_the_rank() {
         cell.turn(&mut data);
         let (model, fitted) = cell.fit(&data, nothing);
         let name = &cell.description.name;
-        assert_eq!(free(&fitted), axes + 6, "{name}");
+        assert_eq!(fitted.free().len(), axes + 6, "{name}");
         // The median of 80 scatters by a tenth.
         assert!(
             fitted.excess_sigma < 0.6 * SIGMA,
@@ -331,12 +278,8 @@ fn poses_add_the_orientation_of_the_tool_to_the_rank() {
             "{name}: {:?} rad",
             fitted.excess_sigma_angle
         );
-        let turns: Vec<f64> = model
-            .row_errors(&data)
-            .iter()
-            .filter_map(|error| error.angle)
-            .collect();
-        let rms = (turns.iter().map(|turn| turn * turn).sum::<f64>() / turns.len() as f64).sqrt();
+        let errors = model.row_errors(&data).into_iter();
+        let rms = rms(errors.filter_map(|error| error.angle));
         assert!(
             (0.85..1.12).contains(&(rms / (3f64.sqrt() * SIGMA_TURN))),
             "{name}: orientations are off by {rms:e} rad"
@@ -356,13 +299,9 @@ fn distances_from_one_anchor_see_all_but_where_the_cell_stands() {
     data.points.position.fill(Vector3::zeros());
     data.points.sigma.fill(Vector3::repeat(f64::INFINITY));
     let (model, fitted) = cell.fit(&data, nothing);
-    assert_eq!(free(&fitted), 27 + 3 - 6);
-    let off: Vec<f64> = model
-        .row_errors(&data)
-        .iter()
-        .map(|error| error.length)
-        .collect();
-    let rms = (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt();
+    assert_eq!(fitted.free().len(), 27 + 3 - 6);
+    let errors = model.row_errors(&data).into_iter();
+    let rms = rms(errors.map(|error| error.length));
     let expected = 2e-5 * (1.0f64 - 24.0 / 200.0).sqrt();
     assert!(
         (0.85..1.15).contains(&(rms / expected)),
@@ -381,19 +320,12 @@ fn an_anchor_beside_a_tracker_is_placed_where_it_is() {
     ];
     cell.reach(&mut data, &anchors, 3e-5);
     let (model, fitted) = cell.fit(&data, nothing);
-    assert_eq!(free(&fitted), 27 + 6);
-    for (k, spec) in model
-        .stack
-        .specs()
-        .iter()
-        .enumerate()
-        .filter(|(_, spec)| spec.name.starts_with("anchor."))
-    {
-        let (name, axis) = (
-            spec.name.split('.').nth(1).unwrap_or_default(),
-            spec.name.chars().last().unwrap_or_default(),
-        );
-        let axis = ['x', 'y', 'z']
+    assert_eq!(fitted.free().len(), 27 + 6);
+    for k in model.stack.parameters_of("anchor") {
+        let spec = &model.stack.specs()[k];
+        let (_, place) = spec.name.split_once('.').unwrap();
+        let (name, axis) = place.split_once('.').unwrap();
+        let axis = ["x", "y", "z"]
             .iter()
             .position(|known| *known == axis)
             .unwrap();
@@ -421,40 +353,21 @@ fn rows_of_one_axis_count_for_that_axis_alone() {
         data.points.sigma[row].y = f64::INFINITY;
     }
     let (model, fitted) = cell.fit(&data, nothing);
-    assert_eq!(free(&fitted), 27);
+    assert_eq!(fitted.free().len(), 27);
     assert_eq!(fitted.values, 3 * 60 + 60);
-    let only: Vec<usize> = (0..60).collect();
-    let half = Measurements {
-        q: data.q[..60 * 6].to_vec(),
-        points: PointReadings::new(
-            only.iter().map(|row| data.points.position[*row]).collect(),
-            SIGMA,
-        ),
-        payload: vec![0.0; 60],
-        joints: 6,
-        ..Measurements::default()
-    };
+    let half = laws::select(&data, &(0..60).collect::<Vec<_>>());
     let (_, few) = cell.fit(&half, nothing);
     let fresh = cell.rows(60, 2);
     let sigma = |fitted: &Fitted| {
-        let all = fitted
-            .covariance
-            .as_ref()
-            .unwrap()
-            .of_predictions(&model, &fresh);
-        all.iter().map(|sigma| sigma * sigma).sum::<f64>()
+        let covariance = fitted.covariance.as_ref().unwrap();
+        rms(covariance.of_predictions(&model, &fresh))
     };
     let [all, some, none] = [&whole, &fitted, &few].map(sigma);
     assert!(
         all < some && some < none,
         "more axes tell more: {all:e}, {some:e}, {none:e}"
     );
-    let off = model
-        .predict(&fresh)
-        .iter()
-        .zip(&fresh.points.position)
-        .map(|(a, b)| (a - b).norm())
-        .fold(0.0, f64::max);
+    let off = largest(misses(&model, &fresh));
     assert!(off < 4.0 * SIGMA, "new poses are off by {off:e} m");
 }
 

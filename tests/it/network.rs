@@ -37,6 +37,16 @@ fn recipe(joints: usize) -> Recipe {
     }
 }
 
+/// Training that takes a moment.
+fn cheap(iterations: usize, members: usize) -> Recipe {
+    Recipe {
+        generations: 5,
+        iterations,
+        members,
+        ..recipe(6)
+    }
+}
+
 /// Normal enough: the sum of twelve uniform numbers.
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
@@ -66,13 +76,14 @@ fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> TrainingSamples {
     samples
 }
 
+fn length(v: [f64; 3]) -> f64 {
+    v.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
 fn mean_error(samples: &TrainingSamples, correction: Option<&Correction>) -> f64 {
     let left = samples.sources.iter().zip(&samples.residual).map(|(q, r)| {
         let delta = correction.map_or([0.0; 3], |correction| correction.at(q).delta);
-        (0..3)
-            .map(|k| (r[k] - delta[k]).powi(2))
-            .sum::<f64>()
-            .sqrt()
+        length(std::array::from_fn(|k| r[k] - delta[k]))
     });
     left.sum::<f64>() / samples.rows() as f64
 }
@@ -185,8 +196,7 @@ fn the_gradient_is_that_of_central_differences() {
 
 /// The SR210D, its base turned and shifted in the tracker's frame.
 fn sr210d() -> ScrewArm {
-    let file = root("pipelines/sr210d/robot.yaml");
-    let text = read(file);
+    let text = read(root("pipelines/sr210d/robot.yaml"));
     let robot = RobotModel::new(robot_of(&text));
     ScrewArm::of(
         &robot,
@@ -273,18 +283,13 @@ fn training_is_the_same_on_one_thread_and_on_three() {
         assert_eq!(on(1), on(3), "{start:?}");
     }
     let tool = sr210d();
-    let cheap = Recipe {
-        generations: 5,
-        iterations: 40,
-        ..recipe(6)
-    };
     let judged = |jobs| {
         let contest = contest(
             Some(&tool),
             &ALL,
             &Recipe {
                 jobs,
-                ..cheap.clone()
+                ..cheap(40, 4)
             },
             3,
         );
@@ -303,12 +308,7 @@ fn training_is_the_same_on_one_thread_and_on_three() {
 fn joint_curves_find_waves_that_no_other_rival_can_see() {
     let tool = sr210d();
     let (training, unseen) = (waves(300, &tool, 20e-6, 1), waves(300, &tool, 20e-6, 2));
-    let cheap = Recipe {
-        generations: 5,
-        iterations: 60,
-        ..recipe(6)
-    };
-    let contest = contest(Some(&tool), &ALL, &cheap, 4);
+    let contest = contest(Some(&tool), &ALL, &cheap(60, 4), 4);
     let comparison = compare(&training, &contest, &|_, _| {});
     let before = mean_error(&unseen, None);
     let best = &comparison.judged[comparison.chosen];
@@ -348,7 +348,6 @@ fn a_joint_curve_does_not_swing_where_no_row_was_and_says_its_doubt() {
         &mut |_| {},
     )
     .unwrap();
-    let length = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
     let (mut largest, mut spread, mut covered, mut rows) =
         ([0.0f64; 2], [0.0; 2], [0.0; 2], [0.0; 2]);
     for (q, residual) in unseen.sources.iter().zip(&unseen.residual) {
@@ -389,17 +388,12 @@ fn a_network_of_joint_motions_learns_what_joints_do_better_than_one_of_displacem
         samples
     };
     let (training, unseen) = (slow(200, 11), slow(300, 12));
-    let cheap = Recipe {
-        generations: 5,
-        iterations: 100,
-        ..recipe(6)
-    };
     let left = |through: Option<ScrewArm>| {
         let (correction, _) = train(
             &training,
             &Recipe {
                 through,
-                ..cheap.clone()
+                ..cheap(100, 4)
             },
             &mut |_| {},
         );
@@ -412,16 +406,10 @@ fn a_network_of_joint_motions_learns_what_joints_do_better_than_one_of_displacem
 
 #[test]
 fn the_judge_keeps_what_helps_and_refuses_what_was_learnt_from_noise() {
-    let cheap = Recipe {
-        generations: 5,
-        members: 2,
-        iterations: 60,
-        ..recipe(6)
-    };
     let tool = sr210d();
     let smooth = compare(
         &arm(150, 1.0, 0.2e-3, 4),
-        &contest(Some(&tool), &ALL, &cheap, 5),
+        &contest(Some(&tool), &ALL, &cheap(60, 2), 5),
         &|_, _| {},
     );
     let best = &smooth.judged[smooth.chosen];
@@ -432,7 +420,7 @@ fn the_judge_keeps_what_helps_and_refuses_what_was_learnt_from_noise() {
     let refused = (0..20).filter(|seed| {
         let recipe = Recipe {
             seed: *seed,
-            ..cheap.clone()
+            ..cheap(60, 2)
         };
         let rivals = [
             Rival::Ridge,
@@ -472,15 +460,9 @@ fn targets_of_one_pose_do_not_vouch_for_each_other() {
         thrice.poses(),
         (0..180).map(|row| row % 60).collect::<Vec<_>>()
     );
-    let cheap = Recipe {
-        generations: 5,
-        members: 2,
-        iterations: 60,
-        ..recipe(6)
-    };
     let comparison = compare(
         &thrice,
-        &contest(None, &[Rival::Ridge, Rival::Process], &cheap, 5),
+        &contest(None, &[Rival::Ridge, Rival::Process], &cheap(60, 2), 5),
         &|_, _| {},
     );
     assert_eq!(comparison.chosen, 0, "nothing carries over to another pose");
@@ -498,7 +480,6 @@ fn outside_the_range_it_saw_the_correction_fades_to_nothing() {
     assert!(edge.share == 1.0 && edge.spread.is_some());
     let margin = range.margin;
     assert!((margin - 0.1 * (range.upper - range.lower)).abs() < 1e-15);
-    let length = |d: [f64; 3]| d.iter().map(|d| d * d).sum::<f64>().sqrt();
     let mut last = edge;
     for step in 1..=20 {
         q[1] = range.upper + margin * f64::from(step) / 20.0;
@@ -523,6 +504,26 @@ fn outside_the_range_it_saw_the_correction_fades_to_nothing() {
     q[1] = f64::NAN;
     assert_eq!(correction.at(&q).share, 0.0);
     assert_eq!(correction.at(&q[..3]).share, 0.0);
+}
+
+/// A correction read from its table, and the table.
+fn back(correction: &Correction, prismatic: &[bool]) -> (Correction, Network) {
+    let table = Network::of(correction, prismatic);
+    let read = Network::from_frame(&table.to_frame().unwrap()).unwrap();
+    (read.correction(prismatic).unwrap().unwrap(), table)
+}
+
+/// mm and m differ in the last bit only.
+fn alike(there: &Correction, here: &Correction, q: &[f64]) {
+    let (there, here) = (there.at(q), here.at(q));
+    let near = |a: f64, b: f64| (a - b).abs() <= 1e-12;
+    assert!(
+        (0..3).all(|k| near(there.delta[k], here.delta[k])) && near(there.share, here.share),
+        "{there:?} {here:?}"
+    );
+    let [there, here] = [there, here].map(|applied| applied.spread);
+    assert_eq!(there.is_some(), here.is_some());
+    assert!(near(there.unwrap_or_default(), here.unwrap_or_default()));
 }
 
 #[test]
@@ -566,7 +567,7 @@ fn a_correction_comes_back_from_its_table() {
         region,
         left: 1e-4,
     };
-    let table = Network::of(&correction, &prismatic);
+    let (read, mut table) = back(&correction, &prismatic);
     // Lengths are stored in mm, their factors per mm.
     let stored = |part: &str, place: [i64; 3]| {
         let mut rows = table.0.iter().filter(|row| row.member == 0);
@@ -589,31 +590,17 @@ fn a_correction_comes_back_from_its_table() {
     ] {
         assert_eq!(stored(part, place), value, "{part}");
     }
-    let back = Network::from_frame(&table.to_frame().unwrap())
-        .unwrap()
-        .correction(&prismatic)
-        .unwrap()
-        .unwrap();
     for _ in 0..100 {
         let q: Vec<f64> = (0..4).map(|_| number(-2.5, 2.5)).collect();
-        let (there, here) = (correction.at(&q), back.at(&q));
-        // mm and m differ in the last bit only.
-        assert!(
-            (0..3).all(|k| (there.delta[k] - here.delta[k]).abs() <= 1e-12),
-            "{there:?} {here:?}"
-        );
-        assert!(
-            (there.share - here.share).abs() < 1e-12
-                && there.spread.is_some() == here.spread.is_some()
-        );
+        alike(&correction, &read, &q);
     }
     let empty = Network::from_frame(&Network(Vec::new()).to_frame().unwrap()).unwrap();
     assert!(empty.correction(&prismatic).unwrap().is_none());
-    let mut holed = table;
-    holed
+    let hole = (2, "bias", 1, 3);
+    table
         .0
-        .retain(|row| !(row.member == 2 && row.part == "bias" && row.layer == 1 && row.to == 3));
-    let message = holed.correction(&prismatic).unwrap_err().to_string();
+        .retain(|row| (row.member, &*row.part, row.layer, row.to) != hole);
+    let message = table.correction(&prismatic).unwrap_err().to_string();
     has(&message, "bias");
 }
 
@@ -621,37 +608,16 @@ fn a_correction_comes_back_from_its_table() {
 fn every_kind_of_correction_comes_back_from_its_table() {
     let tool = sr210d();
     let samples = waves(120, &tool, 50e-6, 7);
-    let cheap = Recipe {
-        generations: 3,
-        iterations: 20,
-        ..recipe(6)
-    };
-    let contest = contest(Some(&tool), &ALL, &cheap, 2);
+    let contest = contest(Some(&tool), &ALL, &cheap(20, 4), 2);
     let comparison = compare(&samples, &contest, &|_, _| {});
     for judged in &comparison.judged[1..] {
         let (correction, _) = learn(&samples, &contest, judged, &mut |_| {}).unwrap();
-        let table = Network::of(&correction, &[false; 6]);
-        let back = Network::from_frame(&table.to_frame().unwrap())
-            .unwrap()
-            .correction(&[false; 6])
-            .unwrap()
-            .unwrap();
+        let (read, mut twice) = back(&correction, &[false; 6]);
         for q in &samples.sources {
-            let (there, here) = (correction.at(q), back.at(q));
-            let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
-            assert!(
-                (0..3).all(|k| near(there.delta[k], here.delta[k]))
-                    && near(there.spread.unwrap(), here.spread.unwrap())
-            );
+            alike(&correction, &read, q);
         }
-        let mut twice = table.clone();
-        twice.0.push(table.0[0].clone());
-        assert!(
-            twice
-                .correction(&[false; 6])
-                .unwrap_err()
-                .to_string()
-                .contains("twice")
-        );
+        twice.0.push(twice.0[0].clone());
+        let message = twice.correction(&[false; 6]).unwrap_err().to_string();
+        has(&message, "twice");
     }
 }

@@ -5,9 +5,7 @@ use crate::fixture;
 use crate::identify::{GEOMETRY, model, recording};
 use crate::recorded::settings;
 use crate::sr210d::experiment;
-use calib::estimate::{
-    Bounds, CONFLICT, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, align, fit,
-};
+use calib::estimate::{Bounds, CONFLICT, Fitted, Known, Model, ParameterStatus, Prior, align, fit};
 use calib::robot::{Measurements, RobotModel};
 use calib::stage::{Identify, Stage};
 use calib::table::{ParameterRow, Parameters};
@@ -53,14 +51,7 @@ impl Case {
             self.start.x[*k] = *value;
         }
         self.start.known = known.iter().copied().collect();
-        let (model, fitted) = fit(
-            &self.start,
-            &self.data,
-            &FitOptions {
-                rows: &rows,
-                candidates: &candidates,
-            },
-        );
+        let (model, fitted) = fit(&self.start, &self.data, &rows, &candidates);
         (model.x, fitted)
     }
 }

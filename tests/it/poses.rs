@@ -4,7 +4,7 @@ use crate::fixture;
 use calib::description::RobotDescription;
 use calib::effect::{EffectContext, EffectStack, Load, arm_effect, identified};
 use calib::estimate::choose::{Aim, DesignRequest, Proposal, Score, Site, median, propose};
-use calib::estimate::{FitOptions, Model, ParameterStatus, fit};
+use calib::estimate::{Model, ParameterStatus, fit};
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::Pose;
 use nalgebra::Vector3;
@@ -161,14 +161,7 @@ fn scatter(
             .position
             .iter_mut()
             .for_each(|point| *point += Vector3::from_fn(|_, _| SIGMA * normal()));
-        let (fitted, outcome) = fit(
-            &model(robot, &effects),
-            &data,
-            &FitOptions {
-                rows: &rows,
-                candidates: free,
-            },
-        );
+        let (fitted, outcome) = fit(&model(robot, &effects), &data, &rows, free);
         for (k, parameter) in free.iter().enumerate() {
             assert!(
                 matches!(outcome.statuses[*parameter], ParameterStatus::Free(_)),

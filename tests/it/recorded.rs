@@ -38,6 +38,12 @@ impl Made {
     pub fn verdict(&self) -> VerdictRow {
         self.get::<calib::table::Verdict>().0.remove(0)
     }
+    /// A quantity of the table of what can be observed.
+    pub fn quantity(&self, name: &str) -> Option<f64> {
+        let rows = self.get::<calib::table::Observability>().0;
+        let found = rows.into_iter().find(|row| row.quantity == name);
+        found.map(|row| row.value)
+    }
     /// Effect and place of each finding.
     pub fn named(&self) -> Vec<(String, String)> {
         let findings: Findings = self.get();

@@ -1,9 +1,9 @@
 //! Mistakes of a recording are found, named and set aside; heavy tails, missing physics and clean recordings are left alone.
 
-use crate::fixture;
+use crate::fixture::{self, rms};
+use crate::identify::model;
 use calib::description::RobotDescription;
-use calib::effect::{EffectContext, EffectStack, Load, arm_effect};
-use calib::estimate::{FitOptions, Model, Screening, SuspectKind, align, fit, fit_screened};
+use calib::estimate::{Model, Screening, SuspectKind, align, fit_screened};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
@@ -34,18 +34,6 @@ fn direction(dice: &mut ChaCha8Rng) -> Vector3<f64> {
     Vector3::from_fn(|_, _| normal(dice)).normalize()
 }
 
-fn model(robot: &RobotModel, base: Pose) -> Model {
-    let setting = EffectContext {
-        base,
-        load: Load::GravityTorque,
-    };
-    let made = EFFECTS
-        .iter()
-        .map(|name| arm_effect(name, &setting).expect("registered"))
-        .collect();
-    Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
-}
-
 /// A robot with errors everywhere, measured with noise; every fourth row is held out.
 struct Trial {
     description: RobotDescription,
@@ -66,6 +54,7 @@ impl Trial {
         let mut truth = model(
             &robot,
             Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.05, -0.1, 2.2)),
+            &EFFECTS,
         );
         for (k, spec) in truth.stack.specs().to_vec().iter().enumerate() {
             let size = if spec.name.starts_with("base_frame") {
@@ -105,52 +94,32 @@ impl Trial {
     fn start(&self) -> Model {
         let robot = RobotModel::new(self.description.clone());
         let base = align(&robot, &self.data, &self.fit_rows());
-        model(&robot, base)
+        model(&robot, base, &EFFECTS)
     }
 
     fn screen(&self) -> (Model, Screening) {
-        let start = self.start();
-        let candidates: Vec<usize> = (0..start.x.len()).collect();
-        let set: Vec<usize> = (0..self.rows())
-            .map(|row| usize::from(row % 4 == 3))
-            .collect();
-        let rows = self.fit_rows();
-        let (model, _, screening) = fit_screened(
-            &start,
-            &self.data,
-            &FitOptions {
-                rows: &rows,
-                candidates: &candidates,
-            },
-            &set,
-        );
+        let set = |row| usize::from(row % 4 == 3);
+        self.fit(Some(&(0..self.rows()).map(set).collect::<Vec<_>>()))
+    }
+
+    /// With rows screened by their sets, or all kept.
+    fn fit(&self, set: Option<&[usize]>) -> (Model, Screening) {
+        let (start, rows) = (self.start(), self.fit_rows());
+        let all: Vec<usize> = (0..start.x.len()).collect();
+        let (model, _, screening) = fit_screened(&start, &self.data, &rows, &all, set);
         (model, screening)
+    }
+
+    fn aside(&self) -> Vec<usize> {
+        self.screen().1.set_aside().collect()
     }
 
     /// Root mean square distance (m) of the model's points from the true ones.
     fn off(&self, model: &Model) -> f64 {
-        let (a, b) = (model.predict(&self.data), self.truth.predict(&self.data));
-        (a.iter()
-            .zip(&b)
-            .map(|(a, b)| (a - b).norm_squared())
-            .sum::<f64>()
-            / self.rows() as f64)
-            .sqrt()
-    }
-
-    fn plain(&self) -> Model {
-        let start = self.start();
-        let candidates: Vec<usize> = (0..start.x.len()).collect();
-        let rows = self.fit_rows();
-        fit(
-            &start,
-            &self.data,
-            &FitOptions {
-                rows: &rows,
-                candidates: &candidates,
-            },
-        )
-        .0
+        let pairs = model.predict(&self.data).into_iter();
+        rms(pairs
+            .zip(self.truth.predict(&self.data))
+            .map(|(a, b)| (a - b).norm()))
     }
 
     /// `count` different rows.
@@ -262,7 +231,7 @@ impl Score {
         spoil: &dyn Fn(&mut Trial) -> Spoilt,
     ) {
         let mut trial = Trial::new(description, rows, seed, normal);
-        self.clean += trial.off(&trial.plain()).powi(2);
+        self.clean += trial.off(&trial.fit(None).0).powi(2);
         let spoilt = spoil(&mut trial);
         let (model, screening) = trial.screen();
         self.with_faults += trial.off(&model).powi(2);
@@ -301,23 +270,20 @@ impl Score {
 fn mistakes_are_found_and_named_and_the_fit_is_as_good_as_without_them() {
     type Spoil = Box<dyn Fn(&mut Trial) -> Spoilt>;
     let mut suite: Vec<(String, Spoil)> = Vec::new();
+    let mut add = |what: String, spoil: Spoil| suite.push((what, spoil));
     for share in [0.01, 0.05, 0.1] {
-        suite.push((
-            format!("{} % outliers", 100.0 * share),
-            Box::new(move |trial| outliers(trial, share)),
-        ));
+        let spoil = move |trial: &mut Trial| outliers(trial, share);
+        add(format!("{} % outliers", 100.0 * share), Box::new(spoil));
     }
     for pairs in 1..=5 {
-        suite.push((
-            format!("{pairs} exchanged pairs"),
-            Box::new(move |trial| exchanges(trial, pairs)),
-        ));
+        let spoil = move |trial: &mut Trial| exchanges(trial, pairs);
+        add(format!("{pairs} exchanged pairs"), Box::new(spoil));
     }
-    suite.push(("zeros".into(), Box::new(zeros)));
-    suite.push(("unit slips".into(), Box::new(slips)));
-    suite.push(("a block in metres".into(), Box::new(slipped_block)));
-    suite.push(("a shifted block".into(), Box::new(shifted_block)));
-    suite.push(("a circle of labels".into(), Box::new(circle)));
+    add("zeros".into(), Box::new(zeros));
+    add("unit slips".into(), Box::new(slips));
+    add("a block in metres".into(), Box::new(slipped_block));
+    add("a shifted block".into(), Box::new(shifted_block));
+    add("a circle of labels".into(), Box::new(circle));
     let mut all = Score::default();
     let mut worst: f64 = 0.0;
     for (k, (what, spoil)) in suite.iter().enumerate() {
@@ -330,24 +296,15 @@ fn mistakes_are_found_and_named_and_the_fit_is_as_good_as_without_them() {
                 spoil,
             );
         }
+        let (precision, recall, harm) = (score.precision(), score.recall(), score.harm());
         println!(
-            "{what}: {} rows, precision {:.3}, recall {:.3}, error {:.2} of the clean fit's",
-            score.spoilt,
-            score.precision(),
-            score.recall(),
-            score.harm()
+            "{what}: precision {precision:.3}, recall {recall:.3}, error {harm:.2} of the clean fit's"
         );
         worst = worst.max(score.harm());
         all.spoilt += score.spoilt;
         all.flagged += score.flagged;
         all.named += score.named;
     }
-    println!(
-        "in all: {} rows, precision {:.4}, recall {:.4}",
-        all.spoilt,
-        all.precision(),
-        all.recall()
-    );
     assert!(worst < 1.2, "error {worst:.2} of the clean fit's");
     assert!(all.precision() >= 0.98, "precision {:.4}", all.precision());
     assert!(all.recall() >= 0.98, "recall {:.4}", all.recall());
@@ -357,26 +314,17 @@ fn mistakes_are_found_and_named_and_the_fit_is_as_good_as_without_them() {
 fn a_held_out_row_is_set_aside_only_by_evidence_beside_the_model() {
     let off = Vector3::new(0.0, 3e-3, 0.0);
     let trial = || Trial::new(fixture::all().remove(0), 160, 4411, normal);
-    let aside = |trial: &Trial| {
-        trial
-            .screen()
-            .1
-            .suspects
-            .iter()
-            .map(|suspect| suspect.row)
-            .collect::<Vec<_>>()
-    };
     let mut held_out = trial();
     held_out.data.points.position[43] += off;
+    let screening = held_out.screen().1;
     assert_eq!(
-        aside(&held_out),
-        Vec::<usize>::new(),
+        (screening.suspects.len(), screening.crowd),
+        (0, 1),
         "3 mm off where the model is the only witness"
     );
-    assert_eq!(held_out.screen().1.crowd, 1);
     let mut fitted = trial();
     fitted.data.points.position[42] += off;
-    assert_eq!(aside(&fitted), [42]);
+    assert_eq!(fitted.aside(), [42]);
     // The same pose again, measured where the model predicts it.
     let mut again = trial();
     let joints = again.data.joints;
@@ -386,7 +334,7 @@ fn a_held_out_row_is_set_aside_only_by_evidence_beside_the_model() {
         .copy_within(43 * joints..44 * joints, 51 * joints);
     again.data.points.position[51] = again.data.points.position[43] + Vector3::repeat(1e-6);
     again.data.points.position[43] += off;
-    assert_eq!(aside(&again), [43]);
+    assert_eq!(again.aside(), [43]);
 }
 
 #[test]
@@ -522,13 +470,6 @@ fn rows_beside_a_wrong_one_in_a_dense_grid_are_not_apart() {
         for row in wrong {
             trial.data.q[row * joints + 1] += 0.1;
         }
-        let screening = trial.screen().1;
-        let aside: Vec<usize> = screening
-            .suspects
-            .iter()
-            .filter(|suspect| !suspect.used())
-            .map(|suspect| suspect.row)
-            .collect();
-        assert_eq!(aside, wrong, "arm {seed}: {:?}", screening.suspects);
+        assert_eq!(trial.aside(), wrong, "arm {seed}");
     }
 }

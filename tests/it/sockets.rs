@@ -16,12 +16,11 @@ use crate::identify::{GEOMETRY, model, normal};
 use crate::recorded::made;
 use calib::description::RobotDescription;
 use calib::effect::names;
-use calib::estimate::{
-    FitOptions, Fitted, Known, KnownLength, Model, ParameterStatus, Prior, fit, gauge,
-};
+use calib::estimate::{Fitted, KnownLength, Model, Prior, gauge};
 use calib::robot::{Measurements, Named, RobotModel};
 use calib::stage::{Simulate, SimulateReads, Stage};
 use calib::table::{Recording, Robot};
+use calib::twin::arm::{Arm, Motion};
 use calib::twin::touch::{Fixture, FixtureKind};
 use calib::twin::truth::{LinkError, TrueRobot};
 use nalgebra::Vector3;
@@ -163,23 +162,11 @@ fn calibrated_knowing(
         })
         .collect();
     for (name, value, sigma) in known {
-        let k = model
-            .stack
-            .specs()
-            .iter()
-            .position(|spec| spec.name == *name)
-            .unwrap();
+        let mut specs = model.stack.specs().iter();
+        let k = specs.position(|spec| spec.name == *name).unwrap();
         let mean = value - model.standing(k).0;
-        model.known.insert(
-            k,
-            Known {
-                prior: Some(Prior {
-                    mean,
-                    sigma: *sigma,
-                }),
-                bounds: None,
-            },
-        );
+        let sigma = *sigma;
+        model.known.entry(k).or_default().prior = Some(Prior { mean, sigma });
     }
     fit_all(&model, data, &rows)
 }
@@ -191,14 +178,6 @@ fn known_place(name: &str, place: [f64; 3]) -> Vec<(String, f64, f64)> {
         .zip(place)
         .map(|(axis, mm)| (format!("anchor.{name}.{axis}"), 1e-3 * mm, 1e-6))
         .collect()
-}
-
-fn free(fitted: &Fitted) -> usize {
-    fitted
-        .statuses
-        .iter()
-        .filter(|status| matches!(status, ParameterStatus::Free(_)))
-        .count()
 }
 
 /// One standard deviation beforehand, SI, of what a maker's tolerances justify.
@@ -234,13 +213,7 @@ fn fitted_with(
     );
     for (k, spec) in model.stack.specs().iter().enumerate() {
         if let Some(sigma) = prior(&spec.name) {
-            model.known.insert(
-                k,
-                Known {
-                    prior: Some(Prior { mean: 0.0, sigma }),
-                    bounds: None,
-                },
-            );
+            model.known.entry(k).or_default().prior = Some(Prior { mean: 0.0, sigma });
         }
     }
     let seen = |name: &String| {
@@ -262,15 +235,18 @@ fn fitted_with(
             sigma,
         })
         .collect();
-    let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(
-        &model,
-        data,
-        &FitOptions {
-            rows,
-            candidates: &candidates,
-        },
-    )
+    fit_all(&model, data, rows)
+}
+
+/// Where the true arm has its ball in every row, m.
+fn true_points(
+    robot: &RobotDescription,
+    truth: &TrueRobot,
+    data: &Measurements,
+) -> Vec<Vector3<f64>> {
+    let (arm, still) = (Arm::new(robot, truth), Motion::none(robot.joints.len()));
+    let place = |row| arm.posture(&truth.drive(robot, data.q(row)), &still).tool;
+    (0..data.rows()).map(|row| place(row).into()).collect()
 }
 
 /// Where a fit has the sockets, m.

@@ -1,6 +1,6 @@
 //! The arm as identified: where it really puts the tool, in its own base frame, under stated circumstances.
 
-use super::solve::Chain;
+use super::solve::{Chain, parts};
 use crate::effect::{Form, PlacementBuffers, Variable};
 use crate::estimate::Model;
 use crate::estimate::choose::spread;
@@ -291,10 +291,7 @@ impl Chain for Reach<'_> {
             pose.translation += Vector3::from(correction.at(&self.sources).delta);
         }
         for velocity in &mut self.velocities {
-            let (v, w): (Vector3<f64>, Vector3<f64>) = (
-                velocity.fixed_rows::<3>(0).into(),
-                velocity.fixed_rows::<3>(3).into(),
-            );
+            let (v, w) = parts(velocity);
             let (v, w) = (base.rotation.tr_mul(&v), base.rotation.tr_mul(&w));
             *velocity = Twist::new(v.x, v.y, v.z, w.x, w.y, w.z);
         }
@@ -375,33 +372,42 @@ mod tests {
 
     #[test]
     fn what_no_circumstance_can_be_is_told_with_what_is_allowed() {
-        assert_eq!(
-            Stated::Payload.fault(-5.0).as_deref(),
-            Some("expected a mass of 0 or more, kg, found -5")
-        );
-        assert_eq!(
-            Stated::Temperature.fault(-500.0).as_deref(),
-            Some("expected a temperature above -273.15 C, found -500")
-        );
-        assert!(
-            Stated::Direction
-                .fault(7.0)
-                .is_some_and(|message| message.ends_with(", found 7"))
-        );
-        assert!(
-            Stated::Payload.fault(f64::INFINITY).is_some()
-                && Stated::Temperature.fault(f64::NAN).is_some()
-        );
-        let sound = [
+        for (stated, value, fault) in [
+            (
+                Stated::Payload,
+                -5.0,
+                "expected a mass of 0 or more, kg, found -5",
+            ),
+            (
+                Stated::Payload,
+                f64::INFINITY,
+                "expected a mass of 0 or more, kg, found inf",
+            ),
+            (
+                Stated::Temperature,
+                -500.0,
+                "expected a temperature above -273.15 C, found -500",
+            ),
+            (
+                Stated::Temperature,
+                f64::NAN,
+                "expected a temperature above -273.15 C, found NaN",
+            ),
+            (
+                Stated::Direction,
+                7.0,
+                "expected a direction: 1, -1, or 0 where it is not known, found 7",
+            ),
+        ] {
+            assert_eq!(stated.fault(value).as_deref(), Some(fault));
+        }
+        for (stated, value) in [
             (Stated::Payload, 0.0),
             (Stated::Temperature, -273.0),
             (Stated::Direction, -1.0),
             (Stated::Direction, 0.0),
-        ];
-        assert!(
-            sound
-                .into_iter()
-                .all(|(stated, value)| stated.fault(value).is_none())
-        );
+        ] {
+            assert_eq!(stated.fault(value), None);
+        }
     }
 }

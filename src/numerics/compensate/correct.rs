@@ -1,13 +1,13 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use super::{
-    ArmSides, Chain, Circumstance, CommandSolution, CorrectedCommand, Coverage, Gate,
-    IdentifiedArm, Nominal, Reach, Remark, StatedPosture, ToolGoal, Uncertainty, beyond_limits,
-    inverse, least_change, one_step,
+    ArmSides, Chain, Circumstance, CommandSolution, CorrectedCommand, Gate, IdentifiedArm, Nominal,
+    Reach, Remark, StatedPosture, ToolGoal, Uncertainty, beyond_limits, inverse, least_change,
+    one_step,
     posture::{CountedArm, inverse_in},
 };
 use crate::error::counted;
-use crate::robot::{JointConvention, RobotModel, RowTime};
+use crate::robot::{JointConvention, RobotModel, RowTime, Visited};
 use crate::spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -96,7 +96,7 @@ impl CorrectionOptions {
 /// Corrects targets in their order: what a target does not say follows from the one before.
 pub struct Corrector<'a> {
     arm: &'a IdentifiedArm,
-    coverage: Option<Coverage>,
+    coverage: Option<Visited>,
     uncertainty: Option<Uncertainty>,
     manner: CorrectionOptions,
     /// The sides of the nominal arm, where it has some.
@@ -140,6 +140,26 @@ pub struct CorrectionTotals {
 }
 
 impl CorrectionTotals {
+    fn add(&mut self, answer: &CorrectedCommand) {
+        self.targets += 1;
+        self.uncorrected_sum += answer.uncorrected;
+        self.uncorrected_max = self.uncorrected_max.max(answer.uncorrected);
+        if answer.q.is_some() {
+            self.residual_max = self.residual_max.max(answer.residual);
+        }
+        let any = |is: fn(&Remark) -> bool| u64::from(answer.remarks.iter().any(is));
+        let refused = any(|remark| matches!(remark, Remark::Refused(_)));
+        self.refused += refused;
+        self.insisted += any(|remark| matches!(remark, Remark::Insisted(_)));
+        self.not_reached += u64::from(answer.q.is_none()) - refused;
+        self.turned +=
+            u64::from(answer.q.is_some()) * any(|remark| matches!(remark, Remark::Turned(_)));
+        self.beyond_limits += any(|remark| matches!(remark, Remark::BeyondLimits(_)));
+        self.uncertain += any(|remark| matches!(remark, Remark::Uncertain(..)));
+        self.beyond_measured +=
+            any(|remark| matches!(remark, Remark::BeyondMeasured(_) | Remark::BeyondFitted(..)));
+    }
+
     /// What the correction does, in a line.
     pub fn summary(&self) -> String {
         format!(
@@ -215,7 +235,7 @@ impl<'a> Corrector<'a> {
     /// A corrector of an arm; nothing is solved yet.
     pub fn new(
         arm: &'a IdentifiedArm,
-        coverage: Option<Coverage>,
+        coverage: Option<Visited>,
         uncertainty: Option<Uncertainty>,
         manner: CorrectionOptions,
     ) -> Self {
@@ -384,10 +404,15 @@ impl<'a> Corrector<'a> {
         if reached {
             let limits = beyond_limits(self.arm.model().robot.description(), &found.q);
             remarks.extend((!limits.is_empty()).then_some(Remark::BeyondLimits(limits)));
+            let Circumstance {
+                payload,
+                temperature,
+                ..
+            } = job.circumstance;
             let unmeasured = self
                 .coverage
                 .iter()
-                .flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance));
+                .flat_map(|visited| visited.beyond(&found.q, payload, temperature));
             remarks.extend(unmeasured.map(Remark::BeyondMeasured));
             remarks.extend(certainty.iter().filter_map(Remark::of_certainty));
             remarks.extend(certainty.iter().flat_map(Remark::beyond));
@@ -398,12 +423,11 @@ impl<'a> Corrector<'a> {
                 remarks.push(Remark::Faded(share));
             }
         }
-        let nominal_pose = nominal.place(&job.home);
-        let turn = ToolGoal {
-            pose: nominal_pose,
+        let nominal_goal = ToolGoal {
+            pose: nominal.place(&job.home),
             oriented: true,
-        }
-        .turn_left(&reach.place(&job.home));
+        };
+        let turn = nominal_goal.turn_left(&reach.place(&job.home));
         let mut command = CorrectedCommand {
             q: reached.then_some(found.q),
             uncorrected: found.before,
@@ -424,9 +448,7 @@ impl<'a> Corrector<'a> {
         self.manner.gate.judge(&mut command, unstated);
         command
     }
-}
 
-impl Corrector<'_> {
     /// Where a whole pose cannot be had, as at a stretched wrist, the point goes before the orientation.
     fn reached(reach: &mut Reach, wanted: &ToolGoal, home: &[f64]) -> CommandSolution {
         let found = least_change(reach, wanted, home, home);
@@ -452,31 +474,6 @@ impl Corrector<'_> {
             before,
             iterations: iterations + found.iterations,
         }
-    }
-}
-
-impl CorrectionTotals {
-    fn add(&mut self, answer: &CorrectedCommand) {
-        self.targets += 1;
-        self.uncorrected_sum += answer.uncorrected;
-        self.uncorrected_max = self.uncorrected_max.max(answer.uncorrected);
-        if answer.q.is_some() {
-            self.residual_max = self.residual_max.max(answer.residual);
-        }
-        let any = |is: fn(&Remark) -> bool| u64::from(answer.remarks.iter().any(is));
-        let refused = any(|remark| matches!(remark, Remark::Refused(_)));
-        self.refused += refused;
-        self.insisted += any(|remark| matches!(remark, Remark::Insisted(_)));
-        self.not_reached += u64::from(answer.q.is_none()) - refused;
-        self.turned += if answer.q.is_some() {
-            any(|remark| matches!(remark, Remark::Turned(_)))
-        } else {
-            0
-        };
-        self.beyond_limits += any(|remark| matches!(remark, Remark::BeyondLimits(_)));
-        self.uncertain += any(|remark| matches!(remark, Remark::Uncertain(..)));
-        self.beyond_measured +=
-            any(|remark| matches!(remark, Remark::BeyondMeasured(_) | Remark::BeyondFitted(..)));
     }
 }
 

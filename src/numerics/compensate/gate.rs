@@ -75,7 +75,6 @@ impl Gate {
 
     /// Why a command is refused; none where it is within the limits. What is no number is not.
     fn reason(&self, command: &CorrectedCommand) -> Option<String> {
-        let beyond = |by: f64, most: f64| by.is_nan() || by > most;
         let GateLimits {
             correction,
             turn,
@@ -151,29 +150,23 @@ impl Gate {
     }
 
     fn too_far(&self, what: &str, shift: f64, tilt: f64) -> Option<String> {
-        let far = |by: f64, most: f64, unit: &str, option: &str| {
-            let message = || {
-                format!(
-                    "{what} is {by:.1} {unit} from the robot file's, at most {} {unit} allowed ({option})",
-                    round(most)
-                )
-            };
-            (by.is_nan() || by > most).then(message)
-        };
-        let GateLimits {
-            shift: most,
-            tilt: most_tilt,
-            ..
-        } = self.limits;
-        far(shift * 1e3, most * 1e3, "mm", "--max-shift").or_else(|| {
-            far(
-                tilt.to_degrees(),
-                most_tilt.to_degrees(),
-                "deg",
-                "--max-tilt",
-            )
-        })
+        let [most, most_tilt] = [self.limits.shift * 1e3, self.limits.tilt.to_degrees()];
+        let all = [
+            (shift * 1e3, most, "mm", "--max-shift"),
+            (tilt.to_degrees(), most_tilt, "deg", "--max-tilt"),
+        ];
+        let far = all.into_iter().find(|(by, most, ..)| beyond(*by, *most));
+        let (by, most, unit, option) = far?;
+        Some(format!(
+            "{what} is {by:.1} {unit} from the robot file's, at most {} {unit} allowed ({option})",
+            round(most)
+        ))
     }
+}
+
+/// What is no number is beyond any limit.
+fn beyond(by: f64, most: f64) -> bool {
+    by.is_nan() || by > most
 }
 
 fn round(value: f64) -> f64 {

@@ -20,7 +20,7 @@ pub use correct::{CommandTarget, CorrectionOptions, CorrectionTotals, Corrector,
 pub use gate::{Gate, GateLimits};
 pub use posture::StatedPosture;
 use remark::beyond_limits;
-pub use remark::{CorrectedCommand, Coverage, Remark, doubts};
+pub use remark::{CorrectedCommand, Remark, doubts};
 pub use rigid::{LeftOut, distance, left_out, rigid};
 pub use sides::{ArmSides, SideShares, StatedSides};
 pub use solve::{

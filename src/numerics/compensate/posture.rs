@@ -44,21 +44,20 @@ impl StatedPosture {
 
     /// A posture of so many joints; `quadrants` are joints, from 0, with their quarter turns: 0 from 0 to 90 deg, -1 from -90 to 0 deg.
     pub fn of_quadrants(joints: usize, quadrants: &[(usize, i32)]) -> Self {
-        let mut out = Self::free(joints);
-        for (joint, quadrant) in quadrants {
-            out.ranges[*joint] = Some([
-                f64::from(*quadrant) * FRAC_PI_2,
-                (f64::from(*quadrant) + 1.0) * FRAC_PI_2,
-            ]);
-        }
-        out
+        Self::within(joints, quadrants, |quadrant| {
+            [quadrant * FRAC_PI_2, (quadrant + 1.0) * FRAC_PI_2]
+        })
     }
 
     /// A posture of so many joints; `turns` are joints, from 0, with their whole turns: 0 from -180 to 180 deg.
     pub fn of_turns(joints: usize, turns: &[(usize, i32)]) -> Self {
+        Self::within(joints, turns, |turn| [-PI, PI].map(|end| TAU * turn + end))
+    }
+
+    fn within(joints: usize, numbers: &[(usize, i32)], range: impl Fn(f64) -> [f64; 2]) -> Self {
         let mut out = Self::free(joints);
-        for (joint, turn) in turns {
-            out.ranges[*joint] = Some([-PI, PI].map(|end| TAU * f64::from(*turn) + end));
+        for (joint, number) in numbers {
+            out.ranges[*joint] = Some(range(f64::from(*number)));
         }
         out
     }
@@ -133,10 +132,7 @@ impl StatedPosture {
                 .filter(fits)
                 .min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
         }
-        let inside = q
-            .iter()
-            .enumerate()
-            .all(|(joint, q)| excess(arm.robot, joint, *q) == 0.0);
+        let inside = (0..q.len()).all(|joint| excess(arm.robot, joint, q[joint]) == 0.0);
         (inside && self.holds(arm, &q)).then_some(q)
     }
 
@@ -190,14 +186,7 @@ pub(super) fn inverse_in(
     let solved = |start: &[f64]| {
         let found = least_change(&mut Nominal::new(robot), wanted, start, start);
         let reached = found.residual + found.turn < REACHED;
-        reached.then(|| {
-            found
-                .q
-                .iter()
-                .enumerate()
-                .map(|(joint, q)| into_limits(robot, joint, *q))
-                .collect::<Vec<f64>>()
-        })
+        reached.then(|| into_limits(robot, &found.q))
     };
     let in_posture = |q: &Vec<f64>| posture.turned(arm, q.clone(), from);
     posture

@@ -5,7 +5,7 @@ use super::{
     Uncertainty,
 };
 use crate::description::RobotDescription;
-use crate::robot::{Measurements, Unmeasured, Visited, numbered};
+use crate::robot::{Measurements, Unmeasured, numbered};
 use rayon::prelude::*;
 use std::fmt;
 
@@ -124,23 +124,6 @@ impl CorrectedCommand {
             .map(Remark::to_string)
             .collect::<Vec<_>>()
             .join("; ")
-    }
-}
-
-/// What was measured.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Coverage(Visited);
-
-impl Coverage {
-    /// The coverage of a recording.
-    pub fn of(data: &Measurements) -> Self {
-        Self(Visited::of(data, &(0..data.rows()).collect::<Vec<_>>()))
-    }
-
-    /// What of a command was never measured; empty inside.
-    pub fn beyond(&self, q: &[f64], circumstance: &Circumstance) -> Vec<Unmeasured> {
-        self.0
-            .beyond(q, circumstance.payload, circumstance.temperature)
     }
 }
 

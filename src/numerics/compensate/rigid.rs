@@ -3,12 +3,11 @@
 //! Lengths, twists, zeros and the tool are constants on the chain, so that the screws at the corrected zero pose hold them exactly.
 
 use super::arm::IdentifiedArm;
-use super::solve::Chain;
+use super::solve::{Chain, parts};
 use crate::description::RobotDescription;
 use crate::effect::{Place, names};
 use crate::estimate::Model;
 use crate::robot::{Measurements, RobotModel};
-use crate::spatial::Twist;
 use nalgebra::{Matrix3, Vector3};
 
 /// Effects that a description holds.
@@ -41,7 +40,7 @@ pub fn rigid(model: &Model) -> RobotDescription {
     let tool = reach.place(&vec![0.0; nominal.joints()]);
     let mut out = nominal.description().clone();
     for (j, (joint, velocity)) in out.joints.iter_mut().zip(reach.velocities()).enumerate() {
-        let (v, w): (Vector3<f64>, Vector3<f64>) = parts(velocity);
+        let (v, w) = parts(velocity);
         if nominal.is_revolute(j) {
             // The axis is placed by its point that is nearest to the nominal one.
             let near = tool.translation + w.cross(&v);
@@ -55,13 +54,6 @@ pub fn rigid(model: &Model) -> RobotDescription {
     let rotation: &Matrix3<f64> = &tool.rotation;
     out.tool_rotation = [0, 1, 2].map(|i| [0, 1, 2].map(|k| rotation[(i, k)]));
     out
-}
-
-fn parts(twist: &Twist) -> (Vector3<f64>, Vector3<f64>) {
-    (
-        twist.fixed_rows::<3>(0).into(),
-        twist.fixed_rows::<3>(3).into(),
-    )
 }
 
 /// The model with the parameters that `keep` refuses (by effect and place) at zero.

@@ -22,6 +22,14 @@ pub trait Chain {
     fn velocities(&self) -> &[Twist];
 }
 
+/// Velocity and turn.
+pub(super) fn parts(twist: &Twist) -> (Vector3<f64>, Vector3<f64>) {
+    (
+        twist.fixed_rows::<3>(0).into(),
+        twist.fixed_rows::<3>(3).into(),
+    )
+}
+
 /// The robot as its file describes it.
 pub struct Nominal<'a> {
     robot: &'a RobotModel,
@@ -272,16 +280,9 @@ pub fn inverse(robot: &RobotModel, wanted: &ToolGoal, from: &[f64]) -> Vec<f64> 
             spread(robot, number)
         };
         let found = least_change(&mut Nominal::new(robot), wanted, &start, &start);
-        let q: Vec<f64> = found
-            .q
-            .iter()
-            .enumerate()
-            .map(|(joint, q)| into_limits(robot, joint, *q))
-            .collect();
-        let outside: f64 = q
-            .iter()
-            .enumerate()
-            .map(|(joint, q)| excess(robot, joint, *q))
+        let q = into_limits(robot, &found.q);
+        let outside: f64 = (0..q.len())
+            .map(|joint| excess(robot, joint, q[joint]))
             .sum();
         let cost = if found.residual + found.turn < REACHED {
             outside
@@ -323,16 +324,20 @@ pub(super) fn spread(robot: &RobotModel, number: u32) -> Vec<f64> {
     (0..robot.joints()).map(position).collect()
 }
 
-/// A revolute joint turned by whole turns into its limits, where they are left.
-pub(super) fn into_limits(robot: &RobotModel, joint: usize, q: f64) -> f64 {
-    let [lower, upper] = limits(robot, joint);
-    if !robot.is_revolute(joint) || (lower..=upper).contains(&q) {
-        return q;
-    }
-    let middle = 0.5 * (lower + upper);
-    q - TAU * ((q - middle) / TAU).round()
+/// Revolute joints turned by whole turns into their limits, where they are left.
+pub(super) fn into_limits(robot: &RobotModel, q: &[f64]) -> Vec<f64> {
+    let turned = |(joint, q): (usize, &f64)| {
+        let [lower, upper] = limits(robot, joint);
+        if !robot.is_revolute(joint) || (lower..=upper).contains(q) {
+            return *q;
+        }
+        let middle = 0.5 * (lower + upper);
+        q - TAU * ((q - middle) / TAU).round()
+    };
+    q.iter().enumerate().map(turned).collect()
 }
 
+/// How far a joint is beyond its limits.
 pub(super) fn excess(robot: &RobotModel, joint: usize, q: f64) -> f64 {
     robot.description().joints[joint]
         .limits

@@ -3,8 +3,8 @@
 //! How certain a correction is, and which finding leaves it open.
 
 use crate::compensate::arm::{BeyondFitted, IdentifiedArm, Reach};
-use crate::estimate::Covariance;
 use crate::estimate::choose::median;
+use crate::estimate::{Covariance, columns};
 use crate::robot::Measurements;
 use crate::statistics::radius_95;
 use nalgebra::{Matrix3, Vector3};
@@ -45,23 +45,18 @@ pub struct Uncertainty {
     /// Names of the stack's parameters.
     names: Vec<String>,
     /// m, 95 %: what is usual at the recorded poses.
-    pub(super) usual: f64,
-    /// m: length of one standard deviation of the instrument there.
-    pub(super) instrument: f64,
+    usual: f64,
+    /// m: length of one standard deviation of the instrument there, rms over the rows.
+    instrument: f64,
 }
 
 impl Uncertainty {
     /// The uncertainty that the parameters of `arm` have; what belonged to the measurement alone does not blur the arm.
     pub fn new(arm: &IdentifiedArm, covariance: Covariance, scatter: Scatter) -> Self {
-        let mut row = vec![None; arm.model().x.len()];
-        covariance
-            .parameters()
-            .iter()
-            .enumerate()
-            .for_each(|(k, parameter)| row[*parameter] = Some(k));
-        arm.of_the_measurement()
-            .iter()
-            .for_each(|parameter| row[*parameter] = None);
+        let mut row = columns(arm.model(), covariance.parameters());
+        for parameter in arm.of_the_measurement() {
+            row[*parameter] = None;
+        }
         let specs = arm.model().stack.specs();
         let mut names = vec![String::new(); specs.len()];
         let mut sources: Vec<Source> = Vec::new();
@@ -89,16 +84,18 @@ impl Uncertainty {
         }
     }
 
-    /// The same with what is usual at the poses of a recording, and what its instrument leaves open.
+    /// The same with what is usual at the poses of a recording (95 % along any direction), and what its instrument leaves open.
     pub fn with_recording(mut self, arm: &IdentifiedArm, data: &Measurements) -> Self {
-        self.usual = self.usual(arm, data);
-        self.instrument = Self::instrument(data);
+        let (rows, mut reach) = (data.rows(), arm.reach());
+        let finite = |value: &f64| value.is_finite();
+        let mut along =
+            |row| COVERAGE * (self.of_parameters(&mut reach, data.q(row)).trace() / 3.0).sqrt();
+        let some = (0..rows).step_by(rows.div_ceil(POSES).max(1));
+        let usual: Vec<f64> = some.map(&mut along).filter(finite).collect();
+        let squares = (0..rows).map(|row| data.noise(row).powi(2)).filter(finite);
+        self.instrument = (squares.sum::<f64>() / rows.max(1) as f64).sqrt();
+        self.usual = if usual.is_empty() { 0.0 } else { median(usual) };
         self
-    }
-
-    /// The effect and place of a parameter of the stack.
-    pub(super) fn name(&self, parameter: usize) -> String {
-        self.names[parameter].clone()
     }
 
     fn jacobian(&self, reach: &mut Reach, q: &[f64]) -> Vec<Vector3<f64>> {
@@ -112,31 +109,8 @@ impl Uncertainty {
     }
 
     /// Covariance (m2, tracker frame) of the point at command `q` by the parameters.
-    pub(super) fn of_parameters(&self, reach: &mut Reach, q: &[f64]) -> Matrix3<f64> {
+    fn of_parameters(&self, reach: &mut Reach, q: &[f64]) -> Matrix3<f64> {
         self.covariance.of_point(&self.jacobian(reach, q))
-    }
-
-    /// Derivatives (m per unit) of the point at command `q` along a direction, by the parameters of the covariance.
-    pub(super) fn along(&self, reach: &mut Reach, q: &[f64], along: &Vector3<f64>) -> Vec<f64> {
-        self.jacobian(reach, q)
-            .iter()
-            .map(|derivative| derivative.dot(along))
-            .collect()
-    }
-
-    /// Variance (m2) along the direction of these derivatives.
-    pub(super) fn variance(&self, derivatives: &[f64]) -> f64 {
-        self.covariance.along(derivatives)
-    }
-
-    /// The same by each effect at a place alone.
-    pub(super) fn by_effect(&self, derivatives: &[f64]) -> Vec<(String, f64)> {
-        let variance =
-            |source: &Source| self.covariance.along_rows(derivatives, &source.parameters);
-        self.sources
-            .iter()
-            .map(|source| (source.name.clone(), variance(source)))
-            .collect()
     }
 
     /// At command `q`, under the circumstances that `reach` is set to.
@@ -205,27 +179,6 @@ impl CorrectionUncertainty {
 }
 
 impl Uncertainty {
-    /// What is usual at the poses of a recording, m, 95 % along any direction.
-    pub(super) fn usual(&self, arm: &IdentifiedArm, data: &Measurements) -> f64 {
-        let mut reach = arm.reach();
-        let stride = data.rows().div_ceil(POSES).max(1);
-        let rows = (0..data.rows()).step_by(stride);
-        let along =
-            |row| COVERAGE * (self.of_parameters(&mut reach, data.q(row)).trace() / 3.0).sqrt();
-        let all: Vec<f64> = rows.map(along).filter(|value| value.is_finite()).collect();
-        if all.is_empty() { 0.0 } else { median(all) }
-    }
-
-    /// Length (m) of one standard deviation of the instrument, rms over the rows of a recording.
-    pub(super) fn instrument(data: &Measurements) -> f64 {
-        let rows = data.rows();
-        let squares: f64 = (0..rows)
-            .map(|row| data.noise(row).powi(2))
-            .filter(|square| square.is_finite())
-            .sum();
-        (squares / rows.max(1) as f64).sqrt()
-    }
-
     /// Standard uncertainty of the correction (m, tracker frame) that led to the command `q`, under the circumstances that `reach` is set to.
     pub(crate) fn of_correction(
         &self,
@@ -240,25 +193,29 @@ impl Uncertainty {
         } else {
             Vector3::zeros()
         };
-        let jacobian = self.along(reach, q, &along);
+        let jacobian: Vec<f64> = self
+            .jacobian(reach, q)
+            .iter()
+            .map(|derivative| derivative.dot(&along))
+            .collect();
         let variance =
-            self.variance(&jacobian) + beyond.iter().map(BeyondFitted::square).sum::<f64>();
+            self.covariance.along(&jacobian) + beyond.iter().map(BeyondFitted::square).sum::<f64>();
         let seen = |one: &&BeyondFitted| COVERAGE * one.square().sqrt() > self.instrument;
-        let named = |one: &BeyondFitted| (self.name(one.parameter), one.variable.to_string());
+        let name = |one: &BeyondFitted| self.names[one.parameter].clone();
         let u95 = COVERAGE * variance.sqrt();
         let mut finding = None;
         if u95 > DOUBTFUL * size {
-            let mut shares = self.by_effect(&jacobian);
-            shares.extend(
-                beyond
-                    .iter()
-                    .map(|one| (self.name(one.parameter), one.square())),
-            );
-            let most = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+            let fitted = self.sources.iter().map(|source| {
+                let share = self.covariance.along_rows(&jacobian, &source.parameters);
+                (source.name.clone(), share)
+            });
+            let shares = fitted.chain(beyond.iter().map(|one| (name(one), one.square())));
+            let most = shares.max_by(|a, b| a.1.total_cmp(&b.1));
             finding = most
                 .filter(|(_, share)| *share >= NAMED * variance)
                 .map(|(name, _)| name);
         }
+        let named = |one| (name(one), one.variable.to_string());
         CorrectionUncertainty {
             correction: size,
             u95,

@@ -3,19 +3,16 @@
 use super::types::{Diagnosis, Question, VerdictKind};
 use super::unasked::{on_its_base, unasked};
 use crate::criteria::search::FEWEST;
-use crate::estimate::{FitOptions, fit_screened};
+use crate::estimate::fit_screened;
 
 /// The nominal robot with its base where the rows to fit have it.
 pub(crate) fn not_asked(question: &Question) -> Diagnosis {
     let (start, candidates) = on_its_base(question);
-    let options = FitOptions {
-        rows: question.fit,
-        candidates: &candidates,
-    };
+    let Question { data, fit, set, .. } = *question;
     let diagnosis = unasked(
         question,
         VerdictKind::NotAsked,
-        fit_screened(&start, question.data, &options, question.set),
+        fit_screened(&start, data, fit, &candidates, Some(set)),
     );
     let rows = question.fit.len();
     let too_few = format!(

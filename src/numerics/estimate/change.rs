@@ -10,7 +10,6 @@ use crate::effect::names;
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::fit::Session;
 use crate::estimate::model::Model;
-use crate::estimate::problem::Problem;
 use crate::robot::{Anchor, Shape, Target};
 use crate::spatial::{Pose, Twist};
 use faer::Mat;
@@ -117,15 +116,8 @@ struct Reduced {
 impl Reduced {
     fn of(before: &Session, after: &Session, shared: &[usize], base: &[usize]) -> Self {
         let order: Vec<usize> = shared.iter().chain(base).copied().collect();
-        let factor = |session: &Session| {
-            let problem = Problem {
-                data: session.data,
-                rows: session.rows,
-                excess: session.fitted.excess(),
-            };
-            problem.observe(session.model, &order).factor
-        };
-        let (first, second) = (factor(before), factor(after));
+        let [first, second] =
+            [before, after].map(|one| one.problem().observe(one.model, &order).factor);
         let (s, b) = (shared.len(), base.len());
         let height = s + b + 1;
         // Columns: shared | base before | base after | steps | right side. Rows: before, after, what is known beforehand.

@@ -4,7 +4,7 @@
 
 use super::factor::StackedRows;
 use super::model::Model;
-use super::problem::{ObservationTerm, Problem};
+use super::problem::{ObservationTerm, Problem, columns};
 use crate::estimate::factor::Triangle;
 use crate::observation::KINDS;
 use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
@@ -24,10 +24,7 @@ pub(crate) fn clustered(
     poses: &[Vec<usize>],
 ) -> Triangle {
     let p = free.len();
-    let mut column = vec![usize::MAX; model.stack.specs().len()];
-    for (j, parameter) in free.iter().enumerate() {
-        column[*parameter] = j;
-    }
+    let column = columns(model, free);
     let lines: Vec<Vec<f64>> = poses
         .par_iter()
         .map_init(
@@ -45,9 +42,10 @@ pub(crate) fn clustered(
                         let share = term.share();
                         jacobian.clear();
                         jacobian.resize(p, Vector3::zeros());
-                        term.derivatives(&mut placed, |parameter, derivative| {
-                            if column[parameter] < p {
-                                jacobian[column[parameter]] += derivative;
+                        let sensitivity = &term.sensitivity;
+                        sensitivity.derivatives(&mut placed, |parameter, derivative| {
+                            if let Some(j) = column[parameter] {
+                                jacobian[j] += derivative;
                             }
                         });
                         let error = term.error * share;

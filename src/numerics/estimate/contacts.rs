@@ -5,7 +5,7 @@
 //! of an arm that is a little smaller is a little smaller.
 
 use super::factor::TriangularFactor;
-use super::fit::{FitOptions, Session, fit};
+use super::fit::{Session, fit};
 use super::levenberg::{FINE, minimise};
 use super::model::Model;
 use super::problem::Problem;
@@ -25,14 +25,8 @@ impl Problem<'_> {
     /// The data of all candidates from joints at which all contacts close; none where there is none.
     pub fn shown(&self, model: &Model, candidates: &[usize]) -> Option<TriangularFactor> {
         let data = closed(model, self.data, self.rows)?;
-        Some(
-            Problem {
-                data: &data,
-                ..*self
-            }
-            .observe(model, candidates)
-            .factor,
-        )
+        let closed = Problem::new(&data, self.rows, self.excess);
+        Some(closed.observe(model, candidates).factor)
     }
 }
 
@@ -151,21 +145,8 @@ fn placed_by(
         lengths: Vec::new(),
         ..model.clone()
     };
-    let (placed, _) = fit(
-        &start,
-        data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        },
-    );
-    (
-        Model {
-            x: placed.x,
-            ..model.clone()
-        },
-        inflation,
-    )
+    let x = fit(&start, data, &rows, &candidates).0.x;
+    (Model { x, ..model.clone() }, inflation)
 }
 
 /// Errors of the rows `part` under a fit to the others, from the whole one on, where `part` holds all rows of some anchor; `None` where it
@@ -200,11 +181,7 @@ pub(super) fn without_places(
     let numbers = |between: &[usize; 2]| between.iter().any(|number| unseen.contains_key(number));
     let mut other = model.clone();
     other.lengths.retain(|known| !numbers(&known.between));
-    let problem = Problem {
-        data,
-        rows: &kept,
-        excess: fitted.excess(),
-    };
+    let problem = Problem::new(data, &kept, fitted.excess());
     let start = problem.evaluate(&other, &free);
     minimise(&problem, &mut other, &free, start, FINE);
     let (other, inflation) = placed_by(&other, data, &unseen);

@@ -2,8 +2,9 @@
 //!
 //! Fisher's F distribution by the incomplete beta function (continued fraction after Lentz; Numerical Recipes, Sec. 6.4).
 
-use crate::estimate::factor::{Triangle, TriangularFactor, dot};
+use crate::estimate::factor::{Triangle, dot};
 use crate::estimate::model::Model;
+use crate::estimate::problem::columns;
 use crate::robot::Measurements;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -19,16 +20,8 @@ pub struct Covariance {
 }
 
 impl Covariance {
-    /// From the whitened factor. `None` if singular.
-    pub(crate) fn of(factor: &TriangularFactor, free: &[usize]) -> Option<Self> {
-        Some(Self {
-            free: free.to_vec(),
-            root: factor.inverse()?,
-        })
-    }
-
     /// From a root.
-    pub(crate) fn of_root(root: Triangle, free: &[usize]) -> Self {
+    pub(crate) fn new(root: Triangle, free: &[usize]) -> Self {
         Self {
             free: free.to_vec(),
             root,
@@ -79,13 +72,17 @@ impl Covariance {
         })
     }
 
+    fn row(&self, parameter: usize) -> Option<usize> {
+        self.free.iter().position(|free| *free == parameter)
+    }
+
+    fn rows(&self, parameters: &[usize]) -> Option<Vec<usize>> {
+        parameters.iter().map(|k| self.row(*k)).collect()
+    }
+
     /// The covariance (SI) of some of the parameters, in their order; `None` where one of them was not estimated.
     pub fn block(&self, parameters: &[usize]) -> Option<DMatrix<f64>> {
-        let rows: Option<Vec<usize>> = parameters
-            .iter()
-            .map(|parameter| self.free.iter().position(|free| free == parameter))
-            .collect();
-        let rows = rows?;
+        let rows = self.rows(parameters)?;
         Some(DMatrix::from_fn(rows.len(), rows.len(), |a, b| {
             self.product(rows[a], rows[b])
         }))
@@ -127,7 +124,7 @@ impl Covariance {
 
     /// Standard deviation of the `row`-th free parameter, SI.
     pub(crate) fn sigma(&self, row: usize) -> f64 {
-        self.product(row, row).sqrt()
+        self.root.row_norm(row)
     }
 
     fn product(&self, a: usize, b: usize) -> f64 {
@@ -139,11 +136,7 @@ impl Covariance {
     /// The squared distance of `values` of some free parameters from zero, in standard deviations: chi-square of as many degrees of
     /// freedom where nothing is there. `None` where one of them is not free.
     pub fn distance(&self, parameters: &[usize], values: &[f64]) -> Option<f64> {
-        let rows: Option<Vec<usize>> = parameters
-            .iter()
-            .map(|parameter| self.free.iter().position(|free| free == parameter))
-            .collect();
-        let rows = rows?;
+        let rows = self.rows(parameters)?;
         let sigma: Vec<f64> = rows.iter().map(|row| self.sigma(*row)).collect();
         let correlation = DMatrix::from_fn(rows.len(), rows.len(), |a, b| {
             self.product(rows[a], rows[b]) / (sigma[a] * sigma[b])
@@ -160,7 +153,7 @@ impl Covariance {
 
     /// The other free parameter that a parameter of the stack is most correlated with, and the correlation.
     pub fn closest(&self, parameter: usize) -> Option<(usize, f64)> {
-        let row = self.free.iter().position(|k| *k == parameter)?;
+        let row = self.row(parameter)?;
         let sigma = self.sigma(row);
         (0..self.free.len())
             .filter(|other| *other != row)
@@ -176,10 +169,7 @@ impl Covariance {
     /// Standard deviation (m, length: root of the summed variances) of every row's predicted position from the parameters' alone.
     pub fn of_predictions(&self, model: &Model, data: &Measurements) -> Vec<f64> {
         let p = self.free.len();
-        let mut column = vec![usize::MAX; model.stack.specs().len()];
-        for (j, parameter) in self.free.iter().enumerate() {
-            column[*parameter] = j;
-        }
+        let column = columns(model, &self.free);
         (0..data.rows())
             .into_par_iter()
             .map_init(
@@ -199,8 +189,8 @@ impl Covariance {
                         &model.x,
                         scratch,
                         |parameter, derivative| {
-                            if let Some(sum) = jacobian.get_mut(column[parameter]) {
-                                *sum += derivative;
+                            if let Some(j) = column[parameter] {
+                                jacobian[j] += derivative;
                             }
                         },
                     );

@@ -6,21 +6,12 @@ use super::factor::TriangularFactor;
 use super::levenberg::{Effort, FINE, Iteration, ROUGH_TOLERANCE, Stop, minimise};
 use super::model::{Model, PriorCheck};
 use super::observe::{Visibility, indices, visibility};
-use super::problem::{Evaluation, Problem, as_of_three, bound, share};
+use super::problem::{Evaluation, Problem, as_of_three, bound, columns, share};
 use super::repeats::{Poses, Repeated, autocorrelation_time};
 use crate::observation::{Dimension, ExcessSigma, Residual};
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
 use std::collections::BTreeMap;
-
-/// What is free. Everything else keeps the value it has in `model.x`.
-#[derive(Clone, Copy)]
-pub struct FitOptions<'a> {
-    /// Rows of the recording to fit.
-    pub rows: &'a [usize],
-    /// Candidate parameters of the stack, in order of precedence.
-    pub candidates: &'a [usize],
-}
 
 /// How a fit treated a parameter of the stack.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,12 +76,28 @@ pub struct Session<'a> {
     pub fitted: &'a Fitted,
 }
 
+impl<'a> Session<'a> {
+    /// What was minimised.
+    pub(crate) fn problem(&self) -> Problem<'a> {
+        Problem::new(self.data, self.rows, self.fitted.excess())
+    }
+}
+
 impl Fitted {
     /// Parameters that were estimated.
     pub fn free(&self) -> Vec<usize> {
-        (0..self.statuses.len())
-            .filter(|k| matches!(self.statuses[*k], ParameterStatus::Free(_)))
-            .collect()
+        self.with_status(|status| matches!(status, ParameterStatus::Free(_)))
+    }
+
+    /// The same with those that a bound stops.
+    pub(crate) fn estimated(&self) -> Vec<usize> {
+        use ParameterStatus::{Bound, Free};
+        self.with_status(|status| matches!(status, Free(_) | Bound(_)))
+    }
+
+    pub(crate) fn with_status(&self, is: impl Fn(&ParameterStatus) -> bool) -> Vec<usize> {
+        let all = 0..self.statuses.len();
+        all.filter(|k| is(&self.statuses[*k])).collect()
     }
 
     /// What the rows show beyond their own noise.
@@ -121,19 +128,21 @@ const STATED: f64 = 2.0;
 /// Rounds of fit and new estimate of the unmodelled part; it settles in two or three.
 const ROUNDS: usize = 4;
 
-/// The model with those of the candidates fitted that the data can see, from its values on.
-pub fn fit(start: &Model, data: &Measurements, options: &FitOptions) -> (Model, Fitted) {
+/// The model with those of the candidates (parameters of the stack in order of precedence) fitted to some rows that the data can see, from
+/// its values on. Everything else keeps its value.
+pub fn fit(
+    start: &Model,
+    data: &Measurements,
+    rows: &[usize],
+    candidates: &[usize],
+) -> (Model, Fitted) {
     let mut model = start.clone();
-    let mut problem = Problem {
-        data,
-        rows: options.rows,
-        excess: ExcessSigma::default(),
-    };
-    for k in options.candidates {
+    let mut problem = Problem::new(data, rows, ExcessSigma::default());
+    for k in candidates {
         model.x[*k] = model.within(*k, model.x[*k]);
     }
     // The start may be far off: judge visibility with the instrument's noise, weight with what is left at the start.
-    let sight = problem.evaluate(&model, options.candidates);
+    let sight = problem.evaluate(&model, candidates);
     problem.excess = excess_sigma(&problem, &sight, 0);
     let mut search = Minimisation {
         statuses: vec![ParameterStatus::Kept; model.x.len()],
@@ -141,50 +150,47 @@ pub fn fit(start: &Model, data: &Measurements, options: &FitOptions) -> (Model, 
         stop: Stop::NothingFree,
         free: Vec::new(),
     };
-    search.settle(&mut problem, &mut model, options.candidates, sight, true);
-    let mut all = problem.observe(&model, options.candidates);
+    search.settle(&mut problem, &mut model, candidates, sight, true);
+    let mut all = problem.observe(&model, candidates);
     let shown = problem
-        .shown(&model, options.candidates)
+        .shown(&model, candidates)
         .unwrap_or_else(|| all.factor.clone());
-    if search.reconsider(&mut problem, &mut model, options.candidates, shown) {
-        all = problem.observe(&model, options.candidates);
+    if search.reconsider(&mut problem, &mut model, candidates, shown) {
+        all = problem.observe(&model, candidates);
     }
-    let fitted = stated(&problem, &model, options.candidates, search, all);
+    let fitted = stated(&problem, &model, candidates, search, all);
     (model, fitted)
 }
 
 /// Which of some further parameters the data can see around a fitted model next to those that were fitted, `times` better than their priors.
-pub fn seen(
-    model: &Model,
-    data: &Measurements,
-    fitted: &Fitted,
-    rows: &[usize],
-    further: &[usize],
-    times: f64,
-) -> Vec<usize> {
-    let problem = Problem {
-        data,
-        rows,
-        excess: fitted.excess(),
-    };
-    let known = fitted.free();
+pub fn seen(session: &Session, further: &[usize], times: f64) -> Vec<usize> {
+    let model = session.model;
+    let known = session.fitted.free();
     let candidates: Vec<usize> = known.iter().chain(further).copied().collect();
-    let prior = |k: &usize| {
-        if known.contains(k) {
-            f64::INFINITY
-        } else {
-            model.stack.specs()[*k].prior_sigma / times
-        }
+    let prior = |k: &usize| match known.contains(k) {
+        true => f64::INFINITY,
+        false => model.stack.specs()[*k].prior_sigma / times,
     };
     let seen = visibility(
-        &problem.observe(model, &candidates).factor,
+        &session.problem().observe(model, &candidates).factor,
         &candidates.iter().map(prior).collect::<Vec<_>>(),
     );
-    let seen = seen
-        .into_iter()
-        .zip(candidates)
-        .filter(|(seen, k)| *seen == Visibility::Seen && further.contains(k));
-    seen.map(|(_, k)| k).collect()
+    picked(&candidates, &seen)
+        .filter(|k| further.contains(k))
+        .collect()
+}
+
+/// The candidates that are seen.
+fn picked<'a>(candidates: &'a [usize], seen: &'a [Visibility]) -> impl Iterator<Item = usize> + 'a {
+    let pairs = candidates.iter().zip(seen);
+    pairs
+        .filter(|(_, verdict)| **verdict == Visibility::Seen)
+        .map(|(k, _)| *k)
+}
+
+fn prior_sigmas(model: &Model, parameters: &[usize]) -> Vec<f64> {
+    let specs = model.stack.specs();
+    parameters.iter().map(|k| specs[*k].prior_sigma).collect()
 }
 
 /// What the data (`all`: in all candidates, at the minimum) say of a fitted model.
@@ -195,11 +201,6 @@ fn stated(
     search: Minimisation,
     all: Evaluation,
 ) -> Fitted {
-    let prior = |set: &[usize]| {
-        set.iter()
-            .map(|k| model.stack.specs()[*k].prior_sigma)
-            .collect::<Vec<_>>()
-    };
     let Minimisation {
         mut statuses,
         course,
@@ -207,16 +208,12 @@ fn stated(
         free,
     } = search;
     let errors = problem.errors(&all.residuals);
-    let place = |k: &usize| {
-        candidates
-            .iter()
-            .position(|other| other == k)
-            .expect("free ones are candidates")
+    let place = columns(model, candidates);
+    let only = |free: &[usize]| {
+        let places: Vec<usize> = free.iter().filter_map(|k| place[*k]).collect();
+        all.factor.select(&places)
     };
-    let data = all
-        .factor
-        .select(&free.iter().map(place).collect::<Vec<_>>());
-    let (factor, _) = model.with_priors(&free, data);
+    let (factor, _) = model.with_priors(&free, only(&free));
     let pinned = model.pinned(&free, &factor);
     bounded(model, &free, &pinned, &factor, &mut statuses);
     let free: Vec<usize> = free
@@ -225,27 +222,20 @@ fn stated(
         .filter(|(_, pinned)| !pinned)
         .map(|(k, _)| k)
         .collect();
-    let data = all
-        .factor
-        .select(&free.iter().map(place).collect::<Vec<_>>());
+    let data = only(&free);
     // The noise is known up to a factor, what was known beforehand is not.
     let scale = reduced(&errors, free.len()).sqrt() * lasting(problem, &all.residuals).sqrt();
     let weight = if scale > 0.0 { 1.0 / scale } else { 1.0 };
     let poses = Poses::of(problem.data, problem.rows);
     let clusters = clusters(&poses, problem.rows.len(), free.len());
-    let covariance = match clusters {
-        Some(poses) => model
-            .with_priors(&free, data.clone())
-            .0
-            .inverse()
-            .map(|inverse| {
-                Covariance::of_root(clustered(problem, model, &free, &inverse, poses), &free)
-            }),
-        None => Covariance::of(
-            &model.with_priors(&free, data.clone().weighted(weight)).0,
-            &free,
-        ),
+    let inverse = |data| model.with_priors(&free, data).0.inverse();
+    let root = match clusters {
+        Some(poses) => {
+            inverse(data.clone()).map(|inverse| clustered(problem, model, &free, &inverse, poses))
+        }
+        None => inverse(data.clone().weighted(weight)),
     };
+    let covariance = root.map(|root| Covariance::new(root, &free));
     let mut prior_checks = BTreeMap::new();
     if let Some(covariance) = &covariance {
         for (row, k) in free.iter().enumerate() {
@@ -261,13 +251,13 @@ fn stated(
         .iter()
         .any(|residual| residual.dimension() == Dimension::Angle);
     let (factor, _) = model.with_priors(&free, data);
-    let singular = factor.singular_values(&prior(&free));
+    let singular = factor.singular_values(&prior_sigmas(model, &free));
     let singular_all = match problem.shown(model, candidates) {
         None if free == candidates => singular.clone(),
         shown => model
             .with_priors(candidates, shown.unwrap_or(all.factor))
             .0
-            .singular_values(&prior(candidates)),
+            .singular_values(&prior_sigmas(model, candidates)),
     };
     Fitted {
         statuses,
@@ -316,19 +306,12 @@ impl Minimisation {
         let (sight, _) = model.with_priors(candidates, all);
         let mut order: Vec<usize> = (0..candidates.len()).collect();
         order.sort_by_key(|j| !self.free.contains(&candidates[*j]));
-        let wary = order
-            .iter()
-            .map(|j| model.stack.specs()[candidates[*j]].prior_sigma / CLEARLY)
-            .collect::<Vec<_>>();
+        let ordered: Vec<usize> = order.iter().map(|j| candidates[*j]).collect();
+        let mut wary = prior_sigmas(model, &ordered);
+        wary.iter_mut().for_each(|sigma| *sigma /= CLEARLY);
         let seen = visibility(&sight.select(&order), &wary);
         let known = self.free.len();
-        let new: Vec<usize> = order
-            .iter()
-            .zip(&seen)
-            .skip(known)
-            .filter(|(_, v)| **v == Visibility::Seen)
-            .map(|(j, _)| candidates[*j])
-            .collect();
+        let new: Vec<usize> = picked(&ordered[known..], &seen[known..]).collect();
         if new.is_empty() {
             return false;
         }
@@ -362,10 +345,7 @@ impl Minimisation {
     ) {
         let mut candidates = candidates.to_vec();
         for round in 0..ROUNDS {
-            let prior: Vec<f64> = candidates
-                .iter()
-                .map(|k| model.stack.specs()[*k].prior_sigma)
-                .collect();
+            let prior = prior_sigmas(model, &candidates);
             let shown = problem
                 .shown(model, &candidates)
                 .map(|factor| model.with_priors(&candidates, factor).0);
@@ -381,12 +361,7 @@ impl Minimisation {
                     ),
                 };
             }
-            let free: Vec<usize> = candidates
-                .iter()
-                .zip(&seen)
-                .filter(|(_, v)| **v == Visibility::Seen)
-                .map(|(k, _)| *k)
-                .collect();
+            let free: Vec<usize> = picked(&candidates, &seen).collect();
             // What is dropped goes back to what was known beforehand and stays there.
             for k in candidates.iter().filter(|k| !free.contains(k)) {
                 model.x[*k] = model.prior_value(*k);

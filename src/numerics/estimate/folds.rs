@@ -12,7 +12,7 @@
 
 use crate::estimate::contacts::without_places;
 use crate::estimate::factor::TriangularFactor;
-use crate::estimate::fit::{FitOptions, ParameterStatus, Session, fit};
+use crate::estimate::fit::{Session, fit};
 use crate::estimate::model::Model;
 use crate::estimate::problem::{ObservationTerm, Problem, share};
 use crate::estimate::repeats::Poses;
@@ -66,7 +66,7 @@ pub fn leave_one_out(whole: &Session) -> Option<Folds> {
     let Session { data, rows, .. } = *whole;
     let folds = parts(data, rows);
     let longest = folds.iter().map(Vec::len).max().unwrap_or_default();
-    if folds.len() < 2 || 3 * (rows.len() - longest) <= whole.candidates().len() {
+    if folds.len() < 2 || 3 * (rows.len() - longest) <= whole.fitted.estimated().len() {
         return None;
     }
     let errors = gather(
@@ -114,28 +114,18 @@ fn at_random(mut order: Vec<&Vec<usize>>, rows: usize, count: usize, seed: u64) 
 }
 
 impl Session<'_> {
-    fn candidates(&self) -> Vec<usize> {
-        let estimated = |k: &usize| {
-            matches!(
-                self.fitted.statuses[*k],
-                ParameterStatus::Free(_) | ParameterStatus::Bound(_)
-            )
-        };
-        (0..self.fitted.statuses.len()).filter(estimated).collect()
-    }
-
     /// The parts in their order, where they are enough for so many folds.
     fn divisible<'p>(&self, parts: &'p [Vec<usize>], count: usize) -> Option<Vec<&'p Vec<usize>>> {
         let left = (self.rows.len() * (count.max(1) - 1)) / count.max(1);
-        let enough = count >= 2 && parts.len() >= 2 * count && 3 * left > self.candidates().len();
+        let estimated = self.fitted.estimated().len();
+        let enough = count >= 2 && parts.len() >= 2 * count && 3 * left > estimated;
         enough.then(|| parts.iter().collect())
     }
 
     /// Errors of the rows of each fold under a fit to the others.
     pub fn without_each(&self, folds: &[Vec<usize>], scale: ErrorScale) -> Vec<Vec<f64>> {
-        let fitted = self.fitted;
-        let candidates = self.candidates();
-        let nearby = NearbyFits::of(self, folds, &fitted.free(), scale);
+        let candidates = self.fitted.estimated();
+        let nearby = NearbyFits::of(self, folds, &self.fitted.free(), scale);
         let close = nearby
             .as_ref()
             .and_then(NearbyFits::alone)
@@ -220,14 +210,7 @@ fn without(whole: &Session, candidates: &[usize], part: &[usize], scale: ErrorSc
         .copied()
         .filter(|row| part.binary_search(row).is_err())
         .collect();
-    let (other, _) = fit(
-        model,
-        data,
-        &FitOptions {
-            rows: &kept,
-            candidates,
-        },
-    );
+    let (other, _) = fit(model, data, &kept, candidates);
     let mut scratch = other.stack.scratch(&other.robot);
     part.iter()
         .map(|row| scale.error(&other, data, *row, &mut scratch))
@@ -294,7 +277,7 @@ impl<'a> NearbyFits<'a> {
         }
         let excess = fitted.excess();
         let part = |rows: &'a Vec<usize>| {
-            let problem = Problem { data, rows, excess };
+            let problem = Problem::new(data, rows, excess);
             let seen = problem.observe(model, columns);
             let shares = problem
                 .errors(&seen.residuals)
@@ -337,8 +320,7 @@ impl<'a> NearbyFits<'a> {
     pub fn with(&self, steps: &[Option<f64>]) -> Option<Vec<Option<Vec<f64>>>> {
         let whole = self.whole.given(steps);
         let inverse = whole.inverse()?;
-        let p = whole.parameters();
-        let inverse = Mat::from_fn(p, p, |i, j| inverse.at(i, j));
+        let inverse = inverse.matrix(1.0);
         let mut model = self.model.clone();
         for (parameter, step) in self.columns.iter().zip(steps) {
             model.x[*parameter] += step.unwrap_or_default();
@@ -375,8 +357,7 @@ impl<'a> NearbyFits<'a> {
             .collect();
         let one = |parameter: &usize| {
             let i = open.iter().position(|other| other == parameter)?;
-            let square: f64 = (i..open.len()).map(|j| inverse.at(i, j).powi(2)).sum();
-            Some((self.model.x[*parameter] + found[i], square.sqrt()))
+            Some((self.model.x[*parameter] + found[i], inverse.row_norm(i)))
         };
         groups.iter().map(one).collect()
     }

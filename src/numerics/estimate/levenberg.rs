@@ -2,7 +2,7 @@
 //!
 //! A model's step with what is known beforehand: priors as rows of the factor, bounds by an active set.
 
-use crate::estimate::factor::{TriangularFactor, axpy, dot};
+use crate::estimate::factor::{TriangularFactor, axpy, norm};
 use crate::estimate::length::LengthTerm;
 use crate::estimate::model::{Known, Model};
 use crate::estimate::problem::{Evaluation, Problem};
@@ -160,12 +160,11 @@ fn raise(damping: f64) -> f64 {
 
 /// |J dx|: how far a step moves the whitened predictions.
 fn step_norm(factor: &TriangularFactor, step: &[f64]) -> f64 {
-    let p = step.len();
-    let mut moved = vec![0.0; p];
+    let mut moved = vec![0.0; step.len()];
     for (j, change) in step.iter().enumerate() {
         axpy(*change, factor.column(j), &mut moved);
     }
-    dot(&moved, &moved).sqrt()
+    norm(&moved)
 }
 
 /// Largest cosine between the residual and a column of J that no bound stops; zero at the minimum.

@@ -25,7 +25,7 @@ pub mod threads;
 pub use change::{ParameterChange, changes};
 pub use contacts::{Reseat, placed_by_left_out, reseated};
 pub use covariance::{Covariance, tail};
-pub use fit::{CLEARLY, FitOptions, Fitted, ParameterStatus, Session, fit, seen};
+pub use fit::{CLEARLY, Fitted, ParameterStatus, Session, fit, seen};
 pub use folds::{
     FoldKind, Folds, NearbyFits, cross_validate, dealt, fold_poses, gather, leave_one_out,
 };
@@ -33,6 +33,7 @@ pub use gauge::{align, align_points, gauge};
 pub use levenberg::{Iteration, Stop};
 pub use model::{Bounds, CONFLICT, Known, KnownLength, Model, Prior, PriorCheck, RowError};
 pub use observe::Visibility;
+pub(crate) use problem::columns;
 pub use remedy::{Remedy, remedies};
 pub use repeats::{Poses, Repeated, autocorrelation_time, spread};
 pub use scale::{ArmScale, ErrorScale, known_places, noise, scale};

@@ -4,7 +4,7 @@
 //! value and says with whom it is redundant. Indices after Sun and Hollerbach, ICRA 2008.
 
 use super::factor::TriangularFactor;
-use crate::estimate::factor::{axpy, dot};
+use crate::estimate::factor::{axpy, dot, norm as length};
 
 /// How a candidate parameter was classed.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,10 +86,6 @@ fn combination(
         .collect();
     parts.sort_by(|a, b| b.1.total_cmp(&a.1));
     parts
-}
-
-fn length(values: &[f64]) -> f64 {
-    dot(values, values).sqrt()
 }
 
 /// Condition and observability indices of singular values (largest first) from `rows` measured points.

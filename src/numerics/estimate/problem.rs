@@ -1,6 +1,6 @@
 //! The calibration problem: weighted residuals of some rows under some free parameters.
 
-use super::factor::{StackedRows, TriangularFactor};
+use super::factor::{StackedRows, TriangularFactor, axpy};
 use super::model::Model;
 use crate::effect::PlacedRow;
 use crate::observation::{
@@ -8,7 +8,6 @@ use crate::observation::{
 };
 use crate::robot::Measurements;
 use crate::statistics::MEDIAN_CHI2;
-use faer::Mat;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -48,7 +47,11 @@ impl Evaluation {
     }
 }
 
-impl Problem<'_> {
+impl<'a> Problem<'a> {
+    pub(crate) fn new(data: &'a Measurements, rows: &'a [usize], excess: ExcessSigma) -> Self {
+        Self { data, rows, excess }
+    }
+
     /// Length in standard deviations and number of axes of every residual.
     pub(crate) fn errors(&self, residuals: &[Residual]) -> Vec<(f64, usize)> {
         let length = |residual: &Residual| {
@@ -75,50 +78,36 @@ impl Problem<'_> {
 
     /// The same from the data alone.
     pub(crate) fn observe(&self, model: &Model, free: &[usize]) -> Evaluation {
-        let mut column = vec![None; model.stack.specs().len()];
-        for (j, parameter) in free.iter().enumerate() {
-            column[*parameter] = Some(j);
-        }
-        let spans: Vec<Span> = self
+        let column = columns(model, free);
+        let spans: Vec<Evaluation> = self
             .rows
             .par_chunks(SPAN)
             .map(|span| self.span(model, span, &column, free.len()))
             .collect();
-        let mut residuals = Vec::with_capacity(self.rows.len());
-        let mut sum: Option<TriangularFactor> = None;
-        let (mut volume, mut pull) = (0.0, vec![0.0; free.len()]);
-        for Span {
-            residuals: some,
-            factor,
-            volume: term,
-            pull: towards,
-        } in spans
-        {
-            residuals.extend(some);
-            volume += term;
-            pull.iter_mut()
-                .zip(towards)
-                .for_each(|(sum, term)| *sum += term);
-            sum = Some(sum.map_or_else(|| factor.clone(), |sum| sum.stack(&factor)));
-        }
-        let cost = self
-            .errors(&residuals)
-            .into_iter()
-            .map(|(error, axes)| huber(error, axes))
-            .sum();
-        let factor = sum.unwrap_or_else(|| TriangularFactor::of(&Mat::zeros(1, free.len() + 1)));
+        let whole = spans.into_iter().reduce(|mut sum, span| {
+            sum.residuals.extend(span.residuals);
+            sum.volume += span.volume;
+            axpy(1.0, &span.pull, &mut sum.pull);
+            sum.factor = sum.factor.stack(&span.factor);
+            sum
+        });
+        let whole = whole.unwrap_or_else(|| self.span(model, &[], &column, free.len()));
+        let errors = self.errors(&whole.residuals).into_iter();
         Evaluation {
-            cost,
-            volume,
-            pull,
-            rms: rms(&residuals),
-            residuals,
-            factor,
+            cost: errors.map(|(error, axes)| huber(error, axes)).sum(),
+            rms: rms(&whole.residuals),
+            ..whole
         }
     }
 
     /// Residuals and factor of some rows, in memory of a chunk.
-    fn span(&self, model: &Model, rows: &[usize], column: &[Option<usize>], p: usize) -> Span {
+    fn span(
+        &self,
+        model: &Model,
+        rows: &[usize],
+        column: &[Option<usize>],
+        p: usize,
+    ) -> Evaluation {
         let mut scratch = model.stack.scratch(&model.robot);
         let data = self.data;
         let kinds = kinds(data);
@@ -132,11 +121,12 @@ impl Problem<'_> {
             let mut lines = tall.chunk(height);
             let mut write = |first: usize, term: ObservationTerm, placed: &mut PlacedRow| {
                 let share = term.share();
-                term.derivatives(placed, |parameter, derivative| {
-                    if let Some(j) = column[parameter] {
-                        add(&mut lines[j][first..], &derivative, share);
-                    }
-                });
+                term.sensitivity
+                    .derivatives(placed, |parameter, derivative| {
+                        if let Some(j) = column[parameter] {
+                            add(&mut lines[j][first..], &derivative, share);
+                        }
+                    });
                 add(&mut lines[p][first..], &term.error, share);
             };
             for (i, &row) in chunk.iter().enumerate() {
@@ -164,11 +154,13 @@ impl Problem<'_> {
             }
             tall.absorb(height);
         }
-        Span {
+        Evaluation {
             residuals,
-            factor: tall.factor(),
+            cost: 0.0,
             volume,
             pull,
+            rms: 0.0,
+            factor: tall.factor(),
         }
     }
 }
@@ -200,14 +192,6 @@ fn add(to: &mut [f64], values: &Vector3<f64>, share: f64) {
         .for_each(|(to, value)| *to += value * share);
 }
 
-/// What a thread makes of its rows.
-struct Span {
-    residuals: Vec<Residual>,
-    factor: TriangularFactor,
-    volume: f64,
-    pull: Vec<f64>,
-}
-
 /// Beyond this whitened error length (99.3 % of good terms of one, two, three numbers are below) a term pulls with constant force.
 const HUBER_BY_AXES: [f64; 4] = [f64::INFINITY, 2.7, 3.15, HUBER];
 pub(crate) const HUBER: f64 = 3.5;
@@ -217,7 +201,8 @@ pub(crate) struct ObservationTerm {
     /// Measured - predicted in standard deviations.
     pub(crate) error: Vector3<f64>,
     pub(crate) axes: usize,
-    sensitivity: Sensitivity,
+    /// Derivatives of what was predicted, in standard deviations per unit of the parameter.
+    pub(crate) sensitivity: Sensitivity,
 }
 
 impl ObservationTerm {
@@ -247,15 +232,15 @@ impl ObservationTerm {
     pub(crate) fn share(&self) -> f64 {
         share(self.error.norm(), self.axes)
     }
+}
 
-    /// Derivatives of what was predicted, in standard deviations per unit of the parameter.
-    pub(crate) fn derivatives(
-        &self,
-        placed: &mut PlacedRow,
-        emit: impl FnMut(usize, Vector3<f64>),
-    ) {
-        self.sensitivity.derivatives(placed, emit);
+/// Where each parameter of the stack is among the `free` ones.
+pub(crate) fn columns(model: &Model, free: &[usize]) -> Vec<Option<usize>> {
+    let mut column = vec![None; model.stack.specs().len()];
+    for (j, parameter) in free.iter().enumerate() {
+        column[*parameter] = Some(j);
     }
+    column
 }
 
 /// Root of Huber's weight of an error of so many axes, in standard deviations.

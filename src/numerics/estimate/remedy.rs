@@ -47,39 +47,20 @@ pub fn remedies(session: &Session) -> BTreeMap<usize, Remedy> {
         model,
         fitted,
     } = *session;
-    let estimated = |k: &usize| {
-        matches!(
-            fitted.statuses[*k],
-            ParameterStatus::Free(_) | ParameterStatus::Bound(_)
-        )
-    };
-    let hidden = |k: &usize| {
-        matches!(
-            fitted.statuses[*k],
-            ParameterStatus::Redundant(_) | ParameterStatus::Unseen
-        )
-    };
-    let count = fitted.statuses.len();
-    let mut candidates: Vec<usize> = (0..count).filter(estimated).collect();
+    use ParameterStatus::{Redundant, Unseen};
+    let mut candidates = fitted.estimated();
     let known = candidates.len();
-    candidates.extend((0..count).filter(hidden));
+    candidates.extend(fitted.with_status(|status| matches!(status, Redundant(_) | Unseen)));
     if candidates.len() == known || rows.is_empty() {
         return BTreeMap::new();
     }
     let excess = fitted.excess();
     let at = |model: &Model, data: &Measurements| {
         let rows: Vec<usize> = (0..data.rows()).collect();
-        Problem {
-            data,
-            rows: &rows,
-            excess,
-        }
-        .observe(model, &candidates)
-        .factor
+        let problem = Problem::new(data, &rows, excess);
+        problem.observe(model, &candidates).factor
     };
-    let recorded = Problem { data, rows, excess }
-        .observe(model, &candidates)
-        .factor;
+    let recorded = session.problem().observe(model, &candidates).factor;
     let declared = model.robot.description().payload_mass;
     let usual = data.payload[rows[0]];
     let spread = at(model, &poses(model, data, rows, &[usual]));

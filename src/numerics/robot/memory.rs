@@ -147,12 +147,7 @@ impl Visited {
     }
 
     /// What of a pose, its payload (kg) and its temperature (C) was never measured; empty inside.
-    pub(crate) fn beyond(
-        &self,
-        q: &[f64],
-        payload: f64,
-        temperature: Option<f64>,
-    ) -> Vec<Unmeasured> {
+    pub fn beyond(&self, q: &[f64], payload: f64, temperature: Option<f64>) -> Vec<Unmeasured> {
         let outside = |value: f64, [lower, upper]: [f64; 2], least: f64| {
             let slack = (SLACK * (upper - lower)).max(least);
             value < lower - slack || value > upper + slack

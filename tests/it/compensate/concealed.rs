@@ -3,15 +3,16 @@
 //! `CALIB_RECORDINGS=100 cargo test --release --test it -- compensate::concealed --nocapture` prints the whole table.
 
 use super::true_error::exact;
+use crate::fixture::all_rows;
 use crate::recorded::{Recorded, recording_of};
 use calib::compensate::{
-    CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, Coverage, IdentifiedArm,
-    Scatter, Uncertainty,
+    CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, IdentifiedArm, Scatter,
+    Uncertainty,
 };
 use calib::description::RobotDescription;
 use calib::effect::Load;
 use calib::estimate::Model;
-use calib::robot::{JointConvention, RobotModel};
+use calib::robot::{JointConvention, RobotModel, Visited};
 use calib::table::{CovarianceTable, Parameters, Prediction, Recording, Robot};
 use calib::twin::arm::Arm;
 use calib::twin::conceal::case::Case;
@@ -112,7 +113,12 @@ pub fn outcomes_at(
     };
     let uncertainty = covariance
         .map(|covariance| Uncertainty::new(&arm, covariance, scatter).with_recording(&arm, &data));
-    let mut corrector = Corrector::new(&arm, Some(Coverage::of(&data)), uncertainty, options());
+    let mut corrector = Corrector::new(
+        &arm,
+        Some(Visited::of(&data, &all_rows(&data))),
+        uncertainty,
+        options(),
+    );
     let commands = corrector.batch(targets.iter().map(|target| command(case, target)).collect());
     let geometry = Corrector::new(&plain, None, None, options())
         .batch(targets.iter().map(|t| command(case, t)).collect());

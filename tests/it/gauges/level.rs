@@ -3,7 +3,7 @@
 use super::SIGMA;
 use super::laws::{Truth, select};
 use crate::desk::{Desk, table};
-use crate::fixture;
+use crate::fixture::{self, misses, rms};
 use crate::identify::normal;
 use crate::ingest::robot;
 use calib::estimate::{Fitted, Model, ParameterStatus};
@@ -66,23 +66,12 @@ fn ingested(data: &Measurements, seed: usize) -> Recording {
 
 /// Rms of what is stated and of what is so of predictions at rows `at`, m.
 fn errors(model: &Model, fitted: &Fitted, at: &Measurements) -> [f64; 2] {
-    let rms = |values: Vec<f64>| {
-        (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
-    };
-    let off = model
-        .predict(at)
-        .iter()
-        .zip(&at.points.position)
-        .map(|(a, b)| (a - b).norm())
-        .collect();
-    [
-        rms(fitted
-            .covariance
-            .as_ref()
-            .unwrap()
-            .of_predictions(model, at)),
-        rms(off),
-    ]
+    let stated = fitted
+        .covariance
+        .as_ref()
+        .unwrap()
+        .of_predictions(model, at);
+    [rms(stated), rms(misses(model, at))]
 }
 
 #[test]

@@ -3,12 +3,10 @@
 use super::laws::select;
 use super::{Cell, SIGMA, THREE};
 use crate::answer::has;
-use crate::fixture::{self, all_rows, diagnosed, question};
+use crate::fixture::{self, all_rows, diagnosed, question, rms};
 use crate::identify::{GEOMETRY, model, normal};
 use calib::diagnose::diagnose;
-use calib::estimate::{
-    FitOptions, Poses, Session, SuspectKind, cross_validate, fit_screened, gauge,
-};
+use calib::estimate::{Poses, Session, SuspectKind, cross_validate, fit_screened, gauge};
 use calib::robot::{Measurements, Named, NoiseBasis, RobotModel};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -109,10 +107,7 @@ fn folds_never_part_the_targets_of_a_pose() {
             fitted: &fitted,
         };
         let folds = cross_validate(&session, 5, 3).unwrap();
-        let rms = |errors: &[f64]| {
-            (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
-        };
-        [rms(&folds.random), rms(&folds.blocks)]
+        [rms(folds.random), rms(folds.blocks)]
     };
     // Rows of a pose share what its joints missed: seen beside the row, it would be predicted better. Logs that differ in the last
     // digits part none.
@@ -146,11 +141,8 @@ fn a_pose_with_wrong_joints_is_set_aside_with_all_its_targets_and_no_event() {
     .unwrap();
     let model = model(&robot, base, &GEOMETRY);
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    let options = FitOptions {
-        rows: &all,
-        candidates: &candidates,
-    };
-    let (_, _, screening) = fit_screened(&model, &data, &options, &vec![0; all.len()]);
+    let set = vec![0; all.len()];
+    let (_, _, screening) = fit_screened(&model, &data, &all, &candidates, Some(&set));
     let of_kind = |kind: SuspectKind| -> Vec<usize> {
         screening
             .suspects

@@ -1,12 +1,13 @@
 //! Targets, orientations and distances as tables: identified, stored and read back.
 
 use super::{Cell, THREE};
+use crate::answer::has;
 use crate::fixture;
 use crate::recorded::{Recorded, settings};
 use calib::effect::Load;
 use calib::robot::{Measurements, Named, RobotModel};
 use calib::spatial::Pose;
-use calib::table::{Observability, Parameters, Prediction, Recording, Table};
+use calib::table::{Parameters, Prediction, Recording, Table};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -138,18 +139,9 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
             (row.sequence >= 90).then_some("rotation distance")
         );
     }
-    let rank = |quantity: &str| {
-        let table: Observability = made.get();
-        table
-            .0
-            .iter()
-            .find(|row| row.quantity == quantity)
-            .map(|row| row.value)
-    };
-    assert_eq!(
-        (rank("rank"), rank("rank_expected")),
-        (Some(24.0 + 18.0 + 6.0), Some(24.0 + 18.0 + 6.0))
-    );
+    for rank in ["rank", "rank_expected"] {
+        assert_eq!(made.quantity(rank), Some(24.0 + 18.0 + 6.0));
+    }
 }
 
 #[test]
@@ -161,10 +153,8 @@ fn a_target_that_the_recording_does_not_have_is_named_with_those_it_has() {
         .err()
         .unwrap();
     assert_eq!(error.exit_code(), 2);
-    assert!(
-        error
-            .to_string()
-            .contains("with.targets.D: the recording has no such target; it has: A, B, C"),
-        "{error}"
+    has(
+        &error.to_string(),
+        "with.targets.D: the recording has no such target; it has: A, B, C",
     );
 }

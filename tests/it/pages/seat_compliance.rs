@@ -25,7 +25,7 @@ mod tests {
         Clock, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, Summary, Survey,
         arm_effect,
     };
-    use calib::estimate::{FitOptions, Model, fit};
+    use calib::estimate::{Model, fit};
     use calib::robot::{Measurements, PointReadings, RobotModel};
     use calib::spatial::{Pose, Twist};
     use nalgebra::Vector3;
@@ -71,14 +71,7 @@ mod tests {
         truth.x[first..].copy_from_slice(&TRUE);
         data.points.position = truth.predict(&data);
         let candidates: Vec<usize> = (0..start.x.len()).collect();
-        let (fitted, _) = fit(
-            &start,
-            &data,
-            &FitOptions {
-                rows: &rows,
-                candidates: &candidates,
-            },
-        );
+        let (fitted, _) = fit(&start, &data, &rows, &candidates);
         for (found, truth) in fitted.x[first..].iter().zip(TRUE) {
             assert!((found - truth).abs() < 1e-9, "{found} for {truth}");
         }

@@ -1,12 +1,10 @@
 //! Sockets beside points of a tracker in one estimation: the tracker tells scale and place, the sockets add to the arm.
 
-use super::{calibrated, fixture, free, socket, touched, truth};
+use super::{calibrated, fixture, socket, touched, true_points, truth};
 use crate::identify::normal;
 use calib::estimate::scale;
 use calib::observation::{only_contacts, rank};
 use calib::robot::{Measurements, Named, PointReadings, Readings};
-use calib::twin::arm::Arm;
-use calib::twin::arm::Motion;
 use nalgebra::Vector3;
 
 /// The tracker's noise, m.
@@ -53,30 +51,18 @@ fn points_of_a_tracker_tell_the_scale_of_sockets() {
             socket("y", [-200.0, 450.0, 520.0], 12, 0.0),
         ];
         let mut points = touched(&robot, &truth, &elsewhere, 5).measurements();
-        let arm = Arm::new(&robot, &truth);
-        let there = |data: &Measurements, row: usize| {
-            Vector3::from(
-                arm.posture(
-                    &truth.drive(&robot, data.q(row)),
-                    &Motion::none(robot.joints.len()),
-                )
-                .tool,
-            )
-        };
-        points.points.position = (0..points.rows())
-            .map(|row| {
-                there(&points, row)
-                    + Vector3::new(1.0, -2.0, 0.5)
-                    + Vector3::from([0, 1, 2].map(|axis| SIGMA * normal(7 * row + axis)))
-            })
-            .collect();
+        points.points.position = true_points(&robot, &truth, &points);
+        for (row, point) in points.points.position.iter_mut().enumerate() {
+            let noise = Vector3::from_fn(|axis, _| SIGMA * normal(7 * row + axis));
+            *point += Vector3::new(1.0, -2.0, 0.5) + noise;
+        }
         points.points.sigma = vec![Vector3::repeat(SIGMA); points.rows()];
         let data = joined(points, &touched(&robot, &truth, &cell, 21).measurements());
         let rows: Vec<usize> = (0..data.rows()).collect();
         let (model, fitted) = calibrated(&robot, &data, &[], &[]);
         assert_eq!(
             rank(&model.robot, &data, &rows, false, 0),
-            Some(free(&fitted)),
+            Some(fitted.free().len()),
             "{}",
             robot.name
         );
@@ -84,10 +70,9 @@ fn points_of_a_tracker_tell_the_scale_of_sockets() {
             !only_contacts(&data, &rows)
                 && scale(&model, &data, &rows, fitted.covariance.as_ref()).is_none()
         );
-        let predicted = model.predict(&data);
-        let (first, last) = (30, data.rows() - 1);
-        let apart = (predicted[first] - predicted[last]).norm()
-            - (there(&data, first) - there(&data, last)).norm();
+        let [ours, real] = [model.predict(&data), true_points(&robot, &truth, &data)]
+            .map(|points| (points[30] - points[data.rows() - 1]).norm());
+        let apart = ours - real;
         assert!(
             apart.abs() < 1.5e-4,
             "{}: distances of sockets are {:.3} mm off",

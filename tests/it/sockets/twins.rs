@@ -1,13 +1,15 @@
 //! Many twins: what is stated of the arm's distances holds as often as it should. `CALIB_RECORDINGS=200` for the whole count.
 
 use super::{
-    Length, calibrated, fitted_with, fixture, free, plane, priors, socket, sphere, touched, truth,
+    Length, calibrated, fitted_with, fixture, plane, priors, socket, sphere, touched, true_points,
+    truth,
 };
+use crate::compensate::concealed::from_environment;
+use crate::fixture::rms;
 use crate::identify::normal;
+use calib::description::RobotDescription;
 use calib::estimate::scale;
 use calib::observation::rank;
-use calib::twin::arm::Arm;
-use calib::twin::arm::Motion;
 use calib::twin::touch::Fixture;
 use nalgebra::{DVector, Vector3};
 
@@ -37,19 +39,20 @@ fn cell(kind: usize) -> Vec<Fixture> {
     all
 }
 
+fn recordings() -> usize {
+    from_environment("CALIB_RECORDINGS", 12) as usize
+}
+
+fn robot(seed: usize) -> RobotDescription {
+    [fixture::offset_wrist, fixture::seven][seed % 2]()
+}
+
 #[test]
 fn stated_sigmas_of_distances_hold_and_the_rank_is_that_of_theory() {
-    let count: usize = std::env::var("CALIB_RECORDINGS")
-        .ok()
-        .and_then(|text| text.parse().ok())
-        .unwrap_or(12);
+    let count = recordings();
     let (mut scores, mut wrong) = (Vec::new(), Vec::new());
     for seed in 0..count {
-        let robot = if seed % 2 == 0 {
-            fixture::offset_wrist()
-        } else {
-            fixture::seven()
-        };
+        let robot = robot(seed);
         let truth = truth(&robot, seed);
         let data = touched(&robot, &truth, &cell(seed / 2), seed).measurements();
         let length =
@@ -61,22 +64,17 @@ fn stated_sigmas_of_distances_hold_and_the_rank_is_that_of_theory() {
             &[],
         );
         let rows: Vec<usize> = (0..data.rows()).collect();
-        if rank(&model.robot, &data, &rows, true, 0) != Some(free(&fitted)) {
-            wrong.push(format!("{} {seed}: {} free", robot.name, free(&fitted)));
+        if rank(&model.robot, &data, &rows, true, 0) != Some(fitted.free().len()) {
+            wrong.push(format!(
+                "{} {seed}: {} free",
+                robot.name,
+                fitted.free().len()
+            ));
         }
         let Some(covariance) = &fitted.covariance else {
             panic!("{} {seed}: singular", robot.name)
         };
-        let (arm, points) = (Arm::new(&robot, &truth), model.predict(&data));
-        let there = |row: usize| {
-            Vector3::from(
-                arm.posture(
-                    &truth.drive(&robot, data.q(row)),
-                    &Motion::none(robot.joints.len()),
-                )
-                .tool,
-            )
-        };
+        let (there, points) = (true_points(&robot, &truth, &data), model.predict(&data));
         let mut scratch = model.stack.scratch(&model.robot);
         for pair in [
             [3, 75],
@@ -103,11 +101,10 @@ fn stated_sigmas_of_distances_hold_and_the_rank_is_that_of_theory() {
             let sigma = weights
                 .dot(&(covariance.block(parameters).unwrap() * &weights))
                 .sqrt();
-            scores.push(((points[a] - points[b]).norm() - (there(a) - there(b)).norm()) / sigma);
+            scores.push(((points[a] - points[b]).norm() - (there[a] - there[b]).norm()) / sigma);
         }
     }
-    let scatter =
-        (scores.iter().map(|score| score * score).sum::<f64>() / scores.len() as f64).sqrt();
+    let scatter = rms(scores.iter().copied());
     let covered =
         scores.iter().filter(|score| score.abs() < 1.96).count() as f64 / scores.len() as f64;
     println!(
@@ -132,17 +129,10 @@ fn stated_sigmas_of_distances_hold_and_the_rank_is_that_of_theory() {
 /// tolerances that lean together is wider.
 #[test]
 fn the_scale_that_priors_tell_scatters_as_stated_where_links_err_on_their_own() {
-    let count: usize = std::env::var("CALIB_RECORDINGS")
-        .ok()
-        .and_then(|text| text.parse().ok())
-        .unwrap_or(12);
+    let count = recordings();
     let mut scores = Vec::new();
     for seed in 0..count {
-        let robot = if seed % 2 == 0 {
-            fixture::offset_wrist()
-        } else {
-            fixture::seven()
-        };
+        let robot = robot(seed);
         let truth = truth(&robot, 500 + seed);
         let data = touched(&robot, &truth, &cell(0), 500 + seed).measurements();
         let rows: Vec<usize> = (0..data.rows()).collect();
@@ -160,29 +150,15 @@ fn the_scale_that_priors_tell_scatters_as_stated_where_links_err_on_their_own() 
             !stated.by_length && stated.by_priors && apart <= together,
             "{stated:?}"
         );
-        let (arm, points) = (Arm::new(&robot, &truth), model.predict(&data));
-        let there = |row: usize| {
-            Vector3::from(
-                arm.posture(
-                    &truth.drive(&robot, data.q(row)),
-                    &Motion::none(robot.joints.len()),
-                )
-                .tool,
-            )
-        };
-        let [ours, real] = [points, rows.iter().map(|row| there(*row)).collect()].map(|points| {
+        let there = true_points(&robot, &truth, &data);
+        let [ours, real] = [model.predict(&data), there].map(|points| {
             let middle = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
-            points
-                .iter()
-                .map(|point| (point - middle).norm_squared())
-                .sum::<f64>()
-                .sqrt()
+            rms(points.iter().map(|point| (point - middle).norm()))
         });
         // The factor by which links are off more than their priors say is by chance here.
         scores.push((ours / real - 1.0) * stated.beyond / apart);
     }
-    let scatter =
-        (scores.iter().map(|score| score * score).sum::<f64>() / scores.len() as f64).sqrt();
+    let scatter = rms(scores.iter().copied());
     let mean = scores.iter().sum::<f64>() / scores.len() as f64;
     println!(
         "{count} twins without a length: scale over its sigma, mean {mean:+.2}, scatter {scatter:.2}"

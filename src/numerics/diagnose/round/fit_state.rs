@@ -9,8 +9,8 @@ use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, arm_effect, names};
 use crate::estimate::{
-    CLEARLY, ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening,
-    Session, fit, fit_screened, seen,
+    CLEARLY, ErrorScale, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session,
+    fit_screened, seen,
 };
 use crate::robot::Measurements;
 use std::ops::Range;
@@ -198,14 +198,13 @@ impl<'a> Fitter<'a> {
         }
         let seen = |known: &[usize], times| {
             let others: Vec<usize> = (0..first).filter(|k| !known.contains(k)).collect();
-            seen(
-                &state.model,
-                &self.data,
-                &state.fitted,
-                &state.screening.kept,
-                &others,
-                times,
-            )
+            let session = Session {
+                data: &self.data,
+                rows: &state.screening.kept,
+                model: &state.model,
+                fitted: &state.fitted,
+            };
+            seen(&session, &others, times)
         };
         let clearly = seen(&self.free, CLEARLY);
         self.free.extend(clearly);
@@ -300,21 +299,9 @@ impl<'a> Fitter<'a> {
             &self.free
         };
         let candidates: Vec<usize> = base.iter().copied().chain(first..start.x.len()).collect();
-        let options = FitOptions {
-            rows: self.question.fit,
-            candidates: &candidates,
-        };
-        let (model, fitted, screening) = if self.keeps_all {
-            let (model, fitted) = fit(&start, &self.data, &options);
-            let kept = options.rows.to_vec();
-            let screening = Screening {
-                kept,
-                ..Screening::default()
-            };
-            (model, fitted, screening)
-        } else {
-            fit_screened(&start, &self.data, &options, self.question.set)
-        };
+        let set = (!self.keeps_all).then_some(self.question.set);
+        let (model, fitted, screening) =
+            fit_screened(&start, &self.data, self.question.fit, &candidates, set);
         let estimated = |(cause, range): (EstimatedCause, &Range<usize>)| EstimatedCause {
             coefficients: model.x[range.clone()].to_vec(),
             ..cause

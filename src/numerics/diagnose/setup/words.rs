@@ -5,7 +5,7 @@
 use crate::criteria::setup::{ARMS, FAR, NAMED, QUARTERLY, SMALL};
 use crate::effect::{ParameterEstimate, Place, figure};
 use crate::error::counted;
-use crate::estimate::{FitOptions, Screening, fit};
+use crate::estimate::{Screening, fit};
 use crate::observation::Dimension;
 use crate::robot::{RobotModel, numbered};
 use crate::setup::compare::{AsStated, ExplainedSetup};
@@ -522,14 +522,7 @@ fn wrong(question: &Question, findings: Vec<Finding>) -> Diagnosis {
         data, fit: rows, ..
     } = *question;
     let (start, candidates) = on_its_base(question);
-    let (model, fitted) = fit(
-        &start,
-        data,
-        &FitOptions {
-            rows,
-            candidates: &candidates,
-        },
-    );
+    let (model, fitted) = fit(&start, data, rows, &candidates);
     let before = ErrorLengths::of(&model.error_sizes(data, Dimension::Length), rows);
     let screening = Screening {
         kept: rows.to_vec(),

@@ -268,9 +268,7 @@ fn sigmas(rows: &Mat<f64>, known: &TriangularFactor) -> Vec<f64> {
     let Some(inverse) = all.inverse() else {
         return vec![f64::INFINITY; p];
     };
-    (0..p)
-        .map(|i| (i..p).map(|j| inverse.at(i, j).powi(2)).sum::<f64>().sqrt())
-        .collect()
+    (0..p).map(|i| inverse.row_norm(i)).collect()
 }
 
 /// Proposes postures. Fails with a sentence where a socket is out of reach or nothing can be identified.

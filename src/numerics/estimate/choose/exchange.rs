@@ -38,13 +38,10 @@ impl DesignTerm {
     ) -> Option<Self> {
         let scale = (drawn.rows() as f64).sqrt();
         let inverse = factor(&jacobian.rows(model, drawn)).inverse()?;
-        let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| {
-            inverse.at(i, j) * scale
-        });
         Some(Self {
             weight,
             jacobian,
-            round,
+            round: inverse.matrix(scale),
             ridge: *RIDGE,
         })
     }
@@ -55,12 +52,10 @@ impl DesignTerm {
         jacobian: PointJacobian,
         known: &TriangularFactor,
     ) -> Option<Self> {
-        let inverse = known.inverse()?;
-        let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| inverse.at(i, j));
         Some(Self {
             weight,
             jacobian,
-            round,
+            round: known.inverse()?.matrix(1.0),
             ridge: 1.0,
         })
     }

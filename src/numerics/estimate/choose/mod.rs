@@ -102,12 +102,8 @@ pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Propos
     let all: Vec<usize> = (0..model.stack.specs().len()).collect();
     let orders: Vec<(f64, Vec<usize>)> = match &wish.aim {
         Aim::Information => vec![(1.0, all)],
-        Aim::Separation([a, b]) => {
-            let (a, b) = (parameters(&model, a)?, parameters(&model, b)?);
-            let others: Vec<usize> = all
-                .into_iter()
-                .filter(|k| !a.contains(k) && !b.contains(k))
-                .collect();
+        Aim::Separation(names) => {
+            let (others, [a, b]) = parted(&model, names)?;
             vec![
                 (2.0, [&others[..], &b, &a].concat()),
                 (-1.0, [&others[..], &b].concat()),
@@ -187,6 +183,14 @@ fn parameters(model: &Model, name: &str) -> Result<Vec<usize>, String> {
         .ok_or_else(|| format!("`{name}` is not among the effects of this model"))
 }
 
+/// All parameters but those of two effects, and those of each of the two.
+fn parted(model: &Model, [a, b]: &[String; 2]) -> Result<(Vec<usize>, [Vec<usize>; 2]), String> {
+    let two = [parameters(model, a)?, parameters(model, b)?];
+    let is_other = |k: &usize| !two.iter().any(|one| one.contains(k));
+    let others = (0..model.stack.specs().len()).filter(is_other).collect();
+    Ok((others, two))
+}
+
 fn check(
     wish: &DesignRequest,
     jacobians: &[(f64, PointJacobian)],
@@ -217,29 +221,19 @@ fn check(
 
 fn separations(
     model: &Model,
-    [a, b]: &[String; 2],
+    names: &[String; 2],
     drawn: &Measurements,
     poses: &Measurements,
     sets: &[Vec<usize>],
 ) -> Result<Vec<Separation>, String> {
+    let (others, two) = parted(model, names)?;
     let mut out = Vec::new();
-    for (effect, rival) in [(a, b), (b, a)] {
-        let (parameters_of_effect, parameters_of_rival) =
-            (parameters(model, effect)?, parameters(model, rival)?);
-        let others: Vec<usize> = (0..model.stack.specs().len())
-            .filter(|k| !parameters_of_effect.contains(k) && !parameters_of_rival.contains(k))
-            .collect();
-        let jacobian = PointJacobian::of(
-            model,
-            drawn,
-            &[&others[..], &parameters_of_rival, &parameters_of_effect].concat(),
-        );
-        let separated: Vec<usize> = jacobian
-            .free()
-            .iter()
-            .copied()
-            .filter(|k| parameters_of_effect.contains(k))
-            .collect();
+    for (k, effect) in names.iter().enumerate() {
+        let (parameters, rivals) = (&two[k], &two[1 - k]);
+        let order = [&others[..], rivals, parameters].concat();
+        let jacobian = PointJacobian::of(model, drawn, &order);
+        let free = jacobian.free().iter().copied();
+        let separated: Vec<usize> = free.filter(|k| parameters.contains(k)).collect();
         let (log, sigma) = jacobian.remainder(&jacobian.rows(model, poses), separated.len());
         let rows = jacobian.rows(model, drawn);
         let random: Vec<(f64, Vec<f64>)> = sets
@@ -247,26 +241,16 @@ fn separations(
             .map(|set| jacobian.remainder(&gather(&rows, set), separated.len()))
             .collect();
         let usual = median(random.iter().map(|(log, _)| *log).collect());
-        let sigma = separated
-            .iter()
-            .zip(&sigma)
-            .enumerate()
-            .map(|(i, (parameter, sigma))| {
-                (
-                    *parameter,
-                    *sigma,
-                    median(random.iter().map(|(_, all)| all[i]).collect()),
-                )
-            });
+        let usual_of = |i: usize| median(random.iter().map(|(_, all)| all[i]).collect());
+        let rows = separated.iter().zip(&sigma).enumerate();
+        let lost = parameters.iter().filter(|k| !separated.contains(k));
         out.push(Separation {
             effect: effect.clone(),
-            rival: rival.clone(),
-            sigma: sigma.collect(),
-            imitated: parameters_of_effect
-                .iter()
-                .copied()
-                .filter(|k| !separated.contains(k))
+            rival: names[1 - k].clone(),
+            sigma: rows
+                .map(|(i, (parameter, sigma))| (*parameter, *sigma, usual_of(i)))
                 .collect(),
+            imitated: lost.copied().collect(),
             gain: ((log - usual) / separated.len().max(1) as f64).exp(),
         });
     }
@@ -275,31 +259,23 @@ fn separations(
 
 /// Rows of a recording as one of their own.
 pub(super) fn subset(data: &Measurements, rows: &[usize]) -> Measurements {
+    let some = |all: &[f64]| {
+        let width = all.len() / data.rows().max(1);
+        let row = |row: &usize| all[row * width..(row + 1) * width].iter().copied();
+        rows.iter().flat_map(row).collect::<Vec<f64>>()
+    };
+    let circumstances = data.circumstances.iter();
     Measurements {
         joints: data.joints,
-        q: rows
-            .iter()
-            .flat_map(|row| data.q(*row).iter().copied())
-            .collect(),
+        q: some(&data.q),
         points: data.points.subset(rows),
-        payload: rows.iter().map(|row| data.payload[*row]).collect(),
-        time: data
-            .time
-            .as_ref()
-            .map(|all| rows.iter().map(|row| all[*row]).collect()),
-        temperature: data
-            .temperature
-            .as_ref()
-            .map(|all| rows.iter().map(|row| all[*row]).collect()),
-        circumstances: data
-            .circumstances
-            .iter()
-            .map(|(name, all)| (*name, picked(all, data.rows(), rows)))
+        payload: some(&data.payload),
+        time: data.time.as_deref().map(some),
+        temperature: data.temperature.as_deref().map(some),
+        circumstances: circumstances
+            .map(|(name, all)| (*name, some(all)))
             .collect(),
-        direction: data
-            .direction
-            .as_ref()
-            .map(|all| picked(all, data.rows(), rows)),
+        direction: data.direction.as_deref().map(some),
         target: data
             .target
             .as_ref()
@@ -311,14 +287,6 @@ pub(super) fn subset(data: &Measurements, rows: &[usize]) -> Measurements {
             .collect(),
         ..Measurements::default()
     }
-}
-
-/// The numbers of these rows, of a quantity with as many for each of `count` rows.
-fn picked(all: &[f64], count: usize, rows: &[usize]) -> Vec<f64> {
-    let width = all.len() / count.max(1);
-    rows.iter()
-        .flat_map(|row| all[row * width..(row + 1) * width].iter().copied())
-        .collect()
 }
 
 /// Sets of `count` different candidates, drawn evenly.

@@ -3,7 +3,7 @@
 use crate::estimate::factor::{StackedRows, TriangularFactor};
 use crate::estimate::model::Model;
 use crate::estimate::observe::{Visibility, visibility};
-use crate::estimate::problem::Problem;
+use crate::estimate::problem::{Problem, columns};
 use crate::observation::{ExcessSigma, MeasurementKind, SocketKind};
 use crate::robot::Measurements;
 use crate::statistics::nearest;
@@ -46,13 +46,8 @@ impl PointJacobian {
     /// Which of the parameters in `order` the data would see; the earlier one stays where two do the same.
     pub(super) fn of(model: &Model, data: &Measurements, order: &[usize]) -> Self {
         let rows: Vec<usize> = (0..data.rows()).collect();
-        let factor = Problem {
-            data,
-            rows: &rows,
-            excess: ExcessSigma::default(),
-        }
-        .evaluate(model, order)
-        .factor;
+        let problem = Problem::new(data, &rows, ExcessSigma::default());
+        let factor = problem.evaluate(model, order).factor;
         let prior = |k: &usize| model.stack.specs()[*k].prior_sigma;
         let seen = visibility(&factor, &order.iter().map(prior).collect::<Vec<_>>());
         let free: Vec<usize> = order
@@ -89,10 +84,7 @@ impl PointJacobian {
     /// socket holds they are those of what closes there.
     pub(super) fn rows(&self, model: &Model, data: &Measurements) -> Mat<f64> {
         let count = model.stack.specs().len();
-        let (mut column, mut size) = (vec![usize::MAX; count], vec![0.0; count]);
-        for (j, parameter) in self.free.iter().enumerate() {
-            column[*parameter] = j;
-        }
+        let (column, mut size) = (columns(model, &self.free), vec![0.0; count]);
         self.sized
             .iter()
             .for_each(|(parameter, part)| size[*parameter] += part);
@@ -107,8 +99,8 @@ impl PointJacobian {
                 |scratch, row| {
                     let mut line = vec![Vector3::zeros(); p];
                     let add = |parameter: usize, derivative: Vector3<f64>| {
-                        if let Some(sum) = line.get_mut(column[parameter]) {
-                            *sum += derivative;
+                        if let Some(j) = column[parameter] {
+                            line[j] += derivative;
                         }
                         if size[parameter] != 0.0
                             && let Some(sum) = line.last_mut()
@@ -177,9 +169,8 @@ impl PointJacobian {
                 max: none,
             };
         };
-        let inverse = Mat::from_fn(p, p, |i, j| inverse.at(i, j));
-        let sigma = (0..p).map(|i| self.prior[i] * norm((i..p).map(|j| inverse[(i, j)])));
-        let spread = product(around.as_ref(), inverse.as_ref());
+        let sigma = (0..p).map(|i| self.prior[i] * inverse.row_norm(i));
+        let spread = product(around.as_ref(), inverse.matrix(1.0).as_ref());
         let mut squares = vec![0.0; around.nrows()];
         for j in 0..p {
             for (sum, value) in squares.iter_mut().zip(spread.col_as_slice(j)) {
@@ -219,7 +210,7 @@ impl PointJacobian {
         (
             log,
             (p - count..p)
-                .map(|i| self.prior[i] * norm((i..p).map(|j| inverse.at(i, j))))
+                .map(|i| self.prior[i] * inverse.row_norm(i))
                 .collect(),
         )
     }

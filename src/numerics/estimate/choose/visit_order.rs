@@ -2,7 +2,7 @@
 
 use super::point_jacobian::PointJacobian;
 use crate::effect::{EffectContext, EffectStack, Load, arm_effect};
-use crate::estimate::factor::{axpy, dot};
+use crate::estimate::factor::{axpy, norm as length};
 use crate::estimate::model::Model;
 use crate::robot::Measurements;
 use rand::rngs::ChaCha8Rng;
@@ -179,8 +179,4 @@ fn turns(model: &Model, poses: &Measurements) -> Vec<f64> {
         );
     }
     out
-}
-
-fn length(values: &[f64]) -> f64 {
-    dot(values, values).sqrt()
 }

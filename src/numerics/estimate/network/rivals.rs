@@ -4,7 +4,7 @@
 //! since a recording's neighbours are alike and a row must not be predicted from its twin. "No correction" is a rival: it stays unless the gain is clear.
 
 use super::arm::ScrewArm;
-use super::basis::{curves, harmonics};
+use super::basis::{BasisTerm, curves, harmonics};
 use super::correction::{Body, Correction};
 use super::linear::Linear;
 use super::process::Process;
@@ -73,6 +73,10 @@ impl Rival {
             Self::Network(start) | Self::JointNetwork(start) => Some(start),
             _ => None,
         }
+    }
+
+    fn is_of(self, kind: fn(TrainingStart) -> Self) -> bool {
+        self.start().is_some_and(|start| kind(start) == self)
     }
 }
 
@@ -144,14 +148,7 @@ pub struct RivalComparison {
     pub chosen: usize,
 }
 
-/// One fit of a rival.
-struct Task {
-    rival: Rival,
-    recipe: Recipe,
-    fold: usize,
-}
-
-/// What a task leaves of the rows of its fold.
+/// What a fit of one fold leaves of the rows of that fold.
 struct Done {
     left: Vec<(usize, f64)>,
     numbers: usize,
@@ -167,9 +164,7 @@ pub fn fits(contest: &RivalContest) -> usize {
 impl RivalContest<'_> {
     /// Whether networks of a kind take part, from whatever start.
     fn has(&self, kind: fn(TrainingStart) -> Rival) -> bool {
-        self.rivals
-            .iter()
-            .any(|rival| rival.start().is_some_and(|start| kind(start) == *rival))
+        self.rivals.iter().any(|rival| rival.is_of(kind))
     }
 }
 
@@ -181,44 +176,63 @@ pub fn compare(
     contest: &RivalContest,
     observe: &(dyn Fn(usize, &str) + Sync),
 ) -> RivalComparison {
+    let folds = contest.folds;
     assert!(
-        contest.folds >= 2 && samples.rows() >= 2,
+        folds >= 2 && samples.rows() >= 2,
         "something to choose from"
     );
     let done = Mutex::new(0);
     let poses = samples.poses();
-    let run = |tasks: &[Task]| {
-        in_order(contest.recipe.jobs, tasks.len(), |t| {
-            let result = tasks[t].run(samples, &poses, contest);
+    let before: Vec<f64> = samples.residual.iter().map(|r| length(*r)).collect();
+    // Every entry in all folds; none where it cannot be fitted to one of them.
+    let judged = |entered: &[(Rival, Recipe)]| -> Vec<Option<JudgedRival>> {
+        let fitted = in_order(contest.recipe.jobs, entered.len() * folds, |t| {
+            let ((rival, recipe), fold) = (&entered[t / folds], t % folds);
+            let result = tried(*rival, recipe, fold, samples, &poses, contest);
             let mut done = done.lock().expect("no fit panics");
             *done += 1;
-            let best = result.as_ref().map_or(f64::NAN, |r| {
+            let mean = result.as_ref().map_or(f64::NAN, |r| {
                 r.left.iter().map(|left| left.1).sum::<f64>() / r.left.len() as f64
             });
-            let place = format!(
-                "{}, part {} of {}: {:.4} mm",
-                tasks[t].rival.name(),
-                tasks[t].fold + 1,
-                contest.folds,
-                best * 1e3
+            let (name, part, mm) = (rival.name(), fold + 1, mean * 1e3);
+            observe(
+                *done,
+                &format!("{name}, part {part} of {folds}: {mm:.4} mm"),
             );
-            observe(*done, &place);
             result
-        })
+        });
+        let entered = entered.iter().zip(fitted.chunks(folds));
+        entered
+            .map(|((rival, recipe), fitted)| {
+                let settings = (recipe.hidden, recipe.decay);
+                let settings = rival.start().is_some().then_some(settings);
+                together(*rival, settings, fitted, &before, &poses)
+            })
+            .collect()
     };
-    let tasks = |rivals: &[(Rival, Recipe)]| -> Vec<Task> {
-        let each = |(rival, recipe): &(Rival, Recipe)| {
-            (0..contest.folds)
-                .map(|fold| Task {
-                    rival: *rival,
-                    recipe: recipe.clone(),
-                    fold,
-                })
-                .collect::<Vec<Task>>()
-        };
-        rivals.iter().flat_map(each).collect()
+    let trial = Recipe {
+        jobs: 1,
+        ..contest.trial.clone()
     };
-    let before: Vec<f64> = samples.residual.iter().map(|r| length(*r)).collect();
+    let rivals = contest.rivals.iter();
+    let mut entered: Vec<(Rival, Recipe)> = rivals.map(|rival| (*rival, trial.clone())).collect();
+    for kind in KINDS.into_iter().filter(|kind| contest.has(*kind)) {
+        let settings = contest
+            .hidden
+            .iter()
+            .flat_map(|hidden| contest.decays.iter().map(move |decay| (*hidden, *decay)));
+        let grid: Vec<(Rival, Recipe)> = settings
+            .map(|(hidden, decay)| (kind(TrainingStart::Random), trial.sized(hidden, decay)))
+            .collect();
+        let errors: Vec<f64> = judged(&grid)
+            .iter()
+            .map(|row| row.as_ref().map_or(f64::NAN, JudgedRival::mean))
+            .collect();
+        if let Some(best) = (0..grid.len()).min_by(|a, b| errors[*a].total_cmp(&errors[*b])) {
+            let of_kind = entered.iter_mut().filter(|(rival, _)| rival.is_of(kind));
+            of_kind.for_each(|(_, recipe)| *recipe = grid[best].1.clone());
+        }
+    }
     let nothing = JudgedRival {
         rival: None,
         left: before.clone(),
@@ -228,56 +242,8 @@ pub fn compare(
         evaluations: 0,
         settings: None,
     };
-    let mut judged = vec![nothing];
-    let trial = Recipe {
-        jobs: 1,
-        ..contest.trial.clone()
-    };
-    let mut entered: Vec<(Rival, Recipe)> = contest
-        .rivals
-        .iter()
-        .map(|rival| (*rival, trial.clone()))
-        .collect();
-    for kind in KINDS.into_iter().filter(|kind| contest.has(*kind)) {
-        let mut grid = Vec::new();
-        for hidden in &contest.hidden {
-            for decay in &contest.decays {
-                grid.push((
-                    kind(TrainingStart::Random),
-                    Recipe {
-                        hidden: *hidden,
-                        decay: *decay,
-                        ..trial.clone()
-                    },
-                ));
-            }
-        }
-        let results = run(&tasks(&grid));
-        let errors: Vec<f64> = results
-            .chunks(contest.folds)
-            .map(|folds| together(folds, &before, &poses).map_or(f64::NAN, |j| j.mean()))
-            .collect();
-        if let Some(best) = (0..grid.len()).min_by(|a, b| errors[*a].total_cmp(&errors[*b])) {
-            let of_network = entered
-                .iter_mut()
-                .filter(|(rival, _)| rival.start().is_some_and(|start| kind(start) == *rival));
-            of_network.for_each(|(_, recipe)| *recipe = grid[best].1.clone());
-        }
-    }
-    let results = run(&tasks(&entered));
-    for ((rival, recipe), folds) in entered.iter().zip(results.chunks(contest.folds)) {
-        let settings = rival
-            .start()
-            .is_some()
-            .then_some((recipe.hidden, recipe.decay));
-        if let Some(row) = together(folds, &before, &poses) {
-            judged.push(JudgedRival {
-                rival: Some(*rival),
-                settings,
-                ..row
-            });
-        }
-    }
+    let others = judged(&entered).into_iter().flatten();
+    let judged: Vec<JudgedRival> = std::iter::once(nothing).chain(others).collect();
     let helping = (0..judged.len()).filter(|j| judged[*j].helps());
     let chosen = helping
         .min_by(|a, b| judged[*a].mean().total_cmp(&judged[*b].mean()))
@@ -292,20 +258,11 @@ pub fn learn(
     judged: &JudgedRival,
     observe: &mut dyn FnMut(&Generation),
 ) -> Option<(Correction, Vec<TrainingStep>)> {
-    let (hidden, decay) = judged
-        .settings
-        .unwrap_or((contest.recipe.hidden, contest.recipe.decay));
-    let (mut correction, course) = fit(
-        judged.rival?,
-        samples,
-        contest,
-        &Recipe {
-            hidden,
-            decay,
-            ..contest.recipe.clone()
-        },
-        observe,
-    )?;
+    let recipe = match judged.settings {
+        Some((hidden, decay)) => contest.recipe.sized(hidden, decay),
+        None => contest.recipe.clone(),
+    };
+    let (mut correction, course) = fit(judged.rival?, samples, contest, recipe, observe)?;
     correction.left = judged.rms() / 3.0_f64.sqrt();
     Some((correction, course))
 }
@@ -314,110 +271,88 @@ fn fit(
     rival: Rival,
     samples: &TrainingSamples,
     contest: &RivalContest,
-    recipe: &Recipe,
+    recipe: Recipe,
     observe: &mut dyn FnMut(&Generation),
 ) -> Option<(Correction, Vec<TrainingStep>)> {
-    let region = || Region::of(&samples.sources, recipe.joints);
+    let linear = |arm, groups: Vec<Vec<BasisTerm>>| {
+        Some(Body::Linear(Linear::fit(
+            samples,
+            arm,
+            &groups,
+            recipe.seed,
+        )?))
+    };
     let body = match rival {
-        Rival::Network(start) => {
-            return Some(train(
-                samples,
-                &Recipe {
-                    start,
-                    through: None,
-                    ..recipe.clone()
-                },
-                observe,
-            ));
+        Rival::Network(start) | Rival::JointNetwork(start) => {
+            let through = match rival {
+                Rival::JointNetwork(_) => Some(contest.arm?.clone()),
+                _ => None,
+            };
+            let recipe = Recipe {
+                start,
+                through,
+                ..recipe
+            };
+            return Some(train(samples, &recipe, observe));
         }
-        Rival::JointNetwork(start) => {
-            let through = Some(contest.arm?.clone());
-            return Some(train(
-                samples,
-                &Recipe {
-                    start,
-                    through,
-                    ..recipe.clone()
-                },
-                observe,
-            ));
-        }
-        Rival::Ridge => Body::Linear(Linear::fit(
-            samples,
-            None,
-            &harmonics(contest.prismatic),
-            recipe.seed,
-        )?),
-        Rival::Curves => Body::Linear(Linear::fit(
-            samples,
-            contest.arm,
-            &curves(contest.arm?, samples.rows()),
-            recipe.seed,
-        )?),
+        Rival::Ridge => linear(None, harmonics(contest.prismatic))?,
+        Rival::Curves => linear(contest.arm, curves(contest.arm?, samples.rows()))?,
         Rival::Process => {
             let (dress, x, y) = dressed(samples, &recipe.features);
             Body::Process(dress, Process::fit(&x, &y)?)
         }
     };
-    Some((
-        Correction {
-            body,
-            region: region(),
-            left: 0.0,
-        },
-        Vec::new(),
-    ))
+    let correction = Correction {
+        body,
+        region: Region::of(&samples.sources, recipe.joints),
+        left: 0.0,
+    };
+    Some((correction, Vec::new()))
 }
 
-impl Task {
-    /// `poses`: that of each row.
-    fn run(
-        &self,
-        samples: &TrainingSamples,
-        poses: &[usize],
-        contest: &RivalContest,
-    ) -> Option<Done> {
-        let count = poses.iter().max()? + 1;
-        let (inside, outside): (Vec<usize>, Vec<usize>) = (0..samples.rows()).partition(|row| {
-            poses[*row] * contest.folds * RUNS / count % contest.folds != self.fold
-        });
-        let recipe = Recipe {
-            seed: self.recipe.seed ^ (self.fold as u64 + 1),
-            ..self.recipe.clone()
-        };
-        let (correction, course) = fit(
-            self.rival,
-            &samples.pick(&inside),
-            contest,
-            &recipe,
-            &mut |_| {},
-        )?;
-        let left = outside.iter().map(|row| {
-            let (delta, residual) = (
-                correction.at(&samples.sources[*row]).delta,
-                samples.residual[*row],
-            );
-            (
-                *row,
-                length(std::array::from_fn(|k| residual[k] - delta[k])),
-            )
-        });
-        // A course counts up within each member, and the swarm's is member 0.
-        let ends = course
-            .iter()
-            .enumerate()
-            .filter(|(i, c)| course.get(i + 1).is_none_or(|next| next.member != c.member));
-        let evaluations = ends.map(|(_, end)| end.evaluations).sum();
-        Some(Done {
-            left: left.collect(),
-            numbers: correction.numbers(),
-            evaluations,
-        })
-    }
+/// A rival learnt without a fold, and what it leaves there; `poses`: that of each row.
+fn tried(
+    rival: Rival,
+    recipe: &Recipe,
+    fold: usize,
+    samples: &TrainingSamples,
+    poses: &[usize],
+    contest: &RivalContest,
+) -> Option<Done> {
+    let count = poses.iter().max()? + 1;
+    let (inside, outside): (Vec<usize>, Vec<usize>) = (0..samples.rows())
+        .partition(|row| poses[*row] * contest.folds * RUNS / count % contest.folds != fold);
+    let recipe = Recipe {
+        seed: recipe.seed ^ (fold as u64 + 1),
+        ..recipe.clone()
+    };
+    let training = samples.pick(&inside);
+    let (correction, course) = fit(rival, &training, contest, recipe, &mut |_| {})?;
+    let left = |row: &usize| {
+        let (delta, residual) = (
+            correction.at(&samples.sources[*row]).delta,
+            samples.residual[*row],
+        );
+        let off = std::array::from_fn(|k| residual[k] - delta[k]);
+        (*row, length(off))
+    };
+    // A course counts up within each member, and the swarm's is member 0.
+    let members = course.chunk_by(|a, b| a.member == b.member);
+    Some(Done {
+        left: outside.iter().map(left).collect(),
+        numbers: correction.numbers(),
+        evaluations: members.map(|one| one[one.len() - 1].evaluations).sum(),
+    })
 }
 
 /// All folds of one rival; `None` where one could not be fitted.
-fn together(folds: &[Option<Done>], before: &[f64], poses: &[usize]) -> Option<JudgedRival> {
+fn together(
+    rival: Rival,
+    settings: Option<(usize, f64)>,
+    folds: &[Option<Done>],
+    before: &[f64],
+    poses: &[usize],
+) -> Option<JudgedRival> {
     let mut left = before.to_vec();
     for fold in folds {
         for (row, value) in &fold.as_ref()?.left {
@@ -425,31 +360,23 @@ fn together(folds: &[Option<Done>], before: &[f64], poses: &[usize]) -> Option<J
         }
     }
     let first = folds.first()?.as_ref()?;
-    let gains: Vec<f64> = before
-        .iter()
-        .zip(&left)
-        .map(|(before, left)| before - left)
-        .collect();
+    let pairs = before.iter().zip(&left);
+    let gains: Vec<f64> = pairs.map(|(before, left)| before - left).collect();
     let gain = mean(&gains);
     // Targets of one pose are moved together: the gain's scatter is that of poses.
     let mut off = vec![0.0; poses.iter().max()? + 1];
-    poses
-        .iter()
-        .zip(&gains)
-        .for_each(|(pose, error)| off[*pose] += error - gain);
+    let rows = poses.iter().zip(&gains);
+    rows.for_each(|(pose, error)| off[*pose] += error - gain);
     let (count, rows) = (off.len() as f64, gains.len() as f64);
-    let sigma = (off.iter().map(|off| off * off).sum::<f64>() * count / (count - 1.0).max(1.0))
-        .sqrt()
-        / rows;
-    let (numbers, evaluations) = (first.numbers, first.evaluations);
+    let squares = off.iter().map(|off| off * off).sum::<f64>();
     Some(JudgedRival {
-        rival: None,
+        rival: Some(rival),
         left,
         gain,
-        sigma,
-        numbers,
-        evaluations,
-        settings: None,
+        sigma: (squares * count / (count - 1.0).max(1.0)).sqrt() / rows,
+        numbers: first.numbers,
+        evaluations: first.evaluations,
+        settings,
     })
 }
 

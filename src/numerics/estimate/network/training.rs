@@ -62,6 +62,17 @@ pub struct Recipe {
     pub jobs: usize,
 }
 
+impl Recipe {
+    /// The same with so many neurons and this decay.
+    pub(super) fn sized(&self, hidden: usize, decay: f64) -> Self {
+        Self {
+            hidden,
+            decay,
+            ..self.clone()
+        }
+    }
+}
+
 /// Which part of the training a record is from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {

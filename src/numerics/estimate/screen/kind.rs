@@ -9,8 +9,9 @@ use crate::criteria::screen::{
     ALIKE, BETTER, CANDIDATES, DISAGREES, IMPOSSIBLE, JOINTS, LONG_RUN, RUN, SLIP_TOLERANCE, SOLE,
     ZERO,
 };
+use crate::estimate::factor::axpy;
 use crate::estimate::model::Model;
-use crate::estimate::problem::{HUBER, ObservationTerm, Problem};
+use crate::estimate::problem::{HUBER, ObservationTerm, Problem, columns};
 use crate::observation::{KINDS, MeasurementKind, noise};
 use crate::robot::Measurements;
 use faer::Mat;
@@ -327,16 +328,12 @@ const CHUNK: usize = 64;
 pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) -> Vec<LeaveOneOut> {
     let data = problem.data;
     let inverse = problem.evaluate(model, free).factor.inverse();
-    let mut column = vec![usize::MAX; model.stack.specs().len()];
-    for (j, parameter) in free.iter().enumerate() {
-        column[*parameter] = j;
-    }
+    let column = columns(model, free);
     let mut fitted = vec![false; data.rows()];
     for row in problem.rows {
         fitted[*row] = true;
     }
-    let inverse =
-        inverse.map(|inverse| Mat::from_fn(free.len(), free.len(), |i, j| inverse.at(i, j)));
+    let inverse = inverse.map(|inverse| inverse.matrix(1.0));
     let screened: Vec<&dyn MeasurementKind> = KINDS
         .iter()
         .copied()
@@ -357,12 +354,14 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
                     continue;
                 };
                 let first = 3 * terms.len();
-                term.derivatives(&mut placed, |parameter, derivative| {
-                    if column[parameter] < free.len() {
-                        let line = &mut lines.col_as_slice_mut(column[parameter])[first..first + 3];
-                        line.iter_mut()
-                            .zip(&derivative)
-                            .for_each(|(value, d)| *value += d);
+                let sensitivity = &term.sensitivity;
+                sensitivity.derivatives(&mut placed, |parameter, derivative| {
+                    if let Some(j) = column[parameter] {
+                        axpy(
+                            1.0,
+                            derivative.as_slice(),
+                            &mut lines.col_as_slice_mut(j)[first..],
+                        );
                     }
                 });
                 terms.push((i, fitted[row], term.error));

@@ -9,7 +9,7 @@ use crate::criteria::screen::{
     BEYOND_CROWD, BULK, CHANCE, CROWD, FAR, GROSS, NOMINAL_TOLERANCE, READMITTING,
 };
 use crate::effect::Effect;
-use crate::estimate::fit::{FitOptions, Fitted, fit};
+use crate::estimate::fit::{Fitted, fit};
 use crate::estimate::model::Model;
 use crate::estimate::problem::Problem;
 pub use crate::estimate::screen::kind::SuspectKind;
@@ -71,18 +71,27 @@ impl Screening {
 /// Fits as [`fit`] does, sets aside what no smooth model can follow among the rows to fit, and fits again until nothing changes.
 ///
 /// All rows of the recording are screened. `set[row]` numbers the set of a row: every set is measured by its own spread, since
-/// held-out rows may see physics that the fitted ones do not. Where more than half of the rows to fit would go, none goes.
+/// held-out rows may see physics that the fitted ones do not. Where more than half of the rows to fit would go, none goes. Without sets
+/// nothing is screened.
 pub fn fit_screened(
     start: &Model,
     data: &Measurements,
-    options: &FitOptions,
-    set: &[usize],
+    asked: &[usize],
+    candidates: &[usize],
+    set: Option<&[usize]>,
 ) -> (Model, Fitted, Screening) {
+    let Some(set) = set else {
+        let (model, fitted) = fit(start, data, asked, candidates);
+        let screening = Screening {
+            kept: asked.to_vec(),
+            ..Screening::default()
+        };
+        return (model, fitted, screening);
+    };
     // Whole blocks may be in metres, zero, or beside other joints: more than a robust loss can bear, and plain to see even from the nominal robot.
     let predicted = start.predict(data);
     // A stretch of a path looks like itself a little further on: there only the velocities tell.
-    let moving = data.in_motion(options.rows);
-    let apart = if moving {
+    let apart = if data.in_motion(asked) {
         vec![0; data.rows()]
     } else {
         apart::apart(data, &predicted)
@@ -93,105 +102,73 @@ pub fn fit_screened(
             .and_then(|point| kind::misread(&point, &predicted[*row], *NOMINAL_TOLERANCE));
         apart[*row] == 0 && misread.is_none()
     };
-    let mut kept: Vec<usize> = options.rows.iter().copied().filter(plain).collect();
+    let mut kept: Vec<usize> = asked.iter().copied().filter(plain).collect();
     // Where the whole log slipped there is nothing else to fit.
     let mut slipped: BTreeMap<usize, i64> = (0..apart.len())
         .zip(apart.iter().copied())
         .filter(|(_, off)| *off != 0)
         .collect();
-    if 2 * kept.len() < options.rows.len() {
-        kept = options.rows.to_vec();
+    if 2 * kept.len() < asked.len() {
+        kept = asked.to_vec();
         slipped.clear();
     }
-    let throughout = throughout(&apart);
-    let (mut model, mut fitted) = fit(
-        start,
-        data,
-        &FitOptions {
-            rows: &kept,
-            ..*options
-        },
-    );
+    let apart = throughout(&apart);
+    let (mut model, mut fitted) = fit(start, data, &kept, candidates);
     let mut aside = BTreeSet::new();
     // Held rows stay suspects, so that later rounds only add to them and it ends.
     for round in 0.. {
-        let held = if round < *READMITTING {
-            BTreeSet::new()
-        } else {
-            aside.clone()
+        let held = match round < *READMITTING {
+            true => BTreeSet::new(),
+            false => aside,
+        };
+        let rows = Rows {
+            asked,
+            kept: &kept,
+            set,
         };
         let Screened {
             suspects,
             crowd,
             reach,
             followed,
-        } = screen(
-            &model,
-            data,
-            &Rows {
-                asked: options.rows,
-                kept: &kept,
-                set,
-            },
-            &fitted,
-            &held,
-            &slipped,
-        );
+        } = screen(&model, data, &rows, &fitted, &held, &slipped);
         // What the fitted model follows never slipped.
         slipped.retain(|row, _| !followed.contains(row));
-        aside = suspects
-            .iter()
-            .filter(|suspect| !suspect.used())
-            .map(|suspect| suspect.row)
-            .collect();
-        let next: Vec<usize> = options
-            .rows
+        let gone = suspects.iter().filter(|suspect| !suspect.used());
+        aside = gone.map(|suspect| suspect.row).collect();
+        let next: Vec<usize> = asked
             .iter()
             .copied()
             .filter(|row| !aside.contains(row))
             .collect();
         if next == kept {
-            return (
-                model,
-                fitted,
-                Screening {
-                    kept,
-                    suspects,
-                    crowd,
-                    reach,
-                    apart: throughout,
-                },
-            );
+            let screening = Screening {
+                kept,
+                suspects,
+                crowd,
+                reach,
+                apart,
+            };
+            return (model, fitted, screening);
         }
-        if 2 * next.len() < options.rows.len() {
+        if 2 * next.len() < asked.len() {
             break;
         }
         kept = next;
         // From the very start: which of two redundant parameters is kept must not depend on rows that are gone.
-        (model, fitted) = fit(
-            start,
-            data,
-            &FitOptions {
-                rows: &kept,
-                ..*options
-            },
-        );
+        (model, fitted) = fit(start, data, &kept, candidates);
     }
-    if kept.len() < options.rows.len() {
-        (model, fitted) = fit(start, data, options);
+    if kept.len() < asked.len() {
+        (model, fitted) = fit(start, data, asked, candidates);
     }
-    let kept = options.rows.to_vec();
-    (
-        model,
-        fitted,
-        Screening {
-            kept,
-            suspects: Vec::new(),
-            crowd: aside.len(),
-            reach: *GROSS,
-            apart: throughout,
-        },
-    )
+    let screening = Screening {
+        kept: asked.to_vec(),
+        suspects: Vec::new(),
+        crowd: aside.len(),
+        reach: *GROSS,
+        apart,
+    };
+    (model, fitted, screening)
 }
 
 /// The offset of more than half of the rows.
@@ -232,11 +209,7 @@ fn screen(
     slipped: &BTreeMap<usize, i64>,
 ) -> Screened {
     let Rows { asked, kept, set } = *rows;
-    let problem = Problem {
-        data,
-        rows: kept,
-        excess: fitted.excess(),
-    };
+    let problem = Problem::new(data, kept, fitted.excess());
     let mut standings = leave_one_out(&problem, model, &fitted.free());
     measure_by_set(&mut standings, set);
     let bulk = bulk(&standings, asked);
