@@ -1,6 +1,7 @@
 //! The arm that moves as the user believes it: axes, masses and tolerances in the base frame at zero pose, SI; and its inertial numbers as the
 //! regressor counts them.
 
+use super::recording::add;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// Inertial numbers of a link.
@@ -8,6 +9,25 @@ pub const INERTIAL_NUMBERS: usize = 10;
 /// Where xx xy xz yy yz zz stand in the matrix.
 pub(crate) const INERTIA_ENTRIES: [(usize, usize); 6] =
     [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+
+/// One of the ten numbers alone, counted on over the links.
+pub(crate) fn unit_number(number: usize) -> [f64; INERTIAL_NUMBERS] {
+    std::array::from_fn(|entry| f64::from(u8::from(entry == number % INERTIAL_NUMBERS)))
+}
+
+/// Mass, its moment and xx xy xz yy yz zz of a matrix.
+fn ten(mass: f64, moment: &Vector3<f64>, inertia: &Matrix3<f64>) -> [f64; INERTIAL_NUMBERS] {
+    std::array::from_fn(|number| match number {
+        0 => mass,
+        1..=3 => moment[number - 1],
+        _ => inertia[INERTIA_ENTRIES[number - 4]],
+    })
+}
+
+/// Adds so much of a body's ten numbers to those of a link of many.
+pub(super) fn add_body(theta: &mut [f64], link: usize, share: f64, ten: &[f64; INERTIAL_NUMBERS]) {
+    add(&mut theta[INERTIAL_NUMBERS * link..], share, ten);
+}
 
 /// The matrix of xx xy xz yy yz zz.
 pub(crate) fn inertia_matrix(six: &[f64]) -> Matrix3<f64> {
@@ -77,26 +97,11 @@ impl DynamicArm {
 pub(super) fn numbers(body: &Inertial, point: &Vector3<f64>) -> [f64; INERTIAL_NUMBERS] {
     let arm = body.centre.coords - point;
     let about = body.inertia + steiner(body.mass, &arm);
-    let mut ten = [
-        body.mass,
-        body.mass * arm.x,
-        body.mass * arm.y,
-        body.mass * arm.z,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    ];
-    for (number, (row, column)) in INERTIA_ENTRIES.into_iter().enumerate() {
-        ten[4 + number] = about[(row, column)];
-    }
-    ten
+    ten(body.mass, &(body.mass * arm), &about)
 }
 
 /// What a point mass adds to the inertia at a distance.
-fn steiner(mass: f64, arm: &Vector3<f64>) -> Matrix3<f64> {
+pub(super) fn steiner(mass: f64, arm: &Vector3<f64>) -> Matrix3<f64> {
     (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass
 }
 
@@ -134,23 +139,18 @@ impl DeclaredInertials {
     pub(crate) fn of(arm: &DynamicArm, bodies: &[Inertial]) -> Self {
         let last = bodies.len() - 1;
         let point = |link: usize| arm.points[link].coords;
-        let links: Vec<f64> = bodies
-            .iter()
-            .enumerate()
+        let all = || bodies.iter().enumerate();
+        let links: Vec<f64> = all()
             .flat_map(|(link, body)| numbers(body, &point(link)))
             .collect();
         let mut theta = links.clone();
         if let Some(payload) = &arm.payload {
-            let load = numbers(payload, &point(last));
-            theta[INERTIAL_NUMBERS * last..]
-                .iter_mut()
-                .zip(load)
-                .for_each(|(sum, value)| *sum += value);
+            add_body(&mut theta, last, 1.0, &numbers(payload, &point(last)));
         }
-        let tolerance = (0..bodies.len()).map(|link| {
+        let tolerance = all().map(|(link, body)| {
             let whole = match &arm.payload {
-                Some(payload) if link == last => joined(&bodies[link], payload),
-                _ => bodies[link],
+                Some(payload) if link == last => joined(body, payload),
+                _ => *body,
             };
             tolerance(arm, &whole, &point(link))
         });
@@ -159,9 +159,7 @@ impl DeclaredInertials {
             tolerance: tolerance.collect(),
             payload: numbers(&payload, &point(last)),
             payload_shift: shifts(&payload, &point(last)),
-            centre_shift: bodies
-                .iter()
-                .enumerate()
+            centre_shift: all()
                 .map(|(link, body)| shifts(body, &point(link)))
                 .collect(),
             links,
@@ -194,11 +192,7 @@ fn shifts(body: &Inertial, point: &Vector3<f64>) -> [[f64; INERTIAL_NUMBERS]; 3]
         let inertia = Matrix3::identity() * (2.0 * arm.dot(&along))
             - arm * along.transpose()
             - along * arm.transpose();
-        let mut ten = [0.0, along.x, along.y, along.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        for (number, (row, column)) in INERTIA_ENTRIES.into_iter().enumerate() {
-            ten[4 + number] = inertia[(row, column)];
-        }
-        ten
+        ten(0.0, &along, &inertia)
     })
 }
 

@@ -1,8 +1,11 @@
 //! Torques by the evidence of the table of causes: a cell is a cause at a place in every shape that it may have; what was accepted stands in the
-//! covariance with its amplitude, and every other cell is compared given these.
+//! covariance with its amplitude, and every other cell is compared given these. Of the forms of a problem: which may stand together, which in
+//! each other's place.
 
-use super::cause::TORQUE_CONSTANT;
-use super::choice::CauseChoice;
+use super::cause::{COULOMB, TORQUE_CONSTANT, TorqueForm, UNKNOWN, VISCOUS};
+use super::problem::TorqueProblem;
+use super::sweep::SweptColumns;
+use super::weighted::WeightedColumns;
 use crate::criteria::cells::{COMMON, NU, SWAPS};
 use crate::criteria::torque::{APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, USUAL};
 use crate::diagnose::table::{
@@ -13,6 +16,119 @@ use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
+
+/// The forms of one problem, with the base model that is fitted with all of them.
+pub(super) struct CauseChoice<'a> {
+    pub(crate) problem: &'a TorqueProblem<'a>,
+    pub(crate) weighted: &'a WeightedColumns,
+    pub(crate) base: SweptColumns<'a>,
+    /// Forms that may be chosen; trial forms of a refinement are none of them.
+    pub(crate) open: usize,
+}
+
+impl<'a> CauseChoice<'a> {
+    /// Over all forms of a problem.
+    pub(crate) fn new(problem: &'a TorqueProblem<'a>, weighted: &'a WeightedColumns) -> Self {
+        Self {
+            problem,
+            weighted,
+            base: SweptColumns::base(&problem.all, weighted),
+            open: problem.all.listed,
+        }
+    }
+
+    /// Over those with a name: a curve without one would be a push, or several causes at once.
+    pub(crate) fn named(problem: &'a TorqueProblem<'a>, weighted: &'a WeightedColumns) -> Self {
+        let mut forms = problem.all.forms[..problem.all.listed].iter();
+        let open = forms.position(|form| form.cause.name == UNKNOWN);
+        Self {
+            open: open.unwrap_or(problem.all.listed),
+            ..Self::new(problem, weighted)
+        }
+    }
+
+    pub(crate) fn form(&self, number: usize) -> &TorqueForm {
+        &self.problem.all.forms[number]
+    }
+
+    /// Whether a set has a form for which something holds.
+    pub(crate) fn has(&self, set: &[usize], holds: impl Fn(&TorqueForm) -> bool) -> bool {
+        set.iter().any(|number| holds(self.form(*number)))
+    }
+
+    /// Whether a form with some coefficients, given the forms of a set, is one that its cause can have.
+    fn may_be(
+        &self,
+        number: usize,
+        set: &[usize],
+        rises: impl Fn() -> bool,
+        values: impl Fn() -> Vec<f64>,
+    ) -> bool {
+        let (form, cause) = (self.form(number), self.form(number).cause);
+        let is_curve = |one: &TorqueForm| one.place == form.place && one.is_nameless_curve();
+        let only_positive = cause.positive || (cause.brakes && !self.has(set, is_curve));
+        (!only_positive || rises())
+            && (cause.is_itself)(form, &self.problem.scene)
+            && (cause.is_possible)(form, &values())
+    }
+
+    /// Whether a form may join a set: once a name and place, and what modifies a friction after it.
+    fn may_join(&self, number: usize, set: &[usize]) -> bool {
+        let form = self.form(number);
+        let taken = |other: &usize| {
+            let other_form = self.form(*other);
+            *other == number
+                || (form.is_called_as(other_form)
+                    && (!form.cause.may_repeat || form.with == other_form.with))
+        };
+        let is_barred = || self.problem.barred.iter().any(|one| form.is_of_kind(one));
+        !set.iter().any(taken)
+            && self.has_what_it_modifies(number, set)
+            && !self.has(set, |other| form.is_one_curve_with(other))
+            && !is_barred()
+    }
+
+    /// Whether the frictions that a form modifies are in a set.
+    fn has_what_it_modifies(&self, number: usize, set: &[usize]) -> bool {
+        let form = self.form(number);
+        let mut modified = form.cause.modifies.iter();
+        modified.all(|name| self.has(set, |other| other.is_called(name, form.place)))
+    }
+
+    /// Whether all of a set have what they modify.
+    fn is_whole(&self, set: &[usize]) -> bool {
+        set.iter()
+            .all(|number| self.has_what_it_modifies(*number, set))
+    }
+
+    /// Viscous and Coulomb friction of every joint: hardly an arm is without.
+    fn common(&self) -> Vec<usize> {
+        let common = |number: &usize| [VISCOUS, COULOMB].contains(&self.form(*number).cause.name);
+        (0..self.open).filter(common).collect()
+    }
+
+    /// Whether two forms may stand in each other's place: they change the torque of one joint.
+    pub(crate) fn compete(&self, a: usize, b: usize) -> bool {
+        let joints = self.problem.joints();
+        let [a, b] = [a, b].map(|number| self.form(number).acts_on(joints));
+        a.iter().any(|joint| b.contains(joint))
+    }
+
+    /// Viscous or Coulomb friction where a set has only the other one: hardly a joint is without either, and the missing one would bias the
+    /// other without being in its uncertainty.
+    pub(crate) fn other_friction(&self, set: &[usize]) -> Vec<usize> {
+        let missing = |number: &usize| {
+            let TorqueForm { cause, place, .. } = self.form(*number);
+            let other = [COULOMB, VISCOUS][usize::from(cause.name != VISCOUS)];
+            !self.has(set, |form| form.is_called(cause.name, *place))
+                && self.has(set, |form| form.is_called(other, *place))
+        };
+        let sweep = self.base.with(set);
+        let missing = self.common().into_iter().filter(missing);
+        // Friction that would drive is none.
+        missing.filter(|number| sweep.rises(*number)).collect()
+    }
+}
 
 /// A cause at a place in every shape that is listed of it.
 pub(super) struct TorqueCell {
@@ -78,7 +194,7 @@ impl ComponentSearch for TorqueTable<'_, '_> {
     fn odds(&self, components: &[TorqueComponent], place: usize, kappa: f64) -> Option<f64> {
         let is_free = !self.kept.contains(&components[place].form)
             && self.choice.is_whole(&forms(&without(components, place)));
-        is_free.then(|| self.odds_of(components, place, kappa).log_odds)
+        is_free.then(|| self.odds_of(components, place, kappa))
     }
 
     fn best(&mut self, components: &[TorqueComponent]) -> Option<TorqueComponent> {
@@ -100,38 +216,27 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     /// The cells of the listed forms.
     pub(crate) fn new(choice: &'b CauseChoice<'a>) -> Self {
         let all = &choice.problem.all;
-        let mut keys: BTreeMap<(&'static str, &'static str, Place, [usize; 2]), Vec<usize>> =
-            BTreeMap::new();
-        for number in 0..all.forms.len() {
-            let form = choice.form(number);
-            let kind = form
-                .cause
-                .coefficients
-                .first()
-                .map_or("", |(name, _)| *name);
-            keys.entry((form.cause.name, kind, form.place, (form.cause.cell)(form)))
-                .or_default()
-                .push(number);
+        let mut keys: BTreeMap<_, Vec<usize>> = BTreeMap::new();
+        for (number, form) in all.forms.iter().enumerate() {
+            let cause = form.cause;
+            let key = (cause.name, form.kind(), form.place, (cause.cell)(form));
+            keys.entry(key).or_default().push(number);
         }
-        let cell = |((name, _, place, _), forms): (
-            &(&'static str, &'static str, Place, [usize; 2]),
-            &Vec<usize>,
-        )| {
-            let price = |form: &usize| (choice.form(*form).cause.price)(choice.form(*form));
-            let least = forms.iter().map(price).fold(f64::INFINITY, f64::min);
+        let cells = keys.into_iter().map(|((name, _, place, _), forms)| {
+            let prices = forms.iter().map(|number| choice.form(*number));
+            let prices = prices.map(|form| (form.cause.price)(form));
             TorqueCell {
                 name,
-                place: *place,
-                log_prior: COMMON.ln() - 0.5 * least,
-                forms: forms.clone(),
+                place,
+                log_prior: COMMON.ln() - 0.5 * prices.fold(f64::INFINITY, f64::min),
+                forms,
             }
-        };
-        let cells: Vec<TorqueCell> = keys.iter().map(cell).collect();
-        let cell_of = cells
-            .iter()
-            .enumerate()
-            .flat_map(|(k, cell)| cell.forms.iter().map(move |form| (*form, k)))
-            .collect();
+        });
+        let cells: Vec<TorqueCell> = cells.collect();
+        let mut cell_of = BTreeMap::new();
+        for (number, cell) in cells.iter().enumerate() {
+            cell_of.extend(cell.forms.iter().map(|form| (*form, number)));
+        }
         let unit = |column: usize| {
             let size = all.size(column);
             if size > 0.0 { *PER_METRE / size } else { 0.0 }
@@ -147,17 +252,12 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             (gram, along)
         };
         // Trial forms that are in no set have no products.
-        let none = || (DMatrix::zeros(0, 0), DVector::zeros(0));
-        let has_products = |number: &usize| choice.weighted.has(all.of(*number).start);
-        let forms = (0..all.forms.len())
-            .map(|number| {
-                if has_products(&number) {
-                    products(number)
-                } else {
-                    none()
-                }
-            })
-            .collect();
+        let forms =
+            (0..all.forms.len()).map(|number| match choice.weighted.has(all.of(number).start) {
+                true => products(number),
+                false => (DMatrix::zeros(0, 0), DVector::zeros(0)),
+            });
+        let forms = forms.collect();
         let freedom = choice.weighted.measured.iter().map(Vec::len).sum::<usize>() as f64;
         let rows = EvidenceRows {
             freedom,
@@ -196,10 +296,8 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
                 .collect::<Vec<_>>()
         };
         let columns: Vec<(usize, f64)> = components.iter().flat_map(columns_of).collect();
-        let left: Vec<Rc<Vec<f64>>> = columns
-            .iter()
-            .map(|(column, _)| self.left_of(*column))
-            .collect();
+        let left = columns.iter().map(|(column, _)| self.left_of(*column));
+        let left: Vec<Rc<Vec<f64>>> = left.collect();
         let count = columns.len();
         let gram = DMatrix::from_fn(count, count, |a, b| {
             left[a][columns[b].0] * columns[a].1 * columns[b].1
@@ -218,18 +316,15 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     /// A form's products seen through the covariance.
     pub(super) fn seen(&self, number: usize, state: &TorqueState) -> FormProducts {
         let columns: Vec<usize> = self.choice.problem.all.of(number).collect();
-        let left: Vec<Rc<Vec<f64>>> = state
+        let left = state
             .columns
             .iter()
-            .map(|(column, _)| self.left_of(*column))
-            .collect();
+            .map(|(column, _)| self.left_of(*column));
+        let left: Vec<Rc<Vec<f64>>> = left.collect();
         let product =
             |a: usize, b: usize| left[a][columns[b]] * state.columns[a].1 * self.unit[columns[b]];
-        let across = state.known.solved(DMatrix::from_fn(
-            state.columns.len(),
-            columns.len(),
-            product,
-        ));
+        let products = DMatrix::from_fn(left.len(), columns.len(), product);
+        let across = state.known.solved(products);
         let (gram, along) = &self.forms[number];
         state.known.see((gram, along), &across, 0)
     }
@@ -237,22 +332,18 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     /// ln of the evidence of a form given a state, and its amplitude; none of one that is impossible.
     pub(super) fn form(&self, number: usize, state: &TorqueState) -> Option<(f64, f64)> {
         let (gram, along) = self.seen(number, state);
-        let columns: Vec<usize> = self.choice.problem.all.of(number).collect();
-        let shares = vec![1.0 / columns.len() as f64; columns.len()];
+        let count = along.len();
+        let shares = vec![1.0 / count as f64; count];
         let found = evidence(&gram, &along, &shares, state.known.rows);
         let values = || {
             // Their means given the rows: of columns that nearly cancel each other least squares would make whatever is large.
-            let least = columns.len() as f64 / found.amplitude.powi(2);
-            let factor = (&gram + DMatrix::identity(gram.nrows(), gram.nrows()) * least).cholesky();
-            let solved = factor.map_or_else(
-                || vec![0.0; columns.len()],
-                |factor| factor.solve(&along).as_slice().to_vec(),
-            );
-            solved
-                .iter()
-                .zip(&columns)
-                .map(|(value, column)| value * self.unit[*column])
-                .collect()
+            let least = count as f64 / found.amplitude.powi(2);
+            let factor = (&gram + DMatrix::identity(count, count) * least).cholesky();
+            let solved =
+                factor.map_or_else(|| DVector::zeros(count), |factor| factor.solve(&along));
+            let units = &self.unit[self.choice.problem.all.of(number)];
+            let values = solved.iter().zip(units);
+            values.map(|(value, unit)| value * unit).collect()
         };
         let rises = || along.iter().all(|value| *value > 0.0);
         let may_be = found.amplitude > 0.0
@@ -262,9 +353,13 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
 
     /// ln of the number of shapes of a cell that may be chosen.
     pub(super) fn log_count(&self, cell: usize) -> f64 {
-        let forms = self.cells[cell].forms.iter();
-        let open = forms.filter(|form| **form < self.choice.open).count();
-        (open.max(1) as f64).ln()
+        (self.open(cell).count().max(1) as f64).ln()
+    }
+
+    /// Shapes of a cell that may be chosen.
+    pub(super) fn open(&self, cell: usize) -> impl Iterator<Item = usize> {
+        let forms = self.cells[cell].forms.iter().copied();
+        forms.filter(|form| *form < self.choice.open)
     }
 
     /// ln of the evidence of every shape of a cell that may join a state.
@@ -273,9 +368,8 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             let (log, amplitude) = self.form(form, state)?;
             Some((log, TorqueComponent { form, amplitude }))
         };
-        let forms = self.cells[cell].forms.iter().copied();
-        forms
-            .filter(|form| *form < self.choice.open && self.choice.may_join(*form, &state.set))
+        self.open(cell)
+            .filter(|form| self.choice.may_join(*form, &state.set))
             .filter_map(shape)
             .collect()
     }
@@ -283,12 +377,12 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     /// The posterior of a cell given a state.
     pub(super) fn cell(&self, cell: usize, state: &TorqueState) -> Option<CellPosterior> {
         let all = self.shapes(cell, state);
-        let best = all.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let log =
-            log_sum(&all.iter().map(|(log, _)| *log).collect::<Vec<_>>()) - self.log_count(cell);
+        let (_, best) = *all.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let logs: Vec<f64> = all.iter().map(|(log, _)| *log).collect();
+        let log = log_sum(&logs) - self.log_count(cell);
         Some(CellPosterior {
             log_odds: self.cells[cell].log_prior + log,
-            best: best.1,
+            best,
         })
     }
 
@@ -303,33 +397,17 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// ln of the odds of a component given the others.
-    pub(super) fn odds_of(
-        &self,
-        components: &[TorqueComponent],
-        place: usize,
-        kappa: f64,
-    ) -> CellPosterior {
+    pub(super) fn odds_of(&self, components: &[TorqueComponent], place: usize, kappa: f64) -> f64 {
         let state = self.state(&without(components, place), Some(kappa));
         let component = components[place];
         let cell = self.cell_of[&component.form];
-        let grid = self.cell(cell, &state);
-        let prior = self.cells[cell].log_prior;
-        let of_itself = self.form(component.form, &state);
-        let Some((log, amplitude)) = of_itself else {
+        let Some((log, _)) = self.form(component.form, &state) else {
             // One that the arm cannot have, whatever others of its cell would do.
-            return CellPosterior {
-                log_odds: f64::NEG_INFINITY,
-                best: component,
-            };
+            return f64::NEG_INFINITY;
         };
-        let log = prior + log - self.log_count(cell);
-        CellPosterior {
-            log_odds: grid.map_or(log, |grid| grid.log_odds.max(log)),
-            best: TorqueComponent {
-                amplitude,
-                ..component
-            },
-        }
+        let log = self.cells[cell].log_prior + log - self.log_count(cell);
+        let grid = self.cell(cell, &state);
+        grid.map_or(log, |grid| grid.log_odds.max(log))
     }
 
     /// Amplitudes anew, each given all others.
@@ -370,24 +448,19 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
                 let here = components[place].form;
                 let others = without(&components, place);
                 let state = self.state(&others, Some(kappa));
-                let stays = self.odds_of(&components, place, kappa).log_odds;
-                let may = |cell: &usize| {
-                    let form = self.cells[*cell].forms[0];
-                    self.choice.compete(form, here)
-                };
-                let Some(best) = self.strongest((0..self.cells.len()).filter(may), &state) else {
+                let stays = self.odds_of(&components, place, kappa);
+                let Some(best) = self.strongest(self.competing(here), &state) else {
                     continue;
                 };
                 let is_same = self.cell_of[&best.best.form] == self.cell_of[&here];
-                let gain = if is_same {
+                let gain = match is_same {
                     // Another shape of the same cell: by itself, against the present one.
-                    let [one, other] = [best.best.form, here].map(|form| {
-                        self.form(form, &state)
-                            .map_or(f64::NEG_INFINITY, |found| found.0)
-                    });
-                    one - other
-                } else {
-                    best.log_odds - stays
+                    true => {
+                        let log = |form: usize| self.form(form, &state).map(|found| found.0);
+                        let log = |form: usize| log(form).unwrap_or(f64::NEG_INFINITY);
+                        log(best.best.form) - log(here)
+                    }
+                    false => best.log_odds - stays,
                 };
                 let mut next = others.clone();
                 next.insert(place, best.best);
@@ -405,16 +478,19 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         components
     }
 
+    /// Cells that may stand in the place of a form.
+    pub(super) fn competing(&self, form: usize) -> impl Iterator<Item = usize> {
+        let may = move |cell: &usize| self.choice.compete(self.cells[*cell].forms[0], form);
+        (0..self.cells.len()).filter(may)
+    }
+
     /// Components of given forms.
     pub(super) fn components(&self, set: &[usize]) -> Vec<TorqueComponent> {
-        self.backfit(
-            set.iter()
-                .map(|form| TorqueComponent {
-                    form: *form,
-                    amplitude: *USUAL,
-                })
-                .collect(),
-        )
+        let component = |form: &usize| TorqueComponent {
+            form: *form,
+            amplitude: *USUAL,
+        };
+        self.backfit(set.iter().map(component).collect())
     }
 
     /// The best components that steps from a start lead to.
@@ -434,41 +510,32 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         self.prune(components)
     }
 
-    /// The odds of a component and of all that could stand in its place.
+    /// ln of the posterior odds of a component, and of other names and places that could stand in its place.
     pub(crate) fn odds_in_place(&self, components: &[TorqueComponent], form: usize) -> CellOdds {
+        let here = |component: &TorqueComponent| component.form == form;
+        let Some(place) = components.iter().position(here) else {
+            return (0.0, Vec::new());
+        };
         let kappa = self.state(components, None).known.kappa;
-        let Some(place) = components
-            .iter()
-            .position(|component| component.form == form)
-        else {
-            return CellOdds {
-                log_odds: 0.0,
-                rivals: Vec::new(),
-            };
-        };
-        let log_odds = self.odds_of(components, place, kappa).log_odds;
+        let log_odds = self.odds_of(components, place, kappa);
         let state = self.state(&without(components, place), Some(kappa));
-        let others = (0..self.cells.len()).filter(|cell| *cell != self.cell_of[&form]);
-        let competing = others.filter(|cell| self.choice.compete(self.cells[*cell].forms[0], form));
+        let rivals = self
+            .competing(form)
+            .filter(|cell| *cell != self.cell_of[&form]);
         let rival = |cell: usize| {
-            let posterior = self.cell(cell, &state)?;
-            Some((
-                (self.cells[cell].name, self.cells[cell].place),
-                posterior.log_odds,
-            ))
+            let TorqueCell { name, place, .. } = self.cells[cell];
+            Some(((name, place), self.cell(cell, &state)?.log_odds))
         };
-        CellOdds {
-            log_odds,
-            rivals: competing.filter_map(rival).collect(),
-        }
+        (log_odds, rivals.filter_map(rival).collect())
     }
 }
 
-/// ln of posterior odds.
-pub(super) struct CellOdds {
-    pub(crate) log_odds: f64,
-    /// Of other names and places.
-    pub(crate) rivals: Vec<((&'static str, Place), f64)>,
+/// ln of posterior odds, and those of rivals.
+pub(super) type CellOdds = (f64, Vec<((&'static str, Place), f64)>);
+
+/// A set without a form.
+pub(super) fn all_but(set: &[usize], form: usize) -> Vec<usize> {
+    set.iter().copied().filter(|other| *other != form).collect()
 }
 
 pub(super) fn forms(components: &[TorqueComponent]) -> Vec<usize> {
@@ -476,12 +543,7 @@ pub(super) fn forms(components: &[TorqueComponent]) -> Vec<usize> {
 }
 
 pub(super) fn without(components: &[TorqueComponent], place: usize) -> Vec<TorqueComponent> {
-    components
-        .iter()
-        .enumerate()
-        .filter(|(other, _)| *other != place)
-        .map(|(_, component)| *component)
-        .collect()
+    [&components[..place], &components[place + 1..]].concat()
 }
 
 /// The best set from what hardly an arm is without. One factor on the whole torque of each joint is asked before masses: where factors explain as
@@ -502,11 +564,7 @@ pub(super) fn from_common(choice: &CauseChoice) -> Vec<usize> {
     }
     let scaled = table.searched(&start);
     let worse = table.total(&masses) - table.total(&scaled);
-    let most = if has_masses(&scaled) {
-        0.0
-    } else {
-        0.5 * *APART
-    };
+    let most = [0.5 * *APART, 0.0][usize::from(has_masses(&scaled))];
     forms(if worse <= most { &scaled } else { &masses })
 }
 
@@ -539,12 +597,9 @@ pub(super) fn faint(choice: &CauseChoice, set: &[usize], silent: &[usize]) -> Ve
     let clear = table.prune(components);
     let kappa = table.noise(&clear);
     // What others need stays in the set, but not for itself.
-    let pays = |place: &usize| table.odds_of(&clear, *place, kappa).log_odds > table.least();
-    let clear: Vec<usize> = (0..clear.len())
-        .filter(pays)
-        .map(|place| clear[place].form)
-        .collect();
-    let mut faint = set.to_vec();
-    faint.retain(|number| !clear.contains(number) && !silent.contains(number));
-    faint
+    let pays = |place: &usize| table.odds_of(&clear, *place, kappa) > table.least();
+    let clear = (0..clear.len()).filter(pays).map(|place| clear[place].form);
+    let clear: Vec<usize> = clear.collect();
+    let is_faint = |number: &usize| !clear.contains(number) && !silent.contains(number);
+    set.iter().copied().filter(is_faint).collect()
 }

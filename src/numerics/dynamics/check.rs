@@ -2,11 +2,8 @@
 
 use super::arm::DynamicArm;
 use super::check_gravity::gravity_faults;
-use super::clock::RecordingClock;
-use super::scene::ends;
+use super::recording::{ClockPace, RecordingClock, TorqueRecording, column, ends};
 use crate::error::{Error, Fault, Result, counted};
-use crate::statistics::nearest;
-use crate::types::TorqueRecording;
 
 /// Rows, at least.
 const FEWEST: usize = 200;
@@ -32,109 +29,81 @@ pub(super) fn check(arm: &DynamicArm, recording: &TorqueRecording) -> Result<()>
     if faults.is_empty() {
         faults.extend(numbers(arm, recording));
     }
-    if faults.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::Data(faults))
-    }
+    none_of(faults)
 }
 
-fn fault(place: impl Into<String>, message: impl Into<String>) -> Fault {
-    Fault::new(place, message)
+/// An error of faults, where there are any.
+pub(super) fn none_of(faults: Vec<Fault>) -> Result<()> {
+    match faults.is_empty() {
+        true => Ok(()),
+        false => Err(Error::Data(faults)),
+    }
 }
 
 fn sizes(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     let (n, rows) = (recording.joints, recording.rows());
     let mut faults = Vec::new();
-    if n == 0 || arm.joints() != n {
-        faults.push(fault(
-            "torques",
-            format!("{n} joints are recorded, the arm has {}", arm.joints()),
-        ));
-    }
-    if rows < FEWEST {
-        faults.push(fault(
-            "torques",
-            format!("{rows} rows; at least {FEWEST} are needed"),
-        ));
-    }
+    let mut claim = |place: &str, is_so: bool, message: String| {
+        faults.extend((!is_so).then(|| Fault::new(place, message)));
+    };
+    let joints = arm.joints();
+    let message = format!("{n} joints are recorded, the arm has {joints}");
+    claim("torques", n > 0 && joints == n, message);
+    let message = format!("{rows} rows; at least {FEWEST} are needed");
+    claim("torques", rows >= FEWEST, message);
+    let velocity = recording.velocity.as_ref().map_or(n * rows, Vec::len);
     let lengths = [
         ("position", recording.position.len(), n * rows),
         ("torque", recording.torque.len(), n * rows),
-        (
-            "velocity",
-            recording.velocity.as_ref().map_or(n * rows, Vec::len),
-            n * rows,
-        ),
+        ("velocity", velocity, n * rows),
         ("trajectory", recording.trajectory.len(), rows),
         ("held_out", recording.held_out.len(), rows),
     ];
     for (name, found, wanted) in lengths {
-        if found != wanted {
-            faults.push(fault(name, format!("{found} numbers instead of {wanted}")));
-        }
+        let message = format!("{found} numbers instead of {wanted}");
+        claim(name, found == wanted, message);
     }
+    let links = arm.links.as_ref().map_or(joints, Vec::len);
     let of_arm = [
         ("points", arm.points.len()),
         ("prismatic", arm.prismatic.len()),
         ("ratio", arm.ratio.len()),
+        ("links", links),
     ];
-    for (name, found) in of_arm
-        .into_iter()
-        .chain(arm.links.as_ref().map(|links| ("links", links.len())))
-    {
-        if found != arm.joints() {
-            faults.push(fault(
-                name,
-                format!("{found} entries for {} joints", arm.joints()),
-            ));
-        }
+    for (name, found) in of_arm {
+        let message = format!("{found} entries for {joints} joints");
+        claim(name, found == joints, message);
     }
     faults
 }
 
 fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     let n = recording.joints;
-    let mut faults = Vec::new();
-    faults.extend(row_faults(recording, 0, None));
+    let mut faults = row_faults(recording, 0, None);
     if !faults.is_empty() {
         return faults;
     }
-    let mut steps: Vec<f64> = recording
-        .time
-        .windows(2)
-        .map(|pair| pair[1] - pair[0])
-        .collect();
-    let usual = nearest(&mut steps, 0.5).unwrap_or(0.0);
+    let usual = ClockPace::usual_step(&recording.time);
     if !(FASTEST..=SLOWEST).contains(&usual) {
         let [most, least] = [1.0 / SLOWEST, 1.0 / FASTEST];
         let message = format!(
             "rows come at {:.3} Hz, {most:.0} to {least:.0} Hz are allowed: times are in s (milliseconds?)",
             1.0 / usual
         );
-        faults.push(fault("time", message));
-        return faults;
+        return vec![Fault::new("time", message)];
     }
     if recording.held_out.iter().all(|held| *held) {
-        faults.push(fault(
-            "held_out",
-            "all rows are held out; some must be fitted",
-        ));
+        let message = "all rows are held out; some must be fitted";
+        faults.push(Fault::new("held_out", message));
     }
-    if let Some(far) = arm
-        .points
-        .iter()
-        .chain([&arm.tool])
-        .map(|point| point.coords.norm())
-        .find(|far| *far > FARTHEST)
-    {
-        faults.push(fault(
-            "points",
-            format!("{far:.0} m from the base: lengths are in m (millimetres?)"),
-        ));
+    let points = arm.points.iter().chain([&arm.tool]);
+    let mut distances = points.map(|point| point.coords.norm());
+    if let Some(far) = distances.find(|far| *far > FARTHEST) {
+        let message = format!("{far:.0} m from the base: lengths are in m (millimetres?)");
+        faults.push(Fault::new("points", message));
     }
     let range = |joint: usize| {
-        let [least, most] = ends(recording.position.iter().skip(joint).step_by(n).copied());
+        let [least, most] = ends(column(&recording.position, n, joint));
         most - least
     };
     let ranges: Vec<f64> = (0..n).map(range).collect();
@@ -143,32 +112,27 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     for (joint, range) in ranges.iter().enumerate() {
         faults.extend(joint_faults(arm, recording, &extremes, joint, *range));
     }
-    let moving = ranges
-        .iter()
-        .filter(|range| **range > 0.2 * LEAST_RANGE)
-        .count();
+    let moving = ranges.iter().filter(|range| **range > 0.2 * LEAST_RANGE);
+    let moving = moving.count();
     let widest = ranges.iter().copied().fold(0.0, f64::max);
     if widest < LEAST_RANGE || 2 * moving < n {
-        let radians = if widest > LEAST_RANGE * DEGREE {
-            "; or radians were read as degrees"
-        } else {
-            ""
+        let radians = match widest > LEAST_RANGE * DEGREE {
+            true => "; or radians were read as degrees",
+            false => "",
         };
-        faults.push(fault(
-            "position",
-            format!("the arm hardly moves (its widest joint over {widest:.3} rad, {moving} of {n} joints at all): masses and friction cannot be seen; at least half of the joints must move, one over {LEAST_RANGE} rad{radians}"),
-        ));
+        let message = format!(
+            "the arm hardly moves (its widest joint over {widest:.3} rad, {moving} of {n} joints at all): masses and friction cannot be seen; at least half of the joints must move, one over {LEAST_RANGE} rad{radians}"
+        );
+        faults.push(Fault::new("position", message));
     }
-    let turned = ranges
-        .iter()
-        .zip(&arm.prismatic)
-        .filter(|(range, slides)| **range > TWO_TURNS && !**slides)
-        .count();
+    let turned = ranges.iter().zip(&arm.prismatic);
+    let turned = turned.filter(|(range, slides)| **range > TWO_TURNS && !**slides);
+    let turned = turned.count();
     if faults.is_empty() && 2 * turned > n {
-        faults.push(fault(
-            "position",
-            format!("{turned} of {n} joints turn over more than two turns (the widest over {widest:.0} rad): angles are in rad (degrees?)"),
-        ));
+        let message = format!(
+            "{turned} of {n} joints turn over more than two turns (the widest over {widest:.0} rad): angles are in rad (degrees?)"
+        );
+        faults.push(Fault::new("position", message));
     }
     if faults.is_empty() {
         faults.extend(gravity_faults(arm, recording));
@@ -189,10 +153,8 @@ pub(super) fn row_faults(
     let n = rows.joints.max(1);
     let not_a_number = |(name, values, each): (&'static str, &Vec<f64>, usize)| {
         let at = values.iter().position(|value| !value.is_finite())?;
-        Some(fault(
-            name,
-            format!("row {}: not a finite number", first + at / each + 1),
-        ))
+        let message = format!("row {}: not a finite number", first + at / each + 1);
+        Some(Fault::new(name, message))
     };
     let columns = [
         ("time", &rows.time, 1),
@@ -204,20 +166,16 @@ pub(super) fn row_faults(
         return faults;
     }
     let all = || {
-        rows.time
-            .iter()
-            .copied()
-            .zip(rows.trajectory.iter().copied())
+        let stamps = rows.time.iter().copied();
+        stamps.zip(rows.trajectory.iter().copied())
     };
-    let pairs = before
-        .into_iter()
-        .chain(all())
-        .zip(all().skip(usize::from(before.is_none())));
+    let next = all().skip(usize::from(before.is_none()));
+    let pairs = before.into_iter().chain(all()).zip(next);
     let row = first + usize::from(before.is_none()) + 1;
     let back = |(row, ((then, from), (now, to))): (usize, (Stamp, Stamp))| {
         let message =
             || format!("row {row}: the clock goes from {then} s to {now} s; it must ascend");
-        (now <= then && from == to).then(|| fault("time", message()))
+        (now <= then && from == to).then(|| Fault::new("time", message()))
     };
     (row..).zip(pairs).find_map(back).into_iter().collect()
 }
@@ -229,21 +187,15 @@ fn joint_faults(
     joint: usize,
     range: f64,
 ) -> Vec<Fault> {
-    let name = format!("joint {}", joint + 1);
     let mut faults = Vec::new();
     if range > WIDEST && !arm.prismatic[joint] {
-        faults.push(fault(
-            &name,
-            format!("positions span {range:.0} rad: angles are in rad (degrees?)"),
-        ));
+        let message = format!("positions span {range:.0} rad: angles are in rad (degrees?)");
+        faults.push(Fault::new(name(joint), message));
     }
-    if let Some(constant) = extremes.constant(joint) {
-        faults.push(constant);
-        return faults;
-    }
-    faults.extend(extremes.saturated(joint));
-    if let Some(velocity) = &recording.velocity {
-        faults.extend(velocity_fault(recording, velocity, joint));
+    faults.extend(extremes.faults_of(joint));
+    if extremes.constant(joint).is_none() {
+        let velocity = recording.velocity.as_ref();
+        faults.extend(velocity.and_then(|velocity| velocity_fault(recording, velocity, joint)));
     }
     faults
 }
@@ -268,12 +220,12 @@ fn velocity_fault(recording: &TorqueRecording, velocity: &[f64], joint: usize) -
     let wrong = square > 0.0
         && other > 0.0
         && (correlation < SAME_VELOCITY || !(0.2..5.0).contains(&ratio));
-    wrong.then(|| {
-        fault(
-            format!("joint {}", joint + 1),
-            format!("recorded velocities are {ratio:.3} times those of the positions (correlation {correlation:.2}): another unit, joint or sign"),
+    let message = || {
+        format!(
+            "recorded velocities are {ratio:.3} times those of the positions (correlation {correlation:.2}): another unit, joint or sign"
         )
-    })
+    };
+    wrong.then(|| Fault::new(name(joint), message()))
 }
 
 /// What is odd about a recording that can be used, a sentence each.
@@ -287,10 +239,9 @@ pub(super) fn remarks(
         let lasted = recording.time[stretch.start] - recording.time[stretch.start - 1];
         torn_at(origin[stretch.start], lasted, usual)
     };
-    few(clock.stretches[1..].iter().map(torn))
-        .into_iter()
-        .chain(of_sets(recording))
-        .collect()
+    let mut remarks = few(clock.stretches[1..].iter().map(torn));
+    remarks.extend(of_sets(recording));
+    remarks
 }
 
 /// The first sentences of many that are alike, and how many more there are.
@@ -359,14 +310,14 @@ impl TorqueExtremes {
     }
 
     /// A column that holds one number.
-    pub(crate) fn constant(&self, joint: usize) -> Option<Fault> {
+    fn constant(&self, joint: usize) -> Option<Fault> {
         let [(least, _), (most, _)] = self.joints[joint];
         let message = || format!("torque is {least} in every row: the column holds no measurement");
         (least == most).then(|| Fault::new(name(joint), message()))
     }
 
     /// Extremes that many rows share.
-    pub(crate) fn saturated(&self, joint: usize) -> impl Iterator<Item = Fault> {
+    fn saturated(&self, joint: usize) -> impl Iterator<Item = Fault> {
         let all = self.rows;
         let shared = move |(_, rows): &Extreme| {
             *rows >= SATURATED_ROWS && *rows as f64 > SATURATED * all as f64
@@ -378,13 +329,18 @@ impl TorqueExtremes {
         })
     }
 
-    /// All of it, joint after joint.
-    pub(crate) fn faults(&self) -> Vec<Fault> {
-        let of_joint = |joint: usize| match self.constant(joint) {
+    /// Both of a joint.
+    fn faults_of(&self, joint: usize) -> Vec<Fault> {
+        match self.constant(joint) {
             Some(constant) => vec![constant],
             None => self.saturated(joint).collect(),
-        };
-        (0..self.joints.len()).flat_map(of_joint).collect()
+        }
+    }
+
+    /// All of it, joint after joint.
+    pub(crate) fn faults(&self) -> Vec<Fault> {
+        let joints = 0..self.joints.len();
+        joints.flat_map(|joint| self.faults_of(joint)).collect()
     }
 }
 
@@ -396,6 +352,7 @@ fn meet(extreme: &mut Extreme, value: f64, beyond: bool) {
     }
 }
 
-fn name(joint: usize) -> String {
+/// What a joint is called.
+pub(super) fn name(joint: usize) -> String {
     format!("joint {}", joint + 1)
 }

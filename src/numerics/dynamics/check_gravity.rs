@@ -2,11 +2,11 @@
 //! unit or of another joint.
 
 use super::arm::{DeclaredInertials, DynamicArm};
-use super::newton_euler::{InverseDynamics, MotionRow};
+use super::newton_euler::at_rest;
+use super::recording::{TorqueRecording, add};
 use crate::criteria::torque::{UNIT, WEIGHS, WEIGHTY};
 use crate::error::Fault;
 use crate::statistics::nearest;
-use crate::types::TorqueRecording;
 
 /// Ratio of measured to simulated torque: beyond it, or below its inverse, a unit is wrong.
 const UNIT_RATIO: f64 = 50.0;
@@ -36,46 +36,28 @@ pub(super) fn gravity_faults(arm: &DynamicArm, recording: &TorqueRecording) -> V
 /// Torques against those of the declared arm standing still: units, signs, joints.
 fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -> Vec<Fault> {
     let n = recording.joints;
-    let mut dynamics = InverseDynamics::new(arm);
-    let (still, mut gravity) = (vec![0.0; n], vec![0.0; n]);
+    let mut gravity_at = at_rest(arm, theta);
     let (mut measured_square, mut gravity_square) = (vec![0.0; n], vec![0.0; n]);
     let mut products = vec![vec![0.0; n]; n];
-    for row in 0..recording.rows() {
-        let position = &recording.position[row * n..(row + 1) * n];
-        dynamics.torque(
-            MotionRow {
-                position,
-                velocity: &still,
-                acceleration: &still,
-            },
-            &arm.gravity,
-            theta,
-            &mut gravity,
-        );
-        for joint in 0..n {
-            let torque = recording.torque[row * n + joint];
+    let rows = recording.position.chunks_exact(n);
+    for (position, torque) in rows.zip(recording.torque.chunks_exact(n)) {
+        let gravity = gravity_at(position);
+        for (joint, torque) in torque.iter().enumerate() {
             measured_square[joint] += torque * torque;
             gravity_square[joint] += gravity[joint] * gravity[joint];
-            gravity
-                .iter()
-                .enumerate()
-                .for_each(|(other, value)| products[joint][other] += torque * value);
+            add(&mut products[joint], *torque, &gravity);
         }
     }
-    let weighty: Vec<usize> = (0..n)
-        .filter(|joint| (gravity_square[*joint] / recording.rows() as f64).sqrt() > SMALL_TORQUE)
-        .collect();
-    let mut ratios: Vec<f64> = weighty
-        .iter()
-        .map(|joint| (measured_square[*joint] / gravity_square[*joint]).sqrt())
-        .collect();
+    let is_weighty =
+        |joint: &usize| (gravity_square[*joint] / recording.rows() as f64).sqrt() > SMALL_TORQUE;
+    let weighty: Vec<usize> = (0..n).filter(is_weighty).collect();
+    let ratio = |joint: usize| (measured_square[joint] / gravity_square[joint]).sqrt();
+    let mut ratios: Vec<f64> = weighty.iter().map(|joint| ratio(*joint)).collect();
     let mut faults = Vec::new();
-    let heaviest = weighty
-        .iter()
-        .copied()
-        .max_by(|a, b| gravity_square[*a].total_cmp(&gravity_square[*b]));
+    let heaviest = weighty.iter().copied();
+    let heaviest = heaviest.max_by(|a, b| gravity_square[*a].total_cmp(&gravity_square[*b]));
     if let (Some(usual), Some(heaviest)) = (nearest(&mut ratios, 0.5), heaviest) {
-        let ratio = (measured_square[heaviest] / gravity_square[heaviest]).sqrt();
+        let ratio = ratio(heaviest);
         let share = |joint: &usize| products[*joint][*joint] / gravity_square[*joint];
         let wrong = |times: f64, most: f64| !(1.0 / most..=most).contains(&times.abs());
         let weighs = |joint: &&usize| {
@@ -92,21 +74,17 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -
         };
         let of_gravity = heavy().any(|joint| *joint == heaviest) && (beyond(true) || beyond(false));
         if of_gravity || wrong(ratio, UNIT_RATIO) {
-            let times = if of_gravity {
-                share(&heaviest).abs()
-            } else {
-                ratio
+            let times = match of_gravity {
+                true => share(&heaviest).abs(),
+                false => ratio,
             };
-            faults.push(Fault::new(
-                "torque",
-                format!(
-                    "torques are {times:.3e} times those of the declared masses at joint {} ({usual:.3e} at most joints): a unit, ratio or \
-                     torque constant is wrong{}",
-                    heaviest + 1,
-                    remedy(recording.from_current, times)
-                ),
-            ));
-            return faults;
+            let message = format!(
+                "torques are {times:.3e} times those of the declared masses at joint {} ({usual:.3e} at most joints): a unit, ratio or \
+                 torque constant is wrong{}",
+                heaviest + 1,
+                remedy(recording.from_current, times)
+            );
+            return vec![Fault::new("torque", message)];
         }
     }
     let left = |joint: usize, other: usize| {
@@ -116,22 +94,16 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -
         if products[*joint][*joint]
             < -0.8 * (measured_square[*joint] * gravity_square[*joint]).sqrt()
         {
-            faults.push(Fault::new(
-                format!("joint {}", joint + 1),
-                "torques are those of the declared masses with the other sign",
-            ));
+            let message = "torques are those of the declared masses with the other sign";
+            faults.push(Fault::new(format!("joint {}", joint + 1), message));
         }
         for other in &weighty[place + 1..] {
             let straight = left(*joint, *joint) + left(*other, *other);
             if left(*joint, *other) + left(*other, *joint) < EXCHANGED * straight {
-                faults.push(Fault::new(
-                    "torque",
-                    format!(
-                        "the columns of joint {} and joint {} look exchanged",
-                        joint + 1,
-                        other + 1
-                    ),
-                ));
+                let (one, other) = (joint + 1, other + 1);
+                let message =
+                    format!("the columns of joint {one} and joint {other} look exchanged");
+                faults.push(Fault::new("torque", message));
             }
         }
     }
@@ -178,13 +150,10 @@ fn angle_fault(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -> 
     let n = recording.joints;
     let straight = unexplained(arm, recording, theta, AngleReading::Straight);
     let pairs = || (0..n).flat_map(|one| (one + 1..n).map(move |other| (one, other)));
-    let others = [
-        AngleReading::Scaled(1.0 / DEGREE),
-        AngleReading::Scaled(DEGREE),
-    ]
-    .into_iter()
-    .chain(pairs().map(|(one, other)| AngleReading::Exchanged(one, other)))
-    .chain(pairs().map(|(one, other)| AngleReading::Renamed(one, other)));
+    let others = [1.0 / DEGREE, DEGREE].map(AngleReading::Scaled).into_iter();
+    let others = others
+        .chain(pairs().map(|(one, other)| AngleReading::Exchanged(one, other)))
+        .chain(pairs().map(|(one, other)| AngleReading::Renamed(one, other)));
     let left = others.map(|reading| (reading, unexplained(arm, recording, theta, reading)));
     let (best, left) = left.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (left < EXCHANGED * straight).then(|| {
@@ -197,22 +166,17 @@ fn angle_fault(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -> 
                 "angles are degrees where radians are expected".into()
             }
             AngleReading::Exchanged(one, other) => {
-                format!(
-                    "the angles of joint {} and joint {} look exchanged",
-                    one + 1,
-                    other + 1
-                )
+                let (one, other) = (one + 1, other + 1);
+                format!("the angles of joint {one} and joint {other} look exchanged")
             }
             AngleReading::Renamed(one, other) => {
                 format!("joint {} and joint {} look exchanged", one + 1, other + 1)
             }
         };
-        Fault::new(
-            "position",
-            format!(
-                "{reading}: the declared masses explain the torques {better:.0} times better so"
-            ),
-        )
+        let message = format!(
+            "{reading}: the declared masses explain the torques {better:.0} times better so"
+        );
+        Fault::new("position", message)
     })
 }
 
@@ -248,11 +212,10 @@ fn unexplained(
     reading: AngleReading,
 ) -> f64 {
     let n = recording.joints;
-    let mut dynamics = InverseDynamics::new(arm);
-    let (still, mut gravity, mut position) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut gravity_at = at_rest(arm, theta);
     let (mut sums, mut rows) = (vec![JointSums::default(); n], 0.0);
     for row in (0..recording.rows()).step_by(recording.rows().div_ceil(TRIED).max(1)) {
-        position.copy_from_slice(&recording.position[row * n..(row + 1) * n]);
+        let mut position = recording.position[row * n..(row + 1) * n].to_vec();
         let mut torque = recording.torque[row * n..(row + 1) * n].to_vec();
         match reading {
             AngleReading::Straight => (),
@@ -263,13 +226,8 @@ fn unexplained(
                 torque.swap(one, other);
             }
         }
-        let motion = MotionRow {
-            position: &position,
-            velocity: &still,
-            acceleration: &still,
-        };
-        dynamics.torque(motion, &arm.gravity, theta, &mut gravity);
         rows += 1.0;
+        let gravity = gravity_at(&position);
         for (sums, (torque, gravity)) in sums.iter_mut().zip(torque.iter().zip(&gravity)) {
             sums.torque += torque;
             sums.gravity += gravity;
@@ -279,9 +237,7 @@ fn unexplained(
         }
     }
     let scaled = |joint: usize| matches!(reading, AngleReading::Renamed(one, other) if recording.from_current && (joint == one || joint == other));
-    sums.iter()
-        .enumerate()
-        .map(|(joint, sums)| sums.left(rows, scaled(joint)))
-        .sum::<f64>()
-        / rows
+    let left = sums.iter().enumerate();
+    let left = left.map(|(joint, sums)| sums.left(rows, scaled(joint)));
+    left.sum::<f64>() / rows
 }

@@ -2,12 +2,12 @@
 
 use super::problem::TorqueProblem;
 use super::types::ContactEvent;
+use super::weighted::JointNoise;
 use crate::criteria::torque::{
     PUSH_APART, PUSH_AVERAGED, PUSH_DEVIATIONS, PUSH_FEWEST, PUSH_GAIN, PUSH_MOVING, PUSH_OTHERS,
     PUSH_OTHERS_GAIN, PUSH_SHARE, PUSH_TIMES_USUAL, PUSHES,
 };
 use crate::statistics::nearest;
-use crate::weighted::JointNoise;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 
@@ -39,37 +39,27 @@ pub(super) fn contacts(
     noise: &[JointNoise],
     held_out: bool,
 ) -> Vec<ContactEvent> {
-    let lasting: Vec<f64> = noise
-        .iter()
-        .map(|joint| joint.autocorrelation().max(1.0))
-        .collect();
-    let sigma: Vec<f64> = noise
-        .iter()
-        .zip(&lasting)
+    let lasting = noise.iter().map(|joint| joint.autocorrelation().max(1.0));
+    let lasting: Vec<f64> = lasting.collect();
+    let sigma = noise.iter().zip(&lasting);
+    let sigma: Vec<f64> = sigma
         .map(|(joint, lasting)| joint.sigma * lasting.sqrt())
         .collect();
     let sigma = &sigma[..];
     let usual: f64 = lasting.iter().map(|lasting| 1.0 / lasting).sum();
-    let rows = problem.reduction.rows.len();
-    let time: Vec<f64> = (0..rows).map(|row| problem.time(row)).collect();
-    let energy: Vec<f64> = (0..rows)
-        .map(|row| {
-            residual
-                .iter()
-                .zip(sigma)
-                .map(|(course, sigma)| (course[row] / sigma).powi(2))
-                .sum::<f64>()
-                / sigma.len() as f64
-        })
-        .collect();
-    let shown: Vec<usize> = (0..rows)
+    let rows = 0..problem.reduction.rows.len();
+    let time: Vec<f64> = rows.clone().map(|row| problem.time(row)).collect();
+    let shown: Vec<usize> = rows
         .filter(|row| held_out || !problem.is_held_out(*row))
         .collect();
-    let energy: Vec<f64> = shown.iter().map(|row| energy[*row]).collect();
-    let average = averaged(
-        &energy,
-        ((*PUSH_AVERAGED * problem.reduction.rate) as usize).max(3),
-    );
+    let energy = |row: &usize| {
+        let joints = residual.iter().zip(sigma);
+        let squares = joints.map(|(course, sigma)| (course[*row] / sigma).powi(2));
+        squares.sum::<f64>() / sigma.len() as f64
+    };
+    let energy: Vec<f64> = shown.iter().map(energy).collect();
+    let width = ((*PUSH_AVERAGED * problem.reduction.rate) as usize).max(3);
+    let average = averaged(&energy, width);
     let median = nearest(&mut average.clone(), 0.5).unwrap_or(0.0);
     let mut apart: Vec<f64> = average.iter().map(|value| (value - median).abs()).collect();
     let spread = 1.4826 * nearest(&mut apart, 0.5).unwrap_or(0.0);
@@ -84,18 +74,12 @@ pub(super) fn contacts(
         {
             break;
         }
-        let found = best_window(
-            problem,
-            residual,
-            EffectiveNoise { sigma, usual },
-            &time,
-            time[shown[highest]],
-        );
+        let (middle, noise) = (time[shown[highest]], EffectiveNoise { sigma, usual });
+        let found = best_window(problem, residual, noise, &time, middle);
         events.extend(found.filter(|event| moves(problem, &time, event)));
-        let near = |row: &usize| (time[shown[*row]] - time[shown[highest]]).abs() < *PUSH_APART;
-        (0..shown.len())
-            .filter(near)
-            .for_each(|row| used[row] = true);
+        for (used, row) in used.iter_mut().zip(&shown) {
+            *used |= (time[*row] - middle).abs() < *PUSH_APART;
+        }
     }
     events.sort_by(|a: &ContactEvent, b| a.start.total_cmp(&b.start));
     events
@@ -120,17 +104,15 @@ fn best_window(
                     duration,
                     taper,
                 };
-                let (event, share) = pushed(problem, residual, noise, time, window, first..last);
-                if best
-                    .as_ref()
-                    .is_none_or(|(known, _)| event.gain > known.gain)
-                {
-                    best = Some((event, share));
+                let found = pushed(problem, residual, noise, time, window, first..last);
+                let known = best.as_ref().map(|(known, _)| known.gain);
+                if known.is_none_or(|known| found.0.gain > known) {
+                    best = Some(found);
                 }
             }
         }
-        best.as_ref()
-            .map(|(event, _)| (event.start, event.end - event.start))
+        let best = best.as_ref();
+        best.map(|(event, _)| (event.start, event.end - event.start))
     };
     let mut now = None;
     for duration in DURATIONS {
@@ -140,11 +122,11 @@ fn best_window(
     }
     for fine in FINE {
         let (start, duration) = now?;
-        for steps in (-FINE_STEPS..=FINE_STEPS)
-            .flat_map(|begin| (-FINE_STEPS..=FINE_STEPS).map(move |end| [begin, end]))
-        {
-            let [begin, end] = steps.map(|steps| fine * f64::from(steps));
-            now = look(start + begin, duration + end - begin);
+        for begin in -FINE_STEPS..=FINE_STEPS {
+            for end in -FINE_STEPS..=FINE_STEPS {
+                let [begin, end] = [begin, end].map(|steps| fine * f64::from(steps));
+                now = look(start + begin, duration + end - begin);
+            }
         }
     }
     best.filter(|(event, share)| event.gain > *PUSH_GAIN && *share > *PUSH_SHARE)
@@ -232,16 +214,13 @@ fn pushed(
 
 /// Whether the arm moves in a good part of an event.
 fn moves(problem: &TorqueProblem, time: &[f64], event: &ContactEvent) -> bool {
-    let rows: Vec<usize> = (0..time.len())
-        .filter(|row| time[*row] >= event.start && time[*row] <= event.end)
-        .collect();
+    let during = |row: &usize| time[*row] >= event.start && time[*row] <= event.end;
+    let rows: Vec<usize> = (0..time.len()).filter(during).collect();
     let scene = &problem.scene;
     let moving = rows.iter().filter(|row| {
         let row = problem.reduction.rows[**row];
-        scene
-            .velocity
-            .iter()
-            .any(|course| course[row].abs() > 2.0 * scene.sign_width)
+        let mut courses = scene.velocity.iter();
+        courses.any(|course| course[row].abs() > 2.0 * scene.sign_width)
     });
     moving.count() as f64 >= *PUSH_MOVING * rows.len() as f64
 }

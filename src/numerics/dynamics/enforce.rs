@@ -4,9 +4,8 @@
 //! moments and the mass as their border (4 x 4), is positive (Wensing, Kim, Slotine, RA-L 2018). Least squares under that condition is a
 //! projection onto a product of cones, found by alternating directions (ADMM): a step in the metric, a step onto the cones.
 
-use super::arm::{INERTIAL_NUMBERS, inertia_matrix};
-use super::problem::TorqueProblem;
-use super::sweep::SweptColumns;
+use super::arm::{INERTIAL_NUMBERS, inertia_matrix, unit_number};
+use super::findings::FittedSet;
 use super::types::EnforcedBodies;
 use nalgebra::{DMatrix, DVector, Matrix4};
 use std::f64::consts::SQRT_2;
@@ -37,16 +36,10 @@ pub(super) struct NearestBodies {
 
 /// The nearest numbers (10 n) that are bodies', by the covariance of all (row-major, 10 n x 10 n). `None` where they are bodies' already.
 pub(super) fn nearest_bodies(theta: &[f64], covariance: &DMatrix<f64>) -> Option<NearestBodies> {
-    let maps: Vec<ConeMap> = theta
-        .chunks_exact(INERTIAL_NUMBERS)
-        .map(ConeMap::of)
-        .collect();
-    let links: Vec<usize> = maps
-        .iter()
-        .enumerate()
-        .filter(|(link, map)| !map.is_body(&theta[INERTIAL_NUMBERS * link..]))
-        .map(|(link, _)| link)
-        .collect();
+    let bodies = || theta.chunks_exact(INERTIAL_NUMBERS);
+    let maps: Vec<ConeMap> = bodies().map(ConeMap::of).collect();
+    let is_none = |link: &usize| !maps[*link].is_body(&theta[INERTIAL_NUMBERS * link..]);
+    let links: Vec<usize> = (0..maps.len()).filter(is_none).collect();
     if links.is_empty() {
         return None;
     }
@@ -60,21 +53,13 @@ pub(super) fn nearest_bodies(theta: &[f64], covariance: &DMatrix<f64>) -> Option
     let start = &to * DVector::from_column_slice(theta);
     let metric = &to * covariance * to.transpose();
     let found = projected(&start, &metric, &maps);
-    let back = to.lu();
-    let theta = back.solve(&found)?.as_slice().to_vec();
-    let moved = &found - &start;
-    let (eigenvalues, vectors) = {
-        let eigen = metric.symmetric_eigen();
-        (eigen.eigenvalues, eigen.eigenvectors)
-    };
-    let least = 1e-14 * eigenvalues.max();
-    let along = vectors.transpose() * moved;
-    let cost = along
-        .iter()
-        .zip(eigenvalues.iter())
-        .filter(|(_, size)| **size > least)
-        .map(|(value, size)| value * value / size)
-        .sum();
+    let theta = to.lu().solve(&found)?.as_slice().to_vec();
+    let eigen = metric.symmetric_eigen();
+    let least = 1e-14 * eigen.eigenvalues.max();
+    let along = eigen.eigenvectors.transpose() * (&found - &start);
+    let seen = along.iter().zip(eigen.eigenvalues.iter());
+    let seen = seen.filter(|(_, size)| **size > least);
+    let cost = seen.map(|(value, size)| value * value / size).sum();
     Some(NearestBodies { theta, cost, links })
 }
 
@@ -93,11 +78,10 @@ fn projected(start: &DVector<f64>, metric: &DMatrix<f64>, maps: &[ConeMap]) -> D
         });
         let free = start + &eigen.eigenvectors * shares;
         let before = std::mem::replace(&mut on, &free + &pull);
-        for (link, map) in maps.iter().enumerate() {
-            map.onto_cone(
-                &mut on.as_mut_slice()[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)],
-            );
-        }
+        let bodies = on.as_mut_slice().chunks_exact_mut(INERTIAL_NUMBERS);
+        maps.iter()
+            .zip(bodies)
+            .for_each(|(map, ten)| map.onto_cone(ten));
         pull += &free - &on;
         let (apart, moved) = ((&free - &on).norm(), (&on - &before).norm());
         if apart.max(moved) < SETTLED * (1.0 + start.norm()) {
@@ -145,11 +129,8 @@ impl ConeMap {
         };
         let mut matrix = DMatrix::zeros(INERTIAL_NUMBERS, INERTIAL_NUMBERS);
         for number in 0..INERTIAL_NUMBERS {
-            let mut unit = [0.0; INERTIAL_NUMBERS];
-            unit[number] = 1.0;
-            matrix
-                .column_mut(number)
-                .copy_from_slice(&entries(&pseudo_inertia(&unit, extent)));
+            let unit = pseudo_inertia(&unit_number(number), extent);
+            matrix.column_mut(number).copy_from_slice(&entries(&unit));
         }
         Self {
             matrix,
@@ -211,24 +192,20 @@ const NOTHING: f64 = 1e-13;
 
 /// Coefficients at which all links are bodies, nearest in the metric of their covariance; `None` where they are already, or where no masses
 /// are declared: base parameters are those of many arms.
-pub(super) fn with_bodies(
-    problem: &TorqueProblem,
-    set: &[usize],
-    sweep: &SweptColumns,
-    solution: &[(usize, f64)],
-) -> Option<(Vec<(usize, f64)>, EnforcedBodies)> {
+pub(super) fn with_bodies(fit: &FittedSet) -> Option<(Vec<(usize, f64)>, EnforcedBodies)> {
+    let (problem, set, solution) = (fit.choice.problem, fit.set, &fit.solution);
     problem.scene.declared.as_ref()?;
-    let pivots: Vec<usize> = solution.iter().map(|(column, _)| *column).collect();
-    let covariance =
-        DMatrix::from_row_slice(pivots.len(), pivots.len(), &sweep.covariance(&pivots));
+    let (pivots, values): (Vec<usize>, Vec<f64>) = solution.iter().copied().unzip();
+    let covariance = fit.sweep.covariance(&pivots);
+    let covariance = DMatrix::from_row_slice(pivots.len(), pivots.len(), &covariance);
     let mut shares = DMatrix::zeros(INERTIAL_NUMBERS * problem.joints(), pivots.len());
     for link in 0..problem.joints() {
         for (column, ten) in problem.inertial_changes(set, link) {
             let Some(pivot) = pivots.iter().position(|one| *one == column) else {
                 continue;
             };
-            let mut block =
-                shares.view_mut((INERTIAL_NUMBERS * link, pivot), (INERTIAL_NUMBERS, 1));
+            let first = INERTIAL_NUMBERS * link;
+            let mut block = shares.view_mut((first, pivot), (INERTIAL_NUMBERS, 1));
             block
                 .iter_mut()
                 .zip(ten)
@@ -239,22 +216,16 @@ pub(super) fn with_bodies(
     let with = &covariance * shares.transpose();
     let variance = &shares * &with;
     let found = nearest_bodies(&theta, &variance)?;
-    let moved = DVector::from_iterator(
-        theta.len(),
-        found.theta.iter().zip(&theta).map(|(new, old)| new - old),
-    );
+    let moved = DVector::from(found.theta) - DVector::from(theta);
     let change = with * solved(&variance, &moved);
-    let solution = solution
-        .iter()
-        .zip(change.iter())
-        .map(|((column, value), change)| (*column, value + change))
-        .collect();
+    let moved = DVector::from(values) + change;
+    let enforced = EnforcedBodies {
+        links: found.links,
+        cost: found.cost,
+    };
     Some((
-        solution,
-        EnforcedBodies {
-            links: found.links,
-            cost: found.cost,
-        },
+        pivots.into_iter().zip(moved.iter().copied()).collect(),
+        enforced,
     ))
 }
 

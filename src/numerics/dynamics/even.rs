@@ -4,11 +4,10 @@
 //! row as by an even clock, it is the stamps that err, and rows get even ones. A pause ends a stretch either way.
 
 use super::check::row_faults;
+use super::recording::{TorqueRecording, TorqueSource};
 use crate::criteria::torque::{PAUSE, UNEVEN, UNEVEN_ROWS};
 use crate::error::Result;
-use crate::filter::Resampler;
 use crate::statistics::nearest;
-use crate::types::{TorqueRecording, TorqueSource};
 
 /// Steps that tell what is usual, at most.
 const STEPS: usize = 1 << 16;
@@ -197,15 +196,13 @@ impl ClockSteps {
 
 /// Whether lists have their lengths and numbers are numbers that ascend.
 fn is_sound(block: &TorqueRecording, joints: usize) -> bool {
-    let (n, rows) = (block.joints, block.rows());
-    let long = |all: &Option<Vec<f64>>, each: usize| {
-        all.as_ref().is_none_or(|all| all.len() == each * rows)
-    };
-    n == joints
-        && [block.position.len(), block.torque.len()] == [n * rows; 2]
+    let rows = block.rows();
+    let columns = block.columns().into_iter();
+    let is_long =
+        |(all, wide): (Option<&Vec<f64>>, usize)| all.is_none_or(|all| all.len() == wide * rows);
+    block.joints == joints
+        && columns.map(is_long).all(|long| long)
         && [block.trajectory.len(), block.held_out.len()] == [rows; 2]
-        && long(&block.velocity, n)
-        && long(&block.temperature, 1)
         && row_faults(block, 0, None).is_empty()
 }
 
@@ -230,10 +227,161 @@ fn gather(block: &TorqueRecording, apart: &mut [Vec<f64>; 2], moved: &mut Vec<f6
     }
 }
 
+/// Makes even rows of recorded ones as they come.
+pub(super) struct Resampler {
+    period: f64,
+    pause: f64,
+    by_stamps: bool,
+    /// Recorded rows from `first` on, of which those before `done` are no longer needed as beginnings of a step.
+    pub(crate) held: TorqueRecording,
+    first: usize,
+    done: usize,
+    /// s, where the present stretch begins, and rows made of it.
+    begun: f64,
+    made: usize,
+    /// s, of the row made last.
+    last: f64,
+    out: TorqueRecording,
+    origin: Vec<usize>,
+}
+
+impl Resampler {
+    /// For rows that have the columns of others; `by_stamps` tells whether they are interpolated by their stamps.
+    pub(crate) fn new([period, pause]: [f64; 2], by_stamps: bool, like: &TorqueRecording) -> Self {
+        let nothing = || TorqueRecording::like(like);
+        Self {
+            period,
+            pause,
+            by_stamps,
+            held: nothing(),
+            first: 0,
+            done: 0,
+            begun: 0.0,
+            made: 0,
+            last: f64::NEG_INFINITY,
+            out: nothing(),
+            origin: Vec::new(),
+        }
+    }
+
+    /// Hands on what was made, each row with the recorded one that it is or comes after.
+    pub(crate) fn hand_on(
+        &mut self,
+        take: &mut dyn FnMut(&TorqueRecording, &[usize]) -> Result<()>,
+    ) -> Result<()> {
+        if !self.origin.is_empty() {
+            take(&self.out, &self.origin)?;
+        }
+        self.out = TorqueRecording::like(&self.held);
+        self.origin.clear();
+        Ok(())
+    }
+
+    /// Whether a stretch ends before a held row, which is not the first one.
+    fn is_torn(&self, row: usize) -> bool {
+        let step = self.held.time[row] - self.held.time[row - 1];
+        step <= 0.0 || step > self.pause
+    }
+
+    /// Makes the rows of all steps whose surroundings are known.
+    pub(crate) fn advance(&mut self, ends: bool) {
+        let rows = self.held.rows();
+        while self.done + 2 < rows || (ends && self.done < rows) {
+            let row = self.done;
+            if row + self.first == 0 || self.is_torn(row) {
+                self.begun = self.held.time[row].max(if self.by_stamps {
+                    f64::NEG_INFINITY
+                } else {
+                    self.last + self.period + self.pause
+                });
+                self.made = 0;
+                self.push(row, self.begun);
+            }
+            self.done += 1;
+            if row + 1 == rows || self.is_torn(row + 1) {
+                continue;
+            }
+            if !self.by_stamps {
+                self.push(row + 1, self.begun + self.made as f64 * self.period);
+                continue;
+            }
+            loop {
+                let time = self.begun + self.made as f64 * self.period;
+                if time > self.held.time[row + 1] {
+                    break;
+                }
+                self.interpolate(row, time);
+            }
+        }
+        // A row before and all that wait.
+        let spent = self.done.saturating_sub(1).min(rows);
+        self.held.forget(spent);
+        self.first += spent;
+        self.done -= spent;
+    }
+
+    /// A recorded row at another time.
+    fn push(&mut self, row: usize, time: f64) {
+        self.out.extend(&self.held, row..row + 1);
+        self.came(row, time);
+    }
+
+    fn came(&mut self, row: usize, time: f64) {
+        if let Some(last) = self.out.time.last_mut() {
+            *last = time;
+        }
+        self.origin.push(self.first + row);
+        self.last = time;
+        self.made += 1;
+    }
+
+    /// A row between a held one and the next: cubic, with the slopes of parabolas through the neighbouring rows.
+    fn interpolate(&mut self, row: usize, time: f64) {
+        let stamps = &self.held.time;
+        let (from, step) = (stamps[row], stamps[row + 1] - stamps[row]);
+        let share = (time - from) / step;
+        let before = (row > 0 && !self.is_torn(row)).then(|| stamps[row] - stamps[row - 1]);
+        let after = (row + 2 < stamps.len() && !self.is_torn(row + 2))
+            .then(|| stamps[row + 2] - stamps[row + 1]);
+        let left = share * share;
+        let [start, end] = [
+            1.0 - 3.0 * left + 2.0 * left * share,
+            3.0 * left - 2.0 * left * share,
+        ];
+        let [leaving, arriving] = [share - 2.0 * left + left * share, left * share - left];
+        // Weights of the rows before, here, next and after it.
+        let mut weights = [0.0, start, end, 0.0];
+        // Slopes times the step: of what this step alone has, and of what the neighbouring one has.
+        let mut slope = |weight: f64, columns: [usize; 2], neighbour: Option<(f64, [usize; 2])>| {
+            let (mine, other) = neighbour.map_or((1.0, 0.0), |(length, _)| {
+                (length / (step + length), step / (step + length))
+            });
+            weights[columns[0]] -= weight * mine;
+            weights[columns[1]] += weight * mine;
+            if let Some((length, places)) = neighbour {
+                weights[places[0]] -= weight * other * step / length;
+                weights[places[1]] += weight * other * step / length;
+            }
+        };
+        slope(leaving, [1, 2], before.map(|length| (length, [0, 1])));
+        slope(arriving, [1, 2], after.map(|length| (length, [2, 3])));
+        self.out.extend(&self.held, row..row + 1);
+        self.out.each(&self.held, |out, held, wide| {
+            let first = out.len() - wide;
+            for entry in 0..wide {
+                let places = (0..4).filter(|place| weights[*place] != 0.0);
+                out[first + entry] = places
+                    .map(|place| weights[place] * held[(row + place - 1) * wide + entry])
+                    .sum();
+            }
+        });
+        self.came(row, time);
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::DynamicArm;
-    use super::super::cases::{Blocks, arm};
+    use super::super::cases::{Blocks, bare};
     use super::super::used::UsedRecording;
     use super::*;
     use rand::rngs::ChaCha8Rng;
@@ -241,15 +389,6 @@ mod tests {
 
     /// Hz of the mean clock.
     const RATE: f64 = 200.0;
-
-    /// The arm of the other cases, whose masses are not declared.
-    fn bare() -> DynamicArm {
-        DynamicArm {
-            links: None,
-            payload: None,
-            ..arm()
-        }
-    }
 
     /// A motion of four joints, rad, with its torque, Nm.
     fn moved(time: f64, joint: usize) -> [f64; 2] {

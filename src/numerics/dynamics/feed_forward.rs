@@ -3,16 +3,15 @@
 //! What is refused though it can be computed: torques of which the model is less certain than they differ from those of the declared arm.
 //! One who insists gets them all the same, with a remark that says so.
 
-use crate::arm::{DynamicArm, INERTIAL_NUMBERS};
-use crate::cause::{TorqueForm, friction_of};
-use crate::clock::{RecordingClock, column};
+use super::arm::{DynamicArm, INERTIAL_NUMBERS};
+use super::cause::{TorqueForm, friction_of};
+use super::model::{COVERAGE, CovariancePlaces, JointRange, TorqueModel};
+use super::newton_euler::InverseDynamics;
+use super::recording::{RecordingClock, TorqueRecording, add, by_joint};
+use super::refine::planned_slopes;
+use super::scene::{DynamicScene, split};
 use crate::effect::Place;
 use crate::error::{Error, Result};
-use crate::model::{COVERAGE, JointRange, TorqueModel};
-use crate::newton_euler::InverseDynamics;
-use crate::scene::{DynamicScene, split};
-use crate::shape_slopes::planned_slopes;
-use crate::types::TorqueRecording;
 use std::fmt;
 
 /// A motion of n joints at an even clock; lists are row-major (rows x n).
@@ -52,14 +51,12 @@ pub struct NeededTorques {
     pub(crate) acceleration: Vec<f64>,
 }
 
-/// What a coefficient of a model adds at a joint, Nm per unit, a value a row.
-pub(super) struct TermCourse {
-    /// Term of the model.
-    pub(crate) term: usize,
-    /// Among all coefficients of the model.
-    pub(crate) coefficient: usize,
-    pub(crate) joint: usize,
-    pub(crate) course: Vec<f64>,
+/// What a coefficient of a term of a model adds at a joint, Nm per unit, a value a row.
+struct TermCourse {
+    term: usize,
+    number: usize,
+    joint: usize,
+    course: Vec<f64>,
 }
 
 impl TorqueModel {
@@ -69,21 +66,18 @@ impl TorqueModel {
         /// Rows that derivatives need.
         const LEAST: usize = 10;
         let (n, rows) = (self.joints(), motion.time.len());
-        if arm.joints() != n || motion.joints != n || motion.position.len() != n * rows {
-            let message = format!(
-                "the model has {n} joints, the arm {}, the motion {}",
-                arm.joints(),
-                motion.joints
-            );
+        let [of_arm, of_motion] = [arm.joints(), motion.joints];
+        if of_arm != n || of_motion != n || motion.position.len() != n * rows {
+            let message =
+                format!("the model has {n} joints, the arm {of_arm}, the motion {of_motion}");
             return Err(Error::data("motion", message));
         }
         if rows < LEAST {
-            return Err(Error::data(
-                "motion",
-                format!("has {rows} rows; at least {LEAST} are needed"),
-            ));
+            let message = format!("has {rows} rows; at least {LEAST} are needed");
+            return Err(Error::data("motion", message));
         }
-        let forms = self.forms()?;
+        let places = self.places()?;
+        let forms = &places.forms;
         let mut scene = self.scene(arm, motion);
         let declared = match &scene.declared {
             Some(declared) => scene.torques_of(&declared.theta),
@@ -93,39 +87,29 @@ impl TorqueModel {
         if forms.iter().any(|form| form.place == Place::Base) {
             scene.tilt(&self.inertials);
         }
-        scene.friction = self.friction(&forms, &scene);
-        let courses = self.courses(&forms, &scene);
-        let mut torque: Vec<Vec<f64>> = scene.rigid.clone();
+        scene.friction = self.friction(forms, &scene);
+        let courses = self.courses(forms, &scene);
+        let mut torque = scene.rigid.clone();
         for one in &courses {
-            let value = self.coefficient(one);
-            torque[one.joint]
-                .iter_mut()
-                .zip(&one.course)
-                .for_each(|(sum, part)| *sum += value * part);
+            add(&mut torque[one.joint], self.coefficient(one), &one.course);
         }
-        let differences = torque
-            .iter()
-            .zip(&declared)
-            .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect());
-        let correction: Vec<Vec<f64>> = differences.collect();
+        let mut correction = torque.clone();
+        for (course, declared) in correction.iter_mut().zip(&declared) {
+            add(course, -1.0, declared);
+        }
         let by_row = |courses: &[Vec<f64>]| {
-            (0..rows)
-                .flat_map(|row| courses.iter().map(move |course| course[row]))
+            let rows = 0..rows;
+            rows.flat_map(|row| courses.iter().map(move |course| course[row]))
                 .collect()
         };
         Ok(NeededTorques {
-            u95: self.uncertainty(&forms, &mut scene, &courses),
+            u95: self.uncertainty(&places, &mut scene, &courses),
             torque: by_row(&torque),
             load: by_row(&scene.rigid),
             correction: by_row(&correction),
             velocity: by_row(&scene.velocity),
             acceleration: by_row(&scene.acceleration),
         })
-    }
-
-    /// Of its terms. Fails where no cause has a term's name.
-    pub(super) fn forms(&self) -> Result<Vec<TorqueForm>> {
-        self.terms.iter().map(|term| term.form()).collect()
     }
 
     /// Nm, `[joint][row]`; `forms` are those of the terms.
@@ -137,7 +121,6 @@ impl TorqueModel {
     /// What each coefficient adds, term after term.
     fn courses(&self, forms: &[TorqueForm], scene: &DynamicScene) -> Vec<TermCourse> {
         let mut courses = Vec::new();
-        let mut first = 0;
         for (term, form) in forms.iter().enumerate() {
             for joint in form.acts_on(self.joints()) {
                 for number in 0..form.width {
@@ -145,24 +128,19 @@ impl TorqueModel {
                     form.write(scene, joint, number, &mut course);
                     courses.push(TermCourse {
                         term,
-                        coefficient: first + number,
+                        number,
                         joint,
                         course,
                     });
                 }
             }
-            first += form.width;
         }
         courses
     }
 
     /// Value of a coefficient.
-    pub(super) fn coefficient(&self, course: &TermCourse) -> f64 {
-        let before: usize = self.terms[..course.term]
-            .iter()
-            .map(|term| term.coefficients.len())
-            .sum();
-        self.terms[course.term].coefficients[course.coefficient - before]
+    fn coefficient(&self, course: &TermCourse) -> f64 {
+        self.terms[course.term].coefficients[course.number]
     }
 
     /// The motion as causes see it.
@@ -177,17 +155,12 @@ impl TorqueModel {
         // A warm arm began to move longer ago than any time constant: what fades has faded.
         let begun = motion.since_start.unwrap_or(f64::INFINITY);
         scene.time.iter_mut().for_each(|time| *time += begun);
-        let columns = |all: &Vec<f64>| {
-            (0..n)
-                .map(|joint| column(all, n, joint))
-                .collect::<Vec<Vec<f64>>>()
-        };
         if let Some(velocity) = &motion.velocity {
-            scene.position = columns(&motion.position);
-            scene.velocity = columns(velocity);
+            scene.position = by_joint(&motion.position, n);
+            scene.velocity = by_joint(velocity, n);
         }
         if let Some(acceleration) = &motion.acceleration {
-            scene.acceleration = columns(acceleration);
+            scene.acceleration = by_joint(acceleration, n);
         }
         scene
     }
@@ -199,36 +172,24 @@ impl TorqueModel {
     /// Nm, 95 %, row-major (rows x n); `None` where the model carries no covariance. The variance of a torque is that of its numbers, each
     /// through its terms (of a shape number to first order), what held-out rows leave beyond it, and the square of what each law adds times how far beyond its range it is used, as a
     /// share of that range.
-    pub(super) fn uncertainty(
+    fn uncertainty(
         &self,
-        forms: &[TorqueForm],
+        places: &CovariancePlaces,
         scene: &mut DynamicScene,
         courses: &[TermCourse],
     ) -> Option<Vec<f64>> {
-        let known = self.identified.iter().filter(|known| **known).count();
-        let coefficients: Vec<&[f64]> = self
-            .terms
-            .iter()
-            .map(|term| term.coefficients.as_slice())
-            .collect();
-        let linear = known
-            + coefficients
-                .iter()
-                .map(|values| values.len())
-                .sum::<usize>();
-        let width = linear
-            + forms
-                .iter()
-                .map(|form| form.shape_numbers().len())
-                .sum::<usize>()
-            + 1;
-        if self.covariance.len() != width * width {
-            return None;
-        }
-        let shapes = planned_slopes(forms, &coefficients, scene, linear);
+        let (forms, width) = (&places.forms, places.width);
+        let covariance = self.covariance_of_all(width)?;
+        let coefficients = self.terms.iter().map(|term| &term.coefficients);
+        let coefficients: Vec<&Vec<f64>> = coefficients.collect();
+        let first = places.shapes.first().copied().unwrap_or(width - 1);
+        let shapes = planned_slopes(forms, &coefficients, scene);
         let scene = &*scene;
         let (n, rows) = (self.joints(), scene.rows());
-        let places: Vec<Option<usize>> = self.places();
+        let mut places_left = 0..;
+        let inertial = self.identified.iter();
+        let inertial = inertial.map(|known| known.then(|| places_left.next()).flatten());
+        let inertial: Vec<Option<usize>> = inertial.collect();
         let by_joint: Vec<Vec<&TermCourse>> = (0..n)
             .map(|joint| courses.iter().filter(|one| one.joint == joint).collect())
             .collect();
@@ -243,50 +204,30 @@ impl TorqueModel {
                 split(&motion, n),
                 &scene.arm.gravity,
                 |joint, link, numbers| {
-                    let placed = places[INERTIAL_NUMBERS * link..].iter().zip(numbers);
-                    let placed =
-                        placed.filter_map(|(place, value)| place.map(|place| (place, *value)));
+                    let placed = inertial[INERTIAL_NUMBERS * link..].iter().zip(numbers);
+                    let placed = placed.filter_map(|(place, value)| Some(((*place)?, *value)));
                     slopes[joint].extend(placed.filter(|(_, value)| *value != 0.0));
                 },
             );
             for (joint, slope) in slopes.iter_mut().enumerate() {
-                slope.extend(
-                    by_joint[joint]
-                        .iter()
-                        .map(|one| (known + one.coefficient, one.course[row])),
-                );
-                slope.extend(
-                    shapes
-                        .iter()
-                        .filter(|one| one.1 == joint)
-                        .map(|(number, _, course)| (*number, course[row])),
-                );
+                slope.extend(by_joint[joint].iter().map(|one| {
+                    let place = places.coefficients[one.term] + one.number;
+                    (place, one.course[row])
+                }));
+                let of_shapes = shapes.iter().filter(|one| one.1 == joint);
+                slope.extend(of_shapes.map(|(number, _, course)| (first + number, course[row])));
                 let row_of = |(a, first): &(usize, f64)| {
-                    let covariance_row = &self.covariance[a * width..(a + 1) * width];
-                    first
-                        * slope
-                            .iter()
-                            .map(|(b, second)| covariance_row[*b] * second)
-                            .sum::<f64>()
+                    let covariance_row = &covariance[a * width..(a + 1) * width];
+                    let with = slope.iter().map(|(b, second)| covariance_row[*b] * second);
+                    first * with.sum::<f64>()
                 };
-                let own_variance = slope.iter().map(row_of).sum::<f64>().max(0.0)
-                    + self.range[joint].misfit.powi(2);
-                let variance = own_variance + self.beyond(forms, scene, &by_joint[joint], row);
+                let by_numbers = slope.iter().map(row_of).sum::<f64>().max(0.0);
+                let variance = by_numbers + self.range[joint].misfit.powi(2);
+                let variance = variance + self.beyond(forms, scene, &by_joint[joint], row);
                 all.push(COVERAGE * variance.sqrt());
             }
         }
         Some(all)
-    }
-
-    /// Where each inertial number stands in the covariance.
-    fn places(&self) -> Vec<Option<usize>> {
-        let mut next = 0;
-        let place = |known: &bool| {
-            let next_column = known.then_some(next);
-            next += usize::from(*known);
-            next_column
-        };
-        self.identified.iter().map(place).collect()
     }
 
     /// Variance of laws that are used beyond the recording at a joint, Nm^2.
@@ -303,10 +244,10 @@ impl TorqueModel {
             let joint = form.joint();
             let share = self.range[joint].beyond(form, scene, joint, row);
             if share > 0.0 {
-                let torque: f64 = term
+                let parts = term
                     .iter()
-                    .map(|one| self.coefficient(one) * one.course[row])
-                    .sum();
+                    .map(|one| self.coefficient(one) * one.course[row]);
+                let torque: f64 = parts.sum();
                 variance += (share * torque).powi(2);
             }
         }
@@ -317,17 +258,13 @@ impl TorqueModel {
 impl JointRange {
     /// How far a law is used beyond what was recorded of its variable, as a share of the recorded range.
     fn beyond(&self, form: &TorqueForm, scene: &DynamicScene, joint: usize, row: usize) -> f64 {
-        let above = |value: f64, most: f64| {
-            if most > 0.0 {
-                (value.abs() / most - 1.0).max(0.0)
-            } else {
-                0.0
-            }
+        let above = |value: f64, most: f64| match most > 0.0 {
+            true => (value.abs() / most - 1.0).max(0.0),
+            false => 0.0,
         };
-        let load = if form.cause.of_rigid {
-            above(scene.rigid[joint][row], self.load)
-        } else {
-            0.0
+        let load = match form.cause.of_rigid {
+            true => above(scene.rigid[joint][row], self.load),
+            false => 0.0,
         };
         let is_friction = !form.cause.modifies.is_empty() || form.friction(0, 1.0, 1.0).is_some();
         if is_friction {
@@ -381,23 +318,21 @@ impl fmt::Display for TorqueRemark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::BeyondRecorded(joint, what) => write!(f, "joint {} {what}", joint + 1),
-            Self::Temperature(at, known) if at < known => {
+            Self::Temperature(at, known) => {
+                let [colder, begins] = match at < known {
+                    true => ["colder", "begins"],
+                    false => ["warmer", "ends"],
+                };
                 write!(
                     f,
-                    "colder than recorded: {at:.1} C, the recording begins at {known:.1} C"
+                    "{colder} than recorded: {at:.1} C, the recording {begins} at {known:.1} C"
                 )
             }
-            Self::Temperature(at, known) => write!(
+            Self::Uncertain(joint, correction, u95) => write!(
                 f,
-                "warmer than recorded: {at:.1} C, the recording ends at {known:.1} C"
+                "joint {}: the correction of {correction:.3} Nm is uncertain by {u95:.3} Nm",
+                joint + 1
             ),
-            Self::Uncertain(joint, correction, u95) => {
-                write!(
-                    f,
-                    "joint {}: the correction of {correction:.3} Nm is uncertain by {u95:.3} Nm",
-                    joint + 1
-                )
-            }
             Self::Refused(reason) => write!(f, "refused: {reason}"),
             Self::Insisted(reason) => write!(f, "written because of --force: {reason}"),
         }
@@ -411,36 +346,29 @@ pub struct JudgedRow(pub Vec<TorqueRemark>);
 impl JudgedRow {
     /// Whether no torques are to be written.
     pub fn is_refused(&self) -> bool {
-        self.0
-            .iter()
-            .any(|remark| matches!(remark, TorqueRemark::Refused(_)))
+        self.has(|remark| matches!(remark, TorqueRemark::Refused(_)))
+    }
+
+    fn has(&self, is_one: fn(&TorqueRemark) -> bool) -> bool {
+        self.0.iter().any(is_one)
     }
 
     /// Whether it was written because someone insisted.
     pub fn is_insisted(&self) -> bool {
-        self.0
-            .iter()
-            .any(|remark| matches!(remark, TorqueRemark::Insisted(_)))
+        self.has(|remark| matches!(remark, TorqueRemark::Insisted(_)))
     }
 
     /// Whether it lies outside of what the recording visited.
     pub fn is_beyond(&self) -> bool {
-        let beyond = |remark: &TorqueRemark| {
-            matches!(
-                remark,
-                TorqueRemark::BeyondRecorded(..) | TorqueRemark::Temperature(..)
-            )
-        };
-        self.0.iter().any(beyond)
+        use TorqueRemark::{BeyondRecorded, Temperature};
+        self.has(|remark| matches!(remark, BeyondRecorded(..) | Temperature(..)))
     }
 }
 
 impl fmt::Display for JudgedRow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0
-            .iter()
-            .enumerate()
-            .try_for_each(|(k, remark)| write!(f, "{}{remark}", if k == 0 { "" } else { "; " }))
+        let all: Vec<String> = self.0.iter().map(ToString::to_string).collect();
+        f.write_str(&all.join("; "))
     }
 }
 
@@ -465,19 +393,13 @@ impl TorqueModel {
         row: usize,
     ) -> JudgedRow {
         let n = self.joints();
-        let mut remarks: Vec<TorqueRemark> = gate
-            .model
-            .iter()
-            .cloned()
-            .map(TorqueRemark::Insisted)
-            .collect();
+        let insisted = gate.model.iter().cloned().map(TorqueRemark::Insisted);
+        let mut remarks: Vec<TorqueRemark> = insisted.collect();
         let mut reason = None;
         for (joint, seen) in self.range.iter().enumerate() {
             let at = n * row + joint;
-            remarks.extend(
-                seen.outside(motion, needed, at)
-                    .map(|what| TorqueRemark::BeyondRecorded(joint, what)),
-            );
+            let outside = seen.outside(motion, needed, at);
+            remarks.extend(outside.map(|what| TorqueRemark::BeyondRecorded(joint, what)));
             let Some(u95) = needed.u95.as_ref().map(|all| all[at]) else {
                 continue;
             };
@@ -522,21 +444,18 @@ impl JointRange {
         at: usize,
     ) -> impl Iterator<Item = &'static str> {
         let [least, greatest] = self.position;
+        let aside = !(least - ASIDE..=greatest + ASIDE).contains(&motion.position[at]);
+        let above = |value: f64, most: f64| value.abs() > BEYOND * most;
+        let (faster, harder) = (
+            above(needed.velocity[at], self.speed),
+            above(needed.acceleration[at], self.acceleration),
+        );
         let all = [
+            (aside, "where it was not recorded"),
+            (faster, "faster than recorded"),
+            (harder, "accelerates more than recorded"),
             (
-                !(least - ASIDE..=greatest + ASIDE).contains(&motion.position[at]),
-                "where it was not recorded",
-            ),
-            (
-                needed.velocity[at].abs() > BEYOND * self.speed,
-                "faster than recorded",
-            ),
-            (
-                needed.acceleration[at].abs() > BEYOND * self.acceleration,
-                "accelerates more than recorded",
-            ),
-            (
-                needed.load[at].abs() > BEYOND * self.load,
+                above(needed.load[at], self.load),
                 "under more load than recorded",
             ),
         ];

@@ -3,8 +3,7 @@
 //! Causes that a robot shows by itself stay in its model; what they are worth is the evidence of each given all others.
 
 use super::cause::{TorqueForm, UNKNOWN};
-use super::cells::{TorqueCell, TorqueComponent, TorqueState, TorqueTable, without};
-use super::choice::CauseChoice;
+use super::cells::{CauseChoice, TorqueCell, TorqueComponent, TorqueState, TorqueTable, without};
 use super::solve::SolvedTorques;
 use crate::criteria::fleet::LEAST_EVIDENCE;
 use crate::criteria::torque::PER_METRE;
@@ -22,12 +21,11 @@ pub(super) fn answers(solved: &mut SolvedTorques, given: &[GivenCell]) -> Vec<Ce
     let components = table.with_given(components, given);
     let (state, mut out) = (table.state(&components, None), Vec::new());
     let kappa = state.known.kappa;
-    let taken: Vec<usize> = components
+    let taken = components
         .iter()
-        .map(|component| table.cell_of[&component.form])
-        .collect();
-    let open = || (0..table.cells.len()).filter(|cell| !taken.contains(cell));
-    for cell in open() {
+        .map(|component| table.cell_of[&component.form]);
+    let taken: Vec<usize> = taken.collect();
+    for cell in (0..table.cells.len()).filter(|cell| !taken.contains(cell)) {
         out.extend(table.answer(cell, &state, None));
     }
     for (place, component) in components.iter().enumerate() {
@@ -39,9 +37,8 @@ pub(super) fn answers(solved: &mut SolvedTorques, given: &[GivenCell]) -> Vec<Ce
         out.extend(shapes);
         out.extend(table.in_place(&components, place, (&state, kappa), left_out));
         if left_out.is_some() {
-            let rivals =
-                open().filter(|cell| choice.compete(table.cells[*cell].forms[0], component.form));
-            for cell in rivals {
+            let rivals = table.competing(component.form);
+            for cell in rivals.filter(|cell| !taken.contains(cell)) {
                 out.extend(table.answer(cell, &state, left_out));
             }
         }
@@ -54,9 +51,10 @@ impl TorqueTable<'_, '_> {
     fn key(&self, cell: usize) -> String {
         let torque_cell = &self.cells[cell];
         let form = self.choice.form(torque_cell.forms[0]);
-        let kind = form.cause.coefficients.first();
-        let kind = kind.filter(|_| torque_cell.name == UNKNOWN);
-        let kind = kind.map_or(String::new(), |(kind, _)| format!(":{kind}"));
+        let kind = match torque_cell.name == UNKNOWN {
+            true => format!(":{}", form.kind()),
+            false => String::new(),
+        };
         let [one, two] = (form.cause.cell)(form);
         let with = match [one, two] {
             [0, 0] => String::new(),
@@ -106,34 +104,48 @@ impl TorqueTable<'_, '_> {
         self.prune(components)
     }
 
+    /// What the cell of a form says, with ln of its posterior odds and its size, Nm.
+    fn whole_answer(
+        &self,
+        form: usize,
+        log_odds: f64,
+        size: f64,
+        left_out: Option<&str>,
+    ) -> CellAnswer {
+        let cell = self.cell_of[&form];
+        let TorqueCell {
+            name,
+            place,
+            log_prior,
+            ..
+        } = self.cells[cell];
+        CellAnswer {
+            left_out: left_out.map(Into::into),
+            cell: self.key(cell),
+            shape: None,
+            effect: name,
+            place,
+            follows: follows(self.choice.form(form)),
+            log: log_odds - log_prior,
+            log_prior,
+            size,
+            sigma: None,
+            log_ratio: None,
+        }
+    }
+
     /// What a cell says given a state, and each of its shapes that robots may share.
     fn answer(&self, cell: usize, state: &TorqueState, left_out: Option<&str>) -> Vec<CellAnswer> {
         let Some(posterior) = self.cell(cell, state) else {
             return Vec::new();
         };
-        let torque_cell = &self.cells[cell];
         let best = posterior.best;
-        let whole = CellAnswer {
-            left_out: left_out.map(Into::into),
-            cell: self.key(cell),
-            shape: None,
-            effect: torque_cell.name,
-            place: torque_cell.place,
-            follows: follows(self.choice.form(best.form)),
-            log: posterior.log_odds - torque_cell.log_prior,
-            log_prior: torque_cell.log_prior,
-            size: best.amplitude * self.newton_metres(best.form),
-            sigma: None,
-            log_ratio: None,
-        };
+        let size = best.amplitude * self.newton_metres(best.form);
+        let whole = self.whole_answer(best.form, posterior.log_odds, size, left_out);
         // Forms of each shape, and ln of the evidence of those that may be.
         let mut shapes: BTreeMap<String, (usize, Vec<f64>)> = BTreeMap::new();
-        for form in torque_cell
-            .forms
-            .iter()
-            .filter(|form| **form < self.choice.open)
-        {
-            let key = shape_key(self.choice.form(*form));
+        for form in self.open(cell) {
+            let key = shape_key(self.choice.form(form));
             shapes.entry(key).or_default().0 += 1;
         }
         if shapes.len() < 2 {
@@ -166,29 +178,17 @@ impl TorqueTable<'_, '_> {
         left_out: Option<&str>,
     ) -> Option<CellAnswer> {
         let component = components[place];
-        let cell = self.cell_of[&component.form];
         let (gram, along) = self.seen(component.form, state);
         let prior = vec![component.amplitude.powi(2) / along.len() as f64; along.len()];
         let found = rms_size(&gram, &along, &prior)?;
         let unit = self.newton_metres(component.form);
-        let TorqueCell {
-            name,
-            place: at,
-            log_prior,
-            ..
-        } = self.cells[cell];
+        let log_odds = self.odds_of(components, place, kappa);
+        let whole = self.whole_answer(component.form, log_odds, found.size * unit, left_out);
         Some(CellAnswer {
-            left_out: left_out.map(Into::into),
-            cell: self.key(cell),
-            shape: None,
-            effect: name,
-            place: at,
-            follows: follows(self.choice.form(component.form)),
-            log: (self.odds_of(components, place, kappa).log_odds - log_prior).max(*LEAST_EVIDENCE),
-            log_prior,
-            size: found.size * unit,
+            log: whole.log.max(*LEAST_EVIDENCE),
             sigma: Some(found.sigma * unit),
             log_ratio: Some(found.log_ratio),
+            ..whole
         })
     }
 }

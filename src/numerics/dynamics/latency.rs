@@ -1,12 +1,11 @@
 //! How much later torques come than the positions of their rows, and by how much friction turns before the velocity does: friction that a
 //! simulator lets a solver find turns with velocity and acceleration, and velocities that a drive smooths lag behind the friction that it feels.
 
-use super::problem::TorqueProblem;
-use super::rich::{basic_forms, noise_of_fit};
+use super::problem::{TorqueProblem, basic_forms, noise_of_fit};
+use super::recording::square;
+use super::refine::{FrictionFit, joint_sign_widths, sign_width};
 use super::sweep::SweptColumns;
-use super::weighted::{Weighing, WeightedColumns};
-use crate::shape_slopes::{FrictionFit, joint_sign_widths, sign_width};
-use crate::weighted::NoiseMemory;
+use super::weighted::{NoiseMemory, Weighing};
 
 /// s: least, most, step of the shifts that are tried.
 const SHIFTS: [f64; 3] = [-0.016, 0.048, 0.004];
@@ -45,27 +44,21 @@ pub(super) fn latency(problem: &TorqueProblem) -> Option<Latency> {
         noise: &noise,
         runs: &runs,
     };
-    let mut chosen: Vec<usize> = (0..problem.all.base)
-        .chain(basic.iter().flat_map(|form| problem.all.of(*form)))
-        .collect();
-    chosen.sort_unstable();
-    let weighted = WeightedColumns::new(&problem.all, &problem.measured, weighing, &chosen);
-    let left_at = |shift: f64| {
+    let weighted = problem.weighted_by(weighing, &basic);
+    let left_at = |shift: f64| -> Vec<f64> {
         let mut weighted = weighted.with_measured(weighing.measured(&problem.difference(shift)));
-        let solution = SweptColumns::base(&problem.all, &weighted)
-            .with(&basic)
-            .solution();
+        let sweep = SweptColumns::base(&problem.all, &weighted).with(&basic);
+        let solution = sweep.solution();
         weighted.subtract(&solution);
         weighted
             .measured
             .iter()
-            .map(|course| course.iter().map(|value| value * value).sum())
-            .collect::<Vec<f64>>()
+            .map(|course| square(course))
+            .collect()
     };
     let steps = ((SHIFTS[1] - SHIFTS[0]) / SHIFTS[2]).round() as usize;
-    let shifts: Vec<f64> = (0..=steps)
-        .map(|step| SHIFTS[0] + SHIFTS[2] * step as f64)
-        .collect();
+    let shift = |step: usize| SHIFTS[0] + SHIFTS[2] * step as f64;
+    let shifts: Vec<f64> = (0..=steps).map(shift).collect();
     let left: Vec<Vec<f64>> = shifts.iter().map(|shift| left_at(*shift)).collect();
     let total: Vec<f64> = left.iter().map(|joints| joints.iter().sum()).collect();
     let least = (0..total.len()).min_by(|a, b| total[*a].total_cmp(&total[*b]))?;
@@ -116,9 +109,9 @@ type Best = (f64, f64, f64);
 fn finer(try_lead: &mut dyn FnMut(f64, f64, &mut Best), best: &mut Best) {
     for step in STEPS {
         let (_, about, moved) = *best;
-        [about - step, about + step]
-            .iter()
-            .for_each(|lead| try_lead(*lead, moved, best));
+        for lead in [about - step, about + step] {
+            try_lead(lead, moved, best);
+        }
     }
 }
 
@@ -141,27 +134,26 @@ pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
             *best = (left, lead, moved);
         }
     };
-    let steps = (LATEST / STEP).round() as i32;
-    (-steps..=steps)
-        .filter(|step| *step != 0)
-        .for_each(|step| try_lead(STEP * f64::from(step), 0.0, &mut best));
+    let steps = |most: i32| {
+        let either = (-most..=most).filter(|step| *step != 0);
+        either.map(|step| STEP * f64::from(step))
+    };
+    for lead in steps((LATEST / STEP).round() as i32) {
+        try_lead(lead, 0.0, &mut best);
+    }
     finer(&mut try_lead, &mut best);
     let alone = best;
-    let moves = (-TOGETHER..=TOGETHER)
-        .filter(|step| *step != 0)
-        .map(|step| STEP * f64::from(step));
-    moves
-        .filter(|moved| latency + moved >= 0.0)
-        .for_each(|moved| try_lead(alone.1 + moved, moved, &mut best));
+    for moved in steps(TOGETHER).filter(|moved| latency + moved >= 0.0) {
+        try_lead(alone.1 + moved, moved, &mut best);
+    }
     if (alone.0 - best.0) * rows < MOVED_GAIN {
         best = alone;
     } else {
         finer(&mut try_lead, &mut best);
     }
     let left = left_by(problem, best.1, best.2);
-    let gains: Vec<f64> = unmoved
-        .iter()
-        .zip(&left)
+    let gains = unmoved.iter().zip(&left);
+    let gains: Vec<f64> = gains
         .map(|(unmoved, left)| rows * (unmoved - left))
         .collect();
     let is_one = (LEAST_LEAD..LATEST - SAME).contains(&best.1.abs())
@@ -180,43 +172,4 @@ pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
         }
     }
     is_new
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::cases::{arm, record};
-    use super::super::{TorqueQuestion, diagnose};
-
-    /// s.
-    const LEAD: f64 = 0.0095;
-
-    #[test]
-    fn friction_that_turns_before_the_velocity_is_plain_friction_with_its_lead() {
-        // As a solver lets it, rad/s.
-        let widths = [0.001, 0.002, 0.006, 0.03];
-        let soft = |(joint, _, _, velocity, acceleration, _): (usize, f64, f64, f64, f64, f64)| {
-            3.0 * velocity
-                + 8.0 * ((velocity + LEAD * acceleration) / widths[joint]).clamp(-1.0, 1.0)
-        };
-        let diagnosis = diagnose(
-            &arm(),
-            &record(&arm(), 0.0, &soft),
-            &TorqueQuestion::default(),
-            &mut |_| (),
-        )
-        .unwrap();
-        let others = diagnosis
-            .findings
-            .iter()
-            .filter(|finding| !["viscous_friction", "coulomb_friction"].contains(&finding.effect));
-        let others = others.map(|finding| finding.statement.clone());
-        let (lead, others) = (
-            diagnosis.model.friction_lead,
-            others.collect::<Vec<String>>(),
-        );
-        assert!(
-            (lead - LEAD).abs() < 0.001 && others.is_empty(),
-            "{lead}: {others:?}"
-        );
-    }
 }

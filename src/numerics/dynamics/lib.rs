@@ -6,11 +6,8 @@
 use calib_diagnose as diagnose;
 use calib_foundation::statistics;
 use calib_numerics::{criteria, effect, error, estimate, spatial};
-// Paths are those of the crate `calib`.
-use crate as dynamics;
 
 mod arm;
-mod bridge;
 #[cfg(test)]
 mod cases;
 #[cfg(test)]
@@ -20,8 +17,6 @@ mod cells;
 mod changes;
 mod check;
 mod check_gravity;
-mod choice;
-mod clock;
 mod columns;
 mod contact;
 mod enforce;
@@ -30,20 +25,16 @@ mod excite;
 mod feed_forward;
 mod filter;
 mod findings;
-mod friction_curve;
 mod given;
 mod latency;
-mod left_out;
 mod masses;
 mod model;
 mod newton_euler;
 mod outcome;
 mod problem;
-mod reduce;
+mod recording;
 mod refine;
-mod rich;
 mod scene;
-mod shape_slopes;
 mod solve;
 mod sweep;
 mod thin;
@@ -57,16 +48,17 @@ pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
 pub use excite::{ExciteRequest, ExcitingMotion, ExpectedSigma, excite};
 pub use feed_forward::{JudgedRow, NeededTorques, PlannedMotion, TorqueGate, TorqueRemark};
 pub use masses::{BodyConsistency, LinkFromTorques, inertial_numbers};
-pub use model::{JointRange, TorqueModel, TorqueTerm};
+pub use model::{FrictionCurve, JointRange, TorqueModel, TorqueTerm};
 pub use newton_euler::{InverseDynamics, MotionRow};
+pub use recording::{TorqueRecording, TorqueSource};
 pub use types::{
-    ContactEvent, EnforcedBodies, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses,
-    TorqueDiagnosis, TorqueErrors, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueQuestion,
-    TorqueRecording, TorqueSource,
+    ContactEvent, EnforcedBodies, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis,
+    TorqueErrors, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueQuestion,
 };
 
 use crate::error::{Error, Result};
 pub use diagnose::{CellAnswer, GivenCell};
+use recording::RecordingClock;
 use used::UsedRecording;
 
 /// What torques that come late are called.
@@ -90,12 +82,8 @@ pub fn diagnose(
     question: &TorqueQuestion,
     tell: &mut dyn FnMut(String),
 ) -> Result<TorqueDiagnosis> {
-    diagnose_used(
-        arm,
-        UsedRecording::of(arm, recording, question.cutoff)?,
-        question,
-        tell,
-    )
+    let used = UsedRecording::of(arm, recording, question.cutoff)?;
+    diagnose_used(arm, used, question, tell)
 }
 
 /// What every cell of the table of torques says of a recording given some of them, for the sum over a fleet; sizes in Nm.
@@ -122,36 +110,28 @@ fn diagnose_used(
 ) -> Result<TorqueDiagnosis> {
     let solved = solved(arm, used.recording, &used.clock, question, tell)?;
     let mut diagnosis = outcome::outcome(&solved, question, used.remarks);
-    diagnosis
-        .courses
-        .row
-        .iter_mut()
-        .for_each(|row| *row = used.origin[*row]);
+    for row in &mut diagnosis.courses.row {
+        *row = used.origin[*row];
+    }
     Ok(diagnosis)
 }
 
 fn solved<'a>(
     arm: &'a DynamicArm,
     recording: TorqueRecording,
-    clock: &clock::RecordingClock,
+    clock: &RecordingClock,
     question: &TorqueQuestion,
     tell: &mut dyn FnMut(String),
 ) -> Result<solve::SolvedTorques<'a>> {
-    if clock
-        .stretches
-        .iter()
-        .all(|stretch| stretch.len() < LEAST_STRETCH)
-    {
-        return Err(Error::data(
-            "time",
-            format!(
-                "the clock or a joint jumps in every {LEAST_STRETCH} rows: nothing can be filtered"
-            ),
-        ));
+    let mut stretches = clock.stretches.iter();
+    if stretches.all(|stretch| stretch.len() < LEAST_STRETCH) {
+        let message = format!(
+            "the clock or a joint jumps in every {LEAST_STRETCH} rows: nothing can be filtered"
+        );
+        return Err(Error::data("time", message));
     }
-    let cutoff = question
-        .cutoff
-        .unwrap_or_else(|| clock::cutoff(&recording, clock))
-        .min(HIGHEST_CUTOFF * clock.rate);
+    let by_pace = || recording::cutoff(&recording, clock);
+    let cutoff = question.cutoff.unwrap_or_else(by_pace);
+    let cutoff = cutoff.min(HIGHEST_CUTOFF * clock.rate);
     Ok(solve::solve(arm, recording, question, clock, cutoff, tell))
 }

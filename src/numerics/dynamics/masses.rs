@@ -7,9 +7,11 @@
 //! Whether inertial numbers are those of a body: mass above zero, and mass spread about its centre in every direction. That is the
 //! condition that the pseudo-inertia be positive (Wensing, Kim, Slotine, RA-L 2018).
 
-use crate::arm::{DynamicArm, INERTIAL_NUMBERS, Inertial, inertia_matrix, numbers};
-use crate::model::TorqueModel;
-use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
+use super::arm::{
+    DynamicArm, INERTIAL_NUMBERS, Inertial, add_body, inertia_matrix, numbers, steiner,
+};
+use super::model::TorqueModel;
+use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
 
 /// A link as torques show it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,11 +32,7 @@ impl TorqueModel {
         let point = |link: usize| arm.points[link].coords;
         let mut theta = self.inertials.clone();
         if let Some(payload) = &arm.payload {
-            let load = numbers(payload, &point(n - 1));
-            theta[INERTIAL_NUMBERS * (n - 1)..]
-                .iter_mut()
-                .zip(load)
-                .for_each(|(sum, value)| *sum -= value);
+            add_body(&mut theta, n - 1, -1.0, &numbers(payload, &point(n - 1)));
         }
         let mut links = Vec::with_capacity(n);
         for link in (0..n).rev() {
@@ -50,11 +48,7 @@ impl TorqueModel {
                         centre: Point3::from(point(link)),
                         inertia: Matrix3::zeros(),
                     };
-                    let ten = numbers(&there, &point(first));
-                    before[INERTIAL_NUMBERS * first..]
-                        .iter_mut()
-                        .zip(ten)
-                        .for_each(|(sum, value)| *sum -= value);
+                    add_body(before, first, -1.0, &numbers(&there, &point(first)));
                 }
             }
             let ten = &body[..INERTIAL_NUMBERS];
@@ -131,10 +125,8 @@ impl TorqueModel {
     pub(crate) fn covariance_of(&self, link: usize) -> Option<DMatrix<f64>> {
         let whole = self.is_whole(link) && !self.covariance.is_empty();
         let width = (self.covariance.len() as f64).sqrt().round() as usize;
-        let first = self.identified[..INERTIAL_NUMBERS * link]
-            .iter()
-            .filter(|known| **known)
-            .count();
+        let before = self.identified[..INERTIAL_NUMBERS * link].iter();
+        let first = before.filter(|known| **known).count();
         let entry =
             |row: usize, column: usize| self.covariance[(first + row) * width + first + column];
         whole.then(|| DMatrix::from_fn(INERTIAL_NUMBERS, INERTIAL_NUMBERS, entry))
@@ -142,21 +134,16 @@ impl TorqueModel {
 
     fn consistency_of(&self, link: usize) -> BodyConsistency {
         let ten = self.ten(link);
-        let slope = |covariance: &DMatrix<f64>| {
-            let by = |number: usize| {
+        let sigma = self.covariance_of(link).map(|covariance| {
+            let slope = DVector::from_fn(INERTIAL_NUMBERS, |number, _| {
                 let step = STEP * covariance[(number, number)].max(0.0).sqrt();
                 let mut moved = ten.to_vec();
                 moved[number] += step;
-                if step > 0.0 {
-                    (spread(&moved) - spread(ten)) / step
-                } else {
-                    0.0
+                match step > 0.0 {
+                    true => (spread(&moved) - spread(ten)) / step,
+                    false => 0.0,
                 }
-            };
-            nalgebra::DVector::from_fn(INERTIAL_NUMBERS, |number, _| by(number))
-        };
-        let sigma = self.covariance_of(link).map(|covariance| {
-            let slope = slope(&covariance);
+            });
             slope.dot(&(&covariance * &slope)).max(0.0).sqrt()
         });
         BodyConsistency {
@@ -171,16 +158,12 @@ impl TorqueModel {
 /// The body nearest to numbers with a mass, and whether it is theirs.
 pub(super) fn nearest(ten: &[f64]) -> (Inertial, bool) {
     let body = body_of(ten);
-    let moments =
-        (Matrix3::identity() * (0.5 * body.inertia.trace()) - body.inertia).symmetric_eigen();
+    let moments = second_moments(&body).symmetric_eigen();
     if moments.eigenvalues.min() >= 0.0 {
         return (body, true);
     }
-    let kept = Matrix3::from_diagonal(
-        &moments
-            .eigenvalues
-            .map(|moment| moment.max(LEAST_SPREAD * body.mass)),
-    );
+    let kept = moments.eigenvalues;
+    let kept = Matrix3::from_diagonal(&kept.map(|moment| moment.max(LEAST_SPREAD * body.mass)));
     let spread = moments.eigenvectors * kept * moments.eigenvectors.transpose();
     (
         Inertial {
@@ -193,25 +176,25 @@ pub(super) fn nearest(ten: &[f64]) -> (Inertial, bool) {
 
 /// Least second moment of mass about the centre.
 fn spread(ten: &[f64]) -> f64 {
-    let about = body_of(ten).inertia;
-    let moments = Matrix3::identity() * (0.5 * about.trace()) - about;
-    moments.symmetric_eigenvalues().min()
+    second_moments(&body_of(ten)).symmetric_eigenvalues().min()
+}
+
+/// Second moments of mass about the centre.
+fn second_moments(body: &Inertial) -> Matrix3<f64> {
+    Matrix3::identity() * (0.5 * body.inertia.trace()) - body.inertia
 }
 
 /// Mass, centre from the joint's point and inertia about the centre.
 fn body_of(ten: &[f64]) -> Inertial {
-    let mass = if ten[0].abs() < LIGHTEST {
-        LIGHTEST
-    } else {
-        ten[0]
+    let mass = match ten[0].abs() < LIGHTEST {
+        true => LIGHTEST,
+        false => ten[0],
     };
     let arm = Vector3::new(ten[1], ten[2], ten[3]) / mass;
-    let about_point = inertia_matrix(&ten[4..]);
-    let steiner = (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass;
     Inertial {
         mass,
         centre: Point3::from(arm),
-        inertia: about_point - steiner,
+        inertia: inertia_matrix(&ten[4..]) - steiner(mass, &arm),
     }
 }
 
@@ -221,8 +204,78 @@ pub fn inertial_numbers(body: &Inertial) -> [f64; INERTIAL_NUMBERS] {
 }
 
 #[cfg(test)]
-mod consistency_tests {
+mod tests {
+    use super::super::arm::DeclaredInertials;
+    use super::super::cases::arm;
+    use super::super::model::JointRange;
+    use super::super::newton_euler::at_rest;
     use super::*;
+
+    fn model(inertials: Vec<f64>, identified: Vec<bool>) -> TorqueModel {
+        TorqueModel {
+            range: vec![JointRange::default(); inertials.len() / 10],
+            inertials,
+            identified,
+            ..TorqueModel::default()
+        }
+    }
+
+    /// Gravity's torques with the arm's own payload.
+    fn gravity(arm: &DynamicArm, links: &[Inertial], position: &[f64]) -> Vec<f64> {
+        at_rest(arm, &DeclaredInertials::of(arm, links).theta)(position)
+    }
+
+    #[test]
+    fn links_of_base_parameters_keep_their_masses_and_have_the_gravity_of_the_arm() {
+        let arm = arm();
+        let bodies = arm.links.clone().expect("links");
+        let mut theta = DeclaredInertials::of(&arm, &bodies).theta;
+        // Base parameters: no link has a mass of its own, the links before carry what the masses did at their joints.
+        for link in (1..4).rev() {
+            let point = Inertial {
+                mass: theta[10 * link],
+                centre: arm.points[link],
+                inertia: Matrix3::zeros(),
+            };
+            let ten = numbers(&point, &arm.points[link - 1].coords);
+            add_body(&mut theta, link - 1, 1.0, &ten);
+            theta[10 * link] = 0.0;
+        }
+        let links = model(theta, vec![false; 40]).links(&arm, &[15.0, 9.0, 7.0, 1.0]);
+        assert_eq!(
+            links.iter().map(|link| link.mass).collect::<Vec<_>>(),
+            [15.0, 9.0, 7.0, 1.0]
+        );
+        let found = links.iter().map(|link| Inertial {
+            mass: link.mass,
+            centre: link.centre,
+            inertia: Matrix3::zeros(),
+        });
+        let found: Vec<Inertial> = found.collect();
+        for position in [[0.0; 4], [0.3, -0.7, 1.1, 0.4], [-1.0, 0.9, -0.5, 2.0]] {
+            let [estimated, truth] =
+                [&found, &bodies].map(|bodies| gravity(&arm, bodies, &position));
+            let mut pairs = estimated.iter().zip(&truth);
+            assert!(
+                pairs.all(|(a, b)| (a - b).abs() < 1e-10),
+                "{estimated:?} {truth:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn links_that_are_identified_whole_are_told_as_they_are_without_the_payload() {
+        let arm = arm();
+        let bodies = arm.links.clone().expect("links");
+        let theta = DeclaredInertials::of(&arm, &bodies).theta;
+        let links = model(theta, vec![true; 40]).links(&arm, &[1.0; 4]);
+        for (link, body) in links.iter().zip(&bodies) {
+            assert!(
+                (link.mass - body.mass).abs() < 1e-12 && (link.centre - body.centre).norm() < 1e-12
+            );
+            assert!((link.inertia.expect("whole") - body.inertia).norm() < 1e-10);
+        }
+    }
 
     #[test]
     fn numbers_of_no_body_become_those_of_the_nearest_with_the_same_mass_and_centre() {
@@ -276,112 +329,5 @@ mod consistency_tests {
         // More about z than about x and y together: no mass is spread so.
         ten[9] += 0.02;
         assert!(spread(&ten) < 0.0);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::arm::DeclaredInertials;
-    use super::super::cases::arm;
-    use super::super::model::JointRange;
-    use super::super::newton_euler::{InverseDynamics, MotionRow};
-    use super::*;
-
-    fn model(inertials: Vec<f64>, identified: Vec<bool>) -> TorqueModel {
-        let seen = JointRange {
-            position: [-1.0, 1.0],
-            speed: 1.0,
-            acceleration: 1.0,
-            load: 1.0,
-            misfit: 0.0,
-            usual: 0.0,
-            sign_width: 0.01,
-        };
-        TorqueModel {
-            range: vec![seen; inertials.len() / 10],
-            inertials,
-            identified,
-            terms: Vec::new(),
-            covariance: Vec::new(),
-            sign_width: 0.01,
-            friction_lead: 0.0,
-            latency: 0.0,
-            cutoff: 10.0,
-            temperature: None,
-        }
-    }
-
-    /// Gravity's torques with the arm's own payload.
-    fn gravity(arm: &DynamicArm, links: &[Inertial], position: &[f64]) -> Vec<f64> {
-        let theta = DeclaredInertials::of(arm, links).theta;
-        let (still, mut torque) = (vec![0.0; position.len()], vec![0.0; position.len()]);
-        let motion = MotionRow {
-            position,
-            velocity: &still,
-            acceleration: &still,
-        };
-        InverseDynamics::new(arm).torque(motion, &arm.gravity, &theta, &mut torque);
-        torque
-    }
-
-    #[test]
-    fn links_of_base_parameters_keep_their_masses_and_have_the_gravity_of_the_arm() {
-        let arm = arm();
-        let bodies = arm.links.clone().expect("links");
-        let mut theta = DeclaredInertials::of(&arm, &bodies).theta;
-        // Base parameters: no link has a mass of its own, the links before carry what the masses did at their joints.
-        for link in (1..4).rev() {
-            let point = Inertial {
-                mass: theta[10 * link],
-                centre: arm.points[link],
-                inertia: Matrix3::zeros(),
-            };
-            let ten = numbers(&point, &arm.points[link - 1].coords);
-            theta[10 * link - 10..10 * link]
-                .iter_mut()
-                .zip(ten)
-                .for_each(|(sum, value)| *sum += value);
-            theta[10 * link] = 0.0;
-        }
-        let links = model(theta, vec![false; 40]).links(&arm, &[15.0, 9.0, 7.0, 1.0]);
-        assert_eq!(
-            links.iter().map(|link| link.mass).collect::<Vec<_>>(),
-            [15.0, 9.0, 7.0, 1.0]
-        );
-        let found: Vec<Inertial> = links
-            .iter()
-            .map(|link| Inertial {
-                mass: link.mass,
-                centre: link.centre,
-                inertia: Matrix3::zeros(),
-            })
-            .collect();
-        for position in [[0.0; 4], [0.3, -0.7, 1.1, 0.4], [-1.0, 0.9, -0.5, 2.0]] {
-            let (estimated, truth) = (
-                gravity(&arm, &found, &position),
-                gravity(&arm, &bodies, &position),
-            );
-            assert!(
-                estimated
-                    .iter()
-                    .zip(&truth)
-                    .all(|(a, b)| (a - b).abs() < 1e-10),
-                "{estimated:?} {truth:?}"
-            );
-        }
-    }
-
-    #[test]
-    fn links_that_are_identified_whole_are_told_as_they_are_without_the_payload() {
-        let arm = arm();
-        let bodies = arm.links.clone().expect("links");
-        let theta = DeclaredInertials::of(&arm, &bodies).theta;
-        let links = model(theta, vec![true; 40]).links(&arm, &[1.0; 4]);
-        for (link, body) in links.iter().zip(&bodies) {
-            assert!(
-                (link.mass - body.mass).abs() < 1e-12 && (link.centre - body.centre).norm() < 1e-12
-            );
-            assert!((link.inertia.expect("whole") - body.inertia).norm() < 1e-10);
-        }
     }
 }

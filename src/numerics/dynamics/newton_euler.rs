@@ -20,7 +20,7 @@ pub struct MotionRow<'a> {
 }
 
 /// A link in its own frame: how it turns, and how its joint's point accelerates (gravity included).
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct LinkMotion {
     /// From the link's frame into that of the link before.
     rotation: Matrix3<f64>,
@@ -41,7 +41,7 @@ pub struct InverseDynamics {
 }
 
 /// A force and a moment per inertial number.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Wrench {
     force: Vector3<f64>,
     moment: Vector3<f64>,
@@ -50,27 +50,16 @@ struct Wrench {
 impl InverseDynamics {
     /// The inverse dynamics by an arm's axes and points.
     pub fn new(arm: &DynamicArm) -> Self {
-        let still = LinkMotion {
-            rotation: Matrix3::identity(),
-            arm: Vector3::zeros(),
-            spin: Vector3::zeros(),
-            spin_change: Vector3::zeros(),
-            acceleration: Vector3::zeros(),
-        };
-        let before = |joint: usize| {
-            if joint == 0 {
-                Vector3::zeros()
-            } else {
-                arm.points[joint - 1].coords
-            }
-        };
+        let points = arm.points.iter().map(|point| point.coords);
+        let before = std::iter::once(Vector3::zeros()).chain(points.clone());
         Self {
             axes: arm.axes.clone(),
-            steps: (0..arm.joints())
-                .map(|joint| arm.points[joint].coords - before(joint))
+            steps: points
+                .zip(before)
+                .map(|(point, before)| point - before)
                 .collect(),
             prismatic: arm.prismatic.clone(),
-            links: vec![still; arm.joints()],
+            links: vec![LinkMotion::default(); arm.joints()],
         }
     }
 
@@ -91,10 +80,9 @@ impl InverseDynamics {
                 motion.acceleration[joint],
             );
             let slides = self.prismatic[joint];
-            let rotation = if slides {
-                Matrix3::identity()
-            } else {
-                turn(&axis, q)
+            let rotation = match slides {
+                true => Matrix3::identity(),
+                false => turn(&axis, q),
             };
             let arm = self.steps[joint] + if slides { axis * q } else { Vector3::zeros() };
             acceleration += spin_change.cross(&arm) + spin.cross(&spin.cross(&arm));
@@ -131,12 +119,9 @@ impl InverseDynamics {
             let mut wrenches = unit_wrenches(&self.links[link]);
             for joint in (0..=link).rev() {
                 let axis = &self.axes[joint];
-                let torque = |wrench: &Wrench| {
-                    if self.prismatic[joint] {
-                        axis.dot(&wrench.force)
-                    } else {
-                        axis.dot(&wrench.moment)
-                    }
+                let torque = |wrench: &Wrench| match self.prismatic[joint] {
+                    true => axis.dot(&wrench.force),
+                    false => axis.dot(&wrench.moment),
                 };
                 write(joint, link, &wrenches.each_ref().map(torque));
                 let LinkMotion { rotation, arm, .. } = &self.links[joint];
@@ -160,10 +145,7 @@ impl InverseDynamics {
         let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
         for joint in (0..self.joints()).rev() {
             let link = &self.links[joint];
-            let wrench = wrench_of(
-                link,
-                &theta[INERTIAL_NUMBERS * joint..INERTIAL_NUMBERS * (joint + 1)],
-            );
+            let wrench = wrench_of(link, &theta[INERTIAL_NUMBERS * joint..][..INERTIAL_NUMBERS]);
             force += wrench.force;
             moment += wrench.moment;
             torque[joint] = self.axes[joint].dot(if self.prismatic[joint] {
@@ -177,6 +159,21 @@ impl InverseDynamics {
     }
 }
 
+/// Torques of an arm with inertial numbers that stands still at some positions.
+pub(super) fn at_rest(arm: &DynamicArm, theta: &[f64]) -> impl FnMut(&[f64]) -> Vec<f64> {
+    let (mut dynamics, still) = (InverseDynamics::new(arm), vec![0.0; arm.joints()]);
+    move |position| {
+        let motion = MotionRow {
+            position,
+            velocity: &still,
+            acceleration: &still,
+        };
+        let mut torque = still.clone();
+        dynamics.torque(motion, &arm.gravity, theta, &mut torque);
+        torque
+    }
+}
+
 /// A turn about an axis.
 pub(crate) fn turn(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
     Pose::from_rotation_vector(axis * angle, Vector3::zeros()).rotation
@@ -185,11 +182,7 @@ pub(crate) fn turn(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
 /// What each inertial number asks of the joint's point for the motion of its link.
 fn unit_wrenches(link: &LinkMotion) -> [Wrench; INERTIAL_NUMBERS] {
     let (w, dw, a) = (&link.spin, &link.spin_change, &link.acceleration);
-    let none = Wrench {
-        force: Vector3::zeros(),
-        moment: Vector3::zeros(),
-    };
-    let mut all = [none; INERTIAL_NUMBERS];
+    let mut all = [Wrench::default(); INERTIAL_NUMBERS];
     all[0].force = *a;
     for axis in 0..3 {
         let unit = Vector3::ith(axis, 1.0);
@@ -223,14 +216,13 @@ fn wrench_of(link: &LinkMotion, theta: &[f64]) -> Wrench {
 
 #[cfg(test)]
 mod tests {
-    use super::super::arm::numbers;
-    use super::super::arm::{Inertial, InertialTolerance};
+    use super::super::arm::{Inertial, numbers};
+    use super::super::cases::bare_arm;
     use super::*;
     use nalgebra::{Point3, Rotation3};
 
     /// An arm of links whose numbers have nothing in common; the third joint slides.
     fn arm() -> (DynamicArm, Vec<Inertial>) {
-        let axis = |x: f64, y: f64, z: f64| Vector3::new(x, y, z).normalize();
         let body = |mass: f64, at: [f64; 3], six: [f64; 6]| Inertial {
             mass,
             centre: Point3::from(at),
@@ -242,33 +234,23 @@ mod tests {
             body(3.0, [0.7, 0.0, 0.6], [0.05, 0.01, 0.0, 0.06, -0.01, 0.04]),
             body(2.0, [0.9, 0.1, 0.7], [0.02, 0.0, 0.005, 0.03, 0.002, 0.01]),
         ];
+        let axes = [
+            [0.1, 0.2, 1.0],
+            [0.3, -1.0, 0.1],
+            [1.0, 0.2, 0.0],
+            [0.2, 1.0, 0.5],
+        ];
+        let points = [
+            [0.0, 0.0, 0.1],
+            [0.2, 0.0, 0.4],
+            [0.5, 0.1, 0.6],
+            [0.8, 0.0, 0.6],
+        ];
         let arm = DynamicArm {
-            axes: vec![
-                axis(0.1, 0.2, 1.0),
-                axis(0.3, -1.0, 0.1),
-                axis(1.0, 0.2, 0.0),
-                axis(0.2, 1.0, 0.5),
-            ],
-            points: [
-                [0.0, 0.0, 0.1],
-                [0.2, 0.0, 0.4],
-                [0.5, 0.1, 0.6],
-                [0.8, 0.0, 0.6],
-            ]
-            .map(Point3::from)
-            .to_vec(),
             prismatic: vec![false, false, true, false],
-            tool: Point3::new(1.0, 0.1, 0.8),
             links: Some(links.clone()),
-            payload: None,
             gravity: Vector3::new(1.0, -2.0, -9.0),
-            ratio: vec![100.0; 4],
-            coupled: Vec::new(),
-            tolerance: InertialTolerance {
-                mass_relative: 0.01,
-                centre: 0.001,
-                inertia_relative: 0.05,
-            },
+            ..bare_arm(axes, points, [1.0, 0.1, 0.8])
         };
         (arm, links)
     }
@@ -299,12 +281,8 @@ mod tests {
     fn lagrangian(arm: &DynamicArm, links: &[Inertial], q: &[f64], dq: &[f64]) -> f64 {
         const STEP: f64 = 1e-5;
         let at = |sign: f64| {
-            let moved: Vec<f64> = q
-                .iter()
-                .zip(dq)
-                .map(|(q, dq)| q + sign * STEP * dq)
-                .collect();
-            placed(arm, links, &moved)
+            let moved = q.iter().zip(dq).map(|(q, dq)| q + sign * STEP * dq);
+            placed(arm, links, &moved.collect::<Vec<f64>>())
         };
         let (here, before, after) = (placed(arm, links, q), at(-1.0), at(1.0));
         (0..q.len())

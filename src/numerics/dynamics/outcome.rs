@@ -1,23 +1,23 @@
 //! The answer to a diagnosis of torques, from what was solved.
 
 use super::arm::{INERTIAL_NAMES, INERTIAL_NUMBERS, inertial_unit};
-use super::cause::TorqueParameter;
-use super::choice::CauseChoice;
+use super::cause::{FittedNumber, plain};
+use super::cells::CauseChoice;
 use super::enforce::with_bodies;
-use super::findings::{contact, findings, plain_finding};
-use super::model::TorqueModel;
+use super::findings::{FittedSet, contact, plain_finding, sigma_of};
+use super::latency::Latency;
 use super::problem::TorqueProblem;
-use super::scene::{ends, largest};
+use super::recording::{ends, largest};
 use super::solve::SolvedTorques;
-use super::sweep::SweptColumns;
 use super::types::{
     EnforcedBodies, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors,
     TorqueFinding, TorqueLeftover, TorqueNoise, TorqueQuestion,
 };
+use super::weighted::{JointNoise, NoiseMemory};
 use crate::diagnose::VerdictKind;
 use crate::effect::Place;
 use crate::error::counted;
-use crate::weighted::{JointNoise, NoiseMemory};
+use crate::statistics::quantile;
 
 /// Times the noise beyond which held-out rows are not explained.
 const UNEXPLAINED: f64 = 1.5;
@@ -32,64 +32,32 @@ pub(super) fn outcome(
 ) -> TorqueDiagnosis {
     let problem = &solved.problem;
     let choice = CauseChoice::new(problem, &solved.weighted);
-    let set = &solved.set;
-    let sweep = choice.base.with(set);
-    let free = sweep.solution();
-    let uncertain = solved.slopes.with_slopes(&sweep);
-    let bodies = if question.enforce_bodies {
-        with_bodies(problem, set, &sweep, &free)
-    } else {
-        None
+    let fit = FittedSet::of(&choice, &solved.set, &solved.slopes);
+    let bodies = question.enforce_bodies.then(|| with_bodies(&fit)).flatten();
+    let (solution, enforced) = match bodies {
+        Some((solution, enforced)) => (solution, Some(enforced)),
+        None => (fit.solution.clone(), None),
     };
-    let (solution, enforced) = bodies.map_or_else(
-        || (free.clone(), None),
-        |(solution, enforced)| (solution, Some(enforced)),
-    );
     // As the arm is simulated today: as declared, else with identified masses alone.
-    let today = if problem.scene.declared.is_some() {
-        Vec::new()
-    } else {
-        choice.base.solution()
+    let today = match problem.scene.declared {
+        Some(_) => Vec::new(),
+        None => choice.base.solution(),
     };
     let (first, last) = (problem.residual(&today), problem.residual(&solution));
-    let counted_rows = |held_out: bool| {
-        problem
-            .runs(held_out)
-            .into_iter()
-            .flatten()
-            .collect::<Vec<usize>>()
-    };
-    let held = counted_rows(true);
-    let judging = if held.is_empty() {
-        counted_rows(false)
-    } else {
-        held.clone()
-    };
-    let (before, after) = (
-        errors(problem, &first, &judging),
-        errors(problem, &last, &judging),
-    );
+    let (held, judging) = (problem.counted_rows(true), problem.judging_rows());
+    let [before, after] = [&first, &last].map(|residual| errors(problem, residual, &judging));
     if let Some(enforced) = &enforced {
-        remarks.push(bodies_remark(
-            enforced,
-            &errors(problem, &problem.residual(&free), &judging),
-            &after,
-        ));
+        let free = errors(problem, &problem.residual(&fit.solution), &judging);
+        remarks.push(bodies_remark(enforced, &free, &after));
     }
-    let mut found = findings(
-        &choice,
-        (set, &solved.silent),
-        &held,
-        (&uncertain, &solved.slopes),
-    );
+    remarks.push(filters_remark(problem));
+    let mut found = fit.findings(&solved.silent, &held);
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
     let leftover = leftover(problem, &last);
-    let over = after
-        .rms
-        .iter()
-        .zip(&problem.noise)
+    let over = after.rms.iter().zip(&problem.noise);
+    let over = over
         .map(|(rms, noise)| rms / noise.sigma)
         .fold(0.0, f64::max);
     let verdict = match over > UNEXPLAINED {
@@ -97,37 +65,31 @@ pub(super) fn outcome(
         false if found.is_empty() => VerdictKind::NothingMissing,
         false => VerdictKind::Explained,
     };
-    let model = TorqueModel::of(&choice, set, (&uncertain, &solved.slopes), &solution);
+    let noise = |noise: &JointNoise| TorqueNoise {
+        sigma: noise.sigma,
+        autocorrelation: noise.autocorrelation(),
+    };
+    let model = fit.model(&solution);
     TorqueDiagnosis {
         verdict,
         statement: statement(verdict, &found, [before.nrmse_mean, after.nrmse_mean], over),
-        remarks: remarks
-            .into_iter()
-            .chain([filters_remark(problem)])
-            .collect(),
+        remarks,
         basis: match problem.scene.declared {
             Some(_) => InertialBasis::Declared,
             None => InertialBasis::Free(problem.all.base),
         },
         cutoff: problem.reduction.cutoff,
         rate: problem.reduction.rate,
-        noise: problem
-            .noise
-            .iter()
-            .map(|n| TorqueNoise {
-                sigma: n.sigma,
-                autocorrelation: n.autocorrelation(),
-            })
-            .collect(),
+        noise: problem.noise.iter().map(noise).collect(),
         before,
         after,
         held_out: !held.is_empty(),
         findings: found,
-        not_observable: not_observable(&choice, set, &sweep),
+        not_observable: not_observable(&fit),
         leftover,
         events: problem.events.clone(),
         courses: courses(problem, &first, &last),
-        inertials: inertials(problem, set, &uncertain, &solution),
+        inertials: inertials(&fit, &solution),
         friction: model.friction_curves().unwrap_or_default(),
         model,
         enforced,
@@ -136,11 +98,8 @@ pub(super) fn outcome(
 
 /// What it costs that links are bodies.
 fn bodies_remark(enforced: &EnforcedBodies, before: &TorqueErrors, after: &TorqueErrors) -> String {
-    let links: Vec<String> = enforced
-        .links
-        .iter()
-        .map(|link| (link + 1).to_string())
-        .collect();
+    let links = enforced.links.iter().map(|link| (link + 1).to_string());
+    let links: Vec<String> = links.collect();
     format!(
         "no body has the numbers of link {}: all links are bodies now, at the price of {:.1} of the whitened squared residual; mean NRMSE of \
          judged rows {:.4} before, {:.4} after; sigmas are those of before",
@@ -165,24 +124,12 @@ fn filters_remark(problem: &TorqueProblem) -> String {
     )
 }
 
-fn late(latency: &super::latency::Latency) -> TorqueFinding {
-    let milliseconds = 1e3 * latency.seconds;
-    let parameter = TorqueParameter {
-        name: "latency".into(),
-        value: milliseconds,
-        unit: "ms",
-        sigma: Some(1e3 * latency.sigma),
-    };
-    let statement =
-        format!("torques come {milliseconds:.1} ms later than the positions of their rows");
-    plain_finding(
-        super::LATENCY,
-        Place::Recording,
-        statement,
-        vec![parameter],
-        latency.gain,
-        1.0,
-    )
+fn late(latency: &Latency) -> TorqueFinding {
+    let [value, sigma] = [latency.seconds, latency.sigma].map(|seconds| 1e3 * seconds);
+    let parameter = plain("latency", FittedNumber { value, sigma }, "ms");
+    let statement = format!("torques come {value:.1} ms later than the positions of their rows");
+    let (name, place) = (super::LATENCY, Place::Recording);
+    plain_finding(name, place, statement, vec![parameter], latency.gain, 1.0)
 }
 
 fn statement(verdict: VerdictKind, found: &[TorqueFinding], nrmse: [f64; 2], over: f64) -> String {
@@ -190,20 +137,15 @@ fn statement(verdict: VerdictKind, found: &[TorqueFinding], nrmse: [f64; 2], ove
         "mean NRMSE of judged rows {:.3} before, {:.3} after",
         nrmse[0], nrmse[1]
     );
+    let findings = counted(found.len(), "finding");
     match verdict {
         VerdictKind::NothingMissing => {
             format!("the rigid arm explains the torques down to their noise ({falls})")
         }
         VerdictKind::Explained => {
-            format!(
-                "with {} the torques are explained down to their noise ({falls})",
-                counted(found.len(), "finding")
-            )
+            format!("with {findings} the torques are explained down to their noise ({falls})")
         }
-        _ => format!(
-            "with {} up to {over:.1} times the noise is left ({falls})",
-            counted(found.len(), "finding")
-        ),
+        _ => format!("with {findings} up to {over:.1} times the noise is left ({falls})"),
     }
 }
 
@@ -225,68 +167,54 @@ fn leftover(problem: &TorqueProblem, residual: &[Vec<f64>]) -> Vec<TorqueLeftove
 }
 
 fn courses(problem: &TorqueProblem, first: &[Vec<f64>], last: &[Vec<f64>]) -> TorqueCourses {
-    let (n, rows) = (problem.joints(), problem.reduction.rows.len());
-    let torque: Vec<Vec<f64>> = (0..n)
-        .map(|joint| problem.torque_at(joint, problem.latency))
-        .collect();
-    let each = |value: &dyn Fn(usize, usize) -> f64| {
-        (0..rows)
-            .flat_map(|row| (0..n).map(move |joint| value(joint, row)))
-            .collect::<Vec<f64>>()
+    fn each<T>([rows, n]: [usize; 2], value: impl Fn(usize, usize) -> T) -> Vec<T> {
+        (0..rows * n).map(|k| value(k % n, k / n)).collect()
+    }
+    let (n, judged) = (problem.joints(), &problem.reduction.rows);
+    let (rows, scene) = (judged.len(), &problem.scene);
+    let torque = (0..n).map(|joint| problem.torque_at(joint, problem.latency));
+    let torque: Vec<Vec<f64>> = torque.collect();
+    let less = |left: &[Vec<f64>]| {
+        each([rows, n], |joint, row| {
+            torque[joint][row] - left[joint][row]
+        })
     };
+    let time = judged.iter().map(|row| problem.start + scene.time[*row]);
     TorqueCourses {
-        row: problem.reduction.rows.clone(),
-        time: problem
-            .reduction
-            .rows
-            .iter()
-            .map(|row| problem.start + problem.scene.time[*row])
-            .collect(),
+        row: judged.clone(),
+        time: time.collect(),
         held_out: (0..rows).map(|row| problem.is_held_out(row)).collect(),
         in_event: (0..rows).map(|row| problem.in_event(row)).collect(),
-        at_rest: (0..rows)
-            .flat_map(|row| (0..n).map(move |joint| rests(problem, joint, row)))
-            .collect(),
-        velocity: each(&|joint, row| problem.scene.velocity[joint][problem.reduction.rows[row]]),
-        measured: each(&|joint, row| torque[joint][row]),
-        simulated: each(&|joint, row| torque[joint][row] - first[joint][row]),
-        corrected: each(&|joint, row| torque[joint][row] - last[joint][row]),
+        at_rest: each([rows, n], |joint, row| rests(problem, joint, row)),
+        velocity: each([rows, n], |joint, row| scene.velocity[joint][judged[row]]),
+        measured: each([rows, n], |joint, row| torque[joint][row]),
+        simulated: less(first),
+        corrected: less(last),
     }
 }
 
-fn inertials(
-    problem: &TorqueProblem,
-    set: &[usize],
-    sweep: &SweptColumns,
-    solution: &[(usize, f64)],
-) -> Vec<InertialEstimate> {
-    let theta = problem.inertials(set, solution);
+fn inertials(fit: &FittedSet, solution: &[(usize, f64)]) -> Vec<InertialEstimate> {
+    let problem = fit.choice.problem;
+    let theta = problem.inertials(fit.set, solution);
     let mut estimates = Vec::new();
     for link in 0..problem.joints() {
-        let changes = problem.inertial_changes(set, link);
+        let changes = problem.inertial_changes(fit.set, link);
         let columns: Vec<usize> = changes.iter().map(|(column, _)| *column).collect();
-        let covariance = sweep.covariance(&columns);
-        for number in 0..INERTIAL_NUMBERS {
+        let covariance = fit.uncertain.covariance(&columns);
+        for (number, quantity) in INERTIAL_NAMES.into_iter().enumerate() {
             let along: Vec<f64> = changes.iter().map(|(_, ten)| ten[number]).collect();
-            let declared = problem
-                .scene
-                .declared
-                .as_ref()
-                .map(|all| all.theta[INERTIAL_NUMBERS * link + number]);
+            let at = INERTIAL_NUMBERS * link + number;
+            let declared = problem.scene.declared.as_ref().map(|all| all.theta[at]);
             if declared.is_none() && along.iter().all(|share| *share == 0.0) {
                 continue;
             }
-            let count = along.len();
-            let variance: f64 = (0..count * count)
-                .map(|entry| along[entry / count] * along[entry % count] * covariance[entry])
-                .sum();
             estimates.push(InertialEstimate {
                 link,
-                quantity: INERTIAL_NAMES[number],
+                quantity,
                 unit: inertial_unit(number),
-                value: theta[INERTIAL_NUMBERS * link + number],
+                value: theta[at],
                 declared,
-                sigma: variance.max(0.0).sqrt(),
+                sigma: sigma_of(&along, &covariance),
             });
         }
     }
@@ -299,42 +227,33 @@ fn inertials(
 const REST: f64 = 2.0;
 
 /// Whether a joint rests in a judged row.
-pub(super) fn rests(problem: &TorqueProblem, joint: usize, row: usize) -> bool {
+fn rests(problem: &TorqueProblem, joint: usize, row: usize) -> bool {
     problem.scene.velocity[joint][problem.reduction.rows[row]].abs()
         < REST * problem.scene.width_at(joint)
 }
 
 /// Errors by a residual (`[joint][judged row]`, Nm) in some rows.
-pub(super) fn errors(
-    problem: &TorqueProblem,
-    residual: &[Vec<f64>],
-    rows: &[usize],
-) -> TorqueErrors {
-    let n = problem.joints();
+fn errors(problem: &TorqueProblem, residual: &[Vec<f64>], rows: &[usize]) -> TorqueErrors {
+    let joints = || 0..problem.joints();
     let rms = |joint: usize, counts: &dyn Fn(usize) -> bool| {
-        let squares: Vec<f64> = rows
-            .iter()
-            .filter(|row| counts(**row))
-            .map(|row| residual[joint][*row].powi(2))
-            .collect();
+        let counted = rows.iter().filter(|row| counts(**row));
+        let squares: Vec<f64> = counted.map(|row| residual[joint][*row].powi(2)).collect();
         (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
     };
-    let all: Vec<f64> = (0..n)
-        .map(|joint| rms(joint, &|_| true).unwrap_or(0.0))
-        .collect();
-    let nrmse: Vec<f64> = (0..n)
-        .map(|joint| all[joint] / spread(problem, joint, rows))
-        .collect();
+    let all = joints().map(|joint| rms(joint, &|_| true).unwrap_or(0.0));
+    let all: Vec<f64> = all.collect();
+    let nrmse = joints().map(|joint| all[joint] / spread(problem, joint, rows));
+    let nrmse: Vec<f64> = nrmse.collect();
+    let of_rows = |rest: bool| {
+        let of_joint = |joint| rms(joint, &|row| rests(problem, joint, row) == rest);
+        joints().map(of_joint).collect()
+    };
     TorqueErrors {
-        nrmse_mean: nrmse.iter().sum::<f64>() / n as f64,
+        nrmse_mean: nrmse.iter().sum::<f64>() / joints().len() as f64,
         nrmse,
         rms: all,
-        rms_moving: (0..n)
-            .map(|joint| rms(joint, &|row| !rests(problem, joint, row)))
-            .collect(),
-        rms_rest: (0..n)
-            .map(|joint| rms(joint, &|row| rests(problem, joint, row)))
-            .collect(),
+        rms_moving: of_rows(false),
+        rms_rest: of_rows(true),
     }
 }
 
@@ -343,13 +262,8 @@ fn spread(problem: &TorqueProblem, joint: usize, rows: &[usize]) -> f64 {
     let torque = problem.torque_at(joint, problem.latency);
     let count = rows.len().max(1) as f64;
     let mean = rows.iter().map(|row| torque[*row]).sum::<f64>() / count;
-    (rows
-        .iter()
-        .map(|row| (torque[*row] - mean).powi(2))
-        .sum::<f64>()
-        / count)
-        .sqrt()
-        .max(f64::MIN_POSITIVE)
+    let squares = rows.iter().map(|row| (torque[*row] - mean).powi(2));
+    (squares.sum::<f64>() / count).sqrt().max(f64::MIN_POSITIVE)
 }
 
 // What these data cannot show, a sentence each.
@@ -360,11 +274,8 @@ const SMALL_RANGE: f64 = 0.2;
 const UNSEEN: f64 = 0.5;
 
 /// Sentences on a set's problem.
-pub(super) fn not_observable(
-    choice: &CauseChoice,
-    set: &[usize],
-    sweep: &SweptColumns,
-) -> Vec<String> {
+fn not_observable(fit: &FittedSet) -> Vec<String> {
+    let choice = fit.choice;
     let scene = &choice.problem.scene;
     let mut sentences = Vec::new();
     if scene.declared.is_none() {
@@ -388,10 +299,8 @@ pub(super) fn not_observable(
     }
     for number in 0..choice.open {
         let form = choice.form(number);
-        let found = set
-            .iter()
-            .any(|other| choice.form(*other).is_called_as(form));
-        if !found && form.width == 1 && form.cause.inertial && is_unseen(choice, sweep, number) {
+        let found = choice.has(fit.set, |other| other.is_called_as(form));
+        if !found && form.width == 1 && form.cause.inertial && is_unseen(fit, number) {
             sentences.push(format!(
                 "{} {}: these motions do not show it",
                 form.place,
@@ -404,27 +313,21 @@ pub(super) fn not_observable(
 
 /// Speeds below and above which a tenth of the moving rows are.
 fn speeds(velocity: &[f64], width: f64) -> (f64, f64) {
-    let mut moving: Vec<f64> = velocity
-        .iter()
-        .map(|value| value.abs())
-        .filter(|speed| *speed > 2.0 * width)
-        .collect();
+    let speeds = velocity.iter().map(|value| value.abs());
+    let mut moving: Vec<f64> = speeds.filter(|speed| *speed > 2.0 * width).collect();
     moving.sort_by(f64::total_cmp);
-    let at = |share: f64| crate::statistics::quantile(&moving, share).unwrap_or(0.0);
+    let at = |share: f64| quantile(&moving, share).unwrap_or(0.0);
     (at(0.1), at(0.9))
 }
 
 /// Whether a form as large as a good part of the joint's torque would not be noticed.
-fn is_unseen(choice: &CauseChoice, sweep: &SweptColumns, number: usize) -> bool {
-    let problem = choice.problem;
-    let column = &problem.all.columns[problem.all.of(number).start];
+fn is_unseen(fit: &FittedSet, number: usize) -> bool {
+    let problem = fit.choice.problem;
+    let place = problem.all.of(number).start;
+    let column = &problem.all.columns[place];
     let size = largest(column.courses.iter().flatten());
     let measured = column.joints.iter().map(|joint| &problem.measured[*joint]);
     let torque = largest(measured.flatten());
-    let mut with = sweep.clone();
-    with.add(number);
-    let sigma = with.covariance(&[problem.all.of(number).start])[0]
-        .max(0.0)
-        .sqrt();
+    let sigma = fit.sweep.with(&[number]).sigma(place);
     sigma == 0.0 || sigma * size > UNSEEN * torque
 }

@@ -1,17 +1,21 @@
 //! A recording prepared for least squares: measured and rigid torque, base and forms in judged rows, and which of these count.
+//!
+//! Noise and its autocorrelation are taken from what a rich model leaves: the base and every smooth named form once, whether it acts or not.
+//! Taken from the present model it would be full of the very torque that is looked for.
 
 use super::arm::{DynamicArm, INERTIAL_NUMBERS};
-use super::cause::{TorqueForm, friction_of};
-use super::clock::{RecordingClock, column};
-use super::columns::TorqueColumns;
-use super::reduce::{ReducedRegressor, Reduction};
-use super::scene::{DynamicScene, ends};
-use super::sweep::value_of;
+use super::cause::{
+    COULOMB, OFFSET, ROTOR, TORQUE_CAUSES, TorqueCause, TorqueForm, VISCOUS, friction_of,
+};
+use super::columns::{ReducedRegressor, Reduction, TorqueColumn, TorqueColumns, columns_of};
+use super::recording::{RecordingClock, TorqueRecording, add, by_joint, ends, lagrange};
+use super::scene::DynamicScene;
+use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueQuestion};
-use super::weighted::{Weighing, WeightedColumns};
+use super::weighted::{JointNoise, NoiseMemory, Weighing, WeightedColumns};
+use crate::criteria::cells::FAR;
 use crate::effect::Place;
-use crate::types::TorqueRecording;
-use crate::weighted::JointNoise;
+use crate::statistics::nearest;
 use std::ops::Range;
 
 /// s around an event whose rows do not count either.
@@ -58,25 +62,18 @@ impl<'a> TorqueProblem<'a> {
         let scene = DynamicScene::new(arm, &recording, clock, cutoff, question.free_inertials);
         let reduction = Reduction::new(clock, cutoff);
         let regressor = ReducedRegressor::of(&scene, &reduction);
-        let mut torque: Vec<Vec<f64>> = (0..recording.joints)
-            .map(|joint| column(&recording.torque, recording.joints, joint))
-            .collect();
+        let mut torque = by_joint(&recording.torque, recording.joints);
         reduction.filter(&mut torque);
         let theta = scene.declared.as_ref().map_or_else(
-            || vec![0.0; 10 * recording.joints],
+            || vec![0.0; INERTIAL_NUMBERS * recording.joints],
             |declared| declared.theta.clone(),
         );
-        let temperature = recording
-            .temperature
-            .as_ref()
-            .map(|all| ends(all.iter().copied()));
+        let temperature = recording.temperature.as_ref();
+        let temperature = temperature.map(|all| ends(all.iter().copied()));
+        let rows = reduction.rows.iter();
         let mut problem = Self {
-            held_out: reduction
-                .rows
-                .iter()
-                .map(|row| recording.held_out[*row])
-                .collect(),
-            all: TorqueColumns::empty(),
+            held_out: rows.map(|row| recording.held_out[*row]).collect(),
+            all: TorqueColumns::default(),
             scene,
             start: recording.time[0],
             reduction,
@@ -95,46 +92,63 @@ impl<'a> TorqueProblem<'a> {
         problem
     }
 
-    /// Forms the columns.
+    /// Forms the columns: of the base, and of all forms of all causes but `without`.
     pub(crate) fn form(&mut self, without: &[String]) {
         let half_range = |joint: usize| {
-            let course = self.torque_at(joint, self.latency);
-            let fitted = course
-                .iter()
-                .zip(&self.held_out)
-                .filter(|(_, held)| !**held);
-            let [least, most] = ends(fitted.map(|(torque, _)| *torque));
+            let course = self.torque_at(joint, self.latency).into_iter();
+            let fitted = course.zip(&self.held_out).filter(|(_, held)| !**held);
+            let [least, most] = ends(fitted.map(|(torque, _)| torque));
             0.5 * (most - least)
         };
         let torque = (0..self.joints()).map(half_range).collect();
-        self.all = TorqueColumns::new(
-            &self.scene,
-            &self.reduction,
-            &self.regressor,
-            without,
-            torque,
-        );
+        self.all = TorqueColumns::of_base(&self.scene, &self.regressor, torque);
+        for cause in TORQUE_CAUSES {
+            if without.iter().all(|name| name != cause.name) {
+                for form in (cause.forms)(cause, &self.scene) {
+                    self.push(form);
+                }
+            }
+        }
+        self.all.listed = self.all.forms.len();
     }
 
-    /// Takes a trial form; its number.
+    /// Columns of a form.
+    fn columns_of(&self, form: &TorqueForm) -> Vec<TorqueColumn> {
+        columns_of(form, &self.scene, &self.reduction, &self.regressor)
+    }
+
+    /// Takes another form; its number.
     pub(crate) fn push(&mut self, form: TorqueForm) -> usize {
-        self.all
-            .push(form, &self.scene, &self.reduction, &self.regressor)
+        let alike = self.all.alike(&form);
+        let columns = alike.unwrap_or_else(|| self.columns_of(&form));
+        self.all.take(form, columns)
+    }
+
+    /// Makes columns of some forms anew whose cause is concerned.
+    fn renew(
+        &mut self,
+        forms: impl IntoIterator<Item = usize>,
+        is_concerned: fn(&TorqueCause) -> bool,
+    ) {
+        for number in forms {
+            let form = &self.all.forms[number];
+            if is_concerned(form.cause) {
+                let fresh = self.columns_of(form);
+                self.all.replace(number, &fresh);
+            }
+        }
     }
 
     /// Makes columns of a set of the sign of a velocity anew, after its width has changed; those of others wait.
     pub(crate) fn renew_signs(&mut self, set: &[usize]) {
-        self.all
-            .renew_signs(set, &self.scene, &self.reduction, &self.regressor);
+        self.renew(set.iter().copied(), |cause| cause.of_sign);
         self.is_stale = true;
     }
 
     /// Makes the columns that wait anew.
     pub(crate) fn refresh(&mut self) {
         if std::mem::take(&mut self.is_stale) {
-            let listed: Vec<usize> = (0..self.all.listed).collect();
-            self.all
-                .renew_signs(&listed, &self.scene, &self.reduction, &self.regressor);
+            self.renew(0..self.all.listed, |cause| cause.of_sign);
         }
     }
 
@@ -144,26 +158,15 @@ impl<'a> TorqueProblem<'a> {
         set: &[usize],
         link: usize,
     ) -> Vec<(usize, [f64; INERTIAL_NUMBERS])> {
-        let base = self.all.base_changes.iter().enumerate();
-        let mut changes: Vec<_> = base
+        let base = self.all.base_changes.iter().copied().enumerate();
+        let of_forms = set.iter().flat_map(|number| {
+            let changes = self.all.forms[*number].inertial(&self.scene);
+            self.all.of(*number).zip(changes.unwrap_or_default())
+        });
+        base.chain(of_forms)
             .filter(|(_, (body, _))| *body == link)
-            .map(|(column, (_, ten))| (column, *ten))
-            .collect();
-        for number in set {
-            let form = &self.all.forms[*number];
-            let of_form = self
-                .scene
-                .declared
-                .as_ref()
-                .and_then(|declared| form.cause.inertial(form, declared));
-            let columns = self.all.of(*number).zip(of_form.into_iter().flatten());
-            changes.extend(
-                columns
-                    .filter(|(_, (body, _))| *body == link)
-                    .map(|(column, (_, ten))| (column, ten)),
-            );
-        }
-        changes
+            .map(|(column, (_, ten))| (column, ten))
+            .collect()
     }
 
     /// Inertial numbers with what coefficients change of them.
@@ -172,10 +175,7 @@ impl<'a> TorqueProblem<'a> {
         for link in 0..self.joints() {
             let body = &mut theta[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)];
             for (column, ten) in self.inertial_changes(set, link) {
-                let value = value_of(solution, column);
-                body.iter_mut()
-                    .zip(ten)
-                    .for_each(|(sum, part)| *sum += value * part);
+                add(body, value_of(solution, column), &ten);
             }
         }
         theta
@@ -198,8 +198,7 @@ impl<'a> TorqueProblem<'a> {
         {
             self.scene.tilt(theta);
         }
-        self.all
-            .renew(&self.scene, &self.reduction, &self.regressor);
+        self.renew(0..self.all.forms.len(), |cause| cause.of_rigid);
     }
 
     /// Coefficients of a form in a solution.
@@ -232,18 +231,12 @@ impl<'a> TorqueProblem<'a> {
     /// Measured torque of judged rows, as it was `latency` s later.
     pub(crate) fn torque_at(&self, joint: usize, latency: f64) -> Vec<f64> {
         let course = &self.torque[joint];
-        let stretch_of = |row: usize| {
-            self.scene
-                .stretches
-                .iter()
-                .find(|stretch| stretch.contains(&row))
-        };
+        let stretches = &self.scene.stretches;
+        let stretch_of = |row: usize| stretches.iter().find(|stretch| stretch.contains(&row));
         let at = |row: &usize| {
             let stretch = stretch_of(*row).cloned().unwrap_or(*row..*row + 1);
-            interpolated(
-                &course[stretch.clone()],
-                (row - stretch.start) as f64 + latency * self.scene.rate,
-            )
+            let at = (row - stretch.start) as f64 + latency * self.scene.rate;
+            interpolated(&course[stretch], at)
         };
         self.reduction.rows.iter().map(at).collect()
     }
@@ -252,11 +245,11 @@ impl<'a> TorqueProblem<'a> {
     pub(crate) fn difference(&self, latency: f64) -> Vec<Vec<f64>> {
         let of_joint = |joint: usize| {
             let mut course = self.torque_at(joint, latency);
-            let rigid = self.regressor.torque(joint, &self.theta);
-            course
-                .iter_mut()
-                .zip(rigid)
-                .for_each(|(value, rigid)| *value -= rigid);
+            add(
+                &mut course,
+                -1.0,
+                &self.regressor.torque(joint, &self.theta),
+            );
             course
         };
         (0..self.torque.len()).map(of_joint).collect()
@@ -295,52 +288,43 @@ impl<'a> TorqueProblem<'a> {
 
     /// Runs of judged rows outside events, of the fitted or of the held-out ones.
     pub(crate) fn runs(&self, held_out: bool) -> Vec<Range<usize>> {
-        self.runs_where(|row| self.held_out[row] == held_out && !self.in_event(row))
+        let counts = |row: usize| self.held_out[row] == held_out && !self.in_event(row);
+        let of_run = |run: &Range<usize>| runs_where(run.clone(), counts);
+        self.reduction.runs.iter().flat_map(of_run).collect()
     }
 
-    /// Runs of judged rows that count.
-    fn runs_where(&self, counts: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
-        let mut runs = Vec::new();
-        for run in &self.reduction.runs {
-            let mut start = None;
-            for row in run.clone() {
-                match (counts(row), start) {
-                    (true, None) => start = Some(row),
-                    (false, Some(first)) => {
-                        runs.push(first..row);
-                        start = None;
-                    }
-                    _ => (),
-                }
-            }
-            runs.extend(start.map(|first| first..run.end));
+    /// The rows of these.
+    pub(crate) fn counted_rows(&self, held_out: bool) -> Vec<usize> {
+        self.runs(held_out).into_iter().flatten().collect()
+    }
+
+    /// Rows that judge: the held-out ones, the fitted ones where none are.
+    pub(crate) fn judging_rows(&self) -> Vec<usize> {
+        let held = self.counted_rows(true);
+        match held.is_empty() {
+            true => self.counted_rows(false),
+            false => held,
         }
-        runs
     }
 
     /// Inner products of fitted rows under the present noise: of the base, all that causes list, and a set.
     pub(crate) fn weighted(&mut self, set: &[usize]) -> WeightedColumns {
         self.refresh();
         let listed = 0..self.all.listed;
-        let forms: Vec<usize> = listed
-            .clone()
-            .chain(set.iter().copied().filter(|form| !listed.contains(form)))
-            .collect();
-        self.weighted_of(&forms)
+        let others = set.iter().copied().filter(|form| !listed.contains(form));
+        self.weighted_of(&listed.clone().chain(others).collect::<Vec<usize>>())
     }
 
     /// The same of the base and some forms.
     pub(crate) fn weighted_of(&self, forms: &[usize]) -> WeightedColumns {
-        let mut chosen: Vec<usize> = (0..self.all.base)
-            .chain(forms.iter().flat_map(|form| self.all.of(*form)))
-            .collect();
+        self.weighted_by(self.weighing(&self.runs(false)), forms)
+    }
+
+    /// The same of the rows of a weighing.
+    pub(crate) fn weighted_by(&self, weighing: Weighing, forms: &[usize]) -> WeightedColumns {
+        let mut chosen = self.all.with_base(forms);
         chosen.sort_unstable();
-        WeightedColumns::new(
-            &self.all,
-            &self.measured,
-            self.weighing(&self.runs(false)),
-            &chosen,
-        )
+        WeightedColumns::new(&self.all, &self.measured, weighing, &chosen)
     }
 
     /// The weighing of some runs under the present noise.
@@ -361,6 +345,14 @@ impl<'a> TorqueProblem<'a> {
     }
 }
 
+/// Runs of rows that count.
+fn runs_where(rows: Range<usize>, counts: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+    let rows: Vec<usize> = rows.collect();
+    let parts = rows.split(|row| !counts(*row));
+    let ends = parts.filter_map(|part| Some(*part.first()?..part.last()? + 1));
+    ends.collect()
+}
+
 /// A smooth course between its rows: cubic through the four nearest.
 fn interpolated(course: &[f64], at: f64) -> f64 {
     let last = course.len() - 1;
@@ -371,14 +363,93 @@ fn interpolated(course: &[f64], at: f64) -> f64 {
         return course[row] + share * (course[(row + 1).min(last)] - course[row]);
     }
     let first = row.saturating_sub(1).min(last - 3);
-    let x = at - first as f64;
-    (0..4)
-        .map(|node: usize| {
-            let others = (0..4).filter(|other| *other != node);
-            let weight: f64 = others
-                .map(|other| (x - other as f64) / (node as f64 - other as f64))
-                .product();
-            weight * course[first + node]
-        })
+    let weights = lagrange(&[0.0, 1.0, 2.0, 3.0], at - first as f64);
+    weights
+        .zip(&course[first..])
+        .map(|(weight, value)| weight * value)
         .sum()
+}
+
+/// Scale and weights find each other in so many rounds.
+const ROUNDS: usize = 4;
+/// Standard deviation over the median of absolute values, of normal noise.
+const MEDIAN: f64 = 1.4826;
+
+/// The rich model's forms, and those of `set`.
+pub(super) fn rich_forms(problem: &TorqueProblem, set: &[usize]) -> Vec<usize> {
+    let forms = problem.all.forms.iter().enumerate();
+    let rich = forms.filter(|(number, form)| (form.cause.rich)(form) && !set.contains(number));
+    let rich = rich.map(|(number, _)| number);
+    set.iter().copied().chain(rich).collect()
+}
+
+/// What hardly an arm is without.
+pub(super) fn basic_forms(problem: &TorqueProblem) -> Vec<usize> {
+    let forms = &problem.all.forms;
+    let is_basic = |form: &usize| {
+        let form = &forms[*form];
+        form.width == 1 && [VISCOUS, COULOMB, OFFSET, ROTOR].contains(&form.cause.name)
+    };
+    (0..problem.all.listed).filter(is_basic).collect()
+}
+
+/// Noise of each joint and the residual of a fit of the base and some forms to the fitted rows.
+pub(super) fn noise_of_fit(
+    problem: &TorqueProblem,
+    forms: &[usize],
+    memory: NoiseMemory,
+) -> (Vec<JointNoise>, Vec<Vec<f64>>) {
+    let runs = problem.runs(false);
+    let mut residual = problem.measured.clone();
+    for _ in 0..ROUNDS {
+        let white = |course: &Vec<f64>| JointNoise::white(robust_sigma(course, &runs));
+        let weighing = Weighing {
+            noise: &residual.iter().map(white).collect::<Vec<_>>(),
+            runs: &runs,
+        };
+        let weighted = problem.weighted_by(weighing, forms);
+        let sweep = SweptColumns::base(&problem.all, &weighted).with(forms);
+        residual = problem.residual(&sweep.solution());
+    }
+    let spent = problem.all.with_base(forms).len() as f64 / problem.joints() as f64;
+    let of_course = |course: &Vec<f64>| JointNoise::of(course, &runs, spent, memory);
+    (residual.iter().map(of_course).collect(), residual)
+}
+
+/// Noise by which what is found is weighed in the end: what the rich model leaves has lost its slow part with what is slow in that model, so
+/// that its course is that of what a set leaves.
+pub(super) fn noise_left(problem: &TorqueProblem, set: &[usize]) -> Vec<JointNoise> {
+    let left = noise_of_fit(problem, set, NoiseMemory::Long).0;
+    let rich = problem.noise.iter();
+    rich.zip(left)
+        .map(|(rich, left)| JointNoise {
+            sigma: rich.sigma,
+            ..left
+        })
+        .collect()
+}
+
+/// Noise of a residual without the rows that stand far out: a push is none.
+pub(super) fn noise_apart(problem: &TorqueProblem, residual: &[Vec<f64>]) -> Vec<JointNoise> {
+    let runs = problem.runs(false);
+    let of_course = |course: &Vec<f64>| {
+        let rows = runs.iter().flat_map(|run| &course[run.clone()]);
+        let mut sizes: Vec<f64> = rows.map(|value| value.abs()).collect();
+        let most = *FAR * MEDIAN * nearest(&mut sizes, 0.5).unwrap_or(0.0);
+        let is_near = |row: usize| course[row].abs() <= most;
+        let near = |run: &Range<usize>| runs_where(run.clone(), is_near);
+        let near: Vec<Range<usize>> = runs.iter().flat_map(near).collect();
+        JointNoise::of(course, &near, 0.0, NoiseMemory::Short)
+    };
+    residual.iter().map(of_course).collect()
+}
+
+/// Half of the mean square, half of the median: neither outliers alone nor their absence decides.
+fn robust_sigma(course: &[f64], runs: &[Range<usize>]) -> f64 {
+    let rows = || runs.iter().flat_map(|run| course[run.clone()].iter());
+    let count = rows().count().max(1) as f64;
+    let square = rows().map(|value| value * value).sum::<f64>() / count;
+    let mut sizes: Vec<f64> = rows().map(|value| value.abs()).collect();
+    let middle = MEDIAN * nearest(&mut sizes, 0.5).unwrap_or(0.0);
+    (0.5 * square + 0.5 * middle * middle).sqrt() + 1e-9
 }

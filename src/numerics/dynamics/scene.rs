@@ -1,10 +1,9 @@
 //! The recording as causes see it: motion, rigid torque and clock at the recording's own rate, joint after joint.
 
 use super::arm::{DeclaredInertials, DynamicArm};
-use super::clock::{RecordingClock, column};
 use super::filter::{ZeroPhase, derivatives};
 use super::newton_euler::{InverseDynamics, MotionRow, turn};
-use crate::types::TorqueRecording;
+use super::recording::{RecordingClock, TorqueRecording, by_joint};
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
 
@@ -58,42 +57,31 @@ impl<'a> DynamicScene<'a> {
             clock.rate,
             (MOTION_BAND * cutoff).min(HIGHEST_BAND * clock.rate),
         );
+        let nothing = || vec![vec![0.0; rows]; n];
+        let declared = arm.links.as_ref().filter(|_| !free);
         let mut scene = Self {
             arm,
             rate: clock.rate,
             time: recording.time.iter().map(|time| time - first).collect(),
             stretches: clock.stretches.clone(),
-            position: (0..n)
-                .map(|joint| column(&recording.position, n, joint))
-                .collect(),
-            velocity: vec![vec![0.0; rows]; n],
-            acceleration: vec![vec![0.0; rows]; n],
-            rigid: vec![vec![0.0; rows]; n],
-            friction: vec![vec![0.0; rows]; n],
-            sideways: [vec![vec![0.0; rows]; n], vec![vec![0.0; rows]; n]],
+            position: by_joint(&recording.position, n),
+            velocity: nothing(),
+            acceleration: nothing(),
+            rigid: nothing(),
+            friction: nothing(),
+            sideways: [nothing(), nothing()],
             sign_width: SIGN_WIDTHS[1],
             sign_shares: vec![1.0; n],
             friction_lead: 0.0,
-            declared: arm
-                .links
-                .as_ref()
-                .filter(|_| !free)
-                .map(|links| DeclaredInertials::of(arm, links)),
+            declared: declared.map(|links| DeclaredInertials::of(arm, links)),
         };
         for stretch in &clock.stretches {
-            let mut courses: Vec<&mut [f64]> = scene
-                .position
-                .iter_mut()
-                .map(|course| &mut course[stretch.clone()])
-                .collect();
-            filter.apply(&mut courses);
+            filter.apply_to(&mut scene.position, stretch);
             for joint in 0..n {
-                let course = &scene.position[joint][stretch.clone()];
-                let velocity = &mut scene.velocity[joint][stretch.clone()];
                 derivatives(
-                    course,
+                    &scene.position[joint][stretch.clone()],
                     clock.rate,
-                    velocity,
+                    &mut scene.velocity[joint][stretch.clone()],
                     &mut scene.acceleration[joint][stretch.clone()],
                 );
             }
@@ -134,10 +122,8 @@ impl<'a> DynamicScene<'a> {
 
     /// Takes a width of each joint's own, rad/s.
     pub(crate) fn turn_each_over(&mut self, widths: impl IntoIterator<Item = f64>) {
-        self.sign_shares = widths
-            .into_iter()
-            .map(|width| width / self.sign_width)
-            .collect();
+        let widths = widths.into_iter();
+        self.sign_shares = widths.map(|width| width / self.sign_width).collect();
     }
 
     /// Takes a width of one joint's own, rad/s.
@@ -147,15 +133,8 @@ impl<'a> DynamicScene<'a> {
 
     /// Smoothed sign of a joint's velocity in a row, as friction has it.
     pub(crate) fn direction(&self, joint: usize, row: usize) -> f64 {
-        self.sign_at(
-            joint,
-            self.velocity[joint][row] + self.friction_lead * self.acceleration[joint][row],
-        )
-    }
-
-    /// Smoothed sign of a velocity of a joint.
-    pub(crate) fn sign_at(&self, joint: usize, velocity: f64) -> f64 {
-        (velocity / self.width_at(joint)).tanh()
+        let ahead = self.friction_lead * self.acceleration[joint][row];
+        ((self.velocity[joint][row] + ahead) / self.width_at(joint)).tanh()
     }
 
     /// s from first to last row.
@@ -215,22 +194,19 @@ impl<'a> DynamicScene<'a> {
         for joint in 0..self.joints() {
             origin += rotation * (self.arm.points[joint].coords - before);
             before = self.arm.points[joint].coords;
-            let axis = rotation * self.arm.axes[joint];
-            axes.push((axis, origin));
-            match self.arm.prismatic[joint] {
+            let (axis, slides) = (rotation * self.arm.axes[joint], self.arm.prismatic[joint]);
+            axes.push((axis, origin, slides));
+            match slides {
                 true => origin += axis * self.position[joint][row],
                 false => rotation *= turn(&self.arm.axes[joint], self.position[joint][row]),
             }
         }
         let tip = origin + rotation * (self.arm.tool.coords - before);
-        let moves = |(joint, (axis, origin)): (usize, &(Vector3<f64>, Vector3<f64>))| match self
-            .arm
-            .prismatic[joint]
-        {
-            true => *axis,
+        let moves = |(axis, origin, slides): (Vector3<f64>, Vector3<f64>, bool)| match slides {
+            true => axis,
             false => axis.cross(&(tip - origin)),
         };
-        axes.iter().enumerate().map(moves).collect()
+        axes.into_iter().map(moves).collect()
     }
 }
 
@@ -246,19 +222,4 @@ pub(super) fn split(motion: &[f64], n: usize) -> MotionRow<'_> {
         velocity: &motion[n..2 * n],
         acceleration: &motion[2 * n..],
     }
-}
-
-/// Least and greatest of what is known of some values; none are beyond each other.
-pub(super) fn ends(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
-    let known = values.into_iter().filter(|value| value.is_finite());
-    known.fold(
-        [f64::INFINITY, f64::NEG_INFINITY],
-        |[least, most], value| [least.min(value), most.max(value)],
-    )
-}
-
-/// The largest size of some values, 0 of none.
-pub(super) fn largest<'v>(values: impl IntoIterator<Item = &'v f64>) -> f64 {
-    let sizes = values.into_iter().map(|value| value.abs());
-    sizes.fold(0.0, f64::max)
 }

@@ -4,13 +4,13 @@
 //! A course that is filtered before its rows are thinned keeps what is slow. Blocks overlap by what the filter remembers, so that it does not
 //! matter where they end.
 
-use super::bridge::Bridged;
-use super::check::{TorqueExtremes, row_faults};
-use super::clock::{ClockPace, MotionPace, RecordingClock, column};
+use super::check::{TorqueExtremes, none_of, row_faults};
 use super::filter::ZeroPhase;
-use crate::error::{Error, Result};
+use super::recording::{
+    Bridged, ClockPace, MotionPace, RecordingClock, TorqueRecording, TorqueSource, by_joint,
+};
+use crate::error::Result;
 use crate::statistics::nearest;
-use crate::types::{TorqueRecording, TorqueSource};
 use std::ops::Range;
 
 /// The rate of kept rows over the cut-off, at least: far from both, friction that turns with the direction is still sampled well.
@@ -41,10 +41,9 @@ impl ThinningPlan {
             .min((rate / (RATE_OVER_CUTOFF * cutoff)) as usize)
             .max(1);
         let all = rows.div_ceil(SPAN);
-        let kept = if rows.div_ceil(every) > most {
-            (most * every / SPAN).clamp(1, all)
-        } else {
-            all
+        let kept = match rows.div_ceil(every) > most {
+            true => (most * every / SPAN).clamp(1, all),
+            false => all,
         };
         Self {
             every,
@@ -137,10 +136,9 @@ impl Thinner {
         let filter = ZeroPhase::new(rate, if plan.every > 1 { BAND } else { rate });
         let nothing = || TorqueRecording::like(like);
         Self {
-            margin: if plan.every > 1 {
-                (MEMORY * rate / BAND) as usize
-            } else {
-                0
+            margin: match plan.every > 1 {
+                true => (MEMORY * rate / BAND) as usize,
+                false => 0,
             },
             filter,
             plan,
@@ -174,8 +172,8 @@ impl Thinner {
             .saturating_sub(waiting)
             .max(self.passed);
         let like = TorqueRecording::like(&self.recorded);
-        let bridged =
-            Bridged::by_steps(std::mem::replace(&mut self.recorded, like), self.pace.usual);
+        let recorded = std::mem::replace(&mut self.recorded, like);
+        let bridged = Bridged::by_steps(recorded, self.pace.usual);
         let mut now = bridged.origin.partition_point(|row| *row < self.passed);
         let last = bridged.origin.partition_point(|row| *row < end);
         self.made_up += (last - now) - (end - self.passed);
@@ -197,11 +195,8 @@ impl Thinner {
             let until = (now + 1..last).take_while(goes_on).last().unwrap_or(now) + 1;
             if self.plan.keeps(row) {
                 self.stretch.extend(&bridged.recording, now..until);
-                self.origins.extend(
-                    bridged.origin[now..until]
-                        .iter()
-                        .map(|row| self.first + row),
-                );
+                let origins = bridged.origin[now..until].iter();
+                self.origins.extend(origins.map(|row| self.first + row));
             }
             now = until;
         }
@@ -220,43 +215,33 @@ impl Thinner {
     /// Keeps every k-th row of the stretch, as far as the filter knows it.
     fn keep(&mut self, ends: bool) {
         let rows = self.stretch.rows();
-        let known = if ends {
-            rows
-        } else {
-            rows.saturating_sub(self.margin)
-        };
-        let chosen: Vec<usize> = (self.next - self.begun..known)
-            .step_by(self.plan.every)
-            .collect();
+        let known = rows.saturating_sub(if ends { 0 } else { self.margin });
+        let chosen = (self.next - self.begun..known).step_by(self.plan.every);
+        let chosen: Vec<usize> = chosen.collect();
         if !chosen.is_empty() {
             let number = self.stretches.len() as u32 + 1;
-            let n = self.stretch.joints;
             let thinned = |values: &[f64]| -> Vec<f64> {
-                let mut courses: Vec<Vec<f64>> =
-                    (0..n).map(|joint| column(values, n, joint)).collect();
+                let mut courses = by_joint(values, self.stretch.joints);
                 self.filter.apply(&mut courses);
-                chosen
-                    .iter()
-                    .flat_map(|row| courses.iter().map(|course| course[*row]))
+                let rows = chosen.iter();
+                rows.flat_map(|row| courses.iter().map(|course| course[*row]))
                     .collect()
             };
+            let picked = |values: &[f64]| chosen.iter().map(|row| values[*row]).collect();
             let stretch = &self.stretch;
             let block = TorqueRecording {
-                time: chosen.iter().map(|row| stretch.time[*row]).collect(),
+                time: picked(&stretch.time),
                 position: thinned(&stretch.position),
                 velocity: stretch.velocity.as_deref().map(thinned),
                 torque: thinned(&stretch.torque),
-                temperature: stretch
-                    .temperature
-                    .as_ref()
-                    .map(|all| chosen.iter().map(|row| all[*row]).collect()),
+                temperature: stretch.temperature.as_deref().map(picked),
                 trajectory: vec![number; chosen.len()],
                 held_out: chosen.iter().map(|row| stretch.held_out[*row]).collect(),
                 ..TorqueRecording::like(stretch)
             };
             self.kept.extend(&block, 0..chosen.len());
-            self.origin
-                .extend(chosen.iter().map(|row| self.origins[*row]));
+            let origins = chosen.iter().map(|row| self.origins[*row]);
+            self.origin.extend(origins);
             self.next += chosen.len() * self.plan.every;
         }
         let spent = (self.next - self.begun)
@@ -297,17 +282,10 @@ impl RecordingSurvey {
         let (mut usual, mut fastest) = (Vec::new(), vec![0.0_f64; n]);
         let (mut motion, mut extremes) = (MotionPace::new(n), TorqueExtremes::new(n));
         source.blocks(&mut |block| {
-            let faults = row_faults(block, first, before);
-            if !faults.is_empty() {
-                return Err(Error::Data(faults));
-            }
+            none_of(row_faults(block, first, before))?;
             first += block.rows();
-            before = block
-                .time
-                .last()
-                .copied()
-                .zip(block.trajectory.last().copied())
-                .or(before);
+            let stamp = block.time.last().copied();
+            before = stamp.zip(block.trajectory.last().copied()).or(before);
             extremes.push(&block.torque);
             if block.rows() > 1 {
                 let pace = ClockPace::of(block);
@@ -318,18 +296,14 @@ impl RecordingSurvey {
                 motion.push(block, &RecordingClock::paced(block, &pace), continues);
                 last = TorqueRecording::like(block);
                 last.extend(block, block.rows() - 1..block.rows());
-                fastest
-                    .iter_mut()
-                    .zip(&pace.fastest)
-                    .for_each(|(most, value)| *most = most.max(*value));
+                for (most, value) in fastest.iter_mut().zip(&pace.fastest) {
+                    *most = most.max(*value);
+                }
                 usual.push(pace.usual);
             }
             Ok(())
         })?;
-        let faults = extremes.faults();
-        if !faults.is_empty() {
-            return Err(Error::Data(faults));
-        }
+        none_of(extremes.faults())?;
         let usual = nearest(&mut usual, 0.5).unwrap_or(1.0);
         Ok(Self {
             pace: ClockPace { usual, fastest },

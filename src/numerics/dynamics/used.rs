@@ -1,13 +1,11 @@
 //! The rows of a recording that a diagnosis works on: all of them, or of a long recording those that memory has room for.
 
 use super::arm::DynamicArm;
-use super::bridge::{self, Bridged};
 use super::check;
-use super::clock::RecordingClock;
 use super::even::EvenSource;
+use super::recording::{Bridged, RecordingClock, TorqueRecording, TorqueSource, bridged_remark};
 use super::thin::{RecordingSurvey, ThinnedRecording, ThinningPlan};
 use crate::error::Result;
-use crate::types::{TorqueRecording, TorqueSource};
 
 /// Rows that are used as they were recorded; of longer recordings about so many are kept, however long they are.
 const LIMIT: usize = 1 << 17;
@@ -39,26 +37,16 @@ impl UsedRecording {
         cutoff: Option<f64>,
         most: usize,
     ) -> Result<Self> {
-        let Some(even) = EvenSource::of(source)? else {
-            return Self::of_even(arm, source, cutoff, most);
+        let even = EvenSource::of(source)?;
+        let source = even.as_ref().map_or(source, |even| even);
+        let mut used = match source.rows() > most {
+            true => Self::thinned(arm, source, cutoff, most)?,
+            false => Self::whole(arm, source)?,
         };
-        let mut used = Self::of_even(arm, &even, cutoff, most)?;
-        used.remarks.insert(0, even.remark);
-        Ok(used)
-    }
-
-    /// Of a recording whose clock goes in even steps.
-    fn of_even(
-        arm: &DynamicArm,
-        source: &dyn TorqueSource,
-        cutoff: Option<f64>,
-        most: usize,
-    ) -> Result<Self> {
-        if source.rows() > most {
-            Self::thinned(arm, source, cutoff, most)
-        } else {
-            Self::whole(arm, source)
+        if let Some(even) = even {
+            used.remarks.insert(0, even.remark);
         }
+        Ok(used)
     }
 
     fn whole(arm: &DynamicArm, source: &dyn TorqueSource) -> Result<Self> {
@@ -80,7 +68,7 @@ impl UsedRecording {
         let odd = check::remarks(&recording, &origin, &clock);
         let remarks = odd
             .into_iter()
-            .chain(bridge::remark(recording.rows() - recorded))
+            .chain(bridged_remark(recording.rows() - recorded))
             .collect();
         Ok(Self {
             recording,
@@ -120,7 +108,7 @@ impl UsedRecording {
         ));
         remarks.extend(check::of_sets(&recording));
         let origin = source.recorded(&origin)?;
-        remarks.extend(bridge::remark(made_up));
+        remarks.extend(bridged_remark(made_up));
         Ok(Self {
             recording,
             clock,
@@ -147,8 +135,8 @@ fn thinning_remark(rows: usize, kept: &TorqueRecording, plan: &ThinningPlan, rat
 
 #[cfg(test)]
 mod tests {
-    use super::super::cases::{Blocks, arm, record_at};
-    use super::super::types::{TorqueDiagnosis, TorqueQuestion};
+    use super::super::cases::{Blocks, arm, found, record_at};
+    use super::super::types::TorqueQuestion;
     use super::*;
 
     /// 40 s at 2 kHz with friction in two joints.
@@ -165,16 +153,6 @@ mod tests {
         )
     }
 
-    fn names(diagnosis: &TorqueDiagnosis) -> Vec<String> {
-        let mut names: Vec<String> = diagnosis
-            .findings
-            .iter()
-            .map(|one| format!("{} {}", one.effect, one.place))
-            .collect();
-        names.sort();
-        names
-    }
-
     #[test]
     fn a_thinned_recording_tells_what_the_whole_one_does() {
         let recording = Blocks(long(), 7001);
@@ -189,7 +167,7 @@ mod tests {
         };
         let ((all, whole), (few, thinned)) = (diagnosed(usize::MAX), diagnosed(10_000));
         assert!(all == 80_000 && few == 10_000, "{all} {few}");
-        assert_eq!(names(&whole), names(&thinned));
+        assert_eq!(found(&whole), found(&thinned));
         for (one, other) in whole.findings.iter().zip(&thinned.findings) {
             for (a, b) in one.parameters.iter().zip(&other.parameters) {
                 let sigma = a.sigma.unwrap_or(0.0);

@@ -2,9 +2,9 @@
 //!
 //! Noise of filtered torques: of each joint an autoregressive course, by which rows are whitened before least squares.
 
-use crate::columns::TorqueColumns;
+use super::columns::{TorqueColumn, TorqueColumns};
+use super::recording::{add, dot};
 use crate::criteria::torque::MEMORY;
-use crate::reduce::TorqueColumn;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use std::ops::Range;
@@ -26,22 +26,13 @@ impl Weighing<'_> {
 
     /// A column, joint after joint.
     pub(crate) fn column(&self, column: &TorqueColumn) -> TorqueColumn {
-        let courses = column
-            .joints
-            .iter()
-            .zip(&column.courses)
-            .map(|(joint, course)| self.course(*joint, course));
-        TorqueColumn {
-            courses: courses.collect(),
-            joints: column.joints.clone(),
-        }
+        column.map(|joint, course| self.course(joint, course))
     }
 
     /// Measured minus rigid, of all joints.
     pub(crate) fn measured(&self, measured: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        measured
-            .iter()
-            .enumerate()
+        let courses = measured.iter().enumerate();
+        courses
             .map(|(joint, course)| self.course(joint, course))
             .collect()
     }
@@ -70,15 +61,10 @@ impl WeightedColumns {
         weighing: Weighing,
         chosen: &[usize],
     ) -> Self {
-        let count = columns.columns.len();
-        let nothing = || TorqueColumn {
-            joints: Vec::new(),
-            courses: Vec::new(),
-        };
-        let mut white: Vec<TorqueColumn> = (0..count).map(|_| nothing()).collect();
-        chosen
-            .iter()
-            .for_each(|number| white[*number] = weighing.column(&columns.columns[*number]));
+        let mut white = vec![TorqueColumn::default(); columns.columns.len()];
+        for number in chosen {
+            white[*number] = weighing.column(&columns.columns[*number]);
+        }
         Self::of_white(white, weighing.measured(measured), chosen)
     }
 
@@ -108,11 +94,7 @@ impl WeightedColumns {
     fn take_joint(&mut self, joint: usize, chosen: &[usize]) {
         let courses: Vec<(usize, &[f64])> = chosen
             .iter()
-            .filter_map(|number| {
-                let column = &self.columns[*number];
-                let place = column.joints.iter().position(|one| *one == joint)?;
-                Some((*number, column.courses[place].as_slice()))
-            })
+            .filter_map(|number| Some((*number, self.columns[*number].at(joint)?)))
             .collect();
         let measured = &self.measured[joint];
         let rows = Mat::from_fn(measured.len(), courses.len(), |row, column| {
@@ -139,16 +121,9 @@ impl WeightedColumns {
 
     /// The same columns with another measured torque (whitened, `[joint]`).
     pub(crate) fn with_measured(&self, measured: Vec<Vec<f64>>) -> Self {
-        let along = |column: &TorqueColumn| {
-            column
-                .joints
-                .iter()
-                .zip(&column.courses)
-                .map(|(joint, course)| dot(course, &measured[*joint]))
-                .sum()
-        };
+        let right = self.columns.iter();
         Self {
-            right: self.columns.iter().map(along).collect(),
+            right: right.map(|column| along(column, &measured)).collect(),
             square: measured.iter().flatten().map(|value| value * value).sum(),
             measured,
             columns: self.columns.clone(),
@@ -162,6 +137,13 @@ impl WeightedColumns {
         !self.gram[column].is_empty()
     }
 
+    /// Takes what is known of coefficients beforehand, 1 / variance of each.
+    pub(crate) fn know(&mut self, priors: &[(usize, f64)]) {
+        for (column, precision) in priors {
+            self.gram[*column][*column] += precision;
+        }
+    }
+
     /// Takes what coefficients explain off the measured torque; inner products stay as they were.
     pub(crate) fn subtract(&mut self, solution: &[(usize, f64)]) {
         for (column, value) in solution {
@@ -173,52 +155,29 @@ impl WeightedColumns {
     pub(crate) fn push(&mut self, column: &TorqueColumn, weighing: Weighing) {
         let white = weighing.column(column);
         let product = |other: &TorqueColumn| {
-            let pairs = white.joints.iter().zip(&white.courses);
-            let with = |(joint, course): (&usize, &Vec<f64>)| {
-                other
-                    .joints
-                    .iter()
-                    .position(|one| one == joint)
-                    .map(|place| dot(course, &other.courses[place]))
-            };
-            pairs.filter_map(with).sum::<f64>()
+            let parts = white.joints.iter().zip(&white.courses);
+            let with = |(joint, course): (&usize, &Vec<f64>)| Some(dot(course, other.at(*joint)?));
+            parts.filter_map(with).sum::<f64>()
         };
         let mut row: Vec<f64> = self.columns.iter().map(&product).collect();
         row.push(product(&white));
-        let right = white
-            .joints
-            .iter()
-            .zip(&white.courses)
-            .map(|(joint, course)| dot(course, &self.measured[*joint]))
-            .sum();
         self.gram
             .iter_mut()
             .zip(&row)
             .filter(|(old, _)| !old.is_empty())
             .for_each(|(old, value)| old.push(*value));
         self.gram.push(row);
-        self.right.push(right);
+        self.right.push(along(&white, &self.measured));
         self.columns.push(white);
     }
 }
 
-/// Product of two courses of one length.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Four sums at once: one would wait for itself.
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let remainder: f64 = a4
-        .remainder()
-        .iter()
-        .zip(b4.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in a4.zip(b4) {
-        for lane in 0..4 {
-            sums[lane] += x[lane] * y[lane];
-        }
-    }
-    sums.iter().sum::<f64>() + remainder
+/// Product of a column with torques of all joints.
+fn along(column: &TorqueColumn, measured: &[Vec<f64>]) -> f64 {
+    let parts = column.joints.iter().zip(&column.courses);
+    parts
+        .map(|(joint, course)| dot(course, &measured[*joint]))
+        .sum()
 }
 
 /// How many rows before a row remembers, at most.
@@ -263,12 +222,10 @@ impl JointNoise {
         let rows: usize = runs.iter().map(Range::len).sum();
         let correlation: Vec<f64> = (0..=longest)
             .map(|lag| {
-                let product = |run: &Range<usize>| {
+                let product = |run: &Range<usize>| -> f64 {
                     let run = &residual[run.clone()];
-                    run.iter()
-                        .zip(run.get(lag..).unwrap_or_default())
-                        .map(|(a, b)| a * b)
-                        .sum::<f64>()
+                    let later = run.get(lag..).unwrap_or_default();
+                    run.iter().zip(later).map(|(a, b)| a * b).sum()
                 };
                 runs.iter().map(product).sum::<f64>() / rows.max(1) as f64
             })
@@ -278,17 +235,15 @@ impl JointNoise {
         let mut left = correlation[0].max(f64::MIN_POSITIVE);
         let mut best = (rows as f64 * left.ln(), left, memory.clone());
         for order in 1..=longest {
+            let before = correlation[..order].iter().rev();
             let ahead: f64 = memory
                 .iter()
-                .enumerate()
-                .map(|(lag, share)| share * correlation[order - 1 - lag])
+                .zip(before)
+                .map(|(share, value)| share * value)
                 .sum();
             let reflection = (correlation[order] - ahead) / left;
             let turned: Vec<f64> = memory.iter().rev().copied().collect();
-            memory
-                .iter_mut()
-                .zip(turned)
-                .for_each(|(share, back)| *share -= reflection * back);
+            add(&mut memory, -reflection, &turned);
             memory.push(reflection);
             left *= 1.0 - reflection * reflection;
             let criterion = rows as f64 * left.max(f64::MIN_POSITIVE).ln() + 2.0 * order as f64;
@@ -315,12 +270,8 @@ impl JointNoise {
         for run in runs {
             let rows = &course[run.clone()];
             for now in self.memory.len()..rows.len() {
-                let known: f64 = self
-                    .memory
-                    .iter()
-                    .enumerate()
-                    .map(|(back, share)| share * rows[now - 1 - back])
-                    .sum();
+                let before = rows[..now].iter().rev();
+                let known: f64 = self.memory.iter().zip(before).map(|(a, b)| a * b).sum();
                 out.push((rows[now] - known) * scale);
             }
         }

@@ -1,11 +1,12 @@
 //! Torques over the angle of a joint: constants, springs, waves, and curves without a name.
 
 use super::{
-    ColumnTorque, FittedNumber, PLAIN, TorqueCause, TorqueForm, at_each_joint, plain, shape,
-    size_of_two, span,
+    ColumnTorque, PLAIN, TorqueCause, TorqueForm, at_each_joint, at_joints, plain, shape,
+    size_of_two, span, warming, wave,
 };
 use crate::criteria::cells::MARGIN;
-use crate::dynamics::scene::{self, DynamicScene};
+use crate::recording;
+use crate::scene::DynamicScene;
 use std::f64::consts::PI;
 
 /// Its name.
@@ -17,33 +18,25 @@ const SPRING_BALANCE_NAME: &str = "spring_balance";
 
 /// Least and greatest angle of a joint, rad.
 pub(super) fn ends(scene: &DynamicScene, joint: usize) -> [f64; 2] {
-    scene::ends(scene.position[joint].iter().copied())
+    recording::ends(scene.position[joint].iter().copied())
 }
 
 /// s in which a sensor warms up.
 const TIMES: [f64; 3] = [5.0, USUAL_TIME, 45.0];
 /// s, of the form that stands in the rich model.
 const USUAL_TIME: f64 = 15.0;
-/// Share of the recording: a zero that moves for longer is one that stays.
-const LONGEST: f64 = 0.45;
-/// Share of the recording at which the search for it ends: what is best there is not known.
-const END: f64 = 0.9;
 
 /// A constant torque that no mass explains: the zero of a current or torque sensor. With a shape (s, and the end of its search) a part of it
 /// comes only as the sensor warms up.
-pub(super) static CURRENT_OFFSET: TorqueCause = TorqueCause {
+pub(crate) static CURRENT_OFFSET: TorqueCause = TorqueCause {
     name: OFFSET,
     coefficients: &[("offset", "Nm"), ("cold", "Nm")],
     price: |form| if form.width == 1 { 0.0 } else { 4.0 },
     of_angle: true,
     rich: |form| form.width == 1 || form.shape[0] == USUAL_TIME,
     forms: |cause, scene| {
-        let longest = LONGEST * scene.duration();
-        let times = TIMES.into_iter().filter(|time| *time <= longest);
-        let times: Vec<[f64; 2]> = times.map(|time| [time, END * scene.duration()]).collect();
-        let times: Vec<&[f64]> = times.iter().map(|shape| &shape[..]).collect();
         let mut forms = at_each_joint(cause, scene, 1, &[&[]]);
-        forms.extend(at_each_joint(cause, scene, 2, &times));
+        forms.extend(warming(cause, scene, &TIMES));
         forms
     },
     spans: |form| {
@@ -80,6 +73,11 @@ const SPRINGS: [usize; 2] = [2, 4];
 /// The joint that arms balance, from 0.
 const BALANCED: usize = 1;
 
+/// It, where the arm has it.
+fn balanced(scene: &DynamicScene) -> impl Iterator<Item = usize> {
+    (0..scene.joints()).filter(|joint| *joint == BALANCED)
+}
+
 /// At a joint that no balancer hangs at.
 pub(super) static CABLE_STIFFNESS: TorqueCause = SPRING;
 
@@ -98,11 +96,7 @@ const SPRING: TorqueCause = TorqueCause {
     lengths: &[2],
     forms: |cause, scene| {
         let joints = (0..scene.joints()).filter(|joint| *joint != BALANCED);
-        let of_joint = |joint| {
-            let ends = ends(scene, joint);
-            SPRINGS.map(|width| TorqueForm::at_joint(cause, joint, width).shaped(&ends))
-        };
-        joints.flat_map(of_joint).collect()
+        at_joints(cause, joints, &SPRINGS, |joint| ends(scene, joint))
     },
     torque: ColumnTorque::Row(|column, row| match column.column {
         0 => column.angle(row),
@@ -141,18 +135,15 @@ pub(super) static SPRING_BALANCE: TorqueCause = TorqueCause {
     name: SPRING_BALANCE_NAME,
     lengths: &[0, 3],
     forms: |cause, scene| {
-        let joints = (0..scene.joints()).filter(|joint| *joint == BALANCED);
-        let of_joint = |joint| {
+        let joints = || balanced(scene);
+        let [straight, stiffens] = SPRINGS;
+        let bent = |joint| {
             let [least, most] = ends(scene, joint);
-            SPRINGS.map(|width| {
-                let form = TorqueForm::at_joint(cause, joint, width);
-                match width == SPRINGS[0] {
-                    true => form,
-                    false => form.shaped(&[least, most, (width - 1) as f64]),
-                }
-            })
+            [least, most, (stiffens - 1) as f64]
         };
-        joints.flat_map(of_joint).collect()
+        let mut forms = at_joints(cause, joints(), &[straight], |_| [0.0; 0]);
+        forms.extend(at_joints(cause, joints(), &[stiffens], bent));
+        forms
     },
     ..SPRING
 };
@@ -183,12 +174,9 @@ pub(super) static BALANCER: TorqueCause = TorqueCause {
     of_angle: true,
     lengths: &[2],
     forms: |cause, scene| {
-        let joints = (0..scene.joints()).filter(|joint| *joint == BALANCED);
-        let of_joint = |joint| {
-            let ends = ends(scene, joint);
-            BALANCERS.map(|width| TorqueForm::at_joint(cause, joint, width).shaped(&ends))
-        };
-        joints.flat_map(of_joint).collect()
+        at_joints(cause, balanced(scene), &BALANCERS, |joint| {
+            ends(scene, joint)
+        })
     },
     torque: ColumnTorque::Row(|column, row| waves(column.angle(row))[column.column]),
     // The second wave only bends the first: the remainder of two that cancel each other where the joint moves is another torque.
@@ -260,17 +248,9 @@ pub(super) static RIPPLE: TorqueCause = TorqueCause {
     has_ends: |form| form.with[0] >= [ORDERS, MOTOR_ORDERS][form.with[1].min(1)],
     torque: ColumnTorque::Row(|column, row| {
         let [order, motor] = column.form.with;
-        let turns = if motor == 1 {
-            column.form.shape[0]
-        } else {
-            1.0
-        };
+        let turns = [1.0, column.form.shape[0]][usize::from(motor == 1)];
         let periods = order as f64 * turns * (1 + column.column / 2) as f64;
-        let turn = periods * column.angle(row);
-        match column.column.is_multiple_of(2) {
-            true => turn.cos(),
-            false => turn.sin(),
-        }
+        wave(column.column, periods * column.angle(row))
     }),
     parameters: |form, fitted| {
         let [order, motor] = form.with;
@@ -315,13 +295,11 @@ pub(super) static ONE_ANGLE: TorqueCause = TorqueCause {
     of_angle: true,
     lengths: &[4],
     forms: |cause, scene| {
-        let of_joint = |joint: usize| {
+        at_joints(cause, 0..scene.joints(), &CURVES, |joint| {
             let [least, most] = ends(scene, joint);
             let margin = *MARGIN * (most - least);
-            let shape = [least - margin, most + margin, least, most];
-            CURVES.map(|width| TorqueForm::at_joint(cause, joint, width).shaped(&shape))
-        };
-        (0..scene.joints()).flat_map(of_joint).collect()
+            [least - margin, most + margin, least, most]
+        })
     },
     torque: ColumnTorque::Row(|column, row| {
         let (from, to) = (column.form.shape[0], column.form.shape[1]);
@@ -351,16 +329,13 @@ pub(super) static TWO_ANGLES: TorqueCause = TorqueCause {
     lengths: &[0],
     forms: |cause, scene| {
         let n = scene.joints();
-        let of_joint = |joint| {
-            let pairs = (0..n * n).map(move |pair| [pair / n, pair % n]);
-            pairs
-                .filter(|[first, second]| first != second)
-                .map(move |with| TorqueForm {
-                    with,
-                    ..TorqueForm::at_joint(cause, joint, 4)
-                })
+        let all = (0..n * n * n).map(|k| (k / (n * n), [k / n % n, k % n]));
+        let pairs = all.filter(|(_, [first, second])| first != second);
+        let form = |(joint, with)| TorqueForm {
+            with,
+            ..TorqueForm::at_joint(cause, joint, 4)
         };
-        (0..n).flat_map(of_joint).collect()
+        pairs.map(form).collect()
     },
     cell: |form| form.with,
     torque: ColumnTorque::Row(|column, row| {
@@ -368,19 +343,9 @@ pub(super) static TWO_ANGLES: TorqueCause = TorqueCause {
             .form
             .with
             .map(|joint| column.scene.position[joint][row]);
-        let one = if column.column < 2 {
-            first.sin()
-        } else {
-            first.cos()
-        };
-        let twice = 2.0 * second;
-        one * if column.column.is_multiple_of(2) {
-            twice.sin()
-        } else {
-            twice.cos()
-        }
+        wave(1 - column.column / 2, first) * wave(1 + column.column, 2.0 * second)
     }),
-    statement: |form, _: &[FittedNumber]| {
+    statement: |form, _| {
         let [first, second] = form.with.map(|joint| joint + 1);
         format!(
             "something without a name acts at {}; it depends on the angles of joint {first} and joint {second}",

@@ -4,11 +4,12 @@
 //!
 //! Friction without a name: curves of speed, and friction that is greater at some angles.
 
-use crate::cause::angle::{UNKNOWN, ends};
-use crate::cause::{
-    ColumnTorque, PLAIN, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, plain, shape, span,
+use super::angle::{UNKNOWN, ends};
+use super::{
+    ColumnTorque, LASTING, PLAIN, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, at_joints,
+    plain, shape, span, warming, wave,
 };
-use crate::scene::largest;
+use crate::recording::largest;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::PI;
 
@@ -18,7 +19,7 @@ pub const COULOMB: &str = "coulomb_friction";
 pub(crate) const VISCOUS: &str = "viscous_friction";
 
 /// Friction that grows with the velocity of a joint. Shape: its exponent, 1 but where the data show another: grease that thins with speed.
-pub(super) static VISCOUS_FRICTION: TorqueCause = TorqueCause {
+pub(crate) static VISCOUS_FRICTION: TorqueCause = TorqueCause {
     name: VISCOUS,
     coefficients: &[("viscous", "Nm s/rad")],
     price: |_| 0.0,
@@ -75,7 +76,7 @@ fn power(form: &TorqueForm, velocity: f64) -> f64 {
 }
 
 /// Friction of one size against the direction of motion.
-pub(super) static COULOMB_FRICTION: TorqueCause = TorqueCause {
+pub(crate) static COULOMB_FRICTION: TorqueCause = TorqueCause {
     name: COULOMB,
     coefficients: &[("coulomb", "Nm")],
     price: |_| 0.0,
@@ -202,10 +203,6 @@ pub(super) static LOAD: TorqueCause = TorqueCause {
 
 /// s in which a gear warms up.
 const TIMES: [f64; 9] = [2.0, 4.0, 8.0, 12.0, 18.0, 26.0, 40.0, 120.0, 400.0];
-/// Share of the recording: what lasts longer is friction that stays.
-const LONGEST: f64 = 0.45;
-/// Share of the recording at which the search for it ends: what is best there is not known.
-const END: f64 = 0.9;
 /// s, the longest that stands in the rich model.
 const USUAL_TIME: f64 = 18.0;
 
@@ -218,29 +215,23 @@ pub(super) static WARMUP: TorqueCause = TorqueCause {
     modifies: &[VISCOUS, COULOMB],
     rich: |form| form.with[0] == 1,
     forms: |cause, scene| {
-        let longest = LONGEST * scene.duration();
-        let times: Vec<f64> = TIMES.into_iter().filter(|time| *time <= longest).collect();
-        let may_be_rich = |time: &&f64| **time <= USUAL_TIME.max(longest / 3.0);
-        let rich = times.iter().rfind(may_be_rich).copied();
-        let shapes: Vec<[f64; 2]> = times
-            .iter()
-            .map(|time| [*time, END * scene.duration()])
-            .collect();
-        let shapes: Vec<&[f64]> = shapes.iter().map(|shape| &shape[..]).collect();
-        let mut forms = at_each_joint(cause, scene, 2, &shapes);
+        let mut forms = warming(cause, scene, &TIMES);
+        let most = USUAL_TIME.max(LASTING * scene.duration() / 3.0);
+        let times = forms.iter().map(|form| form.shape[0]);
+        let rich = times.filter(|time| *time <= most).fold(0.0, f64::max);
         for form in &mut forms {
-            form.with[0] = usize::from(Some(form.shape[0]) == rich);
+            form.with[0] = usize::from(form.shape[0] == rich);
         }
         forms
     },
     spans: |form| vec![span("time", "s", [1.0, form.shape[1]])],
     torque: ColumnTorque::Row(|column, row| {
         let decay = (-column.scene.time[row] / column.form.shape[0]).exp();
-        decay
-            * match column.column {
-                0 => column.velocity(row),
-                _ => column.direction(row),
-            }
+        let value = match column.column {
+            0 => column.velocity(row),
+            _ => column.direction(row),
+        };
+        decay * value
     }),
     statement: |form, fitted| {
         format!(
@@ -310,16 +301,12 @@ pub(super) static WRIST_COUPLING: TorqueCause = TorqueCause {
         let (form, velocity) = (column.form, &column.scene.velocity);
         let ratio = form.shape[0];
         let together = velocity[form.joint()][row] + ratio * velocity[form.with[0]][row];
-        let share = if column.joint == form.joint() {
-            1.0
-        } else {
-            ratio
+        let share = [ratio, 1.0][usize::from(column.joint == form.joint())];
+        let value = match column.column {
+            0 => together,
+            _ => column.scene.sign(together),
         };
-        share
-            * match column.column {
-                0 => together,
-                _ => column.scene.sign(together),
-            }
+        share * value
     }),
     parameters: |form, fitted| {
         vec![
@@ -366,15 +353,13 @@ pub(super) static BY_SPEED: TorqueCause = TorqueCause {
     // Tables of before lines were taken off have none.
     lengths: &[1, 1 + 2 * WAVES],
     forms: |cause, scene| {
-        let form = |joint: usize| {
+        at_joints(cause, 0..scene.joints(), &[WAVES], |joint| {
             let fastest = largest(&scene.velocity[joint]).max(1e-6);
             let speeds = scene.velocity[joint].iter().map(|v| v.abs() / fastest);
             let speeds: Vec<f64> = speeds.filter(|speed| *speed > STILL).collect();
             let lines = (0..WAVES).flat_map(|column| line(&speeds, column));
-            let shape: Vec<f64> = std::iter::once(fastest).chain(lines).collect();
-            TorqueForm::at_joint(cause, joint, WAVES).shaped(&shape)
-        };
-        (0..scene.joints()).map(form).collect()
+            std::iter::once(fastest).chain(lines).collect::<Vec<f64>>()
+        })
     },
     torque: ColumnTorque::Row(|column, row| {
         column.direction(row) * bent(column.form, column.column, column.velocity(row))
@@ -389,14 +374,9 @@ pub(super) static BY_SPEED: TorqueCause = TorqueCause {
     ..PLAIN
 };
 
-/// A wave of a speed, as a share of the fastest.
-fn wave(column: usize, speed: f64) -> f64 {
-    let phase = PI * [1.0, 2.0][column / 2] * speed;
-    if column.is_multiple_of(2) {
-        phase.sin()
-    } else {
-        phase.cos()
-    }
+/// A wave of a speed, as a share of the fastest: sine and cosine of half a wave, then of a whole one.
+fn speed_wave(column: usize, speed: f64) -> f64 {
+    wave(1 + column, PI * [1.0, 2.0][column / 2] * speed)
 }
 
 /// A wave at a velocity without its line. Faster than any row it stays what it was at the fastest.
@@ -406,7 +386,7 @@ fn bent(form: &TorqueForm, column: usize, velocity: f64) -> f64 {
         .shape
         .get(1 + 2 * column..3 + 2 * column)
         .map_or(0.0, |line| line[0] + line[1] * speed);
-    wave(column, speed) - line
+    speed_wave(column, speed) - line
 }
 
 /// The line of speed nearest to a wave over some speeds: at none, and per share of the fastest.
@@ -415,7 +395,7 @@ fn line(speeds: &[f64], column: usize) -> [f64; 2] {
     for speed in speeds {
         let row = Vector2::new(1.0, *speed);
         normal += row * row.transpose();
-        right += row * wave(column, *speed);
+        right += row * speed_wave(column, *speed);
     }
     normal
         .cholesky()
@@ -447,12 +427,7 @@ pub(super) static BY_ANGLE: TorqueCause = TorqueCause {
     },
     torque: ColumnTorque::Row(|column, row| {
         let turn = column.form.with[0] as f64 * column.angle(row);
-        let wave = if column.column == 0 {
-            turn.cos()
-        } else {
-            turn.sin()
-        };
-        column.direction(row) * wave
+        column.direction(row) * wave(column.column, turn)
     }),
     parameters: |form, fitted| {
         vec![

@@ -1,18 +1,13 @@
-//! Bodies and a mounting that are not as declared.
+//! Bodies, a mounting, motors and drives that are not as declared.
 
 use super::{
-    ColumnTorque, FittedNumber, PLAIN, TorqueCause, TorqueForm, at_each_link, plain, shape,
-    size_of_two,
+    ColumnTorque, FittedNumber, PLAIN, TorqueCause, TorqueForm, at_each_joint, at_each_link, plain,
+    shape, size_of_two, span,
 };
-use crate::dynamics::arm::{INERTIAL_NAMES, INERTIAL_NUMBERS, inertial_unit};
-use crate::dynamics::cause::TorqueParameter;
-use crate::dynamics::scene::GRAVITY;
+use crate::arm::{INERTIAL_NAMES, INERTIAL_NUMBERS, inertial_unit, unit_number};
 use crate::effect::Place;
-
-/// A change of one of ten numbers.
-fn unit(number: usize) -> [f64; INERTIAL_NUMBERS] {
-    std::array::from_fn(|entry| f64::from(u8::from(entry == number)))
-}
+use crate::recording::largest;
+use crate::scene::GRAVITY;
 
 /// A number times a factor.
 fn scaled(number: &FittedNumber, by: f64) -> FittedNumber {
@@ -26,14 +21,14 @@ fn scaled(number: &FittedNumber, by: f64) -> FittedNumber {
 const LIGHTEST: f64 = 0.1;
 /// m by which a payload's centre is elsewhere, at most.
 const PAYLOAD_FARTHEST: f64 = 0.5;
-const CENTRE: [&str; 3] = ["centre_x", "centre_y", "centre_z"];
+pub(crate) const CENTRE: [&str; 3] = ["centre_x", "centre_y", "centre_z"];
 /// Entries of an inertia tensor.
 const INERTIA: usize = INERTIAL_NUMBERS - 4;
 /// Mass at the declared centre; mass and centre; all ten numbers.
 const PAYLOADS: [usize; 3] = [1, 4, INERTIAL_NUMBERS];
 
 /// A payload that is not the declared one. Shape: declared mass, kg.
-pub(super) static PAYLOAD: TorqueCause = TorqueCause {
+pub(crate) static PAYLOAD: TorqueCause = TorqueCause {
     name: "payload_error",
     price: |_| 4.0,
     rich: |_| true,
@@ -55,7 +50,7 @@ pub(super) static PAYLOAD: TorqueCause = TorqueCause {
     changes: Some(|form, declared| {
         let last = declared.tolerance.len() - 1;
         let column = |number: usize| match number {
-            _ if form.width == INERTIAL_NUMBERS => unit(number),
+            _ if form.width == INERTIAL_NUMBERS => unit_number(number),
             0 => declared.payload,
             axis => declared.payload_shift[axis - 1],
         };
@@ -155,17 +150,16 @@ pub(super) static LINK_INERTIA: TorqueCause = TorqueCause {
     inertial: true,
     forms: |cause, scene| at_each_link(cause, scene, INERTIA),
     changes: Some(|form, _| {
-        let numbers = 0..INERTIA;
+        let numbers = 4..INERTIAL_NUMBERS;
         numbers
-            .map(|number| (form.link(), unit(4 + number)))
+            .map(|number| (form.link(), unit_number(number)))
             .collect()
     }),
     parameters: |_, fitted| {
         let numbers = INERTIAL_NAMES[4..].iter().zip(fitted);
-        let numbers: Vec<TorqueParameter> = numbers
-            .map(|(name, value)| plain(name, *value, "kg m2"))
-            .collect();
         numbers
+            .map(|(name, value)| plain(name, *value, "kg m2"))
+            .collect()
     },
     statement: |form, fitted| {
         let values = fitted.iter().map(|number| number.value);
@@ -221,6 +215,88 @@ pub(super) static GRAVITY_DIRECTION: TorqueCause = TorqueCause {
             tilt(fitted).value.to_degrees(),
             GRAVITY * size_of_two(fitted).value
         )
+    },
+    ..PLAIN
+};
+
+/// Its name.
+pub(crate) const ROTOR: &str = "rotor_inertia";
+/// Its name.
+pub(crate) const TORQUE_CONSTANT: &str = "torque_constant";
+
+/// Inertia of a motor and its gear, as the joint feels it.
+pub(super) static ROTOR_INERTIA: TorqueCause = TorqueCause {
+    name: ROTOR,
+    coefficients: &[("inertia", "kg m2")],
+    price: |_| 2.0,
+    rich: |_| true,
+    inertial: true,
+    positive: true,
+    torque: ColumnTorque::Row(|column, row| column.scene.acceleration[column.form.joint()][row]),
+    statement: |form, fitted| {
+        format!(
+            "the rotor of {} adds an inertia of {:.4} kg m2 at the joint",
+            form.place, fitted[0].value
+        )
+    },
+    ..PLAIN
+};
+
+/// Shares of the largest torque.
+const HALVES: [f64; 2] = [0.25, 1.0];
+const HALF_SPAN: [f64; 2] = [0.1, 4.0];
+/// Share of the declared one: more is no error of a drive.
+const LARGEST: f64 = 0.6;
+
+/// A current that makes another torque than declared. With a shape (Nm, and the largest torque of the joint) the difference falls with
+/// torque, to half at so many Nm: iron saturates, and a table of a drive is right at its rated current.
+pub(super) static WRONG_CONSTANT: TorqueCause = TorqueCause {
+    name: TORQUE_CONSTANT,
+    coefficients: &[("relative", "1")],
+    price: |form| if form.shape.is_empty() { 4.0 } else { 10.0 },
+    inertial: true,
+    of_rigid: true,
+    rich: |form| form.shape.is_empty(),
+    forms: |cause, scene| {
+        // Where masses are identified it is confounded with them.
+        if scene.declared.is_none() {
+            return Vec::new();
+        }
+        let mut forms = at_each_joint(cause, scene, 1, &[&[]]);
+        for joint in 0..scene.joints() {
+            let largest = largest(&scene.rigid[joint]).max(1e-9);
+            forms.extend(HALVES.map(|half| {
+                TorqueForm::at_joint(cause, joint, 1).shaped(&[half * largest, largest])
+            }));
+        }
+        forms
+    },
+    spans: |form| {
+        let span = |largest: &f64| span("half_at", "Nm", HALF_SPAN.map(|share| share * largest));
+        form.shape.get(1).map(span).into_iter().collect()
+    },
+    is_possible: |_, values| values[0].abs() < LARGEST,
+    torque: ColumnTorque::Row(|column, row| {
+        let (joint, scene) = (column.form.joint(), column.scene);
+        match column.form.shape.first() {
+            None => scene.rigid[joint][row],
+            // A drive makes the torque of friction too, which so depends on load.
+            Some(half) => {
+                let torque = scene.rigid[joint][row] + scene.friction[joint][row];
+                torque / (1.0 + torque.abs() / half)
+            }
+        }
+    }),
+    statement: |form, fitted| {
+        let (place, percent) = (form.place, 100.0 * fitted[0].value);
+        match form.shape.first() {
+            None => format!(
+                "torques of {place} read {percent:+.1} % off: its torque constant is not the declared one"
+            ),
+            Some(half) => format!(
+                "small torques of {place} read {percent:+.1} % off, half of that at {half:.3} Nm: its torque constant is not the declared one"
+            ),
+        }
     },
     ..PLAIN
 };

@@ -4,19 +4,19 @@
 //! columns are functions of a row; what remembers rows before writes whole courses.
 
 mod angle;
-mod drive;
 mod friction;
 mod masses;
 mod memory;
 
 use super::arm::{DeclaredInertials, INERTIAL_NUMBERS};
+use super::recording::add;
 use super::scene::DynamicScene;
 use crate::criteria::torque::AT_END;
 use crate::effect::Place;
-pub(super) use angle::{OFFSET, UNKNOWN};
-pub(super) use drive::{ROTOR, TORQUE_CONSTANT};
+pub(super) use angle::{CURRENT_OFFSET, OFFSET, UNKNOWN};
 pub use friction::COULOMB;
-pub(super) use friction::{VISCOUS, line_of_power};
+pub(super) use friction::{COULOMB_FRICTION, VISCOUS, VISCOUS_FRICTION, line_of_power};
+pub(super) use masses::{CENTRE, PAYLOAD, ROTOR, TORQUE_CONSTANT};
 
 /// A fitted number of a finding.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,8 +41,8 @@ pub(super) static TORQUE_CAUSES: [&TorqueCause; 27] = [
     &memory::PRESLIDING,
     &friction::LOAD,
     &friction::WARMUP,
-    &drive::ROTOR_INERTIA,
-    &drive::WRONG_CONSTANT,
+    &masses::ROTOR_INERTIA,
+    &masses::WRONG_CONSTANT,
     &angle::SPRING_BALANCE,
     &angle::BALANCER,
     &angle::CABLE_STIFFNESS,
@@ -221,25 +221,14 @@ impl TorqueCause {
     pub(crate) fn has_shape(&self, shape: &[f64]) -> bool {
         self.lengths.is_empty() || self.lengths.contains(&shape.len())
     }
-
-    /// Links and changes of their numbers per coefficient of a form; none of what is no wrong mass.
-    pub(crate) fn inertial(
-        &self,
-        form: &TorqueForm,
-        declared: &DeclaredInertials,
-    ) -> Option<InertialChanges> {
-        self.changes.map(|changes| changes(form, declared))
-    }
 }
 
 /// Coefficients by their names, then shape numbers.
 fn plain_parameters(form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
     let coefficients = form.cause.coefficients.iter().zip(fitted);
     let coefficients = coefficients.map(|((name, unit), number)| plain(name, *number, unit));
-    let shapes = form
-        .shape_numbers()
-        .into_iter()
-        .map(|span| shape(span.name, form.shape[span.index], span.unit));
+    let shapes = form.shape_numbers().into_iter();
+    let shapes = shapes.map(|span| shape(span.name, form.shape[span.index], span.unit));
     coefficients.chain(shapes).collect()
 }
 
@@ -311,6 +300,11 @@ impl TorqueForm {
         }
     }
 
+    /// Links and changes of their numbers per coefficient; none of what is no wrong mass, or where no masses are declared.
+    pub(crate) fn inertial(&self, scene: &DynamicScene) -> Option<InertialChanges> {
+        Some((self.cause.changes?)(self, scene.declared.as_ref()?))
+    }
+
     /// Torque per coefficient of a column at a velocity and its smoothed sign, of what is friction over velocity.
     pub(crate) fn friction(&self, column: usize, velocity: f64, sign: f64) -> Option<f64> {
         let friction = self.cause.friction?;
@@ -366,15 +360,25 @@ impl TorqueForm {
         (!(self.cause.has_ends)(self)).then_some(within)
     }
 
+    /// Whether it is a cause of a name at a place.
+    pub(crate) fn is_called(&self, name: &str, place: Place) -> bool {
+        self.cause.name == name && self.place == place
+    }
+
     /// Whether both are the same cause at the same place.
     pub(crate) fn is_called_as(&self, other: &Self) -> bool {
-        self.cause.name == other.cause.name && self.place == other.place
+        self.is_called(other.cause.name, other.place)
+    }
+
+    /// What it is a function of, among those that have no name: what its first coefficient is called.
+    pub(crate) fn kind(&self) -> &'static str {
+        let first = self.cause.coefficients.first();
+        first.map_or("", |(name, _)| *name)
     }
 
     /// Whether both are called the same, and what has no name is a function of the same.
     pub(crate) fn is_of_kind(&self, other: &Self) -> bool {
-        let kind = |form: &Self| form.cause.coefficients.first().map(|(name, _)| *name);
-        self.is_called_as(other) && (self.cause.name != UNKNOWN || kind(self) == kind(other))
+        self.is_called_as(other) && (self.cause.name != UNKNOWN || self.kind() == other.kind())
     }
 
     /// Shape numbers that are found from the data, each once.
@@ -424,25 +428,22 @@ pub(super) fn friction_of<'f>(
         }
         for (column, coefficient) in coefficients.iter().enumerate() {
             form.write(scene, joint, column, &mut course);
-            let sums = friction[joint].iter_mut().zip(&course);
-            sums.for_each(|(sum, value)| *sum += coefficient * value);
+            add(&mut friction[joint], *coefficient, &course);
         }
     }
     friction
 }
 
 /// A parameter that is one coefficient.
-fn plain(name: &str, fitted: FittedNumber, unit: &'static str) -> TorqueParameter {
+pub(super) fn plain(name: &str, fitted: FittedNumber, unit: &'static str) -> TorqueParameter {
     TorqueParameter {
-        name: name.into(),
-        value: fitted.value,
-        unit,
         sigma: Some(fitted.sigma),
+        ..shape(name, fitted.value, unit)
     }
 }
 
 /// A shape number.
-fn shape(name: &str, value: f64, unit: &'static str) -> TorqueParameter {
+pub(super) fn shape(name: &str, value: f64, unit: &'static str) -> TorqueParameter {
     TorqueParameter {
         name: name.into(),
         value,
@@ -458,12 +459,52 @@ fn at_each_joint(
     width: usize,
     shapes: &[&[f64]],
 ) -> Vec<TorqueForm> {
-    let of_joint = |joint| {
-        shapes
-            .iter()
-            .map(move |shape| TorqueForm::at_joint(cause, joint, width).shaped(shape))
+    let shaped = |joint| {
+        let shapes = shapes.iter();
+        shapes.map(move |shape| TorqueForm::at_joint(cause, joint, width).shaped(shape))
     };
-    (0..scene.joints()).flat_map(of_joint).collect()
+    (0..scene.joints()).flat_map(shaped).collect()
+}
+
+/// Share of the recording: what warms up for longer is friction, or a zero, that stays.
+const LASTING: f64 = 0.45;
+/// Share of the recording at which the search for a time ends: what is best there is not known.
+const LAST: f64 = 0.9;
+
+/// The forms of two columns of a cause that fades over some times, s, at each joint. Shape: the time, and the end of its search.
+fn warming(cause: &'static TorqueCause, scene: &DynamicScene, times: &[f64]) -> Vec<TorqueForm> {
+    let lasting = times
+        .iter()
+        .filter(|time| **time <= LASTING * scene.duration());
+    let shapes: Vec<[f64; 2]> = lasting
+        .map(|time| [*time, LAST * scene.duration()])
+        .collect();
+    let shapes: Vec<&[f64]> = shapes.iter().map(|shape| &shape[..]).collect();
+    at_each_joint(cause, scene, 2, &shapes)
+}
+
+/// The forms of a cause at some joints, in some numbers of columns, each with the shape numbers of its joint.
+fn at_joints<S: AsRef<[f64]>>(
+    cause: &'static TorqueCause,
+    joints: impl IntoIterator<Item = usize>,
+    widths: &[usize],
+    shape: impl Fn(usize) -> S,
+) -> Vec<TorqueForm> {
+    let mut forms = Vec::new();
+    for joint in joints {
+        let shape = shape(joint);
+        let of_width = |width| TorqueForm::at_joint(cause, joint, width).shaped(shape.as_ref());
+        forms.extend(widths.iter().copied().map(of_width));
+    }
+    forms
+}
+
+/// The wave of a column, cosine and sine in turn.
+fn wave(column: usize, phase: f64) -> f64 {
+    match column.is_multiple_of(2) {
+        true => phase.cos(),
+        false => phase.sin(),
+    }
 }
 
 /// The forms of a cause that sits at each link of declared masses.
