@@ -8,12 +8,12 @@ use super::robot::FleetRobot;
 use super::round::Round;
 use crate::error::Result;
 use crate::store::frame::Frame;
-use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey, Store, TableRef};
+use crate::store::{Account, Claim, KEY_FORMAT, PendingTable, StageKey, Store, TableRef};
 use crate::table::Table;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs;
 use std::path::PathBuf;
 
 /// Bumped when older records can no longer be understood.
@@ -172,18 +172,6 @@ pub struct Ledger<'a> {
     pub(crate) fleet: String,
 }
 
-/// Held while a robot is computed; the kernel frees it when the process dies.
-pub(super) struct Claim {
-    path: PathBuf,
-    _file: Option<File>,
-}
-
-impl Drop for Claim {
-    fn drop(&mut self) {
-        let _ = fs::remove_file(&self.path);
-    }
-}
-
 impl<'a> Ledger<'a> {
     /// The records of a fleet in a store.
     pub(crate) fn new(store: &'a Store, fleet: &str) -> Self {
@@ -288,27 +276,11 @@ impl<'a> Ledger<'a> {
             .drop_note(&self.records(key), &format!("{key}.json"))
     }
 
-    /// The right to compute a robot; none while another living process has it. Where locks cannot be had, both compute and the
-    /// first record stands.
+    /// The right to compute a robot; none while another living process has it.
     pub(super) fn claim(&self, key: &str) -> Result<Option<Claim>> {
-        let path = self
-            .store
-            .place_of_note(&["fleets", &self.fleet, "claims"], &format!("{key}.lock"))?;
-        let open = || {
-            path.parent().map_or(Ok(()), fs::create_dir_all)?;
-            File::options().create(true).append(true).open(&path)
-        };
-        let Ok(file) = open() else {
-            return Ok(Some(Claim { path, _file: None }));
-        };
-        match file.try_lock() {
-            Ok(()) => Ok(Some(Claim {
-                path,
-                _file: Some(file),
-            })),
-            Err(fs::TryLockError::WouldBlock) => Ok(None),
-            Err(fs::TryLockError::Error(_)) => Ok(Some(Claim { path, _file: None })),
-        }
+        let place = ["fleets", &self.fleet, "claims"];
+        let path = self.store.place_of_note(&place, &format!("{key}.lock"))?;
+        Ok(Claim::take(&path))
     }
 
     /// Keeps what a run of the fleet is about.

@@ -11,7 +11,7 @@ use super::manifest::{
     Surroundings,
 };
 use super::plan::{Plan, Selected};
-use super::run_state::{self, ActionLock, KeyState, RunState};
+use super::run_state::{self, KeyState, RunState};
 use super::services::{Interrupted, Observer, StageServices, label};
 use super::{overrides, reason};
 use crate::error::{Error, Fault, Result};
@@ -165,12 +165,12 @@ impl Running<'_> {
             self.observer
                 .note(id, "waiting for another run that does the same")
         };
-        let lock = ActionLock::take(self.store, &key.id(), &mut waiting);
+        let claim = run_state::claim(self.store, &key.id(), &mut waiting);
         if let (false, Lookup::Done(record)) = (forced, self.store.action(&key)?) {
             return self.cached(index, *record);
         }
         let result = self.execute(index, key, reason);
-        drop(lock);
+        drop(claim);
         if result.is_err() {
             self.manifest.stages[index].status = StageStatus::Failed;
         }
