@@ -61,11 +61,7 @@ impl ClusterOptions {
                 )
             })
             .collect();
-        if faults.is_empty() {
-            Ok(())
-        } else {
-            Err(Error::Spec(faults))
-        }
+        Error::if_spec(faults)
     }
 }
 

@@ -1,7 +1,7 @@
 //! FLEET.yaml, typed: which robots go through which pipeline, with what settings of their own.
 
 use crate::error::{Error, Fault, Result};
-use crate::pipeline::misnamed;
+use crate::pipeline::{misnamed, trouble_at};
 use crate::raw;
 use crate::yaml::{self, Mark, Node, Trouble, typed};
 use schemars::JsonSchema;
@@ -171,35 +171,25 @@ impl FleetFile {
         let label = path.display().to_string();
         let text = raw::text(path).map_err(|error| Error::spec(&label, unreadable(&error)))?;
         let (tree, mut troubles) = yaml::parse(&text);
-        let Some(tree) = tree else {
-            return Err(faulty(&label, troubles));
-        };
-        match typed::<Self>(&tree) {
-            Ok(file) => {
-                troubles.extend(file.check(&tree));
-                if troubles.is_empty() {
-                    Ok((file, tree))
-                } else {
-                    Err(faulty(&label, troubles))
+        if let Some(tree) = tree {
+            match typed::<Self>(&tree) {
+                Ok(file) => {
+                    troubles.extend(file.check(&tree));
+                    if troubles.is_empty() {
+                        return Ok((file, tree));
+                    }
                 }
-            }
-            Err(more) => {
-                troubles.extend(more);
-                Err(faulty(&label, troubles))
+                Err(more) => troubles.extend(more),
             }
         }
+        Err(faulty(&label, troubles))
     }
 
     /// What types cannot express.
     fn check(&self, tree: &Node) -> Vec<Trouble> {
         let mut troubles = Vec::new();
-        let mut fault = |path: &str, message: String| {
-            troubles.push(
-                Trouble::new(message)
-                    .at(tree.nearest_mark(path))
-                    .below(path),
-            );
-        };
+        let mut fault =
+            |path: &str, message: String| troubles.push(trouble_at(tree, path, message));
         if self.calib != FORMAT {
             fault(
                 "calib",
@@ -268,9 +258,7 @@ pub(super) fn pipeline_text(path: &Path, tree: &Node, pipeline: &Path) -> Result
             pipeline.display(),
             unreadable(&error)
         );
-        let trouble = Trouble::new(message)
-            .at(tree.nearest_mark("pipeline"))
-            .below("pipeline");
+        let trouble = trouble_at(tree, "pipeline", message);
         Error::Spec(vec![trouble.fault(&path.display().to_string())])
     })
 }

@@ -1,7 +1,7 @@
 //! Robots from a list: a table of any kind, one row a robot.
 
 use super::robot::FleetRobot;
-use crate::error::{Error, Fault, Result, nearest};
+use crate::error::{Error, Fault, Result, instead};
 use crate::pipeline::Override;
 use crate::raw::{self, Delimiter, Record, TextLayout};
 use crate::stage::ingest::{TableLayout, records};
@@ -21,12 +21,9 @@ pub(super) fn read(path: &Path, variable: &str) -> Result<Vec<FleetRobot>> {
             && !column.starts_with("set.")
             && !column.starts_with("path.")
         {
-            let hint = nearest(column, COLUMNS)
-                .map(|near| format!("; did you mean `{near}`?"))
-                .unwrap_or_else(|| ".".into());
             let message = format!(
-                "`{shown}` has a column {column:?}{hint} Allowed: {}, set.TARGET, path.TARGET",
-                COLUMNS.join(", ")
+                "`{shown}` has a column {column:?}{}, set.TARGET, path.TARGET",
+                instead(column, &COLUMNS)
             );
             faults.push(Fault::new("list", message));
         }
@@ -70,11 +67,7 @@ pub(super) fn read(path: &Path, variable: &str) -> Result<Vec<FleetRobot>> {
     if robots.is_empty() && faults.is_empty() {
         faults.push(Fault::new("list", format!("`{shown}` has no rows")));
     }
-    if faults.is_empty() {
-        Ok(robots)
-    } else {
-        Err(Error::Spec(faults))
-    }
+    Error::if_spec(faults).map(|()| robots)
 }
 
 pub(super) fn is_parquet(path: &Path) -> bool {

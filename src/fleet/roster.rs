@@ -4,6 +4,7 @@ use super::file::{FleetFile, RobotSource, faulty};
 use super::robot::FleetRobot;
 use super::{list, partition};
 use crate::error::{Error, Result};
+use crate::pipeline::trouble_at;
 use crate::stage::matches;
 use crate::store::Store;
 use crate::yaml::{Node, Trouble};
@@ -58,30 +59,19 @@ impl Roster {
         }
         for (name, times) in seen.into_iter().filter(|(_, times)| *times > 1) {
             let message = format!("{times} robots have the name {name:?}; names identify robots");
-            troubles.push(
-                Trouble::new(message)
-                    .at(tree.nearest_mark("robots"))
-                    .below("robots"),
-            );
+            troubles.push(trouble_at(tree, "robots", message));
         }
         for (index, exception) in file.overrides.iter().enumerate() {
             for (k, pattern) in exception.robots.iter().enumerate() {
                 if !robots.iter().any(|robot| matches(pattern, &robot.name)) {
                     let place = format!("overrides[{index}].robots[{k}]");
                     let message = format!("no robot has a name like {pattern:?}");
-                    troubles.push(
-                        Trouble::new(message)
-                            .at(tree.nearest_mark(&place))
-                            .below(&place),
-                    );
+                    troubles.push(trouble_at(tree, &place, message));
                 }
             }
             for robot in &mut robots {
-                if exception
-                    .robots
-                    .iter()
-                    .any(|pattern| matches(pattern, &robot.name))
-                {
+                let mut patterns = exception.robots.iter();
+                if patterns.any(|pattern| matches(pattern, &robot.name)) {
                     robot.set_values(&exception.set);
                     robot.groups = exception.groups.or(&robot.groups);
                 }

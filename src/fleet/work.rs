@@ -5,9 +5,7 @@ use super::ledger::{Ending, LATER, Ledger, RobotRecord, RobotTable};
 use super::robot::FleetRobot;
 use super::round::Round;
 use crate::error::{Error, Result};
-use crate::pipeline::{
-    Observer, Plan, Purpose, RunOptions, Selection, StageReport, Surroundings, run,
-};
+use crate::pipeline::{Observer, Plan, Purpose, RunOptions, Selection, Surroundings, run};
 use crate::stage::STAGES;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -212,9 +210,4 @@ impl Observer for Relay<'_> {
     fn stage_begins(&self, id: &str, _uses: &str, _reason: &str) {
         self.watcher.stage(self.worker, id);
     }
-    fn stage_ends(&self, _report: &StageReport) {}
-    fn begin(&self, _id: &str, _what: &str, _total: Option<u64>, _unit: &str) {}
-    fn advance(&self, _id: &str, _done: u64, _message: &str) {}
-    fn note(&self, _id: &str, _line: &str) {}
-    fn warn(&self, _id: &str, _line: &str) {}
 }

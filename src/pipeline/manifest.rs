@@ -338,12 +338,11 @@ pub fn find_run(store: &Store, text: &str) -> Result<String> {
         [run] if !text.is_empty() => Ok((*run).clone()),
         [] => {
             let tags = store.tags()?;
-            let hint = nearest(text, tags.keys().map(String::as_str))
-                .map(|near| format!("; did you mean the tag `{near}`?"));
-            nothing(format!(
-                "no such run or tag{} `calib log` lists them",
-                hint.unwrap_or_else(|| ";".into())
-            ))
+            let hint = nearest(text, tags.keys().map(String::as_str)).map_or_else(
+                || ";".into(),
+                |near| format!("; did you mean the tag `{near}`?"),
+            );
+            nothing(format!("no such run or tag{hint} `calib log` lists them"))
         }
         several => nothing(format!(
             "the ids of {} runs begin or end like this; give more of the id",

@@ -27,4 +27,4 @@ pub use run::{CompletedRun, run};
 pub use schema::json_schema;
 pub use services::{Interrupted, Observer, Unwatched};
 pub use services::{StageCall, StageTables, run_in_memory};
-pub(crate) use spec::misnamed;
+pub(crate) use spec::{misnamed, trouble_at};

@@ -1,6 +1,6 @@
 //! `--set` and `${variable}`: what is put into the YAML's tree before it is typed.
 
-use crate::error::{Fault, nearest};
+use crate::error::{Fault, listed, nearest};
 use crate::yaml::{self, Mark, Node, Trouble, YamlValue};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -58,10 +58,11 @@ pub(super) type Variables = BTreeMap<String, Node>;
 /// Puts the overrides into the tree and takes its variables out.
 pub(super) fn apply(tree: &mut Node, overrides: &[Override]) -> (Variables, Vec<Fault>) {
     let mut faults = Vec::new();
-    let mut variables: Variables = BTreeMap::new();
-    for (name, _, node) in tree.get("variables").map(Node::entries).unwrap_or_default() {
-        variables.insert(name.clone(), node.clone());
-    }
+    let given = tree.get("variables").map(Node::entries).unwrap_or_default();
+    let given = given
+        .iter()
+        .map(|(name, _, node)| (name.clone(), node.clone()));
+    let mut variables: Variables = given.collect();
     let ids = stage_ids(tree);
     let mut names: BTreeSet<String> = used_variables(tree);
     names.extend(variables.keys().cloned());
@@ -107,23 +108,18 @@ fn unknown(target: &str, names: &BTreeSet<String>, ids: &[String]) -> String {
     if tail.is_empty() && ids.iter().any(|id| id == target) {
         return format!("`{target}` is a stage: name a setting of it, e.g. {target}.SETTING=VALUE");
     }
-    let candidates: Vec<&str> = if tail.is_empty() {
-        names.iter().map(String::as_str).chain(["seed"]).collect()
+    let known: &mut dyn Iterator<Item = &str> = if tail.is_empty() {
+        &mut names.iter().map(String::as_str).chain(["seed"])
     } else {
-        ids.iter().map(String::as_str).collect()
+        &mut ids.iter().map(String::as_str)
     };
-    let hint = nearest(head, candidates).map(|name| format!("; did you mean `{name}{tail}`?"));
-    let list = |items: &mut dyn Iterator<Item = String>| items.collect::<Vec<_>>().join(", ");
+    let hint = nearest(head, known).map(|name| format!("; did you mean `{name}{tail}`?"));
+    let settings = ids.iter().map(|id| format!("{id}.SETTING"));
+    let allowed = names.iter().cloned().chain(["seed".into()]).chain(settings);
     format!(
         "no variable or setting of that name{} Allowed: {}",
         hint.unwrap_or_else(|| ".".into()),
-        list(
-            &mut names
-                .iter()
-                .cloned()
-                .chain(["seed".into()])
-                .chain(ids.iter().map(|id| format!("{id}.SETTING")))
-        )
+        listed(allowed)
     )
 }
 
@@ -194,11 +190,12 @@ fn fill(node: &Node, text: &str, variables: &Variables) -> Result<Node, String> 
             Piece::Variable(name) => name,
         };
         let Some(variable) = variables.get(name) else {
-            let hint = nearest(name, variables.keys().map(String::as_str))
-                .map(|near| format!("; did you mean `${{{near}}}`?"));
+            let hint = nearest(name, variables.keys().map(String::as_str)).map_or_else(
+                || ".".into(),
+                |near| format!("; did you mean `${{{near}}}`?"),
+            );
             return Err(format!(
-                "`${{{name}}}` is not defined{} Give it under `variables` or by --set {name}=VALUE",
-                hint.unwrap_or_else(|| ".".into())
+                "`${{{name}}}` is not defined{hint} Give it under `variables` or by --set {name}=VALUE"
             ));
         };
         if matches!(variable.value, YamlValue::Null) {

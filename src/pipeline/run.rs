@@ -13,21 +13,18 @@ use super::manifest::{
 use super::plan::{Plan, Selected};
 use super::run_state::{self, KeyState, RunState};
 use super::services::{Interrupted, Observer, StageServices, label};
-use super::{overrides, reason};
+use super::{overrides, reason, spec::trouble_at};
 use crate::error::{Error, Fault, Result};
-use crate::stage::{Context, InputTable, Output, StoredTable};
-use crate::store::frame::Frame;
+use crate::stage::{Context, InputTable, Output};
 use crate::store::key::canonical;
 use crate::store::{
-    Account, ActionRecord, FinishedFile, Lookup, PendingTable, PublishedTable, Run, StageKey,
-    Store, TableRef,
+    Account, ActionRecord, FinishedFile, Lookup, PendingTable, Run, StageKey, Store, TableRef,
 };
-use crate::yaml::{self, Node, Trouble};
+use crate::yaml;
 use serde_json::json;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
-use std::sync::OnceLock;
 use std::time::SystemTime;
 
 /// Seconds of work that are made durable together: more than a group of syncs costs, less than one would mind doing again.
@@ -405,35 +402,6 @@ pub(super) fn products(
         .collect()
 }
 
-/// A table that a stage reads chunk by chunk.
-struct LongTable {
-    table: PublishedTable,
-    /// All of it, where that is no more than a chunk: it is decoded once.
-    whole: OnceLock<Frame>,
-}
-
-/// Rows of a table that is held whole once it was read.
-const SHORT: usize = 1 << 16;
-
-impl StoredTable for LongTable {
-    fn rows(&self) -> usize {
-        self.table.rows()
-    }
-    fn frame(&self) -> Result<Frame> {
-        self.table.frame()
-    }
-    fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
-        if self.rows() > SHORT {
-            return self.table.chunks(take);
-        }
-        if let Some(whole) = self.whole.get() {
-            return take(whole);
-        }
-        let whole = self.frame()?;
-        take(self.whole.get_or_init(|| whole))
-    }
-}
-
 fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String, InputTable)>>> {
     let stages = &state.plan.stages;
     let inputs = stages[index].inputs.iter();
@@ -445,12 +413,9 @@ fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String
                 let tables = tables
                     .ok_or_else(|| Error::Bug(format!("stage {} has no tables yet", from.id)))?;
                 let table = run_state::table(tables, from, origin.port)?;
-                let input: InputTable = match input.port.chunked {
-                    true => Box::new(LongTable {
-                        table: store.published(table)?,
-                        whole: OnceLock::new(),
-                    }),
-                    false => Box::new(store.load(table)?),
+                let input = match input.port.chunked {
+                    true => InputTable::Stored(store.published(table)?),
+                    false => InputTable::Frame(store.load(table)?),
                 };
                 Ok((from.id.clone(), input))
             });
@@ -478,19 +443,15 @@ fn panic_message(panic: &(dyn Any + Send)) -> &str {
 }
 
 /// The same error with line, path and stage of each setting: `with.n` of `split` becomes `p.yaml:36:26: stages[2].with.n`.
-pub(super) fn placed(error: Error, plan: &Plan, id: &str) -> Error {
-    match error {
-        Error::Spec(faults) => Error::Spec(all(faults, plan, id)),
-        Error::Data(faults) => Error::Data(all(faults, plan, id)),
-        other => other,
+pub(super) fn placed(mut error: Error, plan: &Plan, id: &str) -> Error {
+    if let Error::Spec(faults) | Error::Data(faults) = &mut error {
+        for fault in faults {
+            if let Some(placed) = one(fault, plan, id) {
+                *fault = placed;
+            }
+        }
     }
-}
-
-fn all(faults: Vec<Fault>, plan: &Plan, id: &str) -> Vec<Fault> {
-    faults
-        .into_iter()
-        .map(|fault| one(&fault, plan, id).unwrap_or(fault))
-        .collect()
+    error
 }
 
 /// None where the fault is not in a setting.
@@ -505,22 +466,11 @@ fn one(fault: &Fault, plan: &Plan, id: &str) -> Option<Fault> {
     }
     let mut tree = yaml::parse(&plan.text).0?;
     overrides::apply(&mut tree, &plan.overrides);
-    let named = |stage: &Node| {
-        stage
-            .get("id")
-            .or_else(|| stage.get("uses"))
-            .and_then(Node::text)
-            .is_some_and(|name| name == id)
-    };
-    let index = tree.get("stages")?.items().iter().position(named)?;
+    let ids = overrides::stage_ids(&tree);
+    let index = ids.iter().position(|name| name == id)?;
     let path = format!("stages[{index}].{place}");
     let message = format!("stage `{id}`: {}", fault.message);
-    Some(
-        Trouble::new(message)
-            .at(tree.nearest_mark(&path))
-            .below(&path)
-            .fault(&plan.file.display().to_string()),
-    )
+    Some(trouble_at(&tree, &path, message).fault(&plan.file.display().to_string()))
 }
 
 impl Plan {

@@ -233,11 +233,7 @@ fn check_values(
             ));
         }
     }
-    if faults.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::Data(faults))
-    }
+    Error::if_data(faults)
 }
 
 /// Whether all numbers are finite and in range, those in the place of null cells too.

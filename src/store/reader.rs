@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A table from a file outside of a store.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,13 +50,19 @@ fn open_published(path: &Path, table: &TableRef) -> Result<File> {
 pub struct PublishedTable {
     path: PathBuf,
     table: TableRef,
+    /// All of it, where that is no more than a chunk: it is decoded once.
+    whole: OnceLock<Frame>,
 }
 
 impl PublishedTable {
     pub(super) fn open(path: PathBuf, table: TableRef) -> Result<Self> {
         known_schema(&path.display().to_string(), &table.schema)?;
         open_published(&path, &table)?;
-        Ok(Self { path, table })
+        Ok(Self {
+            path,
+            table,
+            whole: OnceLock::new(),
+        })
     }
 
     /// How many rows.
@@ -71,6 +77,12 @@ impl PublishedTable {
 
     /// Hands on all rows in their order; of a table without rows, one empty chunk. Fails where the file cannot be read.
     pub(crate) fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
+        if self.rows() <= BATCH_ROWS {
+            if self.whole.get().is_none() {
+                let _ = self.whole.set(self.frame()?);
+            }
+            return self.whole.get().map_or(Ok(()), take);
+        }
         let place = self.path.display().to_string();
         let (kind, version) = known_schema(&place, &self.table.schema)?;
         let unreadable = |why| Error::store(&place, format!("not a readable Parquet file: {why}"));
