@@ -82,18 +82,6 @@ impl Store {
         Ok(store)
     }
 
-    /// Opens `s3://BUCKET/PREFIX` with a folder below `cache` before it. `settings` are the environment's `AWS_...`.
-    #[cfg(feature = "s3")]
-    pub(crate) fn open_s3(
-        url: &str,
-        settings: &std::collections::BTreeMap<String, String>,
-        cache: &Path,
-    ) -> Result<Self> {
-        let bucket = super::s3::S3::open(url, settings)?;
-        let root = cache.join(bucket.folder());
-        Self::open_before(root, Arc::new(bucket))
-    }
-
     /// Says how to come by a calib that opens `s3://BUCKET/PREFIX`.
     #[cfg(not(feature = "s3"))]
     pub fn open_s3(
