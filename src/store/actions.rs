@@ -1,10 +1,9 @@
 //! Action records, the commit point: which tables a stage made from which key. Data first, then the record, put if absent.
 
 use super::Store;
-use super::content::TableHash;
 use super::disk::{make_read_only, place};
 use super::frame::Frame;
-use super::key::{ActionId, StageKey, TableRef, same_bytes};
+use super::key::{ActionId, StageKey, TableHash, TableRef, same_bytes};
 use super::notes::{seal, unseal};
 use super::reader::{self, PublishedTable};
 use super::writer::{FinishedFile, TableWriter};

@@ -6,7 +6,6 @@
 
 pub(crate) mod actions;
 mod check;
-pub(crate) mod content;
 mod disk;
 pub mod frame;
 pub mod key;
@@ -21,8 +20,7 @@ mod verify;
 pub(crate) mod writer;
 
 pub use actions::{Account, ActionRecord, Lookup, PendingTable, Published};
-pub use content::TableHash;
-pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
+pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableHash, TableRef};
 pub(crate) use reader::table_of_bytes;
 pub use reader::{Loose, PublishedTable, read_table};
 pub use runs::{Link, Run, Sealed};
