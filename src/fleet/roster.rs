@@ -1,8 +1,7 @@
 //! The robots of a fleet, each with its name, its groups and what it sets in the pipeline.
 
-use super::file::{FleetFile, RobotSource, faulty};
-use super::robot::FleetRobot;
-use super::{list, partition};
+use super::file::{FleetFile, FleetRobot, RobotSource, faulty};
+use super::sources::{read_list, read_recording};
 use crate::error::{Error, Result};
 use crate::pipeline::trouble_at;
 use crate::stage::matches;
@@ -104,14 +103,14 @@ fn found(
         );
     }
     if let Some(path) = &source.list {
-        return list::read(
+        return read_list(
             &folder.join(path),
             source.variable.as_deref().unwrap_or(FOLDER),
         );
     }
     match (&source.recording, &source.variable) {
         (Some(path), Some(variable)) => {
-            partition::read(&folder.join(path), &source.by, variable, &file.name, store)
+            read_recording(&folder.join(path), &source.by, variable, &file.name, store)
         }
         _ => Ok(Vec::new()),
     }

@@ -1,6 +1,5 @@
 //! The YAML, the plan, the run: `spec` reads and types, `wiring` and `plan` connect, `run` does what is not already done.
 
-mod globs;
 mod look;
 mod manifest;
 mod overrides;

@@ -9,7 +9,7 @@ use crate::stage::{
     Arity, Context, InputTable, OpenedInput, Output, RawFile, STAGES, Services, Sink, Streamed,
 };
 use crate::store::frame::Frame;
-use crate::store::{FinishedFile, Store, TableWriter};
+use crate::store::{Store, TableWriter};
 use crate::yaml::{self, Trouble};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -156,10 +156,9 @@ impl Sink for StoreSink {
         self.writer.push(&chunk)
     }
     fn finish(self: Box<Self>) -> Result<Streamed> {
-        let file: FinishedFile = self.writer.finish()?;
         Ok(Streamed {
             kind: self.kind,
-            handle: Box::new(file),
+            file: Some(self.writer.finish()?),
         })
     }
 }

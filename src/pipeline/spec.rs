@@ -1,6 +1,5 @@
 //! The pipeline's YAML, typed: every stage with its settings and files, or every fault with its place.
 
-use super::globs;
 use super::overrides::{self, Override};
 use crate::error::{Fault, instead};
 use crate::stage::{ErasedStage, StageEntry};
@@ -14,6 +13,7 @@ use std::path::{Path, PathBuf};
 pub(crate) const FORMAT: u64 = 1;
 
 /// A pipeline as far as it could be read.
+#[derive(Default)]
 pub(super) struct Draft {
     pub(crate) name: String,
     pub(crate) seed: u64,
@@ -106,14 +106,7 @@ pub(super) fn read(
     stages: &'static [StageEntry],
 ) -> Draft {
     let (tree, mut troubles) = yaml::parse(text);
-    let mut draft = Draft {
-        name: String::new(),
-        seed: 0,
-        stages: Vec::new(),
-        resolved: serde_json::Value::Null,
-        faults: Vec::new(),
-        troubles: Vec::new(),
-    };
+    let mut draft = Draft::default();
     let Some(mut tree) = tree else {
         return Draft { troubles, ..draft };
     };
@@ -330,7 +323,7 @@ type Typed = (Option<Box<dyn ErasedStage>>, Vec<InputFile>, Vec<Trouble>);
 /// Types the settings of a stage and finds its files.
 fn type_settings(file: &Path, mut with: Node, entry: &StageEntry) -> Typed {
     let folder = file.parent().unwrap_or(Path::new(""));
-    let unnamed = globs::expand(&mut with, folder);
+    let unnamed = overrides::expand(&mut with, folder);
     if !unnamed.is_empty() {
         return (None, Vec::new(), unnamed);
     }

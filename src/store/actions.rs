@@ -19,7 +19,6 @@ const RECORD_FORMAT: u32 = 1;
 /// What a stage made, and how it went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionRecord {
-    /// Format of this record.
     pub(crate) record_format: u32,
     /// Hash of the key.
     pub id: ActionId,

@@ -51,7 +51,6 @@ pub struct ReadKey {
     /// The stage that wrote it, where the port takes several and the reader sees whose they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) stage: Option<String>,
-    /// Hash of its content.
     pub(crate) table: TableHash,
 }
 
@@ -60,7 +59,6 @@ pub struct ReadKey {
 pub struct FileKey {
     /// Its name without folders, which tables of rejected rows show.
     pub(crate) name: String,
-    /// Hash of its bytes.
     pub(crate) content: FileHash,
 }
 

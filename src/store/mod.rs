@@ -21,8 +21,8 @@ pub(crate) mod writer;
 
 pub use actions::{Account, ActionRecord, Lookup, PendingTable, Published};
 pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableHash, TableRef};
-pub(crate) use reader::table_of_bytes;
 pub use reader::{Loose, PublishedTable, read_table};
+pub(crate) use reader::{file_notes, table_of_bytes};
 pub use runs::{Link, Run, Sealed};
 pub use verify::{Sweep, Verification};
 pub use writer::{FinishedFile, TableWriter};

@@ -8,7 +8,7 @@ use super::Store;
 use super::disk::{component, place, refused, remove};
 use super::key::TableRef;
 use crate::error::{Error, Result};
-use serde::Serialize;
+use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;
 use std::fs;
 use std::path::PathBuf;
@@ -23,10 +23,15 @@ impl Store {
         Ok(path)
     }
 
-    /// A note, where there is one. A torn or damaged one is none.
-    pub(crate) fn note(&self, place: &[&str], name: &str) -> Result<Option<Value>> {
-        let path = self.place_of_note(place, name)?;
-        Ok(super::disk::read(&path)?.and_then(|bytes| read(&bytes)))
+    /// A note, where there is one. One that is torn, damaged or of another kind is none.
+    pub(crate) fn note<T: DeserializeOwned>(
+        &self,
+        place: &[&str],
+        name: &str,
+    ) -> Result<Option<T>> {
+        let bytes = super::disk::read(&self.place_of_note(place, name)?)?;
+        let note = bytes.and_then(|bytes| read(&bytes));
+        Ok(note.and_then(|note| serde_json::from_value(note).ok()))
     }
 
     /// Writes a note over what may be there, durably.

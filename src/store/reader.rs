@@ -16,6 +16,7 @@ use parquet::arrow::arrow_reader::{
     ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
 };
 use parquet::errors::ParquetError;
+use parquet::file::metadata::FileMetaData;
 use parquet::file::reader::ChunkReader;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -237,6 +238,19 @@ fn set_aside(path: &Path, why: &str) -> Error {
     Error::store(place, message)
 }
 
+/// What a file says of itself, by key, and of the units of its columns, by name.
+pub(crate) fn file_notes(
+    footer: &FileMetaData,
+) -> (BTreeMap<String, String>, BTreeMap<String, String>) {
+    let pairs = footer.key_value_metadata().into_iter().flatten();
+    let notes: BTreeMap<String, String> = pairs
+        .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)))
+        .collect();
+    let units = notes.get(UNITS);
+    let units = units.and_then(|text| serde_json::from_str(text).ok());
+    (notes, units.unwrap_or_default())
+}
+
 /// The columns of a table, by name.
 type NamedArrays = BTreeMap<String, ArrayRef>;
 
@@ -315,14 +329,7 @@ impl DecodedChunks {
         // Arrow's own description of the columns is left aside: Parquet's says as much of the types that tables have.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(source, options)?;
-        let pairs = builder.metadata().file_metadata().key_value_metadata();
-        let metadata: BTreeMap<String, String> = (pairs.into_iter().flatten())
-            .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)))
-            .collect();
-        let units: BTreeMap<String, String> = metadata
-            .get(UNITS)
-            .and_then(|text| serde_json::from_str(text).ok())
-            .unwrap_or_default();
+        let (metadata, units) = file_notes(builder.metadata().file_metadata());
         let with_unit = |field: &Arc<Field>| {
             let unit = units.get(field.name());
             let unit = unit.map(|unit| ("unit".to_string(), unit.clone()));

@@ -27,9 +27,7 @@ pub struct Run {
 /// A run and the seal of its manifest.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Link {
-    /// Its id.
     pub(crate) run: String,
-    /// Hash of its manifest.
     pub(crate) sealed: String,
 }
 
@@ -38,7 +36,6 @@ pub struct Link {
 pub struct Sealed {
     /// As it was written.
     pub(crate) manifest: Value,
-    /// Hash of it.
     pub(crate) sealed: String,
 }
 

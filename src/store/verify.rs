@@ -20,13 +20,9 @@ use std::time::SystemTime;
 /// What a verification read, and everything that it found wrong.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Verification {
-    /// Tables that were read.
     pub(crate) objects: u64,
-    /// Bytes of these tables.
     pub(crate) bytes: u64,
-    /// Records that were read.
     pub(crate) actions: u64,
-    /// Manifests that were read.
     pub(crate) runs: u64,
     /// Names that were followed.
     pub(crate) tags: u64,
@@ -362,15 +358,11 @@ const HASH: usize = 64;
 /// What was swept, or would be.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Sweep {
-    /// Records that go.
     pub(crate) actions: u64,
-    /// Tables that go.
     pub(crate) objects: u64,
     /// Bytes of the records and tables that go.
     pub(crate) bytes: u64,
-    /// Records that stay.
     pub(crate) kept_actions: u64,
-    /// Tables that stay.
     pub(crate) kept_objects: u64,
     /// Kept only because they are younger than the grace period.
     pub(crate) young: u64,

@@ -2,7 +2,7 @@
 
 use super::{Frame, Table};
 use crate::error::Result;
-use crate::store::PublishedTable;
+use crate::store::{FinishedFile, PublishedTable};
 use std::marker::PhantomData;
 use std::ops::Deref;
 
@@ -181,8 +181,8 @@ pub(crate) use {reads, writes};
 pub struct Streamed {
     /// The name of the schema.
     pub kind: &'static str,
-    /// The engine's handle to the finished file.
-    pub handle: Box<dyn std::any::Any + Send>,
+    /// Finished; none where the engine keeps tables elsewhere.
+    pub file: Option<FinishedFile>,
 }
 
 /// A streamed table with its kind as a type, for a field of a `writes!` struct.

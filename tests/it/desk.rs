@@ -115,7 +115,7 @@ impl Sink for Keep {
         self.chunks.lock().unwrap().insert(self.kind, self.frames);
         Ok(Streamed {
             kind: self.kind,
-            handle: Box::new(()),
+            file: None,
         })
     }
 }
