@@ -190,7 +190,6 @@ pub struct Provenance {
     /// RFC 3339, UTC.
     pub(crate) when: String,
     pub(crate) settings: serde_json::Value,
-    /// The seed of the stage.
     pub(crate) seed: u64,
     /// Raw files: name and blake3.
     pub(crate) files: Vec<(String, String)>,

@@ -154,9 +154,7 @@ fn known_columns(kinds: &BTreeSet<&str>, options: &DiffOptions) -> Result<()> {
 pub struct RunAddress {
     /// As `calib log` names it.
     pub(crate) run: String,
-    /// Its id, if one is named.
     pub(crate) stage: Option<String>,
-    /// Its port, if one is named.
     pub(crate) port: Option<String>,
 }
 

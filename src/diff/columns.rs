@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::source::{CellKind, TableColumn, TableFile};
 use super::{DiffOptions, Discrepancy, Tolerances};
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result, did_you_mean};
 use crate::units::{Quantity, Unit};
 
 /// Columns of A and of B that hold the same.
@@ -245,9 +245,8 @@ fn known_names(a: &TableFile, b: &TableFile, options: &DiffOptions) -> Result<()
     let named = |flag: &'static str, names: &mut dyn Iterator<Item = &String>| -> Result<()> {
         for name in names {
             if !columns.contains(&name.as_str()) {
-                let hint = nearest(name, columns.iter().copied())
-                    .map(|near| format!("; did you mean `{near}`?"));
-                let message = format!("no column `{name}` in either{}", hint.unwrap_or_default());
+                let hint = did_you_mean(name, columns.iter().copied());
+                let message = format!("no column `{name}` in either{hint}");
                 return Err(Error::spec(flag, message));
             }
         }

@@ -35,13 +35,8 @@ pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
     let mut diff = TableDiff {
         a: side(&a),
         b: side(&b),
-        key: Vec::new(),
-        equal: None,
         findings: schema_findings(&a, &b, options)?,
-        rows: RowCounts::default(),
-        columns: Vec::new(),
-        worst: Vec::new(),
-        examples: Examples::default(),
+        ..TableDiff::default()
     };
     diff.key = key_columns(&a, &b, options, &mut diff.findings)?;
     let comparisons = columns::plan(&a, &b, &diff.key, options, &mut diff.findings)?;
@@ -153,29 +148,19 @@ fn schema_findings(
         );
         return Err(Error::spec(b.path.display().to_string(), message));
     }
-    if kind_a != kind_b {
-        return Ok(vec![Discrepancy::new(
-            "schema",
-            "",
-            format!("{kind_a} in A, {kind_b} in B"),
-        )]);
-    }
-    if version_a == version_b {
+    let says = if kind_a != kind_b {
+        format!("{kind_a} in A, {kind_b} in B")
+    } else if version_a == version_b {
         return Ok(Vec::new());
-    }
-    let step = match (
-        version_a.major == version_b.major,
-        version_a.minor == version_b.minor,
-    ) {
-        (false, _) => "major: columns changed their meaning",
-        (true, false) => "minor: columns were added",
-        (true, true) => "patch: descriptions changed",
+    } else {
+        let step = match () {
+            () if version_a.major != version_b.major => "major: columns changed their meaning",
+            () if version_a.minor != version_b.minor => "minor: columns were added",
+            () => "patch: descriptions changed",
+        };
+        format!("{kind_a} {version_a} in A, {version_b} in B ({step})")
     };
-    Ok(vec![Discrepancy::new(
-        "schema",
-        "",
-        format!("{kind_a} {version_a} in A, {version_b} in B ({step})"),
-    )])
+    Ok(vec![Discrepancy::new("schema", "", says)])
 }
 
 fn key_columns(

@@ -1,7 +1,7 @@
 //! One comparison carried through: every pair of cells judged, the statistics of the differences, the worst rows.
 
 use arrow::array::{Array, ArrayRef, AsArray, Float64Array, Int64Array, LargeStringArray};
-use arrow::compute::cast;
+use arrow::compute::{cast, kernels::cmp::distinct};
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -19,7 +19,6 @@ pub(super) const CHANGED: u8 = 2;
 /// A pair of cells that are not the same.
 #[derive(Debug, Clone)]
 pub(super) struct CellDifference {
-    /// The row of A.
     pub(crate) row: u32,
     pub(crate) changed: bool,
     pub(crate) a: CellValue,
@@ -61,7 +60,10 @@ pub(super) fn measure(
     comparison: &ColumnPair,
     sees: &mut Seer,
 ) -> Result<ColumnDiff> {
-    let mut tally = DifferenceSums::new(comparison);
+    let mut tally = DifferenceSums {
+        mixed: comparison.unit == "row",
+        ..DifferenceSums::default()
+    };
     if comparison.how == Comparator::Text {
         texts(files, comparison, &mut tally, sees)?;
     } else {
@@ -165,12 +167,9 @@ impl NumberPairs<'_> {
             _ => f64::NAN,
         };
         let (left, right) = (self.a.numbers[0].value(at), self.b.numbers[0].value(at));
-        let value = |null: bool, value: f64| {
-            if null {
-                CellValue::Null
-            } else {
-                CellValue::Number(value)
-            }
+        let value = |null: bool, value: f64| match null {
+            true => CellValue::Null,
+            false => CellValue::Number(value),
         };
         let largest = if size == 1 {
             left.abs().max(right.abs())
@@ -298,25 +297,21 @@ fn texts(
         let ours = texts_of(&batch?[0])?;
         let theirs = files.pairing.aligned(&theirs, start, ours.len())?;
         let theirs = theirs.as_string::<i64>();
+        let differ = distinct(&ours, theirs).map_err(bug)?;
         for at in files.paired(start, ours.len()) {
-            let text = |cells: &LargeStringArray| {
-                (!cells.is_null(at)).then(|| CellValue::Text(cells.value(at).into()))
+            let text = |cells: &LargeStringArray| match cells.is_null(at) {
+                true => CellValue::Null,
+                false => CellValue::Text(cells.value(at).into()),
             };
-            let null = ours.is_null(at) || theirs.is_null(at);
-            tally.pairs += u64::from(!null);
-            let same = if null {
-                ours.is_null(at) == theirs.is_null(at)
-            } else {
-                ours.value(at) == theirs.value(at)
-            };
-            if same {
+            tally.pairs += u64::from(!ours.is_null(at) && !theirs.is_null(at));
+            if !differ.value(at) {
                 continue;
             }
             let cell = CellDifference {
                 row: (start + at) as u32,
                 changed: true,
-                a: text(&ours).unwrap_or(CellValue::Null),
-                b: text(theirs).unwrap_or(CellValue::Null),
+                a: text(&ours),
+                b: text(theirs),
                 difference: None,
                 sigmas: None,
                 // Below every number beyond its tolerance: those say by how much.
@@ -339,6 +334,7 @@ fn judge(cell: &CellDifference, rows: &[AtomicU8], tally: &mut DifferenceSums) {
 }
 
 /// Sums over the pairs of a column.
+#[derive(Default)]
 struct DifferenceSums {
     pairs: u64,
     within: u64,
@@ -355,22 +351,6 @@ struct DifferenceSums {
 }
 
 impl DifferenceSums {
-    fn new(comparison: &ColumnPair) -> Self {
-        Self {
-            pairs: 0,
-            within: 0,
-            changed: 0,
-            sum: 0.0,
-            squares: 0.0,
-            sigma_squares: 0.0,
-            sigma_count: 0,
-            sizes: Vec::new(),
-            worst: None,
-            worst_sigmas: None,
-            mixed: comparison.unit == "row",
-        }
-    }
-
     fn add(&mut self, cell: &CellDifference) {
         *(if cell.changed {
             &mut self.changed

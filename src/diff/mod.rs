@@ -108,11 +108,9 @@ impl Tolerances {
 }
 
 /// Two tables compared.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub(crate) struct TableDiff {
-    /// The first table.
     pub(crate) a: DiffedTable,
-    /// The second table.
     pub(crate) b: DiffedTable,
     /// Columns that identify rows.
     pub(crate) key: Vec<String>,
@@ -154,7 +152,7 @@ impl Equal {
 }
 
 /// One side of a comparison.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub(crate) struct DiffedTable {
     /// As it was given.
     pub(crate) path: String,
@@ -162,7 +160,6 @@ pub(crate) struct DiffedTable {
     pub(crate) schema: Option<String>,
     /// Hash of its content, where the file carries it.
     pub(crate) table_hash: Option<String>,
-    /// How many.
     pub(crate) rows: u64,
 }
 
@@ -171,9 +168,7 @@ pub(crate) struct DiffedTable {
 pub(crate) struct Discrepancy {
     /// `column`, `unit`, `type`, `semantic`, `schema`, `key`.
     pub(crate) what: String,
-    /// Its name.
     pub(crate) column: String,
-    /// What differs, in words.
     pub(crate) says: String,
 }
 
@@ -211,7 +206,6 @@ pub(crate) struct RowCounts {
 /// A column of which values differ.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct ColumnDiff {
-    /// Its name.
     pub(crate) name: String,
     /// Unit of tolerance and statistics, A's; `row` where every row has its own.
     pub(crate) unit: String,
@@ -223,7 +217,6 @@ pub(crate) struct ColumnDiff {
     pub(crate) changed: u64,
     /// Absolute tolerance, in the unit of the column.
     pub(crate) atol: f64,
-    /// Relative tolerance.
     pub(crate) rtol: f64,
     /// Statistics of B minus A over all pairs; null for texts and where rows have units of their own.
     pub(crate) statistics: Option<DifferenceStatistics>,
@@ -262,11 +255,8 @@ pub(crate) struct WorstRow {
 /// A value that differs.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct WorstCell {
-    /// Its column.
     pub(crate) column: String,
-    /// In the first table.
     pub(crate) a: serde_json::Value,
-    /// In the second table.
     pub(crate) b: serde_json::Value,
     /// The difference of numbers, in their unit.
     pub(crate) difference: Option<f64>,

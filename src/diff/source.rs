@@ -1,6 +1,6 @@
 //! One side of a comparison: a Parquet file opened by its footer, whose columns are read one at a time.
 
-use arrow::array::{Array, ArrayRef, AsArray, LargeStringArray, RecordBatch, new_empty_array};
+use arrow::array::{Array, ArrayRef, AsArray, LargeStringArray, new_empty_array};
 use arrow::compute::{cast, concat};
 use arrow::datatypes::{DataType, Float64Type, Schema};
 use parquet::arrow::arrow_reader::{
@@ -9,7 +9,6 @@ use parquet::arrow::arrow_reader::{
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::errors::ParquetError;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -17,6 +16,7 @@ use std::sync::Arc;
 
 use crate::error::{Error, Result, counted};
 use crate::raw;
+use crate::store::file_notes;
 use crate::store::schema::{self, TableSchema, Version};
 
 /// Rows that are decoded at a time.
@@ -78,30 +78,18 @@ impl TableFile {
                 ),
             ));
         }
-        let pairs: BTreeMap<String, String> = footer
-            .key_value_metadata()
-            .into_iter()
-            .flatten()
-            .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)))
-            .collect();
-        let units: BTreeMap<String, String> = pairs
-            .get("calib.units")
-            .and_then(|text| serde_json::from_str(text).ok())
-            .unwrap_or_default();
+        let (pairs, units) = file_notes(footer);
         let rich = raw::decoded(|| {
             parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata())
         });
         let rich = rich.map_err(|e| unreadable(ParquetError::General(e)))?.ok();
         let columns = metadata.schema().fields().iter().map(|field| {
             let about = |key: &str| metadata_of(rich.as_ref(), field.name(), key);
+            let kind = kind(field.data_type());
             TableColumn {
                 name: field.name().clone(),
-                kind: kind(field.data_type()).unwrap_or(CellKind::Text),
-                stored: if kind(field.data_type()).is_some() {
-                    field.data_type().to_string()
-                } else {
-                    String::new()
-                },
+                kind: kind.unwrap_or(CellKind::Text),
+                stored: kind.map_or_else(String::new, |_| field.data_type().to_string()),
                 unit: about("unit").or_else(|| units.get(field.name()).cloned()),
                 semantic: about("semantic"),
             }
@@ -194,22 +182,15 @@ impl TableFile {
                 )
             })
             .collect();
-        let mut reader = reader;
-        Ok(
-            std::iter::from_fn(move || raw::decoded(|| reader.next()).transpose()).map(
-                move |batch| {
-                    let damaged = |e: &dyn std::fmt::Display| {
-                        Error::spec(&place, format!("damaged, cannot be read to its end: {e}"))
-                    };
-                    let batch: RecordBatch =
-                        batch.map_err(|e| damaged(&e))?.map_err(|e| damaged(&e))?;
-                    wanted
-                        .iter()
-                        .map(|&(at, kind)| plain(batch.column(at), kind).map_err(|e| damaged(&e)))
-                        .collect()
-                },
-            ),
-        )
+        Ok(raw::BatchFile::of(reader).map(move |batch| {
+            let damaged =
+                |e: String| Error::spec(&place, format!("damaged, cannot be read to its end: {e}"));
+            let batch = batch.map_err(damaged)?;
+            let plain = |&(at, kind): &(usize, CellKind)| {
+                cast(batch.column(at), &plain_type(kind)).map_err(|e| damaged(e.to_string()))
+            };
+            wanted.iter().map(plain).collect()
+        }))
     }
 
     /// A whole column.
@@ -291,13 +272,6 @@ fn kind(data_type: &DataType) -> Option<CellKind> {
         T::Timestamp(..) | T::Duration(_) => Some(CellKind::Text),
         _ => None,
     }
-}
-
-fn plain(
-    array: &ArrayRef,
-    kind: CellKind,
-) -> std::result::Result<ArrayRef, arrow::error::ArrowError> {
-    cast(array, &plain_type(kind))
 }
 
 fn plain_type(kind: CellKind) -> DataType {

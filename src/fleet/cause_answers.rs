@@ -64,7 +64,7 @@ pub(super) fn of(
                 sigma: sigma.max(1e-6),
                 log_ratio: row.log_ratio.unwrap_or_default(),
                 unit: row.unit.clone(),
-                deviation: None,
+                ..FleetCellRow::default()
             });
         }
     })?;
@@ -84,22 +84,14 @@ pub(super) fn of(
         let finding = FleetFindingRow {
             group: group.clone(),
             cell: cell.clone(),
-            robot: String::new(),
             effect: first.effect.clone(),
             place: first.place.clone(),
             follows: follows.get(&cell).cloned().unwrap_or_default(),
-            shape: None,
             robots: 1,
             of_robots: sums.robots as i64,
-            log_odds: 0.0,
-            probability: 0.0,
-            rival: None,
-            size: 0.0,
-            spread: None,
             unit: first.unit.clone(),
-            trend: None,
             decided: Some(true),
-            statement: String::new(),
+            ..FleetFindingRow::default()
         };
         let mut given = round.groups.get(&group).into_iter().flatten();
         let Some(given) = given.find(|given| given.cell == cell) else {
@@ -227,13 +219,9 @@ fn not_asked(fleet: &Fleet, round: &Round, records: &[Option<RobotRecord>]) -> F
         Some(FleetOutlierRow {
             robot: robot.name.clone(),
             kind: "not_asked".into(),
-            cell: String::new(),
             group: round.by.of(&robot.groups).into(),
-            size: None,
-            usual: None,
-            unit: None,
-            probability: None,
             statement: format!("{}: {}", robot.name, reason.unwrap_or("failed")),
+            ..FleetOutlierRow::default()
         })
     };
     FleetOutliers(robots.filter_map(row).collect())

@@ -249,18 +249,14 @@ mod tests {
 
     fn row(log: f64) -> CellEvidenceRow {
         CellEvidenceRow {
-            given: String::new(),
             cell: "backlash@joint 2".into(),
-            shape: String::new(),
             effect: "backlash".into(),
             place: "joint 2".into(),
             follows: "approach".into(),
             log_evidence: log,
-            log_prior: 0.0,
             size: 0.05,
-            sigma: None,
-            log_ratio: None,
             unit: "mm".into(),
+            ..CellEvidenceRow::default()
         }
     }
 

@@ -15,7 +15,7 @@ use crate::report::fleet_causes as page;
 use crate::stage::Given;
 use crate::store::TableRef;
 use crate::table::{CellEvidence, CellEvidenceRow, Table};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -43,7 +43,6 @@ struct Alone {
 pub(crate) struct CauseSearch {
     round: Round,
     groups: BTreeMap<String, GroupSearch>,
-    /// Rounds so far.
     pub(crate) rounds: usize,
 }
 
@@ -246,11 +245,9 @@ impl GroupSearch {
 
 /// What a fleet's diagnosis came to.
 pub struct Published {
-    /// What was found.
     pub(crate) answers: Answers,
     /// Where people find the tables and the page.
     pub(crate) tables: Vec<PathBuf>,
-    /// The page.
     pub(crate) page: PathBuf,
 }
 
@@ -295,7 +292,7 @@ pub(crate) fn publish(
 
 /// A table of the diagnosis of a fleet; none where it was not diagnosed.
 pub(super) fn noted<T: Table>(ledger: &Ledger, port: &str) -> Result<Option<T>> {
-    let note = ledger.store.note(&["fleets", &ledger.fleet], NOTE)?;
+    let note: Option<Value> = ledger.store.note(&["fleets", &ledger.fleet], NOTE)?;
     let table =
         note.and_then(|note| serde_json::from_value::<TableRef>(note["tables"][port].clone()).ok());
     ledger.load(table.as_ref())
@@ -309,16 +306,13 @@ mod tests {
         CellEvidenceRow {
             given: present.into(),
             cell: cell.into(),
-            shape: String::new(),
             effect: "backlash".into(),
             place: "joint 2".into(),
             follows: "approach".into(),
             log_evidence,
-            log_prior: 0.0,
             size: 0.05,
-            sigma: None,
-            log_ratio: None,
             unit: "mm".into(),
+            ..CellEvidenceRow::default()
         }
     }
 

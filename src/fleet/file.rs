@@ -1,7 +1,9 @@
 //! FLEET.yaml, typed: which robots go through which pipeline, with what settings of their own.
+//!
+//! One robot of a fleet: its name, its groups and what it sets in the pipeline.
 
 use crate::error::{Error, Fault, Result};
-use crate::pipeline::misnamed;
+use crate::pipeline::{Override, misnamed, trouble_at};
 use crate::raw;
 use crate::yaml::{self, Mark, Node, Trouble, typed};
 use schemars::JsonSchema;
@@ -171,35 +173,25 @@ impl FleetFile {
         let label = path.display().to_string();
         let text = raw::text(path).map_err(|error| Error::spec(&label, unreadable(&error)))?;
         let (tree, mut troubles) = yaml::parse(&text);
-        let Some(tree) = tree else {
-            return Err(faulty(&label, troubles));
-        };
-        match typed::<Self>(&tree) {
-            Ok(file) => {
-                troubles.extend(file.check(&tree));
-                if troubles.is_empty() {
-                    Ok((file, tree))
-                } else {
-                    Err(faulty(&label, troubles))
+        if let Some(tree) = tree {
+            match typed::<Self>(&tree) {
+                Ok(file) => {
+                    troubles.extend(file.check(&tree));
+                    if troubles.is_empty() {
+                        return Ok((file, tree));
+                    }
                 }
-            }
-            Err(more) => {
-                troubles.extend(more);
-                Err(faulty(&label, troubles))
+                Err(more) => troubles.extend(more),
             }
         }
+        Err(faulty(&label, troubles))
     }
 
     /// What types cannot express.
     fn check(&self, tree: &Node) -> Vec<Trouble> {
         let mut troubles = Vec::new();
-        let mut fault = |path: &str, message: String| {
-            troubles.push(
-                Trouble::new(message)
-                    .at(tree.nearest_mark(path))
-                    .below(path),
-            );
-        };
+        let mut fault =
+            |path: &str, message: String| troubles.push(trouble_at(tree, path, message));
         if self.calib != FORMAT {
             fault(
                 "calib",
@@ -268,9 +260,7 @@ pub(super) fn pipeline_text(path: &Path, tree: &Node, pipeline: &Path) -> Result
             pipeline.display(),
             unreadable(&error)
         );
-        let trouble = Trouble::new(message)
-            .at(tree.nearest_mark("pipeline"))
-            .below("pipeline");
+        let trouble = trouble_at(tree, "pipeline", message);
         Error::Spec(vec![trouble.fault(&path.display().to_string())])
     })
 }
@@ -303,4 +293,118 @@ pub fn json_schema() -> String {
         .into_root_schema_for::<FleetFile>()
         .to_value();
     serde_json::to_string_pretty(&schema).expect("a schema is plain data") + "\n"
+}
+
+/// One robot. Its name is data from outside: never a path, never a command.
+#[derive(Debug, Clone)]
+pub struct FleetRobot {
+    /// Unique in the fleet.
+    pub(crate) name: String,
+    /// Its labels.
+    pub(crate) groups: Groups,
+    /// Later ones win.
+    pub(crate) sets: Vec<Override>,
+    /// Why its data cannot be reached at all.
+    pub(crate) unreadable: Option<String>,
+}
+
+impl FleetRobot {
+    pub(super) fn new(name: String) -> Self {
+        Self {
+            name,
+            groups: Groups::default(),
+            sets: Vec::new(),
+            unreadable: None,
+        }
+    }
+
+    /// A name for paths: letters and digits of the robot's name, then its hash.
+    pub(crate) fn handle(&self) -> String {
+        let kept = self
+            .name
+            .chars()
+            .filter(char::is_ascii_alphanumeric)
+            .take(24)
+            .collect::<String>();
+        let hash = blake3::hash(self.name.as_bytes()).to_hex();
+        if kept.is_empty() {
+            hash[..16].to_string()
+        } else {
+            format!("{kept}-{}", &hash[..16])
+        }
+    }
+
+    /// Sets a path or another text.
+    pub(super) fn set_text(&mut self, target: &str, text: &str) {
+        self.sets.push(Override {
+            target: target.into(),
+            value: quoted(text),
+        });
+    }
+    pub(super) fn set_values(&mut self, values: &BTreeMap<String, Value>) {
+        self.sets
+            .extend(values.iter().map(|(target, value)| Override {
+                target: target.clone(),
+                value: written(value),
+            }));
+    }
+}
+
+/// Text as YAML, whatever is in it.
+fn quoted(text: &str) -> String {
+    let mut out = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => out.extend(['\\', c]),
+            ' '..='~' => out.push(c),
+            c => out.push_str(&format!("\\U{:08X}", u32::from(c))),
+        }
+    }
+    out.push('"');
+    out
+}
+
+/// A value as YAML on one line.
+fn written(value: &Value) -> String {
+    match value {
+        Value::String(text) => quoted(text),
+        Value::Array(items) => format!(
+            "[{}]",
+            items.iter().map(written).collect::<Vec<_>>().join(", ")
+        ),
+        Value::Object(map) => {
+            let entry =
+                |(key, value): (&String, &Value)| format!("{}: {}", quoted(key), written(value));
+            format!(
+                "{{{}}}",
+                map.iter().map(entry).collect::<Vec<_>>().join(", ")
+            )
+        }
+        plain => plain.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_survives_the_way_through_yaml() {
+        for text in [
+            "r'1\"",
+            "a\nb",
+            "$(reboot)",
+            "../x",
+            "# no: [comment",
+            "\u{85}\u{2028}\u{1f916}",
+            "",
+            "null",
+            "1e3",
+            "tab\there",
+        ] {
+            let (node, troubles) = crate::yaml::parse(&quoted(text));
+            assert!(troubles.is_empty(), "{text:?}: {troubles:?}");
+            assert_eq!(node.and_then(|node| node.text()).as_deref(), Some(text));
+        }
+    }
 }

@@ -3,17 +3,16 @@
 //! `fleets/<fleet>/records/ab/<key>.json`, put if absent; `claims/` are locks of the living, on which no result depends;
 //! `runs/<id>.json` is the roster of a run, for the tasks of a cluster and for later campaigns; `cancelled.json` names a run.
 
-use super::file::Groups;
-use super::robot::FleetRobot;
+use super::file::{FleetRobot, Groups};
 use super::round::Round;
 use crate::error::Result;
 use crate::store::frame::Frame;
-use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey, Store, TableRef};
+use crate::store::{Account, Claim, KEY_FORMAT, PendingTable, StageKey, Store, TableRef};
 use crate::table::Table;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs;
 use std::path::PathBuf;
 
 /// Bumped when older records can no longer be understood.
@@ -22,10 +21,11 @@ const RECORD_FORMAT: u32 = 1;
 pub(crate) const LATER: u8 = 75;
 
 /// How it ended for a robot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Ending {
     /// All stages are done.
+    #[default]
     Done,
     /// Its data are at fault: the same data will be rejected again.
     Rejected,
@@ -47,27 +47,22 @@ impl Ending {
 /// A table of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RobotTable {
-    /// Id of its stage.
     pub(crate) stage: String,
     /// On which it was written.
     pub(crate) port: String,
     /// The name of its schema.
     pub(crate) kind: String,
-    /// Where it is.
     #[serde(flatten)]
     pub(crate) table: TableRef,
 }
 
 /// Result of a robot.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RobotRecord {
-    /// Format of this record.
     pub(crate) record_format: u32,
-    /// Its name.
     pub(crate) robot: String,
     /// Hash of the robot's name, settings and data.
     pub(crate) key: String,
-    /// How it ended.
     pub(crate) ending: Ending,
     /// As `calib run` would have ended.
     pub(crate) exit_code: u8,
@@ -88,7 +83,6 @@ pub struct RobotRecord {
     pub(crate) tables: Vec<RobotTable>,
     /// Name of the robot's folder among the documents.
     pub(crate) handle: String,
-    /// Names of its documents.
     pub(crate) documents: Vec<String>,
 }
 
@@ -112,17 +106,9 @@ impl RobotRecord {
             record_format: RECORD_FORMAT,
             robot: robot.name.clone(),
             key,
-            ending: Ending::Done,
-            exit_code: 0,
-            reason: None,
-            run: None,
             worker: worker.into(),
-            log: None,
-            ended: String::new(),
-            wall_seconds: 0.0,
-            tables: Vec::new(),
             handle: robot.handle(),
-            documents: Vec::new(),
+            ..Self::default()
         }
     }
 }
@@ -130,9 +116,7 @@ impl RobotRecord {
 /// One run of a fleet, as its tasks and later campaigns need it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct RunNote {
-    /// Its id.
     pub(crate) run: String,
-    /// Its name.
     pub(crate) fleet: String,
     /// `local` or `slurm`.
     pub(crate) engine: String,
@@ -154,9 +138,7 @@ pub struct RunNote {
 /// A robot of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Member {
-    /// Name of the robot.
     pub(crate) name: String,
-    /// Its labels.
     #[serde(default)]
     pub(crate) groups: Groups,
     /// Key of its record, once there is one.
@@ -166,22 +148,8 @@ pub(crate) struct Member {
 
 /// The records of one fleet.
 pub struct Ledger<'a> {
-    /// Where records are.
     pub(crate) store: &'a Store,
-    /// Its name.
     pub(crate) fleet: String,
-}
-
-/// Held while a robot is computed; the kernel frees it when the process dies.
-pub(super) struct Claim {
-    path: PathBuf,
-    _file: Option<File>,
-}
-
-impl Drop for Claim {
-    fn drop(&mut self) {
-        let _ = fs::remove_file(&self.path);
-    }
 }
 
 impl<'a> Ledger<'a> {
@@ -207,10 +175,9 @@ impl<'a> Ledger<'a> {
 
     /// The record of a key; one that is torn, or whose tables are gone, is none.
     pub(crate) fn find(&self, key: &str) -> Result<Option<RobotRecord>> {
-        let note = self
+        let record: Option<RobotRecord> = self
             .store
             .note(&self.records(key), &format!("{key}.json"))?;
-        let record = note.and_then(|note| serde_json::from_value::<RobotRecord>(note).ok());
         let whole = |record: &RobotRecord| {
             let there = |made: &RobotTable| {
                 fs::metadata(self.store.object_path(&made.table))
@@ -288,27 +255,11 @@ impl<'a> Ledger<'a> {
             .drop_note(&self.records(key), &format!("{key}.json"))
     }
 
-    /// The right to compute a robot; none while another living process has it. Where locks cannot be had, both compute and the
-    /// first record stands.
+    /// The right to compute a robot; none while another living process has it.
     pub(super) fn claim(&self, key: &str) -> Result<Option<Claim>> {
-        let path = self
-            .store
-            .place_of_note(&["fleets", &self.fleet, "claims"], &format!("{key}.lock"))?;
-        let open = || {
-            path.parent().map_or(Ok(()), fs::create_dir_all)?;
-            File::options().create(true).append(true).open(&path)
-        };
-        let Ok(file) = open() else {
-            return Ok(Some(Claim { path, _file: None }));
-        };
-        match file.try_lock() {
-            Ok(()) => Ok(Some(Claim {
-                path,
-                _file: Some(file),
-            })),
-            Err(fs::TryLockError::WouldBlock) => Ok(None),
-            Err(fs::TryLockError::Error(_)) => Ok(Some(Claim { path, _file: None })),
-        }
+        let place = ["fleets", &self.fleet, "claims"];
+        let path = self.store.place_of_note(&place, &format!("{key}.lock"))?;
+        Ok(Claim::take(&path))
     }
 
     /// Keeps what a run of the fleet is about.
@@ -332,8 +283,7 @@ impl<'a> Ledger<'a> {
             }
         };
         let Some(name) = name else { return Ok(None) };
-        let note = self.store.note(&self.runs(), &name)?;
-        Ok(note.and_then(|note| serde_json::from_value(note).ok()))
+        self.store.note(&self.runs(), &name)
     }
 
     /// Keeps the roster with the keys of its records, for status and later campaigns.
@@ -343,8 +293,7 @@ impl<'a> Ledger<'a> {
     }
     /// The roster as the last run left it.
     pub(crate) fn closed(&self) -> Result<Option<RunNote>> {
-        let note = self.store.note(&["fleets", &self.fleet], "roster.json")?;
-        Ok(note.and_then(|note| serde_json::from_value(note).ok()))
+        self.store.note(&["fleets", &self.fleet], "roster.json")
     }
 
     /// Asks the workers of a run to stop after the robots that they have in hand.
@@ -357,11 +306,8 @@ impl<'a> Ledger<'a> {
     }
     /// Whether a run was asked to stop.
     pub(crate) fn cancelled(&self, run: &str) -> bool {
-        let note = self
-            .store
-            .note(&["fleets", &self.fleet], "cancelled.json")
-            .ok()
-            .flatten();
-        note.is_some_and(|note| note["run"] == run)
+        let place = ["fleets", &self.fleet];
+        let note = self.store.note::<Value>(&place, "cancelled.json");
+        note.ok().flatten().is_some_and(|note| note["run"] == run)
     }
 }

@@ -1,6 +1,6 @@
 //! Many robots through one pipeline: FLEET.yaml -> roster -> one record a robot in the store -> tables and a page.
 //!
-//! A robot is done when its record is in the store, whoever computed it: threads of this process (`local`) or tasks of a
+//! A robot is done when its record is in the store, whoever computed it: threads of this process (`work`) or tasks of a
 //! cluster (`cluster`). Names of robots are data: they become hashes in paths and never reach a shell.
 
 mod cause_answers;
@@ -9,21 +9,16 @@ pub(crate) mod causes;
 pub(crate) mod cluster;
 pub mod file;
 pub(crate) mod ledger;
-mod list;
-pub(crate) mod local;
-mod partition;
 mod pool;
 mod recalibration;
-pub(crate) mod robot;
 pub(crate) mod roster;
 pub(crate) mod round;
-pub(crate) mod slurm;
+mod sources;
 pub(crate) mod tables;
-mod work;
+pub(crate) mod work;
 
-pub use file::{FleetFile, Groups};
+pub use file::{FleetFile, FleetRobot, Groups};
 pub use ledger::{Ending, Ledger, RobotRecord};
-pub use robot::FleetRobot;
 pub use roster::Roster;
 pub use work::{Visit, Watcher, Workshop};
 
@@ -37,9 +32,7 @@ pub(crate) struct Fleet {
     pub(crate) file: FleetFile,
     /// The pipeline's YAML, where it lies.
     pub(crate) pipeline: PathBuf,
-    /// Its text.
     pub(crate) text: String,
-    /// Its robots.
     pub(crate) roster: Roster,
 }
 

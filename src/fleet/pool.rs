@@ -35,25 +35,18 @@ impl Fleet {
                 if let (Some(parameters), Some(recording)) =
                     (record.last("parameters"), record.last("recording"))
                 {
-                    for (port, table) in [
-                        ("previous_parameters", parameters),
-                        ("previous_recording", recording),
-                    ] {
+                    for (kind, table) in [("parameters", parameters), ("recording", recording)] {
                         let path = ledger.store.object(table)?;
-                        robot.set_text(
-                            &format!("{}.{port}", previous.stage),
-                            &path.to_string_lossy(),
-                        );
+                        let target = format!("{}.previous_{kind}", previous.stage);
+                        robot.set_text(&target, &path.to_string_lossy());
                     }
                 }
             }
         }
-        let by_causes = |prior: &PriorFrom| prior.by == PriorBy::Causes;
-        if let Some(wanted) = self.file.prior.clone().filter(by_causes) {
-            self.expect_causes(&wanted, ledger)?;
-        }
-        let by_parameters = |prior: &PriorFrom| prior.by != PriorBy::Causes;
-        if let Some(wanted) = self.file.prior.clone().filter(by_parameters) {
+        if let Some(wanted) = self.file.prior.clone() {
+            if wanted.by == PriorBy::Causes {
+                return self.expect_causes(&wanted, ledger);
+            }
             let earlier = Earlier::named(&wanted.fleet, "prior.fleet", ledger)?;
             let known = EarlierChanges::read(&earlier, &wanted, ledger)?;
             for robot in &mut self.roster.0 {
@@ -218,8 +211,6 @@ mod tests {
             cell: "backlash@joint 2".into(),
             robot: name.into(),
             group: "m".into(),
-            plant: None,
-            campaign: None,
             effect: "backlash".into(),
             place: "joint 2".into(),
             log_evidence: if size_mm > 0.0 { 9.0 } else { -2.0 },
@@ -228,7 +219,7 @@ mod tests {
             sigma: 0.002,
             log_ratio: 0.5 * (size_mm / 0.002f64).powi(2),
             unit: "mm".into(),
-            deviation: None,
+            ..FleetCellRow::default()
         };
         let sizes = [
             row("a", 0.04),
@@ -241,22 +232,18 @@ mod tests {
         let finding = FleetFindingRow {
             group: "m".into(),
             cell: "backlash@joint 2".into(),
-            robot: String::new(),
             effect: "backlash".into(),
             place: "joint 2".into(),
             follows: "approach".into(),
-            shape: None,
             robots: 5,
             of_robots: 6,
             log_odds: 30.0,
             probability: 1.0,
-            rival: None,
             size: 0.06,
             spread: Some(0.01),
             unit: "mm".into(),
-            trend: None,
             decided: Some(true),
-            statement: String::new(),
+            ..FleetFindingRow::default()
         };
         let of_robot = |robot: &str| {
             let prior = expected(&finding, &sizes, robot);

@@ -6,20 +6,11 @@ use crate::error::{Error, Result};
 use crate::statistics::normal_quantile;
 use crate::table::{Changes, Findings, FleetChangeRow, FleetChanges, Table};
 
-/// How rare a change by chance may be.
-pub(super) struct FalseAlarmRate {
-    /// In the whole fleet.
-    pub(crate) alpha: f64,
-}
-
-/// Changes of all robots with their control limits: alpha shared by every robot and parameter that was tested (Bonferroni).
-pub(super) fn with_limits(robots: &[(&str, &Changes)], limits: &FalseAlarmRate) -> FleetChanges {
-    let tests = robots
-        .iter()
-        .map(|(_, changes)| changes.0.len())
-        .sum::<usize>()
-        .max(1);
-    let each = limits.alpha / tests as f64;
+/// Changes of all robots with their control limits: alpha, the chance of a false alarm in the whole fleet, shared by every robot and parameter
+/// that was tested (Bonferroni).
+pub(super) fn with_limits(robots: &[(&str, &Changes)], alpha: f64) -> FleetChanges {
+    let tests: usize = robots.iter().map(|(_, changes)| changes.0.len()).sum();
+    let each = alpha / tests.max(1) as f64;
     // A normal variable is farther from its mean, either way, with this chance.
     let width = normal_quantile(0.5 * each);
     let mut table = FleetChanges::default();

@@ -1,9 +1,9 @@
 //! The robots of a fleet, each with its name, its groups and what it sets in the pipeline.
 
-use super::file::{FleetFile, RobotSource, faulty};
-use super::robot::FleetRobot;
-use super::{list, partition};
+use super::file::{FleetFile, FleetRobot, RobotSource, faulty};
+use super::sources::{read_list, read_recording};
 use crate::error::{Error, Result};
+use crate::pipeline::trouble_at;
 use crate::stage::matches;
 use crate::store::Store;
 use crate::yaml::{Node, Trouble};
@@ -58,30 +58,19 @@ impl Roster {
         }
         for (name, times) in seen.into_iter().filter(|(_, times)| *times > 1) {
             let message = format!("{times} robots have the name {name:?}; names identify robots");
-            troubles.push(
-                Trouble::new(message)
-                    .at(tree.nearest_mark("robots"))
-                    .below("robots"),
-            );
+            troubles.push(trouble_at(tree, "robots", message));
         }
         for (index, exception) in file.overrides.iter().enumerate() {
             for (k, pattern) in exception.robots.iter().enumerate() {
                 if !robots.iter().any(|robot| matches(pattern, &robot.name)) {
                     let place = format!("overrides[{index}].robots[{k}]");
                     let message = format!("no robot has a name like {pattern:?}");
-                    troubles.push(
-                        Trouble::new(message)
-                            .at(tree.nearest_mark(&place))
-                            .below(&place),
-                    );
+                    troubles.push(trouble_at(tree, &place, message));
                 }
             }
             for robot in &mut robots {
-                if exception
-                    .robots
-                    .iter()
-                    .any(|pattern| matches(pattern, &robot.name))
-                {
+                let mut patterns = exception.robots.iter();
+                if patterns.any(|pattern| matches(pattern, &robot.name)) {
                     robot.set_values(&exception.set);
                     robot.groups = exception.groups.or(&robot.groups);
                 }
@@ -114,14 +103,14 @@ fn found(
         );
     }
     if let Some(path) = &source.list {
-        return list::read(
+        return read_list(
             &folder.join(path),
             source.variable.as_deref().unwrap_or(FOLDER),
         );
     }
     match (&source.recording, &source.variable) {
         (Some(path), Some(variable)) => {
-            partition::read(&folder.join(path), &source.by, variable, &file.name, store)
+            read_recording(&folder.join(path), &source.by, variable, &file.name, store)
         }
         _ => Ok(Vec::new()),
     }

@@ -1,7 +1,6 @@
 //! A round of a fleet's diagnosis: every robot asked what all cells say of it given those that its group has so far.
 
-use super::file::Groups;
-use super::robot::FleetRobot;
+use super::file::{FleetRobot, Groups};
 use crate::error::{Error, Result};
 use crate::pipeline::Plan;
 use crate::stage::{

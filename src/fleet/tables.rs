@@ -2,12 +2,12 @@
 
 use super::Fleet;
 use super::ledger::{Ending, Ledger, RobotRecord};
-use super::recalibration::{self, FalseAlarmRate};
+use super::recalibration;
 use crate::error::Result;
 use crate::report::fleet as page;
 use crate::table::{
     Changes, Findings, FleetChangeRow, FleetRow, FleetTable, Statistics, StatisticsRow, Table,
-    Verdict,
+    Verdict, VerdictRow,
 };
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -46,7 +46,7 @@ pub(crate) fn publish(
         .previous
         .as_ref()
         .map_or(1.0, |previous| previous.alpha);
-    let changes = recalibration::with_limits(&changes, &FalseAlarmRate { alpha });
+    let changes = recalibration::with_limits(&changes, alpha);
     let mut flagged: BTreeMap<&str, Vec<&FleetChangeRow>> = BTreeMap::new();
     for change in changes.0.iter().filter(|change| change.flagged) {
         flagged.entry(&change.robot).or_default().push(change);
@@ -54,12 +54,10 @@ pub(crate) fn publish(
     let mut table = FleetTable::default();
     for ((robot, record), read) in fleet.roster.0.iter().zip(records).zip(&read) {
         let mut row = read.row(robot, record.as_ref());
-        if let (Some(earlier), Some(_)) = (
-            &earlier,
-            record
-                .as_ref()
-                .filter(|record| record.ending == Ending::Done),
-        ) {
+        let is_done = |record: &RobotRecord| record.ending == Ending::Done;
+        if let Some(earlier) = &earlier
+            && record.as_ref().is_some_and(is_done)
+        {
             let changed = flagged.remove(robot.name.as_str()).unwrap_or_default();
             row.changes = Some(changed.len() as i64);
             let flags = earlier.flags(ledger, &robot.name, changed, read.findings.as_ref())?;
@@ -144,13 +142,17 @@ impl Read {
         let rows = self.statistics.as_ref().map(final_rows).unwrap_or_default();
         let (first, last) = (rows.first().copied(), rows.last().copied());
         let verdict = self.verdict.as_ref().and_then(|verdict| verdict.0.first());
+        let findings = self.findings.as_ref();
         // A pipeline that does not predict with what it found still says how much better that is.
         let diagnosed = verdict.filter(|_| last.is_none());
-        let course = rows
-            .iter()
+        let either = |row: Option<&StatisticsRow>,
+                      of_row: fn(&StatisticsRow) -> f64,
+                      of_verdict: fn(&VerdictRow) -> Option<f64>| {
+            row.map(of_row).or(diagnosed.and_then(of_verdict))
+        };
+        let course: Vec<String> = (rows.iter())
             .map(|row| format!("{:.4}", row.rms_mm))
-            .collect::<Vec<_>>()
-            .join(" ");
+            .collect();
         FleetRow {
             robot: robot.name.clone(),
             model: robot.groups.model.clone(),
@@ -162,24 +164,12 @@ impl Read {
             reason: record.and_then(|record| record.reason.clone()),
             points: last.map(|row| row.points),
             held_out: last.map(|row| row.held_out),
-            before_mean_mm: first
-                .map(|row| row.mean_mm)
-                .or(diagnosed.and_then(|v| v.before_mean_mm)),
-            before_rms_mm: first
-                .map(|row| row.rms_mm)
-                .or(diagnosed.and_then(|v| v.before_rms_mm)),
-            before_max_mm: first
-                .map(|row| row.max_mm)
-                .or(diagnosed.and_then(|v| v.before_max_mm)),
-            after_mean_mm: last
-                .map(|row| row.mean_mm)
-                .or(diagnosed.and_then(|v| v.after_mean_mm)),
-            after_rms_mm: last
-                .map(|row| row.rms_mm)
-                .or(diagnosed.and_then(|v| v.after_rms_mm)),
-            after_max_mm: last
-                .map(|row| row.max_mm)
-                .or(diagnosed.and_then(|v| v.after_max_mm)),
+            before_mean_mm: either(first, |row| row.mean_mm, |v| v.before_mean_mm),
+            before_rms_mm: either(first, |row| row.rms_mm, |v| v.before_rms_mm),
+            before_max_mm: either(first, |row| row.max_mm, |v| v.before_max_mm),
+            after_mean_mm: either(last, |row| row.mean_mm, |v| v.after_mean_mm),
+            after_rms_mm: either(last, |row| row.rms_mm, |v| v.after_rms_mm),
+            after_max_mm: either(last, |row| row.max_mm, |v| v.after_max_mm),
             floor_mm: verdict
                 .and_then(|v| v.noise_floor_mm)
                 .or(last.map(|row| row.noise_rms_mm)),
@@ -187,19 +177,11 @@ impl Read {
                 || last.and_then(|row| row.noise_basis.clone()),
                 |v| v.noise_basis.clone(),
             ),
-            course: (!course.is_empty()).then_some(course),
+            course: (!course.is_empty()).then(|| course.join(" ")),
             verdict: verdict.map(|v| v.verdict.clone()),
-            findings: self
-                .findings
-                .as_ref()
-                .map(|findings| findings.0.len() as i64),
-            causes: self
-                .findings
-                .as_ref()
-                .map(causes)
-                .filter(|causes| !causes.is_empty()),
-            changes: None,
-            flags: None,
+            findings: findings.map(|findings| findings.0.len() as i64),
+            causes: findings.map(causes).filter(|causes| !causes.is_empty()),
+            ..FleetRow::default()
         }
     }
 }
@@ -216,23 +198,12 @@ fn causes(findings: &Findings) -> String {
 
 /// One row a step, in pipeline order: of held-out points where the last step has some, of the set with most of them.
 fn final_rows(statistics: &Statistics) -> Vec<&StatisticsRow> {
-    let Some(last) = statistics.0.iter().map(|row| row.order).max() else {
-        return Vec::new();
-    };
-    let of_order = |order: i64, held_out: bool| {
-        statistics
-            .0
-            .iter()
-            .filter(move |row| row.order == order && row.held_out == held_out)
-    };
-    let held_out = of_order(last, true).next().is_some();
-    let Some(set) = of_order(last, held_out)
-        .max_by_key(|row| row.points)
-        .map(|row| row.set.as_str())
-    else {
-        return Vec::new();
-    };
-    (0..=last)
-        .filter_map(|order| of_order(order, held_out).find(|row| row.set == set))
-        .collect()
+    let rows = &statistics.0;
+    let last = rows.iter().map(|row| row.order).max();
+    let most = (rows.iter().filter(|row| Some(row.order) == last))
+        .max_by_key(|row| (row.held_out, row.points));
+    let Some(most) = most else { return Vec::new() };
+    let is_like = |row: &&StatisticsRow| row.held_out == most.held_out && row.set == most.set;
+    let of_order = |order| rows.iter().filter(is_like).find(|row| row.order == order);
+    (0..=most.order).filter_map(of_order).collect()
 }

@@ -4,17 +4,15 @@
 
 use super::plan::{InputFile, PlannedStage, Selection};
 use super::run_state::{KeyState, RunState};
-use super::{Override, Plan, reason, services, spec};
+use super::services::StageServices;
+use super::{Override, Plan, Unwatched, reason, spec};
 use crate::error::{Error, Fault, Result};
 use crate::raw;
-use crate::stage::{
-    Context, InputTable, OpenedInput, Output, RawFile, STAGES, Services, Sink, StageEntry,
-};
+use crate::stage::{Context, ErasedStage, InputTable, Output, STAGES, StageEntry};
 use crate::store::frame::Frame;
 use crate::store::{Lookup, Store};
 use serde::Serialize;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
 
 /// Looks at every stage's files. Gives what stages warn of; fails with the faults of all files, as faults of the author's where one
 /// of them is (a robot file), else as faults of the data.
@@ -22,27 +20,9 @@ pub fn look(plan: &Plan) -> Result<Vec<String>> {
     let mut tables: Vec<Option<Vec<Frame>>> = Vec::new();
     let (mut spec, mut data, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
     for stage in &plan.stages {
-        let services = Onlooker {
-            id: &stage.id,
-            files: &stage.files,
-            warnings: Mutex::default(),
-        };
-        let context = Context {
-            id: &stage.id,
-            seed: 0,
-            jobs: 1,
-            services: &services,
-        };
-        let seen = stage.stage.look(frames(plan, stage, &tables), &context);
-        let warned = services
-            .warnings
-            .into_inner()
-            .unwrap_or_else(PoisonError::into_inner);
-        warnings.extend(
-            warned
-                .into_iter()
-                .map(|line| format!("{}: {line}", stage.id)),
-        );
+        let inputs = frames(plan, stage, &tables);
+        let (seen, warned) = look_at(&*stage.stage, &stage.id, &stage.files, inputs);
+        warnings.extend(warned.iter().map(|line| format!("{}: {line}", stage.id)));
         tables.push(match seen {
             Ok(outputs) => outputs.and_then(in_memory),
             Err(Error::Spec(faults)) => {
@@ -102,31 +82,33 @@ fn faults_of_robots(
         return faults;
     };
     for draft in spec::read(file, &text, overrides, registry).stages {
-        let Some(stage) = draft
-            .stage
-            .filter(|_| draft.entry.is_some_and(|entry| entry.name == "robot"))
-        else {
-            continue;
-        };
-        let services = Onlooker {
-            id: &draft.id,
-            files: &draft.files,
-            warnings: Mutex::default(),
-        };
-        let seen = stage.look(
-            Some(Vec::new()),
-            &Context {
-                id: &draft.id,
-                seed: 0,
-                jobs: 1,
-                services: &services,
-            },
-        );
-        if let Err(Error::Spec(more)) = seen {
+        let is_robot = draft.entry.is_some_and(|entry| entry.name == "robot");
+        if let Some(stage) = draft.stage.filter(|_| is_robot)
+            && let (Err(Error::Spec(more)), _) =
+                look_at(&*stage, &draft.id, &draft.files, Some(Vec::new()))
+        {
             faults.extend(more);
         }
     }
     faults
+}
+
+/// What a stage sees of its files and tables, and what it warns of.
+fn look_at(
+    stage: &dyn ErasedStage,
+    id: &str,
+    files: &[InputFile],
+    inputs: Option<Vec<Vec<(String, InputTable)>>>,
+) -> (Result<Option<Vec<Output>>>, Vec<String>) {
+    let services = StageServices::new(id, None, files, &Unwatched);
+    let context = Context {
+        id,
+        seed: 0,
+        jobs: 1,
+        services: &services,
+    };
+    let seen = stage.look(inputs, &context);
+    (seen, services.lines().warnings)
 }
 
 /// The tables that a stage reads, if those before it could give them all.
@@ -138,8 +120,8 @@ fn frames(
     let inputs = stage.inputs.iter().map(|input| {
         let frames = input.from.iter().map(|origin| {
             let frame = tables.get(origin.stage)?.as_ref()?.get(origin.port)?;
-            let input: InputTable = Box::new(frame.clone());
-            Some((plan.stages.get(origin.stage)?.id.clone(), input))
+            let id = plan.stages.get(origin.stage)?.id.clone();
+            Some((id, InputTable::Frame(frame.clone())))
         });
         frames.collect()
     });
@@ -152,34 +134,6 @@ fn in_memory(outputs: Vec<Output>) -> Option<Vec<Frame>> {
         Output::Streamed(_) => None,
     });
     frames.collect()
-}
-
-/// Opens files, writes nothing and keeps what a stage warns of.
-struct Onlooker<'a> {
-    id: &'a str,
-    files: &'a [InputFile],
-    warnings: Mutex<Vec<String>>,
-}
-
-impl Services for Onlooker<'_> {
-    fn open(&self, file: &RawFile) -> Result<OpenedInput> {
-        services::open(self.id, self.files, file)
-    }
-    fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
-        Err(Error::Bug(format!(
-            "stage {} writes a table of {kind} while it is only looked at",
-            self.id
-        )))
-    }
-    fn begin(&self, _what: &str, _total: Option<u64>, _unit: &str) {}
-    fn advance(&self, _done: u64, _message: &str) {}
-    fn note(&self, _line: String) {}
-    fn warn(&self, line: String) {
-        self.warnings
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .push(line);
-    }
 }
 
 /// What would become of a stage.

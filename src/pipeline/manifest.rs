@@ -83,7 +83,6 @@ pub struct Manifest {
     pub(crate) environment: BTreeMap<String, String>,
     /// As it was typed, word by word.
     pub(crate) command_line: Vec<String>,
-    /// The seed of the pipeline.
     pub(crate) seed: u64,
     pub(crate) jobs: usize,
     /// RFC 3339, UTC.
@@ -122,7 +121,7 @@ pub(crate) struct PipelineRecord {
 }
 
 /// How a stage stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StageStatus {
     /// Its tables were there already.
@@ -132,11 +131,12 @@ pub enum StageStatus {
     /// Its work ended with an error.
     Failed,
     /// Outside of what was selected, or never reached.
+    #[default]
     NotRun,
 }
 
 /// One stage's report: its state, keys and tables.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct StageReport {
     pub(crate) id: String,
     pub(crate) uses: String,
@@ -247,6 +247,12 @@ impl Manifest {
         options: &RunOptions,
         started: String,
     ) -> Self {
+        let pending = |stage: &super::plan::PlannedStage| StageReport {
+            id: stage.id.clone(),
+            uses: stage.entry.name.into(),
+            implementation: stage.entry.implementation,
+            ..StageReport::default()
+        };
         Self {
             manifest_format: MANIFEST_FORMAT,
             run_id: surroundings.run_id.clone(),
@@ -273,27 +279,7 @@ impl Manifest {
             ended: None,
             wall_seconds: None,
             peak_memory_bytes: None,
-            stages: plan.stages.iter().map(StageReport::pending).collect(),
-        }
-    }
-}
-
-impl StageReport {
-    fn pending(stage: &super::plan::PlannedStage) -> Self {
-        Self {
-            id: stage.id.clone(),
-            uses: stage.entry.name.into(),
-            implementation: stage.entry.implementation,
-            status: StageStatus::NotRun,
-            reason: None,
-            action: None,
-            key: None,
-            inputs: Vec::new(),
-            files: Vec::new(),
-            outputs: Vec::new(),
-            notes: Vec::new(),
-            warnings: Vec::new(),
-            wall_seconds: None,
+            stages: plan.stages.iter().map(pending).collect(),
         }
     }
 }
@@ -338,12 +324,11 @@ pub fn find_run(store: &Store, text: &str) -> Result<String> {
         [run] if !text.is_empty() => Ok((*run).clone()),
         [] => {
             let tags = store.tags()?;
-            let hint = nearest(text, tags.keys().map(String::as_str))
-                .map(|near| format!("; did you mean the tag `{near}`?"));
-            nothing(format!(
-                "no such run or tag{} `calib log` lists them",
-                hint.unwrap_or_else(|| ";".into())
-            ))
+            let hint = nearest(text, tags.keys().map(String::as_str)).map_or_else(
+                || ";".into(),
+                |near| format!("; did you mean the tag `{near}`?"),
+            );
+            nothing(format!("no such run or tag{hint} `calib log` lists them"))
         }
         several => nothing(format!(
             "the ids of {} runs begin or end like this; give more of the id",

@@ -1,6 +1,5 @@
 //! The YAML, the plan, the run: `spec` reads and types, `wiring` and `plan` connect, `run` does what is not already done.
 
-mod globs;
 mod look;
 mod manifest;
 mod overrides;
@@ -27,4 +26,4 @@ pub use run::{CompletedRun, run};
 pub use schema::json_schema;
 pub use services::{Interrupted, Observer, Unwatched};
 pub use services::{StageCall, StageTables, run_in_memory};
-pub(crate) use spec::misnamed;
+pub(crate) use spec::{misnamed, trouble_at};

@@ -6,7 +6,7 @@
 //!
 //! Sets that a stage names and no split deals rows to, as far as the settings alone say it.
 
-use crate::error::{Error, Fault, Result, instead, nearest};
+use crate::error::{Error, Fault, Result, instead, listed, suggestion};
 use crate::pipeline::overrides::Override;
 use crate::pipeline::spec;
 pub use crate::pipeline::spec::InputFile;
@@ -178,14 +178,7 @@ impl Plan {
             .position(|stage| stage.id == id)
             .ok_or_else(|| {
                 let ids: Vec<&str> = self.stages.iter().map(|stage| stage.id.as_str()).collect();
-                let hint = crate::error::nearest(id, ids.iter().copied())
-                    .map(|near| format!("; did you mean `{near}`?"));
-                let message = format!(
-                    "no stage `{id}`{} Allowed: {}",
-                    hint.unwrap_or_else(|| ".".into()),
-                    ids.join(", ")
-                );
-                Error::spec(option, message)
+                Error::spec(option, format!("no stage `{id}`{}", instead(id, &ids)))
             })
     }
 }
@@ -282,13 +275,11 @@ pub(super) fn wire(
     for (name, wish) in &stage.reads {
         if !ports.iter().any(|port| port.name == name) {
             let names: Vec<&str> = ports.iter().map(|port| port.name).collect();
-            let hint = nearest(name, names.iter().copied())
-                .map(|near| format!("; did you mean `{near}`?"));
-            let hint = hint.unwrap_or_else(|| ".".into());
+            let hint = suggestion(name, names.iter().copied());
             let message = format!(
                 "stage `{}` has no input `{name}`{hint} Allowed: {}",
                 entry.name,
-                list(&names)
+                list(names)
             );
             troubles.push(
                 Trouble::new(message)
@@ -307,14 +298,13 @@ pub(super) fn wire(
             // A stage that is not known may write anything: its own fault is enough.
             let blind = stages[..index].iter().any(|stage| stage.entry.is_none());
             if from.is_empty() && port.arity == Arity::One && !blind && !stage.reads.contains_key(port.name) {
-                let writers: Vec<&str> =
-                    registry.iter().filter(|entry| writes(entry, port.kind)).map(|entry| entry.name).collect();
+                let writers = registry.iter().filter(|entry| writes(entry, port.kind));
                 troubles.push(
                     Trouble::new(format!(
                         "stage `{}` reads a `{}` table and no stage before it writes one; put one of these before it: {}",
                         stage.id,
                         port.kind,
-                        list(&writers)
+                        list(writers.map(|entry| entry.name))
                     ))
                     .at(stage.mark),
                 );
@@ -360,28 +350,20 @@ fn wished(
     troubles: &mut Vec<Trouble>,
 ) -> Vec<Origin> {
     let mut origins = Vec::new();
+    let place = format!("reads.{}", port.name);
+    let mut fault = |message| troubles.push(Trouble::new(message).at(wish.mark).below(&place));
     for name in &wish.names {
         match find(stages, index, port, name) {
-            Ok(Some(origin)) => origins.push(origin),
-            Ok(None) => {}
-            Err(message) => troubles.push(
-                Trouble::new(message)
-                    .at(wish.mark)
-                    .below(&format!("reads.{}", port.name)),
-            ),
+            Ok(origin) => origins.extend(origin),
+            Err(message) => fault(message),
         }
     }
     if port.arity != Arity::Every && wish.names.len() != 1 {
-        let message = format!(
+        fault(format!(
             "input `{}` takes one table; found {} names",
             port.name,
             wish.names.len()
-        );
-        troubles.push(
-            Trouble::new(message)
-                .at(wish.mark)
-                .below(&format!("reads.{}", port.name)),
-        );
+        ));
     }
     origins.sort_by_key(|origin| (origin.stage, origin.port));
     origins
@@ -399,13 +381,8 @@ fn find(
         .map_or((name, None), |(id, output)| (id, Some(output)));
     let Some(stage) = stages.iter().position(|stage| stage.id == id) else {
         let ids = stages[..index].iter().map(|stage| stage.id.as_str());
-        let hint = nearest(id, ids.clone())
-            .map(|near| format!("; did you mean `{near}`?"))
-            .unwrap_or_else(|| ".".into());
-        return Err(format!(
-            "no stage `{id}`{hint} Allowed: {}",
-            list(&ids.collect::<Vec<_>>())
-        ));
+        let hint = suggestion(id, ids.clone());
+        return Err(format!("no stage `{id}`{hint} Allowed: {}", list(ids)));
     };
     if stage >= index {
         let stage_id = if stage == index {
@@ -432,15 +409,13 @@ fn find(
     match best.and_then(|best| outputs.iter().position(|candidate| candidate == best)) {
         Some(port) => Ok(Some(Origin { stage, port })),
         None => {
-            let written: Vec<String> = outputs
+            let written = outputs
                 .iter()
-                .map(|output| format!("{} ({})", output.name, output.kind))
-                .collect();
-            let written: Vec<&str> = written.iter().map(String::as_str).collect();
+                .map(|output| format!("{} ({})", output.name, output.kind));
             Err(format!(
                 "`{name}` is no `{}` table; stage `{id}` writes: {}",
                 port.kind,
-                list(&written)
+                list(written)
             ))
         }
     }
@@ -449,11 +424,10 @@ fn find(
 fn writes(entry: &StageEntry, kind: &str) -> bool {
     (entry.writes)().iter().any(|port| port.kind == kind)
 }
-fn list(names: &[&str]) -> String {
-    if names.is_empty() {
-        "(none)".into()
-    } else {
-        names.join(", ")
+fn list<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
+    match listed(names).as_str() {
+        "none" => "(none)".into(),
+        names => names.into(),
     }
 }
 

@@ -1,11 +1,13 @@
 //! Why a stage runs: the components of its key against those of its last run, in words.
 
 use super::plan::Plan;
-use crate::error::Result;
+use crate::error::{Result, first_of};
 use crate::store::{Lookup, StageKey, Store};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Names of changes that fit on a line.
+const SHOWN: usize = 3;
 /// Runs that are looked at before a stage counts as never run.
 const HISTORY: usize = 200;
 
@@ -95,25 +97,15 @@ pub fn changes_of(before: &StageKey, now: &StageKey) -> Vec<KeyChange> {
     for (path, old, new) in settings {
         push("settings", &path, old, new);
     }
-    let reads = |key: &StageKey| {
-        key.reads
-            .iter()
-            .flat_map(|(port, tables)| tables.iter().map(|read| input(port, read)))
-            .collect()
+    let parts = |key: &StageKey| -> [BTreeMap<String, String>; 3] {
+        let reads = key.reads.iter();
+        let reads = reads.flat_map(|(port, all)| all.iter().map(|read| input(port, read)));
+        let files = key.files.values();
+        let files = files.map(|file| (file.name.clone(), file.content.to_string()));
+        [reads.collect(), files.collect(), key.schemas.clone()]
     };
-    let files = |key: &StageKey| {
-        key.files
-            .values()
-            .map(|file| (file.name.clone(), file.content.to_string()))
-            .collect()
-    };
-    type Parts = BTreeMap<String, String>;
-    let pairs: [(&'static str, Parts, Parts); 3] = [
-        ("input", reads(before), reads(now)),
-        ("file", files(before), files(now)),
-        ("schema of", before.schemas.clone(), now.schemas.clone()),
-    ];
-    for (what, old, new) in pairs {
+    let pairs = parts(before).into_iter().zip(parts(now));
+    for (what, (old, new)) in ["input", "file", "schema of"].into_iter().zip(pairs) {
         let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
         for name in names {
             let of_map = |map: &BTreeMap<String, String>| {
@@ -144,17 +136,10 @@ fn input(port: &str, read: &crate::store::ReadKey) -> (String, String) {
 /// `settings changed: identify.ratios; input recording changed`.
 fn changes(before: &StageKey, now: &StageKey) -> String {
     let changes = changes_of(before, now);
-    let names = |what: &str| -> Vec<String> {
+    let names = |what: &str| -> Vec<&str> {
         let named = changes.iter().filter(|change| change.what == what);
-        let mut names: Vec<String> = named
-            .map(|change| {
-                change
-                    .name
-                    .split(" (")
-                    .next()
-                    .unwrap_or_default()
-                    .to_string()
-            })
+        let mut names: Vec<&str> = named
+            .map(|change| change.name.split(" (").next().unwrap_or_default())
             .collect();
         names.dedup();
         names
@@ -166,19 +151,21 @@ fn changes(before: &StageKey, now: &StageKey) -> String {
     }
     let settings = names("settings");
     if !settings.is_empty() {
-        reasons.push(format!("settings changed: {}", few(settings)));
+        reasons.push(format!("settings changed: {}", first_of(&settings, SHOWN)));
     }
     for what in ["input", "file", "schema of"] {
         let names = names(what);
         if !names.is_empty() {
-            reasons.push(format!("{what} {} changed", few(names)));
+            reasons.push(format!("{what} {} changed", first_of(&names, SHOWN)));
         }
     }
-    if changes.iter().any(|change| change.what == "seed") {
-        reasons.push("seed changed".into());
-    }
-    if changes.iter().any(|change| change.what == "key format") {
-        reasons.push("calib keys its results in another way now".into());
+    for (what, reason) in [
+        ("seed", "seed changed"),
+        ("key format", "calib keys its results in another way now"),
+    ] {
+        if changes.iter().any(|change| change.what == what) {
+            reasons.push(reason.into());
+        }
     }
     if reasons.is_empty() {
         "its tables are no longer in the store".into()
@@ -209,13 +196,5 @@ fn differing(
         _ => {
             paths.insert((path.into(), before.to_string(), now.to_string()));
         }
-    }
-}
-
-fn few(names: Vec<String>) -> String {
-    const SHOWN: usize = 3; // more do not fit on a line
-    match names.len() {
-        0..=SHOWN => names.join(", "),
-        all => format!("{} and {} more", names[..SHOWN].join(", "), all - SHOWN),
     }
 }

@@ -11,23 +11,18 @@ use super::manifest::{
     Surroundings,
 };
 use super::plan::{Plan, Selected};
-use super::run_state::{self, ActionLock, KeyState, RunState};
+use super::run_state::{self, KeyState, RunState};
 use super::services::{Interrupted, Observer, StageServices, label};
-use super::{overrides, reason};
+use super::{overrides, reason, spec::trouble_at};
 use crate::error::{Error, Fault, Result};
-use crate::stage::{Context, InputTable, Output, StoredTable};
-use crate::store::frame::Frame;
+use crate::stage::{Context, InputTable, Output, Port, Streamed};
 use crate::store::key::canonical;
-use crate::store::{
-    Account, ActionRecord, FinishedFile, Lookup, PendingTable, PublishedTable, Run, StageKey,
-    Store, TableRef,
-};
-use crate::yaml::{self, Node, Trouble};
+use crate::store::{Account, ActionRecord, Lookup, PendingTable, Run, StageKey, Store, TableRef};
+use crate::yaml;
 use serde_json::json;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
-use std::sync::OnceLock;
 use std::time::SystemTime;
 
 /// Seconds of work that are made durable together: more than a group of syncs costs, less than one would mind doing again.
@@ -165,12 +160,12 @@ impl Running<'_> {
             self.observer
                 .note(id, "waiting for another run that does the same")
         };
-        let lock = ActionLock::take(self.store, &key.id(), &mut waiting);
+        let claim = run_state::claim(self.store, &key.id(), &mut waiting);
         if let (false, Lookup::Done(record)) = (forced, self.store.action(&key)?) {
             return self.cached(index, *record);
         }
         let result = self.execute(index, key, reason);
-        drop(lock);
+        drop(claim);
         if result.is_err() {
             self.manifest.stages[index].status = StageStatus::Failed;
         }
@@ -191,19 +186,12 @@ impl Running<'_> {
         let started = (self.now)();
         self.event("begins", index, serde_json::json!({ "reason": reason }))?;
         self.manifest.stages[index].reason = Some(reason);
-        let place = ExecutionSite {
-            store: self.store,
-            threads: self.threads.as_ref(),
-            jobs: self.manifest.jobs,
-            observer: self.observer,
-            run: &self.manifest.run_id,
-        };
-        let mut account = crate::store::Account {
-            run: place.run.into(),
+        let mut account = Account {
+            run: self.manifest.run_id.clone(),
             started: rfc3339(started),
             ..Default::default()
         };
-        let products = products(&self.state, index, &place, &mut account)?;
+        let products = self.products(index, &mut account)?;
         let ended = (self.now)();
         account.ended = rfc3339(ended);
         account.wall_seconds = seconds(started, ended);
@@ -266,6 +254,75 @@ impl Running<'_> {
         Ok(())
     }
 
+    /// Runs the body of a stage; its messages go into `account`. A panic is a bug with the stage's name.
+    fn products(&self, index: usize, account: &mut Account) -> Result<Vec<(String, PendingTable)>> {
+        let plan = self.state.plan;
+        let stage = &plan.stages[index];
+        let inputs = self.loaded(index)?;
+        let services = StageServices::new(&stage.id, Some(self.store), &stage.files, self.observer);
+        let context = Context {
+            id: &stage.id,
+            seed: self.state.seed(index),
+            jobs: self.manifest.jobs,
+            services: &services,
+        };
+        let run = || stage.stage.run(inputs, &context);
+        let body = || match &self.threads {
+            Some(threads) => threads.install(run),
+            None => run(),
+        };
+        let bug = |what: String| Error::Bug(format!("stage {}{what}", stage.id));
+        let outputs = catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
+            if panic.is::<Interrupted>() {
+                return Err(Error::store(&stage.id, "was interrupted: run it again"));
+            }
+            Err(bug(format!(" panicked: {}", panic_message(&*panic))))
+        });
+        let lines = services.lines();
+        (account.notes, account.warnings) = (lines.notes, lines.warnings);
+        let outputs = outputs.map_err(|error| placed(error, plan, &stage.id))?;
+        if outputs.len() != stage.outputs.len() {
+            let ports = stage.outputs.len();
+            let message = format!(" gave {} tables for {ports} ports", outputs.len());
+            return Err(bug(message));
+        }
+        let product = |(port, output): (&Port, Output)| {
+            let (kind, product) = match output {
+                Output::Frame(frame) => (frame.kind(), PendingTable::Frame(frame)),
+                Output::Streamed(Streamed { kind, file }) => {
+                    let other = || bug(": a sink that is not the engine's".into());
+                    (kind, PendingTable::File(file.ok_or_else(other)?))
+                }
+            };
+            if kind != port.kind {
+                return Err(bug(format!(": a table of {kind} on port {}", port.name)));
+            }
+            Ok((port.name.to_string(), product))
+        };
+        stage.outputs.iter().zip(outputs).map(product).collect()
+    }
+
+    /// The tables of every input port of a stage.
+    fn loaded(&self, index: usize) -> Result<Vec<Vec<(String, InputTable)>>> {
+        let stages = &self.state.plan.stages;
+        let inputs = stages[index].inputs.iter().map(|input| {
+            let tables = input.from.iter().map(|origin| {
+                let from = &stages[origin.stage];
+                let tables = self.state.tables[origin.stage].as_ref();
+                let tables = tables
+                    .ok_or_else(|| Error::Bug(format!("stage {} has no tables yet", from.id)))?;
+                let table = run_state::table(tables, from, origin.port)?;
+                let input = match input.port.chunked {
+                    true => InputTable::Stored(self.store.published(table)?),
+                    false => InputTable::Frame(self.store.load(table)?),
+                };
+                Ok((from.id.clone(), input))
+            });
+            tables.collect()
+        });
+        inputs.collect()
+    }
+
     fn inputs(&self, index: usize) -> Result<Vec<InputRecord>> {
         let stages = &self.state.plan.stages;
         let mut records = Vec::new();
@@ -324,143 +381,8 @@ fn seconds(from: SystemTime, to: SystemTime) -> f64 {
     to.duration_since(from).unwrap_or_default().as_secs_f64()
 }
 
-/// Where a stage is executed.
-pub(super) struct ExecutionSite<'a> {
-    pub(crate) store: &'a Store,
-    /// None where this thread is one of them.
-    pub(crate) threads: Option<&'a rayon::ThreadPool>,
-    pub(crate) jobs: usize,
-    pub(crate) observer: &'a dyn Observer,
-    pub(crate) run: &'a str,
-}
-
-/// Runs the body of a stage; its messages go into `account`. A panic is a bug with the stage's name.
-pub(super) fn products(
-    state: &RunState,
-    index: usize,
-    place: &ExecutionSite,
-    account: &mut Account,
-) -> Result<Vec<(String, PendingTable)>> {
-    let stage = &state.plan.stages[index];
-    let inputs = load(state, index, place.store)?;
-    let services = StageServices::new(&stage.id, Some(place.store), &stage.files, place.observer);
-    let context = Context {
-        id: &stage.id,
-        seed: state.seed(index),
-        jobs: place.jobs,
-        services: &services,
-    };
-    let run = || stage.stage.run(inputs, &context);
-    let body = || match place.threads {
-        Some(threads) => threads.install(run),
-        None => run(),
-    };
-    let outputs = catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
-        if panic.is::<Interrupted>() {
-            return Err(Error::store(&stage.id, "was interrupted: run it again"));
-        }
-        Err(Error::Bug(format!(
-            "stage {} panicked: {}",
-            stage.id,
-            panic_message(&*panic)
-        )))
-    });
-    let lines = services.lines();
-    (account.notes, account.warnings) = (lines.notes, lines.warnings);
-    let outputs = outputs.map_err(|error| placed(error, state.plan, &stage.id))?;
-    if outputs.len() != stage.outputs.len() {
-        return Err(Error::Bug(format!(
-            "stage {} gave {} tables for {} ports",
-            stage.id,
-            outputs.len(),
-            stage.outputs.len()
-        )));
-    }
-    stage
-        .outputs
-        .iter()
-        .zip(outputs)
-        .map(|(port, output)| {
-            let (kind, product) = match output {
-                Output::Frame(frame) => (frame.kind(), PendingTable::Frame(frame)),
-                Output::Streamed(streamed) => {
-                    let file = streamed.handle.downcast::<FinishedFile>();
-                    let file = file.map_err(|_| {
-                        Error::Bug(format!(
-                            "stage {}: a sink that is not the engine's",
-                            stage.id
-                        ))
-                    })?;
-                    (streamed.kind, PendingTable::File(*file))
-                }
-            };
-            if kind != port.kind {
-                return Err(Error::Bug(format!(
-                    "stage {}: a table of {kind} on port {}",
-                    stage.id, port.name
-                )));
-            }
-            Ok((port.name.to_string(), product))
-        })
-        .collect()
-}
-
-/// A table that a stage reads chunk by chunk.
-struct LongTable {
-    table: PublishedTable,
-    /// All of it, where that is no more than a chunk: it is decoded once.
-    whole: OnceLock<Frame>,
-}
-
-/// Rows of a table that is held whole once it was read.
-const SHORT: usize = 1 << 16;
-
-impl StoredTable for LongTable {
-    fn rows(&self) -> usize {
-        self.table.rows()
-    }
-    fn frame(&self) -> Result<Frame> {
-        self.table.frame()
-    }
-    fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
-        if self.rows() > SHORT {
-            return self.table.chunks(take);
-        }
-        if let Some(whole) = self.whole.get() {
-            return take(whole);
-        }
-        let whole = self.frame()?;
-        take(self.whole.get_or_init(|| whole))
-    }
-}
-
-fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String, InputTable)>>> {
-    let stages = &state.plan.stages;
-    let inputs = stages[index].inputs.iter();
-    inputs
-        .map(|input| {
-            let tables = input.from.iter().map(|origin| {
-                let from = &stages[origin.stage];
-                let tables = state.tables[origin.stage].as_ref();
-                let tables = tables
-                    .ok_or_else(|| Error::Bug(format!("stage {} has no tables yet", from.id)))?;
-                let table = run_state::table(tables, from, origin.port)?;
-                let input: InputTable = match input.port.chunked {
-                    true => Box::new(LongTable {
-                        table: store.published(table)?,
-                        whole: OnceLock::new(),
-                    }),
-                    false => Box::new(store.load(table)?),
-                };
-                Ok((from.id.clone(), input))
-            });
-            tables.collect()
-        })
-        .collect()
-}
-
 /// Writes the documents of a table to where people find them.
-pub(super) fn documents(store: &Store, pipeline: &str, table: &TableRef) -> Result<Vec<PathBuf>> {
+fn documents(store: &Store, pipeline: &str, table: &TableRef) -> Result<Vec<PathBuf>> {
     let frame = store.load(table)?;
     let names = frame.read::<String>("name")?;
     let contents = frame.read::<String>("content")?;
@@ -478,19 +400,15 @@ fn panic_message(panic: &(dyn Any + Send)) -> &str {
 }
 
 /// The same error with line, path and stage of each setting: `with.n` of `split` becomes `p.yaml:36:26: stages[2].with.n`.
-pub(super) fn placed(error: Error, plan: &Plan, id: &str) -> Error {
-    match error {
-        Error::Spec(faults) => Error::Spec(all(faults, plan, id)),
-        Error::Data(faults) => Error::Data(all(faults, plan, id)),
-        other => other,
+fn placed(mut error: Error, plan: &Plan, id: &str) -> Error {
+    if let Error::Spec(faults) | Error::Data(faults) = &mut error {
+        for fault in faults {
+            if let Some(placed) = one(fault, plan, id) {
+                *fault = placed;
+            }
+        }
     }
-}
-
-fn all(faults: Vec<Fault>, plan: &Plan, id: &str) -> Vec<Fault> {
-    faults
-        .into_iter()
-        .map(|fault| one(&fault, plan, id).unwrap_or(fault))
-        .collect()
+    error
 }
 
 /// None where the fault is not in a setting.
@@ -505,22 +423,11 @@ fn one(fault: &Fault, plan: &Plan, id: &str) -> Option<Fault> {
     }
     let mut tree = yaml::parse(&plan.text).0?;
     overrides::apply(&mut tree, &plan.overrides);
-    let named = |stage: &Node| {
-        stage
-            .get("id")
-            .or_else(|| stage.get("uses"))
-            .and_then(Node::text)
-            .is_some_and(|name| name == id)
-    };
-    let index = tree.get("stages")?.items().iter().position(named)?;
+    let ids = overrides::stage_ids(&tree);
+    let index = ids.iter().position(|name| name == id)?;
     let path = format!("stages[{index}].{place}");
     let message = format!("stage `{id}`: {}", fault.message);
-    Some(
-        Trouble::new(message)
-            .at(tree.nearest_mark(&path))
-            .below(&path)
-            .fault(&plan.file.display().to_string()),
-    )
+    Some(trouble_at(&tree, &path, message).fault(&plan.file.display().to_string()))
 }
 
 impl Plan {

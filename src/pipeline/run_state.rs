@@ -8,11 +8,10 @@ use crate::error::{Error, Result};
 use crate::raw;
 use crate::stage::Arity;
 use crate::store::{
-    ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, Store, TableRef, schema,
+    ActionId, Claim, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, Store, TableRef, schema,
 };
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
@@ -191,50 +190,19 @@ pub(super) fn table<'t>(
 const PATIENCE: Duration = Duration::from_secs(600);
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Held while a stage runs; the kernel frees it when the process dies.
-pub(super) struct ActionLock {
-    held: Option<(File, PathBuf)>,
-}
-
-impl ActionLock {
-    /// Takes the lock of an action, waiting for whoever has it; `waiting` is called once.
-    pub(crate) fn take(store: &Store, action: &ActionId, waiting: &mut dyn FnMut()) -> Self {
-        let folder = store.root().join("locks");
-        let path = folder.join(format!("{action}.lock"));
-        let open = || {
-            fs::create_dir_all(&folder)
-                .and_then(|()| File::options().create(true).append(true).open(&path))
-        };
-        // Where locks cannot be had the work may be done twice, which is harmless.
-        let Ok(file) = open() else {
-            return Self { held: None };
-        };
-        let mut waited = Duration::ZERO;
-        loop {
-            match file.try_lock() {
-                Ok(()) => {
-                    return Self {
-                        held: Some((file, path)),
-                    };
-                }
-                Err(fs::TryLockError::WouldBlock) if waited < PATIENCE => {
-                    if waited.is_zero() {
-                        waiting();
-                    }
-                    std::thread::sleep(PAUSE);
-                    waited += PAUSE;
-                }
-                Err(_) => return Self { held: None },
-            }
+/// The claim on an action, after waiting for whoever has it; `waiting` is called once.
+pub(super) fn claim(store: &Store, action: &ActionId, waiting: &mut dyn FnMut()) -> Option<Claim> {
+    let path = store.root().join("locks").join(format!("{action}.lock"));
+    let mut waited = Duration::ZERO;
+    loop {
+        let claim = Claim::take(&path);
+        if claim.is_some() || waited >= PATIENCE {
+            return claim;
         }
-    }
-}
-
-impl Drop for ActionLock {
-    fn drop(&mut self) {
-        if let Some((file, path)) = self.held.take() {
-            let _ = fs::remove_file(path);
-            let _ = file.unlock();
+        if waited.is_zero() {
+            waiting();
         }
+        std::thread::sleep(PAUSE);
+        waited += PAUSE;
     }
 }

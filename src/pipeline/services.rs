@@ -9,9 +9,9 @@ use crate::stage::{
     Arity, Context, InputTable, OpenedInput, Output, RawFile, STAGES, Services, Sink, Streamed,
 };
 use crate::store::frame::Frame;
-use crate::store::{FinishedFile, Store, TableWriter};
+use crate::store::{Store, TableWriter};
 use crate::yaml::{self, Trouble};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Whoever watches a run: a terminal, a log, nobody.
 pub trait Observer: Sync {
@@ -68,6 +68,9 @@ impl<'a> StageServices<'a> {
             lines: Mutex::default(),
         }
     }
+    fn locked(&self) -> MutexGuard<'_, StageMessages> {
+        self.lines.lock().unwrap_or_else(PoisonError::into_inner)
+    }
     pub(crate) fn lines(self) -> StageMessages {
         self.lines
             .into_inner()
@@ -76,8 +79,25 @@ impl<'a> StageServices<'a> {
 }
 
 impl Services for StageServices<'_> {
+    /// Opens an input file that the stage listed; settings hold paths as text, whatever bytes they have.
     fn open(&self, file: &RawFile) -> Result<OpenedInput> {
-        open(self.id, self.files, file)
+        let asked = file.0.to_string_lossy();
+        let mut files = self.files.iter();
+        let Some(known) = files.find(|known| known.path.to_string_lossy() == asked) else {
+            return Err(Error::Bug(format!(
+                "stage {} opens {asked} without listing it among its files",
+                self.id
+            )));
+        };
+        let shown = known.path.display().to_string();
+        let mut reader =
+            raw::source(&known.path).map_err(|error| Error::unreadable(&shown, &error))?;
+        let bounds = reader.bounds();
+        Ok(OpenedInput {
+            label: label_of(self.files, known),
+            reader,
+            size: bounds.ok().and_then(|bounds| bounds.last().copied()),
+        })
     }
     fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
         let Some(store) = self.store else {
@@ -97,48 +117,12 @@ impl Services for StageServices<'_> {
     }
     fn note(&self, line: String) {
         self.observer.note(self.id, &line);
-        self.lines
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .notes
-            .push(line);
+        self.locked().notes.push(line);
     }
     fn warn(&self, line: String) {
         self.observer.warn(self.id, &line);
-        self.lines
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .warnings
-            .push(line);
+        self.locked().warnings.push(line);
     }
-}
-
-/// Opens an input file that the stage listed; settings hold paths as text, whatever bytes they have.
-pub(super) fn open(
-    id: &str,
-    files: &[super::plan::InputFile],
-    file: &RawFile,
-) -> Result<OpenedInput> {
-    let asked = file.0.to_string_lossy();
-    let Some(known) = files
-        .iter()
-        .find(|known| known.path.to_string_lossy() == asked)
-    else {
-        return Err(Error::Bug(format!(
-            "stage {id} opens {asked} without listing it among its files"
-        )));
-    };
-    let shown = known.path.display().to_string();
-    let mut reader = raw::source(&known.path).map_err(|error| Error::unreadable(&shown, &error))?;
-    let size = reader
-        .bounds()
-        .ok()
-        .and_then(|bounds| bounds.last().copied());
-    Ok(OpenedInput {
-        label: label_of(files, known),
-        reader,
-        size,
-    })
 }
 
 /// A file in messages: by its name, and where the stage has another file of that name, as the YAML names it.
@@ -172,10 +156,9 @@ impl Sink for StoreSink {
         self.writer.push(&chunk)
     }
     fn finish(self: Box<Self>) -> Result<Streamed> {
-        let file: FinishedFile = self.writer.finish()?;
         Ok(Streamed {
             kind: self.kind,
-            handle: Box::new(file),
+            file: Some(self.writer.finish()?),
         })
     }
 }
@@ -245,7 +228,7 @@ pub fn run_in_memory(
     let inputs = (entry.reads)().into_iter().map(|port| {
         let matching = tables.iter().filter(|frame| frame.kind() == port.kind);
         let taken: Vec<(String, InputTable)> = matching
-            .map(|frame| (frame.kind().into(), Box::new(frame.clone()) as InputTable))
+            .map(|frame| (frame.kind().into(), InputTable::Frame(frame.clone())))
             .collect();
         if taken.is_empty() && port.arity == Arity::One {
             return Err(Error::spec(id, format!("reads a table `{}`", port.kind)));

@@ -1,8 +1,7 @@
 //! The pipeline's YAML, typed: every stage with its settings and files, or every fault with its place.
 
-use super::globs;
 use super::overrides::{self, Override};
-use crate::error::{Fault, nearest};
+use crate::error::{Fault, instead};
 use crate::stage::{ErasedStage, StageEntry};
 use crate::yaml::{self, Mark, Node, Trouble, YamlValue, typed};
 use serde::Deserialize;
@@ -14,6 +13,7 @@ use std::path::{Path, PathBuf};
 pub(crate) const FORMAT: u64 = 1;
 
 /// A pipeline as far as it could be read.
+#[derive(Default)]
 pub(super) struct Draft {
     pub(crate) name: String,
     pub(crate) seed: u64,
@@ -106,14 +106,7 @@ pub(super) fn read(
     stages: &'static [StageEntry],
 ) -> Draft {
     let (tree, mut troubles) = yaml::parse(text);
-    let mut draft = Draft {
-        name: String::new(),
-        seed: 0,
-        stages: Vec::new(),
-        resolved: serde_json::Value::Null,
-        faults: Vec::new(),
-        troubles: Vec::new(),
-    };
+    let mut draft = Draft::default();
     let Some(mut tree) = tree else {
         return Draft { troubles, ..draft };
     };
@@ -181,12 +174,16 @@ impl Draft {
     }
 }
 
+/// A fault of what stands at a path of a tree, or would stand there.
+pub(crate) fn trouble_at(tree: &Node, path: &str, message: impl Into<String>) -> Trouble {
+    Trouble::new(message)
+        .at(tree.nearest_mark(path))
+        .below(path)
+}
+
 fn check_head(tree: &Node) -> Vec<Trouble> {
     let mut troubles = Vec::new();
-    let mut fault = |key: &str, message: String| {
-        let mark = tree.nearest_mark(key);
-        troubles.push(Trouble::new(message).at(mark).below(key));
-    };
+    let mut fault = |key: &str, message| troubles.push(trouble_at(tree, key, message));
     match tree.get("calib").map(|node| &node.value) {
         Some(YamlValue::Integer(format)) if *format == i128::from(FORMAT) => {}
         Some(YamlValue::Integer(format)) => fault(
@@ -240,29 +237,15 @@ fn read_stage(
         && node.get("id").is_some()
         && let Some(message) = misnamed(&id)
     {
-        troubles.push(
-            Trouble::new(message)
-                .at(node.nearest_mark("id"))
-                .below("id"),
-        );
+        troubles.push(trouble_at(node, "id", message));
     }
     let entry = uses
         .as_ref()
         .and_then(|name| registry.iter().find(|entry| entry.name == name));
     if let (Some(name), None) = (&uses, entry) {
         let names: Vec<&str> = registry.iter().map(|entry| entry.name).collect();
-        let hint =
-            nearest(name, names.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
-        let message = format!(
-            "unknown stage `{name}`{} Allowed: {}",
-            hint.unwrap_or_else(|| ".".into()),
-            names.join(", ")
-        );
-        troubles.push(
-            Trouble::new(message)
-                .at(node.nearest_mark("uses"))
-                .below("uses"),
-        );
+        let message = format!("unknown stage `{name}`{}", instead(name, &names));
+        troubles.push(trouble_at(node, "uses", message));
     }
     let mut draft = StageDraft {
         id,
@@ -340,7 +323,7 @@ type Typed = (Option<Box<dyn ErasedStage>>, Vec<InputFile>, Vec<Trouble>);
 /// Types the settings of a stage and finds its files.
 fn type_settings(file: &Path, mut with: Node, entry: &StageEntry) -> Typed {
     let folder = file.parent().unwrap_or(Path::new(""));
-    let unnamed = globs::expand(&mut with, folder);
+    let unnamed = overrides::expand(&mut with, folder);
     if !unnamed.is_empty() {
         return (None, Vec::new(), unnamed);
     }
@@ -351,11 +334,7 @@ fn type_settings(file: &Path, mut with: Node, entry: &StageEntry) -> Typed {
     let mut troubles: Vec<Trouble> = stage
         .check()
         .into_iter()
-        .map(|fault| {
-            Trouble::new(fault.message)
-                .at(with.nearest_mark(&fault.place))
-                .below(&fault.place)
-        })
+        .map(|fault| trouble_at(&with, &fault.place, fault.message))
         .collect();
     let mut files = Vec::new();
     for (place, raw) in stage.files() {
@@ -366,16 +345,14 @@ fn type_settings(file: &Path, mut with: Node, entry: &StageEntry) -> Typed {
             folder.join(&raw.0)
         };
         let mark = with.nearest_mark(&place);
-        if let Some(message) = unreadable(&path) {
-            troubles.push(Trouble::new(message).at(mark).below(&place));
-        }
         let text = Node {
             overridden,
             ..Node::new(YamlValue::Text(path.to_string_lossy().into_owned()), mark)
         };
-        if let Err(message) = with.put(&place, text) {
-            troubles.push(Trouble::new(message).at(mark).below(&place));
-        }
+        let wrong = unreadable(&path)
+            .into_iter()
+            .chain(with.put(&place, text).err());
+        troubles.extend(wrong.map(|message| Trouble::new(message).at(mark).below(&place)));
         files.push(InputFile {
             place,
             path,

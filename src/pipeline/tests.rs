@@ -103,10 +103,6 @@ impl Observer for Ear {
     fn stage_begins(&self, id: &str, _: &str, reason: &str) {
         self.0.lock().unwrap().push(format!("{id}: {reason}"));
     }
-    fn stage_ends(&self, _: &StageReport) {}
-    fn begin(&self, _: &str, _: &str, _: Option<u64>, _: &str) {}
-    fn advance(&self, _: &str, _: u64, _: &str) {}
-    fn note(&self, _: &str, _: &str) {}
     fn warn(&self, id: &str, line: &str) {
         self.0
             .lock()
@@ -247,11 +243,6 @@ impl Observer for Hand<'_> {
             std::fs::write(self.file, self.text).unwrap();
         }
     }
-    fn stage_ends(&self, _: &StageReport) {}
-    fn begin(&self, _: &str, _: &str, _: Option<u64>, _: &str) {}
-    fn advance(&self, _: &str, _: u64, _: &str) {}
-    fn note(&self, _: &str, _: &str) {}
-    fn warn(&self, _: &str, _: &str) {}
 }
 
 #[test]

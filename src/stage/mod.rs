@@ -61,8 +61,8 @@ pub use transfer::{Transfer, TransferReads};
 pub use validate::{Validate, ValidateReads};
 
 pub use crate::table::ports::{
-    Arity, Chunks, InputTable, Labelled, Output, Port, PortValue, Produced, Reads, Sink,
-    StoredTable, Streamed, StreamedTable, Writes,
+    Arity, Chunks, InputTable, Labelled, Output, Port, PortValue, Produced, Reads, Sink, Streamed,
+    StreamedTable, Writes,
 };
 
 /// An input file named in the settings. Its content, not its path, is part of the stage's key.

@@ -1,10 +1,9 @@
 //! Action records, the commit point: which tables a stage made from which key. Data first, then the record, put if absent.
 
 use super::Store;
-use super::content::TableHash;
-use super::disk::{make_read_only, place, refused, write};
+use super::disk::{make_read_only, place};
 use super::frame::Frame;
-use super::key::{ActionId, StageKey, TableRef, same_bytes};
+use super::key::{ActionId, StageKey, TableHash, TableRef, same_bytes};
 use super::notes::{seal, unseal};
 use super::reader::{self, PublishedTable};
 use super::writer::{FinishedFile, TableWriter};
@@ -20,7 +19,6 @@ const RECORD_FORMAT: u32 = 1;
 /// What a stage made, and how it went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionRecord {
-    /// Format of this record.
     pub(crate) record_format: u32,
     /// Hash of the key.
     pub id: ActionId,
@@ -103,7 +101,10 @@ impl Store {
         let path = self.object_path(table);
         match path.exists() || !self.in_bucket() || self.obtain(table, &path)? {
             true => Ok(path),
-            false => Err(self.lost(&path)),
+            false => Err(Error::store(
+                self.label(&path),
+                "is missing from the bucket, or its bytes are not those that were published; calib run makes it anew",
+            )),
         }
     }
 
@@ -113,10 +114,8 @@ impl Store {
         if !self.refresh(&path)? {
             return Ok(Lookup::Absent);
         }
-        let bytes = match fs::read(&path) {
-            Ok(bytes) => bytes,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Lookup::Absent),
-            Err(e) => return Err(refused(&path, "read", &e)),
+        let Some(bytes) = super::disk::read(&path)? else {
+            return Ok(Lookup::Absent);
         };
         let damaged = |why: String| {
             Ok(Lookup::Damaged(format!(
@@ -187,34 +186,20 @@ impl Store {
             account,
         };
         let path = self.record_path(&record.id);
-        let aside = self.workspace()?.fresh();
-        let file = write(&aside, &seal(&record)?)?;
-        if self.commit(&aside, &path)? {
-            let _ = fs::remove_file(&aside);
-            self.owe(&path, file)?;
-            return Ok(Published {
-                record,
-                conflict: None,
-            });
-        }
-        match self.action(key)? {
-            Lookup::Done(standing) => {
-                let _ = fs::remove_file(&aside);
-                Ok(Published {
+        let text = seal(&record)?;
+        if !self.put_once(&path, &text)? {
+            if let Lookup::Done(standing) = self.action(key)? {
+                return Ok(Published {
                     conflict: conflict(&standing, &record),
                     record: *standing,
-                })
+                });
             }
-            Lookup::Absent | Lookup::Damaged(_) => {
-                self.give(&aside, &path)?;
-                place(&aside, &path)?;
-                self.owe(&path, file)?;
-                Ok(Published {
-                    record,
-                    conflict: None,
-                })
-            }
+            self.put(&path, &text)?;
         }
+        Ok(Published {
+            record,
+            conflict: None,
+        })
     }
 
     /// Reads a published table.

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::schema::{ColumnType, FieldSchema, TableSchema};
-use crate::error::{Error, Fault, Result, counted};
+use crate::error::{Error, Fault, Result, counted, listed};
 
 /// Rows ascend by the key; nulls do not occur in it.
 const ASCENDING: SortOptions = SortOptions {
@@ -62,22 +62,17 @@ pub(super) fn parse(schema: &TableSchema, columns: Vec<(String, ArrayRef)>) -> R
     if arrays.windows(2).any(|pair| pair[0].len() != pair[1].len()) {
         return Err(bug("columns of unequal length".into()));
     }
-    let batch = match arrays
-        .iter()
-        .zip(arrow_schema.fields())
-        .find(|(array, field)| !field.is_nullable() && array.null_count() > 0)
-    {
-        Some((array, field)) => {
-            let row = (0..array.len())
-                .find(|&row| array.is_null(row))
-                .unwrap_or_default();
+    for (array, field) in arrays.iter().zip(arrow_schema.fields()) {
+        let nulls = array.nulls().filter(|_| !field.is_nullable());
+        let null = nulls.and_then(|nulls| nulls.iter().position(|is_there| !is_there));
+        if let Some(row) = null {
             return Err(bug(format!(
                 "column {}, row {row}: null where a value is needed",
                 field.name()
             )));
         }
-        None => RecordBatch::try_new(arrow_schema, arrays).map_err(|e| bug(e.to_string()))?,
-    };
+    }
+    let batch = RecordBatch::try_new(arrow_schema, arrays).map_err(|e| bug(e.to_string()))?;
     check_values(schema, &layout, &batch)?;
     in_key_order(schema, batch)
 }
@@ -100,54 +95,39 @@ fn layout<'a>(
     {
         return Err("no column of any joint".into());
     }
+    let is_given = |field: &FieldSchema, joint| given.contains_key(&field.column(Some(joint)));
     let mut layout = Vec::new();
-    let mut settled: Vec<&str> = Vec::new();
     for field in &schema.fields {
-        match &field.either {
-            _ if !field.per_joint => {
-                if !field.optional || given.contains_key(&field.name) {
-                    layout.push((field, None));
-                }
+        if !field.per_joint {
+            if !field.optional || given.contains_key(&field.name) {
+                layout.push((field, None));
             }
-            None => {
-                let any = (1..=joints).any(|joint| given.contains_key(&field.column(Some(joint))));
-                if !field.optional || any {
-                    layout.extend((1..=joints).map(|joint| (field, Some(joint))));
-                }
-            }
-            Some(group) if !settled.contains(&group.as_str()) => {
-                settled.push(group);
-                let members: Vec<&FieldSchema> = schema
-                    .fields
-                    .iter()
-                    .filter(|other| other.either.as_ref() == Some(group))
-                    .collect();
-                let given_any = |member: &&FieldSchema| {
-                    (1..=joints).any(|joint| given.contains_key(&member.column(Some(joint))))
-                };
-                if members.iter().all(|member| member.optional) && !members.iter().any(given_any) {
-                    continue;
-                }
-                for joint in 1..=joints {
-                    let mut there = members
-                        .iter()
-                        .filter(|member| given.contains_key(&member.column(Some(joint))));
-                    match (there.next(), there.next()) {
-                        (Some(member), None) => layout.push((member, Some(joint))),
-                        _ => {
-                            let names: Vec<String> = members
-                                .iter()
-                                .map(|member| member.column(Some(joint)))
-                                .collect();
-                            return Err(format!(
-                                "joint {joint} needs exactly one of the columns {}",
-                                names.join(", ")
-                            ));
-                        }
-                    }
-                }
-            }
-            Some(_) => (),
+            continue;
+        }
+        // Those of a group are settled with the first of them.
+        let is_member = |other: &&FieldSchema| match &field.either {
+            Some(group) => other.either.as_ref() == Some(group),
+            None => std::ptr::eq(*other, field),
+        };
+        let members: Vec<&FieldSchema> = schema.fields.iter().filter(is_member).collect();
+        let any = |member: &&FieldSchema| (1..=joints).any(|joint| is_given(member, joint));
+        if !std::ptr::eq(members[0], field)
+            || members.iter().all(|member| member.optional) && !members.iter().any(any)
+        {
+            continue;
+        }
+        for joint in 1..=joints {
+            let there: Vec<_> = (members.iter())
+                .filter(|member| members.len() == 1 || is_given(member, joint))
+                .collect();
+            let [member] = there[..] else {
+                let names = members.iter().map(|member| member.column(Some(joint)));
+                return Err(format!(
+                    "joint {joint} needs exactly one of the columns {}",
+                    listed(names)
+                ));
+            };
+            layout.push((*member, Some(joint)));
         }
     }
     Ok(layout)
@@ -178,37 +158,32 @@ fn check_values(
             ColumnType::Float64 if are_inside(array.as_primitive(), range.min, range.max) => (),
             ColumnType::Float64 => {
                 for (row, value) in array.as_primitive::<Float64Type>().iter().enumerate() {
-                    match value {
-                        Some(value) if !value.is_finite() => {
-                            return Err(Error::Bug(format!(
-                                "{}: {value}; a stored number is finite, or null where allowed",
-                                place(row)
-                            )));
-                        }
-                        Some(value) if outside(value) => bad.push((row, value.to_string())),
-                        _ => (),
+                    let Some(value) = value else { continue };
+                    if !value.is_finite() {
+                        return Err(Error::Bug(format!(
+                            "{}: {value}; a stored number is finite, or null where allowed",
+                            place(row)
+                        )));
                     }
+                    bad.extend(outside(value).then(|| (row, value.to_string())));
                 }
             }
             ColumnType::Int64 if range.min.is_some() || range.max.is_some() => {
                 let values = array.as_primitive::<Int64Type>().iter().enumerate();
                 bad.extend(values.filter_map(|(row, value)| {
-                    value
-                        .filter(|value| outside(*value as f64))
-                        .map(|value| (row, value.to_string()))
+                    let value = value.filter(|value| outside(*value as f64))?;
+                    Some((row, value.to_string()))
                 }));
             }
             ColumnType::Utf8 if !range.values.is_empty() => {
-                for (row, value) in array.as_string::<i32>().iter().enumerate() {
-                    if let Some(value) =
-                        value.filter(|value| !range.values.iter().any(|allowed| allowed == value))
-                    {
-                        return Err(Error::Bug(format!(
-                            "{}: `{value}`; allowed: {}",
-                            place(row),
-                            range.values.join(", ")
-                        )));
-                    }
+                let is_other = |value: &&str| !range.values.iter().any(|allowed| allowed == value);
+                let mut values = array.as_string::<i32>().iter().enumerate();
+                if let Some((row, value)) =
+                    values.find_map(|(row, value)| Some((row, value.filter(is_other)?)))
+                {
+                    let allowed = range.values.join(", ");
+                    let message = format!("{}: `{value}`; allowed: {allowed}", place(row));
+                    return Err(Error::Bug(message));
                 }
             }
             _ => (),
@@ -233,11 +208,7 @@ fn check_values(
             ));
         }
     }
-    if faults.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::Data(faults))
-    }
+    Error::if_data(faults)
 }
 
 /// Whether all numbers are finite and in range, those in the place of null cells too.

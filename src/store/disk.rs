@@ -51,21 +51,30 @@ pub(super) fn sync_dir(path: &Path) -> Result<()> {
         .map_err(|e| refused(path, "sync the folder", &e))
 }
 
-/// Writes a new file; the handle is for making it durable.
-pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<File> {
-    let write = || {
-        let mut file = File::create(path)?;
-        file.write_all(bytes)?;
-        Ok(file)
-    };
-    write().map_err(|e| refused(path, "write", &e))
+/// What is in a folder; nothing where it is not there.
+pub(super) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+    match fs::read_dir(folder) {
+        Ok(entries) => Ok(entries.flatten().map(|entry| entry.path()).collect()),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(Vec::new()),
+        Err(e) => Err(refused(folder, "read", &e)),
+    }
 }
 
-/// Writes a new file and makes its bytes (not yet its name) durable.
-pub(super) fn write_synced(path: &Path, bytes: &[u8]) -> Result<()> {
-    write(path, bytes)?
-        .sync_all()
-        .map_err(|e| refused(path, "write", &e))
+/// The bytes of a file; none where it is not there.
+pub(super) fn read(path: &Path) -> Result<Option<Vec<u8>>> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(refused(path, "read", &e)),
+    }
+}
+
+/// Takes a file away; nothing where it is not there.
+pub(super) fn remove(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(refused(path, "remove", &e)),
+        _ => Ok(()),
+    }
 }
 
 /// Moves `from` to `to`, over what may be there, atomically.
@@ -75,12 +84,6 @@ pub(super) fn place(from: &Path, to: &Path) -> Result<()> {
     // Renaming one name of a file over another name of the same file does nothing, by POSIX.
     let _ = fs::remove_file(from);
     Ok(())
-}
-
-/// Moves `from` to `to`, over what may be there, atomically and durably.
-pub(super) fn replace(from: &Path, to: &Path) -> Result<()> {
-    place(from, to)?;
-    sync_dir(to.parent().unwrap_or(Path::new(".")))
 }
 
 /// Gives the finished file `from` the name `to` if that name is free; false if it is taken.
@@ -151,6 +154,33 @@ struct Owed {
 }
 
 impl Store {
+    /// Writes a file over what may be there, in the bucket first; durable after the next `sync`.
+    pub(super) fn put(&self, path: &Path, bytes: &[u8]) -> Result<()> {
+        let (aside, file) = self.workspace()?.write(bytes)?;
+        self.give(&aside, path)?;
+        place(&aside, path)?;
+        self.owe(path, file)
+    }
+
+    /// The same, durable before it is seen, so that a power cut leaves the one or the other.
+    pub(super) fn put_now(&self, path: &Path, bytes: &[u8]) -> Result<()> {
+        let aside = self.workspace()?.write_synced(bytes)?;
+        self.give(&aside, path)?;
+        place(&aside, path)?;
+        sync_dir(path.parent().unwrap_or(Path::new(".")))
+    }
+
+    /// Writes a file where none is, which the bucket decides where there is one, durable after the next `sync`; false where one stands.
+    pub(super) fn put_once(&self, path: &Path, bytes: &[u8]) -> Result<bool> {
+        let (aside, file) = self.workspace()?.write(bytes)?;
+        let is_first = self.commit(&aside, path)?;
+        let _ = fs::remove_file(&aside);
+        if is_first {
+            self.owe(path, file)?;
+        }
+        Ok(is_first)
+    }
+
     /// Owes a file that was moved to `path`, and its name there.
     pub(super) fn owe(&self, path: &Path, file: File) -> Result<()> {
         let full = {
@@ -204,32 +234,30 @@ impl Store {
 /// Does the same to all, several at a time; hands back the first failure by position.
 pub(super) fn together<T: Sync>(items: &[T], one: impl Fn(&T) -> Result<()> + Sync) -> Result<()> {
     let next = AtomicUsize::new(0);
-    let failure: Mutex<Option<(usize, Error)>> = Mutex::new(None);
     let work = || {
+        let mut failed = Vec::new();
         loop {
             let at = next.fetch_add(1, Ordering::Relaxed);
-            let Some(item) = items.get(at) else { break };
-            if let Err(error) = one(item) {
-                let mut failure = lock(&failure);
-                if failure.as_ref().is_none_or(|(before, _)| at < *before) {
-                    *failure = Some((at, error));
-                }
-            }
+            let Some(item) = items.get(at) else {
+                return failed;
+            };
+            failed.extend(one(item).err().map(|error| (at, error)));
         }
     };
-    thread::scope(|scope| {
-        for _ in 1..items.len().min(AT_ONCE) {
-            // Where there are no more threads, those that are there do it.
-            if thread::Builder::new().spawn_scoped(scope, work).is_err() {
-                break;
-            }
-        }
-        work();
+    let failed = thread::scope(|scope| {
+        // Where there are no more threads, those that are there do it.
+        let threads: Vec<_> = (1..items.len().min(AT_ONCE))
+            .map_while(|_| thread::Builder::new().spawn_scoped(scope, work).ok())
+            .collect();
+        let joined = |thread: thread::ScopedJoinHandle<_>| {
+            (thread.join()).unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        };
+        let mut failed = work();
+        failed.extend(threads.into_iter().flat_map(joined));
+        failed
     });
-    failure
-        .into_inner()
-        .unwrap_or_else(PoisonError::into_inner)
-        .map_or(Ok(()), |(_, error)| Err(error))
+    let first = failed.into_iter().min_by_key(|(at, _)| *at);
+    first.map_or(Ok(()), |(_, error)| Err(error))
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -275,6 +303,25 @@ impl Workspace {
         self.dir
             .join(self.next.fetch_add(1, Ordering::Relaxed).to_string())
     }
+
+    /// Writes a file that nobody sees yet; the handle is for making it durable.
+    pub(super) fn write(&self, bytes: &[u8]) -> Result<(PathBuf, File)> {
+        let aside = self.fresh();
+        let write = || {
+            let mut file = File::create(&aside)?;
+            file.write_all(bytes)?;
+            Ok(file)
+        };
+        let file = write().map_err(|e| refused(&aside, "write", &e))?;
+        Ok((aside, file))
+    }
+
+    /// The same with its bytes (not yet its name) durable.
+    pub(super) fn write_synced(&self, bytes: &[u8]) -> Result<PathBuf> {
+        let (aside, file) = self.write(bytes)?;
+        file.sync_all().map_err(|e| refused(&aside, "write", &e))?;
+        Ok(aside)
+    }
 }
 
 /// A name that nobody else has: 128 random bits, by the kernel's randomness in the keys of std's hasher. No result depends on it.
@@ -290,41 +337,64 @@ impl Drop for Workspace {
     }
 }
 
+/// The locks of the folders below `tmp`.
+fn locks(tmp: &Path) -> impl Iterator<Item = (PathBuf, File)> {
+    let entries = fs::read_dir(tmp).into_iter().flatten().flatten();
+    entries
+        .map(|entry| entry.path())
+        .filter(|path| ends_in(path, "lock"))
+        .filter_map(|path| File::open(&path).ok().map(|lock| (path, lock)))
+}
+
 /// True while a living process has a folder below `tmp`.
 pub(super) fn in_use(tmp: &Path) -> bool {
-    let entries = fs::read_dir(tmp)
-        .into_iter()
-        .flatten()
-        .flatten()
-        .map(|entry| entry.path());
-    let mut locks = entries.filter(|path| {
-        path.extension()
-            .is_some_and(|extension| extension == "lock")
-    });
-    locks.any(|path| {
-        File::open(path).is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
-    })
+    locks(tmp).any(|(_, lock)| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
 }
 
 /// Removes the folders whose owner is dead, that is, whose lock can be had. What cannot be removed stays: it harms nobody.
 fn sweep(tmp: &Path) {
-    let Ok(entries) = fs::read_dir(tmp) else {
-        return;
-    };
-    for path in entries.flatten().map(|entry| entry.path()) {
-        if path.extension().is_none_or(|extension| extension != "lock") {
-            continue;
-        }
-        let Ok(lock) = File::open(&path) else {
-            continue;
+    for (path, _lock) in locks(tmp).filter(|(_, lock)| lock.try_lock().is_ok()) {
+        let _ = fs::remove_dir_all(path.with_extension(""));
+        let _ = fs::remove_file(&path);
+    }
+}
+
+/// Whether a file's name has this extension.
+pub(super) fn ends_in(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|end| end == extension)
+}
+
+/// A file that one living process has locked, and that goes with it; the kernel frees the lock when the process dies. Two that do the same
+/// share the work by it, and no result depends on it.
+#[derive(Debug)]
+pub(crate) struct Claim {
+    path: PathBuf,
+    /// None where locks cannot be had: then both do the work, and who is first stands.
+    _file: Option<File>,
+}
+
+impl Claim {
+    /// None while another living process has it.
+    pub(crate) fn take(path: &Path) -> Option<Self> {
+        let open = || {
+            path.parent().map_or(Ok(()), fs::create_dir_all)?;
+            File::options().create(true).append(true).open(path)
         };
-        match lock.try_lock() {
-            Ok(()) => {
-                let _ = fs::remove_dir_all(path.with_extension(""));
-                let _ = fs::remove_file(&path);
-            }
-            Err(TryLockError::WouldBlock | TryLockError::Error(_)) => (),
-        }
+        let file = match open().map(|file| (file.try_lock(), file)) {
+            Ok((Err(TryLockError::WouldBlock), _)) => return None,
+            Ok((Ok(()), file)) => Some(file),
+            Ok((Err(TryLockError::Error(_)), _)) | Err(_) => None,
+        };
+        Some(Self {
+            path: path.into(),
+            _file: file,
+        })
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.path);
     }
 }
 

@@ -116,26 +116,17 @@ impl Frame {
     }
     /// A column as Rust values, or what is missing. An optional column that is not there is all null.
     pub fn read<C: Cell>(&self, name: &str) -> Result<Vec<C>> {
-        if self.column(name).is_none()
-            && self
-                .schema
-                .fields
-                .iter()
-                .any(|field| field.name == name && field.optional)
-        {
-            let nulls = new_null_array(&C::data_type(), self.rows());
-            return C::from_array(&nulls)
-                .ok_or_else(|| Error::Bug(format!("table {}: no column {name}", self.kind())));
-        }
-        let array = self
-            .column(name)
-            .ok_or_else(|| Error::Bug(format!("table {}: no column {name}", self.kind())))?;
-        C::from_array(array).ok_or_else(|| {
-            Error::Bug(format!(
-                "table {}: column {name} has another type or nulls",
-                self.kind()
-            ))
-        })
+        let fault = |what: String| Error::Bug(format!("table {}: {what}", self.kind()));
+        let mut fields = self.schema.fields.iter();
+        let array = match self.column(name) {
+            Some(array) => array.clone(),
+            None if fields.any(|field| field.name == name && field.optional) => {
+                new_null_array(&C::data_type(), self.rows())
+            }
+            None => return Err(fault(format!("no column {name}"))),
+        };
+        C::from_array(&array)
+            .ok_or_else(|| fault(format!("column {name} has another type or nulls")))
     }
     pub(super) fn arrow_schema(&self) -> SchemaRef {
         self.batch.schema()
@@ -146,10 +137,6 @@ impl Frame {
 pub trait Cell: Sized + Clone {
     /// The type of its column.
     fn data_type() -> DataType;
-    /// Whether the column may hold nulls.
-    fn nullable() -> bool {
-        false
-    }
     /// A column of values.
     fn to_array(values: Vec<Self>) -> ArrayRef;
     /// None where the column has another type, or nulls that `Self` cannot hold.
@@ -174,9 +161,6 @@ macro_rules! cell {
         impl Cell for Option<$rust> {
             fn data_type() -> DataType {
                 $data
-            }
-            fn nullable() -> bool {
-                true
             }
             fn to_array(values: Vec<Self>) -> ArrayRef {
                 Arc::new(<$array>::from(values))

@@ -6,7 +6,6 @@
 
 pub(crate) mod actions;
 mod check;
-pub(crate) mod content;
 mod disk;
 pub mod frame;
 pub mod key;
@@ -21,21 +20,21 @@ mod verify;
 pub(crate) mod writer;
 
 pub use actions::{Account, ActionRecord, Lookup, PendingTable, Published};
-pub use content::TableHash;
-pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
-pub(crate) use reader::table_of_bytes;
+pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableHash, TableRef};
 pub use reader::{Loose, PublishedTable, read_table};
+pub(crate) use reader::{file_notes, table_of_bytes};
 pub use runs::{Link, Run, Sealed};
 pub use verify::{Sweep, Verification};
 pub use writer::{FinishedFile, TableWriter};
 
 use crate::error::{Error, Result};
-use disk::{Durability, Workspace, make_dir, put_if_absent, refused, sync_dir, write_synced};
+pub(crate) use disk::Claim;
+use disk::{Durability, Workspace, entries, make_dir, put_if_absent, sync_dir};
+pub use remote::Bucket;
 use remote::Remote;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -110,8 +109,7 @@ impl Store {
         let workspace = Arc::new(Workspace::open(&self.root.join("tmp"))?);
         let path = self.root.join("format.json");
         if !path.exists() {
-            let aside = workspace.fresh();
-            write_synced(&aside, &format_text()?)?;
+            let aside = workspace.write_synced(&format_text()?)?;
             put_if_absent(&aside, &path)?;
             sync_dir(&self.root)?;
             let _ = fs::remove_file(&aside);
@@ -130,11 +128,7 @@ fn format_text() -> Result<Vec<u8>> {
 
 /// Whether there is a format file; fails where it is not that of a store of this calib.
 fn has_format(path: &Path) -> Result<bool> {
-    match fs::read(path) {
-        Ok(bytes) => check_format(path, &bytes).map(|()| true),
-        Err(e) if e.kind() == ErrorKind::NotFound => Ok(false),
-        Err(e) => Err(refused(path, "read", &e)),
-    }
+    disk::read(path)?.map_or(Ok(false), |bytes| check_format(path, &bytes).map(|()| true))
 }
 
 fn check_format(path: &Path, bytes: &[u8]) -> Result<()> {
@@ -159,37 +153,13 @@ fn check_format(path: &Path, bytes: &[u8]) -> Result<()> {
 
 /// A store may be begun in a folder that does not exist, is empty, or holds only the beginning of one.
 fn check_vacant(root: &Path) -> Result<()> {
-    let entries = match fs::read_dir(root) {
-        Ok(entries) => entries,
-        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
-        Err(e) => return Err(refused(root, "read", &e)),
-    };
-    match entries.flatten().find(|entry| entry.file_name() != "tmp") {
-        None => Ok(()),
-        Some(entry) => {
-            let found = entry.file_name().to_string_lossy().into_owned();
-            Err(Error::spec(
-                root.display().to_string(),
-                format!(
-                    "not a calib store (no format.json, but `{found}`); --store takes a store, or a new or empty folder"
-                ),
-            ))
-        }
-    }
-}
-
-/// Whole files under keys with slashes, as S3 has them; what is written is seen by all at once.
-pub trait Bucket: Debug + Send + Sync {
-    /// As a person writes it: `s3://bucket/prefix`.
-    fn name(&self) -> &str;
-    /// Fetches into a new file; false where there is nothing.
-    fn fetch(&self, key: &str, to: &Path) -> Result<bool>;
-    /// Writes a file over what may be there.
-    fn send(&self, from: &Path, key: &str) -> Result<()>;
-    /// Writes a small file where nothing is, decided once for all who try; false where something is.
-    fn create(&self, from: &Path, key: &str) -> Result<bool>;
-    /// Takes away; nothing where there is nothing.
-    fn remove(&self, key: &str) -> Result<()>;
-    /// Keys below a folder (all where it is empty) with their bytes, in order, `most` at most.
-    fn list(&self, folder: &str, most: usize) -> Result<Vec<(String, u64)>>;
+    let found = entries(root)?;
+    let mut names = found.iter().filter_map(|path| path.file_name());
+    names.find(|name| *name != "tmp").map_or(Ok(()), |name| {
+        let message = format!(
+            "not a calib store (no format.json, but `{}`); --store takes a store, or a new or empty folder",
+            name.to_string_lossy()
+        );
+        Err(Error::spec(root.display().to_string(), message))
+    })
 }

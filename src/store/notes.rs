@@ -5,15 +5,13 @@
 //! The stable human paths: the latest table of every port, and the latest documents, under names that people can open.
 
 use super::Store;
-use super::disk::{
-    component, make_dir, place, put_if_absent, refused, replace, write, write_synced,
-};
+use super::disk::{component, place, refused, remove};
 use super::key::TableRef;
 use crate::error::{Error, Result};
-use serde::Serialize;
+use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 impl Store {
     /// Where a note lies; fails where a part of its place cannot be a file name.
@@ -25,22 +23,20 @@ impl Store {
         Ok(path)
     }
 
-    /// A note, where there is one. A torn or damaged one is none.
-    pub(crate) fn note(&self, place: &[&str], name: &str) -> Result<Option<Value>> {
-        let path = self.place_of_note(place, name)?;
-        match fs::read(&path) {
-            Ok(bytes) => Ok(read(&bytes)),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(error) => Err(refused(&path, "read", &error)),
-        }
+    /// A note, where there is one. One that is torn, damaged or of another kind is none.
+    pub(crate) fn note<T: DeserializeOwned>(
+        &self,
+        place: &[&str],
+        name: &str,
+    ) -> Result<Option<T>> {
+        let bytes = super::disk::read(&self.place_of_note(place, name)?)?;
+        let note = bytes.and_then(|bytes| read(&bytes));
+        Ok(note.and_then(|note| serde_json::from_value(note).ok()))
     }
 
     /// Writes a note over what may be there, durably.
     pub(crate) fn put_note(&self, place: &[&str], name: &str, note: &impl Serialize) -> Result<()> {
-        let path = self.place_of_note(place, name)?;
-        let aside = self.workspace()?.fresh();
-        write_synced(&aside, &text(note)?)?;
-        replace(&aside, &path)
+        self.put_now(&self.place_of_note(place, name)?, &text(note)?)
     }
 
     /// Writes a note if there is none, durable after the next `sync`; false where one stands.
@@ -50,35 +46,17 @@ impl Store {
         name: &str,
         note: &impl Serialize,
     ) -> Result<bool> {
-        let path = self.place_of_note(place, name)?;
-        let aside = self.workspace()?.fresh();
-        let file = write(&aside, &text(note)?)?;
-        let fresh = put_if_absent(&aside, &path)?;
-        let _ = fs::remove_file(&aside);
-        if fresh {
-            self.owe(&path, file)?;
-        }
-        Ok(fresh)
+        self.put_once(&self.place_of_note(place, name)?, &text(note)?)
     }
 
     /// Writes a file over what may be there, durable after the next `sync`.
     pub(crate) fn put_file(&self, folder: &[&str], name: &str, bytes: &[u8]) -> Result<()> {
-        let path = self.place_of_note(folder, name)?;
-        let aside = self.workspace()?.fresh();
-        let file = write(&aside, bytes)?;
-        place(&aside, &path)?;
-        self.owe(&path, file)
+        self.put(&self.place_of_note(folder, name)?, bytes)
     }
 
     /// Takes a note away; nothing where there is none.
     pub(crate) fn drop_note(&self, place: &[&str], name: &str) -> Result<()> {
-        let path = self.place_of_note(place, name)?;
-        match fs::remove_file(&path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                Err(refused(&path, "remove", &error))
-            }
-            _ => Ok(()),
-        }
+        remove(&self.place_of_note(place, name)?)
     }
 }
 
@@ -150,18 +128,14 @@ impl Store {
         table: &TableRef,
     ) -> Result<PathBuf> {
         let name = format!("{}.{}.parquet", component(stage)?, component(port)?);
-        let path = self
-            .root()
-            .join("tables")
-            .join(component(pipeline)?)
-            .join(name);
+        let path = self.place_of_note(&["tables", pipeline], &name)?;
         let object = self.object_path(table);
         let aside = self.workspace()?.fresh();
         if fs::hard_link(&object, &aside).is_err() {
             fs::copy(&object, &aside).map_err(|e| refused(&aside, "copy", &e))?;
         }
         // Not synced: after a power cut the next run shows it again, and a sync of every name is a third of a small run's time.
-        show(&aside, &path)?;
+        place(&aside, &path)?;
         Ok(path)
     }
 
@@ -179,29 +153,13 @@ impl Store {
 
     /// Writes a document (a report) as `documents/<pipeline>/<name>`, and its hash as `seals/<pipeline>/<name>.json`.
     pub fn expose_document(&self, pipeline: &str, name: &str, content: &[u8]) -> Result<PathBuf> {
-        let path = self
-            .root()
-            .join("documents")
-            .join(component(pipeline)?)
-            .join(component(name)?);
-        let aside = self.workspace()?.fresh();
-        let file = write(&aside, content)?;
-        place(&aside, &path)?;
-        self.owe(&path, file)?;
+        let path = self.place_of_note(&["documents", pipeline], name)?;
+        self.put(&path, content)?;
         // Afterwards: a crash in between is mended by the next run, which writes both again.
         let hash = serde_json::json!({ "blake3": blake3::hash(content).to_hex().as_str() });
         self.put_file(&["seals", pipeline], &format!("{name}.json"), &seal(&hash)?)?;
         Ok(path)
     }
-}
-
-/// Gives a file its name for people, atomically.
-fn show(aside: &Path, path: &Path) -> Result<()> {
-    path.parent().map_or(Ok(()), make_dir)?;
-    fs::rename(aside, path).map_err(|e| refused(path, "put the file in place", &e))?;
-    // Renaming one name of a file over another name of the same file does nothing, by POSIX.
-    let _ = fs::remove_file(aside);
-    Ok(())
 }
 
 #[cfg(test)]

@@ -2,26 +2,27 @@
 //!
 //! A table's Parquet file decoded: what it says of itself, its columns, and the hash of what they hold.
 
-use super::content::{TableHash, hash_of_columns};
 use super::disk::refused;
 use super::frame::{Frame, FrameBuilder};
-use super::key::{FileHash, TableRef};
-use super::schema::{self, Version};
+use super::key::{FileHash, TableHash, TableRef, hash_of_columns};
+use super::schema::{self, FieldSchema, Version};
 use super::writer::{CONTENT_HASH, SCHEMA, UNITS};
 use crate::error::{Error, Fault, Result};
 use crate::raw;
-use arrow::array::{ArrayRef, RecordBatch};
+use arrow::array::{ArrayRef, RecordBatch, new_null_array};
 use arrow::compute::concat_batches;
 use arrow::datatypes::{Field, Schema, SchemaRef};
 use parquet::arrow::arrow_reader::{
     ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
 };
+use parquet::errors::ParquetError;
+use parquet::file::metadata::FileMetaData;
 use parquet::file::reader::ChunkReader;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A table from a file outside of a store.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,13 +51,19 @@ fn open_published(path: &Path, table: &TableRef) -> Result<File> {
 pub struct PublishedTable {
     path: PathBuf,
     table: TableRef,
+    /// All of it, where that is no more than a chunk: it is decoded once.
+    whole: OnceLock<Frame>,
 }
 
 impl PublishedTable {
     pub(super) fn open(path: PathBuf, table: TableRef) -> Result<Self> {
         known_schema(&path.display().to_string(), &table.schema)?;
         open_published(&path, &table)?;
-        Ok(Self { path, table })
+        Ok(Self {
+            path,
+            table,
+            whole: OnceLock::new(),
+        })
     }
 
     /// How many rows.
@@ -71,12 +78,16 @@ impl PublishedTable {
 
     /// Hands on all rows in their order; of a table without rows, one empty chunk. Fails where the file cannot be read.
     pub(crate) fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
-        let place = self.path.display().to_string();
-        let (kind, version) = known_schema(&place, &self.table.schema)?;
-        let unreadable = |why| Error::store(&place, format!("not a readable Parquet file: {why}"));
+        if self.rows() <= BATCH_ROWS {
+            if self.whole.get().is_none() {
+                let _ = self.whole.set(self.frame()?);
+            }
+            return self.whole.get().map_or(Ok(()), take);
+        }
+        let (kind, version) = known_schema(&self.path.display().to_string(), &self.table.schema)?;
         let file = File::open(&self.path).map_err(|e| unopened(&self.path, &e))?;
-        let mut chunks = DecodedChunks::of(file).map_err(unreadable)?;
-        while let Some(chunk) = chunks.next().map_err(unreadable)? {
+        let mut chunks = DecodedChunks::of(file).map_err(|why| unreadable(&self.path, &why))?;
+        while let Some(chunk) = (chunks.next()).map_err(|why| unreadable(&self.path, &why))? {
             take(&chunk.frame(kind, version)?)?;
         }
         Ok(())
@@ -85,11 +96,9 @@ impl PublishedTable {
 
 /// Reads a published table; a damaged file is set aside, so that the next run makes it anew.
 pub(super) fn load(path: &Path, table: &TableRef) -> Result<Frame> {
-    let place = path.display().to_string();
-    let (kind, version) = known_schema(&place, &table.schema)?;
-    let file = open_published(path, table)?;
-    let unreadable = |why| Error::store(&place, format!("not a readable Parquet file: {why}"));
-    let decoded = Decoded::of(file).map_err(unreadable)?;
+    let (kind, version) = known_schema(&path.display().to_string(), &table.schema)?;
+    let decoded =
+        Decoded::of(open_published(path, table)?).map_err(|why| unreadable(path, &why))?;
     if decoded.rows() != table.rows {
         return Err(set_aside(
             path,
@@ -100,6 +109,11 @@ pub(super) fn load(path: &Path, table: &TableRef) -> Result<Frame> {
         return Err(set_aside(path, "its content is not what was published"));
     }
     decoded.frame(kind, version)
+}
+
+fn unreadable(path: &Path, why: &str) -> Error {
+    let message = format!("not a readable Parquet file: {why}");
+    Error::store(path.display().to_string(), message)
 }
 
 /// Why a published table does not open: one that is gone, or has something else in its place, no waiting brings back.
@@ -120,33 +134,23 @@ fn unopened(path: &Path, error: &io::Error) -> Error {
 
 /// The kind of a schema id `name/version` that this calib can read.
 fn known_schema<'a>(place: &str, id: &'a str) -> Result<(&'a str, Version)> {
+    let refused = |message: String| Err(Error::store(place, message));
     let parts = id
         .split_once('/')
         .and_then(|(kind, version)| Some((kind, Version::parse(version)?)));
     let Some((kind, version)) = parts else {
-        return Err(Error::store(
-            place,
-            format!("schema `{id}` is not of the form name/1.0.0"),
-        ));
+        return refused(format!("schema `{id}` is not of the form name/1.0.0"));
     };
-    let known = schema::all()
-        .find(|schema| schema.name == kind)
-        .map(|schema| schema.version);
-    match known {
+    let known = schema::all().find(|schema| schema.name == kind);
+    match known.map(|schema| schema.version) {
         Some(known) if known.major == version.major && version.minor <= known.minor => {
             Ok((kind, version))
         }
-        Some(known) => Err(Error::store(
-            place,
-            format!(
-                "the table is {id}, this calib reads {kind}/{known}: use the calib that wrote it, or a newer one"
-            ),
+        Some(known) => refused(format!(
+            "the table is {id}, this calib reads {kind}/{known}: use the calib that wrote it, or a newer one"
         )),
-        None => Err(Error::store(
-            place,
-            format!(
-                "this calib knows no table `{kind}`: use the calib that wrote it, or a newer one"
-            ),
+        None => refused(format!(
+            "this calib knows no table `{kind}`: use the calib that wrote it, or a newer one"
         )),
     }
 }
@@ -225,20 +229,26 @@ fn of_the_data(place: &str, error: Error) -> Error {
 /// Takes a damaged object out of the way.
 fn set_aside(path: &Path, why: &str) -> Error {
     let place = path.display().to_string();
-    match fs::rename(path, path.with_extension("damaged")) {
-        Ok(()) => Error::store(
-            place,
-            format!(
-                "damaged: {why}; it was set aside, and `calib run` of its pipeline writes it anew"
-            ),
-        ),
-        Err(e) => Error::store(
-            place,
-            format!(
-                "damaged: {why}; remove it, and `calib run` of its pipeline writes it anew ({e})"
-            ),
-        ),
-    }
+    let (what, error) = match fs::rename(path, path.with_extension("damaged")) {
+        Ok(()) => ("it was set aside", String::new()),
+        Err(e) => ("remove it", format!(" ({e})")),
+    };
+    let message =
+        format!("damaged: {why}; {what}, and `calib run` of its pipeline writes it anew{error}");
+    Error::store(place, message)
+}
+
+/// What a file says of itself, by key, and of the units of its columns, by name.
+pub(crate) fn file_notes(
+    footer: &FileMetaData,
+) -> (BTreeMap<String, String>, BTreeMap<String, String>) {
+    let pairs = footer.key_value_metadata().into_iter().flatten();
+    let notes: BTreeMap<String, String> = pairs
+        .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)))
+        .collect();
+    let units = notes.get(UNITS);
+    let units = units.and_then(|text| serde_json::from_str(text).ok());
+    (notes, units.unwrap_or_default())
 }
 
 /// The columns of a table, by name.
@@ -248,32 +258,23 @@ type NamedArrays = BTreeMap<String, ArrayRef>;
 const BATCH_ROWS: usize = 1 << 16;
 
 pub(super) struct Decoded {
-    metadata: BTreeMap<String, String>,
+    metadata: Arc<BTreeMap<String, String>>,
     batch: RecordBatch,
 }
 
 impl Decoded {
     /// Decodes a whole file, or says why that cannot be.
     pub fn of<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
-        raw::decoded(|| Self::parse(source)).and_then(|parsed| parsed)
-    }
-
-    fn parse<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
-        let text = |error: &dyn std::fmt::Display| error.to_string();
-        let DecodedChunks {
-            metadata,
-            schema,
-            file_schema,
-            reader,
-            ..
-        } = DecodedChunks::parse(source)?;
-        let batches = reader
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(|error| text(&error))?;
-        let batch = concat_batches(&file_schema, &batches).map_err(|error| text(&error))?;
-        let batch =
-            RecordBatch::try_new(schema, batch.columns().to_vec()).map_err(|error| text(&error))?;
-        Ok(Self { metadata, batch })
+        let mut chunks = DecodedChunks::of(source)?;
+        let mut batches = Vec::new();
+        while let Some(chunk) = chunks.next()? {
+            batches.push(chunk.batch);
+        }
+        let batch = concat_batches(&chunks.schema, &batches).map_err(|error| error.to_string())?;
+        Ok(Self {
+            metadata: chunks.metadata,
+            batch,
+        })
     }
 
     /// The file's own key-value metadata.
@@ -292,24 +293,14 @@ impl Decoded {
 
     /// The columns of an older or the newest version, checked against the newest.
     pub fn frame(self, kind: &str, version: Version) -> Result<Frame> {
-        let names = self
-            .batch
-            .schema_ref()
-            .fields()
-            .iter()
-            .map(|field| field.name().clone());
-        let pairs: Vec<_> = names.zip(self.batch.columns().iter().cloned()).collect();
-        if let Some(twice) = pairs
-            .iter()
-            .enumerate()
-            .find(|(at, (name, _))| pairs[..*at].iter().any(|(other, _)| other == name))
-        {
-            return Err(Error::Bug(format!(
-                "table {kind}: column {} twice",
-                twice.1.0
-            )));
+        let mut columns = NamedArrays::new();
+        let fields = self.batch.schema_ref().fields().iter();
+        for (field, column) in fields.zip(self.batch.columns()) {
+            let name = field.name();
+            if columns.insert(name.clone(), column.clone()).is_some() {
+                return Err(Error::Bug(format!("table {kind}: column {name} twice")));
+            }
         }
-        let columns: NamedArrays = pairs.into_iter().collect();
         let mut frame = FrameBuilder::new(kind);
         let added = added_since(kind, version, &columns, self.batch.num_rows())?;
         for (name, column) in columns.into_iter().chain(added) {
@@ -321,10 +312,9 @@ impl Decoded {
 
 /// A file decoded chunk by chunk.
 pub(super) struct DecodedChunks {
-    metadata: BTreeMap<String, String>,
-    /// With the units of columns, and as Parquet has it.
+    metadata: Arc<BTreeMap<String, String>>,
+    /// With the units of columns.
     schema: SchemaRef,
-    file_schema: SchemaRef,
     reader: ParquetRecordBatchReader,
     begun: bool,
 }
@@ -332,54 +322,25 @@ pub(super) struct DecodedChunks {
 impl DecodedChunks {
     /// Opens a file, or says why that cannot be.
     pub fn of<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
-        raw::decoded(|| Self::parse(source)).and_then(|parsed| parsed)
+        raw::decoded(|| Self::parse(source))?.map_err(|error| error.to_string())
     }
 
-    fn parse<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
-        let text = |error: &dyn std::fmt::Display| error.to_string();
+    fn parse<R: ChunkReader + 'static>(source: R) -> Result<Self, ParquetError> {
         // Arrow's own description of the columns is left aside: Parquet's says as much of the types that tables have.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(source, options)
-            .map_err(|error| text(&error))?;
-        let pairs = builder
-            .metadata()
-            .file_metadata()
-            .key_value_metadata()
-            .into_iter()
-            .flatten();
-        let metadata: BTreeMap<String, String> = pairs
-            .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)))
-            .collect();
-        let units: BTreeMap<String, String> = metadata
-            .get(UNITS)
-            .and_then(|text| serde_json::from_str(text).ok())
-            .unwrap_or_default();
-        let file_schema = builder.schema().clone();
+        let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(source, options)?;
+        let (metadata, units) = file_notes(builder.metadata().file_metadata());
         let with_unit = |field: &Arc<Field>| {
-            let unit = units
-                .get(field.name())
-                .map(|unit| ("unit".to_string(), unit.clone()));
-            field
-                .as_ref()
-                .clone()
-                .with_metadata(unit.into_iter().collect())
+            let unit = units.get(field.name());
+            let unit = unit.map(|unit| ("unit".to_string(), unit.clone()));
+            let field = field.as_ref().clone();
+            field.with_metadata(unit.into_iter().collect())
         };
-        let schema = Arc::new(Schema::new(
-            file_schema
-                .fields()
-                .iter()
-                .map(with_unit)
-                .collect::<Vec<_>>(),
-        ));
-        let reader = builder
-            .with_batch_size(BATCH_ROWS)
-            .build()
-            .map_err(|error| text(&error))?;
+        let fields = builder.schema().fields().iter().map(with_unit);
         Ok(Self {
-            metadata,
-            schema,
-            file_schema,
-            reader,
+            schema: Arc::new(Schema::new(fields.collect::<Vec<_>>())),
+            metadata: Arc::new(metadata),
+            reader: builder.with_batch_size(BATCH_ROWS).build()?,
             begun: false,
         })
     }
@@ -416,12 +377,8 @@ fn added_since(
     let added = schema.fields.iter().filter(|field| {
         field.nullable && !field.optional && !field.per_joint && !columns.contains_key(&field.name)
     });
+    let nulls = |field: &FieldSchema| new_null_array(&field.column_type.arrow(), rows);
     Ok(added
-        .map(|field| {
-            (
-                field.name.clone(),
-                arrow::array::new_null_array(&field.column_type.arrow(), rows),
-            )
-        })
+        .map(|field| (field.name.clone(), nulls(field)))
         .collect())
 }

@@ -5,11 +5,11 @@
 //! store is opened, records when they are looked up, tables when they are needed; what does not have the hash of its name is not taken.
 //! What is for people (`tables/`, `documents/`) lies in the folder alone, where every run puts it.
 
+use super::Store;
 use super::disk::{
-    component, make_dir, make_read_only, place, put_if_absent, refused, together, write,
+    component, make_dir, make_read_only, place, put_if_absent, refused, remove, together,
 };
 use super::key::{TableRef, same_bytes};
-use super::{Bucket, Store};
 use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::fmt::Debug;
@@ -24,6 +24,24 @@ const TRIES: u32 = 5;
 const PAUSE: Duration = Duration::from_millis(200);
 /// More than any store has.
 const ALL: usize = usize::MAX;
+/// Folders that the bucket has, too.
+const SHARED: [&str; 4] = ["objects", "actions", "runs", "tags"];
+
+/// Whole files under keys with slashes, as S3 has them; what is written is seen by all at once.
+pub trait Bucket: Debug + Send + Sync {
+    /// As a person writes it: `s3://bucket/prefix`.
+    fn name(&self) -> &str;
+    /// Fetches into a new file; false where there is nothing.
+    fn fetch(&self, key: &str, to: &Path) -> Result<bool>;
+    /// Writes a file over what may be there.
+    fn send(&self, from: &Path, key: &str) -> Result<()>;
+    /// Writes a small file where nothing is, decided once for all who try; false where something is.
+    fn create(&self, from: &Path, key: &str) -> Result<bool>;
+    /// Takes away; nothing where there is nothing.
+    fn remove(&self, key: &str) -> Result<()>;
+    /// Keys below a folder (all where it is empty) with their bytes, in order, `most` at most.
+    fn list(&self, folder: &str, most: usize) -> Result<Vec<(String, u64)>>;
+}
 
 #[derive(Debug)]
 pub(super) struct Remote {
@@ -64,18 +82,6 @@ impl Store {
         Ok(store)
     }
 
-    /// Opens `s3://BUCKET/PREFIX` with a folder below `cache` before it. `settings` are the environment's `AWS_...`.
-    #[cfg(feature = "s3")]
-    pub(crate) fn open_s3(
-        url: &str,
-        settings: &std::collections::BTreeMap<String, String>,
-        cache: &Path,
-    ) -> Result<Self> {
-        let bucket = super::s3::S3::open(url, settings)?;
-        let root = cache.join(bucket.folder());
-        Self::open_before(root, Arc::new(bucket))
-    }
-
     /// Says how to come by a calib that opens `s3://BUCKET/PREFIX`.
     #[cfg(not(feature = "s3"))]
     pub fn open_s3(
@@ -99,26 +105,23 @@ impl Store {
         self.remote.is_some()
     }
 
-    /// The remote and the key of a file of this store.
-    fn keyed(&self, path: &Path) -> Result<Option<(&Remote, String)>> {
-        let Some(remote) = &self.remote else {
-            return Ok(None);
-        };
-        let inside = path
-            .strip_prefix(self.root())
-            .map_err(|_| Error::Bug(format!("{} is not of the store", path.display())))?;
+    /// The remote and the key of a file of this store; none of what is for people, or where there is no bucket.
+    fn keyed(&self, path: &Path) -> Option<(&Remote, String)> {
+        let remote = self.remote.as_ref()?;
+        let inside = path.strip_prefix(self.root()).ok()?;
         let parts: Vec<_> = inside.iter().map(|part| part.to_string_lossy()).collect();
-        Ok(Some((remote, parts.join("/"))))
+        SHARED
+            .contains(&parts.first()?.as_ref())
+            .then(|| (remote, parts.join("/")))
     }
 
     /// The same where something is going to be written: the bucket becomes a store.
     fn written(&self, path: &Path) -> Result<Option<(&Remote, String)>> {
-        let Some((remote, key)) = self.keyed(path)? else {
+        let Some((remote, key)) = self.keyed(path) else {
             return Ok(None);
         };
         if !remote.begun.load(Ordering::Acquire) {
-            let aside = self.workspace()?.fresh();
-            write(&aside, &super::format_text()?)?;
+            let (aside, _) = self.workspace()?.write(&super::format_text()?)?;
             remote.bucket.create(&aside, "format.json")?;
             // A server that does not know the condition writes again, and the second of two would undo the first.
             if remote.bucket.create(&aside, "format.json")? {
@@ -137,21 +140,7 @@ impl Store {
             .map_or(Ok(()), |(remote, key)| remote.bucket.send(from, &key))
     }
 
-    /// Sends the first manifest of a run, whose id nobody else may have.
-    pub(super) fn give_run(&self, from: &Path, path: &Path) -> Result<()> {
-        let Some((remote, key)) = self.written(path)? else {
-            return Ok(());
-        };
-        match remote.bucket.create(from, &key)? {
-            true => Ok(()),
-            false => Err(Error::store(
-                format!("{}/{key}", remote.bucket.name()),
-                "another run has this id: run again",
-            )),
-        }
-    }
-
-    /// Puts a record that is aside in its place if none stands, which the bucket decides where there is one; false where one stands.
+    /// Puts a file that is aside in its place if none stands, which the bucket decides where there is one; false where one stands.
     pub(super) fn commit(&self, aside: &Path, path: &Path) -> Result<bool> {
         let Some((remote, key)) = self.written(path)? else {
             return put_if_absent(aside, path);
@@ -174,13 +163,13 @@ impl Store {
 
     /// Takes a file of the bucket away.
     pub(super) fn withdraw(&self, path: &Path) -> Result<()> {
-        self.keyed(path)?
+        self.keyed(path)
             .map_or(Ok(()), |(remote, key)| remote.bucket.remove(&key))
     }
 
     /// Makes a file what it is in the bucket; false where it is not there. A file of a store that is only a folder stays as it is.
     pub(super) fn refresh(&self, path: &Path) -> Result<bool> {
-        let Some((remote, key)) = self.keyed(path)? else {
+        let Some((remote, key)) = self.keyed(path) else {
             return Ok(true);
         };
         let aside = self.workspace()?.fresh();
@@ -193,7 +182,7 @@ impl Store {
 
     /// Fetches the file of a table; false where the bucket does not hold it whole, or where there is no bucket.
     pub(super) fn obtain(&self, table: &TableRef, path: &Path) -> Result<bool> {
-        let Some((remote, key)) = self.keyed(path)? else {
+        let Some((remote, key)) = self.keyed(path) else {
             return Ok(false);
         };
         let aside = self.workspace()?.fresh();
@@ -207,11 +196,10 @@ impl Store {
         Ok(whole)
     }
 
-    /// Why a table's file could not be obtained.
-    pub(super) fn lost(&self, path: &Path) -> Error {
+    /// A file as a person finds it: in the bucket, where there is one.
+    pub(super) fn label(&self, path: &Path) -> String {
         let inside = path.strip_prefix(self.root()).unwrap_or(path);
-        let message = "is missing from the bucket, or its bytes are not those that were published; calib run makes it anew";
-        Error::store(format!("{}/{}", self.name(), inside.display()), message)
+        format!("{}/{}", self.name(), inside.display())
     }
 
     /// Fetches all files below a folder of the bucket that are not here; nothing for a store that is only a folder.
@@ -275,10 +263,9 @@ impl Store {
             .filter_map(|(key, _)| below(self.root(), key))
             .collect();
         together(&there, |path| self.refresh(path).map(drop))?;
-        for gone in here.iter().filter(|path| !there.contains(path)) {
-            fs::remove_file(gone).map_err(|e| refused(gone, "remove", &e))?;
-        }
-        Ok(())
+        here.iter()
+            .filter(|path| !there.contains(path))
+            .try_for_each(|gone| remove(gone))
     }
 
     /// Everything in the bucket in a new folder; none for a store that is only a folder.

@@ -4,7 +4,7 @@
 //!
 //! Names for runs, `tags/<name>.json`: what is tagged is kept.
 
-use super::disk::{component, make_dir, place, refused, replace, write, write_synced};
+use super::disk::{component, entries, make_dir, place, refused};
 use super::notes::{seal, unseal};
 use super::{KnownRuns, Store};
 use crate::error::{Error, Result};
@@ -13,7 +13,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{MutexGuard, PoisonError};
 
 /// A run in flight.
@@ -27,9 +27,7 @@ pub struct Run {
 /// A run and the seal of its manifest.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Link {
-    /// Its id.
     pub(crate) run: String,
-    /// Hash of its manifest.
     pub(crate) sealed: String,
 }
 
@@ -38,7 +36,6 @@ pub struct Link {
 pub struct Sealed {
     /// As it was written.
     pub(crate) manifest: Value,
-    /// Hash of it.
     pub(crate) sealed: String,
 }
 
@@ -149,12 +146,11 @@ impl Store {
             return Err(Error::Bug(format!("run {id} was begun already")));
         }
         let begin = || {
-            let path = dir.join("events.jsonl");
-            let aside = self.workspace()?.fresh();
-            let file = write(&aside, &seal(manifest)?)?;
-            self.give_run(&aside, &dir.join("manifest.json"))?;
-            place(&aside, &dir.join("manifest.json"))?;
-            self.owe(&dir.join("manifest.json"), file)?;
+            let (path, stands) = (dir.join("events.jsonl"), dir.join("manifest.json"));
+            if !self.put_once(&stands, &seal(manifest)?)? {
+                let message = "another run has this id: run again";
+                return Err(Error::store(self.label(&stands), message));
+            }
             let events = File::options()
                 .append(true)
                 .create(true)
@@ -172,25 +168,24 @@ impl Store {
 
     /// Replaces the manifest of a run, atomically.
     pub fn write_manifest(&self, run: &Run, manifest: &impl Serialize) -> Result<()> {
-        let aside = self.workspace()?.fresh();
-        write_synced(&aside, &seal(manifest)?)?;
-        self.give_state(run, &aside)?;
-        replace(&aside, &run.dir.join("manifest.json"))
+        let events = run.dir.join("events.jsonl");
+        self.give(&events, &events)?;
+        self.put_now(&run.dir.join("manifest.json"), &seal(manifest)?)
     }
 
     /// Closes the record of a run: everything that it made is durable before its last manifest is seen, and that then; of one among many,
     /// of which the record of each says that it is done, with the next `sync`.
     pub fn finish_run(&self, run: Run, manifest: &impl Serialize, among_many: bool) -> Result<()> {
         let path = run.dir.join("manifest.json");
-        let aside = self.workspace()?.fresh();
+        let events = run.dir.join("events.jsonl");
         let text = seal(manifest)?;
-        let file = write(&aside, &text)?;
-        self.give_state(&run, &aside)?;
-        self.owe(&run.dir.join("events.jsonl"), run.events)?;
+        self.give(&events, &events)?;
+        self.owe(&events, run.events)?;
         if among_many {
-            place(&aside, &path)?;
-            self.owe(&path, file)?;
+            self.put(&path, &text)?;
         } else {
+            let (aside, file) = self.workspace()?.write(&text)?;
+            self.give(&aside, &path)?;
             self.owe(&aside, file)?;
             self.sync_then(|| place(&aside, &path).map(|()| Some(path)))?;
         }
@@ -200,25 +195,11 @@ impl Store {
         Ok(())
     }
 
-    /// Sends the events of a run so far, then its manifest, which is still aside.
-    fn give_state(&self, run: &Run, manifest: &Path) -> Result<()> {
-        let events = run.dir.join("events.jsonl");
-        self.give(&events, &events)?;
-        self.give(manifest, &run.dir.join("manifest.json"))
-    }
-
     /// Folders of runs by name, also of those that did not begin.
     pub(super) fn run_folders(&self) -> Result<Vec<String>> {
-        let dir = self.root().join("runs");
-        let entries = match fs::read_dir(&dir) {
-            Ok(entries) => entries,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-            Err(e) => return Err(refused(&dir, "read", &e)),
-        };
-        let mut names: Vec<String> = entries
-            .flatten()
-            .filter_map(|entry| entry.file_name().into_string().ok())
-            .collect();
+        let found = entries(&self.root().join("runs"))?;
+        let names = found.iter().filter_map(|path| path.file_name()?.to_str());
+        let mut names: Vec<String> = names.map(String::from).collect();
         names.sort();
         Ok(names)
     }
@@ -309,14 +290,8 @@ impl Store {
 
     /// All tags with their runs.
     pub fn tags(&self) -> Result<BTreeMap<String, String>> {
-        let dir = self.root().join("tags");
-        let entries = match fs::read_dir(&dir) {
-            Ok(entries) => entries,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
-            Err(e) => return Err(refused(&dir, "read", &e)),
-        };
         let mut tags = BTreeMap::new();
-        for path in entries.flatten().map(|entry| entry.path()) {
+        for path in entries(&self.root().join("tags"))? {
             let Some(name) = path
                 .file_name()
                 .and_then(|name| name.to_str()?.strip_suffix(".json"))
@@ -347,10 +322,7 @@ impl Store {
         }
         let before = fs::read(&path).ok().filter(|bytes| unseal(bytes).is_ok());
         let before = before.and_then(|bytes| Some(serde_json::from_slice::<Tag>(&bytes).ok()?.run));
-        let aside = self.workspace()?.fresh();
-        write_synced(&aside, &seal(&Tag { run: run.into() })?)?;
-        self.give(&aside, &path)?;
-        replace(&aside, &path)?;
+        self.put_now(&path, &seal(&Tag { run: run.into() })?)?;
         Ok(before)
     }
 

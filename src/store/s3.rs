@@ -12,11 +12,12 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Write};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 use tokio::runtime::Runtime;
 
-use super::Bucket;
 use super::disk::refused;
+use super::{Bucket, Store};
 use crate::error::{Error, Result};
 
 /// Files up to this are sent in one request, bytes; larger ones in parts of this size, a few at a time.
@@ -29,7 +30,7 @@ const PATIENCE: Duration = Duration::from_secs(30);
 const SHOWN: usize = 300;
 
 #[derive(Debug)]
-pub(super) struct S3 {
+struct S3 {
     name: String,
     bucket: String,
     prefix: Key,
@@ -40,9 +41,22 @@ pub(super) struct S3 {
     runtime: Runtime,
 }
 
+impl Store {
+    /// Opens `s3://BUCKET/PREFIX` with a folder below `cache` before it. `settings` are the environment's `AWS_...`.
+    pub(crate) fn open_s3(
+        url: &str,
+        settings: &BTreeMap<String, String>,
+        cache: &Path,
+    ) -> Result<Self> {
+        let bucket = S3::open(url, settings)?;
+        let root = cache.join(bucket.folder());
+        Self::open_before(root, Arc::new(bucket))
+    }
+}
+
 impl S3 {
     /// Nothing is asked yet.
-    pub(crate) fn open(url: &str, settings: &BTreeMap<String, String>) -> Result<Self> {
+    fn open(url: &str, settings: &BTreeMap<String, String>) -> Result<Self> {
         let shape = || Error::spec(url, "expected s3://BUCKET/PREFIX");
         let rest = url
             .strip_prefix("s3://")
@@ -123,7 +137,7 @@ impl S3 {
     }
 
     /// A folder name for what is fetched from here; other endpoints have other buckets of the same name.
-    pub(crate) fn folder(&self) -> String {
+    fn folder(&self) -> String {
         let hash = blake3::hash(format!("{} {}", self.endpoint, self.name).as_bytes()).to_hex();
         format!("{}-{}", self.bucket, &hash[..16])
     }

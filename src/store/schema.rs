@@ -70,7 +70,6 @@ pub struct FieldSchema {
     /// Symbol of a stored unit; `row` where the row says it in its own `unit` column.
     #[serde(default)]
     pub(crate) unit: Option<String>,
-    /// What it means.
     pub(crate) description: String,
     /// `angle`, `quaternion`, `json`, `unit`: how values compare.
     #[serde(default)]

@@ -4,7 +4,7 @@
 
 use crate::error::{Error, Fault, Result};
 use crate::store::actions::ActionRecord;
-use crate::store::disk::refused;
+use crate::store::disk::{ends_in, entries, refused};
 use crate::store::key::FileHash;
 use crate::store::notes::unseal;
 use crate::store::runs::{Sealed, events_fault};
@@ -20,13 +20,9 @@ use std::time::SystemTime;
 /// What a verification read, and everything that it found wrong.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Verification {
-    /// Tables that were read.
     pub(crate) objects: u64,
-    /// Bytes of these tables.
     pub(crate) bytes: u64,
-    /// Records that were read.
     pub(crate) actions: u64,
-    /// Manifests that were read.
     pub(crate) runs: u64,
     /// Names that were followed.
     pub(crate) tags: u64,
@@ -87,17 +83,12 @@ impl Store {
             }
         }
         self.check_documents(&mut found)?;
-        for path in files(&self.root().join("fleets"))?
-            .iter()
-            .filter(|path| path.extension().is_some_and(|end| end == "json"))
-        {
+        for path in self.fleet_notes()? {
             found.notes += 1;
-            let text = fs::read(path).map_err(|e| refused(path, "read", &e))?;
-            found.faults.extend(
-                unseal(&text)
-                    .err()
-                    .map(|why| fault(path, &format!("{why}; calib fleet run writes it anew"))),
-            );
+            if let Err(why) = unseal(&read(&path)?) {
+                let why = format!("{why}; calib fleet run writes it anew");
+                found.faults.push(fault(&path, &why));
+            }
         }
         Ok(found)
     }
@@ -111,21 +102,12 @@ impl Store {
             .collect();
         let mut objects = BTreeMap::new();
         for (path, hashed) in hashes {
-            let name = path
-                .file_stem()
-                .map(|stem| stem.to_string_lossy().into_owned())
-                .unwrap_or_default();
+            let name = stem(&path);
             let (hash, bytes) = hashed?;
             found.objects += 1;
             found.bytes += bytes;
-            let whole = hash.as_str() == name
-                && path
-                    .extension()
-                    .is_some_and(|extension| extension == "parquet");
-            if path
-                .extension()
-                .is_some_and(|extension| extension == "damaged")
-            {
+            let whole = hash.as_str() == name && ends_in(&path, "parquet");
+            if ends_in(&path, "damaged") {
                 found.faults.push(fault(
                     &path,
                     "was set aside as damaged; calib gc takes it away",
@@ -246,7 +228,7 @@ impl Store {
         let mut sealed: BTreeSet<PathBuf> = BTreeSet::new();
         for path in files(&seals)? {
             found.notes += 1;
-            let text = fs::read(&path).map_err(|e| refused(&path, "read", &e))?;
+            let text = read(&path)?;
             let whole = unseal(&text)
                 .ok()
                 .and_then(|_| serde_json::from_slice::<serde_json::Value>(&text).ok());
@@ -317,21 +299,28 @@ impl Store {
 }
 
 fn read_record(path: &Path) -> Result<std::result::Result<ActionRecord, String>> {
-    let bytes = fs::read(path).map_err(|e| refused(path, "read", &e))?;
-    if let Err(why) = unseal(&bytes) {
-        return Ok(Err(why.into()));
-    }
-    let record: ActionRecord = match serde_json::from_slice(&bytes) {
-        Ok(record) => record,
-        Err(e) => return Ok(Err(format!("not an action record ({e})"))),
-    };
-    let named = path
-        .file_stem()
-        .is_some_and(|stem| stem == record.id.as_str());
-    if !named || record.key.id() != record.id {
-        return Ok(Err("the record is not of the key that its name says".into()));
-    }
-    Ok(Ok(record))
+    let bytes = read(path)?;
+    let sealed = unseal(&bytes).map_err(String::from);
+    let record: std::result::Result<ActionRecord, String> = sealed.and_then(|_| {
+        serde_json::from_slice(&bytes).map_err(|e| format!("not an action record ({e})"))
+    });
+    Ok(record.and_then(|record| {
+        let is_named = stem(path) == record.id.as_str() && record.key.id() == record.id;
+        is_named
+            .then_some(record)
+            .ok_or_else(|| "the record is not of the key that its name says".into())
+    }))
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    fs::read(path).map_err(|e| refused(path, "read", &e))
+}
+
+/// A file's name without its extension.
+fn stem(path: &Path) -> String {
+    path.file_stem()
+        .map(|stem| stem.to_string_lossy().into_owned())
+        .unwrap_or_default()
 }
 
 fn fault(path: &Path, why: &str) -> Fault {
@@ -349,13 +338,8 @@ fn hash(path: &Path) -> Result<(FileHash, u64)> {
 
 /// All files below a folder, in order of their paths; none where it is not there.
 pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = match fs::read_dir(folder) {
-        Ok(entries) => entries,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(e) => return Err(refused(folder, "read", &e)),
-    };
     let mut found = Vec::new();
-    for path in entries.flatten().map(|entry| entry.path()) {
+    for path in entries(folder)? {
         if path.is_dir() {
             found.extend(files(&path)?);
         } else {
@@ -368,19 +352,17 @@ pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
 
 /// Letters and digits of a run's id, a ULID.
 const RUN_ID: usize = 26;
+/// Hex digits of a hash.
+const HASH: usize = 64;
 
 /// What was swept, or would be.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Sweep {
-    /// Records that go.
     pub(crate) actions: u64,
-    /// Tables that go.
     pub(crate) objects: u64,
     /// Bytes of the records and tables that go.
     pub(crate) bytes: u64,
-    /// Records that stay.
     pub(crate) kept_actions: u64,
-    /// Tables that stay.
     pub(crate) kept_objects: u64,
     /// Kept only because they are younger than the grace period.
     pub(crate) young: u64,
@@ -407,40 +389,26 @@ impl Store {
         }
         let mut sweep = Sweep::default();
         let mut named: BTreeSet<String> = BTreeSet::new();
-        for path in files(&self.root().join("fleets"))?
-            .iter()
-            .filter(|path| path.extension().is_some_and(|end| end == "json"))
-        {
-            hashes_in(path, &mut named)?;
+        for path in self.fleet_notes()? {
+            named.extend(words(&path, HASH, |byte| byte.is_ascii_hexdigit())?);
         }
-        let mut gone: BTreeSet<PathBuf> = BTreeSet::new();
+        let mut stay = Vec::new();
         for path in files(&self.root().join("actions"))? {
-            let asked = |stem: &str| keep.contains(stem) || named.contains(stem);
-            let kept = path
-                .file_stem()
-                .is_some_and(|stem| asked(&stem.to_string_lossy()));
-            if kept || !old(&path, before, &mut sweep) {
+            let id = stem(&path);
+            if keep.contains(&id) || named.contains(&id) || !old(&path, before, &mut sweep) {
                 sweep.kept_actions += 1;
+                stay.push(path);
                 continue;
             }
             sweep.actions += 1;
             sweep.bytes += remove(&path, dry_run)?;
-            gone.insert(path);
         }
-        for path in files(&self.root().join("actions"))?
-            .iter()
-            .filter(|path| !gone.contains(*path))
-        {
-            hashes_in(path, &mut named)?;
+        // Also in a record that cannot be read as one any more.
+        for path in stay {
+            named.extend(words(&path, HASH, |byte| byte.is_ascii_hexdigit())?);
         }
         for path in files(&self.root().join("objects"))? {
-            let damaged = path
-                .extension()
-                .is_some_and(|extension| extension == "damaged");
-            let needed = !damaged
-                && path
-                    .file_stem()
-                    .is_some_and(|stem| named.contains(&*stem.to_string_lossy()));
+            let needed = !ends_in(&path, "damaged") && named.contains(&stem(&path));
             if needed || !old(&path, before, &mut sweep) {
                 sweep.kept_objects += 1;
                 continue;
@@ -452,14 +420,14 @@ impl Store {
     }
 }
 
-/// What looks like a hash in a record, also in one that cannot be read as one any more.
-fn hashes_in(path: &Path, hashes: &mut BTreeSet<String>) -> Result<()> {
-    let text = fs::read(path).map_err(|e| refused(path, "read", &e))?;
-    let words = text
-        .split(|byte| !byte.is_ascii_hexdigit())
-        .filter(|word| word.len() == 64);
-    hashes.extend(words.map(|word| String::from_utf8_lossy(word).into_owned()));
-    Ok(())
+/// What looks like a hash, or the id of a run, in a file: words of so many of some letters.
+fn words(path: &Path, letters: usize, is_letter: fn(&u8) -> bool) -> Result<Vec<String>> {
+    let text = read(path)?;
+    let words = text.split(|byte| !is_letter(byte));
+    Ok(words
+        .filter(|word| word.len() == letters)
+        .map(|word| String::from_utf8_lossy(word).into_owned())
+        .collect())
 }
 
 /// True where a file was last changed before `before`; a time that lies in the future counts as young.
@@ -485,16 +453,15 @@ impl Store {
     /// Runs that the records of fleets name.
     pub(crate) fn runs_of_fleets(&self) -> Result<BTreeSet<String>> {
         let mut runs = BTreeSet::new();
-        for path in files(&self.root().join("fleets"))?
-            .iter()
-            .filter(|path| path.extension().is_some_and(|end| end == "json"))
-        {
-            let text = fs::read(path).map_err(|e| refused(path, "read", &e))?;
-            let words = text
-                .split(|byte| !byte.is_ascii_alphanumeric())
-                .filter(|word| word.len() == RUN_ID);
-            runs.extend(words.map(|word| String::from_utf8_lossy(word).into_owned()));
+        for path in self.fleet_notes()? {
+            runs.extend(words(&path, RUN_ID, |byte| byte.is_ascii_alphanumeric())?);
         }
         Ok(runs)
+    }
+
+    fn fleet_notes(&self) -> Result<Vec<PathBuf>> {
+        let mut notes = files(&self.root().join("fleets"))?;
+        notes.retain(|path| ends_in(path, "json"));
+        Ok(notes)
     }
 }

@@ -1,10 +1,9 @@
 //! Tables to Parquet files: chunks in, one file out, in bounded memory and with bytes that do not depend on the chunks.
 
 use super::check;
-use super::content::ContentHasher;
 use super::disk::{Workspace, refused};
 use super::frame::Frame;
-use super::key::{FileHash, TableRef};
+use super::key::{ContentHasher, FileHash, TableRef};
 use super::schema::TableSchema;
 use crate::error::{Error, Result};
 use arrow::array::{Array, ArrayRef, AsArray, RecordBatch};
@@ -41,18 +40,15 @@ pub struct TableWriter {
     path: PathBuf,
     workspace: Arc<Workspace>,
     rows: u64,
-    state: Option<WriterState>,
-}
-
-enum WriterState {
-    Here(Box<Open>),
-    Aside(EncodingThread),
+    /// Until the table is large.
+    open: Option<Box<Open>>,
+    aside: Option<EncodingThread>,
 }
 
 /// Encodes the chunks that it is sent.
 struct EncodingThread {
     chunks: Option<SyncSender<RecordBatch>>,
-    thread: Option<JoinHandle<Result<Open>>>,
+    thread: Option<JoinHandle<Result<Box<Open>>>>,
 }
 
 /// A table's finished file, not yet published. Dropped, it leaves nothing.
@@ -84,7 +80,8 @@ impl TableWriter {
             path: workspace.fresh(),
             workspace,
             rows: 0,
-            state: None,
+            open: None,
+            aside: None,
         }
     }
 
@@ -97,42 +94,37 @@ impl TableWriter {
                 self.schema.name
             )));
         }
+        if self.rows == 0 && self.open.is_none() && self.aside.is_none() {
+            self.open = Some(Box::new(Open::new(self.schema, chunk, &self.path)?));
+        }
         self.rows += chunk.rows() as u64;
-        match self.state.take() {
-            Some(WriterState::Aside(mut aside)) => {
-                aside.push(chunk.batch())?;
-                self.state = Some(WriterState::Aside(aside));
-            }
-            Some(WriterState::Here(open)) => self.state = Some(self.begun(open, chunk)?),
-            None => {
-                self.state =
-                    Some(self.begun(Box::new(Open::new(self.schema, chunk, &self.path)?), chunk)?)
-            }
+        if self.rows >= GROUP_ROWS as u64 {
+            self.aside = self
+                .aside
+                .take()
+                .or(self.open.take().map(EncodingThread::new));
         }
-        Ok(())
-    }
-
-    fn begun(&self, mut open: Box<Open>, chunk: &Frame) -> Result<WriterState> {
-        if self.rows < GROUP_ROWS as u64 {
-            open.push(chunk.batch())?;
-            return Ok(WriterState::Here(open));
+        let pushed = match (&mut self.open, &mut self.aside) {
+            (Some(open), _) => open.push(chunk.batch()),
+            (None, Some(aside)) => aside.push(chunk.batch()),
+            (None, None) => Err(Error::Bug("a table that failed before".into())),
+        };
+        // What lacks a chunk is never finished.
+        if pushed.is_err() {
+            (self.open, self.aside) = (None, None);
         }
-        let mut aside = EncodingThread::new(*open);
-        aside.push(chunk.batch())?;
-        Ok(WriterState::Aside(aside))
+        pushed
     }
 
     /// Closes the file.
     pub fn finish(self) -> Result<FinishedFile> {
-        let open = match self.state {
-            Some(WriterState::Here(open)) => *open,
-            Some(WriterState::Aside(aside)) => aside.end()?,
-            None => {
-                return Err(Error::Bug(format!(
-                    "table {}: finished without a chunk",
-                    self.schema.name
-                )));
-            }
+        let without = || {
+            let table = &self.schema.name;
+            Error::Bug(format!("table {table}: finished without a chunk"))
+        };
+        let open = match self.aside {
+            Some(mut aside) => aside.join()?,
+            None => self.open.ok_or_else(without)?,
         };
         let (table, written) = open.finish()?;
         Ok(FinishedFile {
@@ -145,11 +137,11 @@ impl TableWriter {
 }
 
 impl EncodingThread {
-    fn new(mut open: Open) -> Self {
+    fn new(mut open: Box<Open>) -> Self {
         let (chunks, taken) = sync_channel::<RecordBatch>(1);
         let encode = move || {
-            taken
-                .into_iter()
+            let mut chunks = taken.into_iter();
+            chunks
                 .try_for_each(|chunk| open.push(&chunk))
                 .map(|()| open)
         };
@@ -160,30 +152,21 @@ impl EncodingThread {
     }
 
     fn push(&mut self, chunk: &RecordBatch) -> Result<()> {
-        match self
-            .chunks
-            .as_ref()
-            .map(|chunks| chunks.send(chunk.clone()))
-        {
+        let chunks = self.chunks.as_ref();
+        match chunks.map(|chunks| chunks.send(chunk.clone())) {
             Some(Ok(())) => Ok(()),
             // It ended before its time.
             _ => self.join().map(drop),
         }
     }
 
-    fn join(&mut self) -> Result<Open> {
+    fn join(&mut self) -> Result<Box<Open>> {
         self.chunks = None;
-        let thread = self
-            .thread
-            .take()
-            .ok_or_else(|| Error::Bug("a table that failed before".into()))?;
+        let thread = self.thread.take();
+        let thread = thread.ok_or_else(|| Error::Bug("a table that failed before".into()))?;
         thread
             .join()
             .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-    }
-
-    fn end(mut self) -> Result<Open> {
-        self.join()
     }
 }
 
@@ -218,18 +201,13 @@ impl Drop for FinishedFile {
 impl Open {
     fn new(schema: &'static TableSchema, chunk: &Frame, path: &Path) -> Result<Self> {
         let file = File::create_new(path).map_err(|e| refused(path, "write", &e))?;
-        let (arrow_schema, content) = (
-            chunk.arrow_schema(),
-            ContentHasher::new(&schema.name, schema.version.major),
-        );
-        let path = path.to_path_buf();
         Ok(Self {
             schema,
-            path,
+            path: path.to_path_buf(),
             file: Some(file),
             writer: None,
-            arrow_schema,
-            content,
+            arrow_schema: chunk.arrow_schema(),
+            content: ContentHasher::new(&schema.name, schema.version.major),
             waiting: Vec::new(),
             last: None,
             rows: 0,
@@ -392,11 +370,10 @@ fn properties(
         ("calib.primary_key", schema.primary_key.join(",")),
         (UNITS, super::key::canonical(&units.into())),
     ];
-    let zstd = Compression::ZSTD(ZstdLevel::try_new(3).map_err(|e| Error::Bug(e.to_string()))?);
-    let compression = if large.is_some() {
-        zstd
-    } else {
-        Compression::SNAPPY
+    let zstd = ZstdLevel::try_new(3).map_err(|e| Error::Bug(e.to_string()))?;
+    let compression = match large {
+        Some(_) => Compression::ZSTD(zstd),
+        None => Compression::SNAPPY,
     };
     let mut properties = WriterProperties::builder()
         .set_compression(compression)
@@ -435,12 +412,11 @@ fn repeats(column: &ArrayRef) -> bool {
             .iter()
             .collect::<HashSet<_>>()
             .len(),
-        DataType::Float64 => first
-            .as_primitive::<Float64Type>()
-            .iter()
-            .map(|cell| cell.map(f64::to_bits))
-            .collect::<HashSet<_>>()
-            .len(),
+        DataType::Float64 => {
+            let cells = first.as_primitive::<Float64Type>().iter();
+            let bits = cells.map(|cell| cell.map(f64::to_bits));
+            bits.collect::<HashSet<_>>().len()
+        }
         _ => 0,
     };
     2 * different < first.len()
@@ -480,7 +456,7 @@ impl HashingFile {
         self.file.flush()?;
         Ok((
             self.file.get_ref().try_clone()?,
-            FileHash::of_hasher(&self.hasher),
+            FileHash::of(&self.hasher),
             self.bytes,
         ))
     }

@@ -8,7 +8,7 @@
 //!
 //! What a diagnosis says in addition to its verdict.
 
-use crate::diagnose::{Diagnosis, ErrorLengths, Finding, Located, VerdictKind};
+use crate::diagnose::{Diagnosis, ErrorLengths, Located, VerdictKind};
 use crate::dynamics::TorqueDiagnosis;
 use crate::effect::cause;
 use crate::observation::Dimension;
@@ -137,54 +137,45 @@ impl Findings {
     /// A row for each finding.
     pub fn of(diagnosis: &Diagnosis) -> Self {
         let lengths = diagnosis.dimension == Dimension::Length;
-        let turns = |joint: usize| diagnosis.model.robot.is_revolute(joint);
-        let in_rad = |finding: &Finding| {
-            finding
-                .valid
-                .filter(|(joint, _)| turns(*joint))
-                .map(|(_, range)| range)
-        };
-        let in_mm = |finding: &Finding| {
-            finding
-                .valid
-                .filter(|(joint, _)| !turns(*joint))
-                .map(|(_, range)| range.map(|q| 1e3 * q))
-        };
-        let rows = ranked(&diagnosis.findings).map(|(rank, finding)| FindingRow {
-            rank,
-            effect: finding.effect.into(),
-            place: finding.place.to_string(),
-            follows: finding
-                .forms
-                .first()
-                .map(|form| form.follows(finding.place).into()),
-            statement: finding.statement.clone(),
-            f_statistic: finding.evidence.map(|e| e.f_statistic),
-            p_value: finding.evidence.map(|e| e.p_value),
-            delta_bic: finding.evidence.map(|e| e.delta_bic),
-            heldout_gain_mm: finding
-                .evidence
-                .and_then(|e| e.heldout_gain)
-                .filter(|_| lengths)
-                .map(|gain| gain * 1e3),
-            effect_rms_mm: finding
-                .evidence
-                .filter(|_| lengths)
-                .map(|e| e.effect_rms * 1e3),
-            heldout_gain_rad: finding
-                .evidence
-                .and_then(|e| e.heldout_gain)
-                .filter(|_| !lengths),
-            effect_rms_rad: finding.evidence.filter(|_| !lengths).map(|e| e.effect_rms),
-            probability: Some(finding.probabilities.name),
-            place_probability: Some(finding.probabilities.place),
-            none_probability: Some(finding.probabilities.none),
-            valid_joint: finding.valid.map(|(joint, _)| joint as i64 + 1),
-            valid_from_rad: in_rad(finding).map(|range| range[0]),
-            valid_to_rad: in_rad(finding).map(|range| range[1]),
-            valid_from_mm: in_mm(finding).map(|range| range[0]),
-            valid_to_mm: in_mm(finding).map(|range| range[1]),
-            forms: serde_json::to_string(&finding.forms).expect("numbers and names serialise"),
+        let mm = |size: Option<f64>| size.filter(|_| lengths).map(|size| size * 1e3);
+        let rad = |size: Option<f64>| size.filter(|_| !lengths);
+        let rows = ranked(&diagnosis.findings).map(|(rank, finding)| {
+            let evidence = finding.evidence;
+            let gain = evidence.and_then(|e| e.heldout_gain);
+            let effect_rms = evidence.map(|e| e.effect_rms);
+            let (turned, slid) = match finding.valid {
+                Some((joint, range)) if diagnosis.model.robot.is_revolute(joint) => {
+                    (range.map(Some), [None; 2])
+                }
+                Some((_, range)) => ([None; 2], range.map(|q| Some(1e3 * q))),
+                None => ([None; 2], [None; 2]),
+            };
+            FindingRow {
+                rank,
+                effect: finding.effect.into(),
+                place: finding.place.to_string(),
+                follows: finding
+                    .forms
+                    .first()
+                    .map(|form| form.follows(finding.place).into()),
+                statement: finding.statement.clone(),
+                f_statistic: evidence.map(|e| e.f_statistic),
+                p_value: evidence.map(|e| e.p_value),
+                delta_bic: evidence.map(|e| e.delta_bic),
+                heldout_gain_mm: mm(gain),
+                effect_rms_mm: mm(effect_rms),
+                heldout_gain_rad: rad(gain),
+                effect_rms_rad: rad(effect_rms),
+                probability: Some(finding.probabilities.name),
+                place_probability: Some(finding.probabilities.place),
+                none_probability: Some(finding.probabilities.none),
+                valid_joint: finding.valid.map(|(joint, _)| joint as i64 + 1),
+                valid_from_rad: turned[0],
+                valid_to_rad: turned[1],
+                valid_from_mm: slid[0],
+                valid_to_mm: slid[1],
+                forms: serde_json::to_string(&finding.forms).expect("numbers and names serialise"),
+            }
         });
         Self(rows.collect())
     }
@@ -462,29 +453,19 @@ impl VerdictSentences {
 
     /// What a diagnosis of positions says, of the stage `step`.
     pub(crate) fn of_positions(step: &str, diagnosis: &Diagnosis) -> Self {
+        let unseen = (VerdictTopic::NotObservable, &diagnosis.not_observable[..]);
         let next = (
             VerdictTopic::NextMeasurement,
-            diagnosis.next_measurements.as_slice(),
+            &diagnosis.next_measurements[..],
         );
-        Self::of(
-            step,
-            &[
-                (VerdictTopic::NotObservable, &diagnosis.not_observable),
-                next,
-            ],
-        )
+        Self::of(step, &[unseen, next])
     }
 
     /// The same of a diagnosis of torques.
     pub(crate) fn of_torques(step: &str, diagnosis: &TorqueDiagnosis) -> Self {
-        let remarks = (VerdictTopic::Remark, diagnosis.remarks.as_slice());
-        Self::of(
-            step,
-            &[
-                (VerdictTopic::NotObservable, &diagnosis.not_observable),
-                remarks,
-            ],
-        )
+        let unseen = (VerdictTopic::NotObservable, &diagnosis.not_observable[..]);
+        let remarks = (VerdictTopic::Remark, &diagnosis.remarks[..]);
+        Self::of(step, &[unseen, remarks])
     }
 
     /// What the stage `step` says of a topic, in its order.

@@ -2,6 +2,7 @@
 //!
 //! The covariance of the estimated parameters, from the rows that they were fitted to.
 
+use super::prediction::joined;
 use super::{CovarianceRow, CovarianceTable, ParameterRow, Parameters};
 use crate::effect::{
     AnchorShift, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, ToolOffset,
@@ -96,8 +97,7 @@ impl Parameters {
                         let pair = closest.filter(|(_, correlation)| correlation.abs() > CORRELATED);
                         let pair = pair.map(|(other, c)| format!("moves with {} (correlation {c:+.2})", specs[other].name));
                         let of_prior = fitted.prior_checks.get(&k).and_then(|check| against_prior(check, spec.unit));
-                        let remarks: Vec<String> = of_prior.into_iter().chain(pair).collect();
-                        ("free", Some(spec.unit.from_si(*sigma)), (!remarks.is_empty()).then(|| remarks.join("; ")))
+                        ("free", Some(spec.unit.from_si(*sigma)), joined([of_prior, pair]))
                     }
                     ParameterStatus::Bound(wanted) => {
                         let end = if *wanted > model.x[k] { "upper" } else { "lower" };
@@ -143,12 +143,7 @@ impl Parameters {
     /// The same with what would show a parameter (by name) added to its remark.
     pub(crate) fn with_advice(mut self, advice: &BTreeMap<String, String>) -> Self {
         for row in &mut self.0 {
-            if let Some(sentence) = advice.get(&row.name) {
-                row.remark = Some(row.remark.take().map_or_else(
-                    || sentence.clone(),
-                    |remark| format!("{remark}; {sentence}"),
-                ));
-            }
+            row.remark = joined([row.remark.take(), advice.get(&row.name).cloned()]);
         }
         self
     }
@@ -158,8 +153,7 @@ impl Parameters {
         if corrected == Corrected::OutsideSimulation {
             for row in &mut self.0 {
                 row.corrects = Some(Corrected::OUTSIDE.into());
-                let remarks = [Some(Corrected::REMARK.to_string()), row.remark.take()];
-                row.remark = Some(remarks.into_iter().flatten().collect::<Vec<_>>().join("; "));
+                row.remark = joined([Some(Corrected::REMARK.into()), row.remark.take()]);
             }
         }
         self

@@ -2,6 +2,7 @@
 
 use super::{Frame, Table};
 use crate::error::Result;
+use crate::store::{FinishedFile, PublishedTable};
 use std::marker::PhantomData;
 use std::ops::Deref;
 
@@ -180,8 +181,8 @@ pub(crate) use {reads, writes};
 pub struct Streamed {
     /// The name of the schema.
     pub kind: &'static str,
-    /// The engine's handle to the finished file.
-    pub handle: Box<dyn std::any::Any + Send>,
+    /// Finished; none where the engine keeps tables elsewhere.
+    pub file: Option<FinishedFile>,
 }
 
 /// A streamed table with its kind as a type, for a field of a `writes!` struct.
@@ -209,31 +210,37 @@ pub trait Sink: Send {
     fn finish(self: Box<Self>) -> Result<Streamed>;
 }
 
-/// A table that is there to be read.
-pub trait StoredTable: Send + Sync {
-    /// How many rows.
-    fn rows(&self) -> usize;
+/// The table of a port.
+pub enum InputTable {
+    /// In memory.
+    Frame(Frame),
+    /// In the store, to be read chunk by chunk.
+    Stored(PublishedTable),
+}
+
+impl InputTable {
+    fn rows(&self) -> usize {
+        match self {
+            Self::Frame(frame) => frame.rows(),
+            Self::Stored(table) => table.rows(),
+        }
+    }
     /// All of it. Fails where it is damaged.
-    fn frame(&self) -> Result<Frame>;
+    fn frame(&self) -> Result<Frame> {
+        match self {
+            Self::Frame(frame) => Ok(frame.clone()),
+            Self::Stored(table) => table.frame(),
+        }
+    }
     /// Hands on all rows in their order, chunk after chunk, as often as it is called; of a table without rows, one empty chunk. Fails where
     /// it is damaged, and with what `take` fails with.
-    fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()>;
-}
-
-impl StoredTable for Frame {
-    fn rows(&self) -> usize {
-        Self::rows(self)
-    }
-    fn frame(&self) -> Result<Frame> {
-        Ok(self.clone())
-    }
     fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
-        take(self)
+        match self {
+            Self::Frame(frame) => take(frame),
+            Self::Stored(table) => table.chunks(take),
+        }
     }
 }
-
-/// The table of a port.
-pub type InputTable = Box<dyn StoredTable>;
 
 /// A field of a `reads!` struct whose table is read chunk by chunk.
 pub struct Chunks<T>(InputTable, PhantomData<fn() -> T>);
@@ -243,7 +250,7 @@ impl<T: Table> Chunks<T> {
         self.0.rows()
     }
 
-    /// Hands on all rows in their order, as [`StoredTable::chunks`].
+    /// Hands on all rows in their order, chunk by chunk.
     pub(crate) fn each(&self, mut take: impl FnMut(T) -> Result<()>) -> Result<()> {
         self.0.chunks(&mut |frame| take(T::from_frame(frame)?))
     }

@@ -171,10 +171,7 @@ impl Prediction {
         remarks: impl IntoIterator<Item = Option<String>>,
     ) -> Self {
         for (row, remark) in self.0.iter_mut().zip(remarks) {
-            row.remark = match (row.remark.take(), remark) {
-                (Some(first), Some(more)) => Some(format!("{first}; {more}")),
-                (first, more) => first.or(more),
-            };
+            row.remark = joined([row.remark.take(), remark]);
         }
         self
     }
@@ -186,6 +183,12 @@ impl Prediction {
         }
         self
     }
+}
+
+/// Remarks as one; none where there are none.
+pub(super) fn joined(remarks: impl IntoIterator<Item = Option<String>>) -> Option<String> {
+    let more = |first: String, more: String| format!("{first}; {more}");
+    remarks.into_iter().flatten().reduce(more)
 }
 
 /// What a row measured, in words.

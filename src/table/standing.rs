@@ -313,37 +313,35 @@ fn never_fitted(steps: &[Step]) -> BTreeSet<i64> {
 mod tests {
     use super::*;
 
-    /// Steps with a model of their own or without, each with one error at all points but for a little scatter; the first so many points
-    /// are folds of a fit to them, all others are held out.
-    fn steps(all: &[(&str, bool, f64, f64)], folds: i64) -> Vec<Step> {
+    /// Steps by name, error in folds and held-out error, `~` before one without a model of its own; errors are the same at all points but for
+    /// a little scatter. The first so many points are folds of a fit to them, all others are held out.
+    fn steps(all: &str, folds: i64) -> Vec<Step> {
         let scattered =
             |mean: f64, row: i64| (row, mean * (1.0 + 0.1 * f64::from((row % 3) as i32)));
-        let step = |(id, is_identified, fold, held_out): &(&str, bool, f64, f64)| Step {
-            id: (*id).into(),
-            is_identified: *is_identified,
-            unseen: Unseen {
-                folds: (0..folds).map(|row| scattered(*fold, row)).collect(),
-                held_out: (folds..80).map(|row| scattered(*held_out, row)).collect(),
-                fitted: (0..folds).collect(),
-            },
+        let step = |words: &str| {
+            let words: Vec<&str> = words.split_whitespace().collect();
+            let [fold, held_out] = [words[1], words[2]].map(|word| word.parse().unwrap());
+            Step {
+                id: words[0].trim_start_matches('~').into(),
+                is_identified: !words[0].starts_with('~'),
+                unseen: Unseen {
+                    folds: (0..folds).map(|row| scattered(fold, row)).collect(),
+                    held_out: (folds..80).map(|row| scattered(held_out, row)).collect(),
+                    fitted: (0..folds).collect(),
+                },
+            }
         };
-        all.iter().map(step).collect()
+        all.split(',').map(step).collect()
+    }
+
+    fn stands(all: &str, folds: i64) -> Standing {
+        standing(&steps(all, folds), Some("diagnose")).expect("a step")
     }
 
     #[test]
     fn a_diagnosis_stands_with_what_was_learned_on_it_and_not_with_another_model() {
-        let all = [
-            ("nominal", true, 0.9),
-            ("network", false, 0.8),
-            ("diagnose", true, 0.1),
-            ("on_top", false, 0.08),
-            ("joint", true, 0.07),
-            ("more", false, 0.06),
-        ];
-        let all = steps(
-            &all.map(|(id, is_identified, error)| (id, is_identified, error, error)),
-            40,
-        );
+        let all = "nominal 0.9 0.9, ~network 0.8 0.8, diagnose 0.1 0.1, ~on_top 0.08 0.08, joint 0.07 0.07, ~more 0.06 0.06";
+        let all = steps(all, 40);
         let of_diagnosed = |diagnosed| standing(&all, diagnosed).map(|s| (s.step, s.model));
         assert_eq!(
             of_diagnosed(Some("diagnose")),
@@ -363,14 +361,8 @@ mod tests {
 
     #[test]
     fn a_step_that_is_worse_at_points_that_it_did_not_see_is_withdrawn() {
-        let worse = steps(
-            &[
-                ("geometry", true, 0.232, 0.2),
-                ("diagnose", true, 0.498, 0.2),
-            ],
-            40,
-        );
-        let found = standing(&worse, Some("diagnose")).expect("a step");
+        let worse = "geometry 0.232 0.2, diagnose 0.498 0.2";
+        let found = stands(worse, 40);
         assert_eq!(
             (found.step.as_str(), found.model.as_str()),
             ("geometry", "geometry")
@@ -389,62 +381,23 @@ mod tests {
         );
         assert_eq!(found.contradicted, None);
         // What was learned on it and is no worse stands all the same.
-        let mended = steps(
-            &[
-                ("geometry", true, 0.232, 0.2),
-                ("diagnose", true, 0.498, 0.2),
-                ("network", false, 0.2, 0.2),
-            ],
-            40,
-        );
-        let found = standing(&mended, Some("diagnose")).expect("a step");
+        let found = stands(&format!("{worse}, ~network 0.2 0.2"), 40);
         assert_eq!(
             (found.step, found.model, found.withdrawn),
             ("network".into(), "diagnose".into(), Vec::new())
         );
         // Fewer points than five say nothing.
-        let few = steps(
-            &[
-                ("geometry", true, 0.232, 0.2),
-                ("diagnose", true, 0.498, 0.2),
-            ],
-            4,
-        );
-        assert_eq!(
-            standing(&few, Some("diagnose")).map(|s| s.step),
-            Some("diagnose".into())
-        );
+        assert_eq!(stands(worse, 4).step, "diagnose");
         // A share that does not matter is none.
-        let close = steps(
-            &[
-                ("geometry", true, 0.232, 0.2),
-                ("diagnose", true, 0.236, 0.2),
-            ],
-            40,
-        );
-        assert_eq!(
-            standing(&close, Some("diagnose")).map(|s| s.step),
-            Some("diagnose".into())
-        );
+        let close = stands("geometry 0.232 0.2, diagnose 0.236 0.2", 40);
+        assert_eq!(close.step, "diagnose");
     }
 
     #[test]
     fn points_that_no_step_was_fitted_to_choose_nothing_and_are_heard() {
-        let all = |held_out: f64| {
-            steps(
-                &[
-                    ("geometry", true, 0.232, 0.25),
-                    ("diagnose", true, 0.1, held_out),
-                ],
-                40,
-            )
-        };
-        let [agreed, against] =
-            [0.12, 0.9].map(|held_out| standing(&all(held_out), Some("diagnose")).expect("a step"));
-        assert_eq!(
-            (&agreed.step, &against.step),
-            (&"diagnose".to_string(), &"diagnose".to_string())
-        );
+        let with = |held_out| stands(&format!("geometry 0.232 0.25, diagnose 0.1 {held_out}"), 40);
+        let [agreed, against] = ["0.12", "0.9"].map(with);
+        assert_eq!([&agreed.step, &against.step], ["diagnose"; 2]);
         assert_eq!(
             (agreed.contradicted, &against.withdrawn),
             (None, &Vec::new())
@@ -470,14 +423,7 @@ mod tests {
         let runs = 4000;
         let mut contradicted = 0;
         for _ in 0..runs {
-            let mut all = steps(
-                &[
-                    ("nominal", true, 0.3, 0.0),
-                    ("geometry", true, 0.2, 0.0),
-                    ("diagnose", true, 0.1, 0.0),
-                ],
-                55,
-            );
+            let mut all = steps("nominal 0.3 0, geometry 0.2 0, diagnose 0.1 0", 55);
             for row in 55..80 {
                 let noise = [0.018, 0.018, 0.018].map(|sigma| sigma * normal());
                 for step in &mut all {
@@ -497,10 +443,7 @@ mod tests {
 
     #[test]
     fn rows_that_a_later_step_was_fitted_to_judge_by_its_folds_and_by_the_earlier_step_as_it_is() {
-        let all = steps(
-            &[("geometry", true, 0.1, 0.2), ("stiffness", true, 0.5, 0.2)],
-            40,
-        );
+        let all = steps("geometry 0.1 0.2, stiffness 0.5 0.2", 40);
         let [mut geometry, stiffness] = <[Step; 2]>::try_from(all).ok().expect("two steps");
         // The first step was fitted to none of the rows.
         geometry.unseen.held_out.append(&mut geometry.unseen.folds);

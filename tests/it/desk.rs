@@ -60,7 +60,7 @@ impl Desk {
         stage: &dyn ErasedStage,
         frames: Vec<Vec<(String, Frame)>>,
     ) -> Result<BTreeMap<&'static str, Vec<Frame>>> {
-        let input = |(stage, frame): (String, Frame)| (stage, Box::new(frame) as InputTable);
+        let input = |(stage, frame): (String, Frame)| (stage, InputTable::Frame(frame));
         let inputs = frames
             .into_iter()
             .map(|port| port.into_iter().map(input).collect())
@@ -115,7 +115,7 @@ impl Sink for Keep {
         self.chunks.lock().unwrap().insert(self.kind, self.frames);
         Ok(Streamed {
             kind: self.kind,
-            handle: Box::new(()),
+            file: None,
         })
     }
 }

@@ -54,8 +54,9 @@ pub fn query(store: &Store, tables: &QueryTables, sql: &str) -> Result<QueryResu
 }
 
 fn collect(mut context: SQLContext, sql: &str) -> PolarsResult<DataFrame> {
-    let frame = context.execute(sql)?;
-    LazyFrame::from(kept(frame.logical_plan)).collect()
+    let mut plan = context.execute(sql)?.logical_plan;
+    keep_order(&mut plan);
+    LazyFrame::from(plan).collect()
 }
 
 /// A table of the store, not yet read; of a store in a bucket its file is fetched first.
@@ -79,130 +80,54 @@ fn names(frame: &mut LazyFrame) -> PolarsResult<Vec<String>> {
         .collect())
 }
 
-/// The same plan, with every step that may lose the order set to keep it.
-pub(crate) fn kept(plan: DslPlan) -> DslPlan {
+/// Sets every step of a plan that may lose the order to keep it.
+fn keep_order(plan: &mut DslPlan) {
+    // What polars noted about a plan while it read the SQL; it does so again.
+    while let DslPlan::IR { dsl, .. } = plan {
+        *plan = Arc::unwrap_or_clone(std::mem::take(dsl));
+    }
     match plan {
-        // What polars noted about a plan while it read the SQL; it does so again.
-        DslPlan::IR { dsl, .. } => kept(Arc::unwrap_or_clone(dsl)),
-        DslPlan::GroupBy {
-            input,
-            keys,
-            predicates,
-            aggs,
-            maintain_order: _,
-            options,
-            apply,
-        } => DslPlan::GroupBy {
-            input: below(input),
-            keys,
-            predicates,
-            aggs,
-            maintain_order: true,
-            options,
-            apply,
-        },
-        DslPlan::Join {
-            input_left,
-            input_right,
-            left_on,
-            right_on,
-            predicates,
-            mut options,
-        } => {
-            let order = match options.args.how {
-                JoinType::Inner | JoinType::Left | JoinType::Full => {
-                    Some(MaintainOrderJoin::LeftRight)
-                }
-                JoinType::Right => Some(MaintainOrderJoin::RightLeft),
-                JoinType::Semi | JoinType::Anti => Some(MaintainOrderJoin::Left),
+        DslPlan::GroupBy { maintain_order, .. } => *maintain_order = true,
+        DslPlan::Join { options, .. } => {
+            let args = &mut Arc::make_mut(options).args;
+            args.maintain_order = match args.how {
+                JoinType::Inner | JoinType::Left | JoinType::Full => MaintainOrderJoin::LeftRight,
+                JoinType::Right => MaintainOrderJoin::RightLeft,
+                JoinType::Semi | JoinType::Anti => MaintainOrderJoin::Left,
                 // Every row with every row: in order by themselves.
-                _ => None,
+                _ => args.maintain_order,
             };
-            if let Some(order) = order {
-                Arc::make_mut(&mut options).args.maintain_order = order;
-            }
-            let (input_left, input_right) = (below(input_left), below(input_right));
-            DslPlan::Join {
-                input_left,
-                input_right,
-                left_on,
-                right_on,
-                predicates,
-                options,
-            }
         }
-        DslPlan::Distinct { input, mut options } => {
+        DslPlan::Distinct { options, .. } => {
             options.maintain_order = true;
             if matches!(options.keep_strategy, UniqueKeepStrategy::Any) {
                 options.keep_strategy = UniqueKeepStrategy::First;
             }
-            DslPlan::Distinct {
-                input: below(input),
-                options,
-            }
         }
-        DslPlan::Sort {
-            input,
-            by_column,
-            slice,
-            mut sort_options,
-        } => {
-            sort_options.maintain_order = true;
-            DslPlan::Sort {
-                input: below(input),
-                by_column,
-                slice,
-                sort_options,
-            }
-        }
-        DslPlan::Union { inputs, mut args } => {
-            args.maintain_order = true;
-            DslPlan::Union {
-                inputs: inputs.into_iter().map(kept).collect(),
-                args,
-            }
-        }
-        DslPlan::Filter { input, predicate } => DslPlan::Filter {
-            input: below(input),
-            predicate,
-        },
-        DslPlan::Select {
-            expr,
-            input,
-            options,
-        } => DslPlan::Select {
-            expr,
-            input: below(input),
-            options,
-        },
-        DslPlan::HStack {
-            input,
-            exprs,
-            options,
-        } => DslPlan::HStack {
-            input: below(input),
-            exprs,
-            options,
-        },
-        DslPlan::Slice { input, offset, len } => DslPlan::Slice {
-            input: below(input),
-            offset,
-            len,
-        },
-        DslPlan::MapFunction { input, function } => DslPlan::MapFunction {
-            input: below(input),
-            function,
-        },
-        DslPlan::Cache { input, id } => DslPlan::Cache {
-            input: below(input),
-            id,
-        },
-        other => other,
+        DslPlan::Sort { sort_options, .. } => sort_options.maintain_order = true,
+        DslPlan::Union { args, .. } => args.maintain_order = true,
+        _ => {}
     }
-}
-
-fn below(input: Arc<DslPlan>) -> Arc<DslPlan> {
-    Arc::new(kept(Arc::unwrap_or_clone(input)))
+    match plan {
+        DslPlan::Union { inputs, .. } => inputs.iter_mut().for_each(keep_order),
+        DslPlan::Join {
+            input_left,
+            input_right,
+            ..
+        } => [input_left, input_right]
+            .into_iter()
+            .for_each(|input| keep_order(Arc::make_mut(input))),
+        DslPlan::GroupBy { input, .. }
+        | DslPlan::Distinct { input, .. }
+        | DslPlan::Sort { input, .. }
+        | DslPlan::Filter { input, .. }
+        | DslPlan::Select { input, .. }
+        | DslPlan::HStack { input, .. }
+        | DslPlan::Slice { input, .. }
+        | DslPlan::MapFunction { input, .. }
+        | DslPlan::Cache { input, .. } => keep_order(Arc::make_mut(input)),
+        _ => {}
+    }
 }
 
 /// The rows that a query gave.

@@ -3,10 +3,9 @@
 use super::super::surroundings::{cores, program};
 use super::records;
 use crate::error::{Error, Fault, Result, counted};
-use crate::fleet::cluster::ClusterOptions;
+use crate::fleet::cluster::{self, ClusterOptions, Waited};
 use crate::fleet::ledger::RunNote;
-use crate::fleet::local::{self, FleetResults};
-use crate::fleet::slurm::{self, Waited};
+use crate::fleet::work::{self, FleetResults};
 use crate::fleet::{Ending, Workshop};
 use crate::progress::{FleetProgress, Verbosity};
 use clap::{Args, ValueEnum};
@@ -127,12 +126,12 @@ impl EngineArguments {
             return Ok(Some(FleetResults { records, computed }));
         }
         workshop.ledger.put_run(note)?;
-        let options = local::WorkerOptions {
+        let options = work::WorkerOptions {
             workers: self.workers(),
             fail_fast,
             stop: &|| workshop.ledger.cancelled(&note.run),
         };
-        let mut worked = local::work(workshop, chosen, &options, progress)?;
+        let mut worked = work::work(workshop, chosen, &options, progress)?;
         // Of robots outside of what was asked for, what is known stays known.
         if worked.records.iter().any(Option::is_none) {
             worked.records = records(workshop)?;
@@ -181,7 +180,7 @@ fn on_slurm(
     while !left.is_empty() {
         note.tasks = arguments.tasks(&left);
         note.jobs.clear();
-        slurm::submit(&workshop.ledger, note, &options)?;
+        cluster::submit(&workshop.ledger, note, &options)?;
         progress.say(&format!(
             "{} in {}: jobs {}",
             counted(left.len(), "robot"),
@@ -196,12 +195,12 @@ fn on_slurm(
             progress.count(chosen.len() - missing.len(), bad);
             Ok(missing.len())
         };
-        let waited = slurm::wait(&note.jobs, look, &|| workshop.ledger.cancelled(&note.run))?;
+        let waited = cluster::wait(&note.jobs, look, &|| workshop.ledger.cancelled(&note.run))?;
         left = missing()?.0;
         match waited {
             Waited::Complete => break,
             Waited::Stopped => {
-                slurm::cancel(&note.jobs)?;
+                cluster::cancel(&note.jobs)?;
                 break;
             }
             Waited::Gone if round >= arguments.resubmit => {

@@ -8,7 +8,7 @@ use super::cluster::EngineArguments;
 use super::{FleetLocation, records, verdict, workshop};
 use crate::error::{Error, Result, counted, visible};
 use crate::fleet::ledger::{Member, RunNote};
-use crate::fleet::local::{self, FleetResults};
+use crate::fleet::work::{self, FleetResults};
 use crate::fleet::{Ending, Fleet, Ledger, RobotRecord, Workshop, tables};
 use crate::progress::{FleetProgress, Verbosity};
 use crate::store::Store;
@@ -322,10 +322,10 @@ impl ExecArguments {
         workshop.log = task.map(|(job, task)| format!("{job}_{task}.out"));
         let progress = FleetProgress::new(Verbosity::Normal, 1, chosen.len());
         let stop = || workshop.ledger.cancelled(&note.run);
-        let worked = local::work(
+        let worked = work::work(
             &workshop,
             &chosen,
-            &local::WorkerOptions {
+            &work::WorkerOptions {
                 workers: 1,
                 fail_fast: false,
                 stop: &stop,

@@ -8,7 +8,7 @@ use crate::cli::fleet::{FleetLocation, records, workshop};
 use crate::cli::surroundings::surroundings;
 use crate::cli::{emit, emit_json};
 use crate::error::{Error, Result, counted, visible};
-use crate::fleet::{Ending, Fleet, FleetFile, RobotRecord, cluster, slurm};
+use crate::fleet::{Ending, Fleet, FleetFile, RobotRecord, cluster};
 use crate::text::filled;
 use clap::{Args, ValueEnum};
 use minijinja::context;
@@ -143,7 +143,7 @@ pub(super) fn cancel(arguments: &CancelArguments) -> Result<()> {
         .ok_or_else(|| Error::spec(&file.name, "the fleet has no run in this store"))?;
     ledger.cancel(&note.run)?;
     if note.engine == "slurm" {
-        slurm::cancel(&note.jobs)?;
+        cluster::cancel(&note.jobs)?;
     }
     emit(&format!(
         "run {} stops after the robots in hand; `calib fleet run` goes on where it stood\n",
