@@ -26,7 +26,6 @@ mod round;
 mod separate;
 mod setup;
 pub mod table;
-mod too_few;
 mod types;
 mod unasked;
 mod verdict;
@@ -56,7 +55,7 @@ use verdict::{LastRound, conclude};
 /// a [`wrong_setup`] before.
 pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis {
     if question.fit.len() < *FEWEST {
-        return too_few::not_asked(question);
+        return unasked::not_asked(question);
     }
     let first = match Attempt::new(question, false, &mut tell) {
         Ok(first) => first,

@@ -257,6 +257,21 @@ pub(crate) fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {
     );
 }
 
+/// Transpose of `a` times `b`; where one has fewer rows the others count as zero.
+pub(crate) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
+    let rows = a.nrows().min(b.nrows());
+    let (a, b) = (a.subrows(0, rows), b.subrows(0, rows));
+    let mut products = DMatrix::zeros(a.ncols(), b.ncols());
+    let out = MatMut::from_column_major_slice_mut(products.as_mut_slice(), a.ncols(), b.ncols());
+    matmul(out, Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
+    products
+}
+
+/// A matrix of one library as the other one sees it.
+pub(crate) fn view(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
+    MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
+}
+
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four sums: the compiler may not reorder one.
     let (mut sums, chunks) = ([0.0; 4], a.len() / 4);

@@ -145,6 +145,25 @@ pub struct ClosedForm {
 pub const SETUP: &str = "setup";
 
 impl Finding {
+    /// A fault of the recording, no physics.
+    pub(crate) fn of_recording(effect: &'static str, statement: String, probability: f64) -> Self {
+        Self {
+            effect,
+            place: Place::Recording,
+            statement,
+            parameters: Vec::new(),
+            evidence: None,
+            rivals: Vec::new(),
+            probabilities: Probabilities {
+                name: probability,
+                place: probability,
+                none: 1.0 - probability,
+            },
+            valid: None,
+            forms: Vec::new(),
+        }
+    }
+
     /// Whether it is a cause on the arm, its mounting or the instrument; else a fault of the recording, which has no evidence.
     pub(crate) fn is_physics(&self) -> bool {
         self.evidence.is_some() && (self.place != Place::Recording || self.effect == names::UNKNOWN)

@@ -14,7 +14,7 @@ use crate::effect::{
     DeclaredCause, DeclaredForm, Form, Motion, ParameterEstimate, Place, Survey, Variable, names,
     people,
 };
-use crate::judge::{Alternatives, FoldErrors};
+use crate::judge::{Alternatives, fold_error};
 use crate::regression::FormRegression;
 use crate::round::{EstimatedCause, FitState, Fitter, RoundView};
 use crate::types::{ClosedForm, Finding};
@@ -95,20 +95,16 @@ impl FormulaSearch<'_, '_> {
                 self.candidate(DeclaredCause::of(declaration).ok()?, finding.place, &given)
             })
             .collect();
-        let rivals: Vec<EstimatedCause> = candidates
-            .iter()
-            .map(|candidate| self.at_zero(&candidate.form))
-            .collect();
+        let forms = candidates.iter().map(|candidate| &candidate.form);
+        let rivals: Vec<EstimatedCause> = forms.map(|form| self.at_zero(form)).collect();
         let alternatives = Alternatives::of(self.state, self.fitter, &rivals)?;
         let near = alternatives.near()?;
         // Where nothing near the model does without them, all that is known is that it is worse than any formula.
-        let without = near.errors(&members, None).map(|errors| errors.rms());
-        let curve = FoldErrors::of(self.state, self.fitter)?.rms();
+        let without = near.error(&members, None);
+        let curve = fold_error(self.state, self.fitter)?;
         let priced = |(k, candidate): (usize, &Candidate)| Priced {
             price: candidate.price,
-            error: near
-                .errors(&members, Some(k))
-                .map_or(f64::NAN, |errors| errors.rms()),
+            error: near.error(&members, Some(k)).unwrap_or(f64::NAN),
         };
         let priced: Vec<Priced> = candidates.iter().enumerate().map(priced).collect();
         let (shown, chosen) = front(&priced, [without.unwrap_or(f64::INFINITY), curve])?;
@@ -176,12 +172,15 @@ impl FormulaSearch<'_, '_> {
                 _ => return None,
             })
         };
-        let values: Option<Vec<f64>> = survey.rows.iter().enumerate().map(value).collect();
-        values?
-            .into_iter()
-            .fold(None, |range: Option<[f64; 2]>, value| {
-                Some(range.map_or([value; 2], |[low, high]| [low.min(value), high.max(value)]))
-            })
+        let values: Vec<f64> = survey
+            .rows
+            .iter()
+            .enumerate()
+            .map(value)
+            .collect::<Option<_>>()?;
+        let first = *values.first()?;
+        let wider = |[low, high]: [f64; 2], value: &f64| [low.min(*value), high.max(*value)];
+        Some(values.iter().fold([first; 2], wider))
     }
 
     /// A declared law at the place of the finding, its shape numbers where they fit best.
@@ -191,24 +190,17 @@ impl FormulaSearch<'_, '_> {
         place: Place,
         given: &FormRegression,
     ) -> Option<Candidate> {
-        let forms = DeclaredForm::hypotheses(cause, self.survey)
-            .into_iter()
-            .map(|hypothesis| hypothesis.form);
+        let forms = DeclaredForm::hypotheses(cause, self.survey).into_iter();
+        let forms = forms.map(|hypothesis| hypothesis.form);
         let forms: Vec<Form> = forms.filter(|form| form.place() == place).collect();
-        let gains = given.gains(&forms);
-        let mut starts: Vec<(f64, Form)> = gains.into_iter().zip(forms).collect();
+        let with_gains = |forms: Vec<Form>| given.gains(&forms).into_iter().zip(forms);
+        let mut starts: Vec<(f64, Form)> = with_gains(forms).collect();
         starts.sort_by(|a, b| b.0.total_cmp(&a.0));
         // The best start need not lead to the best shape.
-        let ends: Vec<Form> = starts
-            .into_iter()
-            .take(*STARTS)
-            .map(|(_, form)| given.refined(form, self.survey))
-            .collect();
-        let gains = given.gains(&ends);
-        let (_, form) = gains
-            .into_iter()
-            .zip(ends)
-            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        starts.truncate(*STARTS);
+        let ends = starts.into_iter();
+        let ends = ends.map(|(_, form)| given.refined(form, self.survey));
+        let (_, form) = with_gains(ends.collect()).max_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(Candidate {
             cause,
             form,

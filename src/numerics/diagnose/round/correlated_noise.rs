@@ -5,9 +5,8 @@
 //! the coefficients of causes are random with the variances at which they were found, and the likelihood is the marginal one of the rows,
 //! restricted to what the base model cannot do (Patterson and Thompson, 1971).
 
-use super::along_path::CorrelationChange;
 use super::fit_state::{FitState, Fitter};
-use super::stretches::{first_of_pose, thinned};
+use super::stretches::{CorrelationChange, first_of_pose, thinned};
 use crate::criteria::cells::COMMON;
 use crate::criteria::noise::{AS_GOOD, PLAIN};
 use crate::diagnose::table::{Answer, FoundCell};
@@ -190,18 +189,13 @@ impl<'a> Regression<'a> {
         let all: Vec<Option<AutocorrelatedNoise>> = AutocorrelatedNoise::all().collect();
         let costs: Vec<f64> = all.par_iter().map(|noise| self.cost(*noise)).collect();
         let best = costs.iter().copied().fold(f64::INFINITY, f64::min);
-        let as_good = all
-            .into_iter()
-            .zip(costs)
-            .filter(|(_, cost)| *cost < best + *AS_GOOD)
-            .map(|(noise, _)| noise);
+        let as_good = all.into_iter().zip(costs);
         let length =
             |noise: &Option<AutocorrelatedNoise>| noise.map_or(0.0, AutocorrelatedNoise::length);
-        (
-            best,
-            as_good
-                .max_by(|a, b| length(a).total_cmp(&length(b)))
-                .flatten(),
-        )
+        let as_good = as_good.filter(|(_, cost)| *cost < best + *AS_GOOD);
+        let longest = as_good
+            .map(|(noise, _)| noise)
+            .max_by(|a, b| length(a).total_cmp(&length(b)));
+        (best, longest.flatten())
     }
 }

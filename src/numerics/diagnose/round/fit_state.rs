@@ -1,18 +1,18 @@
 //! The model between rounds, and how it is fitted anew with other causes.
 
-use super::along_path::{CorrelationChange, PathCorrelation, follow_a_path};
-use super::base_model::base_model;
 use super::noise::{JointSpread, RepeatPairs, by_residual};
-use super::stretches::lasts;
+use super::stretches::{CorrelationChange, PathCorrelation, follow_a_path, lasts};
 use crate::criteria::noise::{ESTIMATES, REPEATS, SETTLED};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::AutocorrelatedNoise;
-use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, arm_effect, names};
+use crate::effect::{
+    Effect, EffectContext, EffectStack, Form, Load, arm_effect, identified, names,
+};
 use crate::estimate::{
     CLEARLY, ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening,
-    Session, fit, fit_screened, seen,
+    Session, align, fit, fit_screened, seen,
 };
-use crate::robot::Measurements;
+use crate::robot::{Measurements, RobotModel};
 use std::ops::Range;
 
 /// A model with causes, fitted.
@@ -257,14 +257,6 @@ impl<'a> Fitter<'a> {
         change: &CorrelationChange,
         settled: &FitState,
     ) -> Vec<EstimatedCause> {
-        let lasting = || {
-            settled
-                .causes
-                .iter()
-                .filter(|cause| !cause.form.follows_time())
-                .cloned()
-                .collect()
-        };
         match self.on_path {
             PathCorrelation::Unasked
                 if change.noise.is_some() && follow_a_path(&self.data, &settled.screening.kept) =>
@@ -277,11 +269,9 @@ impl<'a> Fitter<'a> {
         }
         self.correlated = change.noise;
         self.estimated += 1;
-        if change.keeps_causes {
-            lasting()
-        } else {
-            Vec::new()
-        }
+        let mut kept = settled.causes.clone();
+        kept.retain(|cause| change.keeps_causes && !cause.form.follows_time());
+        kept
     }
 
     /// From now on rows that no model follows are set aside.
@@ -304,16 +294,16 @@ impl<'a> Fitter<'a> {
             rows: self.question.fit,
             candidates: &candidates,
         };
-        let (model, fitted, screening) = if self.keeps_all {
-            let (model, fitted) = fit(&start, &self.data, &options);
-            let kept = options.rows.to_vec();
-            let screening = Screening {
-                kept,
-                ..Screening::default()
-            };
-            (model, fitted, screening)
-        } else {
-            fit_screened(&start, &self.data, &options, self.question.set)
+        let (model, fitted, screening) = match self.keeps_all {
+            true => {
+                let (model, fitted) = fit(&start, &self.data, &options);
+                let screening = Screening {
+                    kept: options.rows.to_vec(),
+                    ..Screening::default()
+                };
+                (model, fitted, screening)
+            }
+            false => fit_screened(&start, &self.data, &options, self.question.set),
         };
         let estimated = |(cause, range): (EstimatedCause, &Range<usize>)| EstimatedCause {
             coefficients: model.x[range.clone()].to_vec(),
@@ -328,6 +318,42 @@ impl<'a> Fitter<'a> {
             ranges,
         }
     }
+}
+
+/// Effects that the user's simulation has.
+pub const BASE: [&str; 6] = [
+    names::BASE_FRAME,
+    names::TOOL_OFFSET,
+    names::JOINT_OFFSET,
+    names::LINK_GEOMETRY,
+    names::REDUCTION_RATIO,
+    names::COUPLING_RATIO,
+];
+
+/// The base model at its start, less the corrections that the user excludes.
+fn base_model(
+    robot: &RobotModel,
+    data: &Measurements,
+    rows: &[usize],
+    without: &[String],
+) -> Model {
+    let setting = EffectContext {
+        base: align(robot, data, rows),
+        load: Load::GravityTorque,
+    };
+    let effects: Vec<Box<dyn Effect>> = identified()
+        .filter(|cause| {
+            BASE.contains(&cause.name())
+                || (cause.name() == names::ANCHOR && !robot.setup().anchors.is_empty())
+        })
+        .filter(|cause| !without.iter().any(|name| name == cause.name()))
+        .filter_map(|cause| cause.arm_effect(&setting))
+        .filter(|effect| effect.missing(robot, data).is_none())
+        .collect();
+    Model::nominal(
+        robot.clone(),
+        EffectStack::new(robot, setting.base, effects),
+    )
 }
 
 /// The effects of the whole arm in `from` as they stand, then causes at their coefficients, and where the parameters of these are.

@@ -83,13 +83,13 @@ impl JointSpread {
             .collect();
     }
 
-    /// What is left of rows beside points, with the covariance of the instrument and that by the joints.
+    /// What is left of rows beside points, of which kind each.
     fn beside_points(
         &self,
         model: &Model,
         data: &Measurements,
         rows: &[usize],
-    ) -> Vec<LeftBySpread> {
+    ) -> Vec<(&'static str, Sample)> {
         let mut scratch = model.stack.scratch(&model.robot);
         let mut left = Vec::new();
         for row in rows {
@@ -98,30 +98,24 @@ impl JointSpread {
                 .place(&model.robot, data, *row, &model.x, &mut scratch);
             for (kind, spread) in &self.others {
                 let seen = Residual::of(*kind, data, *row, &placed).zip(kind.reading(data, *row));
-                left.extend(seen.map(|(residual, reading)| LeftBySpread {
-                    kind: kind.about().name,
-                    error: residual.error,
-                    fixed: Matrix3::from_fn(|i, j| match (i == j, i < residual.axes) {
+                left.extend(seen.map(|(residual, reading)| {
+                    // 1 on lines that hold nothing.
+                    let fixed = Matrix3::from_fn(|i, j| match (i == j, i < residual.axes) {
                         (true, true) => reading.sigma * reading.sigma,
                         (true, false) => 1.0,
                         (false, _) => 0.0,
-                    }),
-                    varying: spread[*row],
+                    });
+                    let sample = Sample {
+                        error: residual.error,
+                        fixed,
+                        varying: spread[*row],
+                    };
+                    (kind.about().name, sample)
                 }));
             }
         }
         left
     }
-}
-
-/// What is left of one kind in a row.
-struct LeftBySpread {
-    kind: &'static str,
-    error: Vector3<f64>,
-    /// Covariance of the instrument; 1 on lines that hold nothing.
-    fixed: Matrix3<f64>,
-    /// Covariance per squared joint deviation.
-    varying: Matrix3<f64>,
 }
 
 /// What repeats show of the noise.
@@ -131,7 +125,7 @@ pub(super) struct RepeatedNoise {
     pub(crate) joints: JointRepeatability,
 }
 
-/// A repeat: what it is off by, with its covariance.
+/// What something is off by, with its covariance.
 struct Sample {
     error: Vector3<f64>,
     /// Of the instrument.
@@ -150,30 +144,22 @@ pub(super) struct RepeatPairs {
 impl RepeatPairs {
     /// Right after each other, where those are enough; else also returns, those after a shorter time, which drifts spoil least.
     pub(crate) fn of(data: &Measurements, rows: &[usize]) -> Self {
-        let [mut pairs, mut returns] = Self::all(data, rows);
-        if pairs.len() >= *REPEATS || returns.is_empty() {
-            pairs.sort_unstable_by_key(|pair| pair[1]);
-            return Self {
-                pairs,
-                are_returns: false,
-            };
+        let [mut pairs, returns] = Self::all(data, rows);
+        let are_returns = pairs.len() < *REPEATS && !returns.is_empty();
+        if are_returns {
+            pairs.extend(shortest(returns));
         }
-        shortest(&mut returns);
-        pairs.extend(returns);
         pairs.sort_unstable_by_key(|pair| pair[1]);
-        Self {
-            pairs,
-            are_returns: true,
-        }
+        Self { pairs, are_returns }
     }
 
     /// Returns alone; none where they are too few.
     pub(crate) fn returns(data: &Measurements, rows: &[usize]) -> Option<Self> {
-        let [_, mut returns] = Self::all(data, rows);
-        shortest(&mut returns);
-        returns.sort_unstable_by_key(|pair| pair[1]);
-        (returns.len() >= *FEW).then_some(Self {
-            pairs: returns,
+        let [_, returns] = Self::all(data, rows);
+        let mut pairs = shortest(returns);
+        pairs.sort_unstable_by_key(|pair| pair[1]);
+        (pairs.len() >= *FEW).then_some(Self {
+            pairs,
             are_returns: true,
         })
     }
@@ -301,9 +287,10 @@ impl RepeatPairs {
             .filter(|[a, b]| data.anchor(*a) == data.anchor(*b))
         {
             let [from, to] = [a, b].map(|row| spread.beside_points(model, data, &[*row]));
-            let both = to
-                .iter()
-                .filter_map(|to| Some((from.iter().find(|from| from.kind == to.kind)?, to)));
+            let both = to.iter().filter_map(|(kind, to)| {
+                let (_, from) = from.iter().find(|from| from.0 == *kind)?;
+                Some((from, to))
+            });
             // On lines that hold nothing the error is none and the variance a constant.
             samples.extend(both.map(|(from, to)| Sample {
                 error: to.error - from.error,
@@ -361,18 +348,18 @@ pub(super) fn by_residual(
     };
     let mut samples: Vec<_> = rows.iter().filter_map(one).collect();
     let others = spread.beside_points(model, data, rows).into_iter();
-    samples.extend(others.map(|left| Sample {
+    samples.extend(others.map(|(_, left)| Sample {
         error: left.error * freedom,
-        fixed: left.fixed,
-        varying: left.varying,
+        ..left
     }));
     likeliest(&samples, 6.0)
 }
 
 /// Returns after the shortest times, half of them.
-fn shortest(returns: &mut Vec<[usize; 2]>) {
+fn shortest(mut returns: Vec<[usize; 2]>) -> Vec<[usize; 2]> {
     returns.sort_unstable_by_key(|[a, b]| (b - a, *b));
     returns.truncate(returns.len().div_ceil(2).max(*REPEATS));
+    returns
 }
 
 /// By what stated standard deviations are multiplied for the usual sample to be as far off as it is; none without samples.
@@ -396,7 +383,11 @@ fn grid(least: f64, greatest: f64, count: usize) -> impl Iterator<Item = f64> {
 impl Sample {
     /// Squared, in the instrument's stated standard deviations.
     fn square(&self) -> f64 {
-        self.fixed
+        self.square_in(&self.fixed)
+    }
+
+    fn square_in(&self, covariance: &Matrix3<f64>) -> f64 {
+        covariance
             .try_inverse()
             .map_or(*CAP, |inverse| self.error.dot(&(inverse * self.error)))
     }
@@ -404,26 +395,16 @@ impl Sample {
     /// -2 ln of its likelihood, up to a constant.
     fn deviance(&self, scale: f64, sigma: f64) -> f64 {
         let covariance = self.fixed * (scale * scale) + self.varying * (sigma * sigma);
-        let square = covariance
-            .try_inverse()
-            .map_or(*CAP, |inverse| self.error.dot(&(inverse * self.error)));
-        square + covariance.determinant().ln()
+        self.square_in(&covariance) + covariance.determinant().ln()
     }
 }
 
 /// The likeliest deviation; none unless it is better than none by `evidence`.
 fn likeliest(samples: &[Sample], evidence: f64) -> f64 {
     let cost = |sigma: f64| -> f64 {
-        let one = |Sample {
-                       error,
-                       fixed,
-                       varying,
-                   }: &Sample| {
-            let covariance = fixed + varying * (sigma * sigma);
-            let square = covariance
-                .try_inverse()
-                .map_or(*CAP, |inverse| error.dot(&(inverse * error)));
-            square.min(*CAP) + covariance.determinant().ln()
+        let one = |sample: &Sample| {
+            let covariance = sample.fixed + sample.varying * (sigma * sigma);
+            sample.square_in(&covariance).min(*CAP) + covariance.determinant().ln()
         };
         samples.iter().map(one).sum()
     };

@@ -2,7 +2,7 @@
 
 use super::fit_state::{FitState, Fitter};
 use super::stretches::{bounded_autocorrelation_time, thinned};
-use crate::diagnose::whitened::WhitenedProblem;
+use crate::diagnose::whitened::{WhitenedProblem, add_columns};
 use crate::effect::Survey;
 use crate::estimate::Model;
 
@@ -50,19 +50,10 @@ impl<'a> RoundView<'a> {
 
     /// The residual of the rows without the causes of a model.
     pub(crate) fn without_causes(&self, now: &FitState) -> Vec<f64> {
-        let problem = &self.problem;
-        let mut residual = problem.residual.clone();
+        let mut residual = self.problem.residual.clone();
         for cause in &now.causes {
-            let columns = problem.columns(&cause.form);
-            for (column, coefficient) in columns
-                .chunks(problem.residual_rows())
-                .zip(&cause.coefficients)
-            {
-                residual
-                    .iter_mut()
-                    .zip(column)
-                    .for_each(|(value, c)| *value += c * coefficient);
-            }
+            let columns = self.problem.columns(&cause.form);
+            add_columns(&mut residual, &columns, &cause.coefficients);
         }
         residual
     }
@@ -72,10 +63,8 @@ impl<'a> RoundView<'a> {
 pub(crate) fn compliance(model: &Model) -> Vec<f64> {
     let mut out = vec![0.0; model.robot.joints()];
     for (effect, range) in model.stack.effects() {
-        if let Some((joint, compliance)) = effect
-            .form()
-            .and_then(|form| form.compliance(&model.x[range]))
-        {
+        let form = effect.form();
+        if let Some((joint, compliance)) = form.and_then(|form| form.compliance(&model.x[range])) {
             out[joint] += compliance.max(0.0);
         }
     }

@@ -82,17 +82,6 @@ impl Counting {
         &self.0
     }
 
-    /// One joint alone, that shows so many quarter turns at the robot file's zero.
-    pub(crate) fn of_a_zero(joint: usize, quarters: i32) -> Self {
-        let mut out = Self::default();
-        out.0
-            .iter_mut()
-            .skip(joint)
-            .take(1)
-            .for_each(|counted| counted.quarters = quarters);
-        out
-    }
-
     /// The controller's numbers -> joint positions of the robot file, in the order of `ingest`: zeros, signs, couplings.
     pub(crate) fn to_robot(self, q: &mut [f64]) {
         for (q, joint) in q.iter_mut().zip(&self.0) {

@@ -3,18 +3,18 @@
 //! What a diagnosis says of a wrong set-up: the nominal robot where its base fits best, the set-up error, and no physics.
 
 use crate::criteria::setup::{ARMS, FAR, NAMED, QUARTERLY, SMALL};
-use crate::effect::{ParameterEstimate, Place, figure};
+use crate::effect::{ParameterEstimate, figure};
 use crate::error::counted;
-use crate::estimate::{FitOptions, Screening, fit};
+use crate::estimate::{Screening, fit};
 use crate::observation::Dimension;
 use crate::robot::{RobotModel, numbered};
 use crate::setup::compare::{AsStated, ExplainedSetup};
-use crate::setup::counting::{CountedJoint, Counting, LIMIT};
+use crate::setup::counting::{CountedJoint, LIMIT};
 use crate::setup::mixture::TwoSetups;
 use crate::setup::placement::{FreeNumber, median};
 use crate::setup::wrong::{LENGTHS, RowOrder, WrongSetup};
 use crate::types::{Diagnosis, ErrorLengths, Finding, Probabilities, Question, SETUP, VerdictKind};
-use crate::unasked::{on_its_base, unasked};
+use crate::unasked::unasked;
 
 /// What is wrong, and what to change in which file.
 pub(super) struct SetupWords {
@@ -42,9 +42,6 @@ pub(super) fn words(
     reach: f64,
 ) -> SetupWords {
     let joints = robot.joints();
-    let list = |value_of: &dyn Fn(usize) -> String| {
-        (0..joints).map(value_of).collect::<Vec<_>>().join(", ")
-    };
     let (what, mend) = match wrong {
         WrongSetup::PointUnit(unit) => return of_lengths(unit, reach),
         WrongSetup::InRadians => {
@@ -53,19 +50,12 @@ pub(super) fn words(
         WrongSetup::InDegrees => {
             ("the joints are in deg and were read in rad".into(), "in `ingest`: `columns: {q: {.., unit: deg}}`".into())
         }
-        WrongSetup::Sign(joint) => of_signs(&[joint], joints),
         WrongSetup::Signs(group) => of_signs(&group.joints().collect::<Vec<_>>(), joints),
         WrongSetup::Exchanged(a, b) => {
-            let order = list(&|k| {
-                let from = if k == a {
-                    b
-                } else if k == b {
-                    a
-                } else {
-                    k
-                };
-                format!("<joint {}>", from + 1)
-            });
+            let mut order: Vec<usize> = (0..joints).collect();
+            order.swap(a, b);
+            let order = order.iter().map(|k| format!("<joint {}>", k + 1));
+            let order = order.collect::<Vec<_>>().join(", ");
             (
                 format!("joints {} and {} are exchanged", a + 1, b + 1),
                 format!(
@@ -73,40 +63,22 @@ pub(super) fn words(
                 ),
             )
         }
-        WrongSetup::Zero(joint, quarters) => {
-            let degrees = 90 * quarters;
-            let zeros = list(&|k| if k == joint { degrees.to_string() } else { "0".into() });
-            (
-                format!("the recording reads {degrees} deg at the zero of joint {}", joint + 1),
-                format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}`, in deg"),
-            )
-        }
+        WrongSetup::Zero(joint, quarters) => return of_zeros(&[(joint, quarters)], joints),
         WrongSetup::Zeros { joint, quarters, next } => {
-            let (first, second) = (90 * quarters, 90 * next);
-            let zeros = list(&|k| match k {
-                _ if k == joint => first.to_string(),
-                _ if k == joint + 1 => second.to_string(),
-                _ => "0".into(),
-            });
-            (
-                format!(
-                    "the recording reads {first} deg at the zero of joint {} and {second} deg at that of joint {}",
-                    joint + 1,
-                    joint + 2
-                ),
-                format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}`, in deg"),
-            )
+            let what = format!(
+                "the recording reads {} deg at the zero of joint {} and {} deg at that of joint {}",
+                90 * quarters,
+                joint + 1,
+                90 * next,
+                joint + 2
+            );
+            (what, of_zeros(&[(joint, quarters), (joint + 1, next)], joints).mend)
         }
-        WrongSetup::Counting(counting) => return of_counting(counting, joints),
-        WrongSetup::Coupled { moved, by, sign } => {
-            let (how, ratio) = if sign < 0.0 { ("minus", -1) } else { ("plus", 1) };
-            let (moved, by) = (moved + 1, by + 1);
-            (
-                format!(
-                    "joint {moved} is reported {how} the angle of joint {by}, relative to the horizontal and not to the link before it"
-                ),
-                format!("in `ingest`: `columns: {{q: {{.., coupled: [{{joint: {moved}, by: {by}, ratio: {ratio}}}]}}}}`"),
-            )
+        WrongSetup::Counting(counting) => return of_counting(counting.joints().iter().take(joints)),
+        WrongSetup::Coupled { moved, sign, .. } => {
+            let mut counted = vec![CountedJoint::default(); joints];
+            counted[moved].coupled = sign as i32;
+            return of_counting(counted.iter());
         }
         WrongSetup::Mirrored => (
             "the points are a mirror image: an axis of the tracker's frame has the wrong sign, or two are exchanged".into(),
@@ -125,7 +97,6 @@ pub(super) fn together(
     words: impl Fn(WrongSetup) -> SetupWords,
 ) -> Vec<SetupWords> {
     let signs = |wrong: &WrongSetup| match wrong {
-        WrongSetup::Sign(joint) => vec![*joint],
         WrongSetup::Signs(group) => group.joints().collect(),
         _ => Vec::new(),
     };
@@ -167,72 +138,61 @@ fn of_signs(reversed: &[usize], joints: usize) -> (String, String) {
     )
 }
 
+/// Zeros of joints in quarters of a turn.
+fn of_zeros(zeros: &[(usize, i32)], joints: usize) -> SetupWords {
+    let mut counted = vec![CountedJoint::default(); joints];
+    for (joint, quarters) in zeros {
+        counted[*joint].quarters = *quarters;
+    }
+    of_counting(counted.iter())
+}
+
 /// Signs, zeros and couplings of all joints.
-fn of_counting(counting: Counting, joints: usize) -> SetupWords {
-    let all: Vec<(usize, CountedJoint)> = counting
-        .joints()
-        .iter()
-        .copied()
-        .enumerate()
-        .take(joints)
-        .collect();
-    let reversed: Vec<usize> = all
-        .iter()
-        .filter(|(_, counted)| counted.reversed)
-        .map(|(joint, _)| *joint)
-        .collect();
-    let list = |value_of: &dyn Fn(&CountedJoint) -> i32| {
-        all.iter()
-            .map(|(_, counted)| value_of(counted).to_string())
-            .collect::<Vec<_>>()
-            .join(", ")
+fn of_counting<'j>(joints: impl ExactSizeIterator<Item = &'j CountedJoint>) -> SetupWords {
+    let count = joints.len();
+    let all: Vec<(usize, &CountedJoint)> = (1..).zip(joints).collect();
+    let list = |value: &dyn Fn(&CountedJoint) -> i32| {
+        let each = all.iter().map(|(_, counted)| value(counted).to_string());
+        each.collect::<Vec<_>>().join(", ")
     };
-    let (mut what, mut mend) = (Vec::new(), Vec::new());
+    let (mut what, mut mend, mut unit) = (Vec::new(), Vec::new(), "");
+    let reversed = all.iter().filter(|(_, counted)| counted.reversed);
+    let reversed: Vec<usize> = reversed.map(|(joint, _)| joint - 1).collect();
     if !reversed.is_empty() {
-        what.push(of_signs(&reversed, joints).0);
-        mend.push(format!(
-            "sign: [{}]",
-            list(&|counted| if counted.reversed { -1 } else { 1 })
-        ));
+        what.push(of_signs(&reversed, count).0);
+        let signs = list(&|counted| if counted.reversed { -1 } else { 1 });
+        mend.push(format!("sign: [{signs}]"));
     }
     let turned = all.iter().filter(|(_, counted)| counted.quarters != 0);
-    let zeros = turned.map(|(joint, counted)| {
-        format!(
-            "the recording reads {} deg at the zero of joint {}",
-            90 * counted.quarters,
-            joint + 1
-        )
-    });
-    what.extend(zeros);
-    let in_degrees = what.len() > usize::from(!reversed.is_empty());
-    if in_degrees {
+    let turned: Vec<String> = turned
+        .map(|(joint, counted)| {
+            let degrees = 90 * counted.quarters;
+            format!("the recording reads {degrees} deg at the zero of joint {joint}")
+        })
+        .collect();
+    if !turned.is_empty() {
+        unit = ", in deg";
         mend.push(format!(
             "zero: [{}]",
             list(&|counted| 90 * counted.quarters)
         ));
     }
-    let coupled: Vec<(usize, i32)> = all
-        .iter()
-        .filter(|(_, counted)| counted.coupled != 0)
-        .map(|(joint, counted)| (joint + 1, counted.coupled))
-        .collect();
-    if !coupled.is_empty() {
-        let how = |ratio: i32| if ratio < 0 { "minus" } else { "plus" };
-        what.extend(coupled.iter().map(|(joint, ratio)| {
-            let (how, by) = (how(*ratio), joint - 1);
-            format!("joint {joint} is reported {how} the angle of joint {by}, relative to the horizontal and not to the link before it")
-        }));
-        let each: Vec<String> = coupled
-            .iter()
-            .map(|(joint, ratio)| format!("{{joint: {joint}, by: {}, ratio: {ratio}}}", joint - 1))
-            .collect();
-        mend.push(format!("coupled: [{}]", each.join(", ")));
+    what.extend(turned);
+    let mut coupled = Vec::new();
+    for (joint, ratio) in all.iter().map(|(joint, counted)| (joint, counted.coupled)) {
+        let (how, by) = (if ratio < 0 { "minus" } else { "plus" }, joint - 1);
+        if ratio != 0 {
+            what.push(format!("joint {joint} is reported {how} the angle of joint {by}, relative to the horizontal and not to the link before it"));
+            coupled.push(format!("{{joint: {joint}, by: {by}, ratio: {ratio}}}"));
+        }
     }
-    let degrees = if in_degrees { ", in deg" } else { "" };
+    if !coupled.is_empty() {
+        mend.push(format!("coupled: [{}]", coupled.join(", ")));
+    }
     SetupWords::of(
         what.join(", and "),
         format!(
-            "in `ingest`: `columns: {{q: {{.., {}}}}}`{degrees}",
+            "in `ingest`: `columns: {{q: {{.., {}}}}}`{unit}",
             mend.join(", ")
         ),
     )
@@ -340,8 +300,7 @@ fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
             let quarters = (-degrees / 90.0).round() as i32;
             let remaining = -degrees - 90.0 * f64::from(quarters);
             if quarters != 0 && remaining.abs() < *QUARTERLY && joints <= LIMIT {
-                let SetupWords { what, mend, .. } =
-                    of_counting(Counting::of_a_zero(joint, quarters), joints);
+                let SetupWords { what, mend, .. } = of_zeros(&[(joint, quarters)], joints);
                 let what = format!("{what}, and is also {} deg off", figure(remaining, 2));
                 return SetupWords::of(what, mend);
             }
@@ -392,33 +351,28 @@ pub(super) fn explained(
 ) -> Diagnosis {
     let words_of = |wrong| words(wrong, question.robot, &found.placed.values, stated.reach);
     let all = together(&found.wrong, question.robot, words_of);
-    let what: Vec<&str> = all.iter().map(|words| words.what.as_str()).collect();
-    let mend: Vec<&str> = all.iter().map(|words| words.mend.as_str()).collect();
+    let joined =
+        |text: fn(&SetupWords) -> &str, by: &str| all.iter().map(text).collect::<Vec<_>>().join(by);
     let scale: f64 = all.iter().map(|words| words.scale).product();
     let (before, after) = (stated.placed.left, scale * found.placed.left);
     let mut text = format!(
         "{}; with this error the nominal robot is {} off the points (median, base and tool fitted), without it {}. Remedy: {}",
-        what.join(", and "),
+        joined(|words| &words.what, ", and "),
         mm(before),
         mm(after),
-        mend.join("; ")
+        joined(|words| &words.mend, "; ")
     );
-    let mut alike: Vec<SetupWords> = found
-        .alike
-        .iter()
-        .filter(|wrong| wrong.number().is_none())
-        .map(|wrong| words_of(*wrong))
-        .collect();
+    let alike = found.alike.iter().filter(|wrong| wrong.number().is_none());
+    let mut alike: Vec<SetupWords> = alike.map(|wrong| words_of(*wrong)).collect();
     alike.dedup_by(|a, b| a.what == b.what);
-    alike.retain(|other| !what.contains(&other.what.as_str()));
+    alike.retain(|other| all.iter().all(|words| words.what != other.what));
     if !alike.is_empty() {
-        let each: Vec<String> = alike
+        let each = alike
             .iter()
-            .map(|words| format!("{}; remedy then: {}", words.what, words.mend))
-            .collect();
+            .map(|words| format!("{}; remedy then: {}", words.what, words.mend));
         text.push_str(&format!(
             ". These data are explained equally well if {}",
-            each.join(", or if ")
+            each.collect::<Vec<_>>().join(", or if ")
         ));
     }
     let number = |name: &str, value: f64| ParameterEstimate {
@@ -428,19 +382,13 @@ pub(super) fn explained(
         unit: "mm",
         sigma: None,
     };
-    let kept: Vec<bool> = found
-        .placed
-        .off
-        .iter()
-        .map(|off| *off <= *FAR * median(&found.placed.off))
-        .collect();
+    let far = *FAR * median(&found.placed.off);
     let lengths = |off: &[f64], scale: f64| {
-        let kept: Vec<f64> = off
+        let kept = off
             .iter()
-            .zip(&kept)
-            .filter(|(_, kept)| **kept)
-            .map(|(off, _)| scale * off)
-            .collect();
+            .zip(&found.placed.off)
+            .filter(|(_, off)| **off <= far);
+        let kept: Vec<f64> = kept.map(|(off, _)| scale * off).collect();
         ErrorLengths::of_lengths(&kept)
     };
     let name = *NAMED / (1.0 + found.alike.len() as f64);
@@ -454,22 +402,18 @@ pub(super) fn explained(
             place: *NAMED,
             none: 1.0 - *NAMED,
         },
-        ..finding(format!("{text}."))
+        ..finding(text)
     };
-    let errors = (
-        lengths(&stated.placed.off, 1.0),
-        lengths(&found.placed.off, scale),
-    );
     Diagnosis {
-        before: errors.0,
-        after: errors.1,
+        before: lengths(&stated.placed.off, 1.0),
+        after: lengths(&found.placed.off, scale),
         ..wrong(question, vec![finding])
     }
 }
 
 /// Rows of two set-ups.
 pub(super) fn two_setups(question: &Question, found: &TwoSetups) -> Diagnosis {
-    wrong(question, vec![finding(format!("{}.", found.words()))])
+    wrong(question, vec![finding(found.words())])
 }
 
 /// An identified model that leaves the robot file by more than manufacture allows, and no set-up error of the list that explains it.
@@ -479,7 +423,7 @@ pub(super) fn implausible(question: &Question, numbers: &[String]) -> Diagnosis 
          or a wrong unit, and the joints for a wrong zero or sign",
         numbers.join(", ")
     );
-    wrong(question, vec![finding(format!("{text}."))])
+    wrong(question, vec![finding(text)])
 }
 
 /// Nothing of the list explains the residual of the nominal robot.
@@ -498,55 +442,31 @@ pub(super) fn unexplained(question: &Question, stated: &AsStated) -> Diagnosis {
     }
 }
 
-fn finding(statement: String) -> Finding {
-    Finding {
-        effect: SETUP,
-        place: Place::Recording,
-        statement,
-        parameters: Vec::new(),
-        evidence: None,
-        rivals: Vec::new(),
-        probabilities: Probabilities {
-            name: *NAMED,
-            place: *NAMED,
-            none: 1.0 - *NAMED,
-        },
-        valid: None,
-        forms: Vec::new(),
-    }
+fn finding(text: String) -> Finding {
+    Finding::of_recording(SETUP, format!("{text}."), *NAMED)
 }
 
 /// The nominal robot with its base where the rows to fit have it.
 fn wrong(question: &Question, findings: Vec<Finding>) -> Diagnosis {
-    let Question {
-        data, fit: rows, ..
-    } = *question;
-    let (start, candidates) = on_its_base(question);
-    let (model, fitted) = fit(
-        &start,
-        data,
-        &FitOptions {
-            rows,
-            candidates: &candidates,
-        },
-    );
-    let before = ErrorLengths::of(&model.error_sizes(data, Dimension::Length), rows);
-    let screening = Screening {
-        kept: rows.to_vec(),
-        ..Screening::default()
-    };
-    let not_observable =
-        vec!["what the simulation lacks: it is tested once the set-up is right".into()];
-    let diagnosis = unasked(
-        question,
-        VerdictKind::WrongSetup,
-        (model, fitted, screening),
-    );
+    let rows = question.fit;
+    let diagnosis = unasked(question, VerdictKind::WrongSetup, |start, options| {
+        let (model, fitted) = fit(start, question.data, options);
+        let screening = Screening {
+            kept: rows.to_vec(),
+            ..Screening::default()
+        };
+        (model, fitted, screening)
+    });
+    let off = diagnosis
+        .model
+        .error_sizes(question.data, Dimension::Length);
     Diagnosis {
-        before,
+        before: ErrorLengths::of(&off, rows),
         held_out: false,
         findings,
-        not_observable,
+        not_observable: vec![
+            "what the simulation lacks: it is tested once the set-up is right".into(),
+        ],
         ..diagnosis
     }
 }

@@ -22,8 +22,7 @@ pub(super) enum WrongSetup {
     /// The joints are in rad and were read in deg, or the other way round.
     InRadians,
     InDegrees,
-    Sign(usize),
-    /// Several joints turn the other way.
+    /// Joints turn the other way.
     Signs(SignGroup),
     Exchanged(usize, usize),
     /// What is reported at the robot file's zero, in quarters of a turn: 1, -1, or 2.
@@ -70,21 +69,13 @@ impl WrongSetup {
             .collect();
         let mut out: Vec<Self> = (0..LENGTHS.len()).map(Self::PointUnit).collect();
         out.extend([Self::InRadians, Self::InDegrees]);
-        out.extend(turning.iter().map(|joint| Self::Sign(*joint)));
+        out.extend(SignGroup::each(&turning).map(Self::Signs));
         // Before the mirror image: reversing all joints whose axes lie in the plane of a symmetric arm is one, and the usual reason.
         out.extend(SignGroup::all(robot).into_iter().map(Self::Signs));
         out.push(Self::Mirrored);
-        let pairs_from = |k: usize| turning[k + 1..].iter().map(move |b| (k, b));
-        out.extend(
-            (0..turning.len())
-                .flat_map(pairs_from)
-                .map(|(k, b)| Self::Exchanged(turning[k], *b)),
-        );
-        out.extend(
-            turning
-                .iter()
-                .flat_map(|joint| [1, -1, 2].map(|quarters| Self::Zero(*joint, quarters))),
-        );
+        out.extend(every_two(&turning).map(|(a, b)| Self::Exchanged(a, b)));
+        let zeros = |joint: &usize| [1, -1, 2].map(|quarters| Self::Zero(*joint, quarters));
+        out.extend(turning.iter().flat_map(zeros));
         let parallel = turning
             .windows(2)
             .filter(|pair| pair[1] == pair[0] + 1 && robot.is_parallel(pair[0], pair[1]));
@@ -118,7 +109,7 @@ impl WrongSetup {
             Self::Order(_) | Self::Exchanged(..) => 0,
             Self::PointUnit(_) | Self::InRadians | Self::InDegrees | Self::Mirrored => 1,
             Self::Zero(..) | Self::Zeros { .. } => 2,
-            Self::Sign(_) | Self::Signs(_) | Self::Counting(_) => 3,
+            Self::Signs(_) | Self::Counting(_) => 3,
             Self::Coupled { .. } => 4,
             Self::Number(_) => 5,
         }
@@ -126,18 +117,16 @@ impl WrongSetup {
 
     /// The number of the robot file that is to be found.
     pub fn number(self) -> Option<FreeNumber> {
-        if let Self::Number(number) = self {
-            Some(number)
-        } else {
-            None
+        match self {
+            Self::Number(number) => Some(number),
+            _ => None,
         }
     }
 
     pub(crate) fn order(self) -> Option<RowOrder> {
-        if let Self::Order(order) = self {
-            Some(order)
-        } else {
-            None
+        match self {
+            Self::Order(order) => Some(order),
+            _ => None,
         }
     }
 
@@ -155,7 +144,6 @@ impl WrongSetup {
             Self::PointUnit(unit) => pairs.with_points(|point| point * LENGTHS[unit].0),
             Self::InRadians => scaled(180.0 / PI),
             Self::InDegrees => scaled(PI / 180.0),
-            Self::Sign(joint) => pairs.with_joints(|q| q[joint] = -q[joint]),
             Self::Signs(group) => {
                 pairs.with_joints(|q| group.joints().for_each(|joint| q[joint] = -q[joint]))
             }
@@ -179,6 +167,15 @@ impl WrongSetup {
     }
 }
 
+/// Every two of some joints.
+fn every_two(joints: &[usize]) -> impl Iterator<Item = (usize, usize)> {
+    let with = |(k, a): (usize, &usize)| {
+        let a = *a;
+        joints[k + 1..].iter().map(move |b| (a, *b))
+    };
+    joints.iter().enumerate().flat_map(with)
+}
+
 /// Joints, from 0, as bits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SignGroup(u64);
@@ -193,30 +190,24 @@ impl SignGroup {
             .windows(2)
             .find(|pair| robot.is_parallel(pair[0], pair[1]))
             .map(|pair| pair[0]);
-        let of_choose = |choose: &dyn Fn(usize) -> bool| {
+        let chosen = |choose: &dyn Fn(usize) -> bool| {
             Self::of(turning.iter().copied().filter(|joint| choose(*joint)))
         };
-        let mut out = vec![of_choose(&|joint| {
-            robot.joints() == 6 && [0, 3, 5].contains(&joint)
-        })];
+        let of_six = |joint| robot.joints() == 6 && [0, 3, 5].contains(&joint);
+        let mut out = vec![chosen(&of_six)];
         if let Some(pitch) = pitch {
             let is_pitch = |joint: usize| robot.is_parallel(pitch, joint);
             let wrist = (pitch..robot.joints())
                 .find(|joint| !is_pitch(*joint))
                 .unwrap_or(robot.joints());
             out.extend([
-                of_choose(&|joint| !is_pitch(joint)),
-                of_choose(&is_pitch),
-                of_choose(&|joint| is_pitch(joint) && joint < wrist),
+                chosen(&|joint| !is_pitch(joint)),
+                chosen(&is_pitch),
+                chosen(&|joint| is_pitch(joint) && joint < wrist),
             ]);
         }
-        out.push(of_choose(&|_| true));
-        let two = |k: usize| turning[k + 1..].iter().map(move |b| (k, *b));
-        out.extend(
-            (0..turning.len())
-                .flat_map(two)
-                .map(|(k, b)| Self::of([turning[k], b].into_iter())),
-        );
+        out.push(chosen(&|_| true));
+        out.extend(every_two(&turning).map(|(a, b)| Self::of([a, b].into_iter())));
         let mut all: Vec<Self> = Vec::new();
         for group in out.into_iter().filter(|group| group.0.count_ones() > 1) {
             if !all.contains(&group) {
@@ -224,6 +215,12 @@ impl SignGroup {
             }
         }
         all
+    }
+
+    /// A joint each.
+    fn each(joints: &[usize]) -> impl Iterator<Item = Self> {
+        let joints = joints.iter().filter(|joint| **joint < 64);
+        joints.map(|joint| Self::of(std::iter::once(*joint)))
     }
 
     fn of(joints: impl Iterator<Item = usize>) -> Self {

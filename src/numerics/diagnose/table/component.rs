@@ -2,14 +2,15 @@
 //! each computed once.
 
 use super::cell::{CellShape, ShapeGroup};
-use super::factored::FactoredColumns;
-use super::frame::{SearchRows, UnitColumns, product, view};
+use super::factored::{FactoredColumns, unit};
+use super::frame::SearchRows;
 use crate::criteria::cells::ROW_BY_ROW;
 use crate::effect::Form;
+use crate::regression::{product, view};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, Par};
 use nalgebra::{Cholesky, DMatrix, DVector};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock, RwLock, Weak};
 
@@ -61,14 +62,11 @@ impl CellColumns {
             .flatten();
         let values = OnceLock::new();
         let (square, counts) = match &factored {
-            Some(factored) => (
-                factored
-                    .iter()
-                    .flat_map(|form| form.square())
-                    .copied()
-                    .collect(),
-                factored.iter().map(|form| form.square().len()).collect(),
-            ),
+            Some(factored) => {
+                let square = factored.iter().map(|form| &form.square[..]);
+                let counts = square.clone().map(<[f64]>::len).collect();
+                (square.flatten().copied().collect(), counts)
+            }
             None => {
                 let (columns, counts) = frame.columns(&forms.cloned().collect::<Vec<_>>());
                 let _ = values.set(columns.values);
@@ -181,12 +179,6 @@ impl CellColumns {
     }
 }
 
-/// Keys of the forms of some components: a model holds every number once, by its name.
-pub(super) fn form_keys(components: &[&Component]) -> BTreeSet<String> {
-    let forms = components.iter().flat_map(|component| &component.forms);
-    forms.map(Form::key).collect()
-}
-
 /// A cell of the model: its forms in one shape, at an amplitude.
 #[derive(Clone)]
 pub(super) struct Component {
@@ -222,17 +214,8 @@ impl Component {
 
     /// Prior standard deviations of its coefficients, SI.
     pub(crate) fn sigmas(&self) -> Vec<f64> {
-        let scale = |square: &f64| {
-            if *square > 0.0 {
-                square.sqrt().recip()
-            } else {
-                0.0
-            }
-        };
-        self.roots()
-            .zip(self.square.iter())
-            .map(|(root, square)| root * scale(square))
-            .collect()
+        let both = self.roots().zip(self.square.iter());
+        both.map(|(root, square)| root * unit(*square)).collect()
     }
 
     /// With its part in the covariance.
@@ -277,32 +260,6 @@ impl Component {
             part: Arc::new(part),
             mix: Arc::new(mix),
             ..self
-        }
-    }
-
-    /// One that has no part in the covariance yet.
-    pub(crate) fn apart(
-        cell: usize,
-        forms: Vec<Form>,
-        counts: Vec<usize>,
-        group: ShapeGroup,
-        columns: UnitColumns,
-        amplitude: f64,
-    ) -> Self {
-        let shape = group.shapes[0].clone();
-        let UnitColumns { values, square } = columns;
-        Self {
-            id: 0,
-            cell,
-            forms,
-            counts,
-            shape,
-            group: Arc::new(group),
-            values,
-            square: Arc::new(square),
-            amplitude,
-            part: Arc::default(),
-            mix: Arc::default(),
         }
     }
 
@@ -375,7 +332,7 @@ struct PartCache {
 
 impl PartProducts {
     /// Computes what is missing for some components, and forgets what is too much.
-    pub(crate) fn know(&self, components: &[&Component], frame: &SearchRows) {
+    pub(crate) fn know(&self, components: &[Component], frame: &SearchRows) {
         let Ok(mut cache) = self.0.write() else {
             return;
         };
@@ -403,7 +360,7 @@ impl PartProducts {
     }
 
     /// The Gram matrix of components, and their products with the residual.
-    pub(super) fn of(&self, components: &[&Component]) -> (DMatrix<f64>, DVector<f64>) {
+    pub(super) fn of(&self, components: &[Component]) -> (DMatrix<f64>, DVector<f64>) {
         let count: usize = components
             .iter()
             .map(|component| component.part.ncols())

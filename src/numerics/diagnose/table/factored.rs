@@ -3,9 +3,9 @@
 
 use super::cell::alternates;
 use crate::effect::Motion;
-use crate::regression::dot;
+use crate::regression::{dot, view};
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Accum, Mat, Par};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -52,7 +52,7 @@ impl Functions {
 }
 
 /// A column of a matrix.
-pub(super) fn column(matrix: &DMatrix<f64>, k: usize) -> &[f64] {
+fn column(matrix: &DMatrix<f64>, k: usize) -> &[f64] {
     &matrix.as_slice()[k * matrix.nrows()..(k + 1) * matrix.nrows()]
 }
 
@@ -63,6 +63,7 @@ pub(super) struct FactoredColumns {
     functions: Arc<Functions>,
     /// Of each column: direction, function, and what makes it one of unit motion.
     columns: Vec<(usize, usize, f64)>,
+    /// Mean squared motion by a unit of each coefficient.
     pub(super) square: Vec<f64>,
 }
 
@@ -189,9 +190,12 @@ impl FactoredColumns {
         }
     }
 
-    /// Mean squared motion by a unit of each coefficient.
-    pub(crate) fn square(&self) -> &[f64] {
-        &self.square
+    /// The direction of each column, and its function for a motion of unit size.
+    pub(super) fn scaled(&self) -> impl Iterator<Item = (usize, Vec<f64>)> {
+        self.columns.iter().map(|(direction, function, scale)| {
+            let values = self.functions.at(*function).iter();
+            (*direction, values.map(|value| value * scale).collect())
+        })
     }
 
     /// Appends the products of its columns with others by those of each direction with these, row by row.
@@ -202,16 +206,9 @@ impl FactoredColumns {
             .iter()
             .map(|by_row| {
                 let mut sums = Mat::zeros(count, functions);
-                let columns = columns_of(by_row);
-                let functions = columns_of(&self.functions.values);
-                matmul(
-                    sums.as_mut(),
-                    Accum::Replace,
-                    columns,
-                    functions,
-                    1.0,
-                    Par::Seq,
-                );
+                let (columns, functions) = (view(by_row), view(&self.functions.values));
+                let out = sums.as_mut();
+                matmul(out, Accum::Replace, columns, functions, 1.0, Par::Seq);
                 sums
             })
             .collect();
@@ -223,7 +220,7 @@ impl FactoredColumns {
 }
 
 /// Direction and function of each column, in the order of a term's coefficients.
-pub(super) fn pairs(
+fn pairs(
     motion: Motion,
     directions: usize,
     functions: usize,
@@ -245,8 +242,4 @@ pub(super) fn unit(square: f64) -> f64 {
     } else {
         0.0
     }
-}
-
-fn columns_of(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
-    MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
 }

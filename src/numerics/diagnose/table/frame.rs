@@ -2,15 +2,12 @@
 //! geometry projected off.
 
 use super::evidence::EvidenceRows;
-use super::factored::{
-    FactoredColumns, Functions, MotionRows, WeighedDirection, column, pairs, unit,
-};
+use super::factored::{FactoredColumns, Functions, MotionRows, WeighedDirection, unit};
 use super::noise_shape::NoiseShape;
 use crate::diagnose::round::{FitState, Fitter, RoundView};
 use crate::effect::{Basis, Factor, Form, Law, Motion, Variable};
-use crate::regression::{dot, orthonormal, project};
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use crate::regression::{orthonormal, product, project};
+use faer::{Mat, MatRef};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -66,16 +63,7 @@ impl<'a> SearchRows<'a> {
                 / problem.readings_of(i).len().max(1) as f64
         };
         let variance = problem.rows.iter().enumerate().map(variance).collect();
-        let mut residual = problem.residual.clone();
-        for (cause, range) in now.causes.iter().zip(&now.ranges) {
-            let columns = problem.columns(&cause.form);
-            for (column, k) in columns.chunks(problem.residual_rows()).zip(range.clone()) {
-                residual
-                    .iter_mut()
-                    .zip(column)
-                    .for_each(|(value, c)| *value += c * now.model.x[k]);
-            }
-        }
+        let mut residual = view.without_causes(now);
         let mut out = Self {
             view,
             base: Mat::new(),
@@ -133,38 +121,34 @@ impl<'a> SearchRows<'a> {
 
     /// A variable at every row; none where some row does not tell it.
     pub(crate) fn values(&self, variable: Variable) -> Option<Vec<f64>> {
-        match self
-            .variables
-            .iter()
-            .find(|known| known.variable == variable)
-        {
+        match self.variable(variable) {
             Some(known) => known.values.clone(),
             None => self.view.problem.values(variable),
         }
+    }
+
+    fn variable(&self, variable: Variable) -> Option<&VariableRows> {
+        self.variables
+            .iter()
+            .find(|known| known.variable == variable)
     }
 
     /// Computes once what the columns of many forms are made of.
     pub(crate) fn prepare(&mut self, motions: &[Motion], variables: &[Variable]) {
         let is_fresh = |motion: &&Motion| self.motions.iter().all(|known| known.motion != **motion);
         let fresh: Vec<&Motion> = motions.iter().filter(is_fresh).collect();
-        let fresh: Vec<MotionRows> = fresh
-            .into_par_iter()
-            .map(|motion| self.motion(*motion))
-            .collect();
+        let fresh = fresh.into_par_iter().map(|motion| self.motion(*motion));
+        let fresh: Vec<MotionRows> = fresh.collect();
         self.motions.extend(fresh);
-        let is_fresh = |variable: &&Variable| {
-            self.variables
-                .iter()
-                .all(|known| known.variable != **variable)
-        };
+        let is_fresh = |variable: &&Variable| self.variable(**variable).is_none();
         let fresh: Vec<&Variable> = variables.iter().filter(is_fresh).collect();
         let problem = &self.view.problem;
-        self.variables
-            .par_extend(fresh.into_par_iter().map(|variable| VariableRows {
-                variable: *variable,
-                values: problem.values(*variable),
-                functions: Vec::new(),
-            }));
+        let rows = |variable: &Variable| VariableRows {
+            variable: *variable,
+            values: problem.values(*variable),
+            functions: Vec::new(),
+        };
+        self.variables.par_extend(fresh.into_par_iter().map(rows));
     }
 
     /// Computes once the functions of one variable that forms have.
@@ -187,15 +171,22 @@ impl<'a> SearchRows<'a> {
 
     /// Columns of a form as directions times functions; none where it is no such product, or where rows have a part in each other.
     pub(crate) fn factored(&self, form: &Form) -> Option<FactoredColumns> {
-        let term = form.term().filter(|_| self.is_by_row())?;
-        let mut motions = self.motions.iter();
-        let motion = motions.position(|known| known.motion == term.motion())?;
-        let functions = self.functions(term.law())?;
-        Some(FactoredColumns::of(
-            motion,
-            &self.motions[motion],
-            functions,
-        ))
+        self.is_by_row().then(|| self.product(form)).flatten()
+    }
+
+    /// Columns of a form as directions times functions.
+    fn product(&self, form: &Form) -> Option<FactoredColumns> {
+        let (motion, functions) = self.factors(form)?;
+        let directions = &self.motions[motion];
+        Some(FactoredColumns::of(motion, directions, functions))
+    }
+
+    /// The position of a form's motion and the functions along its directions; none where it is no product of such.
+    fn factors(&self, form: &Form) -> Option<(usize, Arc<Functions>)> {
+        let term = form.term()?;
+        let motion = |known: &MotionRows| known.motion == term.motion();
+        let motion = self.motions.iter().position(motion)?;
+        Some((motion, self.functions(term.law())?))
     }
 
     /// Whether rows are weighed each by itself, and all of them are readings.
@@ -313,29 +304,26 @@ impl<'a> SearchRows<'a> {
 
     /// How much of the squared length of `left` the columns of a law at a place explain if they are orthogonal; nothing of what needs more.
     pub(crate) fn roughly(&self, form: &Form, left: &[f64]) -> Option<f64> {
-        let term = form.term().filter(|_| !self.view.problem.is_correlated())?;
-        let of_motion = |known: &&MotionRows| known.motion == term.motion();
-        let motion = self.motions.iter().find(of_motion)?;
-        let functions = self.functions(term.law())?;
+        if self.view.problem.is_correlated() {
+            return None;
+        }
+        let (motion, functions) = self.factors(form)?;
+        let sum = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a + c, b + d];
         let mut fit = 0.0;
-        for WeighedDirection { weighed, .. } in &motion.directions {
-            let of_row = |i: usize| {
+        for WeighedDirection { weighed, .. } in &self.motions[motion].directions {
+            let products = |i: usize| {
                 let lines = self.view.problem.readings_of(i);
-                let sums =
+                let products =
                     lines.map(|line| [weighed[line] * left[line], weighed[line] * weighed[line]]);
-                sums.fold([0.0, 0.0], |sum, square| {
-                    [sum[0] + square[0], sum[1] + square[1]]
-                })
+                products.fold([0.0, 0.0], sum)
             };
-            let rows: Vec<[f64; 2]> = (0..self.variance.len()).map(of_row).collect();
+            let rows: Vec<[f64; 2]> = (0..self.variance.len()).map(products).collect();
             for function in functions.values.column_iter() {
                 let sums = function
                     .iter()
                     .zip(&rows)
                     .map(|(value, [along, square])| [value * along, value * value * square]);
-                let [along, square] = sums.fold([0.0, 0.0], |sum, square| {
-                    [sum[0] + square[0], sum[1] + square[1]]
-                });
+                let [along, square] = sums.fold([0.0, 0.0], sum);
                 fit += along * along / square.max(f64::MIN_POSITIVE);
             }
         }
@@ -346,15 +334,8 @@ impl<'a> SearchRows<'a> {
     fn direction(&self, mut raw: Vec<f64>) -> WeighedDirection {
         raw.truncate(self.view.problem.of_readings().len());
         let count = self.variance.len().max(1) as f64;
-        let of_row = |(i, variance): (usize, &f64)| {
-            raw[self.view.problem.readings_of(i)]
-                .iter()
-                .map(|value| value * value)
-                .sum::<f64>()
-                * variance
-                / count
-        };
-        let square = self.variance.iter().enumerate().map(of_row).collect();
+        let square = self.squares_by_row(&raw).map(|square| square / count);
+        let square = square.collect();
         if !self.view.problem.is_correlated() {
             self.weigh(&mut raw);
         }
@@ -366,25 +347,14 @@ impl<'a> SearchRows<'a> {
 
     /// The columns of a law at a place from the motion's directions and the law's functions.
     fn of_term(&self, form: &Form) -> Option<Weighed> {
-        let term = form.term()?;
-        let of_motion = |known: &&MotionRows| known.motion == term.motion();
-        let MotionRows { directions, .. } = self.motions.iter().find(of_motion)?;
-        let functions = self.functions(term.law())?;
+        let product = self.product(form)?;
+        let directions = &self.motions[product.motion].directions;
         let (problem, row_of) = (&self.view.problem, self.view.problem.rows_of_readings());
-        let (rows, mut columns, mut square) = (row_of.len(), Vec::new(), Vec::new());
-        for (direction, function) in pairs(term.motion(), directions.len(), functions.count()) {
-            let direction = &directions[direction];
-            let length = dot(column(&functions.squares, function), &direction.square);
-            let scale = unit(length);
-            square.push(length);
-            let by: Vec<f64> = functions
-                .at(function)
-                .iter()
-                .map(|value| value * scale)
-                .collect();
+        let mut columns = Vec::new();
+        for (direction, function) in product.scaled() {
             let first = columns.len();
-            let lines = direction.weighed.iter().zip(row_of);
-            columns.extend(lines.map(|(weighed, row)| weighed * by[*row]));
+            let lines = directions[direction].weighed.iter().zip(row_of);
+            columns.extend(lines.map(|(weighed, row)| weighed * function[*row]));
             if problem.is_correlated() {
                 let column = &mut columns[first..];
                 problem.innovate(column);
@@ -393,19 +363,15 @@ impl<'a> SearchRows<'a> {
         }
         Some(Weighed {
             columns,
-            rows,
-            square,
+            rows: row_of.len(),
+            square: product.square,
         })
     }
 
     /// The functions of a law at every row; none of a variable of several numbers, or that some row does not tell.
     fn functions(&self, law: &Law) -> Option<Arc<Functions>> {
         let of_factor = |factor: &Factor| {
-            let known = self
-                .variables
-                .iter()
-                .find(|known| known.variable == factor.variable)?;
-            let mut functions = known.functions.iter();
+            let mut functions = self.variable(factor.variable)?.functions.iter();
             let known = functions.find(|(basis, _)| *basis == factor.basis)?;
             Some(&known.1)
         };
@@ -433,11 +399,7 @@ impl<'a> SearchRows<'a> {
         if !factor.variable.is_single() {
             return None;
         }
-        let values = match self
-            .variables
-            .iter()
-            .find(|known| known.variable == factor.variable)
-        {
+        let values = match self.variable(factor.variable) {
             Some(known) => Cow::Borrowed(known.values.as_deref()?),
             None => Cow::Owned(self.view.problem.values(factor.variable)?),
         };
@@ -457,12 +419,15 @@ impl<'a> SearchRows<'a> {
     }
 
     fn mean_square(&self, column: &[f64]) -> f64 {
-        let of_row = |(i, variance): (usize, &f64)| {
+        self.squares_by_row(column).sum::<f64>() / self.variance.len().max(1) as f64
+    }
+
+    /// Squared motion of each row by a column.
+    fn squares_by_row(&self, column: &[f64]) -> impl Iterator<Item = f64> {
+        self.variance.iter().enumerate().map(|(i, variance)| {
             let lines = self.view.problem.readings_of(i);
             column[lines].iter().map(|value| value * value).sum::<f64>() * variance
-        };
-        self.variance.iter().enumerate().map(of_row).sum::<f64>()
-            / self.variance.len().max(1) as f64
+        })
     }
 
     fn weigh(&self, column: &mut [f64]) {
@@ -484,18 +449,4 @@ impl<'a> SearchRows<'a> {
                 .for_each(|value| *value *= factor);
         }
     }
-}
-
-/// Transpose of `a` times `b`; where one has fewer rows the others count as zero.
-pub(super) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
-    let rows = a.nrows().min(b.nrows());
-    let (a, b) = (a.subrows(0, rows), b.subrows(0, rows));
-    let mut products = DMatrix::zeros(a.ncols(), b.ncols());
-    let out = MatMut::from_column_major_slice_mut(products.as_mut_slice(), a.ncols(), b.ncols());
-    matmul(out, Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
-    products
-}
-
-pub(super) fn view(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
-    MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
 }

@@ -1,8 +1,4 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
-//!
-//! Causes that no data could tell from a finding.
-//!
-//! What the last round looked at, and what it found.
 
 use crate::criteria::cells::{DETAIL, FAINT, IDENTITY, SMALLEST, TRACE};
 use crate::criteria::words::FIRM;
@@ -17,6 +13,7 @@ use crate::round::{FitState, RoundView};
 use crate::types::{Evidence, Finding, RivalCause};
 use crate::verdict::not_observable::{faults, rows_apart};
 use crate::verdict::windup::turns_back;
+use crate::whitened::add_columns;
 use crate::words::{left_out, not_so, sentence, small, with_size};
 
 /// The causes of the last round as findings, strongest first; whether they leave more than noise `at_fitted_rows` or anywhere.
@@ -287,14 +284,7 @@ fn size(last: &LastRound, members: &[usize]) -> f64 {
     let mut sum = vec![0.0; problem.residual_rows()];
     for i in members {
         let columns = problem.motions_by(&state.causes[*i].form);
-        for (column, coefficient) in columns
-            .chunks(problem.residual_rows())
-            .zip(&state.model.x[state.ranges[*i].clone()])
-        {
-            sum.iter_mut()
-                .zip(column)
-                .for_each(|(value, c)| *value += c * coefficient);
-        }
+        add_columns(&mut sum, &columns, &state.model.x[state.ranges[*i].clone()]);
     }
     let squares = problem.rows.iter().enumerate().map(|(i, row)| {
         let lines = problem.readings_of(i);

@@ -4,12 +4,12 @@
 
 use crate::criteria::screen::{BULK, MISTAKES};
 use crate::criteria::words::{FAULT, STILL};
-use crate::effect::{Clock, DeclaredCause, DeclaredForm, Measure, Place, Survey, cause, names};
+use crate::effect::{Clock, DeclaredCause, DeclaredForm, Measure, Survey, cause, names};
 use crate::error::counted;
 use crate::estimate::{Screening, Suspect, SuspectKind};
 use crate::observation::{Dimension, noise, only_contacts};
 use crate::robot::Measurements;
-use crate::types::{Finding, Probabilities, RivalCause};
+use crate::types::{Finding, RivalCause};
 use crate::verdict::findings::LastRound;
 use crate::words::small;
 
@@ -226,74 +226,46 @@ pub(super) fn faults(
     };
     let list = |rows: &[usize]| {
         let named: Vec<String> = rows.iter().take(20).map(usize::to_string).collect();
-        let more = rows.len().saturating_sub(20);
+        let more = match rows.len().saturating_sub(20) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
         let noun = if rows.len() == 1 { "row" } else { "rows" };
-        format!(
-            "{noun} {}{}",
-            named.join(", "),
-            if more > 0 {
-                format!(" and {more} more")
-            } else {
-                String::new()
-            }
-        )
+        format!("{noun} {}{more}", named.join(", "))
     };
-    let mut out = Vec::new();
-    let swapped =
-        of_kinds(|kind| matches!(kind, SuspectKind::Exchanged | SuspectKind::Mislabelled));
-    if !swapped.is_empty() {
-        out.push(of_the_recording(
+    let kinds: [(&str, &str, fn(SuspectKind) -> bool); 3] = [
+        (
             names::MISLABELLED_POINT,
-            format!("points carry another point's name: {}", list(&swapped)),
-            last,
-        ));
-    }
-    let shifted = of_kinds(|kind| matches!(kind, SuspectKind::ShiftedBlock(_)));
-    if !shifted.is_empty() {
-        let text = format!(
-            "joints and points are rows apart in the recording: {}",
-            list(&shifted)
-        );
-        out.push(of_the_recording(names::JOINT_LOG_LAG, text, last));
-    }
-    let wrong = of_kinds(|kind| {
-        matches!(
-            kind,
-            SuspectKind::Outlier | SuspectKind::UnitSlip(_) | SuspectKind::Zero
-        )
-    });
-    if !wrong.is_empty() {
-        out.push(of_the_recording(
-            names::OUTLIER,
-            format!("single wrong points: {}", list(&wrong)),
-            last,
-        ));
-    }
-    out
+            "points carry another point's name",
+            |kind| matches!(kind, SuspectKind::Exchanged | SuspectKind::Mislabelled),
+        ),
+        (
+            names::JOINT_LOG_LAG,
+            "joints and points are rows apart in the recording",
+            |kind| matches!(kind, SuspectKind::ShiftedBlock(_)),
+        ),
+        (names::OUTLIER, "single wrong points", |kind| {
+            use SuspectKind::{Outlier, UnitSlip, Zero};
+            matches!(kind, Outlier | UnitSlip(_) | Zero)
+        }),
+    ];
+    let each = kinds
+        .into_iter()
+        .map(|(effect, text, kinds)| (effect, text, of_kinds(kinds)));
+    each.filter(|(.., rows)| !rows.is_empty())
+        .map(|(effect, text, rows)| {
+            of_the_recording(effect, format!("{text}: {}", list(&rows)), last)
+        })
+        .collect()
 }
 
 /// A fault of the recording; without its name where that is not to be given.
 fn of_the_recording(effect: &'static str, statement: String, last: &LastRound) -> Finding {
-    let effect = if last.excludes(effect) {
-        names::UNKNOWN
-    } else {
-        effect
+    let effect = match last.excludes(effect) {
+        true => names::UNKNOWN,
+        false => effect,
     };
-    Finding {
-        effect,
-        place: Place::Recording,
-        statement,
-        parameters: Vec::new(),
-        evidence: None,
-        rivals: Vec::new(),
-        probabilities: Probabilities {
-            name: *FAULT,
-            place: *FAULT,
-            none: 1.0 - *FAULT,
-        },
-        valid: None,
-        forms: Vec::new(),
-    }
+    Finding::of_recording(effect, statement, *FAULT)
 }
 
 #[cfg(test)]

@@ -346,18 +346,12 @@ impl<'a> WhitenedProblem<'a> {
 
     /// Values of some forms in the present model, zero where it has them not.
     fn present(&self, forms: &[&Form]) -> Vec<f64> {
-        let value = |name: &String| {
-            let specs = self.model.stack.specs();
-            specs
-                .iter()
-                .position(|spec| spec.name == *name)
-                .map_or(0.0, |k| self.model.x[k])
-        };
-        let names = forms
-            .iter()
-            .flat_map(|form| form.parameters(self.robot))
-            .map(|spec| spec.name);
-        names.map(|name| value(&name)).collect()
+        let known = self.model.stack.specs();
+        let specs = forms.iter().flat_map(|form| form.parameters(self.robot));
+        specs
+            .map(|spec| known.iter().position(|known| known.name == spec.name))
+            .map(|place| place.map_or(0.0, |k| self.model.x[k]))
+            .collect()
     }
 
     /// What the currents alone say of the parameters of some forms; nothing where they say nothing.
@@ -380,6 +374,14 @@ impl<'a> WhitenedProblem<'a> {
         currents
             .priors(&columns, &self.present(forms))
             .unwrap_or_default()
+    }
+}
+
+/// Adds columns, one after another, by their coefficients.
+pub(crate) fn add_columns(sum: &mut [f64], columns: &[f64], coefficients: &[f64]) {
+    for (column, coefficient) in columns.chunks(sum.len().max(1)).zip(coefficients) {
+        let each = sum.iter_mut().zip(column);
+        each.for_each(|(value, c)| *value += c * coefficient);
     }
 }
 
@@ -468,15 +470,10 @@ impl WhitenedProblem<'_> {
     pub(crate) fn unit_travel(&self, joint: usize) -> &[f64] {
         let column = |joint: usize| {
             // One in every row, and the angle, which is not asked.
-            let law = Law::new(
-                Variable::Angle { joint },
-                Basis::Straight {
-                    zero: 0.0,
-                    per: 1.0,
-                },
-            );
-            let mut columns =
-                self.motions_by_partials(&Term::new(&Unknown, Motion::Joint { joint }, law).into());
+            let (zero, per) = (0.0, 1.0);
+            let law = Law::new(Variable::Angle { joint }, Basis::Straight { zero, per });
+            let term = Term::new(&Unknown, Motion::Joint { joint }, law);
+            let mut columns = self.motions_by_partials(&term.into());
             columns.truncate(self.residual_rows());
             columns
         };

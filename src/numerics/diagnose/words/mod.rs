@@ -1,12 +1,10 @@
 //! The words for what a diagnosis has decided: progress in a line each, findings and the verdict in a sentence each.
 
 mod statement;
-mod verdict_statement;
 
 pub(crate) use statement::{
-    hidden, left_out, not_so, sentence, slower_than_noise, small, with_size,
+    Ground, hidden, left_out, not_so, sentence, slower_than_noise, small, statement, with_size,
 };
-pub(crate) use verdict_statement::{Ground, statement};
 
 use super::round::{FitState, Fitter};
 use super::whitened::AutocorrelatedNoise;
@@ -50,20 +48,13 @@ pub(crate) fn of_a_round<'f>(
         .collect();
     names.dedup();
     let causes = counted(names.len(), "cause");
-    let mut shown = names
-        .iter()
-        .take(*NAMED)
-        .cloned()
-        .collect::<Vec<_>>()
-        .join(", ");
+    let mut shown = names[..names.len().min(*NAMED)].join(", ");
     if names.len() > *NAMED {
         shown.push_str(", ...");
     }
-    let shown = if shown.is_empty() {
-        shown
-    } else {
-        format!(" ({shown})")
-    };
+    if !shown.is_empty() {
+        shown = format!(" ({shown})");
+    }
     format!("round {round}: {cells} possible causes compared, {causes}{shown}")
 }
 

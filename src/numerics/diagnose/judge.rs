@@ -2,13 +2,10 @@
 //!
 //! Models with causes left out or with another one, judged by folds of the rows in a linear picture: an effect is small, so that its
 //! coefficients change the points in proportion. What is to change the model is fitted afterwards.
-//!
-//! Errors of fitted rows under fits that did not see their pose, and whether they are smaller than those of another model.
 
 use crate::criteria::judge::FOLDS;
 use crate::estimate::{FoldKind, Model, NearbyFits, Session, dealt, gather};
 use crate::round::{EstimatedCause, FitState, Fitter, with_causes};
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// A fitted state of which causes are left out, and rivals that may come in.
@@ -33,12 +30,8 @@ impl<'a> Alternatives<'a> {
             coefficients: vec![0.0; cause.coefficients.len()],
             ..cause.clone()
         };
-        let causes: Vec<EstimatedCause> = state
-            .causes
-            .iter()
-            .cloned()
-            .chain(rivals.iter().map(at_zero))
-            .collect();
+        let mut causes = state.causes.clone();
+        causes.extend(rivals.iter().map(at_zero));
         let (model, ranges) = with_causes(&state.model, &causes);
         Some(Self {
             state,
@@ -102,83 +95,46 @@ impl NearAlternatives<'_> {
             .collect()
     }
 
-    /// The errors of folds without some causes (by their positions), and with a rival (by its own) or none. Nothing where that is not near
+    /// The rms error of folds without some causes (by their positions), and with a rival (by its own) or none. Nothing where that is not near
     /// the state.
-    pub(crate) fn errors(&self, out: &[usize], rival: Option<usize>) -> Option<FoldErrors> {
-        let errors: Option<Vec<Vec<f64>>> = self
-            .nearby
-            .with(&self.steps(out, rival))?
-            .into_iter()
-            .collect();
-        Some(FoldErrors::gathered(
-            &self.session,
-            &self.alternatives.folds,
-            &errors?,
-        ))
+    pub(crate) fn error(&self, out: &[usize], rival: Option<usize>) -> Option<f64> {
+        let errors = self.nearby.with(&self.steps(out, rival))?;
+        let errors: Option<Vec<Vec<f64>>> = errors.into_iter().collect();
+        Some(rms(&self.session, &self.alternatives.folds, &errors?))
     }
 
     /// The coefficients of a rival (by its position) in the place of some causes, with their standard deviations, SI.
     pub(crate) fn coefficients(&self, out: &[usize], rival: usize) -> Option<Vec<(f64, f64)>> {
         let Alternatives { state, ranges, .. } = self.alternatives;
         let columns: Vec<usize> = ranges[state.causes.len() + rival].clone().collect();
-        let found = self
-            .nearby
-            .estimated(&self.steps(out, Some(rival)), &columns)?;
+        let steps = self.steps(out, Some(rival));
+        let found = self.nearby.estimated(&steps, &columns)?.into_iter();
         let scale = state.fitted.noise_scale;
-        Some(
-            found
-                .into_iter()
-                .map(|(value, sigma)| (value, sigma * scale))
-                .collect(),
-        )
+        Some(found.map(|(value, sigma)| (value, sigma * scale)).collect())
     }
 }
 
 /// Rows of the folds that judge a state; the same for every model that is compared. `None` where the poses are too few.
-pub(crate) fn folds(now: &FitState, fitter: &Fitter) -> Option<Vec<Vec<usize>>> {
-    dealt(kind(fitter), &now.session(fitter), *FOLDS)
+fn folds(now: &FitState, fitter: &Fitter) -> Option<Vec<Vec<usize>>> {
+    // Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
+    let kind = match fitter.correlated {
+        Some(_) => FoldKind::Blocks,
+        None => FoldKind::Random(fitter.question.seed),
+    };
+    dealt(kind, &now.session(fitter), *FOLDS)
 }
 
-/// Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
-fn kind(fitter: &Fitter) -> FoldKind {
-    if fitter.correlated.is_some() {
-        FoldKind::Blocks
-    } else {
-        FoldKind::Random(fitter.question.seed)
-    }
+/// Rms error of the fitted rows under fits that did not see their pose; `None` where the poses are too few for folds.
+pub(crate) fn fold_error(now: &FitState, fitter: &Fitter) -> Option<f64> {
+    let session = now.session(fitter);
+    let folds = folds(now, fitter)?;
+    let errors = session.without_each(&folds, fitter.scale);
+    Some(rms(&session, &folds, &errors))
 }
 
-/// Errors of the rows that were fitted.
-pub(crate) struct FoldErrors {
-    /// Squared errors, m2 or rad2, by row.
-    squares: BTreeMap<usize, f64>,
-}
-
-impl FoldErrors {
-    /// `None` where the poses are too few for folds.
-    pub(crate) fn of(now: &FitState, fitter: &Fitter) -> Option<Self> {
-        let session = now.session(fitter);
-        let folds = folds(now, fitter)?;
-        Some(Self::gathered(
-            &session,
-            &folds,
-            &session.without_each(&folds, fitter.scale),
-        ))
-    }
-
-    /// From the errors of each fold's rows.
-    pub(crate) fn gathered(session: &Session, folds: &[Vec<usize>], errors: &[Vec<f64>]) -> Self {
-        let errors = gather(session.data, session.rows, folds, errors);
-        let squares = session
-            .rows
-            .iter()
-            .zip(errors)
-            .map(|(row, error)| (*row, error * error))
-            .collect();
-        Self { squares }
-    }
-
-    pub(crate) fn rms(&self) -> f64 {
-        (self.squares.values().sum::<f64>() / self.squares.len() as f64).sqrt()
-    }
+/// From the errors of each fold's rows.
+fn rms(session: &Session, folds: &[Vec<usize>], errors: &[Vec<f64>]) -> f64 {
+    let errors = gather(session.data, session.rows, folds, errors);
+    let squares = errors.iter().map(|error| error * error);
+    (squares.sum::<f64>() / errors.len() as f64).sqrt()
 }
