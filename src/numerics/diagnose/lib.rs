@@ -107,7 +107,7 @@ impl<'a> Attempt<'a> {
         let mut rounds = Rounds::default();
         loop {
             let view = RoundView::of(&now, &fitter);
-            let round = rounds.search(&view, &now, &fitter);
+            let round = rounds.search(&view);
             tell(words::of_a_round(
                 rounds.count(),
                 round.cells,
@@ -133,8 +133,7 @@ impl<'a> Attempt<'a> {
             {
                 let kept = fitter.take_correlation(&change, &next);
                 tell(words::of_the_correlation(&fitter));
-                now = fitter.fit(&next.model, kept);
-                fitter.follow(&now);
+                now = fitter.refit(&next.model, kept);
                 rounds.again();
                 continue;
             }
@@ -142,8 +141,7 @@ impl<'a> Attempt<'a> {
             let quiet = settled || answer.found.is_empty();
             if let Some(sigma) = quiet.then(|| fitter.noise_left_by(&next)).flatten() {
                 fitter.learn(sigma);
-                now = fitter.fit(&next.model, next.causes);
-                fitter.follow(&now);
+                now = fitter.refit(&next.model, next.causes);
                 rounds.again();
                 continue;
             }
@@ -192,10 +190,8 @@ impl<'a> Attempt<'a> {
             survey: &survey,
             state: self.next,
             answer: self.answer,
-            scale: self.fitter.scale,
-            without: self.fitter.question.without,
         };
-        conclude(last, &self.fitter, &self.before)
+        conclude(last, &self.before)
     }
 }
 
@@ -215,17 +211,14 @@ pub fn cell_evidence(question: &Question, given: &[GivenCell]) -> Result<Vec<Cel
     // Around a model without them, then around one with them inside the chain.
     for _ in 0..if given.is_empty() { 0 } else { 2 } {
         let view = RoundView::of(&now, &fitter);
-        let causes = given_causes(&view, &now, &fitter, given);
-        now = fitter.fit(&now.model, causes);
-        fitter.follow(&now);
+        let causes = given_causes(&view, given);
+        now = fitter.refit(&now.model, causes);
     }
     if let Some(sigma) = fitter.noise_left_by(&now) {
         fitter.learn(sigma);
-        now = fitter.fit(&now.model, now.causes);
-        fitter.follow(&now);
+        now = fitter.refit(&now.model, now.causes);
     }
-    let view = RoundView::of(&now, &fitter);
-    Ok(answers(&view, &now, &fitter, given))
+    Ok(answers(&RoundView::of(&now, &fitter), given))
 }
 
 /// Causes of findings that are smaller than their own uncertainty in the whole model.

@@ -16,7 +16,7 @@ use crate::effect::{
 };
 use crate::judge::{Alternatives, fold_error};
 use crate::regression::FormRegression;
-use crate::round::{EstimatedCause, FitState, Fitter, RoundView};
+use crate::round::{EstimatedCause, FitState, RoundView};
 use crate::types::{ClosedForm, Finding};
 use nalgebra::DMatrix;
 
@@ -27,7 +27,6 @@ pub(super) struct FormulaSearch<'a, 'b> {
     pub(crate) state: &'b FitState,
     pub(crate) view: &'b RoundView<'a>,
     pub(crate) survey: &'b Survey<'a>,
-    pub(crate) fitter: &'b Fitter<'b>,
 }
 
 /// A formula with its shape numbers where they fit best.
@@ -73,7 +72,7 @@ impl FormulaSearch<'_, '_> {
             .collect();
         let (problem, jacobian) = (
             &self.view.problem,
-            self.view.problem.jacobian(self.fitter.free()),
+            self.view.problem.jacobian(self.view.fitter.free()),
         );
         let given = FormRegression::new(
             problem,
@@ -97,11 +96,11 @@ impl FormulaSearch<'_, '_> {
             .collect();
         let forms = candidates.iter().map(|candidate| &candidate.form);
         let rivals: Vec<EstimatedCause> = forms.map(|form| self.at_zero(form)).collect();
-        let alternatives = Alternatives::of(self.state, self.fitter, &rivals)?;
+        let alternatives = Alternatives::of(self.state, self.view.fitter, &rivals)?;
         let near = alternatives.near()?;
         // Where nothing near the model does without them, all that is known is that it is worse than any formula.
         let without = near.error(&members, None);
-        let curve = fold_error(self.state, self.fitter)?;
+        let curve = fold_error(self.state, self.view.fitter)?;
         let priced = |(k, candidate): (usize, &Candidate)| Priced {
             price: candidate.price,
             error: near.error(&members, Some(k)).unwrap_or(f64::NAN),

@@ -123,8 +123,7 @@ impl<'a> Fitter<'a> {
             keeps_all,
         };
         let base = base_model(question.robot, &fitter.data, question.fit, question.without);
-        let mut now = fitter.fit(&base, Vec::new());
-        fitter.follow(&now);
+        let mut now = fitter.refit(&base, Vec::new());
         fitter.spread = JointSpread::of(&now.model, &fitter.data);
         let kept = &now.screening.kept;
         let lasts = lasts(&now.model, &fitter.data, kept);
@@ -317,6 +316,13 @@ impl<'a> Fitter<'a> {
             causes,
             ranges,
         }
+    }
+
+    /// The same, and the base parameters that the rows show then.
+    pub(crate) fn refit(&mut self, from: &Model, causes: Vec<EstimatedCause>) -> FitState {
+        let state = self.fit(from, causes);
+        self.follow(&state);
+        state
     }
 }
 

@@ -8,15 +8,18 @@ use crate::estimate::Model;
 
 /// What is left of the rows that a search looks at, and what moves it.
 pub(crate) struct RoundView<'a> {
+    pub(crate) now: &'a FitState,
+    pub(crate) fitter: &'a Fitter<'a>,
     pub(crate) problem: WhitenedProblem<'a>,
-    autocorrelation_time: f64,
+    /// How many rows of what is left count as one.
+    pub(crate) autocorrelation_time: f64,
     torque: Vec<f64>,
     /// How far each joint yields, rad/Nm.
     pub(crate) compliance: Vec<f64>,
 }
 
 impl<'a> RoundView<'a> {
-    pub(crate) fn of(now: &'a FitState, fitter: &'a Fitter) -> Self {
+    pub(crate) fn of(now: &'a FitState, fitter: &'a Fitter<'a>) -> Self {
         let data = &fitter.data;
         let compliance = compliance(&now.model);
         let mut problem =
@@ -29,16 +32,13 @@ impl<'a> RoundView<'a> {
             problem = problem.with_autocorrelation(noise);
         }
         Self {
+            now,
+            fitter,
             autocorrelation_time,
             torque: problem.torques(),
             compliance,
             problem,
         }
-    }
-
-    /// How many rows of what is left count as one.
-    pub(crate) fn autocorrelation_time(&self) -> f64 {
-        self.autocorrelation_time
     }
 
     pub(crate) fn survey(&self) -> Survey<'_> {

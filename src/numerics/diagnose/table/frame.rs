@@ -4,7 +4,7 @@
 use super::evidence::EvidenceRows;
 use super::factored::{FactoredColumns, Functions, MotionRows, WeighedDirection, unit};
 use super::noise_shape::NoiseShape;
-use crate::diagnose::round::{FitState, Fitter, RoundView};
+use crate::diagnose::round::RoundView;
 use crate::effect::{Basis, Factor, Form, Law, Motion, Variable};
 use crate::regression::{orthonormal, product, project};
 use faer::{Mat, MatRef};
@@ -51,19 +51,14 @@ pub(super) struct SearchRows<'a> {
 
 impl<'a> SearchRows<'a> {
     /// Around a fitted model; the residual is that without its causes.
-    pub(crate) fn of(
-        view: &'a RoundView<'a>,
-        now: &FitState,
-        fitter: &Fitter,
-        noise: NoiseShape,
-    ) -> Self {
+    pub(crate) fn of(view: &'a RoundView<'a>, noise: NoiseShape) -> Self {
         let problem = &view.problem;
         let variance = |(i, row): (usize, &usize)| {
-            fitter.scale.noise(problem.data, *row).powi(2)
+            view.fitter.scale.noise(problem.data, *row).powi(2)
                 / problem.readings_of(i).len().max(1) as f64
         };
         let variance = problem.rows.iter().enumerate().map(variance).collect();
-        let mut residual = view.without_causes(now);
+        let mut residual = view.without_causes(view.now);
         let mut out = Self {
             view,
             base: Mat::new(),
@@ -74,7 +69,7 @@ impl<'a> SearchRows<'a> {
             motions: Vec::new(),
             variables: Vec::new(),
         };
-        let mut jacobian = problem.jacobian(&fitter.seen());
+        let mut jacobian = problem.jacobian(&view.fitter.seen());
         (0..jacobian.ncols()).for_each(|j| out.weigh(jacobian.col_as_slice_mut(j)));
         out.weigh(&mut residual);
         out.base = orthonormal(&jacobian);
@@ -88,7 +83,7 @@ impl<'a> SearchRows<'a> {
     /// What is left, and how many rows say something of their own.
     pub(crate) fn rows(&self) -> EvidenceRows {
         let square = self.residual.iter().map(|value| value * value).sum();
-        let counted = self.residual.len() as f64 / self.view.autocorrelation_time();
+        let counted = self.residual.len() as f64 / self.view.autocorrelation_time;
         EvidenceRows {
             freedom: (counted - self.base.ncols() as f64).max(1.0),
             square,

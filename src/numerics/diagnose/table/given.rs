@@ -12,7 +12,7 @@ use super::state::KnownState;
 use super::{by_currents, estimated, is_kept};
 use crate::criteria::cells::{CLOSELY, OPEN, SMALLEST};
 use crate::criteria::fleet::{LEAST_EVIDENCE, WRITTEN};
-use crate::diagnose::round::{EstimatedCause, FitState, Fitter, RoundView};
+use crate::diagnose::round::{EstimatedCause, RoundView};
 use crate::effect::{Basis, Form, Place, Term, names};
 use rayon::prelude::*;
 
@@ -64,40 +64,29 @@ impl CellAnswer {
 
 /// Does something with the table of the cells that `keeps` leaves, around a fitted model.
 fn with_table<T>(
-    (view, now, fitter): (&RoundView, &FitState, &Fitter),
+    view: &RoundView,
     keeps: impl Fn(&CauseCell) -> bool,
     ask: impl FnOnce(&mut CauseTable) -> T,
 ) -> T {
     let survey = view.survey();
-    let rows = fitter.data.rows();
-    let noise = match now.causes.is_empty() {
-        true => NoiseShape::at_first(view, rows),
-        false => NoiseShape::of(view, rows),
+    let noise = match view.now.causes.is_empty() {
+        true => NoiseShape::at_first(view),
+        false => NoiseShape::of(view),
     };
-    let mut frame = SearchRows::of(view, now, fitter, noise);
+    let mut frame = SearchRows::of(view, noise);
     let is_open = survey.rows.len() >= *OPEN;
-    let kept = |cell: &CauseCell| keeps(cell) && is_kept(cell, view, &survey, fitter);
-    let question = fitter.question;
-    let mut table = CauseTable::new(
-        &mut frame,
-        &survey,
-        question,
-        (&[], Vec::new()),
-        is_open,
-        kept,
-    );
-    ask(&mut table)
+    let kept = |cell: &CauseCell| keeps(cell) && is_kept(cell, view, &survey);
+    let none = (&[][..], Vec::new());
+    let question = view.fitter.question;
+    ask(&mut CauseTable::new(
+        &mut frame, &survey, question, none, is_open, kept,
+    ))
 }
 
 /// Given cells as causes of the whole model around a fitted one.
-pub(crate) fn given_causes(
-    view: &RoundView,
-    now: &FitState,
-    fitter: &Fitter,
-    given: &[GivenCell],
-) -> Vec<EstimatedCause> {
+pub(crate) fn given_causes(view: &RoundView, given: &[GivenCell]) -> Vec<EstimatedCause> {
     let keeps = |cell: &CauseCell| given.iter().any(|one| one.cell == cell.key);
-    let mut causes = with_table((view, now, fitter), keeps, |table| {
+    let mut causes = with_table(view, keeps, |table| {
         let components = table.given(given);
         estimated(table, &components)
     });
@@ -106,14 +95,9 @@ pub(crate) fn given_causes(
 }
 
 /// What all cells say given some, and what each of those says and its rivals say in its place.
-pub(crate) fn answers(
-    view: &RoundView,
-    now: &FitState,
-    fitter: &Fitter,
-    given: &[GivenCell],
-) -> Vec<CellAnswer> {
+pub(crate) fn answers(view: &RoundView, given: &[GivenCell]) -> Vec<CellAnswer> {
     with_table(
-        (view, now, fitter),
+        view,
         |_| true,
         |table| {
             let components = table.given(given);

@@ -33,7 +33,7 @@ pub use search::ComponentSearch;
 pub use size::rms_size;
 pub use state::KnownState;
 
-use super::round::{EstimatedCause, FitState, Fitter, RoundView};
+use super::round::{EstimatedCause, RoundView};
 use super::types::Located;
 use crate::criteria::cells::{IDLE, OPEN, ROUNDS, UNEXPLAINED};
 use crate::criteria::screen::MISTAKES;
@@ -41,7 +41,7 @@ use crate::effect::{Basis, Form, Law, Place, Survey, names};
 use crate::estimate::Prior;
 use crate::observation::only_contacts;
 use cause_table::CauseTable;
-use cell::FreeShape;
+use cell::{CauseCell, FreeShape};
 use component::Component;
 use frame::SearchRows;
 use noise_shape::NoiseShape;
@@ -154,27 +154,25 @@ impl Rounds {
     }
 
     /// Searches around a fitted model.
-    pub(crate) fn search(&mut self, view: &RoundView, now: &FitState, fitter: &Fitter) -> Round {
+    pub(crate) fn search(&mut self, view: &RoundView) -> Round {
         self.round += 1;
         let survey = view.survey();
         let all_count = std::mem::take(&mut self.all_count);
         let noise = if self.round > 1 && !all_count {
-            NoiseShape::of(view, fitter.data.rows())
+            NoiseShape::of(view)
         } else {
-            NoiseShape::at_first(view, fitter.data.rows())
+            NoiseShape::at_first(view)
         };
         let components = self.known.components.iter();
         let sizes =
             components.flat_map(|(_, one)| one.forms.iter().map(move |form| (form, one.amplitude)));
         let noise = noise.with_unknown_memory(&survey, sizes);
         let many_far = noise.far > *MISTAKES;
-        let mut frame = SearchRows::of(view, now, fitter, noise);
-        let question = fitter.question;
-        let contacts_only = only_contacts(&fitter.data, question.fit);
+        let mut frame = SearchRows::of(view, noise);
+        let question = view.fitter.question;
+        let contacts_only = only_contacts(&view.fitter.data, question.fit);
         let empty = self.empty.clone();
-        let keeps = |cell: &cell::CauseCell| {
-            !empty.contains(&cell.key) && is_kept(cell, view, &survey, fitter)
-        };
+        let keeps = |cell: &CauseCell| !empty.contains(&cell.key) && is_kept(cell, view, &survey);
         let all_pairs = if self.pairs.is_none() {
             generated::pairs(&survey, &mut frame)
         } else {
@@ -282,7 +280,8 @@ impl Rounds {
 }
 
 /// Whether a cell may be asked of a recording.
-fn is_kept(cell: &cell::CauseCell, view: &RoundView, survey: &Survey, fitter: &Fitter) -> bool {
+fn is_kept(cell: &CauseCell, view: &RoundView, survey: &Survey) -> bool {
+    let fitter = view.fitter;
     // Where nothing but joints was recorded, base and first joint move with all places that the target was laid into.
     let unseen = only_contacts(&fitter.data, fitter.question.fit)
         && (cell.place == Place::Base

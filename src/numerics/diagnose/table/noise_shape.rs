@@ -21,8 +21,8 @@ pub(super) struct NoiseShape {
 
 impl NoiseShape {
     /// Before anything was found: rows that measured one pose count as far as they say something of their own.
-    pub(crate) fn at_first(view: &RoundView, rows: usize) -> Self {
-        let mut weights = vec![1.0; rows];
+    pub(crate) fn at_first(view: &RoundView) -> Self {
+        let mut weights = vec![1.0; view.problem.data.rows()];
         share_among_repeats(view, &mut weights);
         Self {
             weights,
@@ -58,7 +58,7 @@ impl NoiseShape {
 
     /// By the residual of a fitted model: rows that are far off count less, and a noise that is stronger in some direction is made
     /// even.
-    pub(crate) fn of(view: &RoundView, rows: usize) -> Self {
+    pub(crate) fn of(view: &RoundView) -> Self {
         let problem = &view.problem;
         let residual = problem.of_readings();
         let square = |lines: std::ops::Range<usize>| {
@@ -79,7 +79,7 @@ impl NoiseShape {
         let middle = sizes.len() / 2;
         // The median of a mean of three squares is 0.79 of their expectation.
         let scale = (*sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.89).max(0.3);
-        let mut weights = vec![1.0; rows];
+        let mut weights = vec![1.0; problem.data.rows()];
         for (size, row) in by_row.iter().zip(&problem.rows) {
             weights[*row] = (*FAR * scale / size.max(f64::MIN_POSITIVE)).min(1.0);
         }

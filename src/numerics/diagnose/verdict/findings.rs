@@ -7,7 +7,7 @@ use crate::effect::{
     Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Survey, Variable,
     figure, moved_with_the_payload, names, people, turned_holder,
 };
-use crate::estimate::{ErrorScale, Model, ParameterStatus, tail};
+use crate::estimate::{Model, ParameterStatus, tail};
 use crate::observation::Dimension;
 use crate::round::{FitState, RoundView};
 use crate::types::{Evidence, Finding, RivalCause};
@@ -62,7 +62,10 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
     let mut out: Vec<(f64, FoundCell, Vec<usize>)> = Vec::new();
     for (rms, found, details) in all {
         // No instrument sees so little of the tool: currents alone speak of it.
-        if rms < *SMALLEST && !out.is_empty() && last.scale.dimension() == Dimension::Length {
+        if rms < *SMALLEST
+            && !out.is_empty()
+            && last.view.fitter.scale.dimension() == Dimension::Length
+        {
             out[0].2.extend(&found.members);
             continue;
         }
@@ -142,7 +145,7 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
         clock,
     };
     let impossible = impossible(last, found);
-    let rms = small(effect_rms, last.scale.dimension());
+    let rms = small(effect_rms, last.view.fitter.scale.dimension());
     let named = effect != names::UNKNOWN;
     let excluded = forms
         .iter()
@@ -292,7 +295,7 @@ fn size(last: &LastRound, members: &[usize]) -> f64 {
             lines.len().max(1) as f64,
             lines.map(|line| sum[line].powi(2)).sum::<f64>(),
         );
-        whitened * last.scale.noise(problem.data, *row).powi(2) / values
+        whitened * last.view.fitter.scale.noise(problem.data, *row).powi(2) / values
     });
     (squares.sum::<f64>() / problem.rows.len().max(1) as f64).sqrt()
 }
@@ -359,15 +362,12 @@ pub(crate) struct LastRound<'a, 'b> {
     /// The whole model with all causes.
     pub(crate) state: FitState,
     pub(crate) answer: Answer,
-    /// Unit in which errors of rows are compared and stated.
-    pub(crate) scale: ErrorScale,
-    /// Names of causes that are not to be given.
-    pub(crate) without: &'b [String],
 }
 
 impl LastRound<'_, '_> {
     /// Whether a name is not to be given.
     pub(crate) fn excludes(&self, effect: &str) -> bool {
-        self.without.iter().any(|name| name == effect)
+        let without = self.view.fitter.question.without;
+        without.iter().any(|name| name == effect)
     }
 }

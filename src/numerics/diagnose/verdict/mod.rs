@@ -26,7 +26,8 @@ pub(crate) use findings::LastRound;
 pub use not_observable::other_means;
 
 /// Draws the conclusions of the last round; `before` is what the base model leaves of every row.
-pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>]) -> Diagnosis {
+pub(crate) fn conclude(last: LastRound, before: &[Option<f64>]) -> Diagnosis {
+    let fitter = last.view.fitter;
     let (data, state) = (&fitter.data, &last.state);
     // What is predicted outside of the fitted rows is what everyone is told, and what programs are corrected with.
     let model = state.model.held_within(data, &state.screening.kept);
@@ -87,7 +88,6 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
         state: &last.state,
         view: last.view,
         survey: last.survey,
-        fitter,
     }
     .of_all(&findings);
     let LastRound { state, answer, .. } = last;
