@@ -4,28 +4,29 @@
 //! coefficients change the points in proportion. What is to change the model is fitted afterwards.
 
 use crate::criteria::judge::FOLDS;
-use crate::estimate::{FoldKind, Model, NearbyFits, Session, dealt, gather};
+use crate::estimate::{FoldKind, NearbyFits, Session, dealt, gather};
 use crate::round::{EstimatedCause, FitState, Fitter, with_causes};
 use std::ops::Range;
 
-/// A fitted state of which causes are left out, and rivals that may come in.
-pub(crate) struct Alternatives<'a> {
-    state: &'a FitState,
-    fitter: &'a Fitter<'a>,
-    /// The state's model with the rivals at zero.
-    model: Model,
+/// Fits around a state, in a linear picture: with causes left out, and rivals that may come in.
+pub(crate) struct Alternatives<'n> {
+    state: &'n FitState,
+    session: Session<'n>,
     /// Where the parameters of the causes are, then those of the rivals.
-    ranges: Vec<Range<usize>>,
-    folds: Vec<Vec<usize>>,
+    ranges: &'n [Range<usize>],
+    folds: &'n [Vec<usize>],
+    columns: &'n [usize],
+    nearby: NearbyFits<'n>,
 }
 
-impl<'a> Alternatives<'a> {
-    /// `None` where the poses are too few for folds.
-    pub(crate) fn of(
-        state: &'a FitState,
-        fitter: &'a Fitter,
+impl Alternatives<'_> {
+    /// Asks the fits around a state with some rivals at zero; `None` where the poses are too few for folds, or bounds are in the way.
+    pub(crate) fn ask<T>(
+        state: &FitState,
+        fitter: &Fitter,
         rivals: &[EstimatedCause],
-    ) -> Option<Self> {
+        ask: impl FnOnce(&Alternatives) -> T,
+    ) -> Option<T> {
         let at_zero = |cause: &EstimatedCause| EstimatedCause {
             coefficients: vec![0.0; cause.coefficients.len()],
             ..cause.clone()
@@ -33,66 +34,34 @@ impl<'a> Alternatives<'a> {
         let mut causes = state.causes.clone();
         causes.extend(rivals.iter().map(at_zero));
         let (model, ranges) = with_causes(&state.model, &causes);
-        Some(Self {
-            state,
-            fitter,
-            model,
-            ranges,
-            folds: folds(state, fitter)?,
-        })
-    }
-
-    /// The fits around the state; none where bounds are in the way.
-    pub(crate) fn near(&self) -> Option<NearAlternatives<'_>> {
-        let Self {
-            state,
-            fitter,
-            model,
-            ranges,
-            folds,
-        } = self;
+        let folds = folds(state, fitter)?;
         let session = Session {
-            model,
+            model: &model,
             ..state.session(fitter)
         };
         let mut columns = state.fitted.free();
         columns.extend(ranges[state.causes.len()..].iter().cloned().flatten());
-        let nearby = NearbyFits::of(&session, folds, &columns, fitter.scale)?;
-        Some(NearAlternatives {
-            alternatives: self,
+        let nearby = NearbyFits::of(&session, &folds, &columns, fitter.scale)?;
+        Some(ask(&Alternatives {
+            state,
             session,
-            columns,
+            ranges: &ranges,
+            folds: &folds,
+            columns: &columns,
             nearby,
-        })
+        }))
     }
-}
 
-/// Fits around a state, in a linear picture.
-pub(crate) struct NearAlternatives<'n> {
-    alternatives: &'n Alternatives<'n>,
-    session: Session<'n>,
-    columns: Vec<usize>,
-    nearby: NearbyFits<'n>,
-}
-
-impl NearAlternatives<'_> {
     /// Steps without some causes (by their positions), and all rivals but one (by its own).
     fn steps(&self, out: &[usize], rival: Option<usize>) -> Vec<Option<f64>> {
-        let Alternatives {
-            state,
-            model,
-            ranges,
-            ..
-        } = self.alternatives;
-        let causes = state.causes.len();
-        let left_out = |k: &usize| out.iter().any(|i| ranges[*i].contains(k));
+        let causes = self.state.causes.len();
+        let left_out = |k: &usize| out.iter().any(|i| self.ranges[*i].contains(k));
         let other = |k: &usize| {
-            (causes..ranges.len()).any(|i| ranges[i].contains(k) && rival != Some(i - causes))
+            let mut rivals = self.ranges[causes..].iter().enumerate();
+            rivals.any(|(i, range)| range.contains(k) && rival != Some(i))
         };
-        self.columns
-            .iter()
-            .map(|k| (left_out(k) || other(k)).then_some(-model.x[*k]))
-            .collect()
+        let step = |k: &usize| (left_out(k) || other(k)).then_some(-self.session.model.x[*k]);
+        self.columns.iter().map(step).collect()
     }
 
     /// The rms error of folds without some causes (by their positions), and with a rival (by its own) or none. Nothing where that is not near
@@ -100,16 +69,18 @@ impl NearAlternatives<'_> {
     pub(crate) fn error(&self, out: &[usize], rival: Option<usize>) -> Option<f64> {
         let errors = self.nearby.with(&self.steps(out, rival))?;
         let errors: Option<Vec<Vec<f64>>> = errors.into_iter().collect();
-        Some(rms(&self.session, &self.alternatives.folds, &errors?))
+        Some(rms(&self.session, self.folds, &errors?))
     }
 
     /// The coefficients of a rival (by its position) in the place of some causes, with their standard deviations, SI.
     pub(crate) fn coefficients(&self, out: &[usize], rival: usize) -> Option<Vec<(f64, f64)>> {
-        let Alternatives { state, ranges, .. } = self.alternatives;
-        let columns: Vec<usize> = ranges[state.causes.len() + rival].clone().collect();
+        let columns = self.ranges[self.state.causes.len() + rival].clone();
         let steps = self.steps(out, Some(rival));
-        let found = self.nearby.estimated(&steps, &columns)?.into_iter();
-        let scale = state.fitted.noise_scale;
+        let found = self
+            .nearby
+            .estimated(&steps, &columns.collect::<Vec<_>>())?;
+        let scale = self.state.fitted.noise_scale;
+        let found = found.into_iter();
         Some(found.map(|(value, sigma)| (value, sigma * scale)).collect())
     }
 }

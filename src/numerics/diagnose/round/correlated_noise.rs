@@ -37,21 +37,17 @@ pub(crate) fn correlation_left_by(
     let problem = WhitenedProblem::new(&settled.model, &fitter.data, rows);
     // Rows that measured different numbers have no one correlation from each to the next.
     let width = problem.width()?;
-    let slow: Vec<bool> = settled
-        .causes
-        .iter()
-        .map(|cause| cause.form.follows_time())
-        .collect();
-    let with_all = Regression::of((&problem, width), settled, fitter, &vec![true; slow.len()]);
+    let slow = settled.causes.iter().map(|cause| cause.form.follows_time());
+    let slow: Vec<bool> = slow.collect();
+    let regression = |kept: &[bool]| Regression::of((&problem, width), settled, fitter, kept);
+    let with_all = regression(&vec![true; slow.len()]);
     let price = price_of(&answer.found, &|i| slow[i]);
     let believed = with_all.cost(fitter.correlated) + price;
     let (best, noise) = with_all.likeliest();
     if fitter.causes_of_the_arm_first() {
         // What noise alone explains as well has no other name.
         let best = best + price_of(&answer.found, &|_| true);
-        let (alone, of_noise) =
-            Regression::of((&problem, width), settled, fitter, &vec![false; slow.len()])
-                .likeliest();
+        let (alone, of_noise) = regression(&vec![false; slow.len()]).likeliest();
         let keeps_causes = best < alone - *PLAIN;
         return Some(CorrelationChange {
             noise: if keeps_causes { noise } else { of_noise },
@@ -61,7 +57,7 @@ pub(crate) fn correlation_left_by(
     let best = best + price;
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
-        let (cost, other) = Regression::of((&problem, width), settled, fitter, &kept).likeliest();
+        let (cost, other) = regression(&kept).likeliest();
         // What such noise explains as well is noise. Causes that were not found yet look like it, too: it has to be as much likelier as it is
         // likely that there are some.
         let some_left = -2.0 * answer.nothing_last.max(f64::MIN_POSITIVE).ln();
@@ -80,9 +76,8 @@ pub(crate) fn correlation_left_by(
 
 /// -2 ln of the prior odds of some findings.
 fn price_of(found: &[FoundCell], has: &dyn Fn(usize) -> bool) -> f64 {
-    let priced = found
-        .iter()
-        .filter(|found| found.members.iter().any(|i| has(*i)));
+    let is_priced = |found: &&FoundCell| found.members.iter().any(|i| has(*i));
+    let priced = found.iter().filter(is_priced);
     -2.0 * priced.map(|found| found.log_prior).sum::<f64>()
 }
 
@@ -116,10 +111,8 @@ impl<'a> Regression<'a> {
             let numbers = cause.coefficients.iter().zip(&cause.priors);
             for (column, (coefficient, prior)) in columns.chunks(rows).zip(numbers) {
                 let known = if *kept { prior.mean } else { 0.0 };
-                points
-                    .iter_mut()
-                    .zip(column)
-                    .for_each(|(value, c)| *value += c * (coefficient - known));
+                let each = points.iter_mut().zip(column);
+                each.for_each(|(value, c)| *value += c * (coefficient - known));
                 if *kept {
                     random.extend(column.iter().map(|c| c * prior.sigma));
                 }
@@ -157,11 +150,13 @@ impl<'a> Regression<'a> {
         let columns = MatRef::from_column_major_slice(&columns, rows, count);
         let mut gram = Mat::zeros(count, count);
         let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+        let (out, transposed) = (gram.as_mut(), columns.transpose());
+        let by = Accum::Replace;
         matmul(
-            gram.as_mut(),
+            out,
             lower,
-            Accum::Replace,
-            columns.transpose(),
+            by,
+            transposed,
             whole,
             columns,
             whole,

@@ -32,31 +32,29 @@ impl JointSpread {
     pub(crate) fn of(model: &Model, data: &Measurements) -> Self {
         let problem = WhitenedProblem::new(model, data, (0..data.rows()).collect());
         let summed = |motions: &[Vector3<f64>]| -> Matrix3<f64> {
-            motions
-                .iter()
-                .map(|motion| motion * motion.transpose())
-                .sum()
+            let squares = motions.iter().map(|motion| motion * motion.transpose());
+            squares.sum()
         };
         let of_kind = |kind: &'static dyn MeasurementKind| {
             let name = kind.about().name;
             let by_row = |row: usize| {
-                let variance = kind
-                    .reading(data, row)
-                    .map_or(0.0, |reading| reading.sigma * reading.sigma);
-                problem
-                    .reading_by_joint(row, name)
-                    .map_or_else(Matrix3::zeros, |motions| summed(&motions) * variance)
+                let reading = kind.reading(data, row);
+                let variance = reading.map_or(0.0, |reading| reading.sigma * reading.sigma);
+                let motions = problem.reading_by_joint(row, name);
+                motions.map_or_else(Matrix3::zeros, |motions| summed(&motions) * variance)
             };
             (kind, (0..data.rows()).map(by_row).collect())
         };
-        let others = kinds(data)
-            .into_iter()
-            .filter(|kind| kind.about().name != PointKind.about().name);
+        let is_other =
+            |kind: &&'static dyn MeasurementKind| kind.about().name != PointKind.about().name;
+        let points = (0..data.rows()).map(|row| summed(problem.by_joint(row)));
         Self {
-            points: (0..data.rows())
-                .map(|row| summed(problem.by_joint(row)))
+            points: points.collect(),
+            others: kinds(data)
+                .into_iter()
+                .filter(is_other)
+                .map(of_kind)
                 .collect(),
-            others: others.map(of_kind).collect(),
         }
     }
 
@@ -66,21 +64,14 @@ impl JointSpread {
         data.spread =
             (sigma > 0.0).then(|| self.points.iter().map(|matrix| matrix * square).collect());
         // What sees places has its part by the point's own.
-        let turns = self
-            .others
-            .iter()
-            .filter(|(kind, _)| sigma > 0.0 && kind.about().rank.rotations);
-        data.reading_spread = turns
-            .map(|(kind, all)| {
-                let about = kind.about();
-                (
-                    about.name,
-                    all.iter()
-                        .map(|matrix| matrix.trace() * square / about.axes as f64)
-                        .collect(),
-                )
-            })
-            .collect();
+        let turns = self.others.iter();
+        let turns = turns.filter(|(kind, _)| sigma > 0.0 && kind.about().rank.rotations);
+        let spread = |(kind, all): &(&'static dyn MeasurementKind, Vec<Matrix3<f64>>)| {
+            let about = kind.about();
+            let variance = |matrix: &Matrix3<f64>| matrix.trace() * square / about.axes as f64;
+            (about.name, all.iter().map(variance).collect())
+        };
+        data.reading_spread = turns.map(spread).collect();
     }
 
     /// What is left of rows beside points, of which kind each.
@@ -202,27 +193,21 @@ impl RepeatPairs {
             return stated;
         };
         // Mistakes speak for no noise.
-        let usual: Vec<Sample> = samples
-            .into_iter()
-            .filter(|one| one.square() < *CAP * shown * shown)
-            .collect();
+        let mut usual = samples;
+        usual.retain(|one| one.square() < *CAP * shown * shown);
         let deviance = |scale: f64, sigma: f64| {
-            usual
-                .iter()
-                .map(|one| one.deviance(scale, sigma))
-                .sum::<f64>()
+            let each = usual.iter().map(|one| one.deviance(scale, sigma));
+            each.sum::<f64>()
         };
         let best_joints = |scale: f64| {
-            let all = std::iter::once(0.0)
-                .chain(deviations())
-                .map(|sigma| (deviance(scale, sigma), sigma));
-            all.min_by(|a, b| a.0.total_cmp(&b.0))
-                .unwrap_or((f64::INFINITY, 0.0))
+            let sigmas = std::iter::once(0.0).chain(deviations());
+            let all = sigmas.map(|sigma| (deviance(scale, sigma), sigma));
+            let best = all.min_by(|a, b| a.0.total_cmp(&b.0));
+            best.unwrap_or((f64::INFINITY, 0.0))
         };
         let scales = grid(SMALLEST * shown, LARGEST * shown, STEPS / 3);
-        let best = scales
-            .map(|scale| (best_joints(scale).0, scale))
-            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let costs = scales.map(|scale| (best_joints(scale).0, scale));
+        let best = costs.min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((cost, scale)) = best else {
             return stated;
         };
@@ -230,17 +215,13 @@ impl RepeatPairs {
         if !differs || cost > best_joints(1.0).0 - *CLEARER {
             return stated;
         }
-        let scaled: Vec<Sample> = usual
-            .into_iter()
-            .map(|one| Sample {
-                fixed: one.fixed * (scale * scale),
-                ..one
-            })
-            .collect();
+        for sample in &mut usual {
+            sample.fixed *= scale * scale;
+        }
         RepeatedNoise {
             scale,
             joints: JointRepeatability {
-                sigma: likeliest(&scaled, 2.0),
+                sigma: likeliest(&usual, 2.0),
                 ..joints
             },
         }
@@ -274,18 +255,18 @@ impl RepeatPairs {
         spread: &JointSpread,
     ) -> JointRepeatability {
         let repeats = self.pairs.len();
-        if repeats < *FEW {
-            return JointRepeatability {
-                sigma: 0.0,
-                repeats,
-            };
-        }
+        let sigma = match repeats < *FEW {
+            true => 0.0,
+            false => likeliest(&self.samples(model, data, spread), 2.0),
+        };
+        JointRepeatability { sigma, repeats }
+    }
+
+    /// What everything that the pairs measured differs by.
+    fn samples(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> Vec<Sample> {
         let mut samples = self.of_points(model, data, spread);
-        for [a, b] in self
-            .pairs
-            .iter()
-            .filter(|[a, b]| data.anchor(*a) == data.anchor(*b))
-        {
+        let same_anchor = |[a, b]: &&[usize; 2]| data.anchor(*a) == data.anchor(*b);
+        for [a, b] in self.pairs.iter().filter(same_anchor) {
             let [from, to] = [a, b].map(|row| spread.beside_points(model, data, &[*row]));
             let both = to.iter().filter_map(|(kind, to)| {
                 let (_, from) = from.iter().find(|from| from.0 == *kind)?;
@@ -298,10 +279,7 @@ impl RepeatPairs {
                 varying: from.varying + to.varying,
             }));
         }
-        JointRepeatability {
-            sigma: likeliest(&samples, 2.0),
-            repeats,
-        }
+        samples
     }
 }
 
@@ -409,9 +387,8 @@ fn likeliest(samples: &[Sample], evidence: f64) -> f64 {
         samples.iter().map(one).sum()
     };
     let none = cost(0.0);
-    let best = deviations()
-        .map(|sigma| (cost(sigma), sigma))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let costs = deviations().map(|sigma| (cost(sigma), sigma));
+    let best = costs.min_by(|a, b| a.0.total_cmp(&b.0));
     best.filter(|(cost, _)| *cost < none - evidence)
         .map_or(0.0, |(_, sigma)| sigma)
 }

@@ -131,10 +131,8 @@ impl CauseTable<'_, '_> {
         let state = self.state(&known, Some(kappa));
         let with = self.state(components, Some(kappa));
         // The strongest of several stands for its finding; further ones of its cell add to it.
-        let logs: BTreeMap<usize, f64> = members
-            .iter()
-            .map(|i| (*i, self.log_evidence(&components[*i], &state)))
-            .collect();
+        let log = |i: &usize| (*i, self.log_evidence(&components[*i], &state));
+        let logs: BTreeMap<usize, f64> = members.iter().map(log).collect();
         let strongest = members.iter().max_by(|a, b| logs[*a].total_cmp(&logs[*b]));
         let main = *strongest.unwrap_or(&members[0]);
         let (component, log_main) = (&components[main], logs[&main]);
@@ -146,20 +144,18 @@ impl CauseTable<'_, '_> {
             log += self.log_evidence(&components[*i], &given).max(0.0);
             known.push(components[*i].clone());
         }
-        let also: Vec<usize> = std::iter::once(cell)
-            .chain(self.over_its_variable(component, &state))
-            .collect();
+        let mut also = vec![cell];
+        also.extend(self.over_its_variable(component, &state));
         let alike = self.alike(component, 60);
         let mut scan = self.scan_instead(component, &alike, &state, 8, &also);
-        let log_prior = members
+        let priors = members
             .iter()
-            .map(|i| self.cells[components[*i].cell].log_prior)
-            .sum::<f64>();
+            .map(|i| self.cells[components[*i].cell].log_prior);
+        let log_prior = priors.sum::<f64>();
         // Others are asked what the strongest does, and compete with all of them.
         scan.log_odds[cell] = (self.cells[cell].log_prior + log_main).max(log_prior + log);
-        let better = scan
-            .best()
-            .filter(|best| scan.log_odds[*best] > scan.log_odds[cell] + *SWAPS);
+        let least = scan.log_odds[cell] + *SWAPS;
+        let better = scan.best().filter(|best| scan.log_odds[*best] > least);
         let better = better.and_then(|best| Some((best, scan.closely.get(&best)?.clone())));
         let (effect, place) = (self.name_of(component), self.cells[cell].place);
         let (probabilities, rivals) = self.weigh((effect, place), component, &scan);
@@ -205,10 +201,9 @@ impl CauseTable<'_, '_> {
             };
             let bent = scan.closely.get(&k).map_or(0.0, bends);
             // What was refined stands for its cell.
-            let bent = if k == component.cell && component.shape.is_bent {
-                bent.max(0.9)
-            } else {
-                bent
+            let bent = match k == component.cell && component.shape.is_bent {
+                true => bent.max(0.9),
+                false => bent,
             };
             if cell.name == names::JOINT_COMPLIANCE {
                 *shares.entry((self.bent, cell.place)).or_default() += bent * probability;
@@ -219,15 +214,12 @@ impl CauseTable<'_, '_> {
         }
         let sound = 1.0 - *MISLED;
         let name = sound * shares.get(&(effect, place)).copied().unwrap_or(0.0);
-        let at_place = sound
-            * shares
-                .iter()
-                .filter(|(key, _)| key.1 == place)
-                .map(|(_, share)| share)
-                .sum::<f64>();
-        let rivals = shares
-            .iter()
-            .filter(|(key, share)| **key != (effect, place) && **share > *RIVAL);
+        let here = shares.iter().filter(|(key, _)| key.1 == place);
+        let at_place = sound * here.map(|(_, share)| share).sum::<f64>();
+        let is_rival = |(key, share): &(&(&'static str, Place), &f64)| {
+            **key != (effect, place) && **share > *RIVAL
+        };
+        let rivals = shares.iter().filter(is_rival);
         let rival = |((other, at), share): (&(&'static str, Place), &f64)| RivalCause {
             effect: other,
             place: *at,

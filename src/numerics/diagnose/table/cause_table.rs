@@ -72,10 +72,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 cell.between = Some(known.between);
             }
         }
-        let groups: Vec<Vec<ShapeGroup>> = named
-            .iter()
-            .map(|cell| cell.groups(survey, &values, false))
-            .collect();
+        let groups = named.iter().map(|cell| cell.groups(survey, &values, false));
+        let groups: Vec<Vec<ShapeGroup>> = groups.collect();
         let forms = groups.iter().flatten().flat_map(|group| &group.forms);
         let terms: Vec<&Term> = forms.filter_map(|form| form.term()).collect();
         let mut motions = Vec::new();

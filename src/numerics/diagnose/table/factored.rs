@@ -89,18 +89,17 @@ impl MotionRows {
             }
             sums
         };
-        let all = || {
-            self.directions
-                .iter()
-                .map(|direction| &direction.weighed[..])
-        };
-        let with_each = |weighed: &'_ [f64]| -> Vec<Vec<f64>> {
-            all().map(move |other| along(weighed, other)).collect()
+        let weighed = self.directions.iter().map(|direction| &direction.weighed);
+        let all: Vec<&[f64]> = weighed.map(Vec::as_slice).collect();
+        let with_each = |one: &&[f64]| {
+            all.iter()
+                .map(|other| along(one, other))
+                .collect::<Vec<_>>()
         };
         Self {
             by_base: self.with(base, row_of),
-            by_residual: all().map(|weighed| along(weighed, residual)).collect(),
-            by_each_other: all().flat_map(with_each).collect(),
+            by_residual: all.iter().map(|one| along(one, residual)).collect(),
+            by_each_other: all.iter().flat_map(with_each).collect(),
             ..self
         }
     }

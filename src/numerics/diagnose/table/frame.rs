@@ -149,13 +149,12 @@ impl<'a> SearchRows<'a> {
     /// Computes once the functions of one variable that forms have.
     pub(crate) fn tabulate<'l>(&mut self, laws: impl Iterator<Item = &'l Law>) {
         for factor in laws.flat_map(Law::factors) {
-            let known = self
-                .variables
-                .iter()
-                .position(|known| known.variable == factor.variable);
-            let Some(known) = known else { continue };
-            let functions = &self.variables[known].functions;
-            if functions.iter().all(|(basis, _)| *basis != factor.basis)
+            let of_variable = |known: &VariableRows| known.variable == factor.variable;
+            let Some(known) = self.variables.iter().position(of_variable) else {
+                continue;
+            };
+            let mut functions = self.variables[known].functions.iter();
+            if functions.all(|(basis, _)| *basis != factor.basis)
                 && let Some(fresh) = self.factor(factor)
             {
                 let fresh = Arc::new(Functions::of(fresh));
@@ -235,11 +234,8 @@ impl<'a> SearchRows<'a> {
             .iter()
             .map(|form| self.of_term(form).unwrap_or_else(|| self.of_form(form)))
             .collect();
-        let rows = each
-            .iter()
-            .map(|block| block.rows)
-            .max()
-            .unwrap_or(self.residual.len());
+        let rows = each.iter().map(|block| block.rows).max();
+        let rows = rows.unwrap_or(self.residual.len());
         let counts: Vec<usize> = each.iter().map(|block| block.square.len()).collect();
         let mut values = match &mut each[..] {
             [block] => std::mem::take(&mut block.columns),
@@ -264,26 +260,18 @@ impl<'a> SearchRows<'a> {
 
     /// The columns of any form; without the rows of currents where it says nothing of these.
     fn of_form(&self, form: &Form) -> Weighed {
-        let (all, points, problem) = (
-            self.residual.len(),
-            self.view.problem.of_readings().len(),
-            &self.view.problem,
-        );
+        let problem = &self.view.problem;
+        let (all, points) = (self.residual.len(), problem.of_readings().len());
         let mut columns = problem.motions_by(form);
-        let silent = columns
-            .chunks(all.max(1))
-            .all(|column| column[points..].iter().all(|value| *value == 0.0));
+        let is_zero = |column: &[f64]| column[points..].iter().all(|value| *value == 0.0);
+        let silent = columns.chunks(all.max(1)).all(is_zero);
         let rows = if silent { points } else { all };
-        if silent && points < all {
-            columns = columns
-                .chunks(all)
-                .flat_map(|column| column[..points].iter().copied())
-                .collect();
+        if rows < all {
+            let of_points = columns.chunks(all).flat_map(|column| &column[..points]);
+            columns = of_points.copied().collect();
         }
-        let square: Vec<f64> = columns
-            .chunks(rows.max(1))
-            .map(|column| self.mean_square(column))
-            .collect();
+        let each = columns.chunks(rows.max(1));
+        let square: Vec<f64> = each.map(|column| self.mean_square(column)).collect();
         for (column, square) in columns.chunks_mut(rows.max(1)).zip(&square) {
             problem.innovate(column);
             self.weigh(column);
@@ -439,9 +427,8 @@ impl<'a> SearchRows<'a> {
         }
         if let Some(factor) = self.noise.currents {
             let points = problem.of_readings().len();
-            column[points..]
-                .iter_mut()
-                .for_each(|value| *value *= factor);
+            let currents = column[points..].iter_mut();
+            currents.for_each(|value| *value *= factor);
         }
     }
 }

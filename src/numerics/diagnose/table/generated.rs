@@ -3,7 +3,7 @@
 
 use super::cell::{CauseCell, FreeShape, Over, Shapes, is_square, line};
 use super::frame::SearchRows;
-use crate::criteria::cells::{FADING, LIMITS, PAIR, PRODUCT};
+use crate::criteria::cells::{FADING, LIMITS, PAIR, PRODUCT, UNNAMED, USUAL};
 use crate::diagnose::types::Question;
 use crate::effect::{Axes, AxisPoint, Motion, Place, Polar, Survey, Variable, names};
 use crate::observation::only_contacts;
@@ -28,13 +28,14 @@ const ARROWS: [[i8; 3]; 13] = [
 /// Shorter links (m) are no place of their own.
 const SHORT: f64 = 1e-3;
 
-const FINE: Over = curve(40, 8, 5);
-const CURVE: Over = curve(20, 5, 3);
+const FINE: Over = curve((40, 8, 5));
+const CURVE: Over = curve((20, 5, 3));
 /// A wave of a dozen periods has no slow part that a coarse look would see.
-const WAVY: Over = curve(40, 40, 5);
-const SLOW: Over = curve(8, 4, 2);
+const WAVY: Over = curve((40, 40, 5));
+const SLOW: Over = curve((8, 4, 2));
 
-const fn curve(count: usize, first: usize, lengths: usize) -> Over {
+/// A line or a curve of so many cosines, so many at first, and correlation lengths.
+const fn curve((count, first, lengths): (usize, usize, usize)) -> Over {
     Over::Curve {
         count,
         first,
@@ -52,7 +53,7 @@ pub(super) fn cells(
     question: &Question,
     is_open: bool,
 ) -> Vec<CauseCell> {
-    let unnamed = super::listed::unnamed(question);
+    let odds = prior_odds(question);
     let mut out = Vec::new();
     // Where nothing but joints was recorded, an arm that is smaller closes as well, and whatever follows the place of the tool looks so.
     let closed = only_contacts(survey.data, survey.rows) || !is_open;
@@ -78,12 +79,18 @@ pub(super) fn cells(
         groups.retain(|group| !group.is_empty());
         let count = groups.len() as f64;
         for group in groups {
-            let log_prior = (unnamed / count / group.len() as f64).ln();
+            let log_prior = (odds / count / group.len() as f64).ln();
             let named = |free: FreeShape| cell(free, log_prior, survey);
             out.extend(group.into_iter().map(named));
         }
     }
     out
+}
+
+/// Prior odds of all cells without a name at a place together.
+pub(super) fn prior_odds(question: &Question) -> f64 {
+    let odds = |probability: f64| probability / (1.0 - probability);
+    *UNNAMED * odds(question.open_world) / odds(*USUAL)
 }
 
 /// Whether a variable takes more than one value.
@@ -174,20 +181,14 @@ pub(super) fn siblings(free: &FreeShape, survey: &Survey) -> Vec<FreeShape> {
     let slow = [Variable::Time, Variable::Temperature, Variable::Payload];
     let like = |variable: Variable| slow.into_iter().filter(move |_| slow.contains(&variable));
     let first = like(free.variable).map(|variable| FreeShape { variable, ..*free });
-    let second = like(other).map(|other| FreeShape {
-        over: Over::Product(other),
-        ..*free
-    });
-    motions
-        .chain(first)
-        .chain(second)
-        .filter(|one| {
-            let Over::Product(other) = one.over else {
-                return false;
-            };
-            one != free && other != one.variable && !are_one(one.variable, other, survey)
-        })
-        .collect()
+    let second = like(other).map(Over::Product);
+    let second = second.map(|over| FreeShape { over, ..*free });
+    let is_another = |one: &FreeShape| {
+        matches!(one.over, Over::Product(other)
+            if one != free && other != one.variable && !are_one(one.variable, other, survey))
+    };
+    let all = motions.chain(first).chain(second);
+    all.filter(is_another).collect()
 }
 
 /// Whether two variables change together, so that their product is a curve of one with a break: a clock, and a payload that changes once.
@@ -383,7 +384,7 @@ fn kinds(motion: Motion, survey: &Survey) -> Vec<Kind> {
 }
 
 /// Everything that a place may do and follow and that has no name.
-pub(super) fn unnamed(place: Place, survey: &Survey) -> Vec<CauseCell> {
+pub(super) fn cells_at(place: Place, survey: &Survey) -> Vec<CauseCell> {
     let motions = families(place, survey).into_iter().flatten();
     let motions = motions.filter(|motion| motion.place() == place);
     let all = motions.flat_map(|motion| {

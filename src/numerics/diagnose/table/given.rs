@@ -177,10 +177,8 @@ impl CauseTable<'_, '_> {
                 }
             }
             let logs: Vec<f64> = groups.iter().map(|logs| log_sum(logs)).collect();
-            let follows = block
-                .groups
-                .get(best.2)
-                .map_or("constant", |group| group.group.forms[0].follows(cell.place));
+            let likeliest = block.groups.get(best.2).map(|group| &group.group.forms[0]);
+            let follows = likeliest.map_or("constant", |form| form.follows(cell.place));
             let whole = CellAnswer {
                 left_out: left_out.map(Into::into),
                 cell: cell.key.clone(),
@@ -208,10 +206,9 @@ impl CauseTable<'_, '_> {
             let steps =
                 |form: &Form| matches!(form.term().map(Term::basis), Some(Basis::After { .. }));
             // Keys are long to make.
-            let keys = if shared && logs.iter().any(|log| log.is_finite()) {
-                shape_keys(&block.groups)
-            } else {
-                Vec::new()
+            let keys = match shared && logs.iter().any(|log| log.is_finite()) {
+                true => shape_keys(&block.groups),
+                false => Vec::new(),
             };
             let shapes = block.groups.iter().zip(&logs).zip(keys);
             let shapes = shapes
@@ -221,17 +218,14 @@ impl CauseTable<'_, '_> {
         };
         let mut out: Vec<(CellAnswer, Vec<CellAnswer>)> =
             (0..cells.len()).into_par_iter().map(answer).collect();
-        let mut order: Vec<usize> = (0..out.len())
-            .filter(|k| out[*k].0.log.is_finite())
-            .collect();
+        let mut order: Vec<usize> = (0..out.len()).collect();
+        order.retain(|k| out[*k].0.log.is_finite());
         let odds = |k: &usize| out[*k].0.log + out[*k].0.log_prior;
         order.sort_by(|a, b| odds(b).total_cmp(&odds(a)).then(a.cmp(b)));
         order.truncate(*CLOSELY);
         order.retain(|k| self.cells[cells[*k]].is_coarse());
-        let closely: Vec<_> = order
-            .par_iter()
-            .filter_map(|k| Some((*k, self.closely(cells[*k], state)?)))
-            .collect();
+        let closely = |k: &usize| Some((*k, self.closely(cells[*k], state)?));
+        let closely: Vec<_> = order.par_iter().filter_map(closely).collect();
         for (k, found) in closely {
             if found.log > out[k].0.log {
                 (out[k].0.log, out[k].0.size) = (found.log, found.amplitude);

@@ -6,7 +6,7 @@ use super::cell::{
     support,
 };
 use super::generated;
-use crate::criteria::cells::{BENT, COMMON, RARE, RARER, UNNAMED, USUAL};
+use crate::criteria::cells::{BENT, COMMON, RARE, RARER};
 use crate::criteria::effect;
 use crate::diagnose::types::Question;
 use crate::diagnose::whitened::WhitenedProblem;
@@ -105,19 +105,13 @@ pub(super) fn cells(
             log_prior: if is_named {
                 log_prior(name, place, prior_weight) - prior_weight * unusual
             } else {
-                unnamed(question).ln()
+                generated::prior_odds(question).ln()
             },
             shapes: Shapes::Listed(groups),
             between: None,
         }
     };
     all.into_iter().map(cell).collect()
-}
-
-/// Prior odds of all cells without a name at a place together.
-pub(super) fn unnamed(question: &Question) -> f64 {
-    let odds = |probability: f64| probability / (1.0 - probability);
-    *UNNAMED * odds(question.open_world) / odds(*USUAL)
 }
 
 /// By how much, in ln of odds, the commonest form of a cell is rarer than what is rare.
@@ -252,7 +246,7 @@ pub(crate) fn forms_of(
     let values = |variable| problem.values(variable);
     let (of_name, places): (Vec<CauseCell>, BTreeSet<Place>) = if name == names::UNKNOWN {
         let places = generated::places(survey).into_iter().collect();
-        (generated::unnamed(place, survey), places)
+        (generated::cells_at(place, survey), places)
     } else {
         let mut all = cells(survey, &values, question);
         all.retain(|cell| cell.name == cell_of(name));

@@ -61,17 +61,12 @@ impl NoiseShape {
     pub(crate) fn of(view: &RoundView) -> Self {
         let problem = &view.problem;
         let residual = problem.of_readings();
-        let square = |lines: std::ops::Range<usize>| {
-            let count = lines.len().max(1) as f64;
-            residual[lines]
-                .iter()
-                .map(|value| value * value)
-                .sum::<f64>()
-                / count
+        let mean = |values: &[f64]| {
+            values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64
         };
-        let mut sizes: Vec<f64> = (0..problem.rows.len())
-            .map(|i| square(problem.readings_of(i)).sqrt())
-            .collect();
+        let rows = 0..problem.rows.len();
+        let size = |i: usize| mean(&residual[problem.readings_of(i)]).sqrt();
+        let mut sizes: Vec<f64> = rows.clone().map(size).collect();
         let by_row = sizes.clone();
         if sizes.is_empty() {
             return Self::default();
@@ -84,8 +79,8 @@ impl NoiseShape {
             weights[*row] = (*FAR * scale / size.max(f64::MIN_POSITIVE)).min(1.0);
         }
         let far = weights.iter().filter(|weight| **weight < 0.5).count();
-        let points = (0..problem.rows.len())
-            .filter(|i| weights[problem.rows[*i]] == 1.0 && problem.readings_of(*i).len() == 3);
+        let points =
+            rows.filter(|i| weights[problem.rows[*i]] == 1.0 && problem.readings_of(*i).len() == 3);
         let (mut sum, mut count) = (Matrix3::zeros(), 0.0);
         for i in points {
             let left = Vector3::from_column_slice(&residual[problem.readings_of(i)]);
@@ -93,15 +88,9 @@ impl NoiseShape {
             count += 1.0;
         }
         share_among_repeats(view, &mut weights);
-        let mean = |values: &[f64]| {
-            values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64
-        };
         let currents = &problem.residual[residual.len()..];
-        let currents = (!currents.is_empty()).then(|| {
-            (mean(residual) / mean(currents).max(1e-12))
-                .sqrt()
-                .clamp(0.2, 5.0)
-        });
+        let ratio = (mean(residual) / mean(currents).max(1e-12)).sqrt();
+        let currents = (!currents.is_empty()).then(|| ratio.clamp(0.2, 5.0));
         Self {
             weights,
             far,
@@ -145,26 +134,21 @@ fn share_among_repeats(view: &RoundView, weights: &mut [f64]) {
     let width = problem.width().unwrap_or(0);
     let mut poses: Vec<Vec<usize>> = Vec::new();
     for (i, row) in problem.rows.iter().enumerate() {
-        match poses
-            .last_mut()
-            .filter(|pose| problem.data.same_pose(problem.rows[pose[0]], *row))
-        {
+        let same = |pose: &&mut Vec<usize>| problem.data.same_pose(problem.rows[pose[0]], *row);
+        match poses.last_mut().filter(same) {
             Some(pose) => pose.push(i),
             None => poses.push(vec![i]),
         }
     }
+    poses.retain(|pose| pose.len() > 1);
     let (mut within, mut freedom) = (0.0, 0.0);
-    for pose in poses.iter().filter(|pose| pose.len() > 1) {
+    for pose in &poses {
         for k in 0..width {
-            let values: Vec<f64> = pose
-                .iter()
-                .map(|i| residual[problem.readings_of(*i).start + k])
-                .collect();
+            let value = |i: &usize| residual[problem.readings_of(*i).start + k];
+            let values: Vec<f64> = pose.iter().map(value).collect();
             let mean = values.iter().sum::<f64>() / values.len() as f64;
-            within += values
-                .iter()
-                .map(|value| (value - mean).powi(2))
-                .sum::<f64>();
+            let squares = values.iter().map(|value| (value - mean).powi(2));
+            within += squares.sum::<f64>();
             freedom += values.len() as f64 - 1.0;
         }
     }
@@ -175,7 +159,7 @@ fn share_among_repeats(view: &RoundView, weights: &mut [f64]) {
     let whole =
         residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64;
     let between = (whole - within).max(0.0);
-    for pose in poses.iter().filter(|pose| pose.len() > 1) {
+    for pose in &poses {
         let count = pose.len() as f64;
         let share = ((between + within) / (count * between + within).max(f64::MIN_POSITIVE))
             .sqrt()

@@ -62,10 +62,9 @@ pub(super) struct CellScan {
 impl CellScan {
     /// The cell of the largest odds among those asked closely.
     pub(crate) fn best(&self) -> Option<usize> {
-        self.closely
-            .keys()
-            .copied()
-            .max_by(|a, b| self.log_odds[*a].total_cmp(&self.log_odds[*b]))
+        let odds = |cell: &usize| self.log_odds[*cell];
+        let cells = self.closely.keys().copied();
+        cells.max_by(|a, b| odds(a).total_cmp(&odds(b)))
     }
 
     /// With the cells that another scan of the same state asked closely.
@@ -198,28 +197,21 @@ impl CauseTable<'_, '_> {
             if bounds[some[0]] < (best - *FAR_BELOW).max(*UNLIKELY) {
                 break;
             }
-            let found: Vec<(usize, f64)> =
-                some.par_iter().map(|k| (cells[*k], coarse(*k))).collect();
-            found
-                .into_iter()
-                .for_each(|(cell, log)| log_odds[cell] = log);
+            let found = some.par_iter().map(|k| (cells[*k], coarse(*k)));
+            for (cell, log) in found.collect::<Vec<_>>() {
+                log_odds[cell] = log;
+            }
         }
-        let mut order: Vec<usize> = (0..self.cells.len())
-            .filter(|cell| log_odds[*cell].is_finite())
-            .collect();
+        let mut order: Vec<usize> = (0..self.cells.len()).collect();
+        order.retain(|cell| log_odds[*cell].is_finite());
         order.sort_by(|a, b| log_odds[*b].total_cmp(&log_odds[*a]).then(a.cmp(b)));
         order.truncate(most);
-        let also: BTreeSet<usize> = also
-            .iter()
-            .chain(&self.declared)
-            .copied()
-            .filter(|cell| !order.contains(cell))
-            .collect();
+        let also = also.iter().chain(&self.declared).copied();
+        let also: BTreeSet<usize> = also.filter(|cell| !order.contains(cell)).collect();
         order.extend(also);
-        let closely: BTreeMap<usize, CellEvidence> = order
-            .into_par_iter()
-            .filter_map(|cell| Some((cell, self.closely(cell, state)?)))
-            .collect();
+        let closely = |cell: usize| Some((cell, self.closely(cell, state)?));
+        let closely: BTreeMap<usize, CellEvidence> =
+            order.into_par_iter().filter_map(closely).collect();
         for (cell, found) in &closely {
             log_odds[*cell] = prior(*cell) + found.log;
         }

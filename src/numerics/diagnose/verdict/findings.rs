@@ -54,10 +54,8 @@ pub(super) fn findings(
 fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Vec<usize>)> {
     let sized = |found: &FoundCell| (size(last, &found.members), found.clone(), Vec::new());
     let mut all: Vec<(f64, FoundCell, Vec<usize>)> = last.answer.found.iter().map(sized).collect();
-    let strongest = all
-        .iter()
-        .map(|(_, found, _)| found.log)
-        .fold(0.0, f64::max);
+    let logs = last.answer.found.iter().map(|found| found.log);
+    let strongest = logs.fold(0.0, f64::max);
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut out: Vec<(f64, FoundCell, Vec<usize>)> = Vec::new();
     for (rms, found, details) in all {
@@ -76,9 +74,9 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
             .iter()
             .position(|(_, main, _)| main.place == found.place && unclear(main));
         let first = (found.effect == names::UNKNOWN).then(|| {
-            let here = out
-                .iter()
-                .position(|(most, main, _)| main.place == found.place && rms < *DETAIL * most);
+            let mut mains = out.iter();
+            let here =
+                mains.position(|(most, main, _)| main.place == found.place && rms < *DETAIL * most);
             let trace = |(most, ..): &&(f64, FoundCell, Vec<usize>)| {
                 rms < *TRACE * most || found.log < *FAINT * strongest
             };
@@ -89,9 +87,8 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
             None => out.push((rms, found, details)),
         }
     }
-    out.into_iter()
-        .map(|(_, found, details)| (found, details))
-        .collect()
+    let all = out.into_iter();
+    all.map(|(_, found, details)| (found, details)).collect()
 }
 
 /// A finding with its numbers in the whole model.
@@ -203,42 +200,36 @@ fn impossible(last: &LastRound, found: &FoundCell) -> Option<String> {
         ));
     }
     let state = &last.state;
-    found
-        .members
-        .iter()
-        .zip(&found.bounds)
-        .find_map(|(i, (positive, largest))| {
-            let form = &state.causes[*i].form;
-            let range = state.ranges[*i].clone();
-            let error = |column: usize| match state.fitted.statuses[range.start + column] {
-                ParameterStatus::Free(sigma) => *FIRM * sigma,
-                _ => 0.0,
-            };
-            let values = &state.model.x[range.clone()];
-            // The finer shape of a finding is not what it is called by.
-            if form.cause().is_nameless() {
-                return None;
+    let mut members = found.members.iter().zip(&found.bounds);
+    members.find_map(|(i, (positive, largest))| {
+        let form = &state.causes[*i].form;
+        // The finer shape of a finding is not what it is called by.
+        if form.cause().is_nameless() {
+            return None;
+        }
+        let range = state.ranges[*i].clone();
+        let sigma = |k: usize| match state.fitted.statuses[k] {
+            ParameterStatus::Free(sigma) => Some(*FIRM * sigma),
+            _ => None,
+        };
+        let error = |column: usize| sigma(range.start + column).unwrap_or(0.0);
+        let values = &state.model.x[range.clone()];
+        let beyond = form.impossible(values, &error, last.survey);
+        if beyond.is_some() {
+            return beyond;
+        }
+        let wrong_sign = || Some("has the wrong sign".into());
+        if form.is_against_load(values, &error) {
+            return wrong_sign();
+        }
+        range.clone().find_map(|k| {
+            let (value, error) = (state.model.x[k], sigma(k)?);
+            if *positive && value < -error {
+                return wrong_sign();
             }
-            let beyond = form.impossible(values, &error, last.survey);
-            if beyond.is_some() {
-                return beyond;
-            }
-            if form.is_against_load(values, &error) {
-                return Some("has the wrong sign".into());
-            }
-            range.clone().find_map(|k| {
-                let ParameterStatus::Free(sigma) = state.fitted.statuses[k] else {
-                    return None;
-                };
-                let value = state.model.x[k];
-                if *positive && value < -*FIRM * sigma {
-                    Some("has the wrong sign".into())
-                } else {
-                    (value.abs() - *FIRM * sigma > *largest)
-                        .then(|| "is more than is possible".into())
-                }
-            })
+            (value.abs() - error > *largest).then(|| "is more than is possible".into())
         })
+    })
 }
 
 /// The fitted parameters of some causes, as people read them: without the name of the finding, and of a cause that is not to be named.
@@ -310,13 +301,11 @@ pub(super) fn share_with_identities(
     rivals: &mut Vec<RivalCause>,
 ) -> f64 {
     let mut left = name;
-    let moved = forms
-        .iter()
-        .filter_map(|form| moved_with_the_payload(form, survey))
-        .map(|same| (same, 0.5));
-    let mut same: Vec<_> = forms
-        .iter()
-        .flat_map(|form| form.identities(called))
+    let moved = forms.iter();
+    let moved = moved.filter_map(|form| moved_with_the_payload(form, survey));
+    let moved = moved.map(|same| (same, 0.5));
+    let same = forms.iter().flat_map(|form| form.identities(called));
+    let mut same: Vec<_> = same
         .filter(|(_, place)| is_a_place(*place, survey))
         .collect();
     same.dedup();

@@ -82,22 +82,18 @@ impl<'a> WhitenedProblem<'a> {
         };
         let scratch = || model.stack.scratch(&model.robot);
         let looked: Vec<_> = rows.par_iter().map_init(scratch, look).collect();
-        let (mut motions, mut residual) = (
-            Vec::with_capacity(rows.len()),
-            Vec::with_capacity(3 * rows.len()),
-        );
+        let mut motions = Vec::with_capacity(rows.len());
+        let mut residual = Vec::with_capacity(3 * rows.len());
         let mut readings = ReadingLines::default();
         for (motion, seen) in looked {
             motions.push(motion);
-            residual.extend(
-                seen.iter()
-                    .flat_map(|(reading, error)| reading.lines.iter().map(|line| error[*line])),
-            );
+            let errors = seen.iter();
+            let errors = errors.flat_map(|(one, error)| one.lines.iter().map(|line| error[*line]));
+            residual.extend(errors);
             readings.push(seen.into_iter().map(|(reading, _)| reading).collect());
         }
-        let current_weight = (residual.iter().map(|value| value * value).sum::<f64>()
-            / residual.len().max(1) as f64)
-            .sqrt();
+        let square: f64 = residual.iter().map(|value| value * value).sum();
+        let current_weight = (square / residual.len().max(1) as f64).sqrt();
         Self {
             robot: &model.robot,
             data,
@@ -116,21 +112,17 @@ impl<'a> WhitenedProblem<'a> {
     /// With the motor currents, which say something where a joint yields to torques.
     pub(crate) fn with_currents(mut self) -> Self {
         self.currents = Currents::new(self.robot, self.data, &self.rows, &self.motions);
-        self.residual.extend(
-            self.currents
-                .iter()
-                .flat_map(Currents::whitened)
-                .map(|value| value * self.current_weight),
-        );
+        let whitened = self.currents.iter().flat_map(Currents::whitened);
+        let weighed = whitened.map(|value| value * self.current_weight);
+        self.residual.extend(weighed);
         self
     }
 
     /// With autocorrelated noise: all columns become innovations. Of rows that measured different numbers noise stays white.
     pub(crate) fn with_autocorrelation(mut self, noise: AutocorrelatedNoise) -> Self {
-        let (filter, measured) = (
-            self.width().map(|width| noise.filter(&self.rows, width)),
-            self.measured(),
-        );
+        let width = self.width();
+        let filter = width.map(|width| noise.filter(&self.rows, width));
+        let measured = self.measured();
         if let Some(innovations) = filter {
             innovations.apply(&mut self.residual[..measured]);
             self.innovations = Some(innovations);
@@ -157,10 +149,9 @@ impl<'a> WhitenedProblem<'a> {
 
     /// Numbers that each row measured, where all measured as many.
     pub(crate) fn width(&self) -> Option<usize> {
-        let of_row = |i: usize| self.readings.of_row(i).len();
-        let width = of_row(0);
-        (!self.rows.is_empty() && width > 0 && (0..self.rows.len()).all(|i| of_row(i) == width))
-            .then_some(width)
+        let mut widths = (0..self.rows.len()).map(|i| self.readings.of_row(i).len());
+        let width = widths.next().filter(|width| *width > 0)?;
+        widths.all(|other| other == width).then_some(width)
     }
 
     /// Residuals of what was measured, row by row.
@@ -221,15 +212,13 @@ impl<'a> WhitenedProblem<'a> {
 
     /// The largest motion of the point by each joint, m/rad.
     pub(crate) fn reach(&self) -> Vec<f64> {
-        let joints = 0..self.robot.joints();
-        joints
-            .map(|j| {
-                self.motions
-                    .iter()
-                    .map(|motion| motion.by_joint[j].norm())
-                    .fold(0.0, f64::max)
-            })
-            .collect()
+        let reach = |joint: usize| {
+            let motions = self.motions.iter();
+            motions
+                .map(|motion| motion.by_joint[joint].norm())
+                .fold(0.0, f64::max)
+        };
+        (0..self.robot.joints()).map(reach).collect()
     }
 
     /// Columns of a form, one after another.
@@ -313,21 +302,18 @@ impl<'a> WhitenedProblem<'a> {
         let nuisances = self.currents.as_ref().map_or(0, Currents::nuisances);
         let mut out = Mat::zeros(self.residual_rows(), free.len() + nuisances);
         let mut scratch = model.stack.scratch(&model.robot);
+        let (stack, robot) = (&model.stack, &model.robot);
         for (i, row) in self.rows.iter().enumerate() {
-            let mut placed =
-                model
-                    .stack
-                    .place(&model.robot, self.data, *row, &model.x, &mut scratch);
+            let mut placed = stack.place(robot, self.data, *row, &model.x, &mut scratch);
             for (first, reading) in self.readings.seen(i) {
-                reading
-                    .sensitivity
-                    .derivatives(&mut placed, |parameter, derivative| {
-                        if let Some(j) = column[parameter] {
-                            for (k, line) in reading.lines.iter().enumerate() {
-                                out[(first + k, j)] += derivative[*line];
-                            }
+                let sensitivity = &reading.sensitivity;
+                sensitivity.derivatives(&mut placed, |parameter, derivative| {
+                    if let Some(j) = column[parameter] {
+                        for (k, line) in reading.lines.iter().enumerate() {
+                            out[(first + k, j)] += derivative[*line];
                         }
-                    });
+                    }
+                });
             }
         }
         for j in 0..free.len() {
@@ -361,15 +347,11 @@ impl<'a> WhitenedProblem<'a> {
         };
         let rows = self.residual_rows();
         let all: Vec<f64> = forms.iter().flat_map(|form| self.columns(form)).collect();
-        let columns: Vec<Vec<f64>> = all
-            .chunks(rows)
-            .map(|c| {
-                c[self.measured()..]
-                    .iter()
-                    .map(|value| value / self.current_weight)
-                    .collect()
-            })
-            .collect();
+        let of_currents = |column: &[f64]| {
+            let values = column[self.measured()..].iter();
+            values.map(|value| value / self.current_weight).collect()
+        };
+        let columns: Vec<Vec<f64>> = all.chunks(rows).map(of_currents).collect();
         // The residual is that of the present model; what is asked is the whole parameter, hence at zero where it is new.
         currents
             .priors(&columns, &self.present(forms))
@@ -487,11 +469,8 @@ impl WhitenedProblem<'_> {
         let unit = self.unit_travel(joint);
         let mut out = Vec::with_capacity(values.len() / self.rows.len().max(1) * unit.len());
         for values in values.chunks(self.rows.len().max(1)) {
-            out.extend(
-                unit.iter()
-                    .enumerate()
-                    .map(|(residual_row, unit)| unit * values[self.row_of(residual_row)]),
-            );
+            let lines = unit.iter().enumerate();
+            out.extend(lines.map(|(line, unit)| unit * values[self.row_of(line)]));
         }
         out
     }
@@ -499,9 +478,8 @@ impl WhitenedProblem<'_> {
     /// Sums, row by row, of the products of a column with that of a unit travel of a joint.
     pub(crate) fn along_travel(&self, joint: usize, column: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; self.rows.len()];
-        for (residual_row, (value, unit)) in column.iter().zip(self.unit_travel(joint)).enumerate()
-        {
-            out[self.row_of(residual_row)] += value * unit;
+        for (line, (value, unit)) in column.iter().zip(self.unit_travel(joint)).enumerate() {
+            out[self.row_of(line)] += value * unit;
         }
         out
     }
