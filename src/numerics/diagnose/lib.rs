@@ -19,6 +19,7 @@ use crate as diagnose;
 
 mod closed_form;
 mod judge;
+mod linear;
 mod misfit;
 mod outside;
 mod regression;
@@ -65,7 +66,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         return first.conclude();
     }
     // More rows than mistakes are: a cause that the model lacks may be what moves them, and it is looked for in all rows.
-    tell(words::of_all_rows(first.set_aside()));
+    tell(words::all_rows_text(first.set_aside()));
     let explains = |second: &Attempt| {
         let aside = second.set_aside();
         2 * aside <= first.set_aside()
@@ -103,12 +104,12 @@ impl<'a> Attempt<'a> {
         let before = now
             .model
             .error_sizes(&fitter.data, fitter.scale.dimension());
-        tell(words::of_the_base(&now, &fitter));
+        tell(words::base_text(&now, &fitter));
         let mut rounds = Rounds::default();
         loop {
             let view = RoundView::of(&now, &fitter);
             let round = rounds.search(&view);
-            tell(words::of_a_round(
+            tell(words::round_text(
                 rounds.count(),
                 round.cells,
                 round.causes.iter().map(|cause| &cause.form),
@@ -132,7 +133,7 @@ impl<'a> Attempt<'a> {
                 .flatten()
             {
                 let kept = fitter.take_correlation(&change, &next);
-                tell(words::of_the_correlation(&fitter));
+                tell(words::correlation_text(&fitter));
                 now = fitter.refit(&next.model, kept);
                 rounds.again();
                 continue;
@@ -155,7 +156,7 @@ impl<'a> Attempt<'a> {
                 fitter.follow(&now);
                 continue;
             }
-            tell(words::of_the_conclusions(&next));
+            tell(words::conclusions_text(&next));
             return Ok(Self {
                 fitter,
                 before,

@@ -70,7 +70,7 @@ pub fn discrimination_problem(
     let both = with(model, &rival);
     let is_rival = |(other, _): &(&dyn Effect, _)| other.form() == Some(&rival);
     let held = both.stack.effects().find(is_rival);
-    let of_rival = held.map_or_else(Vec::new, |(_, range)| range.collect());
+    let rival_numbers = held.map_or_else(Vec::new, |(_, range)| range.collect());
     let sizes = forms.iter().map(|k| model.x[*k]).collect();
     let sides = [
         Alternative {
@@ -78,7 +78,7 @@ pub fn discrimination_problem(
             sizes,
         },
         Alternative {
-            parameters: of_rival,
+            parameters: rival_numbers,
             sizes: reference.solve(&rival).coefficients,
         },
     ];

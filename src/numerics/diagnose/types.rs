@@ -46,7 +46,7 @@ pub struct KnownCell {
 }
 
 /// One joint repeatability (rad) and what it rests on.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct JointRepeatability {
     /// rad; 0 where none shows.
     pub sigma: f64,

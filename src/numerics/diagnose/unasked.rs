@@ -62,10 +62,7 @@ pub(super) fn unasked(
         gate_first: None,
         formulas: Vec::new(),
         gate_last: None,
-        repeatability: JointRepeatability {
-            sigma: 0.0,
-            repeats: 0,
-        },
+        repeatability: JointRepeatability::default(),
         located_before: Located::default(),
         located_after: Located::default(),
         kept: screening.kept.clone(),

@@ -71,8 +71,8 @@ pub(super) fn declarations(
     variables: &[NamedVariable],
 ) -> Vec<EffectDeclaration> {
     let sketches = match variables {
-        [one] => of_one(one),
-        [first, second] => of_two(first, second),
+        [one] => one_variable(one),
+        [first, second] => two_variables(first, second),
         _ => Vec::new(),
     };
     let subject: Vec<String> = variables
@@ -160,7 +160,7 @@ fn order(variable: &NamedVariable) -> ShapeNumber {
     ("order", ShapeRange { from, to, start })
 }
 
-fn of_one(variable: &NamedVariable) -> Vec<Sketch> {
+fn one_variable(variable: &NamedVariable) -> Vec<Sketch> {
     let (v, [low, high]) = (&variable.name, variable.range);
     let mut out = Vec::new();
     let mut add = |label, laws: &[String], shape: &[fn(&NamedVariable) -> ShapeNumber]| {
@@ -211,7 +211,7 @@ fn factors(variable: &NamedVariable) -> Vec<(&'static str, Vec<String>)> {
     out
 }
 
-fn of_two(first: &NamedVariable, second: &NamedVariable) -> Vec<Sketch> {
+fn two_variables(first: &NamedVariable, second: &NamedVariable) -> Vec<Sketch> {
     let products = |a: &[String], b: &[String]| -> Vec<String> {
         a.iter()
             .flat_map(|a| b.iter().map(move |b| format!("{a} * {b}")))

@@ -38,7 +38,7 @@ struct Candidate {
 
 impl FormulaSearch<'_, '_> {
     /// Formulas for findings, those of each cheapest first; none where it has a name, or is no function of one or two variables.
-    pub(crate) fn of_all(&self, findings: &[Finding]) -> Vec<ClosedForm> {
+    pub(crate) fn formulas(&self, findings: &[Finding]) -> Vec<ClosedForm> {
         findings
             .iter()
             .enumerate()

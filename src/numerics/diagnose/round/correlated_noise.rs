@@ -11,7 +11,7 @@ use crate::criteria::cells::COMMON;
 use crate::criteria::noise::{AS_GOOD, PLAIN};
 use crate::diagnose::table::{Answer, FoundCell};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
-use crate::regression::{orthonormal, project};
+use crate::linear::{orthonormal, project};
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::prelude::*;
@@ -66,8 +66,8 @@ pub(crate) fn correlation_left_by(
             return (other != fitter.correlated).then(|| change(other));
         }
         let noise_instead = 1.0 / (1.0 + (unlikelier / 2.0).exp());
-        let of_time = |found: &&mut FoundCell| found.members.iter().any(|i| slow[*i]);
-        for found in answer.found.iter_mut().filter(of_time) {
+        let follows_time = |found: &&mut FoundCell| found.members.iter().any(|i| slow[*i]);
+        for found in answer.found.iter_mut().filter(follows_time) {
             found.or_nothing(noise_instead);
         }
     }
@@ -104,7 +104,7 @@ impl<'a> Regression<'a> {
         kept: &[bool],
     ) -> Self {
         let rows = problem.residual_rows();
-        let mut points = problem.of_readings().to_vec();
+        let mut points = problem.measured_residual().to_vec();
         let mut random = Vec::new();
         for (cause, kept) in settled.causes.iter().zip(kept) {
             let columns = problem.columns(&cause.form);

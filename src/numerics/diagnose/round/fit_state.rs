@@ -109,10 +109,7 @@ impl<'a> Fitter<'a> {
             scale: ErrorScale::of(question.data, question.fit),
             free: Vec::new(),
             faint: Vec::new(),
-            repeatability: JointRepeatability {
-                sigma: 0.0,
-                repeats: 0,
-            },
+            repeatability: JointRepeatability::default(),
             spread: JointSpread::default(),
             repeated: 0.0,
             scaled: false,
@@ -127,26 +124,17 @@ impl<'a> Fitter<'a> {
         fitter.spread = JointSpread::of(&now.model, &fitter.data);
         let kept = &now.screening.kept;
         let lasts = lasts(&now.model, &fitter.data, kept);
-        let shown = RepeatPairs::of(&fitter.data, kept).noise(
-            &now.model,
-            &fitter.data,
-            &fitter.spread,
-            lasts,
-        );
+        let pairs = RepeatPairs::of(&fitter.data, kept);
+        let shown = pairs.noise(&now.model, &fitter.data, &fitter.spread, lasts);
         fitter.repeatability = shown.joints;
         fitter.scaled = shown.scale != 1.0;
         if fitter.scaled {
-            fitter
-                .data
-                .points
-                .sigma
-                .iter_mut()
-                .for_each(|sigma| *sigma *= shown.scale);
+            let sigmas = fitter.data.points.sigma.iter_mut();
+            sigmas.for_each(|sigma| *sigma *= shown.scale);
             let returns = RepeatPairs::returns(&fitter.data, kept);
             let by_returns = returns.map_or(0.0, |pairs| {
-                pairs
-                    .repeatability(&now.model, &fitter.data, &fitter.spread)
-                    .sigma
+                let spread = &fitter.spread;
+                pairs.repeatability(&now.model, &fitter.data, spread).sigma
             });
             fitter.repeatability.sigma = fitter.repeatability.sigma.max(by_returns);
         }

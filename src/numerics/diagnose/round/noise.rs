@@ -35,7 +35,7 @@ impl JointSpread {
             let squares = motions.iter().map(|motion| motion * motion.transpose());
             squares.sum()
         };
-        let of_kind = |kind: &'static dyn MeasurementKind| {
+        let spread_of = |kind: &'static dyn MeasurementKind| {
             let name = kind.about().name;
             let by_row = |row: usize| {
                 let reading = kind.reading(data, row);
@@ -53,7 +53,7 @@ impl JointSpread {
             others: kinds(data)
                 .into_iter()
                 .filter(is_other)
-                .map(of_kind)
+                .map(spread_of)
                 .collect(),
         }
     }
@@ -186,7 +186,7 @@ impl RepeatPairs {
     ) -> RepeatedNoise {
         let joints = self.repeatability(model, data, spread);
         let stated = RepeatedNoise { scale: 1.0, joints };
-        let samples = self.of_points(model, data, spread);
+        let samples = self.point_samples(model, data, spread);
         let Some(shown) =
             scale_of(&samples).filter(|_| !self.are_returns && samples.len() >= *REPEATS)
         else {
@@ -228,7 +228,12 @@ impl RepeatPairs {
     }
 
     /// What points differ by beyond the motion that `model` knows between them.
-    fn of_points(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> Vec<Sample> {
+    fn point_samples(
+        &self,
+        model: &Model,
+        data: &Measurements,
+        spread: &JointSpread,
+    ) -> Vec<Sample> {
         let predicted = model.predict(data);
         let one = |[a, b]: &[usize; 2]| {
             let variance =
@@ -264,7 +269,7 @@ impl RepeatPairs {
 
     /// What everything that the pairs measured differs by.
     fn samples(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> Vec<Sample> {
-        let mut samples = self.of_points(model, data, spread);
+        let mut samples = self.point_samples(model, data, spread);
         let same_anchor = |[a, b]: &&[usize; 2]| data.anchor(*a) == data.anchor(*b);
         for [a, b] in self.pairs.iter().filter(same_anchor) {
             let [from, to] = [a, b].map(|row| spread.beside_points(model, data, &[*row]));

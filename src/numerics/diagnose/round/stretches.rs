@@ -29,7 +29,7 @@ pub(super) fn bounded_autocorrelation_time(problem: &WhitenedProblem) -> f64 {
     let rows = &problem.rows;
     let moving = problem.width().filter(|_| problem.data.in_motion(rows));
     let time = moving.map_or(1.0, |width| {
-        autocorrelation_time(problem.of_readings(), width)
+        autocorrelation_time(problem.measured_residual(), width)
     });
     if time < *ALONE {
         1.0
@@ -57,7 +57,7 @@ pub(super) fn lasts(model: &Model, data: &Measurements, rows: &[usize]) -> bool 
     let problem = WhitenedProblem::new(model, data, rows);
     problem
         .width()
-        .is_some_and(|width| autocorrelation_time(problem.of_readings(), width) > *ALONE)
+        .is_some_and(|width| autocorrelation_time(problem.measured_residual(), width) > *ALONE)
 }
 
 /// How far correlation on a path has been looked into.

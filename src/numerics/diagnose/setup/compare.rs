@@ -154,7 +154,7 @@ impl<'a> AsStated<'a> {
         let sample: Vec<usize> = self.judges.iter().map(|k| self.rows[*k]).collect();
         let found = TwoSetups::of(&pairs(&sample), &self.placed)?;
         let is_right = found.left < *CLOUD * self.cloud && found.left < *NOMINAL * self.reach;
-        is_right.then(|| found.of_all(&pairs(&self.rows), &self.rows))
+        is_right.then(|| found.with_all_rows(&pairs(&self.rows), &self.rows))
     }
 
     /// What explains it: one set-up error as a right set-up does, else the whole counting of joints, else one as far as it goes, else a
@@ -185,17 +185,17 @@ impl<'a> AsStated<'a> {
             return found;
         }
         // A unit of the points scales them and hides no counting; one of the joints is mended before theirs is looked for.
-        let of_points = (0..LENGTHS.len()).map(|unit| vec![WrongSetup::PointUnit(unit)]);
-        let with_units = of_points.flat_map(|unit| {
+        let point_units = (0..LENGTHS.len()).map(|unit| vec![WrongSetup::PointUnit(unit)]);
+        let with_units = point_units.flat_map(|unit| {
             counted
                 .iter()
                 .map(move |one| [&unit[..], &one[..]].concat())
         });
-        let of_joints = [WrongSetup::InRadians, WrongSetup::InDegrees]
+        let joint_units = [WrongSetup::InRadians, WrongSetup::InDegrees]
             .into_iter()
             .filter(|unit| self.turns_as_joints_do(*unit));
-        let of_joints = of_joints.flat_map(|unit| countings(&[unit]));
-        let found = chosen(&try_each(with_units.chain(of_joints).collect()));
+        let joint_units = joint_units.flat_map(|unit| countings(&[unit]));
+        let found = chosen(&try_each(with_units.chain(joint_units).collect()));
         if found.is_some() {
             return found;
         }
@@ -220,10 +220,10 @@ fn chosen(tries: &[Try]) -> Option<ExplainedSetup> {
     let explaining: Vec<&Try> = tries.iter().filter(|tried| tried.explains).collect();
     let shares = explaining.iter().map(|tried| tried.share);
     let least = shares.fold(f64::INFINITY, f64::min);
-    let mut of_least = explaining
+    let mut least_ones = explaining
         .iter()
         .filter(|tried| tried.share <= *SAME * least);
-    let best = of_least.next()?;
+    let best = least_ones.next()?;
     // Countings that leave the same are the same by kinematics.
     let is_same = |tried: &Try| {
         matches!(tried.wrong[..], [WrongSetup::Counting(_)]) && tried.share <= *SAME * least

@@ -7,7 +7,7 @@
 
 use crate::criteria::setup::{CLOUD, COUNTINGS, SAME, SCREENED, TRIM};
 use crate::robot::RobotModel;
-use crate::setup::placement::{PointPairs, bodies, median};
+use crate::setup::placement::{PointPairs, bodies, median, turning};
 use crate::spatial::Pose;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -108,18 +108,16 @@ impl Counting {
 
     /// How much is otherwise: of two countings that are the same by kinematics the smaller one is meant.
     fn effort(&self) -> i32 {
-        let of_joint = |joint: &CountedJoint| {
+        let changes = |joint: &CountedJoint| {
             2 * i32::from(joint.reversed) + 3 * joint.quarters.abs() + 5 * joint.coupled.abs()
         };
-        self.0.iter().map(of_joint).sum()
+        self.0.iter().map(changes).sum()
     }
 
     /// Those that leave least of these points, from the one that changes least on, each in its simplest form.
     pub(crate) fn likely(pairs: &PointPairs) -> Vec<Self> {
         let robot = pairs.robot;
-        let turning: &Vec<usize> = &(0..robot.joints())
-            .filter(|joint| robot.is_revolute(*joint))
-            .collect();
+        let turning = &turning(robot);
         if robot.joints() > LIMIT {
             return Vec::new();
         }

@@ -33,7 +33,7 @@ impl TwoSetups {
     }
 
     /// All rows of a recording, of which `numbers` are those of the pairs, by the placement that has them nearest.
-    pub(crate) fn of_all(self, all: &PointPairs, numbers: &[usize]) -> Self {
+    pub(crate) fn with_all_rows(self, all: &PointPairs, numbers: &[usize]) -> Self {
         let numbered = |part: Vec<usize>| part.into_iter().map(|k| numbers[k]).collect();
         let rows = nearest(all, &self.placed).map(numbered);
         Self { rows, ..self }

@@ -35,6 +35,17 @@ pub(super) struct Placement {
 }
 
 impl Placement {
+    /// One that is not judged yet.
+    fn at(base: Pose, seats: Vec<Vector3<f64>>, values: Vec<f64>) -> Self {
+        Self {
+            base,
+            seats,
+            values,
+            off: Vec::new(),
+            left: 0.0,
+        }
+    }
+
     /// By how much it misses points, in the tracker's frame and in that of the last body.
     pub(crate) fn missed(&self, pairs: &PointPairs) -> [Vec<Vector3<f64>>; 2] {
         let missed = |row: usize| {
@@ -78,13 +89,7 @@ pub(super) fn place(pairs: &PointPairs, number: Option<FreeNumber>) -> Placement
         bodies,
         number,
     };
-    let mut now = problem.judged(Placement {
-        base,
-        seats,
-        values,
-        off: Vec::new(),
-        left: 0.0,
-    });
+    let mut now = problem.judged(Placement::at(base, seats, values));
     let mut best = now.clone();
     for _ in 0..STEPS {
         let Some(next) = problem.step(&now).map(|next| problem.judged(next)) else {
@@ -182,16 +187,10 @@ impl PlacementProblem<'_, '_> {
             centre + turn * (now.base.translation - centre) + three(3),
         );
         let seats = now.seats.iter().enumerate();
+        let seats = seats.map(|(k, seat)| seat + three(6 + 3 * k)).collect();
         let values = now.values.iter().enumerate();
-        Some(Placement {
-            base,
-            seats: seats.map(|(k, seat)| seat + three(6 + 3 * k)).collect(),
-            values: values
-                .map(|(k, value)| value + by[6 + targets + k])
-                .collect(),
-            off: Vec::new(),
-            left: 0.0,
-        })
+        let values = values.map(|(k, value)| value + by[6 + targets + k]);
+        Some(Placement::at(base, seats, values.collect()))
     }
 }
 
@@ -302,9 +301,9 @@ impl<'a> PointPairs<'a> {
         let tool = |bodies: &Vec<Pose>| bodies[robot.joints()].point(&robot.home().translation);
         let middle = all.iter().map(tool).sum::<Vector3<f64>>() / all.len().max(1) as f64;
         let distance = |bodies: &Vec<Pose>| {
-            let of_axis =
+            let from_axis =
                 first.map(|joint| (tool(bodies) - bodies[joint].point(robot.point(joint))).norm());
-            of_axis.unwrap_or(0.0).max((tool(bodies) - middle).norm())
+            from_axis.unwrap_or(0.0).max((tool(bodies) - middle).norm())
         };
         all.iter().map(distance).fold(0.0, f64::max)
     }
@@ -317,6 +316,12 @@ pub(super) fn bodies(robot: &RobotModel, q: &[f64]) -> Vec<Pose> {
         out.push(out[joint] * robot.motion(joint, &Travel::new(*travel)));
     }
     out
+}
+
+/// The joints that turn.
+pub(super) fn turning(robot: &RobotModel) -> Vec<usize> {
+    let joints = 0..robot.joints();
+    joints.filter(|joint| robot.is_revolute(*joint)).collect()
 }
 
 /// The middle of lengths; infinite of none, and where any is not a number.
@@ -348,17 +353,14 @@ pub(super) struct SeenNumber {
 impl FreeNumber {
     /// All that a robot has.
     pub(crate) fn all(robot: &RobotModel) -> Vec<Self> {
-        let turning = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint));
-        let lengths = (0..robot.joints().saturating_sub(1)).map(Self::Length);
+        let (turning, last) = (turning(robot), robot.joints().saturating_sub(1));
+        let axes = turning.iter().filter(|joint| **joint > 0);
         // The first zero is the base's, the last one the tool's.
-        let zeros = turning
-            .clone()
-            .filter(|joint| (1..robot.joints().saturating_sub(1)).contains(joint))
-            .map(Self::Zero);
-        lengths
-            .chain(turning.filter(|joint| *joint > 0).map(Self::Axis))
-            .chain(zeros)
-            .collect()
+        let zeros = turning.iter().filter(|joint| (1..last).contains(*joint));
+        let mut out: Vec<Self> = (0..last).map(Self::Length).collect();
+        out.extend(axes.map(|joint| Self::Axis(*joint)));
+        out.extend(zeros.map(|joint| Self::Zero(*joint)));
+        out
     }
 
     pub(crate) fn width(self) -> usize {

@@ -43,14 +43,14 @@ pub(super) fn words(
 ) -> SetupWords {
     let joints = robot.joints();
     let (what, mend) = match wrong {
-        WrongSetup::PointUnit(unit) => return of_lengths(unit, reach),
+        WrongSetup::PointUnit(unit) => return length_words(unit, reach),
         WrongSetup::InRadians => {
             ("the joints are in rad and were read in deg".into(), "in `ingest`: `columns: {q: {.., unit: rad}}`".into())
         }
         WrongSetup::InDegrees => {
             ("the joints are in deg and were read in rad".into(), "in `ingest`: `columns: {q: {.., unit: deg}}`".into())
         }
-        WrongSetup::Signs(group) => of_signs(&group.joints().collect::<Vec<_>>(), joints),
+        WrongSetup::Signs(group) => sign_words(&group.joints().collect::<Vec<_>>(), joints),
         WrongSetup::Exchanged(a, b) => {
             let mut order: Vec<usize> = (0..joints).collect();
             order.swap(a, b);
@@ -63,7 +63,7 @@ pub(super) fn words(
                 ),
             )
         }
-        WrongSetup::Zero(joint, quarters) => return of_zeros(&[(joint, quarters)], joints),
+        WrongSetup::Zero(joint, quarters) => return zero_words(&[(joint, quarters)], joints),
         WrongSetup::Zeros { joint, quarters, next } => {
             let what = format!(
                 "the recording reads {} deg at the zero of joint {} and {} deg at that of joint {}",
@@ -72,20 +72,20 @@ pub(super) fn words(
                 90 * next,
                 joint + 2
             );
-            (what, of_zeros(&[(joint, quarters), (joint + 1, next)], joints).mend)
+            (what, zero_words(&[(joint, quarters), (joint + 1, next)], joints).mend)
         }
-        WrongSetup::Counting(counting) => return of_counting(counting.joints().iter().take(joints)),
+        WrongSetup::Counting(counting) => return counting_words(counting.joints().iter().take(joints)),
         WrongSetup::Coupled { moved, sign, .. } => {
             let mut counted = vec![CountedJoint::default(); joints];
             counted[moved].coupled = sign as i32;
-            return of_counting(counted.iter());
+            return counting_words(counted.iter());
         }
         WrongSetup::Mirrored => (
             "the points are a mirror image: an axis of the tracker's frame has the wrong sign, or two are exchanged".into(),
             "in `ingest`: exchange the columns of `x` and `y`; since the base is fitted, this corrects both cases".into(),
         ),
-        WrongSetup::Order(order) => return of_order(order),
-        WrongSetup::Number(number) => return of_number(number, values, joints),
+        WrongSetup::Order(order) => return order_words(order),
+        WrongSetup::Number(number) => return number_words(number, values, joints),
     };
     SetupWords::of(what, mend)
 }
@@ -102,53 +102,46 @@ pub(super) fn together(
     };
     let turned: Vec<usize> = wrong.iter().flat_map(signs).collect();
     let twice = |joint: &usize| turned.iter().filter(|other| *other == joint).count() > 1;
-    let reversed: Vec<usize> = (0..robot.joints())
-        .filter(|joint| turned.contains(joint) && !twice(joint))
-        .collect();
-    let others = wrong
-        .iter()
-        .filter(|wrong| signs(wrong).is_empty())
-        .map(|wrong| words(*wrong));
-    let (what, mend) = of_signs(&reversed, robot.joints());
-    others
-        .chain((!reversed.is_empty()).then(|| SetupWords::of(what, mend)))
-        .collect()
+    let mut reversed: Vec<usize> = (0..robot.joints()).collect();
+    reversed.retain(|joint| turned.contains(joint) && !twice(joint));
+    let others = wrong.iter().filter(|wrong| signs(wrong).is_empty());
+    let mut all: Vec<SetupWords> = others.map(|wrong| words(*wrong)).collect();
+    if !reversed.is_empty() {
+        let (what, mend) = sign_words(&reversed, robot.joints());
+        all.push(SetupWords::of(what, mend));
+    }
+    all
 }
 
 /// Joints, from 0, that turn the other way.
-fn of_signs(reversed: &[usize], joints: usize) -> (String, String) {
+fn sign_words(reversed: &[usize], joints: usize) -> (String, String) {
     let signs: Vec<&str> = (0..joints)
         .map(|joint| if reversed.contains(&joint) { "-1" } else { "1" })
         .collect();
-    let (verb, axes) = if reversed.len() == 1 {
-        ("turns", "axis")
-    } else {
-        ("turn", "axes")
+    let (noun, verb, axes) = match reversed.len() {
+        1 => ("joint", "turns", "axis"),
+        _ => ("joints", "turn", "axes"),
     };
+    let (joints, signs) = (numbered(reversed), signs.join(", "));
     (
+        format!("{noun} {joints} {verb} the other way than the robot file says"),
         format!(
-            "joint{} {} {verb} the other way than the robot file says",
-            if reversed.len() == 1 { "" } else { "s" },
-            numbered(reversed)
-        ),
-        format!(
-            "in `ingest`: `columns: {{q: {{.., sign: [{}]}}}}`, or turn the {axes} round in the robot file",
-            signs.join(", ")
+            "in `ingest`: `columns: {{q: {{.., sign: [{signs}]}}}}`, or turn the {axes} round in the robot file"
         ),
     )
 }
 
 /// Zeros of joints in quarters of a turn.
-fn of_zeros(zeros: &[(usize, i32)], joints: usize) -> SetupWords {
+fn zero_words(zeros: &[(usize, i32)], joints: usize) -> SetupWords {
     let mut counted = vec![CountedJoint::default(); joints];
     for (joint, quarters) in zeros {
         counted[*joint].quarters = *quarters;
     }
-    of_counting(counted.iter())
+    counting_words(counted.iter())
 }
 
 /// Signs, zeros and couplings of all joints.
-fn of_counting<'j>(joints: impl ExactSizeIterator<Item = &'j CountedJoint>) -> SetupWords {
+fn counting_words<'j>(joints: impl ExactSizeIterator<Item = &'j CountedJoint>) -> SetupWords {
     let count = joints.len();
     let all: Vec<(usize, &CountedJoint)> = (1..).zip(joints).collect();
     let list = |value: &dyn Fn(&CountedJoint) -> i32| {
@@ -159,7 +152,7 @@ fn of_counting<'j>(joints: impl ExactSizeIterator<Item = &'j CountedJoint>) -> S
     let reversed = all.iter().filter(|(_, counted)| counted.reversed);
     let reversed: Vec<usize> = reversed.map(|(joint, _)| joint - 1).collect();
     if !reversed.is_empty() {
-        what.push(of_signs(&reversed, count).0);
+        what.push(sign_words(&reversed, count).0);
         let signs = list(&|counted| if counted.reversed { -1 } else { 1 });
         mend.push(format!("sign: [{signs}]"));
     }
@@ -208,7 +201,7 @@ fn unit_name(unit: &str) -> &'static str {
     }
 }
 
-fn of_lengths(unit: usize, reach: f64) -> SetupWords {
+fn length_words(unit: usize, reach: f64) -> SetupWords {
     let (factor, read, is) = LENGTHS[unit];
     if (ARMS[0]..=ARMS[1]).contains(&reach) {
         let what = format!(
@@ -241,7 +234,7 @@ fn of_lengths(unit: usize, reach: f64) -> SetupWords {
     }
 }
 
-fn of_order(order: RowOrder) -> SetupWords {
+fn order_words(order: RowOrder) -> SetupWords {
     let (what, mend) = match order {
         RowOrder::Shifted(by) => {
             let how = if by < 0 { "ahead of" } else { "behind" };
@@ -269,7 +262,7 @@ fn of_order(order: RowOrder) -> SetupWords {
     SetupWords::of(what, mend.into())
 }
 
-fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
+fn number_words(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
     let (what, mend) = match number {
         FreeNumber::Length(joint) => (
             format!(
@@ -300,7 +293,7 @@ fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
             let quarters = (-degrees / 90.0).round() as i32;
             let remaining = -degrees - 90.0 * f64::from(quarters);
             if quarters != 0 && remaining.abs() < *QUARTERLY && joints <= LIMIT {
-                let SetupWords { what, mend, .. } = of_zeros(&[(joint, quarters)], joints);
+                let SetupWords { what, mend, .. } = zero_words(&[(joint, quarters)], joints);
                 let what = format!("{what}, and is also {} deg off", figure(remaining, 2));
                 return SetupWords::of(what, mend);
             }

@@ -10,7 +10,7 @@
 use crate::criteria::setup::{FARTHEST, LONG, SHIFTS, SORTED};
 use crate::robot::RobotModel;
 use crate::setup::counting::Counting;
-use crate::setup::placement::{FreeNumber, PointPairs, median};
+use crate::setup::placement::{FreeNumber, PointPairs, median, turning};
 use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -64,9 +64,7 @@ impl WrongSetup {
     /// All that this robot and these rows, in their order, may have.
     pub(crate) fn all(pairs: &PointPairs) -> Vec<Self> {
         let robot = pairs.robot;
-        let turning: Vec<usize> = (0..robot.joints())
-            .filter(|joint| robot.is_revolute(*joint))
-            .collect();
+        let turning = turning(robot);
         let mut out: Vec<Self> = (0..LENGTHS.len()).map(Self::PointUnit).collect();
         out.extend([Self::InRadians, Self::InDegrees]);
         out.extend(SignGroup::each(&turning).map(Self::Signs));
@@ -183,23 +181,21 @@ pub(super) struct SignGroup(u64);
 impl SignGroup {
     /// The groups of two joints or more that a robot may have: swivel and roll, pitch, the pitch of the main axes, all, and every two.
     pub(crate) fn all(robot: &RobotModel) -> Vec<Self> {
-        let turning: Vec<usize> = (0..robot.joints().min(64))
-            .filter(|joint| robot.is_revolute(*joint))
-            .collect();
-        let pitch = turning
-            .windows(2)
-            .find(|pair| robot.is_parallel(pair[0], pair[1]))
-            .map(|pair| pair[0]);
+        let mut turning = turning(robot);
+        turning.retain(|joint| *joint < 64);
+        let mut neighbours = turning.windows(2);
+        let pitch = neighbours.find(|pair| robot.is_parallel(pair[0], pair[1]));
+        let pitch = pitch.map(|pair| pair[0]);
         let chosen = |choose: &dyn Fn(usize) -> bool| {
             Self::of(turning.iter().copied().filter(|joint| choose(*joint)))
         };
-        let of_six = |joint| robot.joints() == 6 && [0, 3, 5].contains(&joint);
-        let mut out = vec![chosen(&of_six)];
+        let is_roll_of_six = |joint| robot.joints() == 6 && [0, 3, 5].contains(&joint);
+        let mut out = vec![chosen(&is_roll_of_six)];
         if let Some(pitch) = pitch {
             let is_pitch = |joint: usize| robot.is_parallel(pitch, joint);
-            let wrist = (pitch..robot.joints())
-                .find(|joint| !is_pitch(*joint))
-                .unwrap_or(robot.joints());
+            let mut after = pitch..robot.joints();
+            let wrist = after.find(|joint| !is_pitch(*joint));
+            let wrist = wrist.unwrap_or(robot.joints());
             out.extend([
                 chosen(&|joint| !is_pitch(joint)),
                 chosen(&is_pitch),
@@ -295,14 +291,12 @@ impl RowOrder {
 /// The shifts by which the steps from point to point are most like those of the nominal arm: a rigid motion does not change them.
 fn likely_shifts(pairs: &PointPairs) -> Vec<RowOrder> {
     let (robot, count) = (pairs.robot, pairs.rows());
-    let model: Vec<Vector3<f64>> = (0..count)
-        .map(|row| robot.forward(pairs.q(row)).translation)
-        .collect();
+    let forward = |row: usize| robot.forward(pairs.q(row)).translation;
+    let model: Vec<Vector3<f64>> = (0..count).map(forward).collect();
     let (model, measured) = (steps(&model), steps(&pairs.points));
     let likeness = |shift: usize| {
-        (0..count)
-            .map(|row| model[row] * measured[(row + shift) % count])
-            .sum::<f64>()
+        let products = (0..count).map(|row| model[row] * measured[(row + shift) % count]);
+        products.sum::<f64>()
     };
     let tried = (1..count).filter(|shift| *shift.min(&(count - shift)) <= *FARTHEST);
     let mut all: Vec<(f64, usize)> = tried.map(|shift| (likeness(shift), shift)).collect();
@@ -323,16 +317,12 @@ fn likely_shifts(pairs: &PointPairs) -> Vec<RowOrder> {
 /// Distances from each point to the next, the first being next to the last, less their mean.
 fn steps(points: &[Vector3<f64>]) -> Vec<f64> {
     let next = points.iter().cycle().skip(1);
-    let lengths: Vec<f64> = points
-        .iter()
-        .zip(next)
-        .map(|(a, b)| (b - a).norm())
-        .collect();
+    let lengths = points.iter().zip(next);
+    let mut lengths: Vec<f64> = lengths.map(|(a, b)| (b - a).norm()).collect();
     let limit = *LONG * median(&lengths);
-    let lengths: Vec<f64> = lengths
-        .into_iter()
-        .map(|length| length.min(limit))
-        .collect();
+    lengths
+        .iter_mut()
+        .for_each(|length| *length = length.min(limit));
     let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
     lengths.into_iter().map(|length| length - mean).collect()
 }

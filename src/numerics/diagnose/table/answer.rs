@@ -228,12 +228,12 @@ impl CauseTable<'_, '_> {
         };
         let mut rivals: Vec<RivalCause> = rivals.map(rival).collect();
         rivals.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-        let of_rivals: f64 = rivals.iter().map(|rival| rival.probability).sum();
+        let rival_sum: f64 = rivals.iter().map(|rival| rival.probability).sum();
         (
             Probabilities {
                 name,
                 place: at_place,
-                none: (1.0 - name - of_rivals).max(0.0),
+                none: (1.0 - name - rival_sum).max(0.0),
             },
             rivals,
         )

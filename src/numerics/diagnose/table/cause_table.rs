@@ -64,8 +64,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         named.append(&mut cells);
         named.retain(keeps);
         for cell in &mut named {
-            let of_known = |known: &&KnownCell| known.cell == cell.key;
-            if let Some(known) = question.known.iter().find(of_known) {
+            let is_it = |known: &&KnownCell| known.cell == cell.key;
+            if let Some(known) = question.known.iter().find(is_it) {
                 // However usual a cause is, a recording has to show something of it.
                 let probability = known.probability.clamp(1e-6, *USUAL_MOST);
                 cell.log_prior = (probability / (1.0 - probability)).ln();

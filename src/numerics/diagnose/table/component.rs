@@ -6,7 +6,7 @@ use super::factored::{FactoredColumns, unit};
 use super::frame::SearchRows;
 use crate::criteria::cells::ROW_BY_ROW;
 use crate::effect::Form;
-use crate::regression::{product, view};
+use crate::linear::{product, view};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, Par};
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -75,11 +75,11 @@ impl CellColumns {
         };
         let (mut first, mut first_form) = (0, 0);
         let seen = |mut group: ShapeGroup| {
-            let of_group = first_form..first_form + group.forms.len();
-            let counts: Vec<usize> = counts[of_group.clone()].to_vec();
+            let forms_here = first_form..first_form + group.forms.len();
+            let counts: Vec<usize> = counts[forms_here.clone()].to_vec();
             let count: usize = counts.iter().sum();
             let range = first..first + count;
-            (first, first_form) = (range.end, of_group.end);
+            (first, first_form) = (range.end, forms_here.end);
             let even = group
                 .shapes
                 .iter_mut()
@@ -87,7 +87,7 @@ impl CellColumns {
             even.for_each(|shape| shape.shares = vec![1.0 / count.max(1) as f64; count]);
             let by_factors = factored
                 .as_ref()
-                .and_then(|factored| frame.factored_products(&factored[of_group]));
+                .and_then(|factored| frame.factored_products(&factored[forms_here]));
             let (gram, gradient) = by_factors.unwrap_or_else(|| match values.get() {
                 Some(values) => frame.products(view(values).subcols(range.start, count)),
                 None => frame.products(view(&frame.columns(&group.forms).0.values)),

@@ -6,7 +6,7 @@
 //! integrated (inverse gamma about its statement with nu degrees of freedom), the amplitude a over a logarithmic grid.
 
 use crate::criteria::cells::{EXACT, LARGEST, NU, SMALLEST};
-use crate::regression::dot;
+use crate::linear::dot;
 use nalgebra::{DMatrix, DVector};
 use std::sync::LazyLock;
 

@@ -3,7 +3,7 @@
 
 use super::cell::alternates;
 use crate::effect::Motion;
-use crate::regression::{dot, view};
+use crate::linear::{dot, view};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use nalgebra::{DMatrix, DVector};
@@ -107,7 +107,7 @@ impl MotionRows {
     /// Products of each direction with columns (columns x residual rows) row by row, columns x rows.
     pub(super) fn with(&self, columns: &DMatrix<f64>, row_of: &[usize]) -> Vec<DMatrix<f64>> {
         let count = columns.nrows();
-        let of_direction = |direction: &WeighedDirection| {
+        let row_products = |direction: &WeighedDirection| {
             let mut out = DMatrix::zeros(count, direction.square.len());
             for ((line, row), by) in row_of.iter().enumerate().zip(&direction.weighed) {
                 let sums = &mut out.as_mut_slice()[row * count..(row + 1) * count];
@@ -116,7 +116,7 @@ impl MotionRows {
             }
             out
         };
-        self.directions.iter().map(of_direction).collect()
+        self.directions.iter().map(row_products).collect()
     }
 
     /// Products of factored columns of this motion with each other and with the residual, the base projected off.

@@ -6,7 +6,7 @@ use super::factored::{FactoredColumns, Functions, MotionRows, WeighedDirection, 
 use super::noise_shape::NoiseShape;
 use crate::diagnose::round::RoundView;
 use crate::effect::{Basis, Factor, Form, Law, Motion, Variable};
-use crate::regression::{orthonormal, product, project};
+use crate::linear::{orthonormal, product, project};
 use faer::{Mat, MatRef};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
@@ -92,7 +92,7 @@ impl<'a> SearchRows<'a> {
 
     /// The least variance of the noise over what is stated: what motor currents leave says nothing of the points'.
     pub(crate) fn least_noise(&self) -> f64 {
-        if self.view.problem.of_readings().len() < self.residual.len() {
+        if self.view.problem.measured_residual().len() < self.residual.len() {
             1.0
         } else {
             0.09
@@ -149,8 +149,8 @@ impl<'a> SearchRows<'a> {
     /// Computes once the functions of one variable that forms have.
     pub(crate) fn tabulate<'l>(&mut self, laws: impl Iterator<Item = &'l Law>) {
         for factor in laws.flat_map(Law::factors) {
-            let of_variable = |known: &VariableRows| known.variable == factor.variable;
-            let Some(known) = self.variables.iter().position(of_variable) else {
+            let is_it = |known: &VariableRows| known.variable == factor.variable;
+            let Some(known) = self.variables.iter().position(is_it) else {
                 continue;
             };
             let mut functions = self.variables[known].functions.iter();
@@ -186,7 +186,7 @@ impl<'a> SearchRows<'a> {
     /// Whether rows are weighed each by itself, and all of them are readings.
     fn is_by_row(&self) -> bool {
         !self.view.problem.is_correlated()
-            && self.view.problem.of_readings().len() == self.residual.len()
+            && self.view.problem.measured_residual().len() == self.residual.len()
     }
 
     /// What a motion's columns are made of.
@@ -232,7 +232,10 @@ impl<'a> SearchRows<'a> {
     pub(crate) fn columns(&self, forms: &[Form]) -> (UnitColumns, Vec<usize>) {
         let mut each: Vec<Weighed> = forms
             .iter()
-            .map(|form| self.of_term(form).unwrap_or_else(|| self.of_form(form)))
+            .map(|form| {
+                self.term_columns(form)
+                    .unwrap_or_else(|| self.form_columns(form))
+            })
             .collect();
         let rows = each.iter().map(|block| block.rows).max();
         let rows = rows.unwrap_or(self.residual.len());
@@ -259,16 +262,16 @@ impl<'a> SearchRows<'a> {
     }
 
     /// The columns of any form; without the rows of currents where it says nothing of these.
-    fn of_form(&self, form: &Form) -> Weighed {
+    fn form_columns(&self, form: &Form) -> Weighed {
         let problem = &self.view.problem;
-        let (all, points) = (self.residual.len(), problem.of_readings().len());
+        let (all, points) = (self.residual.len(), problem.measured_residual().len());
         let mut columns = problem.motions_by(form);
         let is_zero = |column: &[f64]| column[points..].iter().all(|value| *value == 0.0);
         let silent = columns.chunks(all.max(1)).all(is_zero);
         let rows = if silent { points } else { all };
         if rows < all {
-            let of_points = columns.chunks(all).flat_map(|column| &column[..points]);
-            columns = of_points.copied().collect();
+            let point_rows = columns.chunks(all).flat_map(|column| &column[..points]);
+            columns = point_rows.copied().collect();
         }
         let each = columns.chunks(rows.max(1));
         let square: Vec<f64> = each.map(|column| self.mean_square(column)).collect();
@@ -315,7 +318,7 @@ impl<'a> SearchRows<'a> {
 
     /// What is needed of a direction of a motion by a unit.
     fn direction(&self, mut raw: Vec<f64>) -> WeighedDirection {
-        raw.truncate(self.view.problem.of_readings().len());
+        raw.truncate(self.view.problem.measured_residual().len());
         let count = self.variance.len().max(1) as f64;
         let square = self.squares_by_row(&raw).map(|square| square / count);
         let square = square.collect();
@@ -329,7 +332,7 @@ impl<'a> SearchRows<'a> {
     }
 
     /// The columns of a law at a place from the motion's directions and the law's functions.
-    fn of_term(&self, form: &Form) -> Option<Weighed> {
+    fn term_columns(&self, form: &Form) -> Option<Weighed> {
         let product = self.product(form)?;
         let directions = &self.motions[product.motion].directions;
         let (problem, row_of) = (&self.view.problem, self.view.problem.rows_of_readings());
@@ -353,15 +356,15 @@ impl<'a> SearchRows<'a> {
 
     /// The functions of a law at every row; none of a variable of several numbers, or that some row does not tell.
     fn functions(&self, law: &Law) -> Option<Arc<Functions>> {
-        let of_factor = |factor: &Factor| {
+        let known_functions = |factor: &Factor| {
             let mut functions = self.variable(factor.variable)?.functions.iter();
             let known = functions.find(|(basis, _)| *basis == factor.basis)?;
             Some(&known.1)
         };
-        if let (Some(functions), None) = (of_factor(&law.first), law.times) {
+        if let (Some(functions), None) = (known_functions(&law.first), law.times) {
             return Some(functions.clone());
         }
-        let factor = |factor: &Factor| match of_factor(factor) {
+        let factor = |factor: &Factor| match known_functions(factor) {
             Some(functions) => Some(Cow::Borrowed(&functions.values)),
             None => Some(Cow::Owned(self.factor(factor)?)),
         };
@@ -426,7 +429,7 @@ impl<'a> SearchRows<'a> {
             }
         }
         if let Some(factor) = self.noise.currents {
-            let points = problem.of_readings().len();
+            let points = problem.measured_residual().len();
             let currents = column[points..].iter_mut();
             currents.for_each(|value| *value *= factor);
         }

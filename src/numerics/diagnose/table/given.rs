@@ -249,7 +249,7 @@ impl CauseTable<'_, '_> {
     ) -> Option<CellAnswer> {
         let cell = &self.cells[component.cell];
         let found = self.closely(component.cell, state)?;
-        let alone = self.of_component(component, state);
+        let alone = self.component_evidence(component, state);
         let log = alone.map_or(found.log, |(log, _)| log.max(found.log));
         let found_size = self.sized(component, state)?;
         Some(CellAnswer {

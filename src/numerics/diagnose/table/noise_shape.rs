@@ -3,6 +3,7 @@
 use crate::criteria::cells::{EVEN, FAR, UNEVEN, UNRECORDED};
 use crate::diagnose::round::RoundView;
 use crate::effect::{Form, Survey, Variable};
+use crate::linear::mean_square;
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
@@ -60,12 +61,9 @@ impl NoiseShape {
     /// even.
     pub(crate) fn of(view: &RoundView) -> Self {
         let problem = &view.problem;
-        let residual = problem.of_readings();
-        let mean = |values: &[f64]| {
-            values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64
-        };
+        let residual = problem.measured_residual();
         let rows = 0..problem.rows.len();
-        let size = |i: usize| mean(&residual[problem.readings_of(i)]).sqrt();
+        let size = |i: usize| mean_square(&residual[problem.readings_of(i)]).sqrt();
         let mut sizes: Vec<f64> = rows.clone().map(size).collect();
         let by_row = sizes.clone();
         if sizes.is_empty() {
@@ -89,7 +87,7 @@ impl NoiseShape {
         }
         share_among_repeats(view, &mut weights);
         let currents = &problem.residual[residual.len()..];
-        let ratio = (mean(residual) / mean(currents).max(1e-12)).sqrt();
+        let ratio = (mean_square(residual) / mean_square(currents).max(1e-12)).sqrt();
         let currents = (!currents.is_empty()).then(|| ratio.clamp(0.2, 5.0));
         Self {
             weights,
@@ -130,7 +128,7 @@ fn unrecorded(variable: Variable, data: &Measurements) -> Vec<f64> {
 /// Rows that measured one pose one after another count as one where they differ less among each other than from the model: what they leave is
 /// then the pose's, not the instrument's.
 fn share_among_repeats(view: &RoundView, weights: &mut [f64]) {
-    let (problem, residual) = (&view.problem, view.problem.of_readings());
+    let (problem, residual) = (&view.problem, view.problem.measured_residual());
     let width = problem.width().unwrap_or(0);
     let mut poses: Vec<Vec<usize>> = Vec::new();
     for (i, row) in problem.rows.iter().enumerate() {
@@ -156,8 +154,7 @@ fn share_among_repeats(view: &RoundView, weights: &mut [f64]) {
         return;
     }
     let within = within / freedom;
-    let whole =
-        residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64;
+    let whole = mean_square(residual);
     let between = (whole - within).max(0.0);
     for pose in &poses {
         let count = pose.len() as f64;

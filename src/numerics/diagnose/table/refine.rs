@@ -96,9 +96,11 @@ impl CauseTable<'_, '_> {
             let other = self.with_forms(&best, forms.to_vec());
             // With other numbers a variable may have so few values that its curve has fewer columns.
             let is_alike = other.values.ncols() == best.shape.shares.len();
-            is_alike.then(|| self.of_component(&other, state)).flatten()
+            is_alike
+                .then(|| self.component_evidence(&other, state))
+                .flatten()
         };
-        let start = self.of_component(&best, state)?;
+        let start = self.component_evidence(&best, state)?;
         let found_as = |forms, (log, amplitude): Worth| Refined {
             forms,
             shape: None,

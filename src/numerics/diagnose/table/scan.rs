@@ -266,7 +266,7 @@ impl CauseTable<'_, '_> {
         let moved = self.with_forms(component, forms);
         let is_other =
             moved.values.ncols() != component.values.ncols() || state.has_any(&moved.forms);
-        let evidence = (!is_other).then(|| self.of_component(&moved, state));
+        let evidence = (!is_other).then(|| self.component_evidence(&moved, state));
         let (log, amplitude) = evidence.flatten()?;
         Some(Refined {
             forms: moved.forms,
@@ -395,7 +395,7 @@ impl CauseTable<'_, '_> {
     }
 
     /// ln of the evidence of one shape with its weight given a state, and its amplitude.
-    pub(crate) fn of_component(
+    pub(crate) fn component_evidence(
         &self,
         component: &Component,
         state: &KnownState,

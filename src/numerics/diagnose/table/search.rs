@@ -135,7 +135,7 @@ impl CauseTable<'_, '_> {
             let mut changed = false;
             for i in some.iter().copied() {
                 let state = self.state(&without(&components, &[i]), Some(kappa));
-                let Some(alone) = self.of_component(&components[i], &state) else {
+                let Some(alone) = self.component_evidence(&components[i], &state) else {
                     continue;
                 };
                 let before = (components[i].amplitude, components[i].shape.shares.clone());
@@ -159,7 +159,7 @@ impl CauseTable<'_, '_> {
                 if same {
                     continue;
                 }
-                let Some(other) = self.of_component(&found, &state) else {
+                let Some(other) = self.component_evidence(&found, &state) else {
                     continue;
                 };
                 // A shape of further numbers stays on the terms on which it came.
@@ -227,7 +227,7 @@ impl CauseTable<'_, '_> {
     pub(crate) fn log_evidence(&self, component: &Component, state: &KnownState) -> f64 {
         let grid = self.closely(component.cell, state);
         let grid = grid.map_or(f64::NEG_INFINITY, |found| found.log);
-        self.of_component(component, state)
+        self.component_evidence(component, state)
             .map_or(grid, |(log, _)| grid.max(log))
     }
 

@@ -9,7 +9,7 @@ use super::factored::unit;
 use super::frame::SearchRows;
 use crate::criteria::cells::{NU, UNEXPLAINED};
 use crate::effect::Form;
-use crate::regression::dot;
+use crate::linear::dot;
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
 };

@@ -70,7 +70,7 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
         let unclear = |main: &FoundCell| {
             something_left && main.effect == names::UNKNOWN && found.log < main.log
         };
-        let of_unclear = out
+        let unclear_main = out
             .iter()
             .position(|(_, main, _)| main.place == found.place && unclear(main));
         let first = (found.effect == names::UNKNOWN).then(|| {
@@ -82,7 +82,7 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
             };
             here.or_else(|| out.first().filter(trace).map(|_| 0))
         });
-        match of_unclear.or(first.flatten()) {
+        match unclear_main.or(first.flatten()) {
             Some(main) => out[main].2.extend(&found.members),
             None => out.push((rms, found, details)),
         }

@@ -89,7 +89,7 @@ pub(crate) fn conclude(last: LastRound, before: &[Option<f64>]) -> Diagnosis {
         view: last.view,
         survey: last.survey,
     }
-    .of_all(&findings);
+    .formulas(&findings);
     let LastRound { state, answer, .. } = last;
     // The folds' errors are told as lengths.
     let lengths = misfit.dimension == Dimension::Length;

@@ -13,6 +13,7 @@ use crate::effect::{
     Term, Unknown, Variable,
 };
 use crate::estimate::{Model, Prior};
+use crate::linear::mean_square;
 use crate::observation::{MeasurementKind, Residual, Sensitivity, kinds};
 use crate::robot::{Measurements, RobotModel};
 pub(crate) use crate::whitened::autocorrelated::AutocorrelatedNoise;
@@ -92,8 +93,7 @@ impl<'a> WhitenedProblem<'a> {
             residual.extend(errors);
             readings.push(seen.into_iter().map(|(reading, _)| reading).collect());
         }
-        let square: f64 = residual.iter().map(|value| value * value).sum();
-        let current_weight = (square / residual.len().max(1) as f64).sqrt();
+        let current_weight = mean_square(&residual).sqrt();
         Self {
             robot: &model.robot,
             data,
@@ -149,19 +149,19 @@ impl<'a> WhitenedProblem<'a> {
 
     /// Numbers that each row measured, where all measured as many.
     pub(crate) fn width(&self) -> Option<usize> {
-        let mut widths = (0..self.rows.len()).map(|i| self.readings.of_row(i).len());
+        let mut widths = (0..self.rows.len()).map(|i| self.readings.lines_of(i).len());
         let width = widths.next().filter(|width| *width > 0)?;
         widths.all(|other| other == width).then_some(width)
     }
 
     /// Residuals of what was measured, row by row.
-    pub(crate) fn of_readings(&self) -> &[f64] {
+    pub(crate) fn measured_residual(&self) -> &[f64] {
         &self.residual[..self.measured()]
     }
 
     /// Residual rows of the readings of a row, by its place in `rows`.
     pub(crate) fn readings_of(&self, place: usize) -> Range<usize> {
-        self.readings.of_row(place)
+        self.readings.lines_of(place)
     }
 
     pub(crate) fn residual_rows(&self) -> usize {
@@ -347,11 +347,11 @@ impl<'a> WhitenedProblem<'a> {
         };
         let rows = self.residual_rows();
         let all: Vec<f64> = forms.iter().flat_map(|form| self.columns(form)).collect();
-        let of_currents = |column: &[f64]| {
+        let current_lines = |column: &[f64]| {
             let values = column[self.measured()..].iter();
             values.map(|value| value / self.current_weight).collect()
         };
-        let columns: Vec<Vec<f64>> = all.chunks(rows).map(of_currents).collect();
+        let columns: Vec<Vec<f64>> = all.chunks(rows).map(current_lines).collect();
         // The residual is that of the present model; what is asked is the whole parameter, hence at zero where it is new.
         currents
             .priors(&columns, &self.present(forms))
@@ -414,7 +414,7 @@ impl ReadingLines {
     }
 
     /// Residual rows of a row.
-    pub(crate) fn of_row(&self, place: usize) -> Range<usize> {
+    pub(crate) fn lines_of(&self, place: usize) -> Range<usize> {
         begin(&self.end_line, place)..self.end_line[place]
     }
 }

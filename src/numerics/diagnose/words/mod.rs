@@ -13,7 +13,7 @@ use crate::effect::Form;
 use crate::error::counted;
 
 /// The base model in a line.
-pub(crate) fn of_the_base(now: &FitState, fitter: &Fitter) -> String {
+pub(crate) fn base_text(now: &FitState, fitter: &Fitter) -> String {
     format!(
         "{}, {} of the base model estimated",
         counted(now.screening.kept.len(), "row"),
@@ -22,7 +22,7 @@ pub(crate) fn of_the_base(now: &FitState, fitter: &Fitter) -> String {
 }
 
 /// What the noise does from point to point.
-pub(crate) fn of_the_correlation(fitter: &Fitter) -> String {
+pub(crate) fn correlation_text(fitter: &Fitter) -> String {
     match fitter.correlated {
         _ if fitter.causes_of_the_arm_first() => {
             "rows follow a path, on which what changes with the pose looks like noise that is correlated from point to point: causes that do \
@@ -38,7 +38,7 @@ pub(crate) fn of_the_correlation(fitter: &Fitter) -> String {
 }
 
 /// A round in a line.
-pub(crate) fn of_a_round<'f>(
+pub(crate) fn round_text<'f>(
     round: usize,
     cells: usize,
     forms: impl Iterator<Item = &'f Form>,
@@ -59,7 +59,7 @@ pub(crate) fn of_a_round<'f>(
 }
 
 /// Why it is searched again, in a line.
-pub(crate) fn of_all_rows(aside: usize) -> String {
+pub(crate) fn all_rows_text(aside: usize) -> String {
     format!(
         "{} stand out: searched again with all rows",
         counted(aside as u64, "row")
@@ -67,7 +67,7 @@ pub(crate) fn of_all_rows(aside: usize) -> String {
 }
 
 /// What follows the last round in a line.
-pub(crate) fn of_the_conclusions(found: &FitState) -> String {
+pub(crate) fn conclusions_text(found: &FitState) -> String {
     format!(
         "{} in the model; probabilities and formulas follow, the last step",
         counted(found.causes.len(), "cause")

@@ -110,7 +110,7 @@ pub(crate) struct Ground {
 
 impl Ground {
     /// Names the noise with its size and where that is from.
-    fn of_noise(&self) -> String {
+    fn noise_text(&self) -> String {
         match self.basis {
             NoiseBasis::Repeats => format!(
                 "the noise that {} show, {}",
@@ -130,19 +130,19 @@ impl Ground {
     }
 
     /// What is left beside the noise, after all that was found.
-    fn of_the_rest(&self) -> String {
+    fn leftover_text(&self) -> String {
         match self.agrees {
-            true => format!("the residual agrees with {}", self.of_noise()),
+            true => format!("the residual agrees with {}", self.noise_text()),
             false => format!(
                 "{} remain, against {}",
                 self.small(self.left),
-                self.of_noise()
+                self.noise_text()
             ),
         }
     }
 
     /// Why the error is not explained.
-    fn of_what_is_missing(&self) -> String {
+    fn missing_text(&self) -> String {
         let left = self.small(self.left);
         let points = if self.dimension == Dimension::Length {
             "points"
@@ -226,23 +226,23 @@ impl Ground {
 pub(crate) fn statement(verdict: VerdictKind, ground: &Ground) -> String {
     let inferred = ground.basis == NoiseBasis::Inferred;
     match verdict {
-        VerdictKind::NothingMissing if inferred => format!("nothing found; {}", ground.of_noise()),
-        VerdictKind::NothingMissing => format!("nothing found; {}", ground.of_the_rest()),
+        VerdictKind::NothingMissing if inferred => {
+            format!("nothing found; {}", ground.noise_text())
+        }
+        VerdictKind::NothingMissing => format!("nothing found; {}", ground.leftover_text()),
         VerdictKind::Explained if inferred => format!(
             "the findings explain the error except for noise; {}",
-            ground.of_noise()
+            ground.noise_text()
         ),
         VerdictKind::Explained => {
-            format!("the findings explain the error; {}", ground.of_the_rest())
+            format!("the findings explain the error; {}", ground.leftover_text())
         }
         VerdictKind::Unexplained if inferred => {
-            format!("{}; {}", ground.of_what_is_missing(), ground.of_noise())
+            format!("{}; {}", ground.missing_text(), ground.noise_text())
         }
-        VerdictKind::Unexplained => format!(
-            "{}, against {}",
-            ground.of_what_is_missing(),
-            ground.of_noise()
-        ),
+        VerdictKind::Unexplained => {
+            format!("{}, against {}", ground.missing_text(), ground.noise_text())
+        }
         VerdictKind::WrongSetup => {
             "the set-up is wrong: correct it first; no physical cause was tested".into()
         }
