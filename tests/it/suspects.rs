@@ -56,30 +56,19 @@ fn on_a_real_robot_what_the_model_lacks_is_not_taken_for_mistakes() {
 #[test]
 fn suspects_are_named_to_the_person_listed_and_still_predicted() {
     let (clean, _) = experiment("all", 1);
-    let sequence = |set: &str, k: usize| {
-        clean
-            .split
-            .0
-            .iter()
-            .filter(|row| row.set == set)
-            .nth(k)
-            .unwrap()
-            .sequence as usize
+    let row = |set: &str, k: usize| {
+        let mut rows = clean.split.0.iter().filter(|row| row.set == set);
+        let sequence = rows.nth(k).unwrap().sequence;
+        let mut all = clean.recording.sequence.iter();
+        all.position(|other| *other == sequence).unwrap()
     };
-    let rows = [
-        sequence("unloaded_fit", 3),
-        sequence("unloaded_check", 7),
-        sequence("unloaded_fit", 20),
-        sequence("check", 5),
-    ];
-    let [a, b, inch, lost] = rows.map(|sequence| {
-        clean
-            .recording
-            .sequence
-            .iter()
-            .position(|s| *s as usize == sequence)
-            .unwrap()
-    });
+    let [a, b, inch, lost] = [
+        ("unloaded_fit", 3),
+        ("unloaded_check", 7),
+        ("unloaded_fit", 20),
+        ("check", 5),
+    ]
+    .map(|(set, k)| row(set, k));
     let mut dirty = clean.clone();
     let points = &mut dirty.recording.position;
     points.swap(a, b);
@@ -90,16 +79,9 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
     let made = dirty.identify_by(&stage).unwrap();
     let (suspects, prediction): (Suspects, Prediction) = (made.get(), made.get());
     let id = |row: usize| &recording.point_id[row];
-    let kinds: Vec<(&str, &str, Option<i64>)> = suspects
-        .0
-        .iter()
-        .map(|row| {
-            (
-                row.point_id.as_str(),
-                row.kind.as_str(),
-                row.partner_sequence,
-            )
-        })
+    let kinds = suspects.0.iter();
+    let kinds: Vec<(&str, &str, Option<i64>)> = kinds
+        .map(|row| (&*row.point_id, &*row.kind, row.partner_sequence))
         .collect();
     let mut expected = vec![
         (id(a).as_str(), "exchanged", Some(recording.sequence[b])),
@@ -119,12 +101,8 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
     let marked = prediction.0.iter().filter(|row| row.suspect).count();
     assert_eq!((prediction.0.len(), marked), (recording.rows(), 4));
     // A row that was looked at to set it aside is no held-out row of the fit's own set.
-    assert!(
-        prediction
-            .0
-            .iter()
-            .all(|row| row.set != "unloaded_fit" || !row.held_out)
-    );
+    let is_fine = |row: &PredictionRow| row.set != "unloaded_fit" || !row.held_out;
+    assert!(prediction.0.iter().all(is_fine));
     let weight = |row: &PredictionRow| match (row.suspect, row.set.as_str()) {
         (true, _) => row.weight == Some(0.0),
         (false, "unloaded_fit") => row.weight.is_some_and(|weight| weight > 0.0),
@@ -134,22 +112,12 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
     stage.screen = false;
     let made = dirty.identify_by(&stage).unwrap();
     let (suspects, prediction): (Suspects, Prediction) = (made.get(), made.get());
-    assert_eq!(
-        (
-            suspects.0.len(),
-            prediction.0.iter().filter(|row| row.suspect).count()
-        ),
-        (0, 0)
-    );
+    assert!(suspects.0.is_empty() && !prediction.0.iter().any(|row| row.suspect));
     // Rows that are not set aside count the less the farther off they are, and the note names them.
     let least = prediction.0[inch].weight.unwrap();
+    let mut weights = prediction.0.iter().filter_map(|row| row.weight);
     assert!(
-        least < 0.01
-            && prediction
-                .0
-                .iter()
-                .filter_map(|row| row.weight)
-                .all(|weight| weight >= least),
+        least < 0.01 && weights.all(|weight| weight >= least),
         "{least}"
     );
     has(

@@ -19,6 +19,7 @@ use crate as diagnose;
 
 mod closed_form;
 mod judge;
+mod linear;
 mod misfit;
 mod outside;
 mod regression;
@@ -26,7 +27,6 @@ mod round;
 mod separate;
 mod setup;
 pub mod table;
-mod too_few;
 mod types;
 mod unasked;
 mod verdict;
@@ -56,7 +56,7 @@ use verdict::{LastRound, conclude};
 /// a [`wrong_setup`] before.
 pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis {
     if question.fit.len() < *FEWEST {
-        return too_few::not_asked(question);
+        return unasked::not_asked(question);
     }
     let first = match Attempt::new(question, false, &mut tell) {
         Ok(first) => first,
@@ -66,7 +66,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         return first.conclude();
     }
     // More rows than mistakes are: a cause that the model lacks may be what moves them, and it is looked for in all rows.
-    tell(words::of_all_rows(first.set_aside()));
+    tell(words::all_rows_text(first.set_aside()));
     let explains = |second: &Attempt| {
         let aside = second.set_aside();
         2 * aside <= first.set_aside()
@@ -104,12 +104,12 @@ impl<'a> Attempt<'a> {
         let before = now
             .model
             .error_sizes(&fitter.data, fitter.scale.dimension());
-        tell(words::of_the_base(&now, &fitter));
+        tell(words::base_text(&now, &fitter));
         let mut rounds = Rounds::default();
         loop {
             let view = RoundView::of(&now, &fitter);
-            let round = rounds.search(&view, &now, &fitter);
-            tell(words::of_a_round(
+            let round = rounds.search(&view);
+            tell(words::round_text(
                 rounds.count(),
                 round.cells,
                 round.causes.iter().map(|cause| &cause.form),
@@ -133,9 +133,8 @@ impl<'a> Attempt<'a> {
                 .flatten()
             {
                 let kept = fitter.take_correlation(&change, &next);
-                tell(words::of_the_correlation(&fitter));
-                now = fitter.fit(&next.model, kept);
-                fitter.follow(&now);
+                tell(words::correlation_text(&fitter));
+                now = fitter.refit(&next.model, kept);
                 rounds.again();
                 continue;
             }
@@ -143,8 +142,7 @@ impl<'a> Attempt<'a> {
             let quiet = settled || answer.found.is_empty();
             if let Some(sigma) = quiet.then(|| fitter.noise_left_by(&next)).flatten() {
                 fitter.learn(sigma);
-                now = fitter.fit(&next.model, next.causes);
-                fitter.follow(&now);
+                now = fitter.refit(&next.model, next.causes);
                 rounds.again();
                 continue;
             }
@@ -158,7 +156,7 @@ impl<'a> Attempt<'a> {
                 fitter.follow(&now);
                 continue;
             }
-            tell(words::of_the_conclusions(&next));
+            tell(words::conclusions_text(&next));
             return Ok(Self {
                 fitter,
                 before,
@@ -193,10 +191,8 @@ impl<'a> Attempt<'a> {
             survey: &survey,
             state: self.next,
             answer: self.answer,
-            scale: self.fitter.scale,
-            without: self.fitter.question.without,
         };
-        conclude(last, &self.fitter, &self.before)
+        conclude(last, &self.before)
     }
 }
 
@@ -216,17 +212,14 @@ pub fn cell_evidence(question: &Question, given: &[GivenCell]) -> Result<Vec<Cel
     // Around a model without them, then around one with them inside the chain.
     for _ in 0..if given.is_empty() { 0 } else { 2 } {
         let view = RoundView::of(&now, &fitter);
-        let causes = given_causes(&view, &now, &fitter, given);
-        now = fitter.fit(&now.model, causes);
-        fitter.follow(&now);
+        let causes = given_causes(&view, given);
+        now = fitter.refit(&now.model, causes);
     }
     if let Some(sigma) = fitter.noise_left_by(&now) {
         fitter.learn(sigma);
-        now = fitter.fit(&now.model, now.causes);
-        fitter.follow(&now);
+        now = fitter.refit(&now.model, now.causes);
     }
-    let view = RoundView::of(&now, &fitter);
-    Ok(answers(&view, &now, &fitter, given))
+    Ok(answers(&RoundView::of(&now, &fitter), given))
 }
 
 /// Causes of findings that are smaller than their own uncertainty in the whole model.

@@ -6,7 +6,9 @@ use crate::criteria::noise::{MAX_CHI_SQUARE, MAX_CHI_SQUARE_OF_STRUCTURE};
 use crate::criteria::search::SIGNIFICANT;
 use crate::effect::PlacementBuffers;
 use crate::estimate::{Model, Screening, noise, tail};
-use crate::observation::{Dimension, KINDS, Residual, dimension, kinds, only_contacts};
+use crate::observation::{
+    Dimension, KINDS, MeasurementKind, Residual, dimension, kinds, only_contacts,
+};
 use crate::robot::{Measurements, NoiseBasis};
 use rayon::prelude::*;
 
@@ -56,10 +58,9 @@ fn left(model: &Model, data: &Measurements, dimension: Dimension) -> Vec<RowMisf
             stated: 0.0,
             values: 0,
         };
-        for residual in kinds
-            .iter()
-            .filter_map(|kind| Residual::of(*kind, data, row, &placed))
-        {
+        let residual =
+            |kind: &&'static dyn MeasurementKind| Residual::of(*kind, data, row, &placed);
+        for residual in kinds.iter().filter_map(residual) {
             if residual.dimension() == dimension {
                 left.size.get_or_insert(residual.error.norm());
             }
@@ -93,18 +94,10 @@ impl Misfit {
     ) -> Self {
         let dimension = dimension(data, question.fit);
         let left = left(model, data, dimension);
-        let aside: Vec<usize> = screening
-            .suspects
-            .iter()
-            .filter(|s| !s.used())
-            .map(|s| s.row)
-            .collect();
-        let judges: Vec<usize> = question
-            .validate
-            .iter()
-            .copied()
-            .filter(|row| !aside.contains(row))
-            .collect();
+        let aside = screening.suspects.iter().filter(|suspect| !suspect.used());
+        let aside: Vec<usize> = aside.map(|suspect| suspect.row).collect();
+        let mut judges = question.validate.to_vec();
+        judges.retain(|row| !aside.contains(row));
         let held_out = !judges.is_empty();
         let kept = &screening.kept;
         let size = |rows: &[usize]| rms(rows.iter().map(|row| left[*row].size));
@@ -120,25 +113,23 @@ impl Misfit {
         let not_carried = not_carried.then(|| size(&judges));
         let rows = if held_out { judges } else { kept.clone() };
         let stated: f64 = kept.iter().map(|row| left[*row].stated).sum();
-        let of_dimension = || {
-            KINDS
+        let instrument = |row: &usize| {
+            let mut kinds = KINDS
                 .iter()
-                .filter(|kind| kind.about().dimension == dimension)
+                .filter(|kind| kind.about().dimension == dimension);
+            kinds.find_map(|kind| kind.instrument(data, *row))
         };
         Self {
             dimension,
             held_out,
             noise_floor: rms(rows.iter().map(|row| noise(data, *row, dimension))),
-            instrument: rms(rows
-                .iter()
-                .map(|row| of_dimension().find_map(|kind| kind.instrument(data, *row)))),
+            instrument: rms(rows.iter().map(instrument)),
             leftover_rms: size(kept),
             chi_square: whitened(kept) / freedom,
             beyond_stated: stated / freedom,
-            figures: if held_out {
-                question.validate.to_vec()
-            } else {
-                rows.clone()
+            figures: match held_out {
+                true => question.validate.to_vec(),
+                false => rows.clone(),
             },
             left_here: size(&rows),
             not_carried,

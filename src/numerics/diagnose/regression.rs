@@ -1,13 +1,11 @@
 //! Least squares on one form at a time given a model, which takes its part of the rows first (Frisch, Waugh, Lovell): a coefficient on what
 //! the model cannot absorb is the one that a joint fit with it would give.
-//!
-//! Dense linear algebra on columns that are stored one after another.
 
 use crate::criteria::search::{IDLE, LEVELS};
 use crate::effect::{Form, Survey};
+use crate::linear::{dot, orthonormal, project, scale, subtract};
 use crate::whitened::WhitenedProblem;
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use faer::Mat;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -58,12 +56,11 @@ impl<'p, 'a> FormRegression<'p, 'a> {
         let mut basis: Vec<Vec<f64>> = (0..base.ncols())
             .map(|j| base.col_as_slice(j).to_vec())
             .collect();
-        for column in forms
+        let columns: Vec<f64> = forms
             .iter()
             .flat_map(|form| problem.columns(form))
-            .collect::<Vec<f64>>()
-            .chunks(residual.len().max(1))
-        {
+            .collect();
+        for column in columns.chunks(residual.len().max(1)) {
             let mut column = column.to_vec();
             scale(&mut column);
             // Twice: what rounding leaves of a long basis.
@@ -116,11 +113,8 @@ impl<'p, 'a> FormRegression<'p, 'a> {
         for level in 0..*LEVELS {
             let near = form.near(survey, level);
             let gains = self.gains(&near);
-            match gains
-                .into_iter()
-                .zip(near)
-                .max_by(|a, b| a.0.total_cmp(&b.0))
-            {
+            let best = gains.into_iter().zip(near);
+            match best.max_by(|a, b| a.0.total_cmp(&b.0)) {
                 Some((gain, other)) if gain > most * (1.0 + 1e-9) => (most, form) = (gain, other),
                 _ => idle += 1,
             }
@@ -145,13 +139,12 @@ impl ModelledRows {
     /// The fit of columns, one after another.
     fn solve(&self, mut stacked: Vec<f64>) -> Solution {
         let rows = self.residual.len().max(1);
-        let weighed = |column: &[f64]| match &self.square {
-            Some(square) => column
-                .iter()
-                .zip(square)
-                .map(|(value, square)| value * square)
-                .collect(),
-            None => column.to_vec(),
+        let weighed = |column: &[f64]| -> Vec<f64> {
+            let Some(square) = &self.square else {
+                return column.to_vec();
+            };
+            let each = column.iter().zip(square);
+            each.map(|(value, square)| value * square).collect()
         };
         let scales: Vec<f64> = stacked
             .chunks_mut(rows)
@@ -174,10 +167,8 @@ impl ModelledRows {
                 gram[(j, i)] = gram[(i, j)];
             }
         }
-        let along = DVector::from_iterator(
-            columns.len(),
-            columns.iter().map(|column| dot(column, &self.residual)),
-        );
+        let along = columns.iter().map(|column| dot(column, &self.residual));
+        let along = DVector::from_iterator(columns.len(), along);
         let SymmetricEigen {
             eigenvectors,
             eigenvalues,
@@ -186,10 +177,10 @@ impl ModelledRows {
         let seen: Vec<usize> = (0..columns.len())
             .filter(|k| eigenvalues[*k] > INVISIBLE)
             .collect();
-        let of_k = |k: usize| {
-            seen.iter()
-                .map(|i| eigenvectors[(k, *i)] * along[*i] / eigenvalues[*i])
-                .sum::<f64>()
+        let coefficient = |k: usize| {
+            let parts = seen.iter();
+            let parts = parts.map(|i| eigenvectors[(k, *i)] * along[*i] / eigenvalues[*i]);
+            parts.sum::<f64>() / scales[k]
         };
         Solution {
             gain: seen
@@ -197,76 +188,9 @@ impl ModelledRows {
                 .map(|i| along[*i].powi(2) / eigenvalues[*i])
                 .sum(),
             rank: seen.len(),
-            coefficients: (0..columns.len()).map(|k| of_k(k) / scales[k]).collect(),
+            coefficients: (0..columns.len()).map(coefficient).collect(),
         }
     }
-}
-
-/// Takes off a column what it has of another one of unit length.
-fn subtract(column: &mut [f64], other: &[f64]) {
-    let share = dot(column, other);
-    column
-        .iter_mut()
-        .zip(other)
-        .for_each(|(value, other)| *value -= share * other);
-}
-
-/// Scales a column to unit length; returns the length that it had.
-fn scale(column: &mut [f64]) -> f64 {
-    let length = dot(column, column).sqrt();
-    column
-        .iter_mut()
-        .for_each(|value| *value /= length.max(1e-300));
-    length
-}
-
-/// An orthonormal basis of the columns of `matrix`, which are scaled to unit length first.
-pub(crate) fn orthonormal(matrix: &Mat<f64>) -> Mat<f64> {
-    let norm = |j: usize| matrix.col(j).norm_l2().max(1e-300);
-    let scale: Vec<f64> = (0..matrix.ncols()).map(norm).collect();
-    let scaled = Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-        matrix[(i, j)] / scale[j]
-    });
-    scaled.qr().compute_thin_Q()
-}
-
-/// Removes from columns (one after another) what lies in the span of an orthonormal basis.
-pub(crate) fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {
-    let rows = basis.nrows();
-    let count = columns.len() / rows.max(1);
-    if basis.ncols() == 0 || count == 0 {
-        return;
-    }
-    let mut share = Mat::zeros(basis.ncols(), count);
-    let mut columns = MatMut::from_column_major_slice_mut(columns, rows, count);
-    matmul(
-        share.as_mut(),
-        Accum::Replace,
-        basis.transpose(),
-        columns.as_ref(),
-        1.0,
-        Par::Seq,
-    );
-    matmul(
-        columns.as_mut(),
-        Accum::Add,
-        basis,
-        share.as_ref(),
-        -1.0,
-        Par::Seq,
-    );
-}
-
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Four sums: the compiler may not reorder one.
-    let (mut sums, chunks) = ([0.0; 4], a.len() / 4);
-    for k in 0..chunks {
-        for lane in 0..4 {
-            sums[lane] += a[4 * k + lane] * b[4 * k + lane];
-        }
-    }
-    let tail: f64 = (4 * chunks..a.len()).map(|k| a[k] * b[k]).sum();
-    sums[0] + sums[1] + sums[2] + sums[3] + tail
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::regression::{FormRegression, Solution};
 use super::round::compliance;
 use super::table::forms_of;
 use super::types::Question;
-use super::whitened::WhitenedProblem;
+use super::whitened::{WhitenedProblem, add_columns};
 use crate::criteria::cells::USUAL;
 use crate::effect::{
     DeclaredCause, Effect, EffectContext, EffectStack, Form, Load, Place, Survey, arm_effect,
@@ -41,45 +41,21 @@ pub fn discrimination_problem(
     let problem = WhitenedProblem::new(model, data, rows.to_vec());
     let (torque, compliance) = (problem.torques(), compliance(model));
     let survey = Survey::new(&model.robot, data, rows, &torque, &compliance);
-    let is = |form: &&Form| finding.contains(*form);
-    let of_other = |(other, range): (&dyn Effect, std::ops::Range<usize>)| {
-        other.form().filter(is).map(|_| range)
-    };
-    let forms: Vec<usize> = model
-        .stack
-        .effects()
-        .filter_map(of_other)
-        .flatten()
+    let effects = model.stack.effects();
+    let parts: Vec<(&Form, std::ops::Range<usize>)> = effects
+        .filter_map(|(effect, range)| Some((effect.form()?, range)))
+        .filter(|(form, _)| finding.contains(form))
         .collect();
+    let forms: Vec<usize> = parts.iter().flat_map(|(_, range)| range.clone()).collect();
     let mut caused = vec![0.0; problem.residual_rows()];
-    for (form, range) in model
-        .stack
-        .effects()
-        .filter_map(|(other, range)| Some((other.form().filter(is)?, range)))
-    {
-        for (column, size) in problem
-            .columns(form)
-            .chunks(problem.residual_rows())
-            .zip(&model.x[range])
-        {
-            caused
-                .iter_mut()
-                .zip(column)
-                .for_each(|(sum, value)| *sum += value * size);
-        }
+    for (form, range) in parts {
+        add_columns(&mut caused, &problem.columns(form), &model.x[range]);
     }
-    let nuisances: Vec<usize> = free
-        .iter()
-        .copied()
-        .filter(|k| !forms.contains(k))
-        .collect();
+    let mut nuisances = free.to_vec();
+    nuisances.retain(|k| !forms.contains(k));
     let jacobian = problem.jacobian(&nuisances);
-    let open: Vec<f64> = problem
-        .residual
-        .iter()
-        .zip(&caused)
-        .map(|(left, right)| left + right)
-        .collect();
+    let open = problem.residual.iter().zip(&caused);
+    let open: Vec<f64> = open.map(|(left, caused)| left + caused).collect();
     // As diagnosis names rivals: by what fits in place of the finding.
     let reference = FormRegression::new(&problem, &jacobian, &[], &open);
     let others = rivals(&survey, &problem, model, (effect, place))?
@@ -92,11 +68,9 @@ pub fn discrimination_problem(
     };
     let rival = reference.refined(form, &survey);
     let both = with(model, &rival);
-    let held = both
-        .stack
-        .effects()
-        .find(|(other, _)| other.form() == Some(&rival));
-    let of_rival: Vec<usize> = held.map(|(_, range)| range.collect()).unwrap_or_default();
+    let is_rival = |(other, _): &(&dyn Effect, _)| other.form() == Some(&rival);
+    let held = both.stack.effects().find(is_rival);
+    let rival_numbers = held.map_or_else(Vec::new, |(_, range)| range.collect());
     let sizes = forms.iter().map(|k| model.x[*k]).collect();
     let sides = [
         Alternative {
@@ -104,7 +78,7 @@ pub fn discrimination_problem(
             sizes,
         },
         Alternative {
-            parameters: of_rival,
+            parameters: rival_numbers,
             sizes: reference.solve(&rival).coefficients,
         },
     ];

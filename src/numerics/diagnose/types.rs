@@ -46,7 +46,7 @@ pub struct KnownCell {
 }
 
 /// One joint repeatability (rad) and what it rests on.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct JointRepeatability {
     /// rad; 0 where none shows.
     pub sigma: f64,
@@ -145,6 +145,25 @@ pub struct ClosedForm {
 pub const SETUP: &str = "setup";
 
 impl Finding {
+    /// A fault of the recording, no physics.
+    pub(crate) fn of_recording(effect: &'static str, statement: String, probability: f64) -> Self {
+        Self {
+            effect,
+            place: Place::Recording,
+            statement,
+            parameters: Vec::new(),
+            evidence: None,
+            rivals: Vec::new(),
+            probabilities: Probabilities {
+                name: probability,
+                place: probability,
+                none: 1.0 - probability,
+            },
+            valid: None,
+            forms: Vec::new(),
+        }
+    }
+
     /// Whether it is a cause on the arm, its mounting or the instrument; else a fault of the recording, which has no evidence.
     pub(crate) fn is_physics(&self) -> bool {
         self.evidence.is_some() && (self.place != Place::Recording || self.effect == names::UNKNOWN)

@@ -3,28 +3,38 @@
 use super::misfit::Misfit;
 use super::types::{Diagnosis, ErrorLengths, JointRepeatability, Located, Question, VerdictKind};
 use super::words::statement;
+use crate::criteria::search::FEWEST;
 use crate::effect::{BasePlacement, Effect, EffectStack};
-use crate::estimate::{Fitted, Model, Screening, align};
+use crate::estimate::{Model, align, fit_screened};
 
-/// The nominal robot on its base, and the parameters of that base.
-pub(super) fn on_its_base(question: &Question) -> (Model, Vec<usize>) {
-    let Question {
-        robot, data, fit, ..
-    } = *question;
-    let base = align(robot, data, fit);
-    let effect: Box<dyn Effect> = Box::new(BasePlacement::new(base));
-    let start = Model::nominal(robot.clone(), EffectStack::new(robot, base, vec![effect]));
-    let candidates = (0..start.x.len()).collect();
-    (start, candidates)
+/// Too few rows to ask what was left out: the nominal robot in its place, and no findings.
+pub(crate) fn not_asked(question: &Question) -> Diagnosis {
+    let diagnosis = unasked(question, VerdictKind::NotAsked, Some(question.set));
+    let rows = question.fit.len();
+    let too_few = format!(
+        "what the simulation lacks: {rows} rows were fitted, at least {} are needed to separate it from geometry",
+        *FEWEST
+    );
+    Diagnosis {
+        after: diagnosis.before,
+        not_observable: vec![too_few],
+        ..diagnosis
+    }
 }
 
-/// What is said of such a model, fitted: no findings, and nothing after.
+/// What is said of the nominal robot, fitted by its base: no findings, and nothing after. Rows are screened by `set`, if given.
 pub(super) fn unasked(
     question: &Question,
     verdict: VerdictKind,
-    (model, fitted, screening): (Model, Fitted, Screening),
+    set: Option<&[usize]>,
 ) -> Diagnosis {
+    let base = align(question.robot, question.data, question.fit);
+    let effect: Box<dyn Effect> = Box::new(BasePlacement::new(base));
+    let stack = EffectStack::new(question.robot, base, vec![effect]);
+    let start = Model::nominal(question.robot.clone(), stack);
+    let candidates: Vec<usize> = (0..start.x.len()).collect();
     let data = question.data;
+    let (model, fitted, screening) = fit_screened(&start, data, question.fit, &candidates, set);
     let misfit = Misfit::of(question, data, &screening, &model, fitted.singular.len());
     Diagnosis {
         dimension: misfit.dimension,
@@ -46,10 +56,7 @@ pub(super) fn unasked(
         gate_first: None,
         formulas: Vec::new(),
         gate_last: None,
-        repeatability: JointRepeatability {
-            sigma: 0.0,
-            repeats: 0,
-        },
+        repeatability: JointRepeatability::default(),
         located_before: Located::default(),
         located_after: Located::default(),
         kept: screening.kept.clone(),

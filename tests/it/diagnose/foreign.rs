@@ -113,126 +113,58 @@ fn what_is_in_no_list_is_diagnosed_and_counted() {
 }
 
 #[test]
-fn a_product_of_which_neither_variable_is_of_its_joint_or_shows_by_itself_is_found() {
-    let design = Design {
-        seed: 1_795_788_582,
-        cases: 60,
-        foreign: 1.0,
-        faulty: 0.0,
-        ..Design::default()
-    };
-    let case = Case::make(&design, 47, Content::Foreign).unwrap();
-    let cause = &case.concealed[0].cause;
-    // Joint 3 turns by jumps over the angle of joint 1, to one side without the payload and to the other with it.
-    assert_eq!((&*case.name, &*cause.place), ("c0048", "joint 3"));
-    let diagnosed = diagnosed(&case, &[]);
-    // Part of it may be called by link 3, which joint 3 turns.
-    let found = found(&diagnosed);
-    assert!(found.contains(&("unknown", "joint 3")), "{found:?}");
-    halves_the_error(&diagnosed);
-}
-
-/// Held-out points are predicted twice as well as before.
-fn halves_the_error(diagnosed: &super::left_out::Diagnosed) {
-    assert!(
-        diagnosed.after < 0.5 * diagnosed.before,
-        "{} -> {}",
-        diagnosed.before,
-        diagnosed.after
-    );
-}
-
-/// Recording of a number (from 0) of 150.
-fn recorded(number: usize) -> Case {
-    recorded_of(1_795_819_041, number)
-}
-
-fn recorded_of(seed: u64, number: usize) -> Case {
-    let design = Design {
+fn what_was_once_overlooked_is_found_where_it_is() {
+    let foreign = |seed, cases| Design {
         seed,
-        cases: 150,
+        cases,
         foreign: 1.0,
         faulty: 0.0,
         ..Design::default()
     };
-    Case::make(&design, number, Content::Foreign).unwrap()
-}
-
-/// Names and places that were found.
-fn found(diagnosed: &super::left_out::Diagnosed) -> Vec<(&str, &str)> {
-    let found = diagnosed.found.iter();
-    found.map(|(name, place, ..)| (&**name, &**place)).collect()
-}
-
-#[test]
-fn a_curve_of_its_own_load_that_turns_back_is_no_windup_of_a_joint() {
-    // Joint 4 turns by corners over its load, to and fro.
-    let case = recorded(31);
-    assert_eq!(case.concealed[0].cause.place, "joint 4");
-    assert_eq!(found(&diagnosed(&case, &[])), [("unknown", "joint 4")]);
-}
-
-#[test]
-fn a_cause_that_moves_few_rows_far_is_found_in_all_rows() {
-    // Elevations jump at one move in eight of joint 1: 44 rows stand out.
-    let case = recorded(24);
-    assert_eq!(case.concealed[0].cause.place, "tracker");
-    let diagnosed = diagnosed(&case, &[]);
-    assert_eq!(found(&diagnosed), [("unknown", "tracker")]);
-    halves_the_error(&diagnosed);
-}
-
-#[test]
-fn elevations_that_err_with_the_place_of_the_target_have_a_mean() {
-    let case = recorded(112);
-    assert_eq!(case.concealed[0].cause.place, "tracker");
-    assert_eq!(found(&diagnosed(&case, &[])), [("unknown", "tracker")]);
-}
-
-#[test]
-fn what_is_more_probable_at_a_closer_look_takes_the_place_of_a_finding() {
-    // Ranges follow the temperature, which time follows: a base that moved once was taken up before other causes were asked.
-    let case = recorded(48);
-    let diagnosed = diagnosed(&case, &[]);
-    assert_eq!(found(&diagnosed), [("unknown", "tracker")]);
-    halves_the_error(&diagnosed);
-}
-
-#[test]
-fn a_curve_that_jumps_is_found_and_predicts() {
-    // The base turns by jumps over the last move of joint 1: cosines alone left 0.216 mm of 0.524.
-    let case = recorded_of(1_795_836_322, 38);
-    assert_eq!(case.concealed[0].cause.place, "base");
-    let diagnosed = diagnosed(&case, &[]);
-    assert_eq!(found(&diagnosed), [("unknown", "base")]);
-    assert!(
-        diagnosed.after < 0.1 * diagnosed.before,
-        "{}",
-        diagnosed.after
-    );
-}
-
-#[test]
-fn rows_that_are_set_aside_and_taken_back_in_turns_come_to_an_end() {
-    // Where free forms move a row as far as it is off, it was readmitted in every second fit, for ever.
-    let case = recorded_of(1_795_856_227, 5);
-    assert_eq!(case.concealed[0].cause.place, "joint 3");
-    let diagnosed = diagnosed(&case, &[]);
-    assert_eq!(found(&diagnosed), [("unknown", "joint 3")]);
-    halves_the_error(&diagnosed);
-}
-
-#[test]
-fn waves_over_the_range_of_a_tracker_are_found() {
-    // 10 um at every 378 mm of ranges over metres: a coarse look at a curve sees none of it.
-    let design = Design {
+    let usual = || foreign(1_795_819_041, 150);
+    let beyond = Design {
         seed: 1_795_861_284,
         cases: 300,
         collection: Collection::Beyond,
         ..Design::default()
     };
-    let content = design.contents().remove(91);
-    let case = Case::make(&design, 91, content).unwrap();
-    assert_eq!(case.concealed[0].cause.effect, "tracker_offset");
-    assert_eq!(found(&diagnosed(&case, &[])), [("unknown", "tracker")]);
+    // A recording of a set, where its cause acts, and how much of the error of held-out points may be left.
+    let any = f64::INFINITY;
+    for (design, number, place, left) in [
+        // Joint 3 turns by jumps over the angle of joint 1, to one side without the payload and to the other with it: a product of which
+        // neither variable is of its joint or shows by itself.
+        (foreign(1_795_788_582, 60), 47, "joint 3", 0.5),
+        // Joint 4 turns by corners over its load, to and fro: no wind-up of a joint turns back.
+        (usual(), 31, "joint 4", any),
+        // Elevations jump at one move in eight of joint 1: 44 rows stand out, and all rows are asked.
+        (usual(), 24, "tracker", 0.5),
+        // Elevations that err with the place of the target have a mean.
+        (usual(), 112, "tracker", any),
+        // Ranges follow the temperature, which time follows: a base that moved once was taken up before other causes were asked.
+        (usual(), 48, "tracker", 0.5),
+        // The base turns by jumps over the last move of joint 1: cosines alone left 0.216 mm of 0.524.
+        (foreign(1_795_836_322, 150), 38, "base", 0.1),
+        // Where free forms move a row as far as it is off, it was readmitted in every second fit, for ever.
+        (foreign(1_795_856_227, 150), 5, "joint 3", 0.5),
+        // 10 um at every 378 mm of ranges over metres: a coarse look at a curve sees none of it.
+        (beyond, 91, "tracker", any),
+    ] {
+        let content = design.contents().remove(number);
+        let case = Case::make(&design, number, content).unwrap();
+        assert_eq!(case.concealed[0].cause.place, place, "{}", case.name);
+        let diagnosed = diagnosed(&case, &[]);
+        let found = diagnosed.found.iter();
+        let mut found: Vec<(&str, &str)> =
+            found.map(|(name, place, ..)| (&**name, &**place)).collect();
+        // Part of the first may be called by link 3, which joint 3 turns.
+        found.retain(|(_, other)| number != 47 || *other == place);
+        assert_eq!(found, [("unknown", place)], "{}", case.name);
+        assert!(
+            diagnosed.after < left * diagnosed.before,
+            "{}: {} -> {}",
+            case.name,
+            diagnosed.before,
+            diagnosed.after
+        );
+    }
 }

@@ -90,13 +90,10 @@ fn recorded(
     let link = |link: usize| LinkError {
         link,
         shift_mm: [0, 1, 2].map(|axis| 0.3 * normal(71 * link + axis)),
-        tilt_arcsec: [0, 1, 2].map(|axis| {
-            if link == joints {
-                0.0
-            } else {
-                60.0 * normal(71 * link + 3 + axis)
-            }
-        }),
+        tilt_arcsec: match link == joints {
+            true => [0.0; 3],
+            false => [3, 4, 5].map(|axis| 60.0 * normal(71 * link + axis)),
+        },
     };
     let truth = TrueRobot {
         links: (1..=joints).map(link).collect(),
@@ -106,15 +103,11 @@ fn recorded(
         ..TrueRobot::default()
     };
     let seen = |robot: &RobotDescription, blocks: &[Block]| -> Vec<Shot> {
-        let (tracker, motors, climate) = (
-            Tracker {
-                noise_um: 0.0,
-                noise_um_per_m: 0.0,
-                ..Tracker::default()
-            },
-            Motors::default(),
-            Climate::default(),
-        );
+        let tracker = Tracker {
+            noise_um: 0.0,
+            noise_um_per_m: 0.0,
+            ..Tracker::default()
+        };
         let poses = Poses {
             range_deg: range_deg.to_vec(),
             ..Poses::default()
@@ -124,11 +117,11 @@ fn recorded(
             truth: &truth,
             effects,
             tracker: &tracker,
-            motors: &motors,
+            motors: &Motors::default(),
             repeatability_arcsec: &vec![repeatability_arcsec; joints],
             poses: &poses,
             blocks,
-            climate: &climate,
+            climate: &Climate::default(),
             seed: 11,
         };
         experiment.record(|| ()).unwrap()
@@ -144,19 +137,15 @@ fn recorded(
         direction: Vec::new(),
         payload_kg: None,
     };
-    let again: Vec<Block> = drawn
-        .iter()
-        .enumerate()
-        .map(|(block, drawn)| Block {
-            points: 0,
-            given: shots
-                .iter()
-                .filter(|shot| shot.block == block)
-                .map(given)
-                .collect(),
-            ..drawn.clone()
-        })
-        .collect();
+    let again = [0, 1].map(|block| Block {
+        points: 0,
+        given: shots
+            .iter()
+            .filter(|shot| shot.block == block)
+            .map(given)
+            .collect(),
+        ..drawn[block].clone()
+    });
     let [plain, x, y, z] = [None, Some(0), Some(1), Some(2)].map(|axis: Option<usize>| {
         let mut moved = robot.clone();
         axis.iter().for_each(|axis| moved.tool[*axis] += APART);
@@ -192,51 +181,31 @@ fn recorded(
 impl Recorded {
     /// Adds what a level on the tool reads where it stands upright.
     fn with_a_level(self) -> Self {
-        let tilt = |turn: &Matrix3<f64>, row: usize, axis: usize| {
-            if turn[(2, 2)] > 0.3 {
-                turn[(2, axis)].asin() + SIGMA_TILT * normal(2 * row + axis)
-            } else {
-                f64::NAN
-            }
-        };
-        let values = self
-            .turn
-            .iter()
-            .enumerate()
-            .flat_map(|(row, turn)| [0, 1].map(|axis| tilt(turn, row, axis)));
-        let (values, sigma) = (values.collect(), vec![SIGMA_TILT; self.point.len()]);
-        self.read(Readings {
-            kind: "inclination",
-            width: 2,
-            values,
-            sigma,
-            anchor: None,
+        self.read("inclination", SIGMA_TILT, None, |all, row| {
+            let turn = &all.turn[row];
+            let tilt = |axis: usize| match turn[(2, 2)] > 0.3 {
+                true => turn[(2, axis)].asin() + SIGMA_TILT * normal(2 * row + axis),
+                false => f64::NAN,
+            };
+            [0, 1].map(tilt).to_vec()
         })
     }
 
     /// Adds distances from four draw-wires in turn.
     fn with_wires(self) -> Self {
-        let anchors: Vec<Vector3<f64>> = [
+        let anchors: [Vector3<f64>; 4] = [
             [3.0, 1.0, 0.0],
             [5.5, -2.5, 0.1],
             [3.0, -3.0, 2.0],
             [6.0, 0.5, 2.5],
         ]
-        .map(Vector3::from)
-        .to_vec();
+        .map(Vector3::from);
         let names = ["A", "B", "C", "D"];
-        let rows = 0..self.point.len();
-        let length = |row: usize| {
-            (self.point[row] - anchors[row % 4]).norm() + SIGMA_WIRE * normal(50_000 + row)
-        };
-        let readings = Readings {
-            kind: "distance",
-            width: 1,
-            values: rows.clone().map(length).collect(),
-            sigma: vec![SIGMA_WIRE; rows.len()],
-            anchor: Some(Names::of(rows.map(|row| names[row % 4]))),
-        };
-        self.read(readings)
+        let anchor = Names::of((0..self.point.len()).map(|row| names[row % 4]));
+        self.read("distance", SIGMA_WIRE, Some(anchor), |all, row| {
+            let length = (all.point[row] - anchors[row % 4]).norm();
+            vec![length + SIGMA_WIRE * normal(50_000 + row)]
+        })
     }
 
     /// Seen by one camera some way off, which is the recording's origin.
@@ -246,21 +215,13 @@ impl Recorded {
         let along = -away.normalize();
         let right = along.cross(&Vector3::z()).normalize();
         let down = along.cross(&right);
-        let image = |row: usize, axis: usize| {
-            let point = self.point[row] - centre - away;
-            [right, down][axis].dot(&point) / along.dot(&point)
-                + SIGMA_IMAGE * normal(30_000 + 2 * row + axis)
-        };
-        let values = (0..self.point.len())
-            .flat_map(|row| [0, 1].map(|axis| image(row, axis)))
-            .collect();
-        let sigma = vec![SIGMA_IMAGE; self.point.len()];
-        self.read(Readings {
-            kind: "planar",
-            width: 2,
-            values,
-            sigma,
-            anchor: None,
+        self.read("planar", SIGMA_IMAGE, None, |all, row| {
+            let point = all.point[row] - centre - away;
+            let image = |axis: usize| {
+                [right, down][axis].dot(&point) / along.dot(&point)
+                    + SIGMA_IMAGE * normal(30_000 + 2 * row + axis)
+            };
+            [0, 1].map(image).to_vec()
         })
     }
 
@@ -274,19 +235,30 @@ impl Recorded {
         self
     }
 
-    fn read(mut self, readings: Readings) -> Self {
-        self.rows.readings.push(readings);
+    /// Adds what a kind of instrument reads of every row.
+    fn read(
+        mut self,
+        kind: &'static str,
+        sigma: f64,
+        anchor: Option<Names>,
+        values: impl Fn(&Self, usize) -> Vec<f64>,
+    ) -> Self {
+        let rows = self.point.len();
+        self.rows.readings.push(Readings {
+            kind,
+            width: values(&self, 0).len(),
+            values: (0..rows).flat_map(|row| values(&self, row)).collect(),
+            sigma: vec![sigma; rows],
+            anchor,
+        });
         self
     }
 
     /// Diagnosed on four of five measured rows; what is said, and whether a wrong set-up is.
     fn diagnosed(&self) -> Diagnosis {
         let data = &self.rows;
-        let measured: Vec<usize> = (0..data.rows())
-            .filter(|row| calib::observation::values(data, *row) > 0)
-            .collect();
-        let (validate, fit): (Vec<usize>, Vec<usize>) =
-            measured.iter().partition(|row| *row % 5 == 4);
+        let measured = (0..data.rows()).filter(|row| calib::observation::values(data, *row) > 0);
+        let (validate, fit): (Vec<usize>, Vec<usize>) = measured.partition(|row| *row % 5 == 4);
         let (robot, _) = gauge(
             RobotModel::new(self.robot.clone()),
             data,
@@ -306,28 +278,21 @@ impl Recorded {
 
 /// Names and places found are those concealed, and what is left is noise.
 fn explains(diagnosis: &Diagnosis, concealed: &Named) {
-    let found: Named = diagnosis
-        .findings
-        .iter()
-        .map(|finding| (finding.effect.to_string(), finding.place.to_string()))
-        .collect();
+    let findings = diagnosis.findings.iter();
+    let found = findings.map(|finding| (finding.effect.to_string(), finding.place.to_string()));
+    let statements = diagnosis.findings.iter().map(|finding| &finding.statement);
     assert_eq!(
-        &found,
+        &found.collect::<Named>(),
         concealed,
         "{}: {:#?}",
         diagnosis.statement,
-        diagnosis
-            .findings
-            .iter()
-            .map(|f| &f.statement)
-            .collect::<Vec<_>>()
+        statements.collect::<Vec<_>>()
     );
     // A noise that is taken from what is left explains nothing.
     let inferred = diagnosis.noise_basis == NoiseBasis::Inferred;
-    let verdict = if inferred {
-        VerdictKind::Unexplained
-    } else {
-        VerdictKind::Explained
+    let verdict = match inferred {
+        true => VerdictKind::Unexplained,
+        false => VerdictKind::Explained,
     };
     assert_eq!(diagnosis.verdict, verdict, "{}", diagnosis.statement);
     let (before, after) = (diagnosis.before.unwrap().rms, diagnosis.after.unwrap().rms);
@@ -348,48 +313,18 @@ fn causes_are_named_from_every_kind_of_measurement() {
     );
     let both: Seen = |recorded| recorded.with_wires().with_some_points();
     let causes = |gear, spring, play| Causes { gear, spring, play };
+    let first = causes((2, 3.0, 60.0, 25.0), (3, 2.5e-7), (5, 70.0));
+    let second = causes((3, 2.0, 60.0, 80.0), (2, 2.5e-7), (4, 70.0));
+    let third = causes((1, 2.0, 40.0, 70.0), (2, 2e-7), (3, 60.0));
+    let fourth = causes((4, 2.0, 60.0, 10.0), (2, 2e-7), (1, 50.0));
+    let fifth = causes((3, 2.0, 60.0, 40.0), (2, 2e-7), (1, 50.0));
     let (angle, length) = (Some(Dimension::Angle), Some(Dimension::Length));
     for (causes, count, given, play_arcsec, seen, dimension) in [
-        (
-            causes((2, 3.0, 60.0, 25.0), (3, 2.5e-7), (5, 70.0)),
-            700,
-            &UPRIGHT[..],
-            0.0,
-            level,
-            angle,
-        ),
-        (
-            causes((3, 2.0, 60.0, 80.0), (2, 2.5e-7), (4, 70.0)),
-            700,
-            &UPRIGHT,
-            4.0,
-            level,
-            angle,
-        ),
-        (
-            causes((1, 2.0, 40.0, 70.0), (2, 2e-7), (3, 60.0)),
-            480,
-            &[],
-            1.5,
-            wires,
-            length,
-        ),
-        (
-            causes((4, 2.0, 60.0, 10.0), (2, 2e-7), (1, 50.0)),
-            240,
-            &[],
-            2.0,
-            both,
-            None,
-        ),
-        (
-            causes((3, 2.0, 60.0, 40.0), (2, 2e-7), (1, 50.0)),
-            480,
-            &[],
-            0.0,
-            camera,
-            angle,
-        ),
+        (first, 700, &UPRIGHT[..], 0.0, level, angle),
+        (second, 700, &UPRIGHT, 4.0, level, angle),
+        (third, 480, &[], 1.5, wires, length),
+        (fourth, 240, &[], 2.0, both, None),
+        (fifth, 480, &[], 0.0, camera, angle),
     ] {
         let diagnosis = seen(recorded(&causes.physics(), count, given, play_arcsec)).diagnosed();
         explains(&diagnosis, &causes.named());

@@ -1,6 +1,6 @@
 //! What the numbers of a finding cannot be is no name of it: `unknown` stands at its place, and the statement says why.
 
-use super::{simulated, wanted};
+use super::{rms, simulated, wanted};
 use crate::answer::{has, starts_with};
 use calib::effect::{Form, Survey};
 use calib::robot::{Measurements, PointReadings, RobotModel};
@@ -137,9 +137,8 @@ fn joints_that_lag_by_less_than_nothing_have_no_name_and_the_model_is_the_same()
         "{answer:#}"
     );
     // What has no name still reproduces the error.
-    let rms = |when: &str| answer[when]["validate_rms_mm"].as_f64().unwrap();
     assert!(
-        rms("after") < 0.5 * rms("before") && answer["verdict"] == "unexplained",
+        rms(&answer, "after") < 0.5 * rms(&answer, "before") && answer["verdict"] == "unexplained",
         "{answer:#}"
     );
     let same = simulated("{joint_log_lag: {share: 0.002}}", 3, 120);

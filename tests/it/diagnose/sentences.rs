@@ -1,35 +1,16 @@
 //! What a diagnosis says where the recording is poor: without a clock no seconds, of few rows nothing.
 
-use super::{CASE, calib, case_with, concealed, refused, table_of};
-use crate::answer::{has, put, read, starts_with};
+use super::{CASE, calib, case_with, concealed, diagnosis, position, refused, rewritten, table_of};
+use crate::answer::{self, has, put, read, starts_with};
 use calib::table::{Curves, Findings};
 use serde_json::Value;
-use std::path::Path;
-
-/// Rewrites the cells of the controller's log, row by row, the head first.
-fn rewritten(folder: &Path, mut change: impl FnMut(usize, &mut Vec<String>)) {
-    let file = folder.join("sealed/recordings/c0001/controller.csv");
-    let text = read(&file);
-    let mut line = |(row, line): (usize, &str)| {
-        let mut cells: Vec<String> = line.split(',').map(String::from).collect();
-        change(row, &mut cells);
-        cells.join(",") + "\n"
-    };
-    let text: String = text.lines().enumerate().map(&mut line).collect();
-    std::fs::write(&file, text).unwrap();
-}
-
-fn diagnosed(folder: &Path) -> Value {
-    let printed = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), folder);
-    serde_json::from_str(&printed).unwrap()
-}
 
 #[test]
 fn without_a_clock_nothing_is_said_in_seconds() {
     let folder = concealed("zero_shift", "923", "120");
     let here = folder.path();
     case_with(here, &[]);
-    let timed = diagnosed(here);
+    let timed = diagnosis(here);
     assert_eq!(timed["clock"], "s");
     assert!(
         timed["findings"][0]["statement"]
@@ -45,15 +26,14 @@ fn without_a_clock_nothing_is_said_in_seconds() {
         .unwrap();
     let mut times: Vec<f64> = Vec::new();
     let mut column = None;
-    rewritten(here, |row, cells| {
-        let at =
-            *column.get_or_insert_with(|| cells.iter().position(|name| name == "time_s").unwrap());
+    rewritten(here, "controller.csv", |row, cells| {
+        let at = *column.get_or_insert_with(|| position(cells, "time_s"));
         let cell = cells.remove(at);
         if row > 0 {
             times.push(cell.parse().unwrap());
         }
     });
-    let rows = diagnosed(here);
+    let rows = diagnosis(here);
     assert_eq!(rows["clock"], "row");
     let first = times.iter().position(|time| *time > step).unwrap() + 1;
     let statement = rows["findings"][0]["statement"].as_str().unwrap();
@@ -81,10 +61,9 @@ fn without_a_clock_nothing_is_said_in_seconds() {
         assert!(point.x >= 1.0 && point.x.fract() == 0.0, "{}", point.x);
     }
     put(here, "t.csv", "x_mm,y_mm,z_mm\n600,0,700\n");
-    let (code, printed) = refused("compensate HEAD t.csv --time 100", here);
-    assert!(
-        code == Some(2) && printed.contains("--time: the recording of the model has no clock"),
-        "{printed}"
+    has(
+        &refused("compensate HEAD t.csv --time 100", here),
+        "--time: the recording of the model has no clock",
     );
 }
 
@@ -98,15 +77,11 @@ fn a_diagnosis_that_cannot_make_up_for_missing_masses_does_not_stand_for_the_run
     assert!(fields.remove("mass").is_some() && fields.remove("com").is_some());
     std::fs::write(&file, robot.to_string()).unwrap();
     case_with(here, &[]);
-    let run: Value =
-        serde_json::from_str(&calib(&format!("run p.yaml --quiet --json {CASE}"), here)).unwrap();
+    let run = answer::calib(here, &format!("run p.yaml --quiet --json {CASE}")).json();
     let rms = |step: &Value| {
-        let rows = run["statistics"].as_array().unwrap();
-        let row = rows
-            .iter()
-            .find(|row| row["step"] == *step && row["held_out"] == true)
-            .unwrap();
-        row["rms_mm"].as_f64().unwrap()
+        let mut rows = run["statistics"].as_array().unwrap().iter();
+        let row = rows.find(|row| row["step"] == *step && row["held_out"] == true);
+        row.unwrap()["rms_mm"].as_f64().unwrap()
     };
     // The payload alone winds up the joints of `joint`, which is all that the file lets one know.
     let standing = &run["standing"]["step"];
@@ -116,7 +91,7 @@ fn a_diagnosis_that_cannot_make_up_for_missing_masses_does_not_stand_for_the_run
         rms(standing),
         rms(&"joint".into())
     );
-    let (_, printed) = refused("compensate HEAD --quiet p.yaml", here);
+    let printed = answer::calib(here, "compensate HEAD --quiet p.yaml").err;
     assert_eq!(
         printed.contains("warning: `diagnose` is withdrawn"),
         *standing != "diagnose",
@@ -129,9 +104,8 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
     let folder = concealed("zero_shift", "923", "60");
     let here = folder.path();
     let (mut column, mut kept) = (None, 0);
-    rewritten(here, |_, cells| {
-        let at =
-            *column.get_or_insert_with(|| cells.iter().position(|name| name == "use").unwrap());
+    rewritten(here, "controller.csv", |_, cells| {
+        let at = *column.get_or_insert_with(|| position(cells, "use"));
         if cells[at] == "fit" {
             kept += 1;
             if kept > 12 {
@@ -141,7 +115,7 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
     });
     case_with(here, &[]);
     calib(&format!("run p.yaml --quiet {CASE}"), here);
-    let answer = diagnosed(here);
+    let answer = diagnosis(here);
     assert_eq!(
         (&answer["verdict"], &answer["findings"]),
         (&"not_asked".into(), &serde_json::json!([]))

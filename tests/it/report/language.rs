@@ -12,13 +12,10 @@ const MESSAGES: &str = include_str!("../../../src/report/language/de.po");
 const STORED: &str = include_str!("../../../src/report/language/de_stored.po");
 
 /// Sources whose sentences stand in tables that the page shows.
-const SOURCES: [&str; 16] = [
+const SOURCES: [&str; 13] = [
     "numerics/compensate/remark",
-    "numerics/diagnose/judge/withdraw",
-    "numerics/diagnose/open_world/look",
     "numerics/diagnose/setup/",
-    "numerics/diagnose/too_few",
-    "numerics/diagnose/verdict_statement",
+    "numerics/diagnose/unasked",
     "numerics/diagnose/words/",
     "numerics/estimate/observe",
     "stage/advice",

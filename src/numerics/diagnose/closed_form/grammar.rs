@@ -54,11 +54,14 @@ fn rounded(value: f64, direction: fn(f64) -> f64) -> f64 {
     direction(value / scale) * scale
 }
 
+/// A shape number by its name.
+type ShapeNumber = (&'static str, ShapeRange);
+
 /// A formula before its place is known.
 struct Sketch {
     label: &'static str,
     laws: Vec<String>,
-    shape: Vec<(&'static str, ShapeRange)>,
+    shape: Vec<ShapeNumber>,
 }
 
 /// Declarations of all formulas at `place` of one variable, or of two; their coefficients are in `unit`.
@@ -68,8 +71,8 @@ pub(super) fn declarations(
     variables: &[NamedVariable],
 ) -> Vec<EffectDeclaration> {
     let sketches = match variables {
-        [one] => of_one(one),
-        [first, second] => of_two(first, second),
+        [one] => one_variable(one),
+        [first, second] => two_variables(first, second),
         _ => Vec::new(),
     };
     let subject: Vec<String> = variables
@@ -120,120 +123,73 @@ fn span(variable: &NamedVariable) -> f64 {
 }
 
 /// Where something happens.
-fn centre(variable: &NamedVariable) -> (&'static str, ShapeRange) {
+fn centre(variable: &NamedVariable) -> ShapeNumber {
     let [from, to] = variable.range;
-    let steps = if variable.is_angle {
-        (span(variable) / *SPACING) as usize
-    } else {
-        12
+    let steps = match variable.is_angle {
+        true => (span(variable) / *SPACING) as usize,
+        false => 12,
     };
-    let start = (1..steps)
-        .map(|k| (1e3 * (from + span(variable) * k as f64 / steps as f64)).round() / 1e3)
-        .collect();
-    (
-        "centre",
-        ShapeRange {
-            from,
-            to,
-            start: Starts(start),
-        },
-    )
+    let at = |k: usize| from + span(variable) * k as f64 / steps as f64;
+    let start = Starts((1..steps).map(|k| (1e3 * at(k)).round() / 1e3).collect());
+    ("centre", ShapeRange { from, to, start })
 }
 
 /// Over how much.
-fn width(variable: &NamedVariable) -> (&'static str, ShapeRange) {
-    let shares: &[f64] = if variable.is_angle {
-        &[0.02, 0.06]
-    } else {
-        &[0.05, 0.2]
+fn width(variable: &NamedVariable) -> ShapeNumber {
+    let shares = match variable.is_angle {
+        true => [0.02, 0.06],
+        false => [0.05, 0.2],
     };
-    let start = shares.iter().map(|share| share * span(variable)).collect();
-    (
-        "width",
-        ShapeRange {
-            from: 0.004 * span(variable),
-            to: span(variable),
-            start: Starts(start),
-        },
-    )
+    let (from, to) = (0.004 * span(variable), span(variable));
+    let start = Starts(shares.map(|share| share * span(variable)).to_vec());
+    ("width", ShapeRange { from, to, start })
 }
 
 /// How often.
-fn order(variable: &NamedVariable) -> (&'static str, ShapeRange) {
-    let unit = if variable.is_angle {
-        1.0
-    } else {
-        std::f64::consts::TAU / span(variable)
+fn order(variable: &NamedVariable) -> ShapeNumber {
+    let (unit, last) = match variable.is_angle {
+        true => (1.0, *ORDER),
+        false => (std::f64::consts::TAU / span(variable), *TURNS),
     };
-    let last = if variable.is_angle { *ORDER } else { *TURNS };
     let start = (1..=4 * last as usize)
         .map(|k| 0.25 * k as f64)
         .filter(|k| *k >= 0.5 && *k < last)
         .map(|k| k * unit);
-    (
-        "order",
-        ShapeRange {
-            from: 0.4 * unit,
-            to: last * unit,
-            start: Starts(start.step_by(2).collect()),
-        },
-    )
+    let (from, to) = (0.4 * unit, last * unit);
+    let start = Starts(start.step_by(2).collect());
+    ("order", ShapeRange { from, to, start })
 }
 
-fn of_one(variable: &NamedVariable) -> Vec<Sketch> {
+fn one_variable(variable: &NamedVariable) -> Vec<Sketch> {
     let (v, [low, high]) = (&variable.name, variable.range);
-    let bare = |label, laws: &[String]| Sketch {
-        label,
-        laws: laws.to_vec(),
-        shape: Vec::new(),
+    let mut out = Vec::new();
+    let mut add = |label, laws: &[String], shape: &[fn(&NamedVariable) -> ShapeNumber]| {
+        out.push(Sketch {
+            label,
+            laws: laws.to_vec(),
+            shape: shape.iter().map(|number| number(variable)).collect(),
+        });
     };
-    let mut out = vec![
-        bare("line", std::slice::from_ref(v)),
-        bare("square", &[format!("{v}^2")]),
-        bare("cube", &[format!("{v}^3")]),
-        bare("cubic", &[format!("{v}^2"), format!("{v}^3")]),
-        bare("growing_square", &[format!("{v} * abs({v})")]),
-        bare("root", &[format!("sqrt(abs({v}))")]),
-        Sketch {
-            label: "kink",
-            laws: vec![format!("abs({v} - centre)")],
-            shape: vec![centre(variable)],
-        },
-        Sketch {
-            label: "step",
-            laws: vec![format!("step({v} - centre)")],
-            shape: vec![centre(variable)],
-        },
-        Sketch {
-            label: "rise",
-            laws: vec![format!("tanh(({v} - centre) / width)")],
-            shape: vec![centre(variable), width(variable)],
-        },
-        Sketch {
-            label: "bump",
-            laws: vec![format!("exp(-(({v} - centre) / width)^2)")],
-            shape: vec![centre(variable), width(variable)],
-        },
-        Sketch {
-            label: "wave",
-            laws: vec![format!("sin(order * {v})"), format!("cos(order * {v})")],
-            shape: vec![order(variable)],
-        },
-    ];
+    add("line", std::slice::from_ref(v), &[]);
+    add("square", &[format!("{v}^2")], &[]);
+    add("cube", &[format!("{v}^3")], &[]);
+    add("cubic", &[format!("{v}^2"), format!("{v}^3")], &[]);
+    add("growing_square", &[format!("{v} * abs({v})")], &[]);
+    add("root", &[format!("sqrt(abs({v}))")], &[]);
+    add("kink", &[format!("abs({v} - centre)")], &[centre]);
+    add("step", &[format!("step({v} - centre)")], &[centre]);
+    let rise = format!("tanh(({v} - centre) / width)");
+    add("rise", &[rise], &[centre, width]);
+    let bump = format!("exp(-(({v} - centre) / width)^2)");
+    add("bump", &[bump], &[centre, width]);
+    let [sine, cosine] = ["sin", "cos"].map(|wave| format!("{wave}(order * {v})"));
+    add("wave", &[sine, cosine], &[order]);
     if low < 0.0 && high > 0.0 {
-        out.push(bare("side", &[format!("sign({v})")]));
+        add("side", &[format!("sign({v})")], &[]);
     }
     if !variable.is_angle {
-        out.push(Sketch {
-            label: "decay",
-            laws: vec![format!("exp(-({v} - {low}) / width)")],
-            shape: vec![width(variable)],
-        });
-        out.push(Sketch {
-            label: "rush",
-            laws: vec![format!("exp(({v} - {high}) / width)")],
-            shape: vec![width(variable)],
-        });
+        add("decay", &[format!("exp(-({v} - {low}) / width)")], &[width]);
+        add("rush", &[format!("exp(({v} - {high}) / width)")], &[width]);
     }
     out
 }
@@ -255,7 +211,7 @@ fn factors(variable: &NamedVariable) -> Vec<(&'static str, Vec<String>)> {
     out
 }
 
-fn of_two(first: &NamedVariable, second: &NamedVariable) -> Vec<Sketch> {
+fn two_variables(first: &NamedVariable, second: &NamedVariable) -> Vec<Sketch> {
     let products = |a: &[String], b: &[String]| -> Vec<String> {
         a.iter()
             .flat_map(|a| b.iter().map(move |b| format!("{a} * {b}")))
@@ -285,20 +241,17 @@ fn of_two(first: &NamedVariable, second: &NamedVariable) -> Vec<Sketch> {
     for (one, other) in [(first, second), (second, first)] {
         let (v, w) = (&one.name, &other.name);
         if one.is_angle {
-            let laws = vec![
-                format!("sin(order * {v}) * {w}"),
-                format!("cos(order * {v}) * {w}"),
-            ];
             out.push(Sketch {
                 label: "scaled_wave",
-                laws,
+                laws: ["sin", "cos"]
+                    .map(|wave| format!("{wave}(order * {v}) * {w}"))
+                    .to_vec(),
                 shape: vec![order(one)],
             });
         }
-        let law = format!("exp(-(({v} - centre) / width)^2) * {w}");
         out.push(Sketch {
             label: "scaled_bump",
-            laws: vec![law],
+            laws: vec![format!("exp(-(({v} - centre) / width)^2) * {w}")],
             shape: vec![centre(one), width(one)],
         });
     }

@@ -11,12 +11,12 @@
 use crate::closed_form::grammar::{NamedVariable, declarations};
 use crate::criteria::closed_form::{BETTER, LIKE, SHOWN, STARTS};
 use crate::effect::{
-    DeclaredCause, DeclaredForm, Form, Motion, ParameterEstimate, Place, Survey, Variable, names,
-    people,
+    DeclaredCause, DeclaredForm, EffectDeclaration, Form, Motion, ParameterEstimate, Place, Survey,
+    Variable, names, people,
 };
-use crate::judge::{Alternatives, FoldErrors};
+use crate::judge::{Alternatives, fold_error};
 use crate::regression::FormRegression;
-use crate::round::{EstimatedCause, FitState, Fitter, RoundView};
+use crate::round::{EstimatedCause, FitState, RoundView};
 use crate::types::{ClosedForm, Finding};
 use nalgebra::DMatrix;
 
@@ -27,7 +27,6 @@ pub(super) struct FormulaSearch<'a, 'b> {
     pub(crate) state: &'b FitState,
     pub(crate) view: &'b RoundView<'a>,
     pub(crate) survey: &'b Survey<'a>,
-    pub(crate) fitter: &'b Fitter<'b>,
 }
 
 /// A formula with its shape numbers where they fit best.
@@ -39,7 +38,7 @@ struct Candidate {
 
 impl FormulaSearch<'_, '_> {
     /// Formulas for findings, those of each cheapest first; none where it has a name, or is no function of one or two variables.
-    pub(crate) fn of_all(&self, findings: &[Finding]) -> Vec<ClosedForm> {
+    pub(crate) fn formulas(&self, findings: &[Finding]) -> Vec<ClosedForm> {
         findings
             .iter()
             .enumerate()
@@ -51,36 +50,21 @@ impl FormulaSearch<'_, '_> {
     fn forms(&self, at: usize, finding: &Finding) -> Option<Vec<ClosedForm>> {
         let nameless = |form: &Form| form.cause().is_nameless();
         // What it has elsewhere are details of the model.
-        let forms: Vec<&Form> = finding
-            .forms
-            .iter()
-            .filter(|form| form.place() == finding.place)
-            .collect();
-        if finding.effect != names::UNKNOWN
-            || forms.is_empty()
-            || !forms.iter().all(|form| nameless(form))
-        {
+        let forms = finding.forms.iter();
+        let forms: Vec<&Form> = forms.filter(|form| form.place() == finding.place).collect();
+        let is_named = finding.effect != names::UNKNOWN;
+        if is_named || forms.is_empty() || !forms.iter().all(|form| nameless(form)) {
             return None;
         }
         let causes = &self.state.causes;
-        let members: Vec<usize> = (0..causes.len())
-            .filter(|i| forms.contains(&&causes[*i].form))
-            .collect();
+        let is_member = |i: &usize| forms.contains(&&causes[*i].form);
+        let (members, others): (Vec<usize>, Vec<usize>) = (0..causes.len()).partition(is_member);
         let (place, variables) = self.variables(&forms)?;
-        let others: Vec<&Form> = (0..causes.len())
-            .filter(|i| !members.contains(i))
-            .map(|i| &causes[i].form)
-            .collect();
-        let (problem, jacobian) = (
-            &self.view.problem,
-            self.view.problem.jacobian(self.fitter.free()),
-        );
-        let given = FormRegression::new(
-            problem,
-            &jacobian,
-            &others,
-            &self.view.without_causes(self.state),
-        );
+        let others: Vec<&Form> = others.iter().map(|i| &causes[*i].form).collect();
+        let problem = &self.view.problem;
+        let jacobian = problem.jacobian(self.view.fitter.free());
+        let residual = self.view.without_causes(self.state);
+        let given = FormRegression::new(problem, &jacobian, &others, &residual);
         let Place::Joint(joint) = finding.place else {
             return None;
         };
@@ -89,45 +73,40 @@ impl FormulaSearch<'_, '_> {
         } else {
             "mm"
         };
-        let candidates: Vec<Candidate> = declarations(&place, unit, &variables)
-            .iter()
-            .filter_map(|declaration| {
-                self.candidate(DeclaredCause::of(declaration).ok()?, finding.place, &given)
-            })
-            .collect();
-        let rivals: Vec<EstimatedCause> = candidates
-            .iter()
-            .map(|candidate| self.at_zero(&candidate.form))
-            .collect();
-        let alternatives = Alternatives::of(self.state, self.fitter, &rivals)?;
-        let near = alternatives.near()?;
-        // Where nothing near the model does without them, all that is known is that it is worse than any formula.
-        let without = near.errors(&members, None).map(|errors| errors.rms());
-        let curve = FoldErrors::of(self.state, self.fitter)?.rms();
-        let priced = |(k, candidate): (usize, &Candidate)| Priced {
-            price: candidate.price,
-            error: near
-                .errors(&members, Some(k))
-                .map_or(f64::NAN, |errors| errors.rms()),
+        let declarations = declarations(&place, unit, &variables);
+        let candidate = |declaration: &EffectDeclaration| {
+            self.candidate(DeclaredCause::of(declaration).ok()?, finding.place, &given)
         };
-        let priced: Vec<Priced> = candidates.iter().enumerate().map(priced).collect();
-        let (shown, chosen) = front(&priced, [without.unwrap_or(f64::INFINITY), curve])?;
-        let one = |(position, k): (usize, &usize)| ClosedForm {
-            finding: at,
-            declaration: candidates[*k].cause.declaration().clone(),
-            price: priced[*k].price,
-            folds: priced[*k].error,
-            curve,
-            without,
-            chosen: Some(position) == chosen,
-            numbers: self.numbers(
-                &candidates[*k],
-                &variables,
-                &given,
-                near.coefficients(&members, *k),
-            ),
-        };
-        Some(shown.iter().enumerate().map(one).collect())
+        let candidates: Vec<Candidate> = declarations.iter().filter_map(candidate).collect();
+        let forms = candidates.iter().map(|candidate| &candidate.form);
+        let rivals: Vec<EstimatedCause> = forms.map(|form| self.at_zero(form)).collect();
+        let (state, fitter) = (self.state, self.view.fitter);
+        let curve = fold_error(state, fitter)?;
+        let shown = Alternatives::ask(state, fitter, &rivals, |near| {
+            // Where nothing near the model does without them, all that is known is that it is worse than any formula.
+            let without = near.error(&members, None);
+            let priced = |(k, candidate): (usize, &Candidate)| Priced {
+                price: candidate.price,
+                error: near.error(&members, Some(k)).unwrap_or(f64::NAN),
+            };
+            let priced: Vec<Priced> = candidates.iter().enumerate().map(priced).collect();
+            let (shown, chosen) = front(&priced, [without.unwrap_or(f64::INFINITY), curve])?;
+            let one = |(position, k): (usize, &usize)| {
+                let coefficients = near.coefficients(&members, *k);
+                ClosedForm {
+                    finding: at,
+                    declaration: candidates[*k].cause.declaration().clone(),
+                    price: priced[*k].price,
+                    folds: priced[*k].error,
+                    curve,
+                    without,
+                    chosen: Some(position) == chosen,
+                    numbers: self.numbers(&candidates[*k], &variables, &given, coefficients),
+                }
+            };
+            Some(shown.iter().enumerate().map(one).collect())
+        });
+        shown.flatten()
     }
 
     /// The place as a declaration has it, and the variables, where they are one or two.
@@ -162,26 +141,10 @@ impl FormulaSearch<'_, '_> {
 
     /// Lowest and highest value over the fitted rows.
     fn range(&self, variable: Variable) -> Option<[f64; 2]> {
-        let survey = self.survey;
-        let value = |(i, row): (usize, &usize)| {
-            Some(match variable {
-                Variable::Angle { joint } => survey.data.q(*row)[joint],
-                Variable::Load { joint } => survey.torque[i * survey.joints() + joint],
-                Variable::Approach { joint } => survey.data.direction(*row, joint),
-                Variable::Move { joint } => survey.data.last_move(*row, joint),
-                Variable::Velocity { joint } => survey.data.velocity(*row, joint),
-                Variable::Temperature => survey.data.temperature(*row)?,
-                Variable::Time => survey.data.time(*row),
-                Variable::Payload => survey.data.payload[*row],
-                _ => return None,
-            })
-        };
-        let values: Option<Vec<f64>> = survey.rows.iter().enumerate().map(value).collect();
-        values?
-            .into_iter()
-            .fold(None, |range: Option<[f64; 2]>, value| {
-                Some(range.map_or([value; 2], |[low, high]| [low.min(value), high.max(value)]))
-            })
+        let values = self.view.problem.values(variable)?;
+        let first = *values.first()?;
+        let wider = |[low, high]: [f64; 2], value: &f64| [low.min(*value), high.max(*value)];
+        Some(values.iter().fold([first; 2], wider))
     }
 
     /// A declared law at the place of the finding, its shape numbers where they fit best.
@@ -191,24 +154,17 @@ impl FormulaSearch<'_, '_> {
         place: Place,
         given: &FormRegression,
     ) -> Option<Candidate> {
-        let forms = DeclaredForm::hypotheses(cause, self.survey)
-            .into_iter()
-            .map(|hypothesis| hypothesis.form);
+        let forms = DeclaredForm::hypotheses(cause, self.survey).into_iter();
+        let forms = forms.map(|hypothesis| hypothesis.form);
         let forms: Vec<Form> = forms.filter(|form| form.place() == place).collect();
-        let gains = given.gains(&forms);
-        let mut starts: Vec<(f64, Form)> = gains.into_iter().zip(forms).collect();
+        let with_gains = |forms: Vec<Form>| given.gains(&forms).into_iter().zip(forms);
+        let mut starts: Vec<(f64, Form)> = with_gains(forms).collect();
         starts.sort_by(|a, b| b.0.total_cmp(&a.0));
         // The best start need not lead to the best shape.
-        let ends: Vec<Form> = starts
-            .into_iter()
-            .take(*STARTS)
-            .map(|(_, form)| given.refined(form, self.survey))
-            .collect();
-        let gains = given.gains(&ends);
-        let (_, form) = gains
-            .into_iter()
-            .zip(ends)
-            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        starts.truncate(*STARTS);
+        let ends = starts.into_iter();
+        let ends = ends.map(|(_, form)| given.refined(form, self.survey));
+        let (_, form) = with_gains(ends.collect()).max_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(Candidate {
             cause,
             form,
@@ -236,32 +192,30 @@ impl FormulaSearch<'_, '_> {
     ) -> Vec<ParameterEstimate> {
         let Candidate { form, .. } = candidate;
         let sigmas = shape_sigmas(form, given);
+        let number = |name: String, value: f64, unit, sigma| ParameterEstimate {
+            name,
+            form: 0,
+            value,
+            unit,
+            sigma,
+        };
         let shape = form.shape_numbers().into_iter().zip(sigmas);
-        let mut out: Vec<ParameterEstimate> = shape
-            .map(|((name, value), sigma)| {
-                let (unit, scale) = unit(&name, variables);
-                ParameterEstimate {
-                    unit,
-                    name,
-                    form: 0,
-                    value: scale * value,
-                    sigma: sigma.map(|sigma| scale * sigma),
-                }
-            })
-            .collect();
+        let shape = shape.map(|((name, value), sigma)| {
+            let (symbol, scale) = unit(&name, variables);
+            number(
+                name,
+                scale * value,
+                symbol,
+                sigma.map(|sigma| scale * sigma),
+            )
+        });
+        let mut out: Vec<ParameterEstimate> = shape.collect();
         let specs = form.parameters(&self.state.model.robot);
-        for ((spec, (value, sigma)), number) in
-            specs.iter().zip(coefficients.unwrap_or_default()).zip(1..)
-        {
+        let coefficients = specs.iter().zip(coefficients.unwrap_or_default());
+        for (k, (spec, (value, sigma))) in (1..).zip(coefficients) {
             let (unit, symbol) = people(spec.unit);
-            let (value, sigma) = (unit.from_si(value), Some(unit.from_si(sigma)));
-            out.push(ParameterEstimate {
-                name: format!("c{number}"),
-                form: 0,
-                value,
-                unit: symbol,
-                sigma,
-            });
+            let sigma = Some(unit.from_si(sigma));
+            out.push(number(format!("c{k}"), unit.from_si(value), symbol, sigma));
         }
         out
     }
@@ -297,10 +251,10 @@ pub(crate) fn front(
         .filter(|k| all[*k].error.is_finite())
         .collect();
     order.sort_by(|a, b| {
-        all[*a]
-            .price
-            .cmp(&all[*b].price)
-            .then(all[*a].error.total_cmp(&all[*b].error))
+        let (one, other) = (&all[*a], &all[*b]);
+        let by_price = one.price.cmp(&other.price);
+        by_price
+            .then(one.error.total_cmp(&other.error))
             .then(a.cmp(b))
     });
     let mut falls: Vec<(usize, f64)> = Vec::new();
@@ -369,12 +323,9 @@ pub(crate) fn shape_sigmas(form: &Form, given: &FormRegression) -> Vec<Option<f6
     let Some(covariance) = information.try_inverse() else {
         return unknown;
     };
-    (0..count)
-        .map(|k| {
-            Some(covariance[(k, k)])
-                .filter(|variance| *variance > 0.0)
-                .map(f64::sqrt)
-        })
+    let variances = (0..count).map(|k| covariance[(k, k)]);
+    variances
+        .map(|variance| (variance > 0.0).then(|| variance.sqrt()))
         .collect()
 }
 

@@ -37,17 +37,11 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
         }
         let numbers: Vec<usize> = family.iter().map(|k| range.start + k).collect();
         let specs = cause.form.parameters(&state.model.robot);
-        let free: Vec<usize> = numbers
-            .iter()
-            .copied()
-            .filter(|k| covariance.parameters().contains(k))
-            .collect();
-        let Some(size) = size(
-            &state.model,
-            covariance,
-            &free,
-            specs[family[0]].prior_sigma,
-        ) else {
+        let estimated = numbers.iter().copied();
+        let estimated = estimated.filter(|k| covariance.parameters().contains(k));
+        let (free, plausible): (Vec<usize>, f64) =
+            (estimated.collect(), specs[family[0]].prior_sigma);
+        let Some(size) = size(&state.model, covariance, &free, plausible) else {
             continue;
         };
         // Bodies farther out are lighter and shorter: what rows hardly show of them is no larger than what they show of the arm's lines.
@@ -56,10 +50,9 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
             .filter(|k| !numbers.contains(k) && is_shown(state, *k))
             .map(|k| state.model.x[k].abs());
         let most = others.fold(0.0, f64::max);
-        let size = if most > 0.0 {
-            size.clamp(*BESIDE * most, most)
-        } else {
-            size
+        let size = match most > 0.0 {
+            true => size.clamp(*BESIDE * most, most),
+            false => size,
         };
         any = true;
         let sigma = |k: usize| match specs[k].prior_sigma {
@@ -67,12 +60,11 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
             plausible if most > 0.0 && !is_shown(state, range.start + k) => plausible.min(most),
             plausible => plausible,
         };
-        cause.priors = (0..specs.len())
-            .map(|k| Prior {
-                mean: 0.0,
-                sigma: sigma(k),
-            })
-            .collect();
+        let prior = |k: usize| Prior {
+            mean: 0.0,
+            sigma: sigma(k),
+        };
+        cause.priors = (0..specs.len()).map(prior).collect();
     }
     any.then_some(causes)
 }
@@ -90,19 +82,14 @@ fn is_shown(state: &FitState, k: usize) -> bool {
 fn size(model: &Model, covariance: &Covariance, numbers: &[usize], plausible: f64) -> Option<f64> {
     let block = covariance.block(numbers)?;
     let values = DVector::from_iterator(numbers.len(), numbers.iter().map(|k| model.x[*k]));
-    let prior = |k: usize| {
-        model
-            .known(k)
-            .prior
-            .map_or(0.0, |prior| prior.sigma.powi(-2))
+    let prior = |k: &usize| {
+        let prior = model.known(*k).prior;
+        prior.map_or(0.0, |prior| prior.sigma.powi(-2))
     };
     let posterior = block.try_inverse()?;
     let about = &posterior * values;
-    let data = posterior
-        - DMatrix::from_diagonal(&DVector::from_iterator(
-            numbers.len(),
-            numbers.iter().map(|k| prior(*k)),
-        ));
+    let priors = DVector::from_iterator(numbers.len(), numbers.iter().map(prior));
+    let data = posterior - DMatrix::from_diagonal(&priors);
     let SymmetricEigen {
         eigenvectors,
         eigenvalues,
@@ -116,15 +103,13 @@ fn size(model: &Model, covariance: &Covariance, numbers: &[usize], plausible: f6
     };
     let sizes = (0..=STEPS).map(|step| plausible * (-FOLDS * step as f64 / STEPS as f64).exp());
     let all: Vec<(f64, f64)> = sizes.map(|size| (size, evidence(size))).collect();
-    let best = all
-        .iter()
-        .map(|(_, evidence)| *evidence)
-        .fold(f64::NEG_INFINITY, f64::max);
+    let best = all.iter().map(|(_, evidence)| *evidence);
+    let best = best.fold(f64::NEG_INFINITY, f64::max);
     // From the plausible size downwards: the loosest that rows do not speak against.
-    let loosest = all
+    let mut loosest = all
         .into_iter()
-        .find(|(_, evidence)| *evidence >= best - *AGAINST)
-        .map(|(size, _)| size)?;
+        .filter(|(_, evidence)| *evidence >= best - *AGAINST);
+    let (loosest, _) = loosest.next()?;
     // What rows clearly show is as large as it is.
     let shown = eigenvalues
         .iter()

@@ -5,14 +5,13 @@
 //! the coefficients of causes are random with the variances at which they were found, and the likelihood is the marginal one of the rows,
 //! restricted to what the base model cannot do (Patterson and Thompson, 1971).
 
-use super::along_path::CorrelationChange;
 use super::fit_state::{FitState, Fitter};
-use super::stretches::{first_of_pose, thinned};
+use super::stretches::{CorrelationChange, first_of_pose, thinned};
 use crate::criteria::cells::COMMON;
 use crate::criteria::noise::{AS_GOOD, PLAIN};
 use crate::diagnose::table::{Answer, FoundCell};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
-use crate::regression::{orthonormal, project};
+use crate::linear::{orthonormal, project};
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::prelude::*;
@@ -38,21 +37,17 @@ pub(crate) fn correlation_left_by(
     let problem = WhitenedProblem::new(&settled.model, &fitter.data, rows);
     // Rows that measured different numbers have no one correlation from each to the next.
     let width = problem.width()?;
-    let slow: Vec<bool> = settled
-        .causes
-        .iter()
-        .map(|cause| cause.form.follows_time())
-        .collect();
-    let with_all = Regression::of((&problem, width), settled, fitter, &vec![true; slow.len()]);
+    let slow = settled.causes.iter().map(|cause| cause.form.follows_time());
+    let slow: Vec<bool> = slow.collect();
+    let regression = |kept: &[bool]| Regression::of((&problem, width), settled, fitter, kept);
+    let with_all = regression(&vec![true; slow.len()]);
     let price = price_of(&answer.found, &|i| slow[i]);
     let believed = with_all.cost(fitter.correlated) + price;
     let (best, noise) = with_all.likeliest();
     if fitter.causes_of_the_arm_first() {
         // What noise alone explains as well has no other name.
         let best = best + price_of(&answer.found, &|_| true);
-        let (alone, of_noise) =
-            Regression::of((&problem, width), settled, fitter, &vec![false; slow.len()])
-                .likeliest();
+        let (alone, of_noise) = regression(&vec![false; slow.len()]).likeliest();
         let keeps_causes = best < alone - *PLAIN;
         return Some(CorrelationChange {
             noise: if keeps_causes { noise } else { of_noise },
@@ -62,7 +57,7 @@ pub(crate) fn correlation_left_by(
     let best = best + price;
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
-        let (cost, other) = Regression::of((&problem, width), settled, fitter, &kept).likeliest();
+        let (cost, other) = regression(&kept).likeliest();
         // What such noise explains as well is noise. Causes that were not found yet look like it, too: it has to be as much likelier as it is
         // likely that there are some.
         let some_left = -2.0 * answer.nothing_last.max(f64::MIN_POSITIVE).ln();
@@ -71,8 +66,8 @@ pub(crate) fn correlation_left_by(
             return (other != fitter.correlated).then(|| change(other));
         }
         let noise_instead = 1.0 / (1.0 + (unlikelier / 2.0).exp());
-        let of_time = |found: &&mut FoundCell| found.members.iter().any(|i| slow[*i]);
-        for found in answer.found.iter_mut().filter(of_time) {
+        let follows_time = |found: &&mut FoundCell| found.members.iter().any(|i| slow[*i]);
+        for found in answer.found.iter_mut().filter(follows_time) {
             found.or_nothing(noise_instead);
         }
     }
@@ -81,9 +76,8 @@ pub(crate) fn correlation_left_by(
 
 /// -2 ln of the prior odds of some findings.
 fn price_of(found: &[FoundCell], has: &dyn Fn(usize) -> bool) -> f64 {
-    let priced = found
-        .iter()
-        .filter(|found| found.members.iter().any(|i| has(*i)));
+    let is_priced = |found: &&FoundCell| found.members.iter().any(|i| has(*i));
+    let priced = found.iter().filter(is_priced);
     -2.0 * priced.map(|found| found.log_prior).sum::<f64>()
 }
 
@@ -110,17 +104,15 @@ impl<'a> Regression<'a> {
         kept: &[bool],
     ) -> Self {
         let rows = problem.residual_rows();
-        let mut points = problem.of_readings().to_vec();
+        let mut points = problem.measured_residual().to_vec();
         let mut random = Vec::new();
         for (cause, kept) in settled.causes.iter().zip(kept) {
             let columns = problem.columns(&cause.form);
             let numbers = cause.coefficients.iter().zip(&cause.priors);
             for (column, (coefficient, prior)) in columns.chunks(rows).zip(numbers) {
                 let known = if *kept { prior.mean } else { 0.0 };
-                points
-                    .iter_mut()
-                    .zip(column)
-                    .for_each(|(value, c)| *value += c * (coefficient - known));
+                let each = points.iter_mut().zip(column);
+                each.for_each(|(value, c)| *value += c * (coefficient - known));
                 if *kept {
                     random.extend(column.iter().map(|c| c * prior.sigma));
                 }
@@ -158,11 +150,13 @@ impl<'a> Regression<'a> {
         let columns = MatRef::from_column_major_slice(&columns, rows, count);
         let mut gram = Mat::zeros(count, count);
         let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+        let (out, transposed) = (gram.as_mut(), columns.transpose());
+        let by = Accum::Replace;
         matmul(
-            gram.as_mut(),
+            out,
             lower,
-            Accum::Replace,
-            columns.transpose(),
+            by,
+            transposed,
             whole,
             columns,
             whole,
@@ -190,18 +184,13 @@ impl<'a> Regression<'a> {
         let all: Vec<Option<AutocorrelatedNoise>> = AutocorrelatedNoise::all().collect();
         let costs: Vec<f64> = all.par_iter().map(|noise| self.cost(*noise)).collect();
         let best = costs.iter().copied().fold(f64::INFINITY, f64::min);
-        let as_good = all
-            .into_iter()
-            .zip(costs)
-            .filter(|(_, cost)| *cost < best + *AS_GOOD)
-            .map(|(noise, _)| noise);
+        let as_good = all.into_iter().zip(costs);
         let length =
             |noise: &Option<AutocorrelatedNoise>| noise.map_or(0.0, AutocorrelatedNoise::length);
-        (
-            best,
-            as_good
-                .max_by(|a, b| length(a).total_cmp(&length(b)))
-                .flatten(),
-        )
+        let as_good = as_good.filter(|(_, cost)| *cost < best + *AS_GOOD);
+        let longest = as_good
+            .map(|(noise, _)| noise)
+            .max_by(|a, b| length(a).total_cmp(&length(b)));
+        (best, longest.flatten())
     }
 }

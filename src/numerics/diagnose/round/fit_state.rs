@@ -1,18 +1,18 @@
 //! The model between rounds, and how it is fitted anew with other causes.
 
-use super::along_path::{CorrelationChange, PathCorrelation, follow_a_path};
-use super::base_model::base_model;
 use super::noise::{JointSpread, RepeatPairs, by_residual};
-use super::stretches::lasts;
+use super::stretches::{CorrelationChange, PathCorrelation, follow_a_path, lasts};
 use crate::criteria::noise::{ESTIMATES, REPEATS, SETTLED};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::AutocorrelatedNoise;
-use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, arm_effect, names};
+use crate::effect::{
+    Effect, EffectContext, EffectStack, Form, Load, arm_effect, identified, names,
+};
 use crate::estimate::{
-    CLEARLY, ErrorScale, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session,
+    CLEARLY, ErrorScale, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, align,
     fit_screened, seen,
 };
-use crate::robot::Measurements;
+use crate::robot::{Measurements, RobotModel};
 use std::ops::Range;
 
 /// A model with causes, fitted.
@@ -109,10 +109,7 @@ impl<'a> Fitter<'a> {
             scale: ErrorScale::of(question.data, question.fit),
             free: Vec::new(),
             faint: Vec::new(),
-            repeatability: JointRepeatability {
-                sigma: 0.0,
-                repeats: 0,
-            },
+            repeatability: JointRepeatability::default(),
             spread: JointSpread::default(),
             repeated: 0.0,
             scaled: false,
@@ -123,31 +120,21 @@ impl<'a> Fitter<'a> {
             keeps_all,
         };
         let base = base_model(question.robot, &fitter.data, question.fit, question.without);
-        let mut now = fitter.fit(&base, Vec::new());
-        fitter.follow(&now);
+        let mut now = fitter.refit(&base, Vec::new());
         fitter.spread = JointSpread::of(&now.model, &fitter.data);
         let kept = &now.screening.kept;
         let lasts = lasts(&now.model, &fitter.data, kept);
-        let shown = RepeatPairs::of(&fitter.data, kept).noise(
-            &now.model,
-            &fitter.data,
-            &fitter.spread,
-            lasts,
-        );
+        let pairs = RepeatPairs::of(&fitter.data, kept);
+        let shown = pairs.noise(&now.model, &fitter.data, &fitter.spread, lasts);
         fitter.repeatability = shown.joints;
         fitter.scaled = shown.scale != 1.0;
         if fitter.scaled {
-            fitter
-                .data
-                .points
-                .sigma
-                .iter_mut()
-                .for_each(|sigma| *sigma *= shown.scale);
+            let sigmas = fitter.data.points.sigma.iter_mut();
+            sigmas.for_each(|sigma| *sigma *= shown.scale);
             let returns = RepeatPairs::returns(&fitter.data, kept);
             let by_returns = returns.map_or(0.0, |pairs| {
-                pairs
-                    .repeatability(&now.model, &fitter.data, &fitter.spread)
-                    .sigma
+                let spread = &fitter.spread;
+                pairs.repeatability(&now.model, &fitter.data, spread).sigma
             });
             fitter.repeatability.sigma = fitter.repeatability.sigma.max(by_returns);
         }
@@ -256,14 +243,6 @@ impl<'a> Fitter<'a> {
         change: &CorrelationChange,
         settled: &FitState,
     ) -> Vec<EstimatedCause> {
-        let lasting = || {
-            settled
-                .causes
-                .iter()
-                .filter(|cause| !cause.form.follows_time())
-                .cloned()
-                .collect()
-        };
         match self.on_path {
             PathCorrelation::Unasked
                 if change.noise.is_some() && follow_a_path(&self.data, &settled.screening.kept) =>
@@ -276,11 +255,9 @@ impl<'a> Fitter<'a> {
         }
         self.correlated = change.noise;
         self.estimated += 1;
-        if change.keeps_causes {
-            lasting()
-        } else {
-            Vec::new()
-        }
+        let mut kept = settled.causes.clone();
+        kept.retain(|cause| change.keeps_causes && !cause.form.follows_time());
+        kept
     }
 
     /// From now on rows that no model follows are set aside.
@@ -315,6 +292,49 @@ impl<'a> Fitter<'a> {
             ranges,
         }
     }
+
+    /// The same, and the base parameters that the rows show then.
+    pub(crate) fn refit(&mut self, from: &Model, causes: Vec<EstimatedCause>) -> FitState {
+        let state = self.fit(from, causes);
+        self.follow(&state);
+        state
+    }
+}
+
+/// Effects that the user's simulation has.
+pub const BASE: [&str; 6] = [
+    names::BASE_FRAME,
+    names::TOOL_OFFSET,
+    names::JOINT_OFFSET,
+    names::LINK_GEOMETRY,
+    names::REDUCTION_RATIO,
+    names::COUPLING_RATIO,
+];
+
+/// The base model at its start, less the corrections that the user excludes.
+fn base_model(
+    robot: &RobotModel,
+    data: &Measurements,
+    rows: &[usize],
+    without: &[String],
+) -> Model {
+    let setting = EffectContext {
+        base: align(robot, data, rows),
+        load: Load::GravityTorque,
+    };
+    let effects: Vec<Box<dyn Effect>> = identified()
+        .filter(|cause| {
+            BASE.contains(&cause.name())
+                || (cause.name() == names::ANCHOR && !robot.setup().anchors.is_empty())
+        })
+        .filter(|cause| !without.iter().any(|name| name == cause.name()))
+        .filter_map(|cause| cause.arm_effect(&setting))
+        .filter(|effect| effect.missing(robot, data).is_none())
+        .collect();
+    Model::nominal(
+        robot.clone(),
+        EffectStack::new(robot, setting.base, effects),
+    )
 }
 
 /// The effects of the whole arm in `from` as they stand, then causes at their coefficients, and where the parameters of these are.

@@ -1,7 +1,5 @@
 //! A round: the recording is looked at around the present model, which is then fitted anew with the causes that were found.
 
-mod along_path;
-mod base_model;
 mod common_size;
 mod correlated_noise;
 mod fit_state;
@@ -9,7 +7,7 @@ mod noise;
 mod stretches;
 mod view;
 
-pub use base_model::BASE;
 pub(crate) use correlated_noise::correlation_left_by;
+pub use fit_state::BASE;
 pub(crate) use fit_state::{EstimatedCause, FitState, Fitter, with_causes};
 pub(crate) use view::{RoundView, compliance};

@@ -32,31 +32,29 @@ impl JointSpread {
     pub(crate) fn of(model: &Model, data: &Measurements) -> Self {
         let problem = WhitenedProblem::new(model, data, (0..data.rows()).collect());
         let summed = |motions: &[Vector3<f64>]| -> Matrix3<f64> {
-            motions
-                .iter()
-                .map(|motion| motion * motion.transpose())
-                .sum()
+            let squares = motions.iter().map(|motion| motion * motion.transpose());
+            squares.sum()
         };
-        let of_kind = |kind: &'static dyn MeasurementKind| {
+        let spread_of = |kind: &'static dyn MeasurementKind| {
             let name = kind.about().name;
             let by_row = |row: usize| {
-                let variance = kind
-                    .reading(data, row)
-                    .map_or(0.0, |reading| reading.sigma * reading.sigma);
-                problem
-                    .reading_by_joint(row, name)
-                    .map_or_else(Matrix3::zeros, |motions| summed(&motions) * variance)
+                let reading = kind.reading(data, row);
+                let variance = reading.map_or(0.0, |reading| reading.sigma * reading.sigma);
+                let motions = problem.reading_by_joint(row, name);
+                motions.map_or_else(Matrix3::zeros, |motions| summed(&motions) * variance)
             };
             (kind, (0..data.rows()).map(by_row).collect())
         };
-        let others = kinds(data)
-            .into_iter()
-            .filter(|kind| kind.about().name != PointKind.about().name);
+        let is_other =
+            |kind: &&'static dyn MeasurementKind| kind.about().name != PointKind.about().name;
+        let points = (0..data.rows()).map(|row| summed(problem.by_joint(row)));
         Self {
-            points: (0..data.rows())
-                .map(|row| summed(problem.by_joint(row)))
+            points: points.collect(),
+            others: kinds(data)
+                .into_iter()
+                .filter(is_other)
+                .map(spread_of)
                 .collect(),
-            others: others.map(of_kind).collect(),
         }
     }
 
@@ -66,30 +64,23 @@ impl JointSpread {
         data.spread =
             (sigma > 0.0).then(|| self.points.iter().map(|matrix| matrix * square).collect());
         // What sees places has its part by the point's own.
-        let turns = self
-            .others
-            .iter()
-            .filter(|(kind, _)| sigma > 0.0 && kind.about().rank.rotations);
-        data.reading_spread = turns
-            .map(|(kind, all)| {
-                let about = kind.about();
-                (
-                    about.name,
-                    all.iter()
-                        .map(|matrix| matrix.trace() * square / about.axes as f64)
-                        .collect(),
-                )
-            })
-            .collect();
+        let turns = self.others.iter();
+        let turns = turns.filter(|(kind, _)| sigma > 0.0 && kind.about().rank.rotations);
+        let spread = |(kind, all): &(&'static dyn MeasurementKind, Vec<Matrix3<f64>>)| {
+            let about = kind.about();
+            let variance = |matrix: &Matrix3<f64>| matrix.trace() * square / about.axes as f64;
+            (about.name, all.iter().map(variance).collect())
+        };
+        data.reading_spread = turns.map(spread).collect();
     }
 
-    /// What is left of rows beside points, with the covariance of the instrument and that by the joints.
+    /// What is left of rows beside points, of which kind each.
     fn beside_points(
         &self,
         model: &Model,
         data: &Measurements,
         rows: &[usize],
-    ) -> Vec<LeftBySpread> {
+    ) -> Vec<(&'static str, Sample)> {
         let mut scratch = model.stack.scratch(&model.robot);
         let mut left = Vec::new();
         for row in rows {
@@ -98,30 +89,24 @@ impl JointSpread {
                 .place(&model.robot, data, *row, &model.x, &mut scratch);
             for (kind, spread) in &self.others {
                 let seen = Residual::of(*kind, data, *row, &placed).zip(kind.reading(data, *row));
-                left.extend(seen.map(|(residual, reading)| LeftBySpread {
-                    kind: kind.about().name,
-                    error: residual.error,
-                    fixed: Matrix3::from_fn(|i, j| match (i == j, i < residual.axes) {
+                left.extend(seen.map(|(residual, reading)| {
+                    // 1 on lines that hold nothing.
+                    let fixed = Matrix3::from_fn(|i, j| match (i == j, i < residual.axes) {
                         (true, true) => reading.sigma * reading.sigma,
                         (true, false) => 1.0,
                         (false, _) => 0.0,
-                    }),
-                    varying: spread[*row],
+                    });
+                    let sample = Sample {
+                        error: residual.error,
+                        fixed,
+                        varying: spread[*row],
+                    };
+                    (kind.about().name, sample)
                 }));
             }
         }
         left
     }
-}
-
-/// What is left of one kind in a row.
-struct LeftBySpread {
-    kind: &'static str,
-    error: Vector3<f64>,
-    /// Covariance of the instrument; 1 on lines that hold nothing.
-    fixed: Matrix3<f64>,
-    /// Covariance per squared joint deviation.
-    varying: Matrix3<f64>,
 }
 
 /// What repeats show of the noise.
@@ -131,7 +116,7 @@ pub(super) struct RepeatedNoise {
     pub(crate) joints: JointRepeatability,
 }
 
-/// A repeat: what it is off by, with its covariance.
+/// What something is off by, with its covariance.
 struct Sample {
     error: Vector3<f64>,
     /// Of the instrument.
@@ -150,30 +135,22 @@ pub(super) struct RepeatPairs {
 impl RepeatPairs {
     /// Right after each other, where those are enough; else also returns, those after a shorter time, which drifts spoil least.
     pub(crate) fn of(data: &Measurements, rows: &[usize]) -> Self {
-        let [mut pairs, mut returns] = Self::all(data, rows);
-        if pairs.len() >= *REPEATS || returns.is_empty() {
-            pairs.sort_unstable_by_key(|pair| pair[1]);
-            return Self {
-                pairs,
-                are_returns: false,
-            };
+        let [mut pairs, returns] = Self::all(data, rows);
+        let are_returns = pairs.len() < *REPEATS && !returns.is_empty();
+        if are_returns {
+            pairs.extend(shortest(returns));
         }
-        shortest(&mut returns);
-        pairs.extend(returns);
         pairs.sort_unstable_by_key(|pair| pair[1]);
-        Self {
-            pairs,
-            are_returns: true,
-        }
+        Self { pairs, are_returns }
     }
 
     /// Returns alone; none where they are too few.
     pub(crate) fn returns(data: &Measurements, rows: &[usize]) -> Option<Self> {
-        let [_, mut returns] = Self::all(data, rows);
-        shortest(&mut returns);
-        returns.sort_unstable_by_key(|pair| pair[1]);
-        (returns.len() >= *FEW).then_some(Self {
-            pairs: returns,
+        let [_, returns] = Self::all(data, rows);
+        let mut pairs = shortest(returns);
+        pairs.sort_unstable_by_key(|pair| pair[1]);
+        (pairs.len() >= *FEW).then_some(Self {
+            pairs,
             are_returns: true,
         })
     }
@@ -209,34 +186,28 @@ impl RepeatPairs {
     ) -> RepeatedNoise {
         let joints = self.repeatability(model, data, spread);
         let stated = RepeatedNoise { scale: 1.0, joints };
-        let samples = self.of_points(model, data, spread);
+        let samples = self.point_samples(model, data, spread);
         let Some(shown) =
             scale_of(&samples).filter(|_| !self.are_returns && samples.len() >= *REPEATS)
         else {
             return stated;
         };
         // Mistakes speak for no noise.
-        let usual: Vec<Sample> = samples
-            .into_iter()
-            .filter(|one| one.square() < *CAP * shown * shown)
-            .collect();
+        let mut usual = samples;
+        usual.retain(|one| one.square() < *CAP * shown * shown);
         let deviance = |scale: f64, sigma: f64| {
-            usual
-                .iter()
-                .map(|one| one.deviance(scale, sigma))
-                .sum::<f64>()
+            let each = usual.iter().map(|one| one.deviance(scale, sigma));
+            each.sum::<f64>()
         };
         let best_joints = |scale: f64| {
-            let all = std::iter::once(0.0)
-                .chain(deviations())
-                .map(|sigma| (deviance(scale, sigma), sigma));
-            all.min_by(|a, b| a.0.total_cmp(&b.0))
-                .unwrap_or((f64::INFINITY, 0.0))
+            let sigmas = std::iter::once(0.0).chain(deviations());
+            let all = sigmas.map(|sigma| (deviance(scale, sigma), sigma));
+            let best = all.min_by(|a, b| a.0.total_cmp(&b.0));
+            best.unwrap_or((f64::INFINITY, 0.0))
         };
         let scales = grid(SMALLEST * shown, LARGEST * shown, STEPS / 3);
-        let best = scales
-            .map(|scale| (best_joints(scale).0, scale))
-            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let costs = scales.map(|scale| (best_joints(scale).0, scale));
+        let best = costs.min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((cost, scale)) = best else {
             return stated;
         };
@@ -244,24 +215,25 @@ impl RepeatPairs {
         if !differs || cost > best_joints(1.0).0 - *CLEARER {
             return stated;
         }
-        let scaled: Vec<Sample> = usual
-            .into_iter()
-            .map(|one| Sample {
-                fixed: one.fixed * (scale * scale),
-                ..one
-            })
-            .collect();
+        for sample in &mut usual {
+            sample.fixed *= scale * scale;
+        }
         RepeatedNoise {
             scale,
             joints: JointRepeatability {
-                sigma: likeliest(&scaled, 2.0),
+                sigma: likeliest(&usual, 2.0),
                 ..joints
             },
         }
     }
 
     /// What points differ by beyond the motion that `model` knows between them.
-    fn of_points(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> Vec<Sample> {
+    fn point_samples(
+        &self,
+        model: &Model,
+        data: &Measurements,
+        spread: &JointSpread,
+    ) -> Vec<Sample> {
         let predicted = model.predict(data);
         let one = |[a, b]: &[usize; 2]| {
             let variance =
@@ -288,22 +260,23 @@ impl RepeatPairs {
         spread: &JointSpread,
     ) -> JointRepeatability {
         let repeats = self.pairs.len();
-        if repeats < *FEW {
-            return JointRepeatability {
-                sigma: 0.0,
-                repeats,
-            };
-        }
-        let mut samples = self.of_points(model, data, spread);
-        for [a, b] in self
-            .pairs
-            .iter()
-            .filter(|[a, b]| data.anchor(*a) == data.anchor(*b))
-        {
+        let sigma = match repeats < *FEW {
+            true => 0.0,
+            false => likeliest(&self.samples(model, data, spread), 2.0),
+        };
+        JointRepeatability { sigma, repeats }
+    }
+
+    /// What everything that the pairs measured differs by.
+    fn samples(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> Vec<Sample> {
+        let mut samples = self.point_samples(model, data, spread);
+        let same_anchor = |[a, b]: &&[usize; 2]| data.anchor(*a) == data.anchor(*b);
+        for [a, b] in self.pairs.iter().filter(same_anchor) {
             let [from, to] = [a, b].map(|row| spread.beside_points(model, data, &[*row]));
-            let both = to
-                .iter()
-                .filter_map(|to| Some((from.iter().find(|from| from.kind == to.kind)?, to)));
+            let both = to.iter().filter_map(|(kind, to)| {
+                let (_, from) = from.iter().find(|from| from.0 == *kind)?;
+                Some((from, to))
+            });
             // On lines that hold nothing the error is none and the variance a constant.
             samples.extend(both.map(|(from, to)| Sample {
                 error: to.error - from.error,
@@ -311,10 +284,7 @@ impl RepeatPairs {
                 varying: from.varying + to.varying,
             }));
         }
-        JointRepeatability {
-            sigma: likeliest(&samples, 2.0),
-            repeats,
-        }
+        samples
     }
 }
 
@@ -361,18 +331,18 @@ pub(super) fn by_residual(
     };
     let mut samples: Vec<_> = rows.iter().filter_map(one).collect();
     let others = spread.beside_points(model, data, rows).into_iter();
-    samples.extend(others.map(|left| Sample {
+    samples.extend(others.map(|(_, left)| Sample {
         error: left.error * freedom,
-        fixed: left.fixed,
-        varying: left.varying,
+        ..left
     }));
     likeliest(&samples, 6.0)
 }
 
 /// Returns after the shortest times, half of them.
-fn shortest(returns: &mut Vec<[usize; 2]>) {
+fn shortest(mut returns: Vec<[usize; 2]>) -> Vec<[usize; 2]> {
     returns.sort_unstable_by_key(|[a, b]| (b - a, *b));
     returns.truncate(returns.len().div_ceil(2).max(*REPEATS));
+    returns
 }
 
 /// By what stated standard deviations are multiplied for the usual sample to be as far off as it is; none without samples.
@@ -396,7 +366,11 @@ fn grid(least: f64, greatest: f64, count: usize) -> impl Iterator<Item = f64> {
 impl Sample {
     /// Squared, in the instrument's stated standard deviations.
     fn square(&self) -> f64 {
-        self.fixed
+        self.square_in(&self.fixed)
+    }
+
+    fn square_in(&self, covariance: &Matrix3<f64>) -> f64 {
+        covariance
             .try_inverse()
             .map_or(*CAP, |inverse| self.error.dot(&(inverse * self.error)))
     }
@@ -404,33 +378,22 @@ impl Sample {
     /// -2 ln of its likelihood, up to a constant.
     fn deviance(&self, scale: f64, sigma: f64) -> f64 {
         let covariance = self.fixed * (scale * scale) + self.varying * (sigma * sigma);
-        let square = covariance
-            .try_inverse()
-            .map_or(*CAP, |inverse| self.error.dot(&(inverse * self.error)));
-        square + covariance.determinant().ln()
+        self.square_in(&covariance) + covariance.determinant().ln()
     }
 }
 
 /// The likeliest deviation; none unless it is better than none by `evidence`.
 fn likeliest(samples: &[Sample], evidence: f64) -> f64 {
     let cost = |sigma: f64| -> f64 {
-        let one = |Sample {
-                       error,
-                       fixed,
-                       varying,
-                   }: &Sample| {
-            let covariance = fixed + varying * (sigma * sigma);
-            let square = covariance
-                .try_inverse()
-                .map_or(*CAP, |inverse| error.dot(&(inverse * error)));
-            square.min(*CAP) + covariance.determinant().ln()
+        let one = |sample: &Sample| {
+            let covariance = sample.fixed + sample.varying * (sigma * sigma);
+            sample.square_in(&covariance).min(*CAP) + covariance.determinant().ln()
         };
         samples.iter().map(one).sum()
     };
     let none = cost(0.0);
-    let best = deviations()
-        .map(|sigma| (cost(sigma), sigma))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let costs = deviations().map(|sigma| (cost(sigma), sigma));
+    let best = costs.min_by(|a, b| a.0.total_cmp(&b.0));
     best.filter(|(cost, _)| *cost < none - evidence)
         .map_or(0.0, |(_, sigma)| sigma)
 }

@@ -2,21 +2,24 @@
 
 use super::fit_state::{FitState, Fitter};
 use super::stretches::{bounded_autocorrelation_time, thinned};
-use crate::diagnose::whitened::WhitenedProblem;
+use crate::diagnose::whitened::{WhitenedProblem, add_columns};
 use crate::effect::Survey;
 use crate::estimate::Model;
 
 /// What is left of the rows that a search looks at, and what moves it.
 pub(crate) struct RoundView<'a> {
+    pub(crate) now: &'a FitState,
+    pub(crate) fitter: &'a Fitter<'a>,
     pub(crate) problem: WhitenedProblem<'a>,
-    autocorrelation_time: f64,
+    /// How many rows of what is left count as one.
+    pub(crate) autocorrelation_time: f64,
     torque: Vec<f64>,
     /// How far each joint yields, rad/Nm.
     pub(crate) compliance: Vec<f64>,
 }
 
 impl<'a> RoundView<'a> {
-    pub(crate) fn of(now: &'a FitState, fitter: &'a Fitter) -> Self {
+    pub(crate) fn of(now: &'a FitState, fitter: &'a Fitter<'a>) -> Self {
         let data = &fitter.data;
         let compliance = compliance(&now.model);
         let mut problem =
@@ -29,16 +32,13 @@ impl<'a> RoundView<'a> {
             problem = problem.with_autocorrelation(noise);
         }
         Self {
+            now,
+            fitter,
             autocorrelation_time,
             torque: problem.torques(),
             compliance,
             problem,
         }
-    }
-
-    /// How many rows of what is left count as one.
-    pub(crate) fn autocorrelation_time(&self) -> f64 {
-        self.autocorrelation_time
     }
 
     pub(crate) fn survey(&self) -> Survey<'_> {
@@ -50,19 +50,10 @@ impl<'a> RoundView<'a> {
 
     /// The residual of the rows without the causes of a model.
     pub(crate) fn without_causes(&self, now: &FitState) -> Vec<f64> {
-        let problem = &self.problem;
-        let mut residual = problem.residual.clone();
+        let mut residual = self.problem.residual.clone();
         for cause in &now.causes {
-            let columns = problem.columns(&cause.form);
-            for (column, coefficient) in columns
-                .chunks(problem.residual_rows())
-                .zip(&cause.coefficients)
-            {
-                residual
-                    .iter_mut()
-                    .zip(column)
-                    .for_each(|(value, c)| *value += c * coefficient);
-            }
+            let columns = self.problem.columns(&cause.form);
+            add_columns(&mut residual, &columns, &cause.coefficients);
         }
         residual
     }
@@ -72,10 +63,8 @@ impl<'a> RoundView<'a> {
 pub(crate) fn compliance(model: &Model) -> Vec<f64> {
     let mut out = vec![0.0; model.robot.joints()];
     for (effect, range) in model.stack.effects() {
-        if let Some((joint, compliance)) = effect
-            .form()
-            .and_then(|form| form.compliance(&model.x[range]))
-        {
+        let form = effect.form();
+        if let Some((joint, compliance)) = form.and_then(|form| form.compliance(&model.x[range])) {
             out[joint] += compliance.max(0.0);
         }
     }

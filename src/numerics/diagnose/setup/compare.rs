@@ -61,12 +61,8 @@ impl<'a> AsStated<'a> {
             .filter_map(|row| rows.binary_search(row).ok())
             .collect();
         let pairs = PointPairs::of(question.robot, data, sample.iter().map(|row| (*row, *row)));
-        let noise = (sample
-            .iter()
-            .map(|row| data.noise(*row).powi(2))
-            .sum::<f64>()
-            / sample.len().max(1) as f64)
-            .sqrt();
+        let squares = sample.iter().map(|row| data.noise(*row).powi(2));
+        let noise = (squares.sum::<f64>() / sample.len().max(1) as f64).sqrt();
         Self {
             question,
             rows,
@@ -105,16 +101,10 @@ impl<'a> AsStated<'a> {
     /// The rows that judge, with set-up errors mended.
     fn mended(&self, wrong: &[WrongSetup]) -> PointPairs<'a> {
         let (data, rows) = (self.question.data, &self.rows);
-        let order = wrong
-            .iter()
-            .find_map(|one| one.order())
-            .unwrap_or(RowOrder::Shifted(0));
-        let partners = order.partners(rows.len());
-        let pairs = PointPairs::of(
-            self.question.robot,
-            data,
-            self.judges.iter().map(|k| (rows[*k], rows[partners[*k]])),
-        );
+        let order = wrong.iter().find_map(|one| one.order());
+        let partners = order.unwrap_or(RowOrder::Shifted(0)).partners(rows.len());
+        let judges = self.judges.iter().map(|k| (rows[*k], rows[partners[*k]]));
+        let pairs = PointPairs::of(self.question.robot, data, judges);
         wrong.iter().fold(pairs, |pairs, one| one.mended(&pairs))
     }
 
@@ -157,38 +147,30 @@ impl<'a> AsStated<'a> {
 
     /// Two set-ups whose rows were read as one, where that explains it.
     pub(crate) fn two_setups(&self) -> Option<TwoSetups> {
-        let of_rows = |rows: &[usize]| {
-            PointPairs::of(
-                self.question.robot,
-                self.question.data,
-                rows.iter().map(|row| (*row, *row)),
-            )
+        let pairs = |rows: &[usize]| {
+            let rows = rows.iter().map(|row| (*row, *row));
+            PointPairs::of(self.question.robot, self.question.data, rows)
         };
         let sample: Vec<usize> = self.judges.iter().map(|k| self.rows[*k]).collect();
-        let found = TwoSetups::of(&of_rows(&sample), &self.placed)?;
+        let found = TwoSetups::of(&pairs(&sample), &self.placed)?;
         let is_right = found.left < *CLOUD * self.cloud && found.left < *NOMINAL * self.reach;
-        is_right.then(|| found.of_all(&of_rows(&self.rows), &self.rows))
+        is_right.then(|| found.with_all_rows(&pairs(&self.rows), &self.rows))
     }
 
     /// What explains it: one set-up error as a right set-up does, else the whole counting of joints, else one as far as it goes, else a
     /// counting and a unit, else two.
     pub(crate) fn explained(&self) -> Option<ExplainedSetup> {
-        let data = self.question.data;
-        let in_order = PointPairs::of(
-            self.question.robot,
-            data,
-            self.rows.iter().map(|row| (*row, *row)),
-        );
+        let in_order = self.rows.iter().map(|row| (*row, *row));
+        let in_order = PointPairs::of(self.question.robot, self.question.data, in_order);
+        let try_each = |all: Vec<Vec<WrongSetup>>| -> Vec<Try> {
+            let tried = all.into_par_iter().map(|wrong| self.tried(wrong));
+            tried.collect()
+        };
         let all = WrongSetup::all(&in_order);
-        let mut one: Vec<Try> = all
-            .par_iter()
-            .map(|wrong| self.tried(vec![*wrong]))
-            .collect();
+        let mut one = try_each(all.iter().map(|wrong| vec![*wrong]).collect());
         let first = chosen(&one);
-        if let Some(found) = first
-            .as_ref()
-            .filter(|found| found.placed.left < *GOOD * self.reach)
-        {
+        let is_right = |found: &&ExplainedSetup| found.placed.left < *GOOD * self.reach;
+        if let Some(found) = first.as_ref().filter(is_right) {
             return Some(found.clone());
         }
         let countings = |unit: &[WrongSetup]| -> Vec<Vec<WrongSetup>> {
@@ -197,71 +179,51 @@ impl<'a> AsStated<'a> {
                 .map(|counting| [unit, &[WrongSetup::Counting(counting)]].concat())
                 .collect()
         };
-        let try_all = |all: Vec<Vec<WrongSetup>>| {
-            chosen(
-                &all.into_par_iter()
-                    .map(|wrong| self.tried(wrong))
-                    .collect::<Vec<_>>(),
-            )
-        };
         let counted = countings(&[]);
-        if let Some(found) = try_all(counted.clone()).or(first) {
-            return Some(found);
+        let found = chosen(&try_each(counted.clone())).or(first);
+        if found.is_some() {
+            return found;
         }
         // A unit of the points scales them and hides no counting; one of the joints is mended before theirs is looked for.
-        let of_points = (0..LENGTHS.len()).map(|unit| vec![WrongSetup::PointUnit(unit)]);
-        let with_units = of_points.flat_map(|unit| {
+        let point_units = (0..LENGTHS.len()).map(|unit| vec![WrongSetup::PointUnit(unit)]);
+        let with_units = point_units.flat_map(|unit| {
             counted
                 .iter()
                 .map(move |one| [&unit[..], &one[..]].concat())
         });
-        let of_joints = [WrongSetup::InRadians, WrongSetup::InDegrees]
+        let joint_units = [WrongSetup::InRadians, WrongSetup::InDegrees]
             .into_iter()
             .filter(|unit| self.turns_as_joints_do(*unit));
-        if let Some(found) = try_all(
-            with_units
-                .chain(of_joints.flat_map(|unit| countings(&[unit])))
-                .collect(),
-        ) {
-            return Some(found);
+        let joint_units = joint_units.flat_map(|unit| countings(&[unit]));
+        let found = chosen(&try_each(with_units.chain(joint_units).collect()));
+        if found.is_some() {
+            return found;
         }
         one.sort_by(|a, b| a.share.total_cmp(&b.share));
-        let first = one
-            .iter()
-            .map(|tried| tried.wrong[0])
-            .filter(|wrong| wrong.number().is_none())
-            .take(*SECOND);
+        let first = one.iter().map(|tried| tried.wrong[0]);
+        let first = first.filter(|wrong| wrong.number().is_none()).take(*SECOND);
         let both = |a: WrongSetup| {
             let others = all
                 .iter()
                 .filter(move |b| a != **b && !(a.order().is_some() && b.order().is_some()));
-            others.map(move |b| {
-                if b.rank() < a.rank() {
-                    vec![*b, a]
-                } else {
-                    vec![a, *b]
-                }
+            others.map(move |b| match b.rank() < a.rank() {
+                true => vec![*b, a],
+                false => vec![a, *b],
             })
         };
-        let pairs: Vec<Vec<WrongSetup>> = first.flat_map(both).collect();
-        let two: Vec<Try> = pairs
-            .into_par_iter()
-            .map(|wrong| self.tried(wrong))
-            .collect();
-        chosen(&two)
+        chosen(&try_each(first.flat_map(both).collect()))
     }
 }
 
 /// The best of tries in the order of the list, if one explains.
 fn chosen(tries: &[Try]) -> Option<ExplainedSetup> {
     let explaining: Vec<&Try> = tries.iter().filter(|tried| tried.explains).collect();
-    let least = explaining
+    let shares = explaining.iter().map(|tried| tried.share);
+    let least = shares.fold(f64::INFINITY, f64::min);
+    let mut least_ones = explaining
         .iter()
-        .map(|tried| tried.share)
-        .fold(f64::INFINITY, f64::min);
-    let best = explaining
-        .iter()
-        .find(|tried| tried.share <= *SAME * least)?;
+        .filter(|tried| tried.share <= *SAME * least);
+    let best = least_ones.next()?;
     // Countings that leave the same are the same by kinematics.
     let is_same = |tried: &Try| {
         matches!(tried.wrong[..], [WrongSetup::Counting(_)]) && tried.share <= *SAME * least
@@ -272,14 +234,10 @@ fn chosen(tries: &[Try]) -> Option<ExplainedSetup> {
             && tried.wrong.len() == 1
             && !is_same(tried)
     };
-    let alike = explaining
-        .iter()
-        .filter(is_rival)
-        .map(|tried| tried.wrong[0])
-        .collect();
+    let alike = explaining.iter().filter(is_rival);
     Some(ExplainedSetup {
         wrong: best.wrong.clone(),
-        alike,
+        alike: alike.map(|tried| tried.wrong[0]).collect(),
         placed: best.placed.clone(),
     })
 }
@@ -322,13 +280,12 @@ pub(super) fn beyond(now: &FitState, robot: &RobotModel, reach: f64) -> Vec<Stri
                 _ => continue,
             };
             if value.abs() > limit + *CLEARLY * sigma {
-                out.push(match spec.unit {
-                    Unit::Radian => {
-                        format!("{} by {} deg", spec.name, figure(value.to_degrees(), 1))
-                    }
-                    Unit::Millimetre => format!("{} by {} mm", spec.name, figure(value * 1e3, 1)),
-                    _ => format!("{} by {} %", spec.name, figure(value * 100.0, 1)),
-                });
+                let (size, digits, unit) = match spec.unit {
+                    Unit::Radian => (value.to_degrees(), 1, "deg"),
+                    Unit::Millimetre => (value * 1e3, 1, "mm"),
+                    _ => (value * 100.0, 1, "%"),
+                };
+                out.push(format!("{} by {} {unit}", spec.name, figure(size, digits)));
             }
         }
     }

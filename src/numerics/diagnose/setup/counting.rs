@@ -7,7 +7,7 @@
 
 use crate::criteria::setup::{CLOUD, COUNTINGS, SAME, SCREENED, TRIM};
 use crate::robot::RobotModel;
-use crate::setup::placement::{PointPairs, bodies, median};
+use crate::setup::placement::{PointPairs, bodies, median, turning};
 use crate::spatial::Pose;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -67,6 +67,17 @@ impl Searched {
         }
     }
 
+    /// A counting with every value of it, and of another number.
+    fn choices(self, other: Option<Self>, counting: Counting) -> Vec<Counting> {
+        let first = self.values().iter().map(|value| self.set(counting, *value));
+        match other {
+            Some(other) => first
+                .flat_map(|counting| other.choices(None, counting))
+                .collect(),
+            None => first.collect(),
+        }
+    }
+
     fn set(self, mut counting: Counting, value: i32) -> Counting {
         match self {
             Self::Sign(joint) => counting.0[joint].reversed = value == 1,
@@ -80,17 +91,6 @@ impl Searched {
 impl Counting {
     pub(crate) fn joints(&self) -> &[CountedJoint] {
         &self.0
-    }
-
-    /// One joint alone, that shows so many quarter turns at the robot file's zero.
-    pub(crate) fn of_a_zero(joint: usize, quarters: i32) -> Self {
-        let mut out = Self::default();
-        out.0
-            .iter_mut()
-            .skip(joint)
-            .take(1)
-            .for_each(|counted| counted.quarters = quarters);
-        out
     }
 
     /// The controller's numbers -> joint positions of the robot file, in the order of `ingest`: zeros, signs, couplings.
@@ -108,18 +108,16 @@ impl Counting {
 
     /// How much is otherwise: of two countings that are the same by kinematics the smaller one is meant.
     fn effort(&self) -> i32 {
-        let of_joint = |joint: &CountedJoint| {
+        let changes = |joint: &CountedJoint| {
             2 * i32::from(joint.reversed) + 3 * joint.quarters.abs() + 5 * joint.coupled.abs()
         };
-        self.0.iter().map(of_joint).sum()
+        self.0.iter().map(changes).sum()
     }
 
     /// Those that leave least of these points, from the one that changes least on, each in its simplest form.
     pub(crate) fn likely(pairs: &PointPairs) -> Vec<Self> {
         let robot = pairs.robot;
-        let turning: Vec<usize> = (0..robot.joints())
-            .filter(|joint| robot.is_revolute(*joint))
-            .collect();
+        let turning = &turning(robot);
         if robot.joints() > LIMIT {
             return Vec::new();
         }
@@ -130,39 +128,25 @@ impl Counting {
             pairs: &pairs.only(&some),
         };
         let searched = Searched::all(robot);
-        let signs = |bits: usize| {
-            let mut counting = Self::default();
-            for (bit, joint) in turning.iter().enumerate() {
-                counting.0[*joint].reversed = bits >> bit & 1 == 1;
-            }
-            counting
-        };
         // The zeros with the longest levers are tried all: no descent leads from one of them to another.
-        let (levers, none) = (
-            searched
-                .iter()
-                .filter(|one| matches!(one, Searched::Zero(_)))
-                .take(2),
-            [0],
-        );
-        let levers: Vec<&Searched> = levers.collect();
-        let values = |lever: usize| levers.get(lever).map_or(&none[..], |one| one.values());
-        let turned = |start: Self| {
-            let set = |counting: Self, lever: usize, value: i32| {
-                levers
-                    .get(lever)
-                    .map_or(counting, |one| one.set(counting, value))
-            };
-            let both = values(0)
-                .iter()
-                .flat_map(|first| values(1).iter().map(move |second| (*first, *second)));
-            both.map(|(first, second)| set(set(start, 0, first), 1, second))
-                .collect::<Vec<_>>()
+        let levers = searched
+            .iter()
+            .filter(|one| matches!(one, Searched::Zero(_)));
+        let mut levers = levers.copied();
+        let turned: Vec<Self> = match (levers.next(), levers.next()) {
+            (Some(first), second) => first.choices(second, Self::default()),
+            _ => vec![Self::default()],
         };
-        let starts: Vec<Self> = (0..1usize << turning.len())
-            .map(signs)
-            .flat_map(turned)
-            .collect();
+        let with_signs = |bits: usize| {
+            turned.iter().map(move |counting| {
+                let mut counting = *counting;
+                for (bit, joint) in turning.iter().enumerate() {
+                    counting.0[*joint].reversed = bits >> bit & 1 == 1;
+                }
+                counting
+            })
+        };
+        let starts: Vec<Self> = (0..1usize << turning.len()).flat_map(with_signs).collect();
         let alone = starts
             .into_par_iter()
             .map(|start| affine.descended(start, &searched, 1));
@@ -171,17 +155,11 @@ impl Counting {
             .into_par_iter()
             .map(|start| affine.descended(start, &searched, 2));
         let found = best(together.collect(), *COUNTINGS);
-        let all: Vec<Searched> = turning
-            .iter()
-            .map(|joint| Searched::Sign(*joint))
-            .chain(searched)
-            .collect();
+        let mut all: Vec<Searched> = turning.iter().map(|joint| Searched::Sign(*joint)).collect();
+        all.extend(searched);
+        let found = found.into_par_iter().map(|one| affine.simplest(one, &all));
         let mut simple: Vec<Self> = Vec::new();
-        for one in found
-            .into_par_iter()
-            .map(|one| affine.simplest(one, &all))
-            .collect::<Vec<_>>()
-        {
+        for one in found.collect::<Vec<_>>() {
             if !simple.contains(&one) {
                 simple.push(one);
             }
@@ -214,34 +192,19 @@ impl AffineImage<'_, '_> {
         loop {
             let before = now.0;
             for (k, one) in searched.iter().enumerate() {
-                let others = if at_once > 1 {
-                    &searched[k + 1..]
-                } else {
-                    &searched[k..=k]
+                let others: Vec<Option<Searched>> = match at_once {
+                    1 => vec![None],
+                    _ => searched[k + 1..].iter().copied().map(Some).collect(),
                 };
                 for other in others {
-                    let base = now.1;
-                    for value in one.values() {
-                        let first = one.set(base, *value);
-                        let values = if at_once > 1 {
-                            other.values()
+                    for tried in one.choices(other, now.1) {
+                        let left = if tried == now.1 {
+                            now.0
                         } else {
-                            &[0][..]
+                            self.left(tried)
                         };
-                        for second in values {
-                            let tried = if at_once > 1 {
-                                other.set(first, *second)
-                            } else {
-                                first
-                            };
-                            let left = if tried == now.1 {
-                                now.0
-                            } else {
-                                self.left(tried)
-                            };
-                            if left < (1.0 - SETTLED) * now.0 {
-                                now = (left, tried);
-                            }
+                        if left < (1.0 - SETTLED) * now.0 {
+                            now = (left, tried);
                         }
                     }
                 }
@@ -257,21 +220,12 @@ impl AffineImage<'_, '_> {
         let most = *SAME * self.left(start);
         let mut now = start;
         loop {
-            let pairs = searched
-                .iter()
-                .enumerate()
-                .flat_map(|(k, one)| searched[k..].iter().map(move |other| (one, other)));
-            let both = |(one, other): (&Searched, &Searched)| {
-                let values = one
-                    .values()
-                    .iter()
-                    .flat_map(|first| other.values().iter().map(move |second| (*first, *second)));
-                values
-                    .map(|(first, second)| other.set(one.set(now, first), second))
-                    .collect::<Vec<_>>()
-            };
-            let mut simpler: Vec<Counting> = pairs
-                .flat_map(both)
+            let choices = searched.iter().enumerate().flat_map(|(k, one)| {
+                let others = searched[k + 1..].iter().copied().map(Some);
+                let others = std::iter::once(None).chain(others);
+                others.flat_map(move |other| one.choices(other, now))
+            });
+            let mut simpler: Vec<Counting> = choices
                 .filter(|tried| tried.effort() < now.effort())
                 .collect();
             simpler.sort_by_key(Counting::effort);

@@ -33,9 +33,9 @@ impl TwoSetups {
     }
 
     /// All rows of a recording, of which `numbers` are those of the pairs, by the placement that has them nearest.
-    pub(crate) fn of_all(self, all: &PointPairs, numbers: &[usize]) -> Self {
-        let rows =
-            nearest(all, &self.placed).map(|part| part.into_iter().map(|k| numbers[k]).collect());
+    pub(crate) fn with_all_rows(self, all: &PointPairs, numbers: &[usize]) -> Self {
+        let numbered = |part: Vec<usize>| part.into_iter().map(|k| numbers[k]).collect();
+        let rows = nearest(all, &self.placed).map(numbered);
         Self { rows, ..self }
     }
 
@@ -83,12 +83,8 @@ fn starts(pairs: &PointPairs, one: &Placement) -> Vec<Vec<bool>> {
         .collect();
     out.push((0..rows).map(|row| row % 2 == 0).collect());
     // The rows that one placement has, and those that it leaves to another.
-    out.push(
-        one.off
-            .iter()
-            .map(|off| *off <= *MIXED_FAR * one.left)
-            .collect(),
-    );
+    let near = one.off.iter().map(|off| *off <= *MIXED_FAR * one.left);
+    out.push(near.collect());
     let [missed, turned] = one.missed(pairs);
     out.extend([missed, turned].iter().map(|all| along_most(all)));
     out
@@ -97,23 +93,17 @@ fn starts(pairs: &PointPairs, one: &Placement) -> Vec<Vec<bool>> {
 /// Whether vectors point along the direction in which they differ most.
 fn along_most(all: &[Vector3<f64>]) -> Vec<bool> {
     let mean = all.iter().sum::<Vector3<f64>>() / all.len().max(1) as f64;
-    let spread: Matrix3<f64> = all
-        .iter()
-        .map(|one| (one - mean) * (one - mean).transpose())
-        .sum();
+    let apart = all.iter().map(|one| one - mean);
+    let spread: Matrix3<f64> = apart.clone().map(|one| one * one.transpose()).sum();
     let axes = SymmetricEigen::new(spread);
-    let along = axes
-        .eigenvectors
-        .column(axes.eigenvalues.imax())
-        .into_owned();
-    all.iter()
-        .map(|one| (one - mean).dot(&along) > 0.0)
-        .collect()
+    let along = axes.eigenvectors.column(axes.eigenvalues.imax());
+    apart.map(|one| one.dot(&along) > 0.0).collect()
 }
 
 fn nearest(pairs: &PointPairs, placed: &[Placement; 2]) -> [Vec<usize>; 2] {
     let [one, other] = placed.each_ref().map(|placed| {
-        placed.missed(pairs)[0]
+        let [missed, _] = placed.missed(pairs);
+        missed
             .iter()
             .map(|missed| missed.norm())
             .collect::<Vec<f64>>()
@@ -135,10 +125,8 @@ fn dealt(pairs: &PointPairs, first: Vec<bool>, before: f64) -> Option<TwoSetups>
         let placed = rows.each_ref().map(|part| place(&pairs.only(part), None));
         let next = nearest(pairs, &placed);
         if next == rows {
-            let off: Vec<f64> = placed
-                .iter()
-                .flat_map(|one| one.off.iter().copied())
-                .collect();
+            let off = placed.iter().flat_map(|one| one.off.iter().copied());
+            let off: Vec<f64> = off.collect();
             return Some(TwoSetups {
                 rows,
                 before,
@@ -165,15 +153,8 @@ fn listed(rows: &[usize]) -> String {
         false => format!("{} to {}", from + 1, to + 1),
     };
     let more = if ranges.len() > LISTED { ", ..." } else { "" };
-    format!(
-        "{}{more}",
-        ranges
-            .iter()
-            .take(LISTED)
-            .map(words)
-            .collect::<Vec<_>>()
-            .join(", ")
-    )
+    let shown = ranges.iter().take(LISTED).map(words);
+    format!("{}{more}", shown.collect::<Vec<_>>().join(", "))
 }
 
 #[cfg(test)]

@@ -16,65 +16,48 @@ use super::types::{Diagnosis, Question};
 use crate::criteria::setup::FEWEST;
 use compare::AsStated;
 
-/// Rows with whole points: nothing else says where the arm is without its geometry.
-struct WholePoints {
-    fit: Vec<usize>,
-    validate: Vec<usize>,
-}
-
-impl WholePoints {
-    fn of(question: &Question) -> Self {
-        let whole = |rows: &[usize]| {
-            rows.iter()
-                .copied()
-                .filter(|row| question.data.has_point(*row))
-                .collect()
-        };
-        Self {
-            fit: whole(question.fit),
-            validate: whole(question.validate),
-        }
-    }
-
-    /// The question of these rows; none where they are too few, or stand beside an outside simulation.
-    fn question<'a>(&'a self, question: &Question<'a>) -> Option<Question<'a>> {
-        let asked = self.fit.len() >= *FEWEST && !question.beside_simulation;
-        asked.then_some(Question {
-            fit: &self.fit,
-            validate: &self.validate,
-            ..*question
-        })
-    }
+/// Rows to fit and to validate with whole points: nothing else says where the arm is without its geometry. None where they are too few, or
+/// stand beside an outside simulation.
+fn whole_points(question: &Question) -> Option<[Vec<usize>; 2]> {
+    let whole = [question.fit, question.validate].map(|rows| {
+        let rows = rows.iter().copied();
+        rows.filter(|row| question.data.has_point(*row))
+            .collect::<Vec<_>>()
+    });
+    (whole[0].len() >= *FEWEST && !question.beside_simulation).then_some(whole)
 }
 
 /// What is wrong with the set-up, if the nominal robot is far off its points; without findings where nothing of the list explains it.
 pub fn wrong_setup(question: &Question) -> Option<Diagnosis> {
-    let points = WholePoints::of(question);
-    let question = &points.question(question)?;
+    let [fit, validate] = &whole_points(question)?;
+    let question = &Question {
+        fit,
+        validate,
+        ..*question
+    };
     let stated = AsStated::of(question);
+    let two_setups = || {
+        let found = stated.two_setups()?;
+        Some(words::two_setups(question, &found))
+    };
     if !stated.is_far_off() {
-        let parted = if stated.is_in_parts() {
-            stated.two_setups()
-        } else {
-            None
-        };
-        return parted.map(|found| words::two_setups(question, &found));
+        return stated.is_in_parts().then(two_setups).flatten();
     }
     if let Some(found) = stated.explained() {
         return Some(words::explained(question, &stated, &found));
     }
-    match stated.two_setups() {
-        Some(found) => Some(words::two_setups(question, &found)),
-        None => stated
-            .is_no_robot()
-            .then(|| words::unexplained(question, &stated)),
-    }
+    let unexplained = || words::unexplained(question, &stated);
+    two_setups().or_else(|| stated.is_no_robot().then(unexplained))
 }
 
 /// What is wrong with the set-up, if the identified base model leaves the robot file by more than manufacture errs.
 pub(crate) fn wrong_when_identified(question: &Question, now: &FitState) -> Option<Diagnosis> {
-    let points = WholePoints::of(question);
-    let question = &points.question(question)?;
+    let [fit, validate] = &whole_points(question)?;
+    let question = &Question {
+        fit,
+        validate,
+        ..*question
+    };
     let stated = AsStated::of(question);
     let beyond = compare::beyond(now, question.robot, stated.reach);
     if beyond.is_empty() {

@@ -35,11 +35,21 @@ pub(super) struct Placement {
 }
 
 impl Placement {
+    /// One that is not judged yet.
+    fn at(base: Pose, seats: Vec<Vector3<f64>>, values: Vec<f64>) -> Self {
+        Self {
+            base,
+            seats,
+            values,
+            off: Vec::new(),
+            left: 0.0,
+        }
+    }
+
     /// By how much it misses points, in the tracker's frame and in that of the last body.
     pub(crate) fn missed(&self, pairs: &PointPairs) -> [Vec<Vector3<f64>>; 2] {
-        let robot = pairs.robot;
         let missed = |row: usize| {
-            let body = bodies(robot, pairs.q(row))[robot.joints()];
+            let body = pairs.last_body(row);
             let missed =
                 pairs.points[row] - self.base.point(&body.point(&self.seats[pairs.target[row]]));
             (
@@ -58,24 +68,18 @@ impl Placement {
 
     /// How far another one's targets sit from its own at most, m.
     pub(crate) fn tool_apart(&self, other: &Self) -> f64 {
-        self.seats
-            .iter()
-            .zip(&other.seats)
-            .map(|(one, other)| (one - other).norm())
-            .fold(0.0, f64::max)
+        let seats = self.seats.iter().zip(&other.seats);
+        seats.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
     }
 }
 
 /// The best placement.
 pub(super) fn place(pairs: &PointPairs, number: Option<FreeNumber>) -> Placement {
     let robot = pairs.robot;
-    let bodies: Vec<Pose> = (0..pairs.rows())
-        .map(|row| bodies(robot, pairs.q(row))[robot.joints()])
-        .collect();
+    let bodies: Vec<Pose> = (0..pairs.rows()).map(|row| pairs.last_body(row)).collect();
     let seats = vec![robot.home().translation; pairs.targets];
-    let model: Vec<Vector3<f64>> = bodies
-        .iter()
-        .zip(&pairs.target)
+    let model = bodies.iter().zip(&pairs.target);
+    let model: Vec<Vector3<f64>> = model
         .map(|(body, target)| body.point(&seats[*target]))
         .collect();
     let base = align_points(&model, &pairs.points);
@@ -85,13 +89,7 @@ pub(super) fn place(pairs: &PointPairs, number: Option<FreeNumber>) -> Placement
         bodies,
         number,
     };
-    let mut now = problem.judged(Placement {
-        base,
-        seats,
-        values,
-        off: Vec::new(),
-        left: 0.0,
-    });
+    let mut now = problem.judged(Placement::at(base, seats, values));
     let mut best = now.clone();
     for _ in 0..STEPS {
         let Some(next) = problem.step(&now).map(|next| problem.judged(next)) else {
@@ -157,11 +155,8 @@ impl PlacementProblem<'_, '_> {
         let kept: Vec<usize> = (0..now.off.len())
             .filter(|row| now.off[*row] <= *TRIM * now.left)
             .collect();
-        let centre = kept
-            .iter()
-            .map(|row| self.pairs.points[*row])
-            .sum::<Vector3<f64>>()
-            / kept.len().max(1) as f64;
+        let points = kept.iter().map(|row| self.pairs.points[*row]);
+        let centre = points.sum::<Vector3<f64>>() / kept.len().max(1) as f64;
         for row in kept {
             let seen = self.seen(now, row);
             let at = now.base.point(&self.point(now, row, &seen));
@@ -173,12 +168,8 @@ impl PlacementProblem<'_, '_> {
             let mut columns: Vec<(usize, Vector3<f64>)> = block(0, -hat(&(at - centre))).collect();
             columns.extend(block(3, Matrix3::identity()));
             columns.extend(block(6 + 3 * self.pairs.target[row], turned));
-            columns.extend(
-                seen.columns
-                    .iter()
-                    .enumerate()
-                    .map(|(k, c)| (6 + targets + k, now.base.rotation * c)),
-            );
+            let numbers = (6 + targets..).zip(&seen.columns);
+            columns.extend(numbers.map(|(k, column)| (k, now.base.rotation * column)));
             for (i, a) in &columns {
                 right[*i] += a.dot(&residual);
                 columns
@@ -195,25 +186,11 @@ impl PlacementProblem<'_, '_> {
             turn * now.base.rotation,
             centre + turn * (now.base.translation - centre) + three(3),
         );
-        let seats = now
-            .seats
-            .iter()
-            .enumerate()
-            .map(|(k, seat)| seat + three(6 + 3 * k))
-            .collect();
-        let values = now
-            .values
-            .iter()
-            .enumerate()
-            .map(|(k, value)| value + by[6 + targets + k])
-            .collect();
-        Some(Placement {
-            base,
-            seats,
-            values,
-            off: Vec::new(),
-            left: 0.0,
-        })
+        let seats = now.seats.iter().enumerate();
+        let seats = seats.map(|(k, seat)| seat + three(6 + 3 * k)).collect();
+        let values = now.values.iter().enumerate();
+        let values = values.map(|(k, value)| value + by[6 + targets + k]);
+        Some(Placement::at(base, seats, values.collect()))
     }
 }
 
@@ -275,6 +252,10 @@ impl<'a> PointPairs<'a> {
         &self.q[row * self.joints()..(row + 1) * self.joints()]
     }
 
+    fn last_body(&self, row: usize) -> Pose {
+        bodies(self.robot, self.q(row))[self.joints()]
+    }
+
     /// The same with a joint's positions changed row by row.
     pub(crate) fn with_joints(&self, change: impl Fn(&mut [f64])) -> Self {
         let mut out = self.clone();
@@ -303,13 +284,11 @@ impl<'a> PointPairs<'a> {
     pub(crate) fn cloud(&self) -> f64 {
         let count = self.rows().max(1) as f64;
         let centre = self.points.iter().sum::<Vector3<f64>>() / count;
-        (self
+        let squares = self
             .points
             .iter()
-            .map(|point| (point - centre).norm_squared())
-            .sum::<f64>()
-            / count)
-            .sqrt()
+            .map(|point| (point - centre).norm_squared());
+        (squares.sum::<f64>() / count).sqrt()
     }
 
     /// How far the tool point of the robot file gets in these rows from the first axis that turns, or from its middle, m.
@@ -322,9 +301,9 @@ impl<'a> PointPairs<'a> {
         let tool = |bodies: &Vec<Pose>| bodies[robot.joints()].point(&robot.home().translation);
         let middle = all.iter().map(tool).sum::<Vector3<f64>>() / all.len().max(1) as f64;
         let distance = |bodies: &Vec<Pose>| {
-            let of_axis =
+            let from_axis =
                 first.map(|joint| (tool(bodies) - bodies[joint].point(robot.point(joint))).norm());
-            of_axis.unwrap_or(0.0).max((tool(bodies) - middle).norm())
+            from_axis.unwrap_or(0.0).max((tool(bodies) - middle).norm())
         };
         all.iter().map(distance).fold(0.0, f64::max)
     }
@@ -337,6 +316,12 @@ pub(super) fn bodies(robot: &RobotModel, q: &[f64]) -> Vec<Pose> {
         out.push(out[joint] * robot.motion(joint, &Travel::new(*travel)));
     }
     out
+}
+
+/// The joints that turn.
+pub(super) fn turning(robot: &RobotModel) -> Vec<usize> {
+    let joints = 0..robot.joints();
+    joints.filter(|joint| robot.is_revolute(*joint)).collect()
 }
 
 /// The middle of lengths; infinite of none, and where any is not a number.
@@ -368,17 +353,14 @@ pub(super) struct SeenNumber {
 impl FreeNumber {
     /// All that a robot has.
     pub(crate) fn all(robot: &RobotModel) -> Vec<Self> {
-        let turning = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint));
-        let lengths = (0..robot.joints().saturating_sub(1)).map(Self::Length);
+        let (turning, last) = (turning(robot), robot.joints().saturating_sub(1));
+        let axes = turning.iter().filter(|joint| **joint > 0);
         // The first zero is the base's, the last one the tool's.
-        let zeros = turning
-            .clone()
-            .filter(|joint| (1..robot.joints().saturating_sub(1)).contains(joint))
-            .map(Self::Zero);
-        lengths
-            .chain(turning.filter(|joint| *joint > 0).map(Self::Axis))
-            .chain(zeros)
-            .collect()
+        let zeros = turning.iter().filter(|joint| (1..last).contains(*joint));
+        let mut out: Vec<Self> = (0..last).map(Self::Length).collect();
+        out.extend(axes.map(|joint| Self::Axis(*joint)));
+        out.extend(zeros.map(|joint| Self::Zero(*joint)));
+        out
     }
 
     pub(crate) fn width(self) -> usize {
@@ -393,44 +375,29 @@ impl FreeNumber {
         values: &[f64],
         seat: &Vector3<f64>,
     ) -> SeenNumber {
-        let displaced = |body: Pose, by: Matrix3<f64>| {
-            let columns: Vec<Vector3<f64>> = (0..3).map(|axis| by.column(axis).into()).collect();
-            let shift = columns
-                .iter()
-                .zip(values)
-                .map(|(column, value)| column * *value)
-                .sum();
-            SeenNumber {
+        if let Self::Zero(joint) = self {
+            let mut turned = q.to_vec();
+            turned[joint] += values[0];
+            let all = bodies(robot, &turned);
+            let body = all[robot.joints()];
+            let arm = body.point(seat) - all[joint].point(robot.point(joint));
+            return SeenNumber {
                 body,
-                shift,
-                columns,
-            }
+                shift: Vector3::zeros(),
+                columns: vec![(all[joint].rotation * robot.axis(joint)).cross(&arm)],
+            };
+        }
+        let all = bodies(robot, q);
+        let by: Matrix3<f64> = match self {
+            Self::Axis(joint) => all[joint].rotation - all[joint + 1].rotation,
+            Self::Length(joint) | Self::Zero(joint) => all[joint + 1].rotation,
         };
-        match self {
-            Self::Length(joint) => {
-                let all = bodies(robot, q);
-                displaced(all[robot.joints()], all[joint + 1].rotation)
-            }
-            Self::Axis(joint) => {
-                let all = bodies(robot, q);
-                displaced(
-                    all[robot.joints()],
-                    all[joint].rotation - all[joint + 1].rotation,
-                )
-            }
-            Self::Zero(joint) => {
-                let mut turned = q.to_vec();
-                turned[joint] += values[0];
-                let all = bodies(robot, &turned);
-                let body = all[robot.joints()];
-                let arm = body.point(seat) - all[joint].point(robot.point(joint));
-                let column = (all[joint].rotation * robot.axis(joint)).cross(&arm);
-                SeenNumber {
-                    body,
-                    shift: Vector3::zeros(),
-                    columns: vec![column],
-                }
-            }
+        let columns: Vec<Vector3<f64>> = (0..3).map(|axis| by.column(axis).into()).collect();
+        let shift = columns.iter().zip(values);
+        SeenNumber {
+            body: all[robot.joints()],
+            shift: shift.map(|(column, value)| column * *value).sum(),
+            columns,
         }
     }
 }

@@ -3,18 +3,17 @@
 //! What a diagnosis says of a wrong set-up: the nominal robot where its base fits best, the set-up error, and no physics.
 
 use crate::criteria::setup::{ARMS, FAR, NAMED, QUARTERLY, SMALL};
-use crate::effect::{ParameterEstimate, Place, figure};
+use crate::effect::{ParameterEstimate, figure};
 use crate::error::counted;
-use crate::estimate::{Screening, fit};
 use crate::observation::Dimension;
 use crate::robot::{RobotModel, numbered};
 use crate::setup::compare::{AsStated, ExplainedSetup};
-use crate::setup::counting::{CountedJoint, Counting, LIMIT};
+use crate::setup::counting::{CountedJoint, LIMIT};
 use crate::setup::mixture::TwoSetups;
 use crate::setup::placement::{FreeNumber, median};
 use crate::setup::wrong::{LENGTHS, RowOrder, WrongSetup};
 use crate::types::{Diagnosis, ErrorLengths, Finding, Probabilities, Question, SETUP, VerdictKind};
-use crate::unasked::{on_its_base, unasked};
+use crate::unasked::unasked;
 
 /// What is wrong, and what to change in which file.
 pub(super) struct SetupWords {
@@ -42,30 +41,20 @@ pub(super) fn words(
     reach: f64,
 ) -> SetupWords {
     let joints = robot.joints();
-    let list = |value_of: &dyn Fn(usize) -> String| {
-        (0..joints).map(value_of).collect::<Vec<_>>().join(", ")
-    };
     let (what, mend) = match wrong {
-        WrongSetup::PointUnit(unit) => return of_lengths(unit, reach),
+        WrongSetup::PointUnit(unit) => return length_words(unit, reach),
         WrongSetup::InRadians => {
             ("the joints are in rad and were read in deg".into(), "in `ingest`: `columns: {q: {.., unit: rad}}`".into())
         }
         WrongSetup::InDegrees => {
             ("the joints are in deg and were read in rad".into(), "in `ingest`: `columns: {q: {.., unit: deg}}`".into())
         }
-        WrongSetup::Sign(joint) => of_signs(&[joint], joints),
-        WrongSetup::Signs(group) => of_signs(&group.joints().collect::<Vec<_>>(), joints),
+        WrongSetup::Signs(group) => sign_words(&group.joints().collect::<Vec<_>>(), joints),
         WrongSetup::Exchanged(a, b) => {
-            let order = list(&|k| {
-                let from = if k == a {
-                    b
-                } else if k == b {
-                    a
-                } else {
-                    k
-                };
-                format!("<joint {}>", from + 1)
-            });
+            let mut order: Vec<usize> = (0..joints).collect();
+            order.swap(a, b);
+            let order = order.iter().map(|k| format!("<joint {}>", k + 1));
+            let order = order.collect::<Vec<_>>().join(", ");
             (
                 format!("joints {} and {} are exchanged", a + 1, b + 1),
                 format!(
@@ -73,47 +62,29 @@ pub(super) fn words(
                 ),
             )
         }
-        WrongSetup::Zero(joint, quarters) => {
-            let degrees = 90 * quarters;
-            let zeros = list(&|k| if k == joint { degrees.to_string() } else { "0".into() });
-            (
-                format!("the recording reads {degrees} deg at the zero of joint {}", joint + 1),
-                format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}`, in deg"),
-            )
-        }
+        WrongSetup::Zero(joint, quarters) => return zero_words(&[(joint, quarters)], joints),
         WrongSetup::Zeros { joint, quarters, next } => {
-            let (first, second) = (90 * quarters, 90 * next);
-            let zeros = list(&|k| match k {
-                _ if k == joint => first.to_string(),
-                _ if k == joint + 1 => second.to_string(),
-                _ => "0".into(),
-            });
-            (
-                format!(
-                    "the recording reads {first} deg at the zero of joint {} and {second} deg at that of joint {}",
-                    joint + 1,
-                    joint + 2
-                ),
-                format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}`, in deg"),
-            )
+            let what = format!(
+                "the recording reads {} deg at the zero of joint {} and {} deg at that of joint {}",
+                90 * quarters,
+                joint + 1,
+                90 * next,
+                joint + 2
+            );
+            (what, zero_words(&[(joint, quarters), (joint + 1, next)], joints).mend)
         }
-        WrongSetup::Counting(counting) => return of_counting(counting, joints),
-        WrongSetup::Coupled { moved, by, sign } => {
-            let (how, ratio) = if sign < 0.0 { ("minus", -1) } else { ("plus", 1) };
-            let (moved, by) = (moved + 1, by + 1);
-            (
-                format!(
-                    "joint {moved} is reported {how} the angle of joint {by}, relative to the horizontal and not to the link before it"
-                ),
-                format!("in `ingest`: `columns: {{q: {{.., coupled: [{{joint: {moved}, by: {by}, ratio: {ratio}}}]}}}}`"),
-            )
+        WrongSetup::Counting(counting) => return counting_words(counting.joints().iter().take(joints)),
+        WrongSetup::Coupled { moved, sign, .. } => {
+            let mut counted = vec![CountedJoint::default(); joints];
+            counted[moved].coupled = sign as i32;
+            return counting_words(counted.iter());
         }
         WrongSetup::Mirrored => (
             "the points are a mirror image: an axis of the tracker's frame has the wrong sign, or two are exchanged".into(),
             "in `ingest`: exchange the columns of `x` and `y`; since the base is fitted, this corrects both cases".into(),
         ),
-        WrongSetup::Order(order) => return of_order(order),
-        WrongSetup::Number(number) => return of_number(number, values, joints),
+        WrongSetup::Order(order) => return order_words(order),
+        WrongSetup::Number(number) => return number_words(number, values, joints),
     };
     SetupWords::of(what, mend)
 }
@@ -125,114 +96,95 @@ pub(super) fn together(
     words: impl Fn(WrongSetup) -> SetupWords,
 ) -> Vec<SetupWords> {
     let signs = |wrong: &WrongSetup| match wrong {
-        WrongSetup::Sign(joint) => vec![*joint],
         WrongSetup::Signs(group) => group.joints().collect(),
         _ => Vec::new(),
     };
     let turned: Vec<usize> = wrong.iter().flat_map(signs).collect();
     let twice = |joint: &usize| turned.iter().filter(|other| *other == joint).count() > 1;
-    let reversed: Vec<usize> = (0..robot.joints())
-        .filter(|joint| turned.contains(joint) && !twice(joint))
-        .collect();
-    let others = wrong
-        .iter()
-        .filter(|wrong| signs(wrong).is_empty())
-        .map(|wrong| words(*wrong));
-    let (what, mend) = of_signs(&reversed, robot.joints());
-    others
-        .chain((!reversed.is_empty()).then(|| SetupWords::of(what, mend)))
-        .collect()
+    let mut reversed: Vec<usize> = (0..robot.joints()).collect();
+    reversed.retain(|joint| turned.contains(joint) && !twice(joint));
+    let others = wrong.iter().filter(|wrong| signs(wrong).is_empty());
+    let mut all: Vec<SetupWords> = others.map(|wrong| words(*wrong)).collect();
+    if !reversed.is_empty() {
+        let (what, mend) = sign_words(&reversed, robot.joints());
+        all.push(SetupWords::of(what, mend));
+    }
+    all
 }
 
 /// Joints, from 0, that turn the other way.
-fn of_signs(reversed: &[usize], joints: usize) -> (String, String) {
+fn sign_words(reversed: &[usize], joints: usize) -> (String, String) {
     let signs: Vec<&str> = (0..joints)
         .map(|joint| if reversed.contains(&joint) { "-1" } else { "1" })
         .collect();
-    let (verb, axes) = if reversed.len() == 1 {
-        ("turns", "axis")
-    } else {
-        ("turn", "axes")
+    let (noun, verb, axes) = match reversed.len() {
+        1 => ("joint", "turns", "axis"),
+        _ => ("joints", "turn", "axes"),
     };
+    let (joints, signs) = (numbered(reversed), signs.join(", "));
     (
+        format!("{noun} {joints} {verb} the other way than the robot file says"),
         format!(
-            "joint{} {} {verb} the other way than the robot file says",
-            if reversed.len() == 1 { "" } else { "s" },
-            numbered(reversed)
-        ),
-        format!(
-            "in `ingest`: `columns: {{q: {{.., sign: [{}]}}}}`, or turn the {axes} round in the robot file",
-            signs.join(", ")
+            "in `ingest`: `columns: {{q: {{.., sign: [{signs}]}}}}`, or turn the {axes} round in the robot file"
         ),
     )
 }
 
+/// Zeros of joints in quarters of a turn.
+fn zero_words(zeros: &[(usize, i32)], joints: usize) -> SetupWords {
+    let mut counted = vec![CountedJoint::default(); joints];
+    for (joint, quarters) in zeros {
+        counted[*joint].quarters = *quarters;
+    }
+    counting_words(counted.iter())
+}
+
 /// Signs, zeros and couplings of all joints.
-fn of_counting(counting: Counting, joints: usize) -> SetupWords {
-    let all: Vec<(usize, CountedJoint)> = counting
-        .joints()
-        .iter()
-        .copied()
-        .enumerate()
-        .take(joints)
-        .collect();
-    let reversed: Vec<usize> = all
-        .iter()
-        .filter(|(_, counted)| counted.reversed)
-        .map(|(joint, _)| *joint)
-        .collect();
-    let list = |value_of: &dyn Fn(&CountedJoint) -> i32| {
-        all.iter()
-            .map(|(_, counted)| value_of(counted).to_string())
-            .collect::<Vec<_>>()
-            .join(", ")
+fn counting_words<'j>(joints: impl ExactSizeIterator<Item = &'j CountedJoint>) -> SetupWords {
+    let count = joints.len();
+    let all: Vec<(usize, &CountedJoint)> = (1..).zip(joints).collect();
+    let list = |value: &dyn Fn(&CountedJoint) -> i32| {
+        let each = all.iter().map(|(_, counted)| value(counted).to_string());
+        each.collect::<Vec<_>>().join(", ")
     };
-    let (mut what, mut mend) = (Vec::new(), Vec::new());
+    let (mut what, mut mend, mut unit) = (Vec::new(), Vec::new(), "");
+    let reversed = all.iter().filter(|(_, counted)| counted.reversed);
+    let reversed: Vec<usize> = reversed.map(|(joint, _)| joint - 1).collect();
     if !reversed.is_empty() {
-        what.push(of_signs(&reversed, joints).0);
-        mend.push(format!(
-            "sign: [{}]",
-            list(&|counted| if counted.reversed { -1 } else { 1 })
-        ));
+        what.push(sign_words(&reversed, count).0);
+        let signs = list(&|counted| if counted.reversed { -1 } else { 1 });
+        mend.push(format!("sign: [{signs}]"));
     }
     let turned = all.iter().filter(|(_, counted)| counted.quarters != 0);
-    let zeros = turned.map(|(joint, counted)| {
-        format!(
-            "the recording reads {} deg at the zero of joint {}",
-            90 * counted.quarters,
-            joint + 1
-        )
-    });
-    what.extend(zeros);
-    let in_degrees = what.len() > usize::from(!reversed.is_empty());
-    if in_degrees {
+    let turned: Vec<String> = turned
+        .map(|(joint, counted)| {
+            let degrees = 90 * counted.quarters;
+            format!("the recording reads {degrees} deg at the zero of joint {joint}")
+        })
+        .collect();
+    if !turned.is_empty() {
+        unit = ", in deg";
         mend.push(format!(
             "zero: [{}]",
             list(&|counted| 90 * counted.quarters)
         ));
     }
-    let coupled: Vec<(usize, i32)> = all
-        .iter()
-        .filter(|(_, counted)| counted.coupled != 0)
-        .map(|(joint, counted)| (joint + 1, counted.coupled))
-        .collect();
-    if !coupled.is_empty() {
-        let how = |ratio: i32| if ratio < 0 { "minus" } else { "plus" };
-        what.extend(coupled.iter().map(|(joint, ratio)| {
-            let (how, by) = (how(*ratio), joint - 1);
-            format!("joint {joint} is reported {how} the angle of joint {by}, relative to the horizontal and not to the link before it")
-        }));
-        let each: Vec<String> = coupled
-            .iter()
-            .map(|(joint, ratio)| format!("{{joint: {joint}, by: {}, ratio: {ratio}}}", joint - 1))
-            .collect();
-        mend.push(format!("coupled: [{}]", each.join(", ")));
+    what.extend(turned);
+    let mut coupled = Vec::new();
+    for (joint, ratio) in all.iter().map(|(joint, counted)| (joint, counted.coupled)) {
+        let (how, by) = (if ratio < 0 { "minus" } else { "plus" }, joint - 1);
+        if ratio != 0 {
+            what.push(format!("joint {joint} is reported {how} the angle of joint {by}, relative to the horizontal and not to the link before it"));
+            coupled.push(format!("{{joint: {joint}, by: {by}, ratio: {ratio}}}"));
+        }
     }
-    let degrees = if in_degrees { ", in deg" } else { "" };
+    if !coupled.is_empty() {
+        mend.push(format!("coupled: [{}]", coupled.join(", ")));
+    }
     SetupWords::of(
         what.join(", and "),
         format!(
-            "in `ingest`: `columns: {{q: {{.., {}}}}}`{degrees}",
+            "in `ingest`: `columns: {{q: {{.., {}}}}}`{unit}",
             mend.join(", ")
         ),
     )
@@ -248,7 +200,7 @@ fn unit_name(unit: &str) -> &'static str {
     }
 }
 
-fn of_lengths(unit: usize, reach: f64) -> SetupWords {
+fn length_words(unit: usize, reach: f64) -> SetupWords {
     let (factor, read, is) = LENGTHS[unit];
     if (ARMS[0]..=ARMS[1]).contains(&reach) {
         let what = format!(
@@ -281,7 +233,7 @@ fn of_lengths(unit: usize, reach: f64) -> SetupWords {
     }
 }
 
-fn of_order(order: RowOrder) -> SetupWords {
+fn order_words(order: RowOrder) -> SetupWords {
     let (what, mend) = match order {
         RowOrder::Shifted(by) => {
             let how = if by < 0 { "ahead of" } else { "behind" };
@@ -309,7 +261,7 @@ fn of_order(order: RowOrder) -> SetupWords {
     SetupWords::of(what, mend.into())
 }
 
-fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
+fn number_words(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
     let (what, mend) = match number {
         FreeNumber::Length(joint) => (
             format!(
@@ -340,8 +292,7 @@ fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
             let quarters = (-degrees / 90.0).round() as i32;
             let remaining = -degrees - 90.0 * f64::from(quarters);
             if quarters != 0 && remaining.abs() < *QUARTERLY && joints <= LIMIT {
-                let SetupWords { what, mend, .. } =
-                    of_counting(Counting::of_a_zero(joint, quarters), joints);
+                let SetupWords { what, mend, .. } = zero_words(&[(joint, quarters)], joints);
                 let what = format!("{what}, and is also {} deg off", figure(remaining, 2));
                 return SetupWords::of(what, mend);
             }
@@ -392,33 +343,28 @@ pub(super) fn explained(
 ) -> Diagnosis {
     let words_of = |wrong| words(wrong, question.robot, &found.placed.values, stated.reach);
     let all = together(&found.wrong, question.robot, words_of);
-    let what: Vec<&str> = all.iter().map(|words| words.what.as_str()).collect();
-    let mend: Vec<&str> = all.iter().map(|words| words.mend.as_str()).collect();
+    let joined =
+        |text: fn(&SetupWords) -> &str, by: &str| all.iter().map(text).collect::<Vec<_>>().join(by);
     let scale: f64 = all.iter().map(|words| words.scale).product();
     let (before, after) = (stated.placed.left, scale * found.placed.left);
     let mut text = format!(
         "{}; with this error the nominal robot is {} off the points (median, base and tool fitted), without it {}. Remedy: {}",
-        what.join(", and "),
+        joined(|words| &words.what, ", and "),
         mm(before),
         mm(after),
-        mend.join("; ")
+        joined(|words| &words.mend, "; ")
     );
-    let mut alike: Vec<SetupWords> = found
-        .alike
-        .iter()
-        .filter(|wrong| wrong.number().is_none())
-        .map(|wrong| words_of(*wrong))
-        .collect();
+    let alike = found.alike.iter().filter(|wrong| wrong.number().is_none());
+    let mut alike: Vec<SetupWords> = alike.map(|wrong| words_of(*wrong)).collect();
     alike.dedup_by(|a, b| a.what == b.what);
-    alike.retain(|other| !what.contains(&other.what.as_str()));
+    alike.retain(|other| all.iter().all(|words| words.what != other.what));
     if !alike.is_empty() {
-        let each: Vec<String> = alike
+        let each = alike
             .iter()
-            .map(|words| format!("{}; remedy then: {}", words.what, words.mend))
-            .collect();
+            .map(|words| format!("{}; remedy then: {}", words.what, words.mend));
         text.push_str(&format!(
             ". These data are explained equally well if {}",
-            each.join(", or if ")
+            each.collect::<Vec<_>>().join(", or if ")
         ));
     }
     let number = |name: &str, value: f64| ParameterEstimate {
@@ -428,19 +374,13 @@ pub(super) fn explained(
         unit: "mm",
         sigma: None,
     };
-    let kept: Vec<bool> = found
-        .placed
-        .off
-        .iter()
-        .map(|off| *off <= *FAR * median(&found.placed.off))
-        .collect();
+    let far = *FAR * median(&found.placed.off);
     let lengths = |off: &[f64], scale: f64| {
-        let kept: Vec<f64> = off
+        let kept = off
             .iter()
-            .zip(&kept)
-            .filter(|(_, kept)| **kept)
-            .map(|(off, _)| scale * off)
-            .collect();
+            .zip(&found.placed.off)
+            .filter(|(_, off)| **off <= far);
+        let kept: Vec<f64> = kept.map(|(off, _)| scale * off).collect();
         ErrorLengths::of_lengths(&kept)
     };
     let name = *NAMED / (1.0 + found.alike.len() as f64);
@@ -454,22 +394,18 @@ pub(super) fn explained(
             place: *NAMED,
             none: 1.0 - *NAMED,
         },
-        ..finding(format!("{text}."))
+        ..finding(text)
     };
-    let errors = (
-        lengths(&stated.placed.off, 1.0),
-        lengths(&found.placed.off, scale),
-    );
     Diagnosis {
-        before: errors.0,
-        after: errors.1,
+        before: lengths(&stated.placed.off, 1.0),
+        after: lengths(&found.placed.off, scale),
         ..wrong(question, vec![finding])
     }
 }
 
 /// Rows of two set-ups.
 pub(super) fn two_setups(question: &Question, found: &TwoSetups) -> Diagnosis {
-    wrong(question, vec![finding(format!("{}.", found.words()))])
+    wrong(question, vec![finding(found.words())])
 }
 
 /// An identified model that leaves the robot file by more than manufacture allows, and no set-up error of the list that explains it.
@@ -479,7 +415,7 @@ pub(super) fn implausible(question: &Question, numbers: &[String]) -> Diagnosis 
          or a wrong unit, and the joints for a wrong zero or sign",
         numbers.join(", ")
     );
-    wrong(question, vec![finding(format!("{text}."))])
+    wrong(question, vec![finding(text)])
 }
 
 /// Nothing of the list explains the residual of the nominal robot.
@@ -498,48 +434,24 @@ pub(super) fn unexplained(question: &Question, stated: &AsStated) -> Diagnosis {
     }
 }
 
-fn finding(statement: String) -> Finding {
-    Finding {
-        effect: SETUP,
-        place: Place::Recording,
-        statement,
-        parameters: Vec::new(),
-        evidence: None,
-        rivals: Vec::new(),
-        probabilities: Probabilities {
-            name: *NAMED,
-            place: *NAMED,
-            none: 1.0 - *NAMED,
-        },
-        valid: None,
-        forms: Vec::new(),
-    }
+fn finding(text: String) -> Finding {
+    Finding::of_recording(SETUP, format!("{text}."), *NAMED)
 }
 
 /// The nominal robot with its base where the rows to fit have it.
 fn wrong(question: &Question, findings: Vec<Finding>) -> Diagnosis {
-    let Question {
-        data, fit: rows, ..
-    } = *question;
-    let (start, candidates) = on_its_base(question);
-    let (model, fitted) = fit(&start, data, rows, &candidates);
-    let before = ErrorLengths::of(&model.error_sizes(data, Dimension::Length), rows);
-    let screening = Screening {
-        kept: rows.to_vec(),
-        ..Screening::default()
-    };
-    let not_observable =
-        vec!["what the simulation lacks: it is tested once the set-up is right".into()];
-    let diagnosis = unasked(
-        question,
-        VerdictKind::WrongSetup,
-        (model, fitted, screening),
-    );
+    let rows = question.fit;
+    let diagnosis = unasked(question, VerdictKind::WrongSetup, None);
+    let off = diagnosis
+        .model
+        .error_sizes(question.data, Dimension::Length);
     Diagnosis {
-        before,
+        before: ErrorLengths::of(&off, rows),
         held_out: false,
         findings,
-        not_observable,
+        not_observable: vec![
+            "what the simulation lacks: it is tested once the set-up is right".into(),
+        ],
         ..diagnosis
     }
 }

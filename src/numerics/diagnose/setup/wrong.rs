@@ -10,7 +10,7 @@
 use crate::criteria::setup::{FARTHEST, LONG, SHIFTS, SORTED};
 use crate::robot::RobotModel;
 use crate::setup::counting::Counting;
-use crate::setup::placement::{FreeNumber, PointPairs, median};
+use crate::setup::placement::{FreeNumber, PointPairs, median, turning};
 use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -22,8 +22,7 @@ pub(super) enum WrongSetup {
     /// The joints are in rad and were read in deg, or the other way round.
     InRadians,
     InDegrees,
-    Sign(usize),
-    /// Several joints turn the other way.
+    /// Joints turn the other way.
     Signs(SignGroup),
     Exchanged(usize, usize),
     /// What is reported at the robot file's zero, in quarters of a turn: 1, -1, or 2.
@@ -65,26 +64,16 @@ impl WrongSetup {
     /// All that this robot and these rows, in their order, may have.
     pub(crate) fn all(pairs: &PointPairs) -> Vec<Self> {
         let robot = pairs.robot;
-        let turning: Vec<usize> = (0..robot.joints())
-            .filter(|joint| robot.is_revolute(*joint))
-            .collect();
+        let turning = turning(robot);
         let mut out: Vec<Self> = (0..LENGTHS.len()).map(Self::PointUnit).collect();
         out.extend([Self::InRadians, Self::InDegrees]);
-        out.extend(turning.iter().map(|joint| Self::Sign(*joint)));
+        out.extend(SignGroup::each(&turning).map(Self::Signs));
         // Before the mirror image: reversing all joints whose axes lie in the plane of a symmetric arm is one, and the usual reason.
         out.extend(SignGroup::all(robot).into_iter().map(Self::Signs));
         out.push(Self::Mirrored);
-        let pairs_from = |k: usize| turning[k + 1..].iter().map(move |b| (k, b));
-        out.extend(
-            (0..turning.len())
-                .flat_map(pairs_from)
-                .map(|(k, b)| Self::Exchanged(turning[k], *b)),
-        );
-        out.extend(
-            turning
-                .iter()
-                .flat_map(|joint| [1, -1, 2].map(|quarters| Self::Zero(*joint, quarters))),
-        );
+        out.extend(every_two(&turning).map(|(a, b)| Self::Exchanged(a, b)));
+        let zeros = |joint: &usize| [1, -1, 2].map(|quarters| Self::Zero(*joint, quarters));
+        out.extend(turning.iter().flat_map(zeros));
         let parallel = turning
             .windows(2)
             .filter(|pair| pair[1] == pair[0] + 1 && robot.is_parallel(pair[0], pair[1]));
@@ -118,7 +107,7 @@ impl WrongSetup {
             Self::Order(_) | Self::Exchanged(..) => 0,
             Self::PointUnit(_) | Self::InRadians | Self::InDegrees | Self::Mirrored => 1,
             Self::Zero(..) | Self::Zeros { .. } => 2,
-            Self::Sign(_) | Self::Signs(_) | Self::Counting(_) => 3,
+            Self::Signs(_) | Self::Counting(_) => 3,
             Self::Coupled { .. } => 4,
             Self::Number(_) => 5,
         }
@@ -126,18 +115,16 @@ impl WrongSetup {
 
     /// The number of the robot file that is to be found.
     pub fn number(self) -> Option<FreeNumber> {
-        if let Self::Number(number) = self {
-            Some(number)
-        } else {
-            None
+        match self {
+            Self::Number(number) => Some(number),
+            _ => None,
         }
     }
 
     pub(crate) fn order(self) -> Option<RowOrder> {
-        if let Self::Order(order) = self {
-            Some(order)
-        } else {
-            None
+        match self {
+            Self::Order(order) => Some(order),
+            _ => None,
         }
     }
 
@@ -155,7 +142,6 @@ impl WrongSetup {
             Self::PointUnit(unit) => pairs.with_points(|point| point * LENGTHS[unit].0),
             Self::InRadians => scaled(180.0 / PI),
             Self::InDegrees => scaled(PI / 180.0),
-            Self::Sign(joint) => pairs.with_joints(|q| q[joint] = -q[joint]),
             Self::Signs(group) => {
                 pairs.with_joints(|q| group.joints().for_each(|joint| q[joint] = -q[joint]))
             }
@@ -179,6 +165,15 @@ impl WrongSetup {
     }
 }
 
+/// Every two of some joints.
+fn every_two(joints: &[usize]) -> impl Iterator<Item = (usize, usize)> {
+    let with = |(k, a): (usize, &usize)| {
+        let a = *a;
+        joints[k + 1..].iter().map(move |b| (a, *b))
+    };
+    joints.iter().enumerate().flat_map(with)
+}
+
 /// Joints, from 0, as bits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SignGroup(u64);
@@ -186,37 +181,29 @@ pub(super) struct SignGroup(u64);
 impl SignGroup {
     /// The groups of two joints or more that a robot may have: swivel and roll, pitch, the pitch of the main axes, all, and every two.
     pub(crate) fn all(robot: &RobotModel) -> Vec<Self> {
-        let turning: Vec<usize> = (0..robot.joints().min(64))
-            .filter(|joint| robot.is_revolute(*joint))
-            .collect();
-        let pitch = turning
-            .windows(2)
-            .find(|pair| robot.is_parallel(pair[0], pair[1]))
-            .map(|pair| pair[0]);
-        let of_choose = |choose: &dyn Fn(usize) -> bool| {
+        let mut turning = turning(robot);
+        turning.retain(|joint| *joint < 64);
+        let mut neighbours = turning.windows(2);
+        let pitch = neighbours.find(|pair| robot.is_parallel(pair[0], pair[1]));
+        let pitch = pitch.map(|pair| pair[0]);
+        let chosen = |choose: &dyn Fn(usize) -> bool| {
             Self::of(turning.iter().copied().filter(|joint| choose(*joint)))
         };
-        let mut out = vec![of_choose(&|joint| {
-            robot.joints() == 6 && [0, 3, 5].contains(&joint)
-        })];
+        let is_roll_of_six = |joint| robot.joints() == 6 && [0, 3, 5].contains(&joint);
+        let mut out = vec![chosen(&is_roll_of_six)];
         if let Some(pitch) = pitch {
             let is_pitch = |joint: usize| robot.is_parallel(pitch, joint);
-            let wrist = (pitch..robot.joints())
-                .find(|joint| !is_pitch(*joint))
-                .unwrap_or(robot.joints());
+            let mut after = pitch..robot.joints();
+            let wrist = after.find(|joint| !is_pitch(*joint));
+            let wrist = wrist.unwrap_or(robot.joints());
             out.extend([
-                of_choose(&|joint| !is_pitch(joint)),
-                of_choose(&is_pitch),
-                of_choose(&|joint| is_pitch(joint) && joint < wrist),
+                chosen(&|joint| !is_pitch(joint)),
+                chosen(&is_pitch),
+                chosen(&|joint| is_pitch(joint) && joint < wrist),
             ]);
         }
-        out.push(of_choose(&|_| true));
-        let two = |k: usize| turning[k + 1..].iter().map(move |b| (k, *b));
-        out.extend(
-            (0..turning.len())
-                .flat_map(two)
-                .map(|(k, b)| Self::of([turning[k], b].into_iter())),
-        );
+        out.push(chosen(&|_| true));
+        out.extend(every_two(&turning).map(|(a, b)| Self::of([a, b].into_iter())));
         let mut all: Vec<Self> = Vec::new();
         for group in out.into_iter().filter(|group| group.0.count_ones() > 1) {
             if !all.contains(&group) {
@@ -224,6 +211,12 @@ impl SignGroup {
             }
         }
         all
+    }
+
+    /// A joint each.
+    fn each(joints: &[usize]) -> impl Iterator<Item = Self> {
+        let joints = joints.iter().filter(|joint| **joint < 64);
+        joints.map(|joint| Self::of(std::iter::once(*joint)))
     }
 
     fn of(joints: impl Iterator<Item = usize>) -> Self {
@@ -298,14 +291,12 @@ impl RowOrder {
 /// The shifts by which the steps from point to point are most like those of the nominal arm: a rigid motion does not change them.
 fn likely_shifts(pairs: &PointPairs) -> Vec<RowOrder> {
     let (robot, count) = (pairs.robot, pairs.rows());
-    let model: Vec<Vector3<f64>> = (0..count)
-        .map(|row| robot.forward(pairs.q(row)).translation)
-        .collect();
+    let forward = |row: usize| robot.forward(pairs.q(row)).translation;
+    let model: Vec<Vector3<f64>> = (0..count).map(forward).collect();
     let (model, measured) = (steps(&model), steps(&pairs.points));
     let likeness = |shift: usize| {
-        (0..count)
-            .map(|row| model[row] * measured[(row + shift) % count])
-            .sum::<f64>()
+        let products = (0..count).map(|row| model[row] * measured[(row + shift) % count]);
+        products.sum::<f64>()
     };
     let tried = (1..count).filter(|shift| *shift.min(&(count - shift)) <= *FARTHEST);
     let mut all: Vec<(f64, usize)> = tried.map(|shift| (likeness(shift), shift)).collect();
@@ -326,16 +317,12 @@ fn likely_shifts(pairs: &PointPairs) -> Vec<RowOrder> {
 /// Distances from each point to the next, the first being next to the last, less their mean.
 fn steps(points: &[Vector3<f64>]) -> Vec<f64> {
     let next = points.iter().cycle().skip(1);
-    let lengths: Vec<f64> = points
-        .iter()
-        .zip(next)
-        .map(|(a, b)| (b - a).norm())
-        .collect();
+    let lengths = points.iter().zip(next);
+    let mut lengths: Vec<f64> = lengths.map(|(a, b)| (b - a).norm()).collect();
     let limit = *LONG * median(&lengths);
-    let lengths: Vec<f64> = lengths
-        .into_iter()
-        .map(|length| length.min(limit))
-        .collect();
+    lengths
+        .iter_mut()
+        .for_each(|length| *length = length.min(limit));
     let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
     lengths.into_iter().map(|length| length - mean).collect()
 }

@@ -2,6 +2,7 @@
 //! the residual sits before and after.
 
 use super::cause_table::CauseTable;
+use super::cell::Shapes;
 use super::component::{CellColumns, Component};
 use super::evidence::log_sum;
 use super::scan::{CellEvidence, CellScan};
@@ -79,9 +80,8 @@ impl CauseTable<'_, '_> {
     /// The findings that components are; `first` is where the residual sat before any of them.
     pub(super) fn answer(&mut self, components: &[Component], first: (Located, f64)) -> Answer {
         self.know(components);
-        let all: Vec<&Component> = components.iter().collect();
-        let state = self.state(&all, None);
-        let scan = self.scan(&state, &all, 4, &[]);
+        let state = self.state(components, None);
+        let scan = self.scan(&state, 4, &[]);
         let mut ranges = Vec::new();
         let mut at = 0;
         for component in components {
@@ -108,7 +108,6 @@ impl CauseTable<'_, '_> {
                 let cell = &self.cells[best];
                 format!("most like {} at {}", cell.name, cell.place)
             });
-        let hidden = self.hidden(&state, &all);
         Answer {
             found,
             nothing_first: first.1,
@@ -116,7 +115,7 @@ impl CauseTable<'_, '_> {
             next,
             located_first: first.0,
             located_last: self.locate(&state),
-            hidden,
+            hidden: self.hidden(&state),
             better,
         }
     }
@@ -128,61 +127,42 @@ impl CauseTable<'_, '_> {
         members: &[usize],
         kappa: f64,
     ) -> (FoundCell, Option<(usize, CellEvidence)>) {
-        let others = without(components, members);
-        let other_components: Vec<&Component> = others.iter().collect();
-        let state = self.state(&other_components, Some(kappa));
-        let with = self.state(&components.iter().collect::<Vec<_>>(), Some(kappa));
+        let mut known = without(components, members);
+        let state = self.state(&known, Some(kappa));
+        let with = self.state(components, Some(kappa));
         // The strongest of several stands for its finding; further ones of its cell add to it.
-        let log_of = |i: usize, state: &KnownState, other_components: &[&Component]| {
-            self.log_evidence(&components[i], state, other_components)
-        };
-        let strongest = members.iter().copied().max_by(|a, b| {
-            log_of(*a, &state, &other_components).total_cmp(&log_of(*b, &state, &other_components))
-        });
-        let main = strongest.unwrap_or(members[0]);
-        let cell = components[main].cell;
-        let log_main = log_of(main, &state, &other_components);
+        let log = |i: &usize| (*i, self.log_evidence(&components[*i], &state));
+        let logs: BTreeMap<usize, f64> = members.iter().map(log).collect();
+        let strongest = members.iter().max_by(|a, b| logs[*a].total_cmp(&logs[*b]));
+        let main = *strongest.unwrap_or(&members[0]);
+        let (component, log_main) = (&components[main], logs[&main]);
+        let cell = component.cell;
         let mut log = log_main;
-        let mut known = other_components.clone();
-        known.push(&components[main]);
-        for i in members.iter().copied().filter(|i| *i != main) {
+        known.push(component.clone());
+        for i in members.iter().filter(|i| **i != main) {
             let given = self.state(&known, Some(kappa));
-            log += log_of(i, &given, &known).max(0.0);
-            known.push(&components[i]);
+            log += self.log_evidence(&components[*i], &given).max(0.0);
+            known.push(components[*i].clone());
         }
-        let also: Vec<usize> = std::iter::once(cell)
-            .chain(self.over_its_variable(&components[main], &state, &other_components))
-            .collect();
-        let alike = self.alike(&components[main], 60);
-        let mut scan = self.scan_instead(
-            &components[main],
-            &alike,
-            &state,
-            &other_components,
-            8,
-            &also,
-        );
-        let log_prior = members
+        let mut also = vec![cell];
+        also.extend(self.over_its_variable(component, &state));
+        let alike = self.alike(component, 60);
+        let mut scan = self.scan_instead(component, &alike, &state, 8, &also);
+        let priors = members
             .iter()
-            .map(|i| self.cells[components[*i].cell].log_prior)
-            .sum::<f64>();
+            .map(|i| self.cells[components[*i].cell].log_prior);
+        let log_prior = priors.sum::<f64>();
         // Others are asked what the strongest does, and compete with all of them.
         scan.log_odds[cell] = (self.cells[cell].log_prior + log_main).max(log_prior + log);
-        let better = scan
-            .best()
-            .filter(|best| scan.log_odds[*best] > scan.log_odds[cell] + *SWAPS);
+        let least = scan.log_odds[cell] + *SWAPS;
+        let better = scan.best().filter(|best| scan.log_odds[*best] > least);
         let better = better.and_then(|best| Some((best, scan.closely.get(&best)?.clone())));
-        let (effect, place) = (self.name_of(&components[main]), self.cells[cell].place);
-        let (probabilities, rivals) = self.weigh((effect, place), cell, &components[main], &scan);
-        let mut bounds = Vec::new();
-        for i in members {
-            bounds.extend(
-                components[*i]
-                    .forms
-                    .iter()
-                    .map(|_| (components[*i].group.positive, components[*i].group.largest)),
-            );
-        }
+        let (effect, place) = (self.name_of(component), self.cells[cell].place);
+        let (probabilities, rivals) = self.weigh((effect, place), component, &scan);
+        let bounds = members.iter().flat_map(|i| {
+            let Component { forms, group, .. } = &components[*i];
+            std::iter::repeat_n((group.positive, group.largest), forms.len())
+        });
         let gain = (state.rows.square - with.rows.square).max(0.0);
         let found = FoundCell {
             effect,
@@ -194,7 +174,7 @@ impl CauseTable<'_, '_> {
             numbers: members.iter().map(|i| components[*i].part.ncols()).sum(),
             probabilities,
             rivals,
-            bounds,
+            bounds: bounds.collect(),
         };
         (found, better)
     }
@@ -203,18 +183,10 @@ impl CauseTable<'_, '_> {
     fn weigh(
         &self,
         (effect, place): (&'static str, Place),
-        found_in: usize,
         component: &Component,
         scan: &CellScan,
     ) -> (Probabilities, Vec<RivalCause>) {
-        let whole = log_sum(
-            &scan
-                .log_odds
-                .iter()
-                .copied()
-                .chain([0.0])
-                .collect::<Vec<_>>(),
-        );
+        let whole = log_of_all(scan);
         let mut shares: BTreeMap<(&'static str, Place), f64> = BTreeMap::new();
         for (k, cell) in self.cells.iter().enumerate() {
             let probability = (scan.log_odds[k] - whole).exp();
@@ -229,10 +201,9 @@ impl CauseTable<'_, '_> {
             };
             let bent = scan.closely.get(&k).map_or(0.0, bends);
             // What was refined stands for its cell.
-            let bent = if k == found_in && component.shape.is_bent {
-                bent.max(0.9)
-            } else {
-                bent
+            let bent = match k == component.cell && component.shape.is_bent {
+                true => bent.max(0.9),
+                false => bent,
             };
             if cell.name == names::JOINT_COMPLIANCE {
                 *shares.entry((self.bent, cell.place)).or_default() += bent * probability;
@@ -243,15 +214,12 @@ impl CauseTable<'_, '_> {
         }
         let sound = 1.0 - *MISLED;
         let name = sound * shares.get(&(effect, place)).copied().unwrap_or(0.0);
-        let at_place = sound
-            * shares
-                .iter()
-                .filter(|(key, _)| key.1 == place)
-                .map(|(_, share)| share)
-                .sum::<f64>();
-        let rivals = shares
-            .iter()
-            .filter(|(key, share)| **key != (effect, place) && **share > *RIVAL);
+        let here = shares.iter().filter(|(key, _)| key.1 == place);
+        let at_place = sound * here.map(|(_, share)| share).sum::<f64>();
+        let is_rival = |(key, share): &(&(&'static str, Place), &f64)| {
+            **key != (effect, place) && **share > *RIVAL
+        };
+        let rivals = shares.iter().filter(is_rival);
         let rival = |((other, at), share): (&(&'static str, Place), &f64)| RivalCause {
             effect: other,
             place: *at,
@@ -260,12 +228,12 @@ impl CauseTable<'_, '_> {
         };
         let mut rivals: Vec<RivalCause> = rivals.map(rival).collect();
         rivals.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-        let of_rivals: f64 = rivals.iter().map(|rival| rival.probability).sum();
+        let rival_sum: f64 = rivals.iter().map(|rival| rival.probability).sum();
         (
             Probabilities {
                 name,
                 place: at_place,
-                none: (1.0 - name - of_rivals).max(0.0),
+                none: (1.0 - name - rival_sum).max(0.0),
             },
             rivals,
         )
@@ -277,17 +245,14 @@ impl CauseTable<'_, '_> {
         let mut lines: BTreeMap<(usize, bool, u32), f64> = BTreeMap::new();
         let mut cells: BTreeMap<(Place, &'static str), ExplainedCell> = BTreeMap::new();
         let clock = Clock::of(self.survey.data);
-        let across = self.across(state);
-        for (k, cell) in self.cells.iter().enumerate() {
-            let block = &self.coarse[k];
-            state.shapes(block, &across, self.first[k], |group, shape, found| {
+        let all: Vec<usize> = (0..self.cells.len()).collect();
+        let (across, first) = self.across_cells(&all, state);
+        for ((cell, block), first) in self.cells.iter().zip(&self.coarse).zip(first) {
+            for (group, shape, found) in state.shapes(block, &across, first) {
                 let seen = &block.groups[group];
                 let share = found.fit / state.rows.square.max(f64::MIN_POSITIVE);
-                let parameters = seen.group.shapes[shape]
-                    .shares
-                    .iter()
-                    .filter(|share| **share > 0.0)
-                    .count();
+                let shares = &seen.group.shapes[shape].shares;
+                let parameters = shares.iter().filter(|share| **share > 0.0).count();
                 let delta_bic = 2.0 * (found.log + cell.log_prior);
                 let entry = |by, name: String| ExplainedShare {
                     by,
@@ -313,17 +278,13 @@ impl CauseTable<'_, '_> {
                 if new.delta_bic > at.delta_bic {
                     *at = new;
                 }
-                let variables: Vec<String> = form
-                    .variables()
-                    .into_iter()
-                    .map(|asked| clock.named(asked))
-                    .collect();
-                let variable =
-                    (!variables.is_empty()).then(|| ("variable", variables.join(" and ")));
-                for (by, name) in [("place", cell.place.to_string())]
-                    .into_iter()
-                    .chain(variable)
-                {
+                let variables = form.variables().into_iter();
+                let variables: Vec<String> = variables.map(|asked| clock.named(asked)).collect();
+                let mut names = vec![("place", cell.place.to_string())];
+                if !variables.is_empty() {
+                    names.push(("variable", variables.join(" and ")));
+                }
+                for (by, name) in names {
                     let new = entry(by, name.clone());
                     let at = best.entry((by, name)).or_insert_with(|| new.clone());
                     if new.delta_bic > at.delta_bic {
@@ -334,7 +295,7 @@ impl CauseTable<'_, '_> {
                     let at = lines.entry(line).or_insert(0.0);
                     *at = at.max(share);
                 }
-            });
+            }
         }
         let mut shares: Vec<ExplainedShare> = best.into_values().collect();
         shares.sort_by(|a, b| {
@@ -358,46 +319,38 @@ impl CauseTable<'_, '_> {
     }
 
     /// Standard errors of forms that geometry may hide.
-    fn hidden(&self, state: &KnownState, components: &[&Component]) -> Vec<(Form, f64)> {
+    fn hidden(&self, state: &KnownState) -> Vec<(Form, f64)> {
         let mut out = Vec::new();
         for cell in self.cells.iter().filter(|cell| cell.is_named()) {
-            let super::cell::Shapes::Listed(groups) = &cell.shapes else {
+            let Shapes::Listed(groups) = &cell.shapes else {
                 continue;
             };
             for group in groups {
                 let [form] = &group.forms[..] else { continue };
+                let is_found = |component: &Component| component.forms.contains(form);
                 if form.cause().hidden(form, self.survey.robot).is_none()
-                    || components
-                        .iter()
-                        .any(|component| component.forms.contains(form))
+                    || state.components.iter().any(is_found)
                 {
                     continue;
                 }
                 let block = CellColumns::of(vec![group.clone()], self.frame);
-                let across = self.across_block(&block, state, components);
-                out.extend(
-                    state
-                        .errors(&block, &across)
-                        .first()
-                        .map(|error| (form.clone(), *error)),
-                );
+                let errors = state.errors(&block, &self.across_block(&block, state));
+                out.extend(errors.first().map(|error| (form.clone(), *error)));
             }
         }
         out
     }
 }
 
+/// ln of the odds of all cells and of nothing together.
+fn log_of_all(scan: &CellScan) -> f64 {
+    let odds = scan.log_odds.iter().copied().chain([0.0]);
+    log_sum(&odds.collect::<Vec<_>>())
+}
+
 /// Probability that nothing more is there.
 pub(super) fn nothing(scan: &CellScan) -> f64 {
-    (-log_sum(
-        &scan
-            .log_odds
-            .iter()
-            .copied()
-            .chain([0.0])
-            .collect::<Vec<_>>(),
-    ))
-    .exp()
+    (-log_of_all(scan)).exp()
 }
 
 /// The joint, side of the gear and order of a pure sine and cosine of a joint's or its motor's angle at that joint.

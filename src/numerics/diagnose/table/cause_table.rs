@@ -57,28 +57,23 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let mut cells = generated::cells(survey, frame, question, is_open);
         cells.extend(generated::products(shown, survey, frame));
         let mut known: BTreeSet<String> = cells.iter().map(|cell| cell.key.clone()).collect();
-        cells.extend(
-            pairs
-                .into_iter()
-                .filter(|cell| known.insert(cell.key.clone())),
-        );
+        let is_new = |cell: &CauseCell| known.insert(cell.key.clone());
+        cells.extend(pairs.into_iter().filter(is_new));
         let values = |variable: Variable| frame.values(variable);
         let mut named = listed::cells(survey, &values, question);
         named.append(&mut cells);
         named.retain(keeps);
         for cell in &mut named {
-            let of_known = |known: &&KnownCell| known.cell == cell.key;
-            if let Some(known) = question.known.iter().find(of_known) {
+            let is_it = |known: &&KnownCell| known.cell == cell.key;
+            if let Some(known) = question.known.iter().find(is_it) {
                 // However usual a cause is, a recording has to show something of it.
                 let probability = known.probability.clamp(1e-6, *USUAL_MOST);
                 cell.log_prior = (probability / (1.0 - probability)).ln();
                 cell.between = Some(known.between);
             }
         }
-        let groups: Vec<Vec<ShapeGroup>> = named
-            .iter()
-            .map(|cell| cell.groups(survey, &values, false))
-            .collect();
+        let groups = named.iter().map(|cell| cell.groups(survey, &values, false));
+        let groups: Vec<Vec<ShapeGroup>> = groups.collect();
         let forms = groups.iter().flatten().flat_map(|group| &group.forms);
         let terms: Vec<&Term> = forms.filter_map(|form| form.term()).collect();
         let mut motions = Vec::new();
@@ -96,9 +91,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         frame.prepare(&motions, &variables);
         frame.tabulate(terms.iter().map(|term| term.law()));
         let is_declared = |cell: &CauseCell| cell.is_named() && cause(cell.name).is_none();
-        let declared = (0..named.len())
-            .filter(|cell| is_declared(&named[*cell]))
-            .collect();
+        let declared = (0..named.len()).filter(|cell| is_declared(&named[*cell]));
+        let excludes = |name: &str| question.without.iter().any(|out| out == name);
         let mut table = Self {
             frame,
             survey,
@@ -113,18 +107,13 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             next: 0,
             numbers: Vec::new(),
             likely: Vec::new(),
-            declared,
+            declared: declared.collect(),
             from_before: Vec::new(),
             multiplied: shown.to_vec(),
             has_steps: false,
-            bent: if question
-                .without
-                .iter()
-                .any(|out| out == names::JOINT_HARDENING)
-            {
-                names::UNKNOWN
-            } else {
-                names::JOINT_HARDENING
+            bent: match excludes(names::JOINT_HARDENING) {
+                true => names::UNKNOWN,
+                false => names::JOINT_HARDENING,
             },
         };
         table.extend(named.into_iter().zip(groups).collect());
@@ -150,18 +139,23 @@ impl<'f, 'a> CauseTable<'f, 'a> {
 
     /// A component's product with the numbers that its variables have; none of what is no product.
     pub(crate) fn product(&self, component: &Component) -> Option<FreeShape> {
-        let Shapes::Free(free) = &self.cells[component.cell].shapes else {
-            return None;
-        };
+        let free = self.cells[component.cell].free()?;
         let law = component.forms.first()?.term()?.law();
-        let (Over::Product(_), Some(times)) = (free.over, law.times) else {
-            return None;
-        };
+        let times = law.times.filter(|_| free.is_product())?;
         Some(FreeShape {
             variable: law.first.variable,
             over: Over::Product(times.variable),
             ..*free
         })
+    }
+
+    /// The groups of shapes of a motion; all of them if `closely`.
+    pub(super) fn groups(&self, free: &FreeShape, closely: bool) -> Vec<ShapeGroup> {
+        free.groups(
+            self.survey,
+            &|variable| self.frame.values(variable),
+            closely,
+        )
     }
 
     /// Cells that may do what a product does; none of what is no product.
@@ -180,20 +174,18 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 continue;
             };
             let log_prior = self.cells[component.cell].log_prior;
-            let siblings = generated::siblings(&free, self.survey)
-                .into_iter()
-                .map(|free| generated::cell(free, log_prior, self.survey))
-                .filter(|cell| !without.contains(&cell.key));
-            let frame = self.frame;
-            let values = |variable: Variable| frame.values(variable);
-            for cell in siblings {
+            for free in generated::siblings(&free, self.survey) {
+                let cell = generated::cell(free, log_prior, self.survey);
+                if without.contains(&cell.key) {
+                    continue;
+                }
                 let known = self.cells.iter_mut();
                 let mut known = known.chain(fresh.iter_mut().map(|(cell, _)| cell));
                 if let Some(known) = known.find(|known| known.key == cell.key) {
                     known.log_prior = known.log_prior.max(log_prior);
                     continue;
                 }
-                let groups = cell.groups(self.survey, &values, false);
+                let groups = self.groups(&free, false);
                 if !groups.is_empty() {
                     fresh.push((cell, groups));
                 }
@@ -216,11 +208,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         }
         self.fine[cell].get_or_init(|| {
             let values = |variable: Variable| self.frame.values(variable);
-            CellColumns::of(
-                self.cells[cell].groups(self.survey, &values, true),
-                self.frame,
-            )
-            .between(self.cells[cell].between)
+            let groups = self.cells[cell].groups(self.survey, &values, true);
+            CellColumns::of(groups, self.frame).between(self.cells[cell].between)
         })
     }
 
@@ -248,13 +237,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         }
     }
 
-    /// L^-1 Z'X of all coarse columns given a state.
-    pub(crate) fn across(&self, state: &KnownState) -> DMatrix<f64> {
-        let all: Vec<usize> = (0..self.cells.len()).collect();
-        self.across_cells(&all, state).0
-    }
-
-    /// The same of some cells, with the first column of each.
+    /// L^-1 Z'X of the coarse columns of some cells given a state, with the first column of each.
     pub(crate) fn across_cells(
         &self,
         cells: &[usize],
@@ -263,9 +246,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let parts: Vec<&DMatrix<f64>> = state
             .components
             .iter()
-            .map(|id| &self.products[id])
+            .map(|component| &self.products[&component.id])
             .collect();
-        let rows: usize = parts.iter().map(|part| part.nrows()).sum();
         let mut first = Vec::with_capacity(cells.len());
         let mut columns = Vec::new();
         for cell in cells {
@@ -275,19 +257,9 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         }
         let solved: Vec<DMatrix<f64>> = columns
             .par_chunks(512)
-            .map(|some| {
-                let mut values = Vec::with_capacity(rows * some.len());
-                for column in some {
-                    for part in &parts {
-                        let count = part.nrows();
-                        values.extend_from_slice(
-                            &part.as_slice()[column * count..(column + 1) * count],
-                        );
-                    }
-                }
-                state.solved(DMatrix::from_vec(rows, some.len(), values))
-            })
+            .map(|some| state.solved(stacked(&parts, some.iter().copied())))
             .collect();
+        let rows: usize = parts.iter().map(|part| part.nrows()).sum();
         let mut values = Vec::with_capacity(rows * columns.len());
         for part in &solved {
             values.extend_from_slice(part.as_slice());
@@ -304,8 +276,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     /// Cells that do much of what a component does with their shares of its squared motion, those that do most first.
     pub(crate) fn overlaps(&self, component: &Component) -> Vec<(f64, usize)> {
         // Its likeliest motion, of unit length, in the directions of its part.
-        self.parts.know(&[component], self.frame);
-        let state = KnownState::of(&[component], &self.parts, self.frame, None);
+        let state = self.state(std::slice::from_ref(component), None);
         let Some(weights) = state.weights() else {
             return Vec::new();
         };
@@ -335,26 +306,18 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     /// Cells with a name at the place of a component, and of a curve those over its variable there or next to it: columns that are looked at
     /// coarsely do not show how alike fine curves are.
     pub(crate) fn near(&self, component: &Component) -> Vec<usize> {
-        let of_cell = |cell: &CauseCell| match &cell.shapes {
-            Shapes::Free(FreeShape {
-                variable: asked,
-                over: Over::Curve { .. },
-                ..
-            }) => Some(*asked),
-            Shapes::Free(_) => None,
+        let followed = |cell: &CauseCell| match &cell.shapes {
+            Shapes::Free(free) => free.is_curve().then_some(free.variable),
             Shapes::Listed(groups) => {
-                let form = groups.first().and_then(|group| group.forms.first());
-                form.and_then(|form| form.term())
-                    .filter(|term| term.law().times.is_none())
-                    .map(|term| term.law().first.variable)
+                let law = groups.first()?.forms.first()?.term()?.law();
+                law.times.is_none().then_some(law.first.variable)
             }
         };
         let cell = &self.cells[component.cell];
-        let free = matches!(cell.shapes, Shapes::Free(_));
-        let variable = of_cell(cell).filter(|_| free);
+        let variable = cell.free().and_then(|_| followed(cell));
         let near = |other: &CauseCell| {
             variable.is_some()
-                && of_cell(other) == variable
+                && followed(other) == variable
                 && generated::are_near(cell.place, other.place, 2, self.survey)
         };
         let named_here = |other: &CauseCell| other.is_named() && other.place == cell.place;
@@ -369,52 +332,45 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         &self,
         component: &Component,
         state: &KnownState,
-        others: &[&Component],
     ) -> Vec<usize> {
-        let Shapes::Free(free) = &self.cells[component.cell].shapes else {
+        let free = self.cells[component.cell].free();
+        let Some(free) = free.filter(|free| free.is_curve() && !free.near(0).is_empty()) else {
             return Vec::new();
         };
-        let is_curve = |over| matches!(over, Over::Curve { .. });
-        let same = |cell: &CauseCell| match &cell.shapes {
-            Shapes::Free(other) => is_curve(other.over) && other.variable.is_alike(free.variable),
-            Shapes::Listed(_) => false,
-        };
-        if !is_curve(free.over) || free.near(0).is_empty() {
-            return Vec::new();
-        }
+        let same = |other: &FreeShape| other.is_curve() && other.variable.is_alike(free.variable);
         let all: Vec<usize> = (0..self.cells.len())
-            .filter(|cell| same(&self.cells[*cell]))
+            .filter(|cell| self.cells[*cell].free().is_some_and(same))
             .collect();
-        let mut promising = self.promising(&all, state, others);
+        let mut promising = self.promising(&all, state);
         promising.truncate(2 * *CLOSELY);
         promising
     }
 
-    /// The same of a block's columns, from the components that the state has.
-    pub(crate) fn across_block(
-        &self,
-        block: &CellColumns,
-        state: &KnownState,
-        components: &[&Component],
-    ) -> DMatrix<f64> {
-        let parts: Vec<DMatrix<f64>> = components
-            .iter()
-            .map(|component| component.by_part(&self.known.of(component, block, self.frame)))
-            .collect();
-        let rows = parts.iter().map(DMatrix::nrows).sum();
-        let columns = block.count();
-        let mut values = Vec::with_capacity(rows * columns);
-        for column in 0..columns {
-            for part in &parts {
-                let rows = part.nrows();
-                values.extend_from_slice(&part.as_slice()[column * rows..(column + 1) * rows]);
-            }
-        }
-        state.solved(DMatrix::from_vec(rows, columns, values))
+    /// L^-1 Z'X of a block's columns given a state.
+    pub(crate) fn across_block(&self, block: &CellColumns, state: &KnownState) -> DMatrix<f64> {
+        let part =
+            |component: &Component| component.by_part(&self.known.of(component, block, self.frame));
+        let parts: Vec<DMatrix<f64>> = state.components.iter().map(part).collect();
+        let parts: Vec<&DMatrix<f64>> = parts.iter().collect();
+        state.solved(stacked(&parts, 0..block.count()))
     }
 
-    pub(crate) fn state(&self, components: &[&Component], kappa: Option<f64>) -> KnownState {
+    pub(crate) fn state(&self, components: &[Component], kappa: Option<f64>) -> KnownState {
         self.parts.know(components, self.frame);
-        KnownState::of(components, &self.parts, self.frame, kappa)
+        KnownState::of(components.to_vec(), &self.parts, self.frame, kappa)
     }
+}
+
+/// Some columns of matrices that stand on each other.
+fn stacked(parts: &[&DMatrix<f64>], columns: impl ExactSizeIterator<Item = usize>) -> DMatrix<f64> {
+    let rows: usize = parts.iter().map(|part| part.nrows()).sum();
+    let count = columns.len();
+    let mut values = Vec::with_capacity(rows * count);
+    for column in columns {
+        for part in parts {
+            let rows = part.nrows();
+            values.extend_from_slice(&part.as_slice()[column * rows..(column + 1) * rows]);
+        }
+    }
+    DMatrix::from_vec(rows, count, values)
 }

@@ -104,21 +104,48 @@ impl CauseCell {
     pub(crate) fn is_named(&self) -> bool {
         self.name != names::UNKNOWN
     }
+
+    /// Its motion and variable, where it is one over the other.
+    pub(crate) fn free(&self) -> Option<&FreeShape> {
+        match &self.shapes {
+            Shapes::Free(free) => Some(free),
+            Shapes::Listed(_) => None,
+        }
+    }
 }
 
 impl ShapeGroup {
-    /// A single form, all of its columns alike.
-    pub(crate) fn of(form: Form, log_weight: f64) -> Self {
-        let shape = CellShape {
-            shares: Vec::new(),
-            log_weight,
-            is_bent: false,
-        };
+    /// Forms in some shapes, whose coefficients may be anything.
+    pub(crate) fn new(forms: Vec<Form>, shapes: Vec<CellShape>) -> Self {
         Self {
-            forms: vec![form],
-            shapes: vec![shape],
+            forms,
+            shapes,
             positive: false,
             largest: f64::INFINITY,
+        }
+    }
+
+    /// A single form, all of its columns alike.
+    pub(crate) fn of(form: Form, log_weight: f64) -> Self {
+        Self::new(vec![form], vec![CellShape::new(Vec::new(), log_weight)])
+    }
+}
+
+impl CellShape {
+    /// A plain shape.
+    pub(crate) fn new(shares: Vec<f64>, log_weight: f64) -> Self {
+        Self {
+            shares,
+            log_weight,
+            is_bent: false,
+        }
+    }
+
+    /// A shape of further numbers.
+    pub(crate) fn bent(shares: Vec<f64>, log_weight: f64) -> Self {
+        Self {
+            is_bent: true,
+            ..Self::new(shares, log_weight)
         }
     }
 }
@@ -145,29 +172,28 @@ impl FreeShape {
             .collect()
     }
 
+    pub(super) fn is_product(&self) -> bool {
+        matches!(self.over, Over::Product(_))
+    }
+
+    pub(super) fn is_curve(&self) -> bool {
+        matches!(self.over, Over::Curve { .. })
+    }
+
     /// Whether it is a product of one variable with itself.
     pub(super) fn is_square(&self) -> bool {
         matches!(self.over, Over::Product(other) if is_square(self.variable, other))
     }
 
-    /// Its curves at all correlation lengths.
-    pub(crate) fn curves(&self, values: &dyn Fn(Variable) -> Option<Vec<f64>>) -> Vec<ShapeGroup> {
-        let (Over::Curve { count, lengths, .. }, Some(values)) = (self.over, values(self.variable))
-        else {
+    /// Its curves over some values at all correlation lengths, each of such a weight.
+    pub(crate) fn curves(&self, values: &[f64], log_weight: f64) -> Vec<ShapeGroup> {
+        let Over::Curve { count, lengths, .. } = self.over else {
             return Vec::new();
         };
-        let [low, high] = support(&values);
-        let shape = |shares| CellShape {
-            shares,
-            log_weight: 0.0,
-            is_bent: false,
-        };
-        vec![ShapeGroup {
-            forms: vec![self.term(Law::new(self.variable, self.cosines([low, high], count)))],
-            shapes: self.smooth(count, lengths).into_iter().map(shape).collect(),
-            positive: false,
-            largest: f64::INFINITY,
-        }]
+        let law = Law::new(self.variable, self.cosines(support(values), count));
+        let shapes = self.smooth(count, lengths).into_iter();
+        let shapes = shapes.map(|shares| CellShape::new(shares, log_weight));
+        vec![ShapeGroup::new(vec![self.term(law)], shapes.collect())]
     }
 
     /// Whether a constant of its motion is neither geometry nor a place of the instrument, so that its curves have a mean.
@@ -183,7 +209,7 @@ impl FreeShape {
 
     /// The same, or a curve of one of two variables, which is multiplied.
     fn curves_have_mean(&self) -> bool {
-        self.has_mean() || matches!(self.over, Over::Product(_))
+        self.has_mean() || self.is_product()
     }
 
     /// A line over values of its variable.
@@ -208,21 +234,18 @@ impl FreeShape {
 
     /// Shares of its cosines, half of all for the mean where it has one, for every direction of its motion alike.
     fn shares(&self, cosines: Vec<f64>) -> Vec<f64> {
-        let functions = if self.curves_have_mean() {
-            let others = cosines.into_iter().map(|share| 0.5 * share);
-            std::iter::once(0.5).chain(others).collect()
-        } else {
-            cosines
+        let functions = match self.curves_have_mean() {
+            true => with_mean(cosines),
+            false => cosines,
         };
         over_fields(functions, self.motion, fields(self.motion))
     }
 
     /// Shares of a smooth curve, one list a correlation length.
     pub(super) fn smooth(&self, count: usize, lengths: usize) -> Vec<Vec<f64>> {
-        let of_length = |length: &f64| self.shares(density(count, *length));
-        LENGTHS[..lengths.min(LENGTHS.len())]
-            .iter()
-            .map(of_length)
+        let lengths = LENGTHS[..lengths.min(LENGTHS.len())].iter();
+        lengths
+            .map(|length| self.shares(density(count, *length)))
             .collect()
     }
 
@@ -237,113 +260,76 @@ impl FreeShape {
         values: &dyn Fn(Variable) -> Option<Vec<f64>>,
         closely: bool,
     ) -> Vec<ShapeGroup> {
-        let fields = fields(self.motion);
-        match self.over {
-            Over::Step => {
-                let times: Vec<f64> = if closely {
-                    survey.boundaries.clone()
-                } else {
-                    survey.changes(*STEPS).collect()
-                };
-                let log_weight = -(times.len().max(1) as f64).ln();
-                let form = |at| self.term(Law::new(self.variable, Basis::After { at }));
-                times
-                    .into_iter()
-                    .map(|at| ShapeGroup::of(form(at), log_weight))
-                    .collect()
-            }
-            Over::Line => {
-                let Some(line) = values(self.variable).and_then(|values| self.line(&values)) else {
-                    return Vec::new();
-                };
-                vec![ShapeGroup::of(
-                    self.term(Law::new(self.variable, line)),
-                    0.0,
-                )]
-            }
-            Over::Curve {
-                count,
-                first,
-                lengths,
-            } => {
-                let Some(values) = values(self.variable) else {
-                    return Vec::new();
-                };
-                let Some(line) = self.line(&values) else {
-                    return Vec::new();
-                };
-                let straight = fields * line.count();
-                let line = self.term(Law::new(self.variable, line));
-                if has_few(&values) {
-                    return vec![ShapeGroup::of(line, 0.0)];
-                }
-                let count = if closely { count } else { first };
-                let [low, high] = support(&values);
-                let curve = self.term(Law::new(self.variable, self.cosines([low, high], count)));
-                let lengths = if closely { lengths } else { lengths.min(2) };
-                let rough = (closely && lengths > 3).then(|| self.rough(count));
-                vec![ShapeGroup {
-                    forms: vec![line, curve],
-                    shapes: line_and_curve(straight, &self.smooth(count, lengths), rough),
-                    positive: false,
-                    largest: f64::INFINITY,
-                }]
-            }
-            Over::Product(other) => {
-                let factors = [self.variable, other].map(|variable| {
-                    values(variable).and_then(|values| {
-                        factor(
-                            &values,
-                            if closely {
-                                EACH[fields.clamp(1, 3) - 1]
-                            } else {
-                                *ROUGHLY
-                            },
-                        )
-                    })
-                });
-                let [Some(a), Some(b)] = factors else {
-                    return Vec::new();
-                };
-                let form = self.term(Law::new(self.variable, a).times(other, b));
-                let spectrum = |basis: Basis, length: f64| -> Vec<f64> {
-                    match basis {
-                        Basis::Straight { .. } => vec![0.5, 0.5],
-                        basis => {
-                            let curve = density(basis.count() - 1, length);
-                            std::iter::once(0.5)
-                                .chain(curve.into_iter().map(|share| 0.5 * share))
-                                .collect()
-                        }
-                    }
-                };
-                let lengths = &LENGTHS[..2];
-                let shape = |length: f64| {
-                    let [first, second] = [a, b].map(|basis| spectrum(basis, length));
-                    let mut shares: Vec<f64> = first
-                        .iter()
-                        .flat_map(|x| second.iter().map(move |y| x * y))
-                        .collect();
-                    if !self.has_mean() {
-                        shares[0] = 0.0;
-                    }
-                    let sum: f64 = shares.iter().sum();
-                    let shares = shares.into_iter().map(|share| share / sum).collect();
-                    CellShape {
-                        shares: over_fields(shares, self.motion, fields),
-                        log_weight: -(lengths.len() as f64).ln(),
-                        is_bent: false,
-                    }
-                };
-                let shapes = lengths.iter().copied().map(shape).collect();
-                vec![ShapeGroup {
-                    forms: vec![form],
-                    shapes,
-                    positive: false,
-                    largest: f64::INFINITY,
-                }]
-            }
+        let form = |basis| self.term(Law::new(self.variable, basis));
+        if self.over == Over::Step {
+            let times: Vec<f64> = match closely {
+                true => survey.boundaries.clone(),
+                false => survey.changes(*STEPS).collect(),
+            };
+            let log_weight = -(times.len().max(1) as f64).ln();
+            let step = |at| ShapeGroup::of(form(Basis::After { at }), log_weight);
+            return times.into_iter().map(step).collect();
         }
+        let Some(of_first) = values(self.variable) else {
+            return Vec::new();
+        };
+        let group = match self.over {
+            Over::Product(other) => {
+                values(other).and_then(|second| self.product(&of_first, (other, &second), closely))
+            }
+            over => self.line(&of_first).map(|line| match over {
+                Over::Curve {
+                    count,
+                    first,
+                    lengths,
+                } if !has_few(&of_first) => {
+                    let count = if closely { count } else { first };
+                    let lengths = if closely { lengths } else { lengths.min(2) };
+                    let rough = (closely && lengths > 3).then(|| self.rough(count));
+                    let straight = fields(self.motion) * line.count();
+                    let curve = self.cosines(support(&of_first), count);
+                    let shapes = line_and_curve(straight, &self.smooth(count, lengths), rough);
+                    ShapeGroup::new(vec![form(line), form(curve)], shapes)
+                }
+                _ => ShapeGroup::of(form(line), 0.0),
+            }),
+        };
+        group.into_iter().collect()
+    }
+
+    /// Any function of its variable times any of another one; none where either hardly varies.
+    fn product(
+        &self,
+        first: &[f64],
+        (other, second): (Variable, &[f64]),
+        closely: bool,
+    ) -> Option<ShapeGroup> {
+        let fields = fields(self.motion);
+        let count = match closely {
+            true => EACH[fields.clamp(1, 3) - 1],
+            false => *ROUGHLY,
+        };
+        let (a, b) = (factor(first, count)?, factor(second, count)?);
+        let spectrum = |basis: Basis, length: f64| match basis {
+            Basis::Straight { .. } => vec![0.5, 0.5],
+            basis => with_mean(density(basis.count() - 1, length)),
+        };
+        let lengths = &LENGTHS[..2];
+        let shape = |length: &f64| {
+            let [first, second] = [a, b].map(|basis| spectrum(basis, *length));
+            let products = |x: &f64| second.iter().map(|y| x * y).collect::<Vec<_>>();
+            let mut shares: Vec<f64> = first.iter().flat_map(products).collect();
+            if !self.has_mean() {
+                shares[0] = 0.0;
+            }
+            CellShape::new(
+                over_fields(normalised(shares), self.motion, fields),
+                -(lengths.len() as f64).ln(),
+            )
+        };
+        let form = self.term(Law::new(self.variable, a).times(other, b));
+        let shapes = lengths.iter().map(shape).collect();
+        Some(ShapeGroup::new(vec![form], shapes))
     }
 }
 
@@ -378,16 +364,12 @@ fn near(variable: Variable, level: i32) -> Vec<Variable> {
     };
     match variable {
         Variable::Recent { joint, time } => scales
-            .map(|scale| Variable::Recent {
-                joint,
-                time: time * scale,
-            })
+            .map(|scale| time * scale)
+            .map(|time| Variable::Recent { joint, time })
             .to_vec(),
         Variable::Stretch { joint, limit } => scales
-            .map(|scale| Variable::Stretch {
-                joint,
-                limit: limit * scale,
-            })
+            .map(|scale| limit * scale)
+            .map(|limit| Variable::Stretch { joint, limit })
             .to_vec(),
         Variable::Position { along } => turned(along)
             .map(|along| Variable::Position { along })
@@ -442,47 +424,28 @@ pub(super) fn not_quite_straight(
     motion: Motion,
     variable: Variable,
     values: &[f64],
-    log_weight: f64,
 ) -> Option<ShapeGroup> {
     if has_few(values) {
         return None;
     }
-    let [low, high] = support(values);
-    let curve = Term::new(
-        &Unknown,
-        motion,
-        Law::new(
-            variable,
-            Basis::Cosines {
-                low,
-                high,
-                count: *BENDING,
-            },
-        ),
-    );
+    let ([low, high], count) = (support(values), *BENDING);
+    let law = Law::new(variable, Basis::Cosines { low, high, count });
     let fields = fields(motion);
     let mut shapes = Vec::new();
     for length in &LENGTHS[..3] {
-        let curve = over_fields(density(*BENDING, *length), motion, fields);
-        for share in *BENT {
-            let all = 1.0 + share * share;
-            let line = std::iter::repeat_n(1.0 / (fields as f64 * all), fields);
-            let shares = line
-                .chain(curve.iter().map(|part| part * share * share / all))
-                .collect();
-            shapes.push(CellShape {
-                shares,
-                log_weight: log_weight - 6.0_f64.ln(),
-                is_bent: true,
-            });
-        }
+        let curve = over_fields(density(count, *length), motion, fields);
+        shapes.extend(BENT.map(|share| bent(fields, &curve, share, -6.0_f64.ln())));
     }
-    Some(ShapeGroup {
-        forms: vec![line, curve.into()],
-        shapes,
-        positive: false,
-        largest: f64::INFINITY,
-    })
+    let curve = Term::new(&Unknown, motion, law).into();
+    Some(ShapeGroup::new(vec![line, curve], shapes))
+}
+
+/// A line of so many columns with a curve that has a share of it.
+fn bent(line: usize, curve: &[f64], share: f64, log_weight: f64) -> CellShape {
+    let all = 1.0 + share * share;
+    let straight = std::iter::repeat_n(1.0 / (line as f64 * all), line);
+    let curve = curve.iter().map(|part| part * share * share / all);
+    CellShape::bent(straight.chain(curve).collect(), log_weight)
 }
 
 /// A line of so many columns, curves of some correlation lengths, lines that are not quite straight, and a curve with corners.
@@ -491,51 +454,20 @@ pub(super) fn line_and_curve(
     lengths: &[Vec<f64>],
     rough: Option<Vec<f64>>,
 ) -> Vec<CellShape> {
-    let curve = lengths[0].len();
+    let plain = |straight: f64, curve: &[f64], log_weight: f64| {
+        let straight = std::iter::repeat_n(straight, line);
+        CellShape::new(straight.chain(curve.iter().copied()).collect(), log_weight)
+    };
     let half = 0.5_f64.ln();
-    let straight = std::iter::repeat_n(1.0 / line as f64, line)
-        .chain(std::iter::repeat_n(0.0, curve))
-        .collect();
-    let mut out = vec![CellShape {
-        shares: straight,
-        log_weight: half,
-        is_bent: false,
-    }];
+    let none = vec![0.0; lengths[0].len()];
+    let mut out = vec![plain(1.0 / line as f64, &none, half)];
     let count = (lengths.len() as f64).ln();
-    for curve_shares in lengths {
-        let alone = std::iter::repeat_n(0.0, line)
-            .chain(curve_shares.iter().copied())
-            .collect();
-        out.push(CellShape {
-            shares: alone,
-            log_weight: half - count,
-            is_bent: false,
-        });
-        for share in *BENT {
-            let all = 1.0 + share * share;
-            let line = std::iter::repeat_n(1.0 / (line as f64 * all), line);
-            let shares = line
-                .chain(
-                    curve_shares
-                        .iter()
-                        .map(|curve_shares| curve_shares * share * share / all),
-                )
-                .collect();
-            out.push(CellShape {
-                shares,
-                log_weight: half - count - 2.0_f64.ln(),
-                is_bent: true,
-            });
-        }
+    for curve in lengths {
+        out.push(plain(0.0, curve, half - count));
+        let log_weight = half - count - 2.0_f64.ln();
+        out.extend(BENT.map(|share| bent(line, curve, share, log_weight)));
     }
-    if let Some(rough) = rough {
-        let shares = std::iter::repeat_n(0.0, line).chain(rough).collect();
-        out.push(CellShape {
-            shares,
-            log_weight: half - count,
-            is_bent: false,
-        });
-    }
+    out.extend(rough.map(|rough| plain(0.0, &rough, half - count)));
     out
 }
 
@@ -575,21 +507,29 @@ pub(super) fn over_fields(shares: Vec<f64>, motion: Motion, fields: usize) -> Ve
 
 /// Shares of cosines: the spectral density of a Matern kernel with smoothness 3/2 (Rasmussen and Williams, 2006, ch. 4).
 pub(super) fn density(count: usize, length: f64) -> Vec<f64> {
-    let of_k = |k: usize| {
+    let at_order = |k: usize| {
         let wave = PI * k as f64 * length / (1.0 + 2.0 * *MARGIN);
         (3.0 + wave * wave).powi(-2)
     };
-    let all: Vec<f64> = (1..=count).map(of_k).collect();
-    let sum: f64 = all.iter().sum();
-    all.into_iter().map(|density| density / sum).collect()
+    normalised((1..=count).map(at_order).collect())
 }
 
 /// The same of a curve with corners: the spectral density of an exponential kernel.
 pub(super) fn cornered(count: usize) -> Vec<f64> {
-    let of_k = |k: usize| 1.0 / (1.0 + (PI * k as f64 * 0.3).powi(2));
-    let all: Vec<f64> = (1..=count).map(of_k).collect();
-    let sum: f64 = all.iter().sum();
-    all.into_iter().map(|density| density / sum).collect()
+    let at_order = |k: usize| 1.0 / (1.0 + (PI * k as f64 * 0.3).powi(2));
+    normalised((1..=count).map(at_order).collect())
+}
+
+/// Shares of a sum of one.
+fn normalised(shares: Vec<f64>) -> Vec<f64> {
+    let sum: f64 = shares.iter().sum();
+    shares.into_iter().map(|share| share / sum).collect()
+}
+
+/// Shares of a curve with a mean, which has half of all.
+pub(super) fn with_mean(curve: Vec<f64>) -> Vec<f64> {
+    let curve = curve.into_iter().map(|share| 0.5 * share);
+    std::iter::once(0.5).chain(curve).collect()
 }
 
 /// The lowest and highest of some values.

@@ -2,14 +2,15 @@
 //! each computed once.
 
 use super::cell::{CellShape, ShapeGroup};
-use super::factored::FactoredColumns;
-use super::frame::{SearchRows, UnitColumns, product, view};
+use super::factored::{FactoredColumns, unit};
+use super::frame::SearchRows;
 use crate::criteria::cells::ROW_BY_ROW;
 use crate::effect::Form;
+use crate::linear::{product, view};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, Par};
 use nalgebra::{Cholesky, DMatrix, DVector};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock, RwLock, Weak};
 
@@ -61,14 +62,11 @@ impl CellColumns {
             .flatten();
         let values = OnceLock::new();
         let (square, counts) = match &factored {
-            Some(factored) => (
-                factored
-                    .iter()
-                    .flat_map(|form| form.square())
-                    .copied()
-                    .collect(),
-                factored.iter().map(|form| form.square().len()).collect(),
-            ),
+            Some(factored) => {
+                let square = factored.iter().map(|form| &form.square[..]);
+                let counts = square.clone().map(<[f64]>::len).collect();
+                (square.flatten().copied().collect(), counts)
+            }
             None => {
                 let (columns, counts) = frame.columns(&forms.cloned().collect::<Vec<_>>());
                 let _ = values.set(columns.values);
@@ -77,21 +75,19 @@ impl CellColumns {
         };
         let (mut first, mut first_form) = (0, 0);
         let seen = |mut group: ShapeGroup| {
-            let of_group = first_form..first_form + group.forms.len();
-            let counts: Vec<usize> = counts[of_group.clone()].to_vec();
+            let forms_here = first_form..first_form + group.forms.len();
+            let counts: Vec<usize> = counts[forms_here.clone()].to_vec();
             let count: usize = counts.iter().sum();
             let range = first..first + count;
-            (first, first_form) = (range.end, of_group.end);
-            for shape in group
+            (first, first_form) = (range.end, forms_here.end);
+            let even = group
                 .shapes
                 .iter_mut()
-                .filter(|shape| shape.shares.is_empty())
-            {
-                shape.shares = vec![1.0 / count.max(1) as f64; count];
-            }
+                .filter(|shape| shape.shares.is_empty());
+            even.for_each(|shape| shape.shares = vec![1.0 / count.max(1) as f64; count]);
             let by_factors = factored
                 .as_ref()
-                .and_then(|factored| frame.factored_products(&factored[of_group]));
+                .and_then(|factored| frame.factored_products(&factored[forms_here]));
             let (gram, gradient) = by_factors.unwrap_or_else(|| match values.get() {
                 Some(values) => frame.products(view(values).subcols(range.start, count)),
                 None => frame.products(view(&frame.columns(&group.forms).0.values)),
@@ -181,12 +177,6 @@ impl CellColumns {
     }
 }
 
-/// Keys of the forms of some components: a model holds every number once, by its name.
-pub(super) fn form_keys(components: &[&Component]) -> BTreeSet<String> {
-    let forms = components.iter().flat_map(|component| &component.forms);
-    forms.map(Form::key).collect()
-}
-
 /// A cell of the model: its forms in one shape, at an amplitude.
 #[derive(Clone)]
 pub(super) struct Component {
@@ -222,17 +212,8 @@ impl Component {
 
     /// Prior standard deviations of its coefficients, SI.
     pub(crate) fn sigmas(&self) -> Vec<f64> {
-        let scale = |square: &f64| {
-            if *square > 0.0 {
-                square.sqrt().recip()
-            } else {
-                0.0
-            }
-        };
-        self.roots()
-            .zip(self.square.iter())
-            .map(|(root, square)| root * scale(square))
-            .collect()
+        let both = self.roots().zip(self.square.iter());
+        both.map(|(root, square)| root * unit(*square)).collect()
     }
 
     /// With its part in the covariance.
@@ -242,67 +223,27 @@ impl Component {
         if roots.len() > 2 {
             let mut gram = product(view(&self.values), view(&self.values));
             for (j, mut column) in gram.column_iter_mut().enumerate() {
-                column
-                    .iter_mut()
-                    .zip(&roots)
-                    .for_each(|(entry, root)| *entry *= root * roots[j]);
+                let entries = column.iter_mut().zip(&roots);
+                entries.for_each(|(entry, root)| *entry *= root * roots[j]);
             }
             let eigen = gram.symmetric_eigen();
-            let seen: Vec<usize> = (0..eigen.eigenvalues.len())
-                .filter(|k| eigen.eigenvalues[*k] > UNSEEN)
-                .collect();
-            let kept = if seen.is_empty() {
-                vec![eigen.eigenvalues.imax()]
-            } else {
-                seen
-            };
-            mix *= eigen.eigenvectors.select_columns(kept.iter());
+            let mut kept: Vec<usize> = (0..roots.len()).collect();
+            kept.retain(|k| eigen.eigenvalues[*k] > UNSEEN);
+            if kept.is_empty() {
+                kept.push(eigen.eigenvalues.imax());
+            }
+            mix *= eigen.eigenvectors.select_columns(&kept);
         }
         let mut part = DMatrix::zeros(self.values.nrows(), mix.ncols());
-        let out = MatMut::from_column_major_slice_mut(
-            part.as_mut_slice(),
-            self.values.nrows(),
-            mix.ncols(),
-        );
-        matmul(
-            out,
-            Accum::Replace,
-            view(&self.values),
-            view(&mix),
-            1.0,
-            Par::Seq,
-        );
+        let (rows, columns) = part.shape();
+        let out = MatMut::from_column_major_slice_mut(part.as_mut_slice(), rows, columns);
+        let (values, by) = (view(&self.values), view(&mix));
+        matmul(out, Accum::Replace, values, by, 1.0, Par::Seq);
         Self {
             id,
             part: Arc::new(part),
             mix: Arc::new(mix),
             ..self
-        }
-    }
-
-    /// One that has no part in the covariance yet.
-    pub(crate) fn apart(
-        cell: usize,
-        forms: Vec<Form>,
-        counts: Vec<usize>,
-        group: ShapeGroup,
-        columns: UnitColumns,
-        amplitude: f64,
-    ) -> Self {
-        let shape = group.shapes[0].clone();
-        let UnitColumns { values, square } = columns;
-        Self {
-            id: 0,
-            cell,
-            forms,
-            counts,
-            shape,
-            group: Arc::new(group),
-            values,
-            square: Arc::new(square),
-            amplitude,
-            part: Arc::default(),
-            mix: Arc::default(),
         }
     }
 
@@ -375,63 +316,49 @@ struct PartCache {
 
 impl PartProducts {
     /// Computes what is missing for some components, and forgets what is too much.
-    pub(crate) fn know(&self, components: &[&Component], frame: &SearchRows) {
+    pub(crate) fn know(&self, components: &[Component], frame: &SearchRows) {
         let Ok(mut cache) = self.0.write() else {
             return;
         };
         if cache.pairs.len() > 20_000 {
             *cache = PartCache::default();
         }
-        for (i, component) in components.iter().enumerate() {
-            cache
-                .along
-                .entry(component.id)
-                .or_insert_with(|| Arc::new(frame.along(view(&component.part))));
-            for other in &components[..=i] {
-                let key = (component.id.max(other.id), component.id.min(other.id));
-                let [later, earlier] = if component.id >= other.id {
-                    [component, other]
-                } else {
-                    [other, component]
-                };
-                cache
-                    .pairs
-                    .entry(key)
-                    .or_insert_with(|| Arc::new(product(view(&later.part), view(&earlier.part))));
+        for (i, a) in components.iter().enumerate() {
+            let along = cache.along.entry(a.id);
+            along.or_insert_with(|| Arc::new(frame.along(view(&a.part))));
+            for b in &components[..=i] {
+                let [later, earlier] = if a.id >= b.id { [a, b] } else { [b, a] };
+                let pair = cache.pairs.entry((later.id, earlier.id));
+                pair.or_insert_with(|| Arc::new(product(view(&later.part), view(&earlier.part))));
             }
         }
     }
 
     /// The Gram matrix of components, and their products with the residual.
-    pub(super) fn of(&self, components: &[&Component]) -> (DMatrix<f64>, DVector<f64>) {
-        let count: usize = components
-            .iter()
-            .map(|component| component.part.ncols())
-            .sum();
+    pub(super) fn of(&self, components: &[Component]) -> (DMatrix<f64>, DVector<f64>) {
+        let count: usize = components.iter().map(|one| one.part.ncols()).sum();
         let (mut gram, mut along) = (DMatrix::zeros(count, count), DVector::zeros(count));
         let Ok(cache) = self.0.read() else {
             return (gram, along);
         };
         let mut down = 0;
-        for (i, component) in components.iter().enumerate() {
-            let rows = component.part.ncols();
-            if let Some(known) = cache.along.get(&component.id) {
+        for (i, a) in components.iter().enumerate() {
+            let rows = a.part.ncols();
+            if let Some(known) = cache.along.get(&a.id) {
                 along.rows_mut(down, rows).copy_from(known);
             }
             let mut across = 0;
-            for other in &components[..=i] {
-                let columns = other.part.ncols();
-                let key = (component.id.max(other.id), component.id.min(other.id));
-                if let Some(known) = cache.pairs.get(&key) {
-                    let block = if component.id >= other.id {
-                        (**known).clone()
-                    } else {
-                        known.transpose()
+            for b in &components[..=i] {
+                let columns = b.part.ncols();
+                if let Some(known) = cache.pairs.get(&(a.id.max(b.id), a.id.min(b.id))) {
+                    let [block, transposed] = match a.id >= b.id {
+                        true => [(**known).clone(), known.transpose()],
+                        false => [known.transpose(), (**known).clone()],
                     };
-                    gram.view_mut((across, down), (columns, rows))
-                        .copy_from(&block.transpose());
-                    gram.view_mut((down, across), (rows, columns))
-                        .copy_from(&block);
+                    let mut above = gram.view_mut((across, down), (columns, rows));
+                    above.copy_from(&transposed);
+                    let mut below = gram.view_mut((down, across), (rows, columns));
+                    below.copy_from(&block);
                 }
                 across += columns;
             }
@@ -444,10 +371,8 @@ impl PartProducts {
     pub(crate) fn overlap(&self, a: &Component, b: &Component) -> f64 {
         let Ok(cache) = self.0.read() else { return 1.0 };
         let square = |a: u64, b: u64| {
-            cache
-                .pairs
-                .get(&(a.max(b), a.min(b)))
-                .map(|known| known.norm_squared())
+            let known = cache.pairs.get(&(a.max(b), a.min(b)));
+            known.map(|known| known.norm_squared())
         };
         match (square(a.id, b.id), square(a.id, a.id), square(b.id, b.id)) {
             (Some(both), Some(first), Some(second)) => {

@@ -6,7 +6,7 @@
 //! integrated (inverse gamma about its statement with nu degrees of freedom), the amplitude a over a logarithmic grid.
 
 use crate::criteria::cells::{EXACT, LARGEST, NU, SMALLEST};
-use crate::regression::dot;
+use crate::linear::dot;
 use nalgebra::{DMatrix, DVector};
 use std::sync::LazyLock;
 
@@ -70,11 +70,8 @@ pub(crate) fn evidence_between(
     let matrix = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
         roots[i] * gram[(kept[i], kept[j])] * roots[j]
     });
-    let mut along: Vec<f64> = kept
-        .iter()
-        .zip(&roots)
-        .map(|(k, root)| root * gradient[*k])
-        .collect();
+    let along = kept.iter().zip(&roots);
+    let mut along: Vec<f64> = along.map(|(k, root)| root * gradient[*k]).collect();
     let (diagonal, off_diagonal) = tridiagonal(matrix, &mut along);
     over_amplitudes((&diagonal, &off_diagonal, &along), rows, [low, high])
 }
@@ -139,22 +136,16 @@ fn tridiagonal(mut matrix: DMatrix<f64>, along: &mut [f64]) -> (Vec<f64>, Vec<f6
             *value = share * dot(&column[k + 1..], mirror);
         }
         let along_mirror = 0.5 * share * dot(image, mirror);
-        image
-            .iter_mut()
-            .zip(&*mirror)
-            .for_each(|(value, by)| *value -= along_mirror * by);
+        let entries = image.iter_mut().zip(&*mirror);
+        entries.for_each(|(value, by)| *value -= along_mirror * by);
         for ((column, by), value) in below.chunks_mut(count).zip(&*mirror).zip(&*image) {
             let both = mirror.iter().zip(&*image);
-            column[k + 1..]
-                .iter_mut()
-                .zip(both)
-                .for_each(|(entry, (a, b))| *entry -= a * value + b * by);
+            let entries = column[k + 1..].iter_mut().zip(both);
+            entries.for_each(|(entry, (a, b))| *entry -= a * value + b * by);
         }
         let turn = share * dot(mirror, &along[k + 1..]);
-        along[k + 1..]
-            .iter_mut()
-            .zip(&*mirror)
-            .for_each(|(value, by)| *value -= turn * by);
+        let entries = along[k + 1..].iter_mut().zip(&*mirror);
+        entries.for_each(|(value, by)| *value -= turn * by);
     }
     (diagonal, off)
 }

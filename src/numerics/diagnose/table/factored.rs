@@ -3,9 +3,9 @@
 
 use super::cell::alternates;
 use crate::effect::Motion;
-use crate::regression::dot;
+use crate::linear::{dot, view};
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Accum, Mat, Par};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -52,7 +52,7 @@ impl Functions {
 }
 
 /// A column of a matrix.
-pub(super) fn column(matrix: &DMatrix<f64>, k: usize) -> &[f64] {
+fn column(matrix: &DMatrix<f64>, k: usize) -> &[f64] {
     &matrix.as_slice()[k * matrix.nrows()..(k + 1) * matrix.nrows()]
 }
 
@@ -63,6 +63,7 @@ pub(super) struct FactoredColumns {
     functions: Arc<Functions>,
     /// Of each column: direction, function, and what makes it one of unit motion.
     columns: Vec<(usize, usize, f64)>,
+    /// Mean squared motion by a unit of each coefficient.
     pub(super) square: Vec<f64>,
 }
 
@@ -88,18 +89,17 @@ impl MotionRows {
             }
             sums
         };
-        let all = || {
-            self.directions
-                .iter()
-                .map(|direction| &direction.weighed[..])
-        };
-        let with_each = |weighed: &'_ [f64]| -> Vec<Vec<f64>> {
-            all().map(move |other| along(weighed, other)).collect()
+        let weighed = self.directions.iter().map(|direction| &direction.weighed);
+        let all: Vec<&[f64]> = weighed.map(Vec::as_slice).collect();
+        let with_each = |one: &&[f64]| {
+            all.iter()
+                .map(|other| along(one, other))
+                .collect::<Vec<_>>()
         };
         Self {
             by_base: self.with(base, row_of),
-            by_residual: all().map(|weighed| along(weighed, residual)).collect(),
-            by_each_other: all().flat_map(with_each).collect(),
+            by_residual: all.iter().map(|one| along(one, residual)).collect(),
+            by_each_other: all.iter().flat_map(with_each).collect(),
             ..self
         }
     }
@@ -107,7 +107,7 @@ impl MotionRows {
     /// Products of each direction with columns (columns x residual rows) row by row, columns x rows.
     pub(super) fn with(&self, columns: &DMatrix<f64>, row_of: &[usize]) -> Vec<DMatrix<f64>> {
         let count = columns.nrows();
-        let of_direction = |direction: &WeighedDirection| {
+        let row_products = |direction: &WeighedDirection| {
             let mut out = DMatrix::zeros(count, direction.square.len());
             for ((line, row), by) in row_of.iter().enumerate().zip(&direction.weighed) {
                 let sums = &mut out.as_mut_slice()[row * count..(row + 1) * count];
@@ -116,7 +116,7 @@ impl MotionRows {
             }
             out
         };
-        self.directions.iter().map(of_direction).collect()
+        self.directions.iter().map(row_products).collect()
     }
 
     /// Products of factored columns of this motion with each other and with the residual, the base projected off.
@@ -189,9 +189,12 @@ impl FactoredColumns {
         }
     }
 
-    /// Mean squared motion by a unit of each coefficient.
-    pub(crate) fn square(&self) -> &[f64] {
-        &self.square
+    /// The direction of each column, and its function for a motion of unit size.
+    pub(super) fn scaled(&self) -> impl Iterator<Item = (usize, Vec<f64>)> {
+        self.columns.iter().map(|(direction, function, scale)| {
+            let values = self.functions.at(*function).iter();
+            (*direction, values.map(|value| value * scale).collect())
+        })
     }
 
     /// Appends the products of its columns with others by those of each direction with these, row by row.
@@ -202,16 +205,9 @@ impl FactoredColumns {
             .iter()
             .map(|by_row| {
                 let mut sums = Mat::zeros(count, functions);
-                let columns = columns_of(by_row);
-                let functions = columns_of(&self.functions.values);
-                matmul(
-                    sums.as_mut(),
-                    Accum::Replace,
-                    columns,
-                    functions,
-                    1.0,
-                    Par::Seq,
-                );
+                let (columns, functions) = (view(by_row), view(&self.functions.values));
+                let out = sums.as_mut();
+                matmul(out, Accum::Replace, columns, functions, 1.0, Par::Seq);
                 sums
             })
             .collect();
@@ -223,7 +219,7 @@ impl FactoredColumns {
 }
 
 /// Direction and function of each column, in the order of a term's coefficients.
-pub(super) fn pairs(
+fn pairs(
     motion: Motion,
     directions: usize,
     functions: usize,
@@ -245,8 +241,4 @@ pub(super) fn unit(square: f64) -> f64 {
     } else {
         0.0
     }
-}
-
-fn columns_of(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
-    MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
 }

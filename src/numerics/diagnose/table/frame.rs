@@ -2,15 +2,12 @@
 //! geometry projected off.
 
 use super::evidence::EvidenceRows;
-use super::factored::{
-    FactoredColumns, Functions, MotionRows, WeighedDirection, column, pairs, unit,
-};
+use super::factored::{FactoredColumns, Functions, MotionRows, WeighedDirection, unit};
 use super::noise_shape::NoiseShape;
-use crate::diagnose::round::{FitState, Fitter, RoundView};
+use crate::diagnose::round::RoundView;
 use crate::effect::{Basis, Factor, Form, Law, Motion, Variable};
-use crate::regression::{dot, orthonormal, project};
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use crate::linear::{orthonormal, product, project};
+use faer::{Mat, MatRef};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -54,28 +51,14 @@ pub(super) struct SearchRows<'a> {
 
 impl<'a> SearchRows<'a> {
     /// Around a fitted model; the residual is that without its causes.
-    pub(crate) fn of(
-        view: &'a RoundView<'a>,
-        now: &FitState,
-        fitter: &Fitter,
-        noise: NoiseShape,
-    ) -> Self {
+    pub(crate) fn of(view: &'a RoundView<'a>, noise: NoiseShape) -> Self {
         let problem = &view.problem;
         let variance = |(i, row): (usize, &usize)| {
-            fitter.scale.noise(problem.data, *row).powi(2)
+            view.fitter.scale.noise(problem.data, *row).powi(2)
                 / problem.readings_of(i).len().max(1) as f64
         };
         let variance = problem.rows.iter().enumerate().map(variance).collect();
-        let mut residual = problem.residual.clone();
-        for (cause, range) in now.causes.iter().zip(&now.ranges) {
-            let columns = problem.columns(&cause.form);
-            for (column, k) in columns.chunks(problem.residual_rows()).zip(range.clone()) {
-                residual
-                    .iter_mut()
-                    .zip(column)
-                    .for_each(|(value, c)| *value += c * now.model.x[k]);
-            }
-        }
+        let mut residual = view.without_causes(view.now);
         let mut out = Self {
             view,
             base: Mat::new(),
@@ -86,7 +69,7 @@ impl<'a> SearchRows<'a> {
             motions: Vec::new(),
             variables: Vec::new(),
         };
-        let mut jacobian = problem.jacobian(&fitter.seen());
+        let mut jacobian = problem.jacobian(&view.fitter.seen());
         (0..jacobian.ncols()).for_each(|j| out.weigh(jacobian.col_as_slice_mut(j)));
         out.weigh(&mut residual);
         out.base = orthonormal(&jacobian);
@@ -100,7 +83,7 @@ impl<'a> SearchRows<'a> {
     /// What is left, and how many rows say something of their own.
     pub(crate) fn rows(&self) -> EvidenceRows {
         let square = self.residual.iter().map(|value| value * value).sum();
-        let counted = self.residual.len() as f64 / self.view.autocorrelation_time();
+        let counted = self.residual.len() as f64 / self.view.autocorrelation_time;
         EvidenceRows {
             freedom: (counted - self.base.ncols() as f64).max(1.0),
             square,
@@ -109,7 +92,7 @@ impl<'a> SearchRows<'a> {
 
     /// The least variance of the noise over what is stated: what motor currents leave says nothing of the points'.
     pub(crate) fn least_noise(&self) -> f64 {
-        if self.view.problem.of_readings().len() < self.residual.len() {
+        if self.view.problem.measured_residual().len() < self.residual.len() {
             1.0
         } else {
             0.09
@@ -133,50 +116,45 @@ impl<'a> SearchRows<'a> {
 
     /// A variable at every row; none where some row does not tell it.
     pub(crate) fn values(&self, variable: Variable) -> Option<Vec<f64>> {
-        match self
-            .variables
-            .iter()
-            .find(|known| known.variable == variable)
-        {
+        match self.variable(variable) {
             Some(known) => known.values.clone(),
             None => self.view.problem.values(variable),
         }
+    }
+
+    fn variable(&self, variable: Variable) -> Option<&VariableRows> {
+        self.variables
+            .iter()
+            .find(|known| known.variable == variable)
     }
 
     /// Computes once what the columns of many forms are made of.
     pub(crate) fn prepare(&mut self, motions: &[Motion], variables: &[Variable]) {
         let is_fresh = |motion: &&Motion| self.motions.iter().all(|known| known.motion != **motion);
         let fresh: Vec<&Motion> = motions.iter().filter(is_fresh).collect();
-        let fresh: Vec<MotionRows> = fresh
-            .into_par_iter()
-            .map(|motion| self.motion(*motion))
-            .collect();
+        let fresh = fresh.into_par_iter().map(|motion| self.motion(*motion));
+        let fresh: Vec<MotionRows> = fresh.collect();
         self.motions.extend(fresh);
-        let is_fresh = |variable: &&Variable| {
-            self.variables
-                .iter()
-                .all(|known| known.variable != **variable)
-        };
+        let is_fresh = |variable: &&Variable| self.variable(**variable).is_none();
         let fresh: Vec<&Variable> = variables.iter().filter(is_fresh).collect();
         let problem = &self.view.problem;
-        self.variables
-            .par_extend(fresh.into_par_iter().map(|variable| VariableRows {
-                variable: *variable,
-                values: problem.values(*variable),
-                functions: Vec::new(),
-            }));
+        let rows = |variable: &Variable| VariableRows {
+            variable: *variable,
+            values: problem.values(*variable),
+            functions: Vec::new(),
+        };
+        self.variables.par_extend(fresh.into_par_iter().map(rows));
     }
 
     /// Computes once the functions of one variable that forms have.
     pub(crate) fn tabulate<'l>(&mut self, laws: impl Iterator<Item = &'l Law>) {
         for factor in laws.flat_map(Law::factors) {
-            let known = self
-                .variables
-                .iter()
-                .position(|known| known.variable == factor.variable);
-            let Some(known) = known else { continue };
-            let functions = &self.variables[known].functions;
-            if functions.iter().all(|(basis, _)| *basis != factor.basis)
+            let is_it = |known: &VariableRows| known.variable == factor.variable;
+            let Some(known) = self.variables.iter().position(is_it) else {
+                continue;
+            };
+            let mut functions = self.variables[known].functions.iter();
+            if functions.all(|(basis, _)| *basis != factor.basis)
                 && let Some(fresh) = self.factor(factor)
             {
                 let fresh = Arc::new(Functions::of(fresh));
@@ -187,21 +165,28 @@ impl<'a> SearchRows<'a> {
 
     /// Columns of a form as directions times functions; none where it is no such product, or where rows have a part in each other.
     pub(crate) fn factored(&self, form: &Form) -> Option<FactoredColumns> {
-        let term = form.term().filter(|_| self.is_by_row())?;
-        let mut motions = self.motions.iter();
-        let motion = motions.position(|known| known.motion == term.motion())?;
-        let functions = self.functions(term.law())?;
-        Some(FactoredColumns::of(
-            motion,
-            &self.motions[motion],
-            functions,
-        ))
+        self.is_by_row().then(|| self.product(form)).flatten()
+    }
+
+    /// Columns of a form as directions times functions.
+    fn product(&self, form: &Form) -> Option<FactoredColumns> {
+        let (motion, functions) = self.factors(form)?;
+        let directions = &self.motions[motion];
+        Some(FactoredColumns::of(motion, directions, functions))
+    }
+
+    /// The position of a form's motion and the functions along its directions; none where it is no product of such.
+    fn factors(&self, form: &Form) -> Option<(usize, Arc<Functions>)> {
+        let term = form.term()?;
+        let motion = |known: &MotionRows| known.motion == term.motion();
+        let motion = self.motions.iter().position(motion)?;
+        Some((motion, self.functions(term.law())?))
     }
 
     /// Whether rows are weighed each by itself, and all of them are readings.
     fn is_by_row(&self) -> bool {
         !self.view.problem.is_correlated()
-            && self.view.problem.of_readings().len() == self.residual.len()
+            && self.view.problem.measured_residual().len() == self.residual.len()
     }
 
     /// What a motion's columns are made of.
@@ -247,13 +232,13 @@ impl<'a> SearchRows<'a> {
     pub(crate) fn columns(&self, forms: &[Form]) -> (UnitColumns, Vec<usize>) {
         let mut each: Vec<Weighed> = forms
             .iter()
-            .map(|form| self.of_term(form).unwrap_or_else(|| self.of_form(form)))
+            .map(|form| {
+                self.term_columns(form)
+                    .unwrap_or_else(|| self.form_columns(form))
+            })
             .collect();
-        let rows = each
-            .iter()
-            .map(|block| block.rows)
-            .max()
-            .unwrap_or(self.residual.len());
+        let rows = each.iter().map(|block| block.rows).max();
+        let rows = rows.unwrap_or(self.residual.len());
         let counts: Vec<usize> = each.iter().map(|block| block.square.len()).collect();
         let mut values = match &mut each[..] {
             [block] => std::mem::take(&mut block.columns),
@@ -277,27 +262,19 @@ impl<'a> SearchRows<'a> {
     }
 
     /// The columns of any form; without the rows of currents where it says nothing of these.
-    fn of_form(&self, form: &Form) -> Weighed {
-        let (all, points, problem) = (
-            self.residual.len(),
-            self.view.problem.of_readings().len(),
-            &self.view.problem,
-        );
+    fn form_columns(&self, form: &Form) -> Weighed {
+        let problem = &self.view.problem;
+        let (all, points) = (self.residual.len(), problem.measured_residual().len());
         let mut columns = problem.motions_by(form);
-        let silent = columns
-            .chunks(all.max(1))
-            .all(|column| column[points..].iter().all(|value| *value == 0.0));
+        let is_zero = |column: &[f64]| column[points..].iter().all(|value| *value == 0.0);
+        let silent = columns.chunks(all.max(1)).all(is_zero);
         let rows = if silent { points } else { all };
-        if silent && points < all {
-            columns = columns
-                .chunks(all)
-                .flat_map(|column| column[..points].iter().copied())
-                .collect();
+        if rows < all {
+            let point_rows = columns.chunks(all).flat_map(|column| &column[..points]);
+            columns = point_rows.copied().collect();
         }
-        let square: Vec<f64> = columns
-            .chunks(rows.max(1))
-            .map(|column| self.mean_square(column))
-            .collect();
+        let each = columns.chunks(rows.max(1));
+        let square: Vec<f64> = each.map(|column| self.mean_square(column)).collect();
         for (column, square) in columns.chunks_mut(rows.max(1)).zip(&square) {
             problem.innovate(column);
             self.weigh(column);
@@ -313,29 +290,26 @@ impl<'a> SearchRows<'a> {
 
     /// How much of the squared length of `left` the columns of a law at a place explain if they are orthogonal; nothing of what needs more.
     pub(crate) fn roughly(&self, form: &Form, left: &[f64]) -> Option<f64> {
-        let term = form.term().filter(|_| !self.view.problem.is_correlated())?;
-        let of_motion = |known: &&MotionRows| known.motion == term.motion();
-        let motion = self.motions.iter().find(of_motion)?;
-        let functions = self.functions(term.law())?;
+        if self.view.problem.is_correlated() {
+            return None;
+        }
+        let (motion, functions) = self.factors(form)?;
+        let sum = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a + c, b + d];
         let mut fit = 0.0;
-        for WeighedDirection { weighed, .. } in &motion.directions {
-            let of_row = |i: usize| {
+        for WeighedDirection { weighed, .. } in &self.motions[motion].directions {
+            let products = |i: usize| {
                 let lines = self.view.problem.readings_of(i);
-                let sums =
+                let products =
                     lines.map(|line| [weighed[line] * left[line], weighed[line] * weighed[line]]);
-                sums.fold([0.0, 0.0], |sum, square| {
-                    [sum[0] + square[0], sum[1] + square[1]]
-                })
+                products.fold([0.0, 0.0], sum)
             };
-            let rows: Vec<[f64; 2]> = (0..self.variance.len()).map(of_row).collect();
+            let rows: Vec<[f64; 2]> = (0..self.variance.len()).map(products).collect();
             for function in functions.values.column_iter() {
                 let sums = function
                     .iter()
                     .zip(&rows)
                     .map(|(value, [along, square])| [value * along, value * value * square]);
-                let [along, square] = sums.fold([0.0, 0.0], |sum, square| {
-                    [sum[0] + square[0], sum[1] + square[1]]
-                });
+                let [along, square] = sums.fold([0.0, 0.0], sum);
                 fit += along * along / square.max(f64::MIN_POSITIVE);
             }
         }
@@ -344,17 +318,10 @@ impl<'a> SearchRows<'a> {
 
     /// What is needed of a direction of a motion by a unit.
     fn direction(&self, mut raw: Vec<f64>) -> WeighedDirection {
-        raw.truncate(self.view.problem.of_readings().len());
+        raw.truncate(self.view.problem.measured_residual().len());
         let count = self.variance.len().max(1) as f64;
-        let of_row = |(i, variance): (usize, &f64)| {
-            raw[self.view.problem.readings_of(i)]
-                .iter()
-                .map(|value| value * value)
-                .sum::<f64>()
-                * variance
-                / count
-        };
-        let square = self.variance.iter().enumerate().map(of_row).collect();
+        let square = self.squares_by_row(&raw).map(|square| square / count);
+        let square = square.collect();
         if !self.view.problem.is_correlated() {
             self.weigh(&mut raw);
         }
@@ -365,26 +332,15 @@ impl<'a> SearchRows<'a> {
     }
 
     /// The columns of a law at a place from the motion's directions and the law's functions.
-    fn of_term(&self, form: &Form) -> Option<Weighed> {
-        let term = form.term()?;
-        let of_motion = |known: &&MotionRows| known.motion == term.motion();
-        let MotionRows { directions, .. } = self.motions.iter().find(of_motion)?;
-        let functions = self.functions(term.law())?;
+    fn term_columns(&self, form: &Form) -> Option<Weighed> {
+        let product = self.product(form)?;
+        let directions = &self.motions[product.motion].directions;
         let (problem, row_of) = (&self.view.problem, self.view.problem.rows_of_readings());
-        let (rows, mut columns, mut square) = (row_of.len(), Vec::new(), Vec::new());
-        for (direction, function) in pairs(term.motion(), directions.len(), functions.count()) {
-            let direction = &directions[direction];
-            let length = dot(column(&functions.squares, function), &direction.square);
-            let scale = unit(length);
-            square.push(length);
-            let by: Vec<f64> = functions
-                .at(function)
-                .iter()
-                .map(|value| value * scale)
-                .collect();
+        let mut columns = Vec::new();
+        for (direction, function) in product.scaled() {
             let first = columns.len();
-            let lines = direction.weighed.iter().zip(row_of);
-            columns.extend(lines.map(|(weighed, row)| weighed * by[*row]));
+            let lines = directions[direction].weighed.iter().zip(row_of);
+            columns.extend(lines.map(|(weighed, row)| weighed * function[*row]));
             if problem.is_correlated() {
                 let column = &mut columns[first..];
                 problem.innovate(column);
@@ -393,26 +349,22 @@ impl<'a> SearchRows<'a> {
         }
         Some(Weighed {
             columns,
-            rows,
-            square,
+            rows: row_of.len(),
+            square: product.square,
         })
     }
 
     /// The functions of a law at every row; none of a variable of several numbers, or that some row does not tell.
     fn functions(&self, law: &Law) -> Option<Arc<Functions>> {
-        let of_factor = |factor: &Factor| {
-            let known = self
-                .variables
-                .iter()
-                .find(|known| known.variable == factor.variable)?;
-            let mut functions = known.functions.iter();
+        let known_functions = |factor: &Factor| {
+            let mut functions = self.variable(factor.variable)?.functions.iter();
             let known = functions.find(|(basis, _)| *basis == factor.basis)?;
             Some(&known.1)
         };
-        if let (Some(functions), None) = (of_factor(&law.first), law.times) {
+        if let (Some(functions), None) = (known_functions(&law.first), law.times) {
             return Some(functions.clone());
         }
-        let factor = |factor: &Factor| match of_factor(factor) {
+        let factor = |factor: &Factor| match known_functions(factor) {
             Some(functions) => Some(Cow::Borrowed(&functions.values)),
             None => Some(Cow::Owned(self.factor(factor)?)),
         };
@@ -433,11 +385,7 @@ impl<'a> SearchRows<'a> {
         if !factor.variable.is_single() {
             return None;
         }
-        let values = match self
-            .variables
-            .iter()
-            .find(|known| known.variable == factor.variable)
-        {
+        let values = match self.variable(factor.variable) {
             Some(known) => Cow::Borrowed(known.values.as_deref()?),
             None => Cow::Owned(self.view.problem.values(factor.variable)?),
         };
@@ -457,12 +405,15 @@ impl<'a> SearchRows<'a> {
     }
 
     fn mean_square(&self, column: &[f64]) -> f64 {
-        let of_row = |(i, variance): (usize, &f64)| {
+        self.squares_by_row(column).sum::<f64>() / self.variance.len().max(1) as f64
+    }
+
+    /// Squared motion of each row by a column.
+    fn squares_by_row(&self, column: &[f64]) -> impl Iterator<Item = f64> {
+        self.variance.iter().enumerate().map(|(i, variance)| {
             let lines = self.view.problem.readings_of(i);
             column[lines].iter().map(|value| value * value).sum::<f64>() * variance
-        };
-        self.variance.iter().enumerate().map(of_row).sum::<f64>()
-            / self.variance.len().max(1) as f64
+        })
     }
 
     fn weigh(&self, column: &mut [f64]) {
@@ -478,24 +429,9 @@ impl<'a> SearchRows<'a> {
             }
         }
         if let Some(factor) = self.noise.currents {
-            let points = problem.of_readings().len();
-            column[points..]
-                .iter_mut()
-                .for_each(|value| *value *= factor);
+            let points = problem.measured_residual().len();
+            let currents = column[points..].iter_mut();
+            currents.for_each(|value| *value *= factor);
         }
     }
-}
-
-/// Transpose of `a` times `b`; where one has fewer rows the others count as zero.
-pub(super) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
-    let rows = a.nrows().min(b.nrows());
-    let (a, b) = (a.subrows(0, rows), b.subrows(0, rows));
-    let mut products = DMatrix::zeros(a.ncols(), b.ncols());
-    let out = MatMut::from_column_major_slice_mut(products.as_mut_slice(), a.ncols(), b.ncols());
-    matmul(out, Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
-    products
-}
-
-pub(super) fn view(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
-    MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
 }

@@ -1,9 +1,9 @@
 //! The cells without a name: every motion of every place over every variable of the recording, less what a named cell is; and products of
 //! two variables where one of them shows. What is left out here would take the name of a neighbour.
 
-use super::cell::{CauseCell, FreeShape, Over, Shapes, is_square};
+use super::cell::{CauseCell, FreeShape, Over, Shapes, is_square, line};
 use super::frame::SearchRows;
-use crate::criteria::cells::{FADING, LIMITS, PAIR, PRODUCT};
+use crate::criteria::cells::{FADING, LIMITS, PAIR, PRODUCT, UNNAMED, USUAL};
 use crate::diagnose::types::Question;
 use crate::effect::{Axes, AxisPoint, Motion, Place, Polar, Survey, Variable, names};
 use crate::observation::only_contacts;
@@ -28,27 +28,20 @@ const ARROWS: [[i8; 3]; 13] = [
 /// Shorter links (m) are no place of their own.
 const SHORT: f64 = 1e-3;
 
-const FINE: Over = Over::Curve {
-    count: 40,
-    first: 8,
-    lengths: 5,
-};
-const CURVE: Over = Over::Curve {
-    count: 20,
-    first: 5,
-    lengths: 3,
-};
+const FINE: Over = curve((40, 8, 5));
+const CURVE: Over = curve((20, 5, 3));
 /// A wave of a dozen periods has no slow part that a coarse look would see.
-const WAVY: Over = Over::Curve {
-    count: 40,
-    first: 40,
-    lengths: 5,
-};
-const SLOW: Over = Over::Curve {
-    count: 8,
-    first: 4,
-    lengths: 2,
-};
+const WAVY: Over = curve((40, 40, 5));
+const SLOW: Over = curve((8, 4, 2));
+
+/// A line or a curve of so many cosines, so many at first, and correlation lengths.
+const fn curve((count, first, lengths): (usize, usize, usize)) -> Over {
+    Over::Curve {
+        count,
+        first,
+        lengths,
+    }
+}
 
 /// Variables of one kind, which share its prior odds.
 type Kind = Vec<(Variable, Over)>;
@@ -60,61 +53,50 @@ pub(super) fn cells(
     question: &Question,
     is_open: bool,
 ) -> Vec<CauseCell> {
-    let unnamed = super::listed::unnamed(question);
+    let odds = prior_odds(question);
     let mut out = Vec::new();
-    let varies = |frame: &SearchRows, variable: Variable| {
-        frame
-            .values(variable)
-            .is_some_and(|values| super::cell::line(&values).is_some())
-    };
     // Where nothing but joints was recorded, an arm that is smaller closes as well, and whatever follows the place of the tool looks so.
     let closed = only_contacts(survey.data, survey.rows) || !is_open;
     let places = if closed { Vec::new() } else { places(survey) };
     for place in places {
-        let families = families(place, survey);
-        let mut groups: Vec<Vec<(Motion, Variable, Over)>> = Vec::new();
-        for motions in families {
-            let kinds: Vec<Kind> = kinds(place, motions[0], survey);
-            let variables: Vec<Variable> = kinds
-                .iter()
-                .flatten()
-                .map(|(variable, _)| *variable)
-                .collect();
+        let mut groups: Vec<Vec<FreeShape>> = Vec::new();
+        for motions in families(place, survey) {
+            let kinds = kinds(motions[0], survey);
+            let variables: Vec<Variable> = kinds.iter().flatten().map(|(one, _)| *one).collect();
             frame.prepare(&[], &variables);
-            for kind in kinds {
-                let kind = kind
-                    .into_iter()
-                    .filter(|(variable, _)| varies(frame, *variable));
-                let all: Vec<_> = kind
-                    .flat_map(|(variable, over)| {
-                        motions.iter().map(move |motion| (*motion, variable, over))
-                    })
-                    .filter(|(motion, variable, over)| {
-                        !is_listed(*motion, *variable, *over, survey)
-                    })
-                    .collect();
-                if !all.is_empty() {
-                    groups.push(all);
-                }
-            }
-        }
-        let count = groups.len() as f64;
-        for group in groups {
-            let log_prior = (unnamed / count / group.len() as f64).ln();
-            out.extend(group.into_iter().map(|(motion, variable, over)| {
-                cell(
-                    FreeShape {
-                        motion,
+            for mut kind in kinds {
+                kind.retain(|(variable, _)| varies(*variable, frame));
+                let all = kind.into_iter().flat_map(|(variable, over)| {
+                    motions.iter().map(move |motion| FreeShape {
+                        motion: *motion,
                         variable,
                         over,
-                    },
-                    log_prior,
-                    survey,
-                )
-            }));
+                    })
+                });
+                groups.push(all.filter(|free| !is_listed(free, survey)).collect());
+            }
+        }
+        groups.retain(|group| !group.is_empty());
+        let count = groups.len() as f64;
+        for group in groups {
+            let log_prior = (odds / count / group.len() as f64).ln();
+            let named = |free: FreeShape| cell(free, log_prior, survey);
+            out.extend(group.into_iter().map(named));
         }
     }
     out
+}
+
+/// Prior odds of all cells without a name at a place together.
+pub(super) fn prior_odds(question: &Question) -> f64 {
+    let odds = |probability: f64| probability / (1.0 - probability);
+    *UNNAMED * odds(question.open_world) / odds(*USUAL)
+}
+
+/// Whether a variable takes more than one value.
+fn varies(variable: Variable, frame: &SearchRows) -> bool {
+    let values = frame.values(variable);
+    values.is_some_and(|values| line(&values).is_some())
 }
 
 /// Products of a motion's variable that shows with every other one that it may follow.
@@ -124,30 +106,22 @@ pub(super) fn products(
     frame: &mut SearchRows,
 ) -> Vec<CauseCell> {
     let mut out: Vec<CauseCell> = Vec::new();
-    for FreeShape {
-        motion, variable, ..
-    } in shown
-    {
-        let kinds = kinds(motion.place(), *motion, survey);
+    for free in shown {
+        let kinds = kinds(free.motion, survey).into_iter().flatten();
         let others: Vec<Variable> = kinds
-            .into_iter()
-            .flatten()
             .map(|(other, _)| other)
-            .filter(|other| other != variable)
+            .filter(|other| *other != free.variable)
             .collect();
         frame.prepare(&[], &others);
-        let mut seen: Vec<Variable> = Vec::new();
         for other in others {
-            let free = FreeShape {
-                motion: *motion,
-                variable: *variable,
+            let product = FreeShape {
                 over: Over::Product(other),
+                ..*free
             };
-            if seen.contains(&other) || free.is_square() || are_one(*variable, other, survey) {
+            if product.is_square() || are_one(free.variable, other, survey) {
                 continue;
             }
-            seen.push(other);
-            let cell = cell(free, PRODUCT.ln(), survey);
+            let cell = cell(product, PRODUCT.ln(), survey);
             if !out.iter().any(|known| known.key == cell.key) {
                 out.push(cell);
             }
@@ -161,17 +135,11 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
     let mut out = Vec::new();
     for place in places(survey) {
         for motion in families(place, survey).into_iter().flatten() {
-            let kinds = kinds(place, motion, survey);
             let mut variables: Vec<Variable> = Vec::new();
-            for variable in kinds
-                .into_iter()
-                .filter(|kind| kind.len() <= survey.joints())
-                .flatten()
-                .map(|(variable, _)| variable)
-            {
-                if frame
-                    .values(variable)
-                    .is_some_and(|values| super::cell::line(&values).is_some())
+            let mut kinds = kinds(motion, survey);
+            kinds.retain(|kind| kind.len() <= survey.joints());
+            for (variable, _) in kinds.into_iter().flatten() {
+                if varies(variable, frame)
                     && !variables.iter().any(|known| is_square(*known, variable))
                 {
                     variables.push(variable);
@@ -194,8 +162,8 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
 
 /// Cells of products that were seen among all pairs.
 pub(super) fn pair_cells(seen: &[FreeShape], survey: &Survey) -> Vec<CauseCell> {
-    let of_free = |free: &FreeShape| cell(*free, PAIR.ln(), survey);
-    seen.iter().map(of_free).collect()
+    let product = |free: &FreeShape| cell(*free, PAIR.ln(), survey);
+    seen.iter().map(product).collect()
 }
 
 /// Products that may do what one does: of the same variables at the places near it, where a motion that an axis does not turn is the same one,
@@ -213,20 +181,14 @@ pub(super) fn siblings(free: &FreeShape, survey: &Survey) -> Vec<FreeShape> {
     let slow = [Variable::Time, Variable::Temperature, Variable::Payload];
     let like = |variable: Variable| slow.into_iter().filter(move |_| slow.contains(&variable));
     let first = like(free.variable).map(|variable| FreeShape { variable, ..*free });
-    let second = like(other).map(|other| FreeShape {
-        over: Over::Product(other),
-        ..*free
-    });
-    motions
-        .chain(first)
-        .chain(second)
-        .filter(|one| {
-            let Over::Product(other) = one.over else {
-                return false;
-            };
-            one != free && other != one.variable && !are_one(one.variable, other, survey)
-        })
-        .collect()
+    let second = like(other).map(Over::Product);
+    let second = second.map(|over| FreeShape { over, ..*free });
+    let is_another = |one: &FreeShape| {
+        matches!(one.over, Over::Product(other)
+            if one != free && other != one.variable && !are_one(one.variable, other, survey))
+    };
+    let all = motions.chain(first).chain(second);
+    all.filter(is_another).collect()
 }
 
 /// Whether two variables change together, so that their product is a curve of one with a break: a clock, and a payload that changes once.
@@ -298,36 +260,31 @@ pub(crate) fn places(survey: &Survey) -> Vec<Place> {
 /// The motions of a place, by family.
 pub(super) fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
     match place {
-        // What carries the first joint is the base, and leans with it.
-        Place::Joint(joint) if joint > 0 && survey.robot.is_revolute(joint) => vec![
-            vec![Motion::Joint { joint }],
-            vec![false, true]
-                .into_iter()
-                .map(|turning| Motion::Axis {
-                    joint,
-                    about: None,
-                    turning,
-                    at: AxisPoint::Own,
-                })
-                .collect(),
-            vec![Motion::Slide { joint, along: true }],
-            vec![Motion::Slide {
+        Place::Joint(joint) if !survey.robot.is_revolute(joint) => {
+            vec![vec![Motion::Joint { joint }]]
+        }
+        Place::Joint(joint) => {
+            let axis = [false, true].map(|turning| Motion::Axis {
                 joint,
-                along: false,
-            }],
-        ],
-        Place::Joint(joint) if survey.robot.is_revolute(joint) => vec![
-            vec![Motion::Joint { joint }],
-            vec![Motion::Slide { joint, along: true }],
-        ],
-        Place::Joint(joint) => vec![vec![Motion::Joint { joint }]],
-        Place::Links(link, _) => vec![
-            vec![Motion::Links {
-                first: link,
-                last: link,
-            }],
-            vec![Motion::Bend { link }],
-        ],
+                about: None,
+                turning,
+                at: AxisPoint::Own,
+            });
+            let slide = |along| vec![Motion::Slide { joint, along }];
+            let turn = vec![Motion::Joint { joint }];
+            match joint {
+                // What carries the first joint is the base, and leans with it.
+                0 => vec![turn, slide(true)],
+                _ => vec![turn, axis.to_vec(), slide(true), slide(false)],
+            }
+        }
+        Place::Links(link, _) => {
+            let (first, last) = (link, link);
+            vec![
+                vec![Motion::Links { first, last }],
+                vec![Motion::Bend { link }],
+            ]
+        }
         Place::Tracker => [Polar::Range, Polar::Azimuth, Polar::Elevation]
             .map(|reading| vec![Motion::Instrument { reading }])
             .to_vec(),
@@ -338,126 +295,85 @@ pub(super) fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
     }
 }
 
-/// What a motion of a place may follow, by kind.
-pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> {
-    let joints = survey.joints();
+/// What a motion may follow, by kind.
+fn kinds(motion: Motion, survey: &Survey) -> Vec<Kind> {
+    let place = motion.place();
+    let reading = match motion {
+        Motion::Instrument { reading } => Some(reading),
+        _ => None,
+    };
     let seat = match place {
-        Place::Joint(joint) | Place::Links(joint, _) => joint,
-        Place::Tool => joints.saturating_sub(1),
-        _ => 0,
+        Place::Joint(joint) | Place::Links(joint, _) => Some(joint),
+        Place::Tool => Some(survey.joints().saturating_sub(1)),
+        _ => Some(0),
     };
-    let others = || (0..joints).filter(move |joint| *joint != seat);
-    let turns = matches!(motion, Motion::Joint { .. });
+    let seat = seat.filter(|_| reading.is_none());
+    let here: Vec<usize> = seat.into_iter().collect();
+    let others: Vec<usize> = (0..survey.joints())
+        .filter(|joint| Some(*joint) != seat)
+        .collect();
+    let each = |joints: &[usize], over: Over, variable: &dyn Fn(usize) -> Variable| -> Kind {
+        joints
+            .iter()
+            .map(|joint| (variable(*joint), over))
+            .collect()
+    };
     let arrows = ARROWS.map(|arrow| Vector3::from(arrow).map(f64::from).normalize().into());
-    let stretch = |joint: usize| Variable::Stretch {
-        joint,
-        limit: LIMITS[1] * survey.travel(joint),
-    };
-    let recent = |joint| Variable::Recent {
-        joint,
-        time: FADING[1],
-    };
     let mut out: Vec<Kind> = Vec::new();
-    if let Motion::Instrument { reading } = motion {
-        // What counts fractions of a wave errs by them.
-        let range = match reading {
-            Polar::Range => WAVY,
-            _ => CURVE,
-        };
-        out.extend(
-            [
-                (Variable::Azimuth, CURVE),
-                (Variable::Elevation, CURVE),
-                (Variable::Range, range),
-            ]
-            .map(|one| vec![one]),
-        );
-        out.push(
-            (0..joints)
-                .map(|joint| (Variable::Angle { joint }, CURVE))
-                .collect(),
-        );
-        out.push(
-            (0..joints)
-                .map(|joint| (Variable::Approach { joint }, Over::Line))
-                .collect(),
-        );
-        out.push(
-            (0..joints)
-                .map(|joint| (Variable::Move { joint }, SLOW))
-                .collect(),
-        );
-        out.push(
-            arrows
-                .map(|along| (Variable::Sighted { along }, SLOW))
-                .to_vec(),
-        );
-        out.push((0..joints).map(|joint| (stretch(joint), SLOW)).collect());
-        if survey.data.has_clock() {
-            out.push((0..joints).map(|joint| (recent(joint), SLOW)).collect());
-        }
+    // What counts fractions of a wave errs by them.
+    let over_range = match reading {
+        Some(Polar::Range) => WAVY,
+        _ => CURVE,
+    };
+    if reading.is_some() {
+        out.push(vec![(Variable::Azimuth, CURVE)]);
+        out.push(vec![(Variable::Elevation, CURVE)]);
+        out.push(vec![(Variable::Range, over_range)]);
+    }
+    let turns = matches!(motion, Motion::Joint { .. });
+    let angle = |joint| Variable::Angle { joint };
+    out.push(each(&here, if turns { FINE } else { CURVE }, &angle));
+    out.push(each(&others, CURVE, &angle));
+    let approach = |joint| Variable::Approach { joint };
+    out.push(each(&here, Over::Line, &approach));
+    out.push(each(&others, Over::Line, &approach));
+    let last_move = |joint| Variable::Move { joint };
+    out.push(each(&here, CURVE, &last_move));
+    out.push(each(&others, SLOW, &last_move));
+    if reading.is_some() {
+        let sighted = |along| (Variable::Sighted { along }, SLOW);
+        out.push(arrows.map(sighted).to_vec());
     } else {
-        out.push(vec![(
-            Variable::Angle { joint: seat },
-            if turns { FINE } else { CURVE },
-        )]);
-        out.push(
-            others()
-                .map(|joint| (Variable::Angle { joint }, CURVE))
-                .collect(),
-        );
-        out.push(vec![(Variable::Approach { joint: seat }, Over::Line)]);
-        out.push(
-            others()
-                .map(|joint| (Variable::Approach { joint }, Over::Line))
-                .collect(),
-        );
-        out.push(vec![(Variable::Move { joint: seat }, CURVE)]);
-        out.push(
-            others()
-                .map(|joint| (Variable::Move { joint }, SLOW))
-                .collect(),
-        );
-        let loaded = |joint: &usize| survey.is_loaded(*joint);
-        out.push(
-            [seat]
-                .into_iter()
-                .filter(loaded)
-                .map(|joint| (Variable::Load { joint }, CURVE))
-                .collect(),
-        );
-        out.push(
-            others()
-                .filter(loaded)
-                .map(|joint| (Variable::Load { joint }, SLOW))
-                .collect(),
-        );
-        out.push(
-            arrows
-                .map(|along| (Variable::Position { along }, SLOW))
-                .to_vec(),
-        );
-        let limits = LIMITS.map(|share| Variable::Stretch {
-            joint: seat,
-            limit: share * survey.travel(seat),
-        });
-        out.push(limits.map(|variable| (variable, SLOW)).to_vec());
-        out.push(others().map(|joint| (stretch(joint), SLOW)).collect());
-        if survey.data.has_clock() {
-            out.push(
-                FADING
-                    .map(|time| (Variable::Recent { joint: seat, time }, SLOW))
-                    .to_vec(),
-            );
-            out.push(others().map(|joint| (recent(joint), SLOW)).collect());
+        for (joints, over) in [(&here, CURVE), (&others, SLOW)] {
+            let mut loaded = joints.clone();
+            loaded.retain(|joint| survey.is_loaded(*joint));
+            out.push(each(&loaded, over, &|joint| Variable::Load { joint }));
         }
+        let position = |along| (Variable::Position { along }, SLOW);
+        out.push(arrows.map(position).to_vec());
+    }
+    let stretch = |joint: usize, share: f64| Variable::Stretch {
+        joint,
+        limit: share * survey.travel(joint),
+    };
+    let at_limits = |joint: &usize| LIMITS.map(|share| (stretch(*joint, share), SLOW));
+    out.push(here.iter().flat_map(at_limits).collect());
+    out.push(each(&others, SLOW, &|joint| stretch(joint, LIMITS[1])));
+    if survey.data.has_clock() {
+        let fading = |joint: &usize| {
+            let joint = *joint;
+            FADING.map(|time| (Variable::Recent { joint, time }, SLOW))
+        };
+        out.push(here.iter().flat_map(fading).collect());
+        let time = FADING[1];
+        out.push(each(&others, SLOW, &|joint| Variable::Recent {
+            joint,
+            time,
+        }));
     }
     if place == Place::Tool {
-        out.push(
-            (0..3)
-                .map(|axis| (Variable::Gravity { axis: Some(axis) }, SLOW))
-                .collect(),
-        );
+        let gravity = |axis| (Variable::Gravity { axis: Some(axis) }, SLOW);
+        out.push((0..3).map(gravity).collect());
     }
     out.push(vec![(Variable::Time, CURVE)]);
     out.push(vec![(Variable::Time, Over::Step)]);
@@ -467,10 +383,27 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
     out
 }
 
-/// Whether this motion over this variable, in all shapes, is the cell of a cause.
-pub(super) fn is_listed(motion: Motion, variable: Variable, over: Over, survey: &Survey) -> bool {
+/// Everything that a place may do and follow and that has no name.
+pub(super) fn cells_at(place: Place, survey: &Survey) -> Vec<CauseCell> {
+    let motions = families(place, survey).into_iter().flatten();
+    let motions = motions.filter(|motion| motion.place() == place);
+    let all = motions.flat_map(|motion| {
+        let kinds = kinds(motion, survey).into_iter().flatten();
+        kinds.map(move |(variable, over)| FreeShape {
+            motion,
+            variable,
+            over,
+        })
+    });
+    all.filter(|free| !is_listed(free, survey))
+        .map(|free| cell(free, 0.0, survey))
+        .collect()
+}
+
+/// Whether a motion over a variable, in all shapes, is the cell of a cause.
+fn is_listed(free: &FreeShape, survey: &Survey) -> bool {
     let last = survey.joints().saturating_sub(1);
-    match (motion, variable, over) {
+    match (free.motion, free.variable, free.over) {
         // What the last joint carries is the tool.
         (Motion::Slide { joint, .. }, Variable::Time, Over::Step) => joint == last,
         (

@@ -4,7 +4,7 @@ use super::cause_table::CauseTable;
 use super::cell::CauseCell;
 use super::component::{CellColumns, Component, SeenGroup, shape_keys};
 use super::evidence::log_sum;
-use super::frame::{SearchRows, product, view as matrix};
+use super::frame::SearchRows;
 use super::noise_shape::NoiseShape;
 use super::search::without;
 use super::size::{SizeEvidence, rms_size};
@@ -12,7 +12,7 @@ use super::state::KnownState;
 use super::{by_currents, estimated, is_kept};
 use crate::criteria::cells::{CLOSELY, OPEN, SMALLEST};
 use crate::criteria::fleet::{LEAST_EVIDENCE, WRITTEN};
-use crate::diagnose::round::{EstimatedCause, FitState, Fitter, RoundView};
+use crate::diagnose::round::{EstimatedCause, RoundView};
 use crate::effect::{Basis, Form, Place, Term, names};
 use rayon::prelude::*;
 
@@ -64,40 +64,29 @@ impl CellAnswer {
 
 /// Does something with the table of the cells that `keeps` leaves, around a fitted model.
 fn with_table<T>(
-    (view, now, fitter): (&RoundView, &FitState, &Fitter),
+    view: &RoundView,
     keeps: impl Fn(&CauseCell) -> bool,
     ask: impl FnOnce(&mut CauseTable) -> T,
 ) -> T {
     let survey = view.survey();
-    let rows = fitter.data.rows();
-    let noise = match now.causes.is_empty() {
-        true => NoiseShape::at_first(view, rows),
-        false => NoiseShape::of(view, rows),
+    let noise = match view.now.causes.is_empty() {
+        true => NoiseShape::at_first(view),
+        false => NoiseShape::of(view),
     };
-    let mut frame = SearchRows::of(view, now, fitter, noise);
+    let mut frame = SearchRows::of(view, noise);
     let is_open = survey.rows.len() >= *OPEN;
-    let kept = |cell: &CauseCell| keeps(cell) && is_kept(cell, view, &survey, fitter);
-    let question = fitter.question;
-    let mut table = CauseTable::new(
-        &mut frame,
-        &survey,
-        question,
-        (&[], Vec::new()),
-        is_open,
-        kept,
-    );
-    ask(&mut table)
+    let kept = |cell: &CauseCell| keeps(cell) && is_kept(cell, view, &survey);
+    let none = (&[][..], Vec::new());
+    let question = view.fitter.question;
+    ask(&mut CauseTable::new(
+        &mut frame, &survey, question, none, is_open, kept,
+    ))
 }
 
 /// Given cells as causes of the whole model around a fitted one.
-pub(crate) fn given_causes(
-    view: &RoundView,
-    now: &FitState,
-    fitter: &Fitter,
-    given: &[GivenCell],
-) -> Vec<EstimatedCause> {
+pub(crate) fn given_causes(view: &RoundView, given: &[GivenCell]) -> Vec<EstimatedCause> {
     let keeps = |cell: &CauseCell| given.iter().any(|one| one.cell == cell.key);
-    let mut causes = with_table((view, now, fitter), keeps, |table| {
+    let mut causes = with_table(view, keeps, |table| {
         let components = table.given(given);
         estimated(table, &components)
     });
@@ -106,35 +95,28 @@ pub(crate) fn given_causes(
 }
 
 /// What all cells say given some, and what each of those says and its rivals say in its place.
-pub(crate) fn answers(
-    view: &RoundView,
-    now: &FitState,
-    fitter: &Fitter,
-    given: &[GivenCell],
-) -> Vec<CellAnswer> {
+pub(crate) fn answers(view: &RoundView, given: &[GivenCell]) -> Vec<CellAnswer> {
     with_table(
-        (view, now, fitter),
+        view,
         |_| true,
         |table| {
             let components = table.given(given);
-            let all: Vec<&Component> = components.iter().collect();
-            let state = table.state(&all, None);
+            let state = table.state(&components, None);
+            let is_given = |cell: &usize| components.iter().any(|one| one.cell == *cell);
             let others: Vec<usize> = (0..table.cells.len())
-                .filter(|cell| components.iter().all(|component| component.cell != *cell))
+                .filter(|cell| !is_given(cell))
                 .collect();
-            let mut out = table.answers(&others, &state, &all, None);
+            let mut out = table.answers(&others, &state, None);
             for (i, component) in components.iter().enumerate() {
-                let without_it = without(&components, &[i]);
-                let other_components: Vec<&Component> = without_it.iter().collect();
-                let state = table.state(&other_components, Some(state.kappa));
+                let state = table.state(&without(&components, &[i]), Some(state.kappa));
                 let left_out = table.cells[component.cell].key.clone();
                 let mut alike = table.alike(component, 40);
-                alike.retain(|cell| components.iter().all(|other| other.cell != *cell));
+                alike.retain(|cell| !is_given(cell));
                 alike.push(component.cell);
-                let mut rivals = table.answers(&alike, &state, &other_components, Some(&left_out));
+                let mut rivals = table.answers(&alike, &state, Some(&left_out));
                 rivals.retain(|rival| rival.cell != left_out || rival.shape.is_some());
                 out.extend(rivals);
-                out.extend(table.of_given(component, &state, &other_components, left_out));
+                out.extend(table.given_answer(component, &state, left_out));
             }
             out
         },
@@ -151,10 +133,9 @@ impl CauseTable<'_, '_> {
                     continue;
                 };
                 let others = out.iter().filter(|(other, _)| *other != i);
-                let others: Vec<&Component> = others.map(|(_, component)| component).collect();
+                let others: Vec<Component> = others.map(|(_, other)| other.clone()).collect();
                 let state = self.state(&others, None);
-                let shape = one.shape.as_deref();
-                let Some(found) = self.closely_in(cell, &state, &others, shape) else {
+                let Some(found) = self.closely_in(cell, &state, one.shape.as_deref()) else {
                     continue;
                 };
                 let component = Component {
@@ -182,25 +163,22 @@ impl CauseTable<'_, '_> {
         &self,
         cells: &[usize],
         state: &KnownState,
-        components: &[&Component],
         left_out: Option<&str>,
     ) -> Vec<CellAnswer> {
         let (across, first) = self.across_cells(cells, state);
-        let of_k = |k: usize| {
+        let answer = |k: usize| {
             let (cell, block) = (&self.cells[cells[k]], &self.coarse[cells[k]]);
             let mut groups: Vec<Vec<f64>> = vec![Vec::new(); block.groups.len()];
             let mut best = (f64::NEG_INFINITY, 0.0, 0);
-            state.shapes(block, &across, first[k], |group, _, found| {
+            for (group, _, found) in state.shapes(block, &across, first[k]) {
                 groups[group].push(found.log);
                 if found.log > best.0 {
                     best = (found.log, found.amplitude, group);
                 }
-            });
+            }
             let logs: Vec<f64> = groups.iter().map(|logs| log_sum(logs)).collect();
-            let follows = block
-                .groups
-                .get(best.2)
-                .map_or("constant", |group| group.group.forms[0].follows(cell.place));
+            let likeliest = block.groups.get(best.2).map(|group| &group.group.forms[0]);
+            let follows = likeliest.map_or("constant", |form| form.follows(cell.place));
             let whole = CellAnswer {
                 left_out: left_out.map(Into::into),
                 cell: cell.key.clone(),
@@ -228,10 +206,9 @@ impl CauseTable<'_, '_> {
             let steps =
                 |form: &Form| matches!(form.term().map(Term::basis), Some(Basis::After { .. }));
             // Keys are long to make.
-            let keys = if shared && logs.iter().any(|log| log.is_finite()) {
-                shape_keys(&block.groups)
-            } else {
-                Vec::new()
+            let keys = match shared && logs.iter().any(|log| log.is_finite()) {
+                true => shape_keys(&block.groups),
+                false => Vec::new(),
             };
             let shapes = block.groups.iter().zip(&logs).zip(keys);
             let shapes = shapes
@@ -240,18 +217,15 @@ impl CauseTable<'_, '_> {
             (whole, shapes)
         };
         let mut out: Vec<(CellAnswer, Vec<CellAnswer>)> =
-            (0..cells.len()).into_par_iter().map(of_k).collect();
-        let mut order: Vec<usize> = (0..out.len())
-            .filter(|k| out[*k].0.log.is_finite())
-            .collect();
+            (0..cells.len()).into_par_iter().map(answer).collect();
+        let mut order: Vec<usize> = (0..out.len()).collect();
+        order.retain(|k| out[*k].0.log.is_finite());
         let odds = |k: &usize| out[*k].0.log + out[*k].0.log_prior;
         order.sort_by(|a, b| odds(b).total_cmp(&odds(a)).then(a.cmp(b)));
         order.truncate(*CLOSELY);
         order.retain(|k| self.cells[cells[*k]].is_coarse());
-        let closely: Vec<_> = order
-            .par_iter()
-            .filter_map(|k| Some((*k, self.closely(cells[*k], state, components)?)))
-            .collect();
+        let closely = |k: &usize| Some((*k, self.closely(cells[*k], state)?));
+        let closely: Vec<_> = order.par_iter().filter_map(closely).collect();
         for (k, found) in closely {
             if found.log > out[k].0.log {
                 (out[k].0.log, out[k].0.size) = (found.log, found.amplitude);
@@ -267,19 +241,17 @@ impl CauseTable<'_, '_> {
     }
 
     /// What a given cell says given the others, and its size.
-    fn of_given(
+    fn given_answer(
         &self,
         component: &Component,
         state: &KnownState,
-        others: &[&Component],
         key: String,
     ) -> Option<CellAnswer> {
         let cell = &self.cells[component.cell];
-        let found = self.closely(component.cell, state, others)?;
-        let log = self
-            .of_component(component, state, others)
-            .map_or(found.log, |(log, _)| log.max(found.log));
-        let found_size = self.sized(component, state, others)?;
+        let found = self.closely(component.cell, state)?;
+        let alone = self.component_evidence(component, state);
+        let log = alone.map_or(found.log, |(log, _)| log.max(found.log));
+        let found_size = self.sized(component, state)?;
         Some(CellAnswer {
             left_out: Some(key.clone()),
             cell: key,
@@ -297,17 +269,10 @@ impl CauseTable<'_, '_> {
     }
 
     /// Rms motion of a component given others, m.
-    fn sized(
-        &self,
-        component: &Component,
-        state: &KnownState,
-        others: &[&Component],
-    ) -> Option<SizeEvidence> {
+    fn sized(&self, component: &Component, state: &KnownState) -> Option<SizeEvidence> {
         let block = CellColumns::of_component(component, self.frame);
-        let across = self.across_block(&block, state, others);
-        let whole = product(matrix(&component.values), matrix(&component.values));
-        let along = self.frame.along(matrix(&component.values));
-        let (gram, gradient) = state.see((&whole, &along), &across, 0);
+        let across = self.across_block(&block, state);
+        let (gram, gradient) = state.seen(&block.groups[0], &across, 0);
         let prior = component.shape.shares.iter();
         let prior: Vec<f64> = prior
             .map(|share| component.amplitude * component.amplitude * share)

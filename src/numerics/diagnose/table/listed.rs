@@ -1,16 +1,21 @@
 //! The cells that have a name: each cause of the library at each of its places, in the shapes that it proposes and as curves of the same
 //! physics.
 
-use super::cell::{CauseCell, CellShape, FreeShape, Over, ShapeGroup, Shapes, not_quite_straight};
-use crate::criteria::cells::{BENT, COMMON, RARE, RARER, UNNAMED, USUAL};
+use super::cell::{
+    CauseCell, CellShape, FreeShape, Over, ShapeGroup, Shapes, has_few, line, not_quite_straight,
+    support,
+};
+use super::generated;
+use crate::criteria::cells::{BENT, COMMON, RARE, RARER};
 use crate::criteria::effect;
 use crate::diagnose::types::Question;
+use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::{
-    AxisPoint, Basis, CAUSES, DeclaredForm, Hypothesis, Law, Motion, Place, Survey, Term, Unknown,
-    Variable, cause, names,
+    AxisPoint, Basis, CAUSES, DeclaredForm, Form, Hypothesis, Law, Motion, Place, Survey, Term,
+    Unknown, Variable, cause, names,
 };
 use crate::robot::RobotModel;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Causes that most arms have; all others of the list are rare.
 const OF_MOST_ARMS: [&str; 11] = [
@@ -40,7 +45,7 @@ fn log_prior(name: &str, place: Place, weight: f64) -> f64 {
 }
 
 /// The cause under whose name a form is a cell: a joint yields to its load in one way, in proportion or not.
-pub(super) fn cell_of(cause: &'static str) -> &'static str {
+fn cell_of(cause: &str) -> &str {
     if cause == names::JOINT_HARDENING {
         names::JOINT_COMPLIANCE
     } else {
@@ -100,19 +105,13 @@ pub(super) fn cells(
             log_prior: if is_named {
                 log_prior(name, place, prior_weight) - prior_weight * unusual
             } else {
-                unnamed(question).ln()
+                generated::prior_odds(question).ln()
             },
             shapes: Shapes::Listed(groups),
             between: None,
         }
     };
     all.into_iter().map(cell).collect()
-}
-
-/// Prior odds of all cells without a name at a place together.
-pub(super) fn unnamed(question: &Question) -> f64 {
-    let odds = |probability: f64| probability / (1.0 - probability);
-    *UNNAMED * odds(question.open_world) / odds(*USUAL)
 }
 
 /// By how much, in ln of odds, the commonest form of a cell is rarer than what is rare.
@@ -135,15 +134,12 @@ fn weighed(hypotheses: Vec<Hypothesis>, robot: &RobotModel) -> Vec<ShapeGroup> {
         let is_hardening = hypothesis.form.name() == names::JOINT_HARDENING;
         let is_bent = is_hardening || weight < 0.5 * plain && hypothesis.tried > 1.0;
         let shape = |shares, part: f64| CellShape {
-            shares,
-            log_weight: (part * weight / sum).ln(),
             is_bent,
+            ..CellShape::new(shares, (part * weight / sum).ln())
         };
         let shapes = if is_hardening {
-            vec![
-                shape(bent_shares(hypothesis.form.numbers(robot).len()), 0.5),
-                shape(Vec::new(), 0.5),
-            ]
+            let shares = bent_shares(hypothesis.form.numbers(robot).len());
+            vec![shape(shares, 0.5), shape(Vec::new(), 0.5)]
         } else {
             vec![shape(Vec::new(), 1.0)]
         };
@@ -178,62 +174,38 @@ fn curves(
         return Vec::new();
     };
     let (motion, load) = (Motion::Joint { joint }, Variable::Load { joint });
+    let mut forms = groups.iter().flat_map(|group| &group.forms);
     match name {
         names::JOINT_COMPLIANCE => {
-            let line = groups
-                .iter()
-                .flat_map(|group| &group.forms)
-                .find(|form| form.name() == name);
+            let line = forms.find(|form| form.name() == name);
             let line =
                 line.filter(|form| form.variables() == [load] && form.compliance(&[1.0]).is_some());
             let curve = line.cloned().zip(values(load));
             curve
-                .and_then(|(line, values)| not_quite_straight(line, motion, load, &values, 0.0))
+                .and_then(|(line, values)| not_quite_straight(line, motion, load, &values))
                 .into_iter()
                 .collect()
         }
         names::BACKLASH => {
-            let gap = groups
-                .iter()
-                .flat_map(|group| &group.forms)
-                .any(|form| form.variables() == [Variable::Approach { joint }]);
-            let Some(values) = values(load).filter(|_| gap) else {
+            let gap = Variable::Approach { joint };
+            let loads = values(load).filter(|values| line(values).is_some());
+            let Some(loads) = loads.filter(|_| forms.any(|form| form.variables() == [gap])) else {
                 return Vec::new();
             };
-            let Some(Basis::Linear { .. }) = super::cell::line(&values) else {
-                return Vec::new();
-            };
-            let [low, high] = super::cell::support(&values);
-            let law = Law::of(Variable::Approach { joint }).times(
-                load,
-                Basis::Series {
-                    low,
-                    high,
-                    count: 8,
-                },
-            );
-            let shares = std::iter::once(0.5)
-                .chain([0.3, 0.12, 0.04, 0.02, 0.01, 0.006, 0.004])
-                .collect();
-            let shape = CellShape {
-                shares,
-                log_weight: 0.3_f64.ln(),
-                is_bent: true,
-            };
-            let form = Term::new(&Unknown, motion, law).into();
-            vec![ShapeGroup {
-                forms: vec![form],
-                shapes: vec![shape],
-                positive: false,
-                largest: f64::INFINITY,
-            }]
+            let ([low, high], count) = (support(&loads), 8);
+            let law = Law::of(gap).times(load, Basis::Series { low, high, count });
+            let shares = vec![0.5, 0.3, 0.12, 0.04, 0.02, 0.01, 0.006, 0.004];
+            vec![ShapeGroup::new(
+                vec![Term::new(&Unknown, motion, law).into()],
+                vec![CellShape::bent(shares, 0.3_f64.ln())],
+            )]
         }
         names::AXIS_WOBBLE => {
             let variable = Variable::Angle { joint };
-            let Some(values) = values(variable).filter(|values| !super::cell::has_few(values))
-            else {
+            let Some(values) = values(variable).filter(|values| !has_few(values)) else {
                 return Vec::new();
             };
+            let lengths = 3;
             let free = |turning| FreeShape {
                 motion: Motion::Axis {
                     joint,
@@ -245,41 +217,58 @@ fn curves(
                 over: Over::Curve {
                     count: 12,
                     first: 12,
-                    lengths: 3,
+                    lengths,
                 },
             };
-            let known = |_: Variable| Some(values.clone());
-            let mut out: Vec<ShapeGroup> = [true, false]
-                .into_iter()
-                .flat_map(|turning| free(turning).curves(&known))
-                .collect();
-            let count = out
-                .iter()
-                .map(|group| group.shapes.len())
-                .sum::<usize>()
-                .max(1) as f64;
-            let shapes = out.iter_mut().flat_map(|group| &mut group.shapes);
-            shapes.for_each(|shape| shape.log_weight = 0.3_f64.ln() - count.ln());
+            let log_weight = 0.3_f64.ln() - ((2 * lengths) as f64).ln();
+            let axis = [true, false].into_iter();
+            let axis = axis.flat_map(|turning| free(turning).curves(&values, log_weight));
             // About the middle of the link that the joint moves.
-            let bent = |order| {
-                Law::new(
-                    variable,
-                    Basis::Wave {
-                        order,
-                        overtone: false,
-                    },
-                )
-            };
-            let bent = [1, 2]
-                .map(|order| Term::new(&Unknown, Motion::Bend { link: joint }, bent(order)).into());
-            out.extend(
-                bent.into_iter()
-                    .filter(|_| joint + 1 < joints)
-                    .map(|form| ShapeGroup::of(form, 0.05_f64.ln())),
-            );
-            out
+            let bends = [1, 2].into_iter().filter(|_| joint + 1 < joints);
+            let bends = bends.map(|order| {
+                let law = Law::new(variable, wave(order));
+                let form = Term::new(&Unknown, Motion::Bend { link: joint }, law).into();
+                ShapeGroup::of(form, 0.05_f64.ln())
+            });
+            axis.chain(bends).collect()
         }
         _ => Vec::new(),
+    }
+}
+
+/// The forms of a name at a place as a search looks at them first, one at a time; where there are none, all places of that name.
+pub(crate) fn forms_of(
+    (name, place): (&str, Place),
+    question: &Question,
+    survey: &Survey,
+    problem: &WhitenedProblem,
+) -> Result<Vec<Form>, BTreeSet<Place>> {
+    let values = |variable| problem.values(variable);
+    let (of_name, places): (Vec<CauseCell>, BTreeSet<Place>) = if name == names::UNKNOWN {
+        let places = generated::places(survey).into_iter().collect();
+        (generated::cells_at(place, survey), places)
+    } else {
+        let mut all = cells(survey, &values, question);
+        all.retain(|cell| cell.name == cell_of(name));
+        let places = all.iter().map(|cell| cell.place).collect();
+        (all, places)
+    };
+    let groups = of_name
+        .iter()
+        .filter(|cell| cell.place == place)
+        .flat_map(|cell| cell.groups(survey, &values, false));
+    let one_by_one = groups
+        .filter(|group| name == names::UNKNOWN || group.forms.len() == 1)
+        .flat_map(|group| group.forms);
+    // A joint yields to its load in one way: in proportion, or not.
+    let bends = [names::JOINT_COMPLIANCE, names::JOINT_HARDENING].contains(&name);
+    let forms: Vec<Form> = one_by_one
+        .filter(|form| !bends || form.name() == name)
+        .collect();
+    if forms.is_empty() {
+        Err(places)
+    } else {
+        Ok(forms)
     }
 }
 
@@ -292,32 +281,28 @@ fn hoses(survey: &Survey, joint: usize) -> Vec<Hypothesis> {
         .into_iter()
         .filter(turns)
         .collect();
-    let wave = Basis::Wave {
-        order: 1,
-        overtone: false,
-    };
     let law = |other: &usize| {
         let cosines = |joint: usize| {
-            let [low, high] = survey.range[joint];
-            Basis::Series {
-                low,
-                high,
-                count: 3,
-            }
+            let ([low, high], count) = (survey.range[joint], 3);
+            Basis::Series { low, high, count }
         };
-        let [here, other] =
-            [joint, *other].map(|joint| (Variable::Angle { joint }, cosines(joint)));
+        let [here, there] = [joint, *other].map(|joint| Variable::Angle { joint });
         [
-            Law::new(here.0, wave).times(other.0, wave),
-            Law::new(here.0, here.1).times(other.0, other.1),
+            Law::new(here, wave(1)).times(there, wave(1)),
+            Law::new(here, cosines(joint)).times(there, cosines(*other)),
         ]
     };
-    let laws = neighbours.iter().flat_map(law);
-    laws.map(|law| {
-        Hypothesis::new(
-            Term::new(&Unknown, Motion::Joint { joint }, law),
-            2 * neighbours.len(),
-        )
-    })
-    .collect()
+    let pull = |law: Law| {
+        let term = Term::new(&Unknown, Motion::Joint { joint }, law);
+        Hypothesis::new(term, 2 * neighbours.len())
+    };
+    neighbours.iter().flat_map(law).map(pull).collect()
+}
+
+/// A sine and a cosine of so many periods a turn.
+fn wave(order: u32) -> Basis {
+    Basis::Wave {
+        order,
+        overtone: false,
+    }
 }

@@ -10,7 +10,6 @@ mod cell;
 mod component;
 mod evidence;
 mod factored;
-mod forms;
 mod frame;
 mod generated;
 mod given;
@@ -26,15 +25,15 @@ mod stepped;
 
 pub(crate) use answer::{Answer, FoundCell};
 pub use evidence::{AMPLITUDES, EvidenceRows, GroupEvidence, evidence, log_sum};
-pub(crate) use forms::forms_of;
 pub(crate) use generated::places;
 pub use given::{CellAnswer, GivenCell};
 pub(crate) use given::{answers, given_causes};
+pub(crate) use listed::forms_of;
 pub use search::ComponentSearch;
 pub use size::rms_size;
 pub use state::KnownState;
 
-use super::round::{EstimatedCause, FitState, Fitter, RoundView};
+use super::round::{EstimatedCause, RoundView};
 use super::types::Located;
 use crate::criteria::cells::{IDLE, OPEN, ROUNDS, UNEXPLAINED};
 use crate::criteria::screen::MISTAKES;
@@ -42,7 +41,7 @@ use crate::effect::{Basis, Form, Law, Place, Survey, names};
 use crate::estimate::Prior;
 use crate::observation::only_contacts;
 use cause_table::CauseTable;
-use cell::FreeShape;
+use cell::{CauseCell, FreeShape};
 use component::Component;
 use frame::SearchRows;
 use noise_shape::NoiseShape;
@@ -51,11 +50,8 @@ use std::collections::BTreeSet;
 /// What rounds of searching around better and better models keep.
 #[derive(Default)]
 pub(crate) struct Rounds {
-    /// Components with the keys of their cells.
-    components: Vec<(String, Component)>,
+    known: KnownComponents,
     shown: Vec<FreeShape>,
-    /// Products among the components, with ln of their prior odds.
-    products: Vec<(FreeShape, f64)>,
     /// Whether cells without a name are asked of few rows, too.
     is_open: bool,
     /// Products of two variables that show together; none before they were looked for.
@@ -75,11 +71,34 @@ pub(crate) struct Rounds {
 }
 
 /// Components from round to round.
+#[derive(Default)]
 struct KnownComponents {
     /// With the keys of their cells.
     components: Vec<(String, Component)>,
     /// Products among them, with ln of their prior odds.
     products: Vec<(FreeShape, f64)>,
+}
+
+impl KnownComponents {
+    fn of(table: &CauseTable, components: Vec<Component>) -> Self {
+        let cell = |component: &Component| &table.cells[component.cell];
+        let product = |component: &Component| {
+            let free = cell(component).free().filter(|free| free.is_product())?;
+            Some((*free, cell(component).log_prior))
+        };
+        let keyed = |component: Component| (cell(&component).key.clone(), component);
+        Self {
+            products: components.iter().filter_map(product).collect(),
+            components: components.into_iter().map(keyed).collect(),
+        }
+    }
+
+    /// Keys of the cells, in their order.
+    fn keys(&self) -> Vec<String> {
+        let mut keys: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
+        keys.sort();
+        keys
+    }
 }
 
 /// What a round found.
@@ -109,7 +128,7 @@ impl Rounds {
     /// From the beginning without the cells of some causes of the last model; false if they are none.
     pub(crate) fn again_without(&mut self, causes: &[usize]) -> bool {
         let mut at = 0;
-        for (key, component) in &self.components {
+        for (key, component) in &self.known.components {
             let range = at..at + component.forms.len();
             at = range.end;
             if causes.iter().any(|cause| range.contains(cause)) {
@@ -124,69 +143,62 @@ impl Rounds {
 
     /// Goes on with the components that the last answer found to be more probable; false where there are none, or where they were had before.
     pub(crate) fn exchange(&mut self) -> bool {
-        let Some(KnownComponents {
-            components,
-            products,
-        }) = self.better.take()
-        else {
+        let Some(better) = self.better.take() else {
             return false;
         };
-        let mut keys: Vec<String> = components.iter().map(|(key, _)| key.clone()).collect();
-        keys.sort();
-        let is_new = self.exchanged.insert(keys);
+        let is_new = self.exchanged.insert(better.keys());
         if is_new {
-            (self.components, self.products) = (components, products);
+            self.known = better;
         }
         is_new
     }
 
     /// Searches around a fitted model.
-    pub(crate) fn search(&mut self, view: &RoundView, now: &FitState, fitter: &Fitter) -> Round {
+    pub(crate) fn search(&mut self, view: &RoundView) -> Round {
         self.round += 1;
         let survey = view.survey();
         let all_count = std::mem::take(&mut self.all_count);
         let noise = if self.round > 1 && !all_count {
-            NoiseShape::of(view, fitter.data.rows())
+            NoiseShape::of(view)
         } else {
-            NoiseShape::at_first(view, fitter.data.rows())
+            NoiseShape::at_first(view)
         };
-        let components = self.components.iter();
-        let known =
+        let components = self.known.components.iter();
+        let sizes =
             components.flat_map(|(_, one)| one.forms.iter().map(move |form| (form, one.amplitude)));
-        let noise = noise.with_unknown_memory(&survey, known);
+        let noise = noise.with_unknown_memory(&survey, sizes);
         let many_far = noise.far > *MISTAKES;
-        let mut frame = SearchRows::of(view, now, fitter, noise);
-        let question = fitter.question;
-        let contacts_only = only_contacts(&fitter.data, question.fit);
+        let mut frame = SearchRows::of(view, noise);
+        let question = view.fitter.question;
+        let contacts_only = only_contacts(&view.fitter.data, question.fit);
         let empty = self.empty.clone();
-        let keeps = |cell: &cell::CauseCell| {
-            !empty.contains(&cell.key) && is_kept(cell, view, &survey, fitter)
-        };
+        let keeps = |cell: &CauseCell| !empty.contains(&cell.key) && is_kept(cell, view, &survey);
         let all_pairs = if self.pairs.is_none() {
             generated::pairs(&survey, &mut frame)
         } else {
             Vec::new()
         };
-        let known = self.products.drain(..);
-        let known = known.map(|(free, log_prior)| generated::cell(free, log_prior, &survey));
-        let mut products: Vec<_> = known.collect();
+        let before = self.known.keys();
+        let known = std::mem::take(&mut self.known);
+        let products = known.products.into_iter();
+        let products = products.map(|(free, prior)| generated::cell(free, prior, &survey));
+        let mut products: Vec<_> = products.collect();
         let pairs = self.pairs.as_deref().unwrap_or_default();
         products.extend(generated::pair_cells(pairs, &survey));
         let products = (&self.shown[..], products);
         let is_open = self.is_open || survey.rows.len() >= *OPEN;
         let mut table = CauseTable::new(&mut frame, &survey, question, products, is_open, keeps);
-        let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
         table.from_before.clone_from(&before);
         table.has_steps = self.pairs.is_some();
         let mut components = Vec::new();
-        for (key, component) in std::mem::take(&mut self.components) {
+        for (key, component) in known.components {
             if let Some(cell) = table.cell(&key) {
                 components.push(table.component_of(&component, cell));
             }
         }
         if self.first.is_none() {
             let state = table.state(&[], None);
-            let scan = table.scan(&state, &[], 12, &[]);
+            let scan = table.scan(&state, 12, &[]);
             self.first = Some((table.locate(&state), answer::nothing(&scan)));
         }
         let has_begun = !components.is_empty();
@@ -210,46 +222,29 @@ impl Rounds {
             }
             components = table.by_several(components);
         }
-        let keys_of = |table: &CauseTable, components: &[Component]| -> Vec<String> {
-            let key = |component: &Component| table.cells[component.cell].key.clone();
-            components.iter().map(key).collect()
-        };
-        let keys = keys_of(&table, &components);
-        let sorted = |keys: &[String]| {
-            let mut keys = keys.to_vec();
-            keys.sort();
-            keys
-        };
+        let known = KnownComponents::of(&table, components.clone());
+        let keys = known.keys();
         let shown = table.shown(&components);
-        let is_settled = sorted(&keys) == sorted(&before) && shown.len() <= self.shown.len();
+        let is_settled = keys == before && shown.len() <= self.shown.len();
         let mut is_last =
             components.is_empty() || is_settled && self.round > 1 || self.round >= *ROUNDS;
         if is_last && !(is_open && self.pairs.is_some()) {
-            let all: Vec<&Component> = components.iter().collect();
-            let state = table.state(&all, None);
+            let state = table.state(&components, None);
             let unexplained = (state.kappa > *UNEXPLAINED || many_far) && !contacts_only;
             if !is_open {
                 self.is_open = unexplained;
                 is_last = !unexplained;
             } else if self.pairs.is_none() {
-                let named: Vec<&Component> = all
-                    .iter()
-                    .copied()
-                    .filter(|component| table.cells[component.cell].is_named())
-                    .collect();
+                let named = table.named(&components);
                 let mut seen = Vec::new();
                 if unexplained {
-                    seen = table.seen_pairs(&all_pairs, &state, &all);
+                    seen = table.seen_pairs(&all_pairs, &state);
                 }
                 // What several components without a name explain may be one product.
-                if named.len() + 1 < all.len() {
-                    let state = table.state(&named, None);
-                    let more = table.seen_pairs(&all_pairs, &state, &named);
-                    seen.extend(
-                        more.into_iter()
-                            .filter(|free| !seen.contains(free))
-                            .collect::<Vec<_>>(),
-                    );
+                if named.len() + 1 < components.len() {
+                    let mut more = table.seen_pairs(&all_pairs, &table.state(&named, None));
+                    more.retain(|free| !seen.contains(free));
+                    seen.extend(more);
                 }
                 // Rows that stand out in number may be those between two steps.
                 self.all_count = many_far && !contacts_only;
@@ -270,22 +265,12 @@ impl Rounds {
             let next = table.backfit(next, 1);
             table.is_better(&next, &components).then_some(next)
         });
-        let product = |component: &Component| match table.cells[component.cell].shapes {
-            cell::Shapes::Free(free) => matches!(free.over, cell::Over::Product(_))
-                .then_some((free, table.cells[component.cell].log_prior)),
-            cell::Shapes::Listed(_) => None,
-        };
-        self.exchanged.insert(sorted(&keys));
-        self.better = better.map(|next| KnownComponents {
-            products: next.iter().filter_map(product).collect(),
-            components: keys_of(&table, &next).into_iter().zip(next).collect(),
-        });
+        self.exchanged.insert(keys);
+        self.better = better.map(|next| KnownComponents::of(&table, next));
         let mut causes = estimated(&table, &components);
         by_currents(&mut causes, view);
         let cells = table.cells.len();
-        self.products = components.iter().filter_map(product).collect();
-        self.components = keys.into_iter().zip(components).collect();
-        self.shown = shown;
+        (self.known, self.shown) = (known, shown);
         Round {
             causes,
             answer,
@@ -295,7 +280,8 @@ impl Rounds {
 }
 
 /// Whether a cell may be asked of a recording.
-fn is_kept(cell: &cell::CauseCell, view: &RoundView, survey: &Survey, fitter: &Fitter) -> bool {
+fn is_kept(cell: &CauseCell, view: &RoundView, survey: &Survey) -> bool {
+    let fitter = view.fitter;
     // Where nothing but joints was recorded, base and first joint move with all places that the target was laid into.
     let unseen = only_contacts(&fitter.data, fitter.question.fit)
         && (cell.place == Place::Base
@@ -312,8 +298,7 @@ fn is_kept(cell: &cell::CauseCell, view: &RoundView, survey: &Survey, fitter: &F
 /// Components as causes of the whole model, each with what the evidence says of the size of its coefficients; waves that the rows could not
 /// show are left out.
 fn estimated(table: &CauseTable, components: &[Component]) -> Vec<EstimatedCause> {
-    let all: Vec<&Component> = components.iter().collect();
-    let coefficients = table.state(&all, None).coefficients(&all, table.frame);
+    let coefficients = table.state(components, None).coefficients(table.frame);
     let mut out = Vec::new();
     for (component, coefficients) in components.iter().zip(coefficients) {
         let sigmas = component.sigmas();
@@ -344,19 +329,11 @@ fn estimated(table: &CauseTable, components: &[Component]) -> Vec<EstimatedCause
 
 /// What the motor currents say of the numbers of the torque model, as their priors.
 fn by_currents(causes: &mut [EstimatedCause], view: &RoundView) {
-    let of_torque_model: Vec<Form> = causes
-        .iter()
-        .map(|cause| cause.form.clone())
-        .filter(|form| form.is_of_torque_model())
-        .collect();
-    let mut priors = view
-        .problem
-        .priors_by_currents(&of_torque_model.iter().collect::<Vec<_>>())
-        .into_iter();
-    for cause in causes
-        .iter_mut()
-        .filter(|cause| cause.form.is_of_torque_model())
-    {
+    let is_asked = |cause: &&mut EstimatedCause| cause.form.is_of_torque_model();
+    let mut asked: Vec<&mut EstimatedCause> = causes.iter_mut().filter(is_asked).collect();
+    let forms: Vec<&Form> = asked.iter().map(|cause| &cause.form).collect();
+    let mut priors = view.problem.priors_by_currents(&forms).into_iter();
+    for cause in &mut asked {
         let by_current: Vec<Prior> = priors.by_ref().take(cause.coefficients.len()).collect();
         if by_current.len() == cause.coefficients.len() {
             cause.priors = by_current;
@@ -370,48 +347,31 @@ fn without_idle_waves(
     count: usize,
     seen: &dyn Fn(usize) -> bool,
 ) -> (Form, Vec<usize>) {
-    let all: Vec<usize> = (0..count).collect();
-    let Some(term) = form.term() else {
-        return (form.clone(), all);
-    };
-    let (
-        Basis::Cosines {
-            low,
-            high,
-            count: waves,
-        },
-        None,
-    ) = (term.basis(), term.law().times)
-    else {
-        return (form.clone(), all);
+    let curve = form.term().filter(|term| term.law().times.is_none());
+    let curve = curve.and_then(|term| match term.basis() {
+        Basis::Cosines { low, high, count } => Some((term, [low, high], count)),
+        _ => None,
+    });
+    let Some((term, [low, high], waves)) = curve else {
+        return (form.clone(), (0..count).collect());
     };
     let fields = count / waves.max(1);
     let alternates = cell::alternates(term.motion());
-    let column = |wave: usize, field: usize| {
-        if alternates {
-            wave * fields + field
-        } else {
-            field * waves + wave
-        }
+    let wave = |column: usize| match alternates {
+        true => column / fields,
+        false => column % waves,
     };
-    let last = (0..waves)
-        .rev()
-        .find(|wave| (0..fields).any(|field| seen(column(*wave, field))))
-        .map_or(1, |last| last + 1);
+    let columns = 0..fields * waves;
+    let last = columns
+        .clone()
+        .filter(|column| seen(*column))
+        .map(wave)
+        .max();
+    let count = last.map_or(1, |last| last + 1);
     let law = Law::new(
         term.law().first.variable,
-        Basis::Cosines {
-            low,
-            high,
-            count: last,
-        },
+        Basis::Cosines { low, high, count },
     );
-    let kept = if alternates {
-        (0..last * fields).collect()
-    } else {
-        (0..fields)
-            .flat_map(|field| (0..last).map(move |wave| field * waves + wave))
-            .collect()
-    };
-    (Form::from(term.with(law)), kept)
+    let kept = columns.filter(|column| wave(*column) < count);
+    (Form::from(term.with(law)), kept.collect())
 }

@@ -3,6 +3,7 @@
 use crate::criteria::cells::{EVEN, FAR, UNEVEN, UNRECORDED};
 use crate::diagnose::round::RoundView;
 use crate::effect::{Form, Survey, Variable};
+use crate::linear::mean_square;
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
@@ -21,8 +22,8 @@ pub(super) struct NoiseShape {
 
 impl NoiseShape {
     /// Before anything was found: rows that measured one pose count as far as they say something of their own.
-    pub(crate) fn at_first(view: &RoundView, rows: usize) -> Self {
-        let mut weights = vec![1.0; rows];
+    pub(crate) fn at_first(view: &RoundView) -> Self {
+        let mut weights = vec![1.0; view.problem.data.rows()];
         share_among_repeats(view, &mut weights);
         Self {
             weights,
@@ -58,20 +59,12 @@ impl NoiseShape {
 
     /// By the residual of a fitted model: rows that are far off count less, and a noise that is stronger in some direction is made
     /// even.
-    pub(crate) fn of(view: &RoundView, rows: usize) -> Self {
+    pub(crate) fn of(view: &RoundView) -> Self {
         let problem = &view.problem;
-        let residual = problem.of_readings();
-        let square = |lines: std::ops::Range<usize>| {
-            let count = lines.len().max(1) as f64;
-            residual[lines]
-                .iter()
-                .map(|value| value * value)
-                .sum::<f64>()
-                / count
-        };
-        let mut sizes: Vec<f64> = (0..problem.rows.len())
-            .map(|i| square(problem.readings_of(i)).sqrt())
-            .collect();
+        let residual = problem.measured_residual();
+        let rows = 0..problem.rows.len();
+        let size = |i: usize| mean_square(&residual[problem.readings_of(i)]).sqrt();
+        let mut sizes: Vec<f64> = rows.clone().map(size).collect();
         let by_row = sizes.clone();
         if sizes.is_empty() {
             return Self::default();
@@ -79,13 +72,13 @@ impl NoiseShape {
         let middle = sizes.len() / 2;
         // The median of a mean of three squares is 0.79 of their expectation.
         let scale = (*sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.89).max(0.3);
-        let mut weights = vec![1.0; rows];
+        let mut weights = vec![1.0; problem.data.rows()];
         for (size, row) in by_row.iter().zip(&problem.rows) {
             weights[*row] = (*FAR * scale / size.max(f64::MIN_POSITIVE)).min(1.0);
         }
         let far = weights.iter().filter(|weight| **weight < 0.5).count();
-        let points = (0..problem.rows.len())
-            .filter(|i| weights[problem.rows[*i]] == 1.0 && problem.readings_of(*i).len() == 3);
+        let points =
+            rows.filter(|i| weights[problem.rows[*i]] == 1.0 && problem.readings_of(*i).len() == 3);
         let (mut sum, mut count) = (Matrix3::zeros(), 0.0);
         for i in points {
             let left = Vector3::from_column_slice(&residual[problem.readings_of(i)]);
@@ -93,15 +86,9 @@ impl NoiseShape {
             count += 1.0;
         }
         share_among_repeats(view, &mut weights);
-        let mean = |values: &[f64]| {
-            values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64
-        };
         let currents = &problem.residual[residual.len()..];
-        let currents = (!currents.is_empty()).then(|| {
-            (mean(residual) / mean(currents).max(1e-12))
-                .sqrt()
-                .clamp(0.2, 5.0)
-        });
+        let ratio = (mean_square(residual) / mean_square(currents).max(1e-12)).sqrt();
+        let currents = (!currents.is_empty()).then(|| ratio.clamp(0.2, 5.0));
         Self {
             weights,
             far,
@@ -141,30 +128,25 @@ fn unrecorded(variable: Variable, data: &Measurements) -> Vec<f64> {
 /// Rows that measured one pose one after another count as one where they differ less among each other than from the model: what they leave is
 /// then the pose's, not the instrument's.
 fn share_among_repeats(view: &RoundView, weights: &mut [f64]) {
-    let (problem, residual) = (&view.problem, view.problem.of_readings());
+    let (problem, residual) = (&view.problem, view.problem.measured_residual());
     let width = problem.width().unwrap_or(0);
     let mut poses: Vec<Vec<usize>> = Vec::new();
     for (i, row) in problem.rows.iter().enumerate() {
-        match poses
-            .last_mut()
-            .filter(|pose| problem.data.same_pose(problem.rows[pose[0]], *row))
-        {
+        let same = |pose: &&mut Vec<usize>| problem.data.same_pose(problem.rows[pose[0]], *row);
+        match poses.last_mut().filter(same) {
             Some(pose) => pose.push(i),
             None => poses.push(vec![i]),
         }
     }
+    poses.retain(|pose| pose.len() > 1);
     let (mut within, mut freedom) = (0.0, 0.0);
-    for pose in poses.iter().filter(|pose| pose.len() > 1) {
+    for pose in &poses {
         for k in 0..width {
-            let values: Vec<f64> = pose
-                .iter()
-                .map(|i| residual[problem.readings_of(*i).start + k])
-                .collect();
+            let value = |i: &usize| residual[problem.readings_of(*i).start + k];
+            let values: Vec<f64> = pose.iter().map(value).collect();
             let mean = values.iter().sum::<f64>() / values.len() as f64;
-            within += values
-                .iter()
-                .map(|value| (value - mean).powi(2))
-                .sum::<f64>();
+            let squares = values.iter().map(|value| (value - mean).powi(2));
+            within += squares.sum::<f64>();
             freedom += values.len() as f64 - 1.0;
         }
     }
@@ -172,10 +154,9 @@ fn share_among_repeats(view: &RoundView, weights: &mut [f64]) {
         return;
     }
     let within = within / freedom;
-    let whole =
-        residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64;
+    let whole = mean_square(residual);
     let between = (whole - within).max(0.0);
-    for pose in poses.iter().filter(|pose| pose.len() > 1) {
+    for pose in &poses {
         let count = pose.len() as f64;
         let share = ((between + within) / (count * between + within).max(f64::MIN_POSITIVE))
             .sqrt()

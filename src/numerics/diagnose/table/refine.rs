@@ -2,11 +2,10 @@
 
 use super::cause_table::CauseTable;
 use super::cell::{FreeShape, Over, ShapeGroup, Shapes, fields};
-use super::component::{Component, form_keys};
 use super::scan::{CellEvidence, CellScan, Refined};
 use super::state::KnownState;
 use crate::criteria::cells::{BENDS, CLOSELY, LEVELS, SEPARATED, STICKS};
-use crate::effect::{Basis, Form, Variable};
+use crate::effect::{Basis, Form, Term, Variable};
 use rayon::prelude::*;
 
 /// ln of the evidence of a shape, and its amplitude.
@@ -21,7 +20,6 @@ impl CauseTable<'_, '_> {
         &self,
         scan: &mut CellScan,
         state: &KnownState,
-        components: &[&Component],
         prior: &(dyn Fn(usize) -> f64 + Sync),
     ) {
         let most = scan.best().map_or(0.0, |best| scan.log_odds[best]);
@@ -36,15 +34,11 @@ impl CauseTable<'_, '_> {
                 || self.is_over_numbers(*cell)
         };
         let listed: Vec<usize> = scan.closely.keys().copied().filter(asked).collect();
-        let refined: Vec<(usize, Refined)> = listed
-            .into_par_iter()
-            .filter_map(|cell| {
-                Some((
-                    cell,
-                    self.refined(cell, &scan.closely[&cell], state, components)?,
-                ))
-            })
-            .collect();
+        let closer = |cell: usize| {
+            let refined = self.refined(cell, &scan.closely[&cell], state)?;
+            Some((cell, refined))
+        };
+        let refined: Vec<(usize, Refined)> = listed.into_par_iter().filter_map(closer).collect();
         for (cell, closer) in refined {
             let Some(found) = scan.closely.get_mut(&cell) else {
                 continue;
@@ -59,40 +53,29 @@ impl CauseTable<'_, '_> {
 
     /// Gives the best cell of a scan and those near it finer shapes where those say more: a product that of one curve times another, a curve
     /// steps.
-    pub(crate) fn separate(
-        &self,
-        scan: &mut CellScan,
-        state: &KnownState,
-        components: &[&Component],
-    ) {
+    pub(crate) fn separate(&self, scan: &mut CellScan, state: &KnownState) {
         let Some(best) = scan.best() else { return };
         let least = 0.8 * scan.log_odds[best];
         let mut near: Vec<usize> = scan.closely.keys().copied().collect();
         near.retain(|cell| scan.log_odds[*cell] >= least);
-        near.sort_by(|a, b| {
-            scan.log_odds[*b]
-                .total_cmp(&scan.log_odds[*a])
-                .then(a.cmp(b))
-        });
-        let products = near.iter().filter(|cell| self.is_product(**cell));
-        let curves = near.iter().filter(|cell| !self.is_product(**cell));
-        let some: Vec<usize> = products
-            .take(*SEPARATED)
-            .chain(curves.take(*CLOSELY))
-            .copied()
-            .collect();
-        let separated: Vec<(usize, Refined)> = some
-            .into_par_iter()
-            .filter_map(|cell| {
-                let found = &scan.closely[&cell];
-                let separated = if self.is_product(cell) {
-                    self.separable(cell, found, state, components)?
-                } else {
-                    self.stepped(cell, found, state, components, cell == best)?
-                };
-                (separated.log > found.log).then_some((cell, separated))
-            })
-            .collect();
+        let odds = |cell: &usize| scan.log_odds[*cell];
+        near.sort_by(|a, b| odds(b).total_cmp(&odds(a)).then(a.cmp(b)));
+        let is_product = |cell: &usize| self.cells[*cell].free().is_some_and(FreeShape::is_product);
+        let (mut some, mut curves): (Vec<usize>, Vec<usize>) =
+            near.into_iter().partition(is_product);
+        some.truncate(*SEPARATED);
+        curves.truncate(*CLOSELY);
+        some.extend(curves);
+        let separate = |cell: usize| {
+            let found = &scan.closely[&cell];
+            let separated = if is_product(&cell) {
+                self.separable(cell, found, state)?
+            } else {
+                self.stepped(cell, found, state, cell == best)?
+            };
+            (separated.log > found.log).then_some((cell, separated))
+        };
+        let separated: Vec<(usize, Refined)> = some.into_par_iter().filter_map(separate).collect();
         for (cell, separated) in separated {
             if let Some(found) = scan.closely.get_mut(&cell) {
                 scan.log_odds[cell] += separated.log - found.log;
@@ -107,63 +90,52 @@ impl CauseTable<'_, '_> {
         cell: usize,
         found: &CellEvidence,
         state: &KnownState,
-        others: &[&Component],
     ) -> Option<Refined> {
         let best = self.as_found(cell, found);
-        let keys = form_keys(others);
         let value = |forms: &[Form]| {
             let other = self.with_forms(&best, forms.to_vec());
             // With other numbers a variable may have so few values that its curve has fewer columns.
             let is_alike = other.values.ncols() == best.shape.shares.len();
             is_alike
-                .then(|| self.of_component(&other, state, others))
+                .then(|| self.component_evidence(&other, state))
                 .flatten()
         };
-        let is_there = |forms: &[Form]| forms.iter().any(|form| keys.contains(&form.key()));
-        let start = self.of_component(&best, state, others)?;
+        let start = self.component_evidence(&best, state)?;
+        let found_as = |forms, (log, amplitude): Worth| Refined {
+            forms,
+            shape: None,
+            log,
+            amplitude,
+        };
         match (&self.cells[cell].shapes, &best.forms[..]) {
             (Shapes::Free(free), _) => {
-                let values = |variable: Variable| self.frame.values(variable);
+                let forms_of = |free: &FreeShape| {
+                    let groups = self.groups(free, true);
+                    forms_of(groups.get(found.shape.0)?, found.shape.1)
+                };
                 let near = |free: &FreeShape, level| {
-                    let forms = |free: FreeShape| {
-                        let groups = free.groups(self.survey, &values, true);
-                        let group = groups.get(found.shape.0)?;
-                        Some((free, self.forms_of(group, found.shape.1)?))
+                    let is_other = |variable: &&Variable| {
+                        free.variable.is_alike(**variable) && **variable != free.variable
                     };
-                    let known = self
-                        .numbers
-                        .iter()
-                        .filter(|variable| free.variable.is_alike(**variable));
-                    let known = known.filter(|variable| level == 0 && **variable != free.variable);
+                    let known = self.numbers.iter().filter(|_| level == 0).filter(is_other);
                     let known = known.map(|variable| FreeShape {
                         variable: *variable,
                         ..*free
                     });
-                    free.near(level)
-                        .into_iter()
-                        .chain(known)
-                        .filter(|free| self.slips(free))
-                        .filter_map(forms)
-                        .filter(|(_, forms)| !is_there(forms))
+                    let near = free.near(level).into_iter().chain(known);
+                    near.filter(|free| self.slips(free))
+                        .filter_map(|free| Some((free, forms_of(&free)?)))
+                        .filter(|(_, forms)| !state.has_any(forms))
                         .collect::<Vec<_>>()
                 };
-                let (free, log, amplitude) = climb(*free, start, &near, &value, &|_, _| 0.0)?;
-                let groups = free.groups(self.survey, &values, true);
-                let forms = self.forms_of(groups.get(found.shape.0)?, found.shape.1)?;
-                Some(Refined {
-                    forms,
-                    shape: None,
-                    log,
-                    amplitude,
-                })
+                let (free, worth) = climb(*free, start, &near, &value, &|_, _| 0.0)?;
+                Some(found_as(forms_of(&free)?, worth))
             }
             (Shapes::Listed(_), [form]) if !form.cause().is_nameless() => {
                 let near = |form: &Form, level| {
-                    let near = form
-                        .near(self.survey, level)
-                        .into_iter()
-                        .map(|near| (near.clone(), vec![near]));
-                    near.filter(|(_, forms)| !is_there(forms))
+                    let near = form.near(self.survey, level).into_iter();
+                    near.map(|near| (near.clone(), vec![near]))
+                        .filter(|(_, forms)| !state.has_any(forms))
                         .collect::<Vec<_>>()
                 };
                 let price = |form: &Form, near: &Form| {
@@ -173,34 +145,21 @@ impl CauseTable<'_, '_> {
                         0.0
                     }
                 };
-                let (form, log, amplitude) = climb(form.clone(), start, &near, &value, &price)?;
-                Some(Refined {
-                    forms: vec![form],
-                    shape: None,
-                    log,
-                    amplitude,
-                })
+                let (form, worth) = climb(form.clone(), start, &near, &value, &price)?;
+                Some(found_as(vec![form], worth))
             }
             _ => None,
         }
     }
 
-    /// Whether a cell is any function of two variables.
-    fn is_product(&self, cell: usize) -> bool {
-        matches!(&self.cells[cell].shapes, Shapes::Free(free) if matches!(free.over, Over::Product(_)))
-    }
-
     /// Whether a cell follows a variable with numbers that a component follows with others.
     fn is_over_numbers(&self, cell: usize) -> bool {
-        match &self.cells[cell].shapes {
-            Shapes::Free(free) => {
-                let other = |variable: &Variable| {
-                    free.variable.is_alike(*variable) && free.variable != *variable
-                };
-                self.numbers.iter().any(other)
-            }
-            Shapes::Listed(_) => false,
-        }
+        self.cells[cell].free().is_some_and(|free| {
+            let other = |variable: &Variable| {
+                free.variable.is_alike(*variable) && free.variable != *variable
+            };
+            self.numbers.iter().any(other)
+        })
     }
 
     /// Whether a shape is none of what sticks over so much of a joint's travel that it is the joint's angle.
@@ -211,24 +170,23 @@ impl CauseTable<'_, '_> {
         };
         slips(free.variable) && !matches!(free.over, Over::Product(other) if !slips(other))
     }
+}
 
-    /// The forms of a shape of a group: those that it gives a share; none where the group has fewer shapes with other numbers.
-    fn forms_of(&self, group: &ShapeGroup, shape: usize) -> Option<Vec<Form>> {
-        let mut at = 0;
-        let shares = &group.shapes.get(shape)?.shares;
-        let mut out = Vec::new();
-        for form in &group.forms {
-            let count = form
-                .term()
-                .map_or(0, |term| fields(term.motion()) * term.law().count());
-            let shares_here = shares.get(at..at + count).unwrap_or_default();
-            at += count;
-            if shares_here.is_empty() || shares_here.iter().any(|share| *share > 0.0) {
-                out.push(form.clone());
-            }
+/// The forms of a shape of a group: those that it gives a share; none where the group has fewer shapes with other numbers.
+fn forms_of(group: &ShapeGroup, shape: usize) -> Option<Vec<Form>> {
+    let mut at = 0;
+    let shares = &group.shapes.get(shape)?.shares;
+    let mut out = Vec::new();
+    for form in &group.forms {
+        let term = form.term();
+        let count = term.map_or(0, |term| fields(term.motion()) * term.law().count());
+        let shares_here = shares.get(at..at + count).unwrap_or_default();
+        at += count;
+        if shares_here.is_empty() || shares_here.iter().any(|share| *share > 0.0) {
+            out.push(form.clone());
         }
-        Some(out)
     }
+    Some(out)
 }
 
 /// Steps from a shape to the best near it, in steps that halve, until none is better: the last with ln of its evidence and its amplitude, none
@@ -239,34 +197,30 @@ fn climb<T: Clone>(
     near: &dyn Fn(&T, i32) -> Vec<Variant<T>>,
     value: &dyn Fn(&[Form]) -> Option<Worth>,
     price: &dyn Fn(&T, &T) -> f64,
-) -> Option<(T, f64, f64)> {
-    let (mut now, (mut log, mut amplitude), mut moved) = (first, start, false);
+) -> Option<(T, Worth)> {
+    let (mut now, mut worth, mut moved) = (first, start, false);
     for level in 0..*LEVELS {
         loop {
-            let tried = near(&now, level).into_iter().filter_map(|other| {
-                value(&other.1).map(|(log, amplitude)| (log, amplitude, other.0))
-            });
-            let paid = |(log, _, other): &(f64, f64, T)| log - price(&now, other);
+            let tried = near(&now, level).into_iter();
+            let tried = tried.filter_map(|(other, forms)| Some((value(&forms)?, other)));
+            let paid = |((log, _), other): &(Worth, T)| log - price(&now, other);
             let Some(next) = tried.max_by(|a, b| paid(a).total_cmp(&paid(b))) else {
                 break;
             };
-            if paid(&next) <= log + 1e-6 {
+            if paid(&next) <= worth.0 + 1e-6 {
                 break;
             }
-            let gained = next.0 - log;
-            (log, amplitude, now, moved) = (next.0, next.1, next.2, true);
+            let gained = next.0.0 - worth.0;
+            (worth, now, moved) = (next.0, next.1, true);
             if gained < 0.05 {
                 break;
             }
         }
     }
-    moved.then_some((now, log, amplitude))
+    moved.then_some((now, worth))
 }
 
 /// Whether a form is a wave of whole periods a turn.
 fn is_whole_order(form: &Form) -> bool {
-    matches!(
-        form.term().map(|term| term.basis()),
-        Some(Basis::Wave { .. })
-    )
+    matches!(form.term().map(Term::basis), Some(Basis::Wave { .. }))
 }

@@ -1,10 +1,9 @@
 //! What each cell says given the components of a model.
 
 use super::cause_table::CauseTable;
-use super::cell::{CellShape, FreeShape, Over, ShapeGroup, Shapes};
-use super::component::{CellColumns, Component, form_keys, shape_keys};
+use super::cell::{CellShape, FreeShape, ShapeGroup};
+use super::component::{CellColumns, Component, shape_keys};
 use super::evidence::{GroupEvidence, log_sum};
-use super::frame::UnitColumns;
 use super::state::KnownState;
 use crate::criteria::cells::{BENDS, FAR_BELOW, JOINS, PAIR, PAIRS, SEPARATED, UNLIKELY};
 use crate::effect::{Form, Variable};
@@ -63,10 +62,9 @@ pub(super) struct CellScan {
 impl CellScan {
     /// The cell of the largest odds among those asked closely.
     pub(crate) fn best(&self) -> Option<usize> {
-        self.closely
-            .keys()
-            .copied()
-            .max_by(|a, b| self.log_odds[*a].total_cmp(&self.log_odds[*b]))
+        let odds = |cell: &usize| self.log_odds[*cell];
+        let cells = self.closely.keys().copied();
+        cells.max_by(|a, b| odds(a).total_cmp(&odds(b)))
     }
 
     /// With the cells that another scan of the same state asked closely.
@@ -79,14 +77,9 @@ impl CellScan {
 }
 
 impl CauseTable<'_, '_> {
-    /// The evidence of a cell in all of its shapes given a state of some components.
-    pub(crate) fn closely(
-        &self,
-        cell: usize,
-        state: &KnownState,
-        components: &[&Component],
-    ) -> Option<CellEvidence> {
-        self.closely_in(cell, state, components, None)
+    /// The evidence of a cell in all of its shapes given a state.
+    pub(crate) fn closely(&self, cell: usize, state: &KnownState) -> Option<CellEvidence> {
+        self.closely_in(cell, state, None)
     }
 
     /// The same of one of its shapes, where that is given.
@@ -94,77 +87,56 @@ impl CauseTable<'_, '_> {
         &self,
         cell: usize,
         state: &KnownState,
-        components: &[&Component],
-        shape: Option<&str>,
+        asked: Option<&str>,
     ) -> Option<CellEvidence> {
         let block = self.fine(cell);
-        let across = self.across_block(block, state, components);
-        let mut all: Vec<(f64, usize, usize, GroupEvidence)> = Vec::new();
-        let keys = form_keys(components);
-        let is_there = |group: usize| {
-            block.groups[group]
-                .group
-                .forms
-                .iter()
-                .any(|form| keys.contains(&form.key()))
+        let shapes = asked.map_or_else(Vec::new, |_| shape_keys(&block.groups));
+        let is_asked = |group: usize| {
+            !state.has_any(&block.groups[group].group.forms)
+                && asked.is_none_or(|asked| shapes[group] == asked)
         };
-        let shapes = match shape {
-            Some(_) => shape_keys(&block.groups),
-            None => Vec::new(),
-        };
-        let there: Vec<bool> = (0..block.groups.len())
-            .map(|group| {
-                let is_other = shape.is_some_and(|shape| shapes[group] != shape);
-                !keys.is_empty() && is_there(group) || is_other
-            })
-            .collect();
-        state.shapes(block, &across, 0, |group, shape, found| {
-            if !there[group] {
-                all.push((found.log, group, shape, found));
-            }
-        });
+        let there: Vec<bool> = (0..block.groups.len()).map(is_asked).collect();
+        let mut all = self.shapes(block, state);
+        all.retain(|(group, ..)| there[*group]);
         // A shape of further numbers only where it is clearly better.
-        let price = |group: usize, shape: usize| {
-            if block.groups[group].group.shapes[shape].is_bent {
-                *BENDS
-            } else {
-                0.0
-            }
+        let is_bent = |group: usize, shape: usize| block.groups[group].group.shapes[shape].is_bent;
+        let paid = |(group, shape, found): &(usize, usize, GroupEvidence)| {
+            found.log - if is_bent(*group, *shape) { *BENDS } else { 0.0 }
         };
-        let paid = |one: &&(f64, usize, usize, GroupEvidence)| one.0 - price(one.1, one.2);
         let best = all.iter().max_by(|a, b| paid(a).total_cmp(&paid(b)))?;
-        let log = log_sum(&all.iter().map(|one| one.0).collect::<Vec<_>>());
-        let bent = log_sum(
-            &all.iter()
-                .filter(|one| price(one.1, one.2) > 0.0)
-                .map(|one| one.0)
-                .collect::<Vec<_>>(),
-        );
+        let bent = all.iter().filter(|one| is_bent(one.0, one.1));
         Some(CellEvidence {
-            log,
-            bent,
-            shape: (best.1, best.2),
-            amplitude: best.3.amplitude,
-            fit: best.3.fit,
+            log: log_of_all(&all),
+            bent: log_sum(&bent.map(|one| one.2.log).collect::<Vec<_>>()),
+            shape: (best.0, best.1),
+            amplitude: best.2.amplitude,
+            fit: best.2.fit,
             refined: None,
         })
     }
 
-    /// ln of the prior odds of a cell next to others. One that is there already has no price for another component, nor has another motion of
-    /// a place that is known to move with a variable: what moves does not keep to one axis.
-    pub(crate) fn log_prior(&self, cell: usize, mut others: impl Iterator<Item = usize>) -> f64 {
-        let moves = |cell: usize| match &self.cells[cell].shapes {
-            Shapes::Free(free) if matches!(free.over, Over::Curve { .. }) => {
-                Some((free.motion.place(), free.variable))
-            }
-            _ => None,
+    /// What each shape of a block says given a state, by its group and its place in that.
+    pub(super) fn shapes(
+        &self,
+        block: &CellColumns,
+        state: &KnownState,
+    ) -> Vec<(usize, usize, GroupEvidence)> {
+        state.shapes(block, &self.across_block(block, state), 0)
+    }
+
+    /// ln of the prior odds of a cell next to components. One that is there already has no price for another component, nor has another motion
+    /// of a place that is known to move with a variable: what moves does not keep to one axis.
+    pub(crate) fn log_prior(&self, cell: usize, components: &[Component]) -> f64 {
+        let moves = |cell: usize| {
+            let free = self.cells[cell].free().filter(|free| free.is_curve())?;
+            Some((free.motion.place(), free.variable))
         };
         let this = moves(cell);
-        let is_same = |other: usize| {
-            let both = this.zip(moves(other));
-            other == cell || both.is_some_and(|(a, b)| a.0 == b.0 && a.1.is_alike(b.1))
+        let is_same = |other: &Component| {
+            let both = this.zip(moves(other.cell));
+            other.cell == cell || both.is_some_and(|(a, b)| a.0 == b.0 && a.1.is_alike(b.1))
         };
-        if others.any(is_same) {
+        if components.iter().any(is_same) {
             0.0
         } else {
             self.cells[cell].log_prior
@@ -172,26 +144,15 @@ impl CauseTable<'_, '_> {
     }
 
     /// The odds of every cell given a state, closely those of the best and of some more.
-    pub(crate) fn scan(
-        &self,
-        state: &KnownState,
-        components: &[&Component],
-        most: usize,
-        also: &[usize],
-    ) -> CellScan {
+    pub(crate) fn scan(&self, state: &KnownState, most: usize, also: &[usize]) -> CellScan {
         let all: Vec<usize> = (0..self.cells.len()).collect();
-        self.scan_some(&all, state, components, most, also)
+        self.scan_some(&all, state, most, also)
     }
 
     /// Some cells, the most promising first.
-    pub(crate) fn promising(
-        &self,
-        cells: &[usize],
-        state: &KnownState,
-        components: &[&Component],
-    ) -> Vec<usize> {
+    pub(crate) fn promising(&self, cells: &[usize], state: &KnownState) -> Vec<usize> {
         let across = self.across_cells(cells, state);
-        let (_, order) = self.by_bound(cells, state, components, &across);
+        let (_, order) = self.by_bound(cells, state, &across);
         order.into_iter().map(|k| cells[k]).collect()
     }
 
@@ -201,13 +162,11 @@ impl CauseTable<'_, '_> {
         &self,
         cells: &[usize],
         state: &KnownState,
-        components: &[&Component],
         (across, first): &(DMatrix<f64>, Vec<usize>),
     ) -> (Vec<f64>, Vec<usize>) {
         let bound = |k: usize| {
-            let there = components.iter().map(|component| component.cell);
             let block = &self.coarse[cells[k]];
-            self.log_prior(cells[k], there) + state.bound(block, across, first[k])
+            self.log_prior(cells[k], &state.components) + state.bound(block, across, first[k])
         };
         let bounds: Vec<f64> = (0..cells.len()).into_par_iter().map(bound).collect();
         let mut order: Vec<usize> = (0..cells.len()).collect();
@@ -220,23 +179,16 @@ impl CauseTable<'_, '_> {
         &self,
         cells: &[usize],
         state: &KnownState,
-        components: &[&Component],
         most: usize,
         also: &[usize],
     ) -> CellScan {
-        let prior = |cell: usize| {
-            let there = components.iter().map(|component| component.cell);
-            self.log_prior(cell, there)
-        };
+        let prior = |cell: usize| self.log_prior(cell, &state.components);
         let across = self.across_cells(cells, state);
-        let (bounds, promising) = self.by_bound(cells, state, components, &across);
+        let (bounds, promising) = self.by_bound(cells, state, &across);
         let (across, first) = across;
         let coarse = |k: usize| {
-            let mut logs = Vec::new();
-            state.shapes(&self.coarse[cells[k]], &across, first[k], |_, _, found| {
-                logs.push(found.log)
-            });
-            prior(cells[k]) + log_sum(&logs)
+            let shapes = state.shapes(&self.coarse[cells[k]], &across, first[k]);
+            prior(cells[k]) + log_of_all(&shapes)
         };
         let mut log_odds = vec![f64::NEG_INFINITY; self.cells.len()];
         // In turns, until no other cell could come near the best.
@@ -245,28 +197,21 @@ impl CauseTable<'_, '_> {
             if bounds[some[0]] < (best - *FAR_BELOW).max(*UNLIKELY) {
                 break;
             }
-            let found: Vec<(usize, f64)> =
-                some.par_iter().map(|k| (cells[*k], coarse(*k))).collect();
-            found
-                .into_iter()
-                .for_each(|(cell, log)| log_odds[cell] = log);
+            let found = some.par_iter().map(|k| (cells[*k], coarse(*k)));
+            for (cell, log) in found.collect::<Vec<_>>() {
+                log_odds[cell] = log;
+            }
         }
-        let mut order: Vec<usize> = (0..self.cells.len())
-            .filter(|cell| log_odds[*cell].is_finite())
-            .collect();
+        let mut order: Vec<usize> = (0..self.cells.len()).collect();
+        order.retain(|cell| log_odds[*cell].is_finite());
         order.sort_by(|a, b| log_odds[*b].total_cmp(&log_odds[*a]).then(a.cmp(b)));
         order.truncate(most);
-        let also: BTreeSet<usize> = also
-            .iter()
-            .chain(&self.declared)
-            .copied()
-            .filter(|cell| !order.contains(cell))
-            .collect();
+        let also = also.iter().chain(&self.declared).copied();
+        let also: BTreeSet<usize> = also.filter(|cell| !order.contains(cell)).collect();
         order.extend(also);
-        let closely: BTreeMap<usize, CellEvidence> = order
-            .into_par_iter()
-            .filter_map(|cell| Some((cell, self.closely(cell, state, components)?)))
-            .collect();
+        let closely = |cell: usize| Some((cell, self.closely(cell, state)?));
+        let closely: BTreeMap<usize, CellEvidence> =
+            order.into_par_iter().filter_map(closely).collect();
         for (cell, found) in &closely {
             log_odds[*cell] = prior(*cell) + found.log;
         }
@@ -276,7 +221,7 @@ impl CauseTable<'_, '_> {
             closely,
             order,
         };
-        self.refine(&mut scan, state, components, &prior);
+        self.refine(&mut scan, state, &prior);
         scan
     }
 
@@ -287,21 +232,20 @@ impl CauseTable<'_, '_> {
         component: &Component,
         cells: &[usize],
         state: &KnownState,
-        others: &[&Component],
         most: usize,
         also: &[usize],
     ) -> CellScan {
-        let mut scan = self.scan_some(cells, state, others, most, also);
+        let mut scan = self.scan_some(cells, state, most, also);
         let siblings = self.siblings(component);
         if !siblings.is_empty() {
-            scan.join(self.scan_some(&siblings, state, others, *SEPARATED, &[]));
+            scan.join(self.scan_some(&siblings, state, *SEPARATED, &[]));
         }
         if scan.best().is_some_and(|best| best != component.cell) {
-            self.separate(&mut scan, state, others);
+            self.separate(&mut scan, state);
         }
         for cell in siblings {
             if let Some(found) = scan.closely.get_mut(&cell)
-                && let Some(moved) = self.moved(component, cell, state, others)
+                && let Some(moved) = self.moved(component, cell, state)
             {
                 scan.log_odds[cell] += (moved.log - found.log).max(0.0);
                 found.improve(moved);
@@ -311,27 +255,18 @@ impl CauseTable<'_, '_> {
     }
 
     /// A component's laws in its shape for the motion of another cell; none where that has other directions.
-    fn moved(
-        &self,
-        component: &Component,
-        cell: usize,
-        state: &KnownState,
-        others: &[&Component],
-    ) -> Option<Refined> {
-        let Shapes::Free(free) = &self.cells[cell].shapes else {
-            return None;
-        };
+    fn moved(&self, component: &Component, cell: usize, state: &KnownState) -> Option<Refined> {
+        let free = self.cells[cell].free()?;
         let product = self.product(component)?;
         if free.variable != product.variable || free.over != product.over {
             return None;
         }
         let moved = |form: &Form| Some(free.term(*form.term()?.law()));
         let forms: Vec<Form> = component.forms.iter().map(moved).collect::<Option<_>>()?;
-        let keys = form_keys(others);
         let moved = self.with_forms(component, forms);
-        let is_other = moved.values.ncols() != component.values.ncols()
-            || moved.forms.iter().any(|form| keys.contains(&form.key()));
-        let evidence = (!is_other).then(|| self.of_component(&moved, state, others));
+        let is_other =
+            moved.values.ncols() != component.values.ncols() || state.has_any(&moved.forms);
+        let evidence = (!is_other).then(|| self.component_evidence(&moved, state));
         let (log, amplitude) = evidence.flatten()?;
         Some(Refined {
             forms: moved.forms,
@@ -342,41 +277,26 @@ impl CauseTable<'_, '_> {
     }
 
     /// Those of some products that a state shows, the most probable first.
-    pub(crate) fn seen_pairs(
-        &self,
-        pairs: &[FreeShape],
-        state: &KnownState,
-        components: &[&Component],
-    ) -> Vec<FreeShape> {
-        let values = |variable: Variable| self.frame.values(variable);
+    pub(crate) fn seen_pairs(&self, pairs: &[FreeShape], state: &KnownState) -> Vec<FreeShape> {
         let log = |free: &FreeShape| {
-            let block = CellColumns::of(free.groups(self.survey, &values, false), self.frame);
-            let across = self.across_block(&block, state, components);
-            let mut logs = Vec::new();
-            state.shapes(&block, &across, 0, |_, _, found| logs.push(found.log));
-            log_sum(&logs)
+            let block = CellColumns::of(self.groups(free, false), self.frame);
+            log_of_all(&self.shapes(&block, state))
         };
-        let left = state.left(components, self.frame);
+        let left = state.left(self.frame);
         let rough = |free: &FreeShape| {
-            let groups = free.groups(self.survey, &values, false);
-            Some((
-                self.frame.roughly(groups.first()?.forms.first()?, &left)?,
-                *free,
-            ))
+            let groups = self.groups(free, false);
+            let form = groups.first()?.forms.first()?;
+            Some((self.frame.roughly(form, &left)?, *free))
         };
         let mut promising: Vec<(f64, FreeShape)> = pairs.par_iter().filter_map(rough).collect();
         promising.sort_by(|a, b| b.0.total_cmp(&a.0));
         promising.truncate(6 * *PAIRS);
-        let seen = promising
-            .par_iter()
-            .map(|(_, free)| (log(free), *free))
-            .filter(|(log, _)| log + PAIR.ln() > *JOINS);
-        let mut seen: Vec<(f64, FreeShape)> = seen.collect();
+        let seen = promising.par_iter().map(|(_, free)| (log(free), *free));
+        let mut seen: Vec<(f64, FreeShape)> =
+            seen.filter(|(log, _)| log + PAIR.ln() > *JOINS).collect();
         seen.sort_by(|a, b| b.0.total_cmp(&a.0));
-        seen.into_iter()
-            .take(*PAIRS)
-            .map(|(_, free)| free)
-            .collect()
+        seen.truncate(*PAIRS);
+        seen.into_iter().map(|(_, free)| free).collect()
     }
 
     /// The component that a cell is in a scan.
@@ -406,7 +326,7 @@ impl CauseTable<'_, '_> {
         self.component_of(&found_component, cell)
     }
 
-    /// The same with the numbers of its listed shape.
+    /// The same with the numbers of its listed shape; it has no part in the covariance yet.
     pub(crate) fn as_found(&self, cell: usize, found: &CellEvidence) -> Component {
         let block = self.fine(cell);
         let seen = &block.groups[found.shape.0];
@@ -426,34 +346,30 @@ impl CauseTable<'_, '_> {
                 kept.extend(columns);
             }
         }
-        let values = block.values(self.frame).select_columns(
-            kept.iter()
-                .map(|k| seen.range.start + k)
-                .collect::<Vec<_>>()
-                .iter(),
-        );
-        let square = kept
-            .iter()
-            .map(|k| block.square[seen.range.start + k])
-            .collect();
-        let shares = kept.iter().map(|k| shape.shares[*k]).collect();
-        let shape = CellShape { shares, ..shape };
+        let columns: Vec<usize> = kept.iter().map(|k| seen.range.start + k).collect();
+        let values = block.values(self.frame).select_columns(&columns);
+        let shape = CellShape {
+            shares: kept.iter().map(|k| shape.shares[*k]).collect(),
+            ..shape
+        };
         let group = ShapeGroup {
             forms: forms.clone(),
-            shapes: vec![shape],
+            shapes: vec![shape.clone()],
             ..seen.group.clone()
         };
-        Component::apart(
+        Component {
+            id: 0,
             cell,
             forms,
             counts,
-            group,
-            UnitColumns {
-                values: Arc::new(values),
-                square,
-            },
-            found.amplitude,
-        )
+            shape,
+            group: Arc::new(group),
+            values: Arc::new(values),
+            square: Arc::new(columns.iter().map(|k| block.square[*k]).collect()),
+            amplitude: found.amplitude,
+            part: Arc::default(),
+            mix: Arc::default(),
+        }
     }
 
     /// A component with other forms, before it has a part in the covariance.
@@ -479,18 +395,18 @@ impl CauseTable<'_, '_> {
     }
 
     /// ln of the evidence of one shape with its weight given a state, and its amplitude.
-    pub(crate) fn of_component(
+    pub(crate) fn component_evidence(
         &self,
         component: &Component,
         state: &KnownState,
-        others: &[&Component],
     ) -> Option<(f64, f64)> {
         let block = CellColumns::of_component(component, self.frame);
-        let across = self.across_block(&block, state, others);
-        let mut found = None;
-        state.shapes(&block, &across, 0, |_, _, evidence| {
-            found = Some((evidence.log, evidence.amplitude))
-        });
-        found
+        let (.., found) = self.shapes(&block, state).pop()?;
+        Some((found.log, found.amplitude))
     }
+}
+
+/// ln of the evidence of all shapes together.
+fn log_of_all(shapes: &[(usize, usize, GroupEvidence)]) -> f64 {
+    log_sum(&shapes.iter().map(|one| one.2.log).collect::<Vec<_>>())
 }

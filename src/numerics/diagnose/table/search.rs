@@ -1,7 +1,7 @@
 //! The search for the cells that the rows show: forward, exchange, drop, each by the evidence of a cell given all others.
 
 use super::cause_table::CauseTable;
-use super::cell::{FreeShape, Over, Shapes};
+use super::cell::{FreeShape, Over};
 use super::component::Component;
 use super::evidence::AMPLITUDES;
 use super::state::KnownState;
@@ -63,42 +63,35 @@ impl ComponentSearch for CauseTable<'_, '_> {
     }
 
     fn noise(&self, components: &[Component]) -> f64 {
-        self.state(&components.iter().collect::<Vec<_>>(), None)
-            .kappa
+        self.state(components, None).kappa
     }
 
     fn odds(&self, components: &[Component], i: usize, kappa: f64) -> Option<f64> {
-        let others = without(components, &[i]);
-        let others: Vec<&Component> = others.iter().collect();
-        let state = self.state(&others, Some(kappa));
-        let prior = self.log_prior(components[i].cell, others.iter().map(|other| other.cell));
-        Some(prior + self.log_evidence(&components[i], &state, &others))
+        let state = self.state(&without(components, &[i]), Some(kappa));
+        let prior = self.log_prior(components[i].cell, &state.components);
+        Some(prior + self.log_evidence(&components[i], &state))
     }
 
     /// What is smaller than the second order of what this round has found already waits for the next round, which is around a model that has
     /// that in it.
     fn best(&mut self, components: &[Component]) -> Option<Component> {
-        let now: Vec<&Component> = components.iter().collect();
-        let state = self.state(&now, None);
-        let numbers: usize = components
-            .iter()
-            .map(|component| component.part.ncols())
-            .sum();
+        let state = self.state(components, None);
+        let numbers: usize = components.iter().map(|one| one.part.ncols()).sum();
         // So many numbers describe rows and explain nothing.
         if components.len() >= *COMPONENTS || 3.0 * numbers as f64 > state.rows.freedom {
             return None;
         }
-        let mut scan = self.scan_some(&self.likely, &state, &now, *CLOSELY, &[]);
+        let mut scan = self.scan_some(&self.likely, &state, *CLOSELY, &[]);
         // A misjudged noise makes everything seem likely.
         let price = *JOINS * (1.0 + 2.0 * state.kappa.clamp(1.0, 4.0).ln());
         if self.likely.len() < self.cells.len()
             && scan.best().is_none_or(|best| scan.log_odds[best] < price)
         {
-            scan = self.scan(&state, &now, *CLOSELY, &[]);
+            scan = self.scan(&state, *CLOSELY, &[]);
         }
         // What was unlikely before is asked again when the likely ones are used up.
         self.likely = scan.order.iter().copied().take(*LIKELY).collect();
-        self.separate(&mut scan, &state, &now);
+        self.separate(&mut scan, &state);
         let best = scan.best().filter(|best| scan.log_odds[*best] >= price)?;
         let found = &scan.closely[&best];
         let new = components
@@ -113,8 +106,7 @@ impl ComponentSearch for CauseTable<'_, '_> {
         let Some(newest) = components.last() else {
             return components;
         };
-        self.parts
-            .know(&components.iter().collect::<Vec<_>>(), self.frame);
+        self.parts.know(&components, self.frame);
         let coupled = |i: &usize| self.parts.overlap(&components[*i], newest) > *COUPLED;
         let some: Vec<usize> = (0..components.len()).filter(coupled).collect();
         self.backfit_some(components, &some, 1)
@@ -139,37 +131,25 @@ impl CauseTable<'_, '_> {
         rounds: usize,
     ) -> Vec<Component> {
         for _ in 0..rounds {
-            let kappa = self
-                .state(&components.iter().collect::<Vec<_>>(), None)
-                .kappa;
+            let kappa = self.noise(&components);
             let mut changed = false;
             for i in some.iter().copied() {
-                let others: Vec<Component> = without(&components, &[i]);
-                let others: Vec<&Component> = others.iter().collect();
-                let state = self.state(&others, Some(kappa));
-                let alone = self.of_component(&components[i], &state, &others);
-                let Some(alone) = alone else { continue };
+                let state = self.state(&without(&components, &[i]), Some(kappa));
+                let Some(alone) = self.component_evidence(&components[i], &state) else {
+                    continue;
+                };
                 let before = (components[i].amplitude, components[i].shape.shares.clone());
                 components[i].amplitude = alone.1;
-                let Some(mut grid) = self.closely(components[i].cell, &state, &others) else {
+                let Some(mut grid) = self.closely(components[i].cell, &state) else {
                     continue;
                 };
                 let found = self.as_found(components[i].cell, &grid);
                 let same = found.forms == components[i].forms
                     && found.shape.shares.len() == components[i].shape.shares.len();
                 if same {
-                    let Component {
-                        shape,
-                        group,
-                        amplitude,
-                        ..
-                    } = found.clone();
-                    components[i] = Component {
-                        shape,
-                        group,
-                        amplitude,
-                        ..components[i].clone()
-                    };
+                    components[i].shape = found.shape.clone();
+                    components[i].group = found.group.clone();
+                    components[i].amplitude = found.amplitude;
                 }
                 if before != (components[i].amplitude, components[i].shape.shares.clone()) {
                     self.next += 1;
@@ -179,7 +159,7 @@ impl CauseTable<'_, '_> {
                 if same {
                     continue;
                 }
-                let Some(other) = self.of_component(&found, &state, &others) else {
+                let Some(other) = self.component_evidence(&found, &state) else {
                     continue;
                 };
                 // A shape of further numbers stays on the terms on which it came.
@@ -187,7 +167,7 @@ impl CauseTable<'_, '_> {
                     log - if component.shape.is_bent { *BENDS } else { 0.0 }
                 };
                 if paid(other, &found) > paid(alone, &components[i]) + *SWAPS {
-                    grid.refined = self.refined(components[i].cell, &grid, &state, &others);
+                    grid.refined = self.refined(components[i].cell, &grid, &state);
                     components[i] = self.component(components[i].cell, &grid);
                     changed = true;
                 }
@@ -204,7 +184,7 @@ impl CauseTable<'_, '_> {
     /// worse than all of them. Nothing else.
     pub(crate) fn start(&mut self) -> Vec<Component> {
         let state = self.state(&[], None);
-        let scan = self.scan(&state, &[], *CLOSELY, &[]);
+        let scan = self.scan(&state, *CLOSELY, &[]);
         let loads = |form: &Form| {
             form.variables()
                 .iter()
@@ -222,7 +202,7 @@ impl CauseTable<'_, '_> {
             .collect();
         let mut components = Vec::new();
         for cell in yields {
-            if let Some(mut found) = self.closely(cell, &state, &[]) {
+            if let Some(mut found) = self.closely(cell, &state) {
                 found.shape = (0, 0);
                 components.push(self.component(cell, &found));
             }
@@ -244,16 +224,10 @@ impl CauseTable<'_, '_> {
     }
 
     /// ln of the evidence of a component's cell, its refined shape among the others.
-    pub(crate) fn log_evidence(
-        &self,
-        component: &Component,
-        state: &KnownState,
-        others: &[&Component],
-    ) -> f64 {
-        let grid = self
-            .closely(component.cell, state, others)
-            .map_or(f64::NEG_INFINITY, |found| found.log);
-        self.of_component(component, state, others)
+    pub(crate) fn log_evidence(&self, component: &Component, state: &KnownState) -> f64 {
+        let grid = self.closely(component.cell, state);
+        let grid = grid.map_or(f64::NEG_INFINITY, |found| found.log);
+        self.component_evidence(component, state)
             .map_or(grid, |(log, _)| grid.max(log))
     }
 
@@ -267,36 +241,27 @@ impl CauseTable<'_, '_> {
         let mut seen = BTreeSet::from([key(&components)]);
         'rounds: for _ in 0..*EXCHANGES {
             self.know(&components);
-            let kappa = self
-                .state(&components.iter().collect::<Vec<_>>(), None)
-                .kappa;
+            let kappa = self.noise(&components);
             let mut order: Vec<usize> = (0..components.len()).collect();
-            order.sort_by(|a, b| {
-                components[*a]
-                    .amplitude
-                    .total_cmp(&components[*b].amplitude)
-            });
+            let size = |i: &usize| components[*i].amplitude;
+            order.sort_by(|a, b| size(a).total_cmp(&size(b)));
             for i in order {
                 let cell = components[i].cell;
-                let others = without(&components, &[i]);
-                let given: Vec<&Component> = others.iter().collect();
-                let state = self.state(&given, Some(kappa));
+                let state = self.state(&without(&components, &[i]), Some(kappa));
                 let alike = self.alike(&components[i], 24);
                 let near: Vec<usize> = std::iter::once(cell)
                     .chain(self.near(&components[i]))
-                    .chain(self.over_its_variable(&components[i], &state, &given))
+                    .chain(self.over_its_variable(&components[i], &state))
                     .collect();
-                let scan = self.scan_instead(&components[i], &alike, &state, &given, 5, &near);
+                let scan = self.scan_instead(&components[i], &alike, &state, 5, &near);
                 let Some(best) = scan.best() else { continue };
-                let prior = self.log_prior(cell, given.iter().map(|other| other.cell));
-                let stays = prior + self.log_evidence(&components[i], &state, &given);
+                let prior = self.log_prior(cell, &state.components);
+                let stays = prior + self.log_evidence(&components[i], &state);
                 if best == cell || scan.log_odds[best] <= stays + *SWAPS {
                     continue;
                 }
-                let found = scan.closely[&best].clone();
-                let new = self.component(best, &found);
-                let mut next = others.clone();
-                next.push(new);
+                let mut next = state.components;
+                next.push(self.component(best, &scan.closely[&best]));
                 let next = self.backfit(next, 1);
                 if seen.insert(key(&next)) {
                     components = next;
@@ -311,24 +276,26 @@ impl CauseTable<'_, '_> {
     /// Components, or those that a search from the ones with a name finds, whichever are the more probable: what was taken up before another
     /// cell was in the table is in the way of it.
     pub(crate) fn or_from_named(&mut self, components: Vec<Component>) -> Vec<Component> {
-        let named: Vec<Component> = components
-            .iter()
-            .filter(|component| self.cells[component.cell].is_named())
-            .cloned()
-            .collect();
+        let named = self.named(&components);
         if named.len() == components.len() {
             return components;
         }
-        let named = self.anew(named);
-        let others = self.grow(named);
-        let others = self.swap(others);
-        let others = self.grow(others);
+        let mut others = self.anew(named);
+        others = self.grow(others);
+        others = self.swap(others);
+        others = self.grow(others);
         if self.is_better(&others, &components) {
             others
         } else {
             self.know(&components);
             components
         }
+    }
+
+    /// Components with a name.
+    pub(super) fn named(&self, components: &[Component]) -> Vec<Component> {
+        let is_named = |component: &&Component| self.cells[component.cell].is_named();
+        components.iter().filter(is_named).cloned().collect()
     }
 
     /// Whether some components are more probable than others, at the less noise of both.
@@ -339,11 +306,10 @@ impl CauseTable<'_, '_> {
 
     /// ln of the posterior of a set of components, up to a constant, at a noise.
     fn total(&self, components: &[Component], kappa: f64) -> f64 {
-        let state = self.state(&components.iter().collect::<Vec<_>>(), Some(kappa));
+        let state = self.state(components, Some(kappa));
         let mut prior = 0.0;
         for (i, component) in components.iter().enumerate() {
-            let before = components[..i].iter().map(|other| other.cell);
-            prior += self.log_prior(component.cell, before);
+            prior += self.log_prior(component.cell, &components[..i]);
             prior += component.shape.log_weight - (AMPLITUDES as f64).ln();
         }
         let half = 0.5 * (state.rows.freedom + *NU);
@@ -373,21 +339,17 @@ impl CauseTable<'_, '_> {
             let near = self.near(&components[at]).into_iter();
             let near = near.filter(|cell| self.cells[*cell].is_named() && !named.contains(cell));
             named.extend(near.collect::<Vec<_>>());
-            let kappa = self
-                .state(&components.iter().collect::<Vec<_>>(), None)
-                .kappa;
+            let kappa = self.noise(&components);
             let before = self.total(&components, kappa);
             let mut next = without(&components, &[at]);
             for _ in 0..*WAVES {
                 self.know(&next);
-                let given: Vec<&Component> = next.iter().collect();
-                let state = self.state(&given, Some(kappa));
-                let scan = self.scan_some(&named, &state, &given, 4, &[]);
+                let state = self.state(&next, Some(kappa));
+                let scan = self.scan_some(&named, &state, 4, &[]);
                 let Some(best) = scan.best().filter(|best| scan.log_odds[*best] > 0.0) else {
                     break;
                 };
-                let found = scan.closely[&best].clone();
-                next.push(self.component(best, &found));
+                next.push(self.component(best, &scan.closely[&best]));
                 next = self.backfit(next, 1);
                 if self.total(&next, kappa) > before {
                     components = next;
@@ -401,61 +363,42 @@ impl CauseTable<'_, '_> {
 
     /// Motions over a variable that show, whose products are not cells yet.
     pub fn shown(&self, components: &[Component]) -> Vec<FreeShape> {
-        // What has become a product still shows by its first variable.
-        let products =
-            components
-                .iter()
-                .filter_map(|component| match &self.cells[component.cell].shapes {
-                    Shapes::Free(free) if matches!(free.over, Over::Product(_)) => {
-                        Some((free.motion, free.variable))
-                    }
-                    _ => None,
-                });
-        let products: Vec<_> = products.collect();
-        let stays = |shown: &&FreeShape| {
-            products
-                .iter()
-                .any(|(motion, variable)| *motion == shown.motion && *variable == shown.variable)
+        let followed = |component: &Component| {
+            let term = component.forms.first()?.term()?;
+            Some((term.motion(), term.law().times, term.law().first.variable))
         };
-        let mut out: Vec<FreeShape> = self.multiplied.iter().filter(stays).copied().collect();
-        let most = components
+        let same = |a: &FreeShape, b: &FreeShape| (a.motion, a.variable) == (b.motion, b.variable);
+        let free = |component: &Component| self.cells[component.cell].free();
+        // What has become a product still shows by its first variable.
+        let products: Vec<&FreeShape> = components
             .iter()
-            .map(|component| component.amplitude)
-            .fold(0.0, f64::max);
-        for component in components
-            .iter()
-            .filter(|component| component.amplitude > 2.0 * *TRACE * most)
-        {
-            let free = match &self.cells[component.cell].shapes {
-                Shapes::Free(free) if !matches!(free.over, Over::Product(_)) => {
-                    let refined = component
-                        .forms
-                        .first()
-                        .and_then(|form| Some(form.term()?.law().first.variable));
-                    Some(FreeShape {
-                        variable: refined.unwrap_or(free.variable),
-                        ..*free
-                    })
-                }
-                Shapes::Free(_) => None,
-                Shapes::Listed(_) => component.forms.first().and_then(|form| {
-                    let term = form.term().filter(|term| term.law().times.is_none())?;
-                    let variable = term.law().first.variable;
-                    Some(FreeShape {
-                        motion: term.motion(),
+            .filter_map(free)
+            .filter(|free| free.is_product())
+            .collect();
+        let mut out = self.multiplied.clone();
+        out.retain(|shown| products.iter().any(|product| same(product, shown)));
+        let most = components.iter().map(|component| component.amplitude);
+        let most = most.fold(0.0, f64::max);
+        for component in components {
+            if component.amplitude <= 2.0 * *TRACE * most {
+                continue;
+            }
+            let followed = followed(component);
+            let shows = match free(component) {
+                Some(free) if free.is_product() => None,
+                Some(free) => Some(FreeShape {
+                    variable: followed.map_or(free.variable, |(.., variable)| variable),
+                    ..*free
+                }),
+                None => followed.and_then(|(motion, times, variable)| {
+                    (times.is_none() && variable.is_single()).then_some(FreeShape {
+                        motion,
                         variable,
                         over: Over::Line,
                     })
-                    .filter(|_| variable.is_single())
                 }),
             };
-            if let Some(free) = free
-                && !out
-                    .iter()
-                    .any(|other| other.motion == free.motion && other.variable == free.variable)
-            {
-                out.push(free);
-            }
+            out.extend(shows.filter(|shows| !out.iter().any(|other| same(other, shows))));
         }
         out
     }

@@ -3,15 +3,16 @@
 
 use super::cause_table::CauseTable;
 use super::cell::{
-    CellShape, FreeShape, Over, ShapeGroup, Shapes, alternates, cornered, density, fields,
-    over_fields, support,
+    CellShape, FreeShape, Over, ShapeGroup, alternates, cornered, density, fields, over_fields,
+    support, with_mean,
 };
-use super::component::{CellColumns, Component, form_keys};
+use super::component::CellColumns;
+use super::evidence::GroupEvidence;
 use super::scan::{CellEvidence, Refined};
 use super::state::KnownState;
 use crate::criteria::cells::{JUMPING, LENGTHS, NU, TURNED, TURNS};
 use crate::effect::{Basis, Law, Motion};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 type Weights = [f64; Basis::CURVE];
 
@@ -34,12 +35,8 @@ impl CauseTable<'_, '_> {
         cell: usize,
         found: &CellEvidence,
         state: &KnownState,
-        others: &[&Component],
     ) -> Option<Refined> {
-        let Shapes::Free(free) = &self.cells[cell].shapes else {
-            return None;
-        };
-        let mut free = *free;
+        let mut free = *self.cells[cell].free()?;
         if let Some(refined) = &found.refined {
             let law = *refined.forms.first()?.term()?.law();
             free.variable = law.first.variable;
@@ -49,24 +46,15 @@ impl CauseTable<'_, '_> {
         let Over::Product(other) = free.over else {
             return None;
         };
-        let supports =
-            [free.variable, other].map(|variable| Some(support(&self.frame.values(variable)?)));
-        let [Some(first), Some(second)] = supports else {
-            return None;
-        };
-        let supports = [first, second];
-        let mut curves = [(self.first_curve(free, supports, state, others)?, 0.0); 2];
+        let range = |variable| Some(support(&self.frame.values(variable)?));
+        let supports = [range(free.variable)?, range(other)?];
+        let mut curves = [(self.first_curve(free, supports[0], state)?, 0.0); 2];
         let mut best: Option<Half> = None;
         let mut last = f64::NEG_INFINITY;
         for turn in 0..*TURNS {
             let given = turn % 2;
-            let half = self.half(
-                free,
-                (supports, Basis::CURVE),
-                (given, curves[given]),
-                state,
-                others,
-            )?;
+            let known = (given, curves[given]);
+            let half = self.half(free, (supports, Basis::CURVE), known, state)?;
             curves[1 - given] = (half.weights, half.cost);
             if turn == 0 {
                 continue;
@@ -81,7 +69,7 @@ impl CauseTable<'_, '_> {
             last = log;
         }
         for (given, curve) in curves.into_iter().enumerate() {
-            let half = self.half(free, (supports, *JUMPING), (given, curve), state, others);
+            let half = self.half(free, (supports, *JUMPING), (given, curve), state);
             best = best
                 .into_iter()
                 .chain(half)
@@ -106,7 +94,7 @@ impl CauseTable<'_, '_> {
                     free.term(Law::new(free.variable, bases[0]).times(other, bases[1]))
                 };
                 let variable = [other, free.variable][given];
-                if let Some(mut stepped) = self.with_steps(free, variable, &form, state, others)
+                if let Some(mut stepped) = self.with_steps(free, variable, &form, state)
                     && stepped.log + cost > best.log
                 {
                     stepped.log += cost;
@@ -117,29 +105,18 @@ impl CauseTable<'_, '_> {
                 }
             }
         }
-        let keys = form_keys(others);
-        let is_new = best.forms.iter().all(|form| !keys.contains(&form.key()));
-        is_new.then_some(best)
+        (!state.has_any(&best.forms)).then_some(best)
     }
 
     /// A curve of the first variable from the likeliest product of few functions of each.
     fn first_curve(
         &self,
         free: &FreeShape,
-        [[low, high], _]: [[f64; 2]; 2],
+        [low, high]: [f64; 2],
         state: &KnownState,
-        others: &[&Component],
     ) -> Option<Weights> {
-        let values = |variable| self.frame.values(variable);
-        let block = CellColumns::of(free.groups(self.survey, &values, false), self.frame);
-        let across = self.across_block(&block, state, others);
-        let mut found = (f64::NEG_INFINITY, 0, 0.0);
-        state.shapes(&block, &across, 0, |_, shape, evidence| {
-            if evidence.log > found.0 {
-                found = (evidence.log, shape, evidence.amplitude);
-            }
-        });
-        let coefficients = state.likeliest(&block, &across, (found.1, found.2))?;
+        let block = CellColumns::of(self.groups(free, false), self.frame);
+        let (.., coefficients) = self.likeliest(&block, state)?;
         let law = *block.groups[0].group.forms[0].term()?.law();
         let [rows, columns] = [law.first.basis.count(), law.times?.basis.count()];
         let fields = fields(free.motion);
@@ -171,7 +148,6 @@ impl CauseTable<'_, '_> {
         (supports, functions): ([[f64; 2]; 2], usize),
         (given, (weights, cost)): (usize, (Weights, f64)),
         state: &KnownState,
-        others: &[&Component],
     ) -> Option<Half> {
         let Over::Product(other) = free.over else {
             return None;
@@ -194,31 +170,13 @@ impl CauseTable<'_, '_> {
         let spectra: Vec<Vec<f64>> = smooth.chain([cornered(functions - 1)]).collect();
         let log_weight = cost - (spectra.len() as f64).ln();
         let shape = |curve: Vec<f64>| {
-            let curve = curve.into_iter().map(|share| 0.5 * share);
-            let shares = std::iter::once(0.5).chain(curve).collect();
-            CellShape {
-                shares: over_fields(shares, free.motion, fields),
-                log_weight,
-                is_bent: false,
-            }
+            let shares = over_fields(with_mean(curve), free.motion, fields);
+            CellShape::new(shares, log_weight)
         };
-        let group = ShapeGroup {
-            forms: vec![form.clone()],
-            shapes: spectra.into_iter().map(shape).collect(),
-            positive: false,
-            largest: f64::INFINITY,
-        };
+        let shapes = spectra.into_iter().map(shape).collect();
+        let group = ShapeGroup::new(vec![form.clone()], shapes);
         let block = CellColumns::of(vec![group], self.frame);
-        let across = self.across_block(&block, state, others);
-        let (mut log, mut found) = (f64::NEG_INFINITY, None);
-        state.shapes(&block, &across, 0, |_, shape, evidence| {
-            if evidence.log > log {
-                log = evidence.log;
-                found = Some((shape, evidence));
-            }
-        });
-        let (shape, evidence) = found?;
-        let coefficients = state.likeliest(&block, &across, (shape, evidence.amplitude))?;
+        let (shape, evidence, coefficients) = self.likeliest(&block, state)?;
         let unfolded = DMatrix::from_fn(functions, fields, |k, field| {
             coefficients[place(free.motion, fields, functions, k, field)]
         });
@@ -231,13 +189,31 @@ impl CauseTable<'_, '_> {
             refined: Refined {
                 forms: vec![form],
                 shape: Some(block.groups[0].group.shapes[shape].clone()),
-                log,
+                log: evidence.log,
                 amplitude: evidence.amplitude,
             },
             weights,
-            cost: log - cost - gain,
+            cost: evidence.log - cost - gain,
             fit: evidence.fit,
         })
+    }
+
+    /// The shape of a block of one group that says most, its evidence and its likeliest coefficients (SI).
+    fn likeliest(
+        &self,
+        block: &CellColumns,
+        state: &KnownState,
+    ) -> Option<(usize, GroupEvidence, DVector<f64>)> {
+        let across = self.across_block(block, state);
+        let mut best: Option<(usize, GroupEvidence)> = None;
+        for (_, shape, found) in state.shapes(block, &across, 0) {
+            if found.log > best.map_or(f64::NEG_INFINITY, |best| best.1.log) {
+                best = Some((shape, found));
+            }
+        }
+        let (shape, found) = best?;
+        let coefficients = state.likeliest(block, &across, (shape, found.amplitude))?;
+        Some((shape, found, coefficients))
     }
 }
 

@@ -116,11 +116,11 @@ impl Squares {
     fn log_density(&self, at: f64) -> f64 {
         let widest = self.variances.iter().copied().fold(0.0, f64::max);
         let slope = |t: f64| -> f64 {
-            let of_variance = |(variance, square): (f64, f64)| {
+            let slope_by = |(variance, square): (f64, f64)| {
                 let s = 1.0 - 2.0 * t * variance;
                 variance / s + square / (s * s)
             };
-            self.terms().map(of_variance).sum()
+            self.terms().map(slope_by).sum()
         };
         // 1 - 2 t times the widest variance, from hardly more than none.
         let point = |log: f64| (1.0 - log.exp()) / (2.0 * widest);
@@ -159,9 +159,9 @@ mod tests {
 
     fn peak(log: impl Fn(f64) -> f64) -> (f64, f64) {
         let sizes = (0..2000).map(|k| 2e-3 * f64::from(k));
-        let of_size = |size: f64| (size, log(size));
+        let at_size = |size: f64| (size, log(size));
         sizes
-            .map(of_size)
+            .map(at_size)
             .max_by(|a, b| a.1.total_cmp(&b.1))
             .unwrap()
     }

@@ -5,14 +5,18 @@
 
 use super::component::{CellColumns, Component, PartProducts, SeenGroup};
 use super::evidence::{EvidenceRows, GroupEvidence, evidence_between};
+use super::factored::unit;
 use super::frame::SearchRows;
 use crate::criteria::cells::{NU, UNEXPLAINED};
-use crate::regression::dot;
+use crate::effect::Form;
+use crate::linear::dot;
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
 };
 use faer::{Mat, MatMut, Par, Side};
 use nalgebra::{Cholesky, DMatrix, DVector};
+use std::collections::BTreeSet;
+use std::sync::OnceLock;
 
 /// Some components in the covariance.
 pub struct KnownState {
@@ -20,8 +24,10 @@ pub struct KnownState {
     pub kappa: f64,
     /// What is left, seen through the covariance.
     pub rows: EvidenceRows,
-    /// Which components, by their numbers.
-    pub(crate) components: Vec<u64>,
+    /// Which components.
+    pub(super) components: Vec<Component>,
+    /// Keys of their forms, once somebody asks.
+    keys: OnceLock<BTreeSet<String>>,
     /// Cholesky factor of kappa^2 + Z'Z.
     lower: Mat<f64>,
     /// L^-1 Z'r.
@@ -31,17 +37,25 @@ pub struct KnownState {
 impl KnownState {
     /// Components with the noise that fits them, or with a stated one.
     pub(super) fn of(
-        components: &[&Component],
+        components: Vec<Component>,
         products: &PartProducts,
         frame: &SearchRows,
         kappa: Option<f64>,
     ) -> Self {
-        let (gram, along) = products.of(components);
-        let known = Self::new(&gram, along, frame.rows(), frame.least_noise(), kappa);
+        let (gram, along) = products.of(&components);
         Self {
-            components: components.iter().map(|component| component.id).collect(),
-            ..known
+            components,
+            ..Self::new(&gram, along, frame.rows(), frame.least_noise(), kappa)
         }
+    }
+
+    /// Whether any of some forms is among those of its components: a model holds every number once, by its name.
+    pub(super) fn has_any(&self, forms: &[Form]) -> bool {
+        let keys = self.keys.get_or_init(|| {
+            let forms = self.components.iter().flat_map(|one| &one.forms);
+            forms.map(Form::key).collect()
+        });
+        !keys.is_empty() && forms.iter().any(|form| keys.contains(&form.key()))
     }
 
     /// Columns of unit prior variance in the covariance, by their Gram matrix and their products with the residual of rows.
@@ -88,38 +102,42 @@ impl KnownState {
                 freedom: rows.freedom.min(left),
             },
             components: Vec::new(),
+            keys: OnceLock::new(),
             lower,
             along: solved_along,
         }
     }
 
     /// The likeliest coefficients (SI) of its components, one component after another.
-    pub(super) fn coefficients(
-        &self,
-        components: &[&Component],
-        frame: &SearchRows,
-    ) -> Vec<Vec<f64>> {
-        let left = DVector::from_vec(self.left(components, frame));
-        let of_component = |component: &&Component| {
-            let along = component
-                .values
-                .tr_mul(&left.rows(0, component.values.nrows()))
-                / (self.kappa * self.kappa);
+    pub(super) fn coefficients(&self, frame: &SearchRows) -> Vec<Vec<f64>> {
+        let left = DVector::from_vec(self.left(frame));
+        let coefficients = |component: &Component| {
+            let seen = left.rows(0, component.values.nrows());
+            let along = component.values.tr_mul(&seen) / (self.kappa * self.kappa);
             let scaled = component.roots().zip(component.sigmas()).zip(along.iter());
             scaled
                 .map(|((root, sigma), along)| sigma * root * along)
                 .collect()
         };
-        components.iter().map(of_component).collect()
+        self.components.iter().map(coefficients).collect()
     }
 
     /// What its components leave of the residual at their likeliest.
-    pub(super) fn left(&self, components: &[&Component], frame: &SearchRows) -> Vec<f64> {
+    pub(super) fn left(&self, frame: &SearchRows) -> Vec<f64> {
         let residual = DVector::from_column_slice(frame.residual());
-        let left = self.weights().map_or_else(
-            || residual.clone(),
-            |weights| &residual - side_by_side(components, residual.len()) * weights,
-        );
+        let left = match self.weights() {
+            Some(weights) => {
+                let count = weights.len();
+                let mut parts = DMatrix::zeros(residual.len(), count);
+                let mut first = 0;
+                for Component { part, .. } in &self.components {
+                    parts.view_mut((0, first), part.shape()).copy_from(part);
+                    first += part.ncols();
+                }
+                residual - parts * weights
+            }
+            None => residual,
+        };
         left.data.into()
     }
 
@@ -221,18 +239,10 @@ impl KnownState {
         let squares = &block.square[group.range.clone()];
         // A function that is zero at all values that there are, as a cosine may be at two, is rounding.
         let least = 1e-9 * squares.iter().copied().fold(0.0, f64::max);
-        let scale = |square: f64| {
-            if square > least {
-                square.sqrt().recip()
-            } else {
-                0.0
-            }
-        };
-        let scaled = weights.iter().zip(squares);
-        Some(DVector::from_iterator(
-            weights.len(),
-            scaled.map(|(weight, square)| weight * scale(*square)),
-        ))
+        let scale = |square: f64| if square > least { unit(square) } else { 0.0 };
+        Some(DVector::from_fn(weights.len(), |k, _| {
+            weights[k] * scale(squares[k])
+        }))
     }
 
     /// Standard error of each coefficient (SI) of a block of one group given the components.
@@ -242,18 +252,16 @@ impl KnownState {
         };
         let (gram, _) = self.seen(group, across, 0);
         let inverse = gram.try_inverse();
-        let of_k = |k: usize| {
-            let variance = inverse
-                .as_ref()
-                .map_or(f64::INFINITY, |inverse| inverse[(k, k)]);
-            let square = block.square[group.range.start + k];
+        let variance = |k: usize| inverse.as_ref().map_or(f64::INFINITY, |all| all[(k, k)]);
+        let error = |k: usize| {
+            let (variance, square) = (variance(k), block.square[group.range.start + k]);
             if variance > 0.0 && square > 0.0 {
                 (variance / square).sqrt()
             } else {
                 f64::INFINITY
             }
         };
-        (0..group.range.len()).map(of_k).collect()
+        (0..group.range.len()).map(error).collect()
     }
 
     /// ln of the largest evidence that any shape of a block could have, whatever its prior: that of its least squares fit.
@@ -286,15 +294,15 @@ impl KnownState {
         most
     }
 
-    /// What each group of a block says: for every shape ln of its evidence with its weight, and its amplitude; nothing of a shape whose
-    /// coefficient would have a size that it cannot have.
+    /// What each shape of a block says, by its group and its place in that: its evidence with its weight; nothing of a shape whose coefficient
+    /// would have a size that it cannot have.
     pub(super) fn shapes(
         &self,
         block: &CellColumns,
         across: &DMatrix<f64>,
         first: usize,
-        mut each: impl FnMut(usize, usize, GroupEvidence),
-    ) {
+    ) -> Vec<(usize, usize, GroupEvidence)> {
+        let mut out = Vec::new();
         for (g, group) in block.groups.iter().enumerate() {
             let (gram, gradient) = self.seen(group, across, first);
             let single = gradient.len() == 1;
@@ -308,18 +316,13 @@ impl KnownState {
                 }
             }
             for (s, shape) in group.group.shapes.iter().enumerate() {
-                let found =
+                let mut found =
                     evidence_between(&gram, &gradient, &shape.shares, self.rows, block.between);
-                each(
-                    g,
-                    s,
-                    GroupEvidence {
-                        log: found.log + shape.log_weight,
-                        ..found
-                    },
-                );
+                found.log += shape.log_weight;
+                out.push((g, s, found));
             }
         }
+        out
     }
 }
 
@@ -330,22 +333,4 @@ fn solve(lower: &Mat<f64>, columns: &mut [f64]) {
         let columns = MatMut::from_column_major_slice_mut(columns, rows, count);
         solve_lower_triangular_in_place(lower.as_ref(), columns, Par::Seq);
     }
-}
-
-/// The parts of components in the covariance as one matrix.
-fn side_by_side(components: &[&Component], rows: usize) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(
-        rows,
-        components
-            .iter()
-            .map(|component| component.part.ncols())
-            .sum(),
-    );
-    let mut first = 0;
-    for component in components {
-        out.view_mut((0, first), component.part.shape())
-            .copy_from(&*component.part);
-        first += component.part.ncols();
-    }
-    out
 }

@@ -2,10 +2,8 @@
 //! more numbers than a recording bears, and leave the name to a product that has them.
 
 use super::cause_table::CauseTable;
-use super::cell::{
-    CellShape, FreeShape, Over, ShapeGroup, Shapes, fields, has_few, line_and_curve, support,
-};
-use super::component::{CellColumns, Component, form_keys};
+use super::cell::{CellShape, FreeShape, ShapeGroup, fields, has_few, line_and_curve, support};
+use super::component::CellColumns;
 use super::evidence::{EvidenceRows, GroupEvidence, evidence};
 use super::scan::{CellEvidence, Refined};
 use super::state::KnownState;
@@ -32,24 +30,20 @@ impl CauseTable<'_, '_> {
         cell: usize,
         found: &CellEvidence,
         state: &KnownState,
-        others: &[&Component],
         closely: bool,
     ) -> Option<Refined> {
-        let Shapes::Free(free) = &self.cells[cell].shapes else {
-            return None;
-        };
-        let refined = found.refined.as_ref();
-        let variable = match refined {
+        let free = self.cells[cell].free().filter(|free| free.is_curve())?;
+        let variable = match &found.refined {
             Some(refined) => refined.forms.first()?.term()?.law().first.variable,
             None => free.variable,
         };
         let mut free = FreeShape { variable, ..*free };
-        if !matches!(free.over, Over::Curve { .. }) || !state.leaves_more_than_noise(found.fit) {
+        if !state.leaves_more_than_noise(found.fit) {
             return None;
         }
         let alone = |free: &FreeShape| {
             let form = |basis| free.term(Law::new(free.variable, basis));
-            self.with_steps(free, free.variable, &form, state, others)
+            self.with_steps(free, free.variable, &form, state)
         };
         let mut best = alone(&free)?;
         let is_stepped = |refined: &Refined| {
@@ -63,11 +57,9 @@ impl CauseTable<'_, '_> {
             0..0
         };
         for level in levels {
-            let of_near = |near: FreeShape| Some((alone(&near)?, near));
-            let tried: Vec<_> = free
-                .near(level)
-                .into_par_iter()
-                .filter_map(of_near)
+            let near = free.near(level).into_par_iter();
+            let tried: Vec<_> = near
+                .filter_map(|near| Some((alone(&near)?, near)))
                 .collect();
             let next = tried.into_iter().max_by(|a, b| a.0.log.total_cmp(&b.0.log));
             if let Some((next, near)) = next.filter(|next| next.0.log > best.log) {
@@ -84,7 +76,6 @@ impl CauseTable<'_, '_> {
         variable: Variable,
         form: &dyn Fn(Basis) -> Form,
         state: &KnownState,
-        others: &[&Component],
     ) -> Option<Refined> {
         let values = self
             .frame
@@ -106,17 +97,10 @@ impl CauseTable<'_, '_> {
         let straight = fields * line.term()?.law().count();
         let with = |some: &[usize]| {
             let after = some.iter().map(|gap| form(Basis::After { at: all[*gap] }));
-            let group = ShapeGroup {
-                forms: [line.clone(), curve.clone()]
-                    .into_iter()
-                    .chain(after)
-                    .collect(),
-                shapes: Vec::new(),
-                positive: false,
-                largest: f64::INFINITY,
-            };
+            let forms = [line.clone(), curve.clone()].into_iter().chain(after);
+            let group = ShapeGroup::new(forms.collect(), Vec::new());
             let block = CellColumns::of(vec![group], self.frame);
-            let across = self.across_block(&block, state, others);
+            let across = self.across_block(&block, state);
             let (gram, gradient) = state.seen(&block.groups[0], &across, 0);
             let steps = Steps {
                 curve: gradient.len() - some.len() * fields,
@@ -163,15 +147,10 @@ impl CauseTable<'_, '_> {
             let columns = count * fields;
             shares.extend(std::iter::repeat_n(part / columns as f64, columns));
         }
-        let keys = form_keys(others);
-        let shape = CellShape {
-            shares,
-            log_weight: chosen.log_weight - price(at.len(), all.len()),
-            is_bent: false,
-        };
-        (!forms.iter().any(|form| keys.contains(&form.key()))).then_some(Refined {
+        let log_weight = chosen.log_weight - price(at.len(), all.len());
+        (!state.has_any(&forms)).then(|| Refined {
             forms,
-            shape: Some(shape),
+            shape: Some(CellShape::new(shares, log_weight)),
             log: best.log,
             amplitude: best.amplitude,
         })
@@ -190,14 +169,14 @@ impl Steps {
         let mut worse = 0;
         loop {
             let price = price(at.len(), all);
-            let of_shape = |shape: usize| {
-                let found = self.with(&shapes[shape], &at);
-                let log = found.log + shapes[shape].log_weight - price;
-                (shape, GroupEvidence { log, ..found })
+            let with_price = |shape: usize| {
+                let mut found = self.with(&shapes[shape], &at);
+                found.log = found.log + shapes[shape].log_weight - price;
+                (shape, found)
             };
-            let (shape, found) = (0..shapes.len())
-                .filter(|shape| !shapes[*shape].is_bent)
-                .map(of_shape)
+            let plain = (0..shapes.len()).filter(|shape| !shapes[*shape].is_bent);
+            let (shape, found) = plain
+                .map(with_price)
                 .max_by(|a, b| a.1.log.total_cmp(&b.1.log))?;
             let next = self.next(&shapes[shape], &at, found.amplitude, some);
             if best.as_ref().is_none_or(|best| found.log > best.2.log) {
@@ -268,12 +247,8 @@ impl Steps {
             let gradient = self.gradient.rows(first, self.each) - with.tr_mul(&along);
             let factor = seen.cholesky()?;
             let fit = variance * gradient.dot(&factor.solve(&gradient));
-            let cost: f64 = factor
-                .l_dirty()
-                .diagonal()
-                .iter()
-                .map(|value| value.ln())
-                .sum();
+            let pivots = factor.l_dirty().diagonal();
+            let cost: f64 = pivots.iter().map(|value| value.ln()).sum();
             Some(-half * (1.0 - fit / left).max(1e-9).ln() - cost)
         };
         let others = (0..some).filter(|step| !at.contains(step));

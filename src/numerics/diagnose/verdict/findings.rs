@@ -1,8 +1,4 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
-//!
-//! Causes that no data could tell from a finding.
-//!
-//! What the last round looked at, and what it found.
 
 use crate::criteria::cells::{DETAIL, FAINT, IDENTITY, SMALLEST, TRACE};
 use crate::criteria::words::FIRM;
@@ -11,12 +7,13 @@ use crate::effect::{
     Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Survey, Variable,
     figure, moved_with_the_payload, names, people, turned_holder,
 };
-use crate::estimate::{ErrorScale, Model, ParameterStatus, tail};
+use crate::estimate::{Model, ParameterStatus, tail};
 use crate::observation::Dimension;
 use crate::round::{FitState, RoundView};
 use crate::types::{Evidence, Finding, RivalCause};
 use crate::verdict::not_observable::{faults, rows_apart};
 use crate::verdict::windup::turns_back;
+use crate::whitened::add_columns;
 use crate::words::{left_out, not_so, sentence, small, with_size};
 
 /// The causes of the last round as findings, strongest first; whether they leave more than noise `at_fitted_rows` or anywhere.
@@ -57,41 +54,41 @@ pub(super) fn findings(
 fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Vec<usize>)> {
     let sized = |found: &FoundCell| (size(last, &found.members), found.clone(), Vec::new());
     let mut all: Vec<(f64, FoundCell, Vec<usize>)> = last.answer.found.iter().map(sized).collect();
-    let strongest = all
-        .iter()
-        .map(|(_, found, _)| found.log)
-        .fold(0.0, f64::max);
+    let logs = last.answer.found.iter().map(|found| found.log);
+    let strongest = logs.fold(0.0, f64::max);
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut out: Vec<(f64, FoundCell, Vec<usize>)> = Vec::new();
     for (rms, found, details) in all {
         // No instrument sees so little of the tool: currents alone speak of it.
-        if rms < *SMALLEST && !out.is_empty() && last.scale.dimension() == Dimension::Length {
+        if rms < *SMALLEST
+            && !out.is_empty()
+            && last.view.fitter.scale.dimension() == Dimension::Length
+        {
             out[0].2.extend(&found.members);
             continue;
         }
         let unclear = |main: &FoundCell| {
             something_left && main.effect == names::UNKNOWN && found.log < main.log
         };
-        let of_unclear = out
+        let unclear_main = out
             .iter()
             .position(|(_, main, _)| main.place == found.place && unclear(main));
         let first = (found.effect == names::UNKNOWN).then(|| {
-            let here = out
-                .iter()
-                .position(|(most, main, _)| main.place == found.place && rms < *DETAIL * most);
+            let mut mains = out.iter();
+            let here =
+                mains.position(|(most, main, _)| main.place == found.place && rms < *DETAIL * most);
             let trace = |(most, ..): &&(f64, FoundCell, Vec<usize>)| {
                 rms < *TRACE * most || found.log < *FAINT * strongest
             };
             here.or_else(|| out.first().filter(trace).map(|_| 0))
         });
-        match of_unclear.or(first.flatten()) {
+        match unclear_main.or(first.flatten()) {
             Some(main) => out[main].2.extend(&found.members),
             None => out.push((rms, found, details)),
         }
     }
-    out.into_iter()
-        .map(|(_, found, details)| (found, details))
-        .collect()
+    let all = out.into_iter();
+    all.map(|(_, found, details)| (found, details)).collect()
 }
 
 /// A finding with its numbers in the whole model.
@@ -145,7 +142,7 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
         clock,
     };
     let impossible = impossible(last, found);
-    let rms = small(effect_rms, last.scale.dimension());
+    let rms = small(effect_rms, last.view.fitter.scale.dimension());
     let named = effect != names::UNKNOWN;
     let excluded = forms
         .iter()
@@ -203,42 +200,36 @@ fn impossible(last: &LastRound, found: &FoundCell) -> Option<String> {
         ));
     }
     let state = &last.state;
-    found
-        .members
-        .iter()
-        .zip(&found.bounds)
-        .find_map(|(i, (positive, largest))| {
-            let form = &state.causes[*i].form;
-            let range = state.ranges[*i].clone();
-            let error = |column: usize| match state.fitted.statuses[range.start + column] {
-                ParameterStatus::Free(sigma) => *FIRM * sigma,
-                _ => 0.0,
-            };
-            let values = &state.model.x[range.clone()];
-            // The finer shape of a finding is not what it is called by.
-            if form.cause().is_nameless() {
-                return None;
+    let mut members = found.members.iter().zip(&found.bounds);
+    members.find_map(|(i, (positive, largest))| {
+        let form = &state.causes[*i].form;
+        // The finer shape of a finding is not what it is called by.
+        if form.cause().is_nameless() {
+            return None;
+        }
+        let range = state.ranges[*i].clone();
+        let sigma = |k: usize| match state.fitted.statuses[k] {
+            ParameterStatus::Free(sigma) => Some(*FIRM * sigma),
+            _ => None,
+        };
+        let error = |column: usize| sigma(range.start + column).unwrap_or(0.0);
+        let values = &state.model.x[range.clone()];
+        let beyond = form.impossible(values, &error, last.survey);
+        if beyond.is_some() {
+            return beyond;
+        }
+        let wrong_sign = || Some("has the wrong sign".into());
+        if form.is_against_load(values, &error) {
+            return wrong_sign();
+        }
+        range.clone().find_map(|k| {
+            let (value, error) = (state.model.x[k], sigma(k)?);
+            if *positive && value < -error {
+                return wrong_sign();
             }
-            let beyond = form.impossible(values, &error, last.survey);
-            if beyond.is_some() {
-                return beyond;
-            }
-            if form.is_against_load(values, &error) {
-                return Some("has the wrong sign".into());
-            }
-            range.clone().find_map(|k| {
-                let ParameterStatus::Free(sigma) = state.fitted.statuses[k] else {
-                    return None;
-                };
-                let value = state.model.x[k];
-                if *positive && value < -*FIRM * sigma {
-                    Some("has the wrong sign".into())
-                } else {
-                    (value.abs() - *FIRM * sigma > *largest)
-                        .then(|| "is more than is possible".into())
-                }
-            })
+            (value.abs() - error > *largest).then(|| "is more than is possible".into())
         })
+    })
 }
 
 /// The fitted parameters of some causes, as people read them: without the name of the finding, and of a cause that is not to be named.
@@ -287,14 +278,7 @@ fn size(last: &LastRound, members: &[usize]) -> f64 {
     let mut sum = vec![0.0; problem.residual_rows()];
     for i in members {
         let columns = problem.motions_by(&state.causes[*i].form);
-        for (column, coefficient) in columns
-            .chunks(problem.residual_rows())
-            .zip(&state.model.x[state.ranges[*i].clone()])
-        {
-            sum.iter_mut()
-                .zip(column)
-                .for_each(|(value, c)| *value += c * coefficient);
-        }
+        add_columns(&mut sum, &columns, &state.model.x[state.ranges[*i].clone()]);
     }
     let squares = problem.rows.iter().enumerate().map(|(i, row)| {
         let lines = problem.readings_of(i);
@@ -302,7 +286,7 @@ fn size(last: &LastRound, members: &[usize]) -> f64 {
             lines.len().max(1) as f64,
             lines.map(|line| sum[line].powi(2)).sum::<f64>(),
         );
-        whitened * last.scale.noise(problem.data, *row).powi(2) / values
+        whitened * last.view.fitter.scale.noise(problem.data, *row).powi(2) / values
     });
     (squares.sum::<f64>() / problem.rows.len().max(1) as f64).sqrt()
 }
@@ -317,13 +301,11 @@ pub(super) fn share_with_identities(
     rivals: &mut Vec<RivalCause>,
 ) -> f64 {
     let mut left = name;
-    let moved = forms
-        .iter()
-        .filter_map(|form| moved_with_the_payload(form, survey))
-        .map(|same| (same, 0.5));
-    let mut same: Vec<_> = forms
-        .iter()
-        .flat_map(|form| form.identities(called))
+    let moved = forms.iter();
+    let moved = moved.filter_map(|form| moved_with_the_payload(form, survey));
+    let moved = moved.map(|same| (same, 0.5));
+    let same = forms.iter().flat_map(|form| form.identities(called));
+    let mut same: Vec<_> = same
         .filter(|(_, place)| is_a_place(*place, survey))
         .collect();
     same.dedup();
@@ -369,15 +351,12 @@ pub(crate) struct LastRound<'a, 'b> {
     /// The whole model with all causes.
     pub(crate) state: FitState,
     pub(crate) answer: Answer,
-    /// Unit in which errors of rows are compared and stated.
-    pub(crate) scale: ErrorScale,
-    /// Names of causes that are not to be given.
-    pub(crate) without: &'b [String],
 }
 
 impl LastRound<'_, '_> {
     /// Whether a name is not to be given.
     pub(crate) fn excludes(&self, effect: &str) -> bool {
-        self.without.iter().any(|name| name == effect)
+        let without = self.view.fitter.question.without;
+        without.iter().any(|name| name == effect)
     }
 }

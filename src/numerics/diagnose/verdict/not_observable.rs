@@ -4,12 +4,12 @@
 
 use crate::criteria::screen::{BULK, MISTAKES};
 use crate::criteria::words::{FAULT, STILL};
-use crate::effect::{Clock, DeclaredCause, DeclaredForm, Measure, Place, Survey, cause, names};
+use crate::effect::{Clock, DeclaredCause, DeclaredForm, Measure, Survey, cause, names};
 use crate::error::counted;
 use crate::estimate::{Screening, Suspect, SuspectKind};
 use crate::observation::{Dimension, noise, only_contacts};
 use crate::robot::Measurements;
-use crate::types::{Finding, Probabilities, RivalCause};
+use crate::types::{Finding, RivalCause};
 use crate::verdict::findings::LastRound;
 use crate::words::small;
 
@@ -104,9 +104,8 @@ pub(super) fn not_tried(survey: &Survey, causes: &[&'static DeclaredCause]) -> V
 /// Links whose weight the robot file does not give.
 fn masses(survey: &Survey) -> Option<String> {
     let all = &survey.robot.description().joints;
-    let bare = (1..)
-        .zip(all)
-        .filter(|(_, joint)| joint.mass.is_none() || joint.centre.is_none());
+    let bare = (1..).zip(all);
+    let bare = bare.filter(|(_, joint)| joint.mass.is_none() || joint.centre.is_none());
     let bare: Vec<String> = bare
         .map(|(number, _): (usize, _)| number.to_string())
         .collect();
@@ -139,23 +138,19 @@ fn is_one_motion(finding: &Finding, rival: &RivalCause) -> bool {
 /// What would tell findings from their rivals, a sentence each.
 pub(super) fn next(findings: &[Finding], causes: &[&'static DeclaredCause]) -> Vec<String> {
     let mut out = Vec::new();
+    let measure = |name: &str| {
+        let mut declared = causes.iter().filter(|declared| declared.name() == name);
+        match declared.next() {
+            Some(declared) => declared.about().measure,
+            None => cause(name)?.measure,
+        }
+    };
     for finding in findings {
         for rival in finding.rivals.iter().take(2) {
-            let how = least(
-                [finding.effect, rival.effect]
-                    .into_iter()
-                    .filter_map(|name| {
-                        let declared = causes.iter().find(|declared| declared.name() == name);
-                        declared.map_or_else(
-                            || cause(name)?.measure,
-                            |declared| declared.about().measure,
-                        )
-                    }),
-            );
-            let how = if is_one_motion(finding, rival) {
-                ONE_MOTION
-            } else {
-                how.unwrap_or(POSES)
+            let names = [finding.effect, rival.effect];
+            let how = match is_one_motion(finding, rival) {
+                true => ONE_MOTION,
+                false => least(names.into_iter().filter_map(measure)).unwrap_or(POSES),
             };
             out.push(format!(
                 "{} at {} or {} at {}: {how}",
@@ -190,12 +185,8 @@ pub(super) fn rows_apart(offset: i64, last: &LastRound) -> Finding {
 /// Whether more rows are set aside by the model alone than mistakes are: missing physics may show most there.
 pub(super) fn stand_out_in_number(screening: &Screening, rows: usize) -> bool {
     let far = |s: &&Suspect| is_by_the_model_alone(s) && s.statistic > screening.reach;
-    let many = screening
-        .suspects
-        .iter()
-        .filter(far)
-        .count()
-        .saturating_sub(*MISTAKES);
+    let many = screening.suspects.iter().filter(far).count();
+    let many = many.saturating_sub(*MISTAKES);
     many as f64 > (1.0 - *BULK) * rows as f64
 }
 
@@ -214,86 +205,58 @@ pub(super) fn faults(
     let screening = &last.state.screening;
     // What has no other explanation than that it is far out must be farther than this noise reaches.
     let far = |s: &Suspect| s.kind != SuspectKind::Outlier || s.statistic > screening.reach;
-    let of_kinds = |kinds: fn(SuspectKind) -> bool| -> Vec<usize> {
-        let counted = screening
-            .suspects
-            .iter()
-            .filter(|s| !s.used() && kinds(s.kind) && Some(s.row) != unknown);
-        counted
-            .filter(|s| far(s) && !(something_left && is_by_the_model_alone(s)))
-            .map(|s| s.row + 1)
-            .collect()
+    let rows_of = |kinds: fn(SuspectKind) -> bool| -> Vec<usize> {
+        let kept = screening.suspects.iter().filter(|s| {
+            !s.used()
+                && kinds(s.kind)
+                && Some(s.row) != unknown
+                && far(s)
+                && !(something_left && is_by_the_model_alone(s))
+        });
+        kept.map(|s| s.row + 1).collect()
     };
     let list = |rows: &[usize]| {
         let named: Vec<String> = rows.iter().take(20).map(usize::to_string).collect();
-        let more = rows.len().saturating_sub(20);
+        let more = match rows.len().saturating_sub(20) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
         let noun = if rows.len() == 1 { "row" } else { "rows" };
-        format!(
-            "{noun} {}{}",
-            named.join(", "),
-            if more > 0 {
-                format!(" and {more} more")
-            } else {
-                String::new()
-            }
-        )
+        format!("{noun} {}{more}", named.join(", "))
     };
-    let mut out = Vec::new();
-    let swapped =
-        of_kinds(|kind| matches!(kind, SuspectKind::Exchanged | SuspectKind::Mislabelled));
-    if !swapped.is_empty() {
-        out.push(of_the_recording(
+    let kinds: [(&str, &str, fn(SuspectKind) -> bool); 3] = [
+        (
             names::MISLABELLED_POINT,
-            format!("points carry another point's name: {}", list(&swapped)),
-            last,
-        ));
-    }
-    let shifted = of_kinds(|kind| matches!(kind, SuspectKind::ShiftedBlock(_)));
-    if !shifted.is_empty() {
-        let text = format!(
-            "joints and points are rows apart in the recording: {}",
-            list(&shifted)
-        );
-        out.push(of_the_recording(names::JOINT_LOG_LAG, text, last));
-    }
-    let wrong = of_kinds(|kind| {
-        matches!(
-            kind,
-            SuspectKind::Outlier | SuspectKind::UnitSlip(_) | SuspectKind::Zero
-        )
-    });
-    if !wrong.is_empty() {
-        out.push(of_the_recording(
-            names::OUTLIER,
-            format!("single wrong points: {}", list(&wrong)),
-            last,
-        ));
-    }
-    out
+            "points carry another point's name",
+            |kind| matches!(kind, SuspectKind::Exchanged | SuspectKind::Mislabelled),
+        ),
+        (
+            names::JOINT_LOG_LAG,
+            "joints and points are rows apart in the recording",
+            |kind| matches!(kind, SuspectKind::ShiftedBlock(_)),
+        ),
+        (names::OUTLIER, "single wrong points", |kind| {
+            use SuspectKind::{Outlier, UnitSlip, Zero};
+            matches!(kind, Outlier | UnitSlip(_) | Zero)
+        }),
+    ];
+    let each = kinds
+        .into_iter()
+        .map(|(effect, text, kinds)| (effect, text, rows_of(kinds)));
+    each.filter(|(.., rows)| !rows.is_empty())
+        .map(|(effect, text, rows)| {
+            of_the_recording(effect, format!("{text}: {}", list(&rows)), last)
+        })
+        .collect()
 }
 
 /// A fault of the recording; without its name where that is not to be given.
 fn of_the_recording(effect: &'static str, statement: String, last: &LastRound) -> Finding {
-    let effect = if last.excludes(effect) {
-        names::UNKNOWN
-    } else {
-        effect
+    let effect = match last.excludes(effect) {
+        true => names::UNKNOWN,
+        false => effect,
     };
-    Finding {
-        effect,
-        place: Place::Recording,
-        statement,
-        parameters: Vec::new(),
-        evidence: None,
-        rivals: Vec::new(),
-        probabilities: Probabilities {
-            name: *FAULT,
-            place: *FAULT,
-            none: 1.0 - *FAULT,
-        },
-        valid: None,
-        forms: Vec::new(),
-    }
+    Finding::of_recording(effect, statement, *FAULT)
 }
 
 #[cfg(test)]

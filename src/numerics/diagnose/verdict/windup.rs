@@ -30,18 +30,14 @@ pub(super) fn turns_back(last: &LastRound, found: &FoundCell) -> Option<[f64; 2]
     if found.members.iter().any(is_stated) {
         return None;
     }
-    let parameters: Vec<usize> = found
-        .members
-        .iter()
-        .flat_map(|i| state.ranges[*i].clone())
-        .collect();
+    let ranges = found.members.iter().map(|i| state.ranges[*i].clone());
+    let parameters: Vec<usize> = ranges.flatten().collect();
     let covariance = state.fitted.covariance.as_ref()?.block(&parameters)?;
     let groups = groups(last, found, joint, parameters.len());
-    let [least, most] = groups
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], group| {
-            [a.min(group.turn), b.max(group.turn)]
-        });
+    let turns = groups.iter().map(|group| group.turn);
+    let [least, most] = turns.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], turn| {
+        [a.min(turn), b.max(turn)]
+    });
     let firmly = |from: &LoadGroup, to: &LoadGroup| {
         let along = &to.derivatives - &from.derivatives;
         let error = along.dot(&(&covariance * &along)).max(0.0).sqrt();

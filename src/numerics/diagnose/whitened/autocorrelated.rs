@@ -2,6 +2,8 @@
 //! of each axis. Its innovations (Kalman, 1960) are white, so that causes which change slowly compete against it on equal terms.
 
 use crate::criteria::noise::GROSS;
+use crate::linear::mean_square;
+
 /// Noise of which a part is correlated along the rows of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct AutocorrelatedNoise {
@@ -34,12 +36,9 @@ impl AutocorrelatedNoise {
 
     /// Brings gross residuals back to where they no longer hide what the others share.
     pub(crate) fn without_gross(residual: &mut [f64]) {
-        let scale = (residual.iter().map(|value| value * value).sum::<f64>()
-            / residual.len().max(1) as f64)
-            .sqrt();
-        residual
-            .iter_mut()
-            .for_each(|value| *value = value.clamp(-*GROSS * scale, *GROSS * scale));
+        let most = *GROSS * mean_square(residual).sqrt();
+        let values = residual.iter_mut();
+        values.for_each(|value| *value = value.clamp(-most, most));
     }
 
     /// The share times the autocorrelation time.

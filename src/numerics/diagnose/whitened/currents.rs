@@ -71,13 +71,11 @@ impl Currents {
                 ][k]
             });
             // A balancer takes its share off the slope, unless torques by the joint's own angle are left to it.
-            let slopes = [3, 5]
-                .into_iter()
-                .filter_map(|count| solve(&features.columns(0, count).into_owned(), &held));
-            let Some(slope) = slopes
-                .map(|x| x[0])
-                .find(|slope| FOLLOWS.contains(&slope.abs()))
-            else {
+            let slopes = [3, 5].into_iter().filter_map(|count| {
+                Some(solve(&features.columns(0, count).into_owned(), &held)?[0])
+            });
+            let mut slopes = slopes.filter(|slope| FOLLOWS.contains(&slope.abs()));
+            let Some(slope) = slopes.next() else {
                 continue;
             };
             let Some(all) = solve(&features, &held) else {
@@ -85,12 +83,9 @@ impl Currents {
             };
             let left = DVector::from_vec(held.clone()) - &features * all;
             let sigma = median_deviation(left.as_slice()).max(*CURRENTS * most);
-            let residual = held
-                .iter()
-                .zip(&torque)
-                .map(|(held, torque)| held * slope.signum() - torque)
-                .collect();
-            usable.push((joint, residual, sigma));
+            let residual = held.iter().zip(&torque);
+            let residual = residual.map(|(held, torque)| held * slope.signum() - torque);
+            usable.push((joint, residual.collect(), sigma));
         }
         if usable.is_empty() {
             return None;
@@ -143,22 +138,14 @@ impl Currents {
     /// What the currents alone say of some parameters with whitened `columns` (of the residual rows of currents), now at `values`.
     pub(crate) fn priors(&self, columns: &[Vec<f64>], values: &[f64]) -> Option<Vec<Prior>> {
         let (rows, count) = (self.residual_rows(), columns.len());
-        let seen: Vec<f64> = self
-            .whitened()
-            .enumerate()
-            .map(|(row, value)| {
-                value
-                    + columns
-                        .iter()
-                        .zip(values)
-                        .map(|(column, x)| column[row] * x)
-                        .sum::<f64>()
-            })
-            .collect();
-        let scale: Vec<f64> = columns
-            .iter()
-            .map(|c| c.iter().map(|v| v * v).sum::<f64>().sqrt().max(1e-300))
-            .collect();
+        let by_columns = |row: usize| {
+            let each = columns.iter().zip(values);
+            each.map(|(column, x)| column[row] * x).sum::<f64>()
+        };
+        let seen = self.whitened().enumerate();
+        let seen: Vec<f64> = seen.map(|(row, value)| value + by_columns(row)).collect();
+        let length = |column: &Vec<f64>| column.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let scale: Vec<f64> = columns.iter().map(|one| length(one).max(1e-300)).collect();
         let matrix = DMatrix::from_fn(rows, count + self.nuisances(), |row, k| {
             if k < count {
                 columns[k][row] / scale[k]

@@ -13,6 +13,7 @@ use crate::effect::{
     Term, Unknown, Variable,
 };
 use crate::estimate::{Model, Prior};
+use crate::linear::mean_square;
 use crate::observation::{MeasurementKind, Residual, Sensitivity, kinds};
 use crate::robot::{Measurements, RobotModel};
 pub(crate) use crate::whitened::autocorrelated::AutocorrelatedNoise;
@@ -82,22 +83,17 @@ impl<'a> WhitenedProblem<'a> {
         };
         let scratch = || model.stack.scratch(&model.robot);
         let looked: Vec<_> = rows.par_iter().map_init(scratch, look).collect();
-        let (mut motions, mut residual) = (
-            Vec::with_capacity(rows.len()),
-            Vec::with_capacity(3 * rows.len()),
-        );
+        let mut motions = Vec::with_capacity(rows.len());
+        let mut residual = Vec::with_capacity(3 * rows.len());
         let mut readings = ReadingLines::default();
         for (motion, seen) in looked {
             motions.push(motion);
-            residual.extend(
-                seen.iter()
-                    .flat_map(|(reading, error)| reading.lines.iter().map(|line| error[*line])),
-            );
+            let errors = seen.iter();
+            let errors = errors.flat_map(|(one, error)| one.lines.iter().map(|line| error[*line]));
+            residual.extend(errors);
             readings.push(seen.into_iter().map(|(reading, _)| reading).collect());
         }
-        let current_weight = (residual.iter().map(|value| value * value).sum::<f64>()
-            / residual.len().max(1) as f64)
-            .sqrt();
+        let current_weight = mean_square(&residual).sqrt();
         Self {
             robot: &model.robot,
             data,
@@ -116,21 +112,17 @@ impl<'a> WhitenedProblem<'a> {
     /// With the motor currents, which say something where a joint yields to torques.
     pub(crate) fn with_currents(mut self) -> Self {
         self.currents = Currents::new(self.robot, self.data, &self.rows, &self.motions);
-        self.residual.extend(
-            self.currents
-                .iter()
-                .flat_map(Currents::whitened)
-                .map(|value| value * self.current_weight),
-        );
+        let whitened = self.currents.iter().flat_map(Currents::whitened);
+        let weighed = whitened.map(|value| value * self.current_weight);
+        self.residual.extend(weighed);
         self
     }
 
     /// With autocorrelated noise: all columns become innovations. Of rows that measured different numbers noise stays white.
     pub(crate) fn with_autocorrelation(mut self, noise: AutocorrelatedNoise) -> Self {
-        let (filter, measured) = (
-            self.width().map(|width| noise.filter(&self.rows, width)),
-            self.measured(),
-        );
+        let width = self.width();
+        let filter = width.map(|width| noise.filter(&self.rows, width));
+        let measured = self.measured();
         if let Some(innovations) = filter {
             innovations.apply(&mut self.residual[..measured]);
             self.innovations = Some(innovations);
@@ -157,20 +149,19 @@ impl<'a> WhitenedProblem<'a> {
 
     /// Numbers that each row measured, where all measured as many.
     pub(crate) fn width(&self) -> Option<usize> {
-        let of_row = |i: usize| self.readings.of_row(i).len();
-        let width = of_row(0);
-        (!self.rows.is_empty() && width > 0 && (0..self.rows.len()).all(|i| of_row(i) == width))
-            .then_some(width)
+        let mut widths = (0..self.rows.len()).map(|i| self.readings.lines_of(i).len());
+        let width = widths.next().filter(|width| *width > 0)?;
+        widths.all(|other| other == width).then_some(width)
     }
 
     /// Residuals of what was measured, row by row.
-    pub(crate) fn of_readings(&self) -> &[f64] {
+    pub(crate) fn measured_residual(&self) -> &[f64] {
         &self.residual[..self.measured()]
     }
 
     /// Residual rows of the readings of a row, by its place in `rows`.
     pub(crate) fn readings_of(&self, place: usize) -> Range<usize> {
-        self.readings.of_row(place)
+        self.readings.lines_of(place)
     }
 
     pub(crate) fn residual_rows(&self) -> usize {
@@ -221,15 +212,13 @@ impl<'a> WhitenedProblem<'a> {
 
     /// The largest motion of the point by each joint, m/rad.
     pub(crate) fn reach(&self) -> Vec<f64> {
-        let joints = 0..self.robot.joints();
-        joints
-            .map(|j| {
-                self.motions
-                    .iter()
-                    .map(|motion| motion.by_joint[j].norm())
-                    .fold(0.0, f64::max)
-            })
-            .collect()
+        let reach = |joint: usize| {
+            let motions = self.motions.iter();
+            motions
+                .map(|motion| motion.by_joint[joint].norm())
+                .fold(0.0, f64::max)
+        };
+        (0..self.robot.joints()).map(reach).collect()
     }
 
     /// Columns of a form, one after another.
@@ -313,21 +302,18 @@ impl<'a> WhitenedProblem<'a> {
         let nuisances = self.currents.as_ref().map_or(0, Currents::nuisances);
         let mut out = Mat::zeros(self.residual_rows(), free.len() + nuisances);
         let mut scratch = model.stack.scratch(&model.robot);
+        let (stack, robot) = (&model.stack, &model.robot);
         for (i, row) in self.rows.iter().enumerate() {
-            let mut placed =
-                model
-                    .stack
-                    .place(&model.robot, self.data, *row, &model.x, &mut scratch);
+            let mut placed = stack.place(robot, self.data, *row, &model.x, &mut scratch);
             for (first, reading) in self.readings.seen(i) {
-                reading
-                    .sensitivity
-                    .derivatives(&mut placed, |parameter, derivative| {
-                        if let Some(j) = column[parameter] {
-                            for (k, line) in reading.lines.iter().enumerate() {
-                                out[(first + k, j)] += derivative[*line];
-                            }
+                let sensitivity = &reading.sensitivity;
+                sensitivity.derivatives(&mut placed, |parameter, derivative| {
+                    if let Some(j) = column[parameter] {
+                        for (k, line) in reading.lines.iter().enumerate() {
+                            out[(first + k, j)] += derivative[*line];
                         }
-                    });
+                    }
+                });
             }
         }
         for j in 0..free.len() {
@@ -346,18 +332,12 @@ impl<'a> WhitenedProblem<'a> {
 
     /// Values of some forms in the present model, zero where it has them not.
     fn present(&self, forms: &[&Form]) -> Vec<f64> {
-        let value = |name: &String| {
-            let specs = self.model.stack.specs();
-            specs
-                .iter()
-                .position(|spec| spec.name == *name)
-                .map_or(0.0, |k| self.model.x[k])
-        };
-        let names = forms
-            .iter()
-            .flat_map(|form| form.parameters(self.robot))
-            .map(|spec| spec.name);
-        names.map(|name| value(&name)).collect()
+        let known = self.model.stack.specs();
+        let specs = forms.iter().flat_map(|form| form.parameters(self.robot));
+        specs
+            .map(|spec| known.iter().position(|known| known.name == spec.name))
+            .map(|place| place.map_or(0.0, |k| self.model.x[k]))
+            .collect()
     }
 
     /// What the currents alone say of the parameters of some forms; nothing where they say nothing.
@@ -367,19 +347,23 @@ impl<'a> WhitenedProblem<'a> {
         };
         let rows = self.residual_rows();
         let all: Vec<f64> = forms.iter().flat_map(|form| self.columns(form)).collect();
-        let columns: Vec<Vec<f64>> = all
-            .chunks(rows)
-            .map(|c| {
-                c[self.measured()..]
-                    .iter()
-                    .map(|value| value / self.current_weight)
-                    .collect()
-            })
-            .collect();
+        let current_lines = |column: &[f64]| {
+            let values = column[self.measured()..].iter();
+            values.map(|value| value / self.current_weight).collect()
+        };
+        let columns: Vec<Vec<f64>> = all.chunks(rows).map(current_lines).collect();
         // The residual is that of the present model; what is asked is the whole parameter, hence at zero where it is new.
         currents
             .priors(&columns, &self.present(forms))
             .unwrap_or_default()
+    }
+}
+
+/// Adds columns, one after another, by their coefficients.
+pub(crate) fn add_columns(sum: &mut [f64], columns: &[f64], coefficients: &[f64]) {
+    for (column, coefficient) in columns.chunks(sum.len().max(1)).zip(coefficients) {
+        let each = sum.iter_mut().zip(column);
+        each.for_each(|(value, c)| *value += c * coefficient);
     }
 }
 
@@ -430,7 +414,7 @@ impl ReadingLines {
     }
 
     /// Residual rows of a row.
-    pub(crate) fn of_row(&self, place: usize) -> Range<usize> {
+    pub(crate) fn lines_of(&self, place: usize) -> Range<usize> {
         begin(&self.end_line, place)..self.end_line[place]
     }
 }
@@ -468,15 +452,10 @@ impl WhitenedProblem<'_> {
     pub(crate) fn unit_travel(&self, joint: usize) -> &[f64] {
         let column = |joint: usize| {
             // One in every row, and the angle, which is not asked.
-            let law = Law::new(
-                Variable::Angle { joint },
-                Basis::Straight {
-                    zero: 0.0,
-                    per: 1.0,
-                },
-            );
-            let mut columns =
-                self.motions_by_partials(&Term::new(&Unknown, Motion::Joint { joint }, law).into());
+            let (zero, per) = (0.0, 1.0);
+            let law = Law::new(Variable::Angle { joint }, Basis::Straight { zero, per });
+            let term = Term::new(&Unknown, Motion::Joint { joint }, law);
+            let mut columns = self.motions_by_partials(&term.into());
             columns.truncate(self.residual_rows());
             columns
         };
@@ -490,11 +469,8 @@ impl WhitenedProblem<'_> {
         let unit = self.unit_travel(joint);
         let mut out = Vec::with_capacity(values.len() / self.rows.len().max(1) * unit.len());
         for values in values.chunks(self.rows.len().max(1)) {
-            out.extend(
-                unit.iter()
-                    .enumerate()
-                    .map(|(residual_row, unit)| unit * values[self.row_of(residual_row)]),
-            );
+            let lines = unit.iter().enumerate();
+            out.extend(lines.map(|(line, unit)| unit * values[self.row_of(line)]));
         }
         out
     }
@@ -502,9 +478,8 @@ impl WhitenedProblem<'_> {
     /// Sums, row by row, of the products of a column with that of a unit travel of a joint.
     pub(crate) fn along_travel(&self, joint: usize, column: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; self.rows.len()];
-        for (residual_row, (value, unit)) in column.iter().zip(self.unit_travel(joint)).enumerate()
-        {
-            out[self.row_of(residual_row)] += value * unit;
+        for (line, (value, unit)) in column.iter().zip(self.unit_travel(joint)).enumerate() {
+            out[self.row_of(line)] += value * unit;
         }
         out
     }

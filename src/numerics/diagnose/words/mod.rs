@@ -1,12 +1,10 @@
 //! The words for what a diagnosis has decided: progress in a line each, findings and the verdict in a sentence each.
 
 mod statement;
-mod verdict_statement;
 
 pub(crate) use statement::{
-    hidden, left_out, not_so, sentence, slower_than_noise, small, with_size,
+    Ground, hidden, left_out, not_so, sentence, slower_than_noise, small, statement, with_size,
 };
-pub(crate) use verdict_statement::{Ground, statement};
 
 use super::round::{FitState, Fitter};
 use super::whitened::AutocorrelatedNoise;
@@ -15,7 +13,7 @@ use crate::effect::Form;
 use crate::error::counted;
 
 /// The base model in a line.
-pub(crate) fn of_the_base(now: &FitState, fitter: &Fitter) -> String {
+pub(crate) fn base_text(now: &FitState, fitter: &Fitter) -> String {
     format!(
         "{}, {} of the base model estimated",
         counted(now.screening.kept.len(), "row"),
@@ -24,7 +22,7 @@ pub(crate) fn of_the_base(now: &FitState, fitter: &Fitter) -> String {
 }
 
 /// What the noise does from point to point.
-pub(crate) fn of_the_correlation(fitter: &Fitter) -> String {
+pub(crate) fn correlation_text(fitter: &Fitter) -> String {
     match fitter.correlated {
         _ if fitter.causes_of_the_arm_first() => {
             "rows follow a path, on which what changes with the pose looks like noise that is correlated from point to point: causes that do \
@@ -40,7 +38,7 @@ pub(crate) fn of_the_correlation(fitter: &Fitter) -> String {
 }
 
 /// A round in a line.
-pub(crate) fn of_a_round<'f>(
+pub(crate) fn round_text<'f>(
     round: usize,
     cells: usize,
     forms: impl Iterator<Item = &'f Form>,
@@ -50,25 +48,18 @@ pub(crate) fn of_a_round<'f>(
         .collect();
     names.dedup();
     let causes = counted(names.len(), "cause");
-    let mut shown = names
-        .iter()
-        .take(*NAMED)
-        .cloned()
-        .collect::<Vec<_>>()
-        .join(", ");
+    let mut shown = names[..names.len().min(*NAMED)].join(", ");
     if names.len() > *NAMED {
         shown.push_str(", ...");
     }
-    let shown = if shown.is_empty() {
-        shown
-    } else {
-        format!(" ({shown})")
-    };
+    if !shown.is_empty() {
+        shown = format!(" ({shown})");
+    }
     format!("round {round}: {cells} possible causes compared, {causes}{shown}")
 }
 
 /// Why it is searched again, in a line.
-pub(crate) fn of_all_rows(aside: usize) -> String {
+pub(crate) fn all_rows_text(aside: usize) -> String {
     format!(
         "{} stand out: searched again with all rows",
         counted(aside as u64, "row")
@@ -76,7 +67,7 @@ pub(crate) fn of_all_rows(aside: usize) -> String {
 }
 
 /// What follows the last round in a line.
-pub(crate) fn of_the_conclusions(found: &FitState) -> String {
+pub(crate) fn conclusions_text(found: &FitState) -> String {
     format!(
         "{} in the model; probabilities and formulas follow, the last step",
         counted(found.causes.len(), "cause")

@@ -1,0 +1,111 @@
+//! Folds of the rows to fit: how well poses are predicted by a fit that did not see them. Rows that are held out for validation take no part.
+//!
+//! Models with causes left out or with another one, judged by folds of the rows in a linear picture: an effect is small, so that its
+//! coefficients change the points in proportion. What is to change the model is fitted afterwards.
+
+use crate::criteria::judge::FOLDS;
+use crate::estimate::{FoldKind, NearbyFits, Session, dealt, gather};
+use crate::round::{EstimatedCause, FitState, Fitter, with_causes};
+use std::ops::Range;
+
+/// Fits around a state, in a linear picture: with causes left out, and rivals that may come in.
+pub(crate) struct Alternatives<'n> {
+    state: &'n FitState,
+    session: Session<'n>,
+    /// Where the parameters of the causes are, then those of the rivals.
+    ranges: &'n [Range<usize>],
+    folds: &'n [Vec<usize>],
+    columns: &'n [usize],
+    nearby: NearbyFits<'n>,
+}
+
+impl Alternatives<'_> {
+    /// Asks the fits around a state with some rivals at zero; `None` where the poses are too few for folds, or bounds are in the way.
+    pub(crate) fn ask<T>(
+        state: &FitState,
+        fitter: &Fitter,
+        rivals: &[EstimatedCause],
+        ask: impl FnOnce(&Alternatives) -> T,
+    ) -> Option<T> {
+        let at_zero = |cause: &EstimatedCause| EstimatedCause {
+            coefficients: vec![0.0; cause.coefficients.len()],
+            ..cause.clone()
+        };
+        let mut causes = state.causes.clone();
+        causes.extend(rivals.iter().map(at_zero));
+        let (model, ranges) = with_causes(&state.model, &causes);
+        let folds = folds(state, fitter)?;
+        let session = Session {
+            model: &model,
+            ..state.session(fitter)
+        };
+        let mut columns = state.fitted.free();
+        columns.extend(ranges[state.causes.len()..].iter().cloned().flatten());
+        let nearby = NearbyFits::of(&session, &folds, &columns, fitter.scale)?;
+        Some(ask(&Alternatives {
+            state,
+            session,
+            ranges: &ranges,
+            folds: &folds,
+            columns: &columns,
+            nearby,
+        }))
+    }
+
+    /// Steps without some causes (by their positions), and all rivals but one (by its own).
+    fn steps(&self, out: &[usize], rival: Option<usize>) -> Vec<Option<f64>> {
+        let causes = self.state.causes.len();
+        let left_out = |k: &usize| out.iter().any(|i| self.ranges[*i].contains(k));
+        let other = |k: &usize| {
+            let mut rivals = self.ranges[causes..].iter().enumerate();
+            rivals.any(|(i, range)| range.contains(k) && rival != Some(i))
+        };
+        let step = |k: &usize| (left_out(k) || other(k)).then_some(-self.session.model.x[*k]);
+        self.columns.iter().map(step).collect()
+    }
+
+    /// The rms error of folds without some causes (by their positions), and with a rival (by its own) or none. Nothing where that is not near
+    /// the state.
+    pub(crate) fn error(&self, out: &[usize], rival: Option<usize>) -> Option<f64> {
+        let errors = self.nearby.with(&self.steps(out, rival))?;
+        let errors: Option<Vec<Vec<f64>>> = errors.into_iter().collect();
+        Some(rms(&self.session, self.folds, &errors?))
+    }
+
+    /// The coefficients of a rival (by its position) in the place of some causes, with their standard deviations, SI.
+    pub(crate) fn coefficients(&self, out: &[usize], rival: usize) -> Option<Vec<(f64, f64)>> {
+        let columns = self.ranges[self.state.causes.len() + rival].clone();
+        let steps = self.steps(out, Some(rival));
+        let found = self
+            .nearby
+            .estimated(&steps, &columns.collect::<Vec<_>>())?;
+        let scale = self.state.fitted.noise_scale;
+        let found = found.into_iter();
+        Some(found.map(|(value, sigma)| (value, sigma * scale)).collect())
+    }
+}
+
+/// Rows of the folds that judge a state; the same for every model that is compared. `None` where the poses are too few.
+fn folds(now: &FitState, fitter: &Fitter) -> Option<Vec<Vec<usize>>> {
+    // Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
+    let kind = match fitter.correlated {
+        Some(_) => FoldKind::Blocks,
+        None => FoldKind::Random(fitter.question.seed),
+    };
+    dealt(kind, &now.session(fitter), *FOLDS)
+}
+
+/// Rms error of the fitted rows under fits that did not see their pose; `None` where the poses are too few for folds.
+pub(crate) fn fold_error(now: &FitState, fitter: &Fitter) -> Option<f64> {
+    let session = now.session(fitter);
+    let folds = folds(now, fitter)?;
+    let errors = session.without_each(&folds, fitter.scale);
+    Some(rms(&session, &folds, &errors))
+}
+
+/// From the errors of each fold's rows.
+fn rms(session: &Session, folds: &[Vec<usize>], errors: &[Vec<f64>]) -> f64 {
+    let errors = gather(session.data, session.rows, folds, errors);
+    let squares = errors.iter().map(|error| error * error);
+    (squares.sum::<f64>() / errors.len() as f64).sqrt()
+}

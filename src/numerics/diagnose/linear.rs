@@ -1,0 +1,84 @@
+//! Dense linear algebra on columns that are stored one after another.
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+use nalgebra::DMatrix;
+
+/// Takes off a column what it has of another one of unit length.
+pub(crate) fn subtract(column: &mut [f64], other: &[f64]) {
+    let share = dot(column, other);
+    let each = column.iter_mut().zip(other);
+    each.for_each(|(value, other)| *value -= share * other);
+}
+
+/// Scales a column to unit length; returns the length that it had.
+pub(crate) fn scale(column: &mut [f64]) -> f64 {
+    let length = dot(column, column).sqrt();
+    let each = column.iter_mut();
+    each.for_each(|value| *value /= length.max(1e-300));
+    length
+}
+
+/// An orthonormal basis of the columns of `matrix`, which are scaled to unit length first.
+pub(crate) fn orthonormal(matrix: &Mat<f64>) -> Mat<f64> {
+    let norm = |j: usize| matrix.col(j).norm_l2().max(1e-300);
+    let scale: Vec<f64> = (0..matrix.ncols()).map(norm).collect();
+    let scaled = Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
+        matrix[(i, j)] / scale[j]
+    });
+    scaled.qr().compute_thin_Q()
+}
+
+/// Removes from columns (one after another) what lies in the span of an orthonormal basis.
+pub(crate) fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {
+    let rows = basis.nrows();
+    let count = columns.len() / rows.max(1);
+    if basis.ncols() == 0 || count == 0 {
+        return;
+    }
+    let mut share = Mat::zeros(basis.ncols(), count);
+    let mut columns = MatMut::from_column_major_slice_mut(columns, rows, count);
+    let (out, transposed) = (share.as_mut(), basis.transpose());
+    matmul(
+        out,
+        Accum::Replace,
+        transposed,
+        columns.as_ref(),
+        1.0,
+        Par::Seq,
+    );
+    let (out, share) = (columns.as_mut(), share.as_ref());
+    matmul(out, Accum::Add, basis, share, -1.0, Par::Seq);
+}
+
+/// Transpose of `a` times `b`; where one has fewer rows the others count as zero.
+pub(crate) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
+    let rows = a.nrows().min(b.nrows());
+    let (a, b) = (a.subrows(0, rows), b.subrows(0, rows));
+    let mut products = DMatrix::zeros(a.ncols(), b.ncols());
+    let out = MatMut::from_column_major_slice_mut(products.as_mut_slice(), a.ncols(), b.ncols());
+    matmul(out, Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
+    products
+}
+
+/// A matrix of one library as the other one sees it.
+pub(crate) fn view(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
+    MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
+}
+
+/// The mean of squares; 0 of none.
+pub(crate) fn mean_square(values: &[f64]) -> f64 {
+    values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64
+}
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Four sums: the compiler may not reorder one.
+    let (mut sums, chunks) = ([0.0; 4], a.len() / 4);
+    for k in 0..chunks {
+        for lane in 0..4 {
+            sums[lane] += a[4 * k + lane] * b[4 * k + lane];
+        }
+    }
+    let tail: f64 = (4 * chunks..a.len()).map(|k| a[k] * b[k]).sum();
+    sums[0] + sums[1] + sums[2] + sums[3] + tail
+}
