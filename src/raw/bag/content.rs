@@ -84,10 +84,9 @@ pub fn bag_content(source: Box<dyn InputSource>, label: &str) -> Result<BagConte
         let seen = found.entry(name.clone());
         seen.or_insert_with(|| unseen(name, topic));
     }
-    let loss = (!messages.losses.is_empty()).then(|| messages.losses.join("; "));
     Ok(BagContent {
         topics: found.into_values().collect(),
-        loss,
+        loss: messages.loss(),
         source: messages.source.into_inner(),
     })
 }
