@@ -2,9 +2,9 @@
 
 use super::emit;
 use crate::error::{Error, Result};
-use crate::init::{InitRequest, RobotFileKind, StarterFiles, TYPICAL, start};
+use crate::init::{InitRequest, StarterFiles, TYPICAL, start, typical};
 use crate::raw::ending;
-use crate::robot::LIBRARY;
+use crate::robot::{LIBRARY, LibraryArm};
 use crate::text::filled;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -29,7 +29,7 @@ pub(super) struct InitArguments {
     ///
     /// Without it the robot.yaml of the folder; where there is none, the first typical one.
     #[arg(long, value_name = "ARM", value_parser = kinds())]
-    robot: Option<RobotFileKind>,
+    robot: Option<&'static LibraryArm>,
     /// Takes the robot from this URDF instead, or says where the URDF lies that the folder's robot.yaml refers to
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
@@ -48,15 +48,18 @@ const EXAMPLES: &str = "Examples:
   calib init --robot seven";
 
 /// Typical robots as values of an option, each with its line of help; arms of the library are taken by name and listed by `calib robots`.
-fn kinds() -> impl TypedValueParser<Value = RobotFileKind> {
-    let typical = TYPICAL
+fn kinds() -> impl TypedValueParser<Value = &'static LibraryArm> {
+    let typicals = TYPICAL
         .iter()
-        .map(|arm| PossibleValue::new(arm.name).help(arm.help));
+        .map(|(arm, help)| PossibleValue::new(arm.name).help(*help));
     let arms = LIBRARY
         .iter()
         .map(|arm| PossibleValue::new(arm.name).hide(true));
-    PossibleValuesParser::new(typical.chain(arms))
-        .try_map(|name| RobotFileKind::find(&name).ok_or("no such arm"))
+    PossibleValuesParser::new(typicals.chain(arms)).try_map(|name| {
+        typical(&name)
+            .or_else(|| LibraryArm::find(&name))
+            .ok_or("no such arm")
+    })
 }
 
 impl InitArguments {
@@ -166,7 +169,7 @@ fn closing(arguments: &InitArguments, start: &StarterFiles, files: &[PathBuf; 2]
         |(path, account): &(PathBuf, String)| (path.display().to_string(), account.clone());
     let first = match (&start.robot, arguments.robot, &arguments.urdf) {
         (None, ..) => "see that it is the robot of these recordings",
-        (_, Some(RobotFileKind::Arm(_)), _) => {
+        (_, Some(arm), _) if typical(arm.name).is_none() => {
             "the arm's own numbers; put the measured point where it says REPLACE"
         }
         (.., None) => "put your robot's numbers where it says REPLACE",

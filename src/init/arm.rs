@@ -40,24 +40,16 @@ impl StartingArm {
             return Self::there(request, &file);
         }
         let Some(urdf) = request.urdf else {
-            return Self::to_start_from(
-                request.robot.unwrap_or(RobotFileKind::Typical(&TYPICAL[0])),
-            );
+            return Self::to_start_from(request.robot.unwrap_or(&TYPICAL[0].0));
         };
         let (label, text) = read(urdf)?;
         let UrdfOutline {
             base,
             sliding,
             notes,
-        } = urdf_outline(
-            RobotFileText {
-                label: &label,
-                text: &text,
-            },
-            request.tip,
-        )?;
-        let chain = format!(
-            "the chain from `{base}` to `{}` has {}",
+        } = urdf_outline(file_text(&label, &text), request.tip)?;
+        let other = format!(
+            "the chain from `{base}` to `{}` has {}, the recording {{}}; name the last link that moves, or one fixed to it",
             request.tip,
             counted(sliding.len(), "joint")
         );
@@ -67,12 +59,7 @@ impl StartingArm {
             sliding,
             counting: None,
             notes,
-            other: (
-                "--tip",
-                format!(
-                    "{chain}, the recording {{}}; name the last link that moves, or one fixed to it"
-                ),
-            ),
+            other: ("--tip", other),
         })
     }
 
@@ -85,68 +72,57 @@ impl StartingArm {
             ));
         }
         let urdf = request.urdf.map(read).transpose()?;
-        let urdf = urdf
-            .as_ref()
-            .map(|(label, text)| RobotFileText { label, text });
-        let read = read_calib(
-            RobotFileText {
-                label: &label,
-                text: &text,
-            },
-            urdf,
-        )?;
-        let sliding: Vec<bool> = read
-            .robot
-            .joints
-            .iter()
+        let urdf = urdf.as_ref().map(|(label, text)| file_text(label, text));
+        let read = read_calib(file_text(&label, &text), urdf)?;
+        let joints = read.robot.joints.iter();
+        let sliding: Vec<bool> = joints
             .map(|joint| joint.kind == JointKind::Prismatic)
             .collect();
-        let sliding_joints = counted(sliding.len(), "joint");
+        let other = format!(
+            "{label} has {}, the recording {{}}; put the robot of the recording there",
+            counted(sliding.len(), "joint")
+        );
         Ok(Self {
             text: None,
             joints: sliding.len(),
             sliding,
             counting: read.about.counting(),
             notes: Vec::new(),
-            other: (
-                "robot.yaml",
-                format!(
-                    "{label} has {sliding_joints}, the recording {{}}; put the robot of the recording there"
-                ),
-            ),
+            other: ("robot.yaml", other),
         })
     }
 
-    fn to_start_from(kind: RobotFileKind) -> Result<Self> {
-        let (joints, name) = (kind.joints()?, kind.name());
+    fn to_start_from(arm: &LibraryArm) -> Result<Self> {
+        let read = arm.read()?;
+        let joints = read.robot.joints.len();
+        let other = format!(
+            "{} has {}, the recording {{}}; choose another kind",
+            arm.name,
+            counted(joints, "joint")
+        );
         Ok(Self {
-            text: Some(kind.text().into()),
+            text: Some(arm.text.into()),
             joints,
             sliding: Vec::new(),
-            counting: kind.counting()?,
+            counting: read.about.counting(),
             notes: Vec::new(),
-            other: (
-                "--robot",
-                format!(
-                    "{name} has {}, the recording {{}}; choose another kind",
-                    counted(joints, "joint")
-                ),
-            ),
+            other: ("--robot", other),
         })
     }
 
     /// Fails unless a recording has as many joints.
     pub(crate) fn agrees(&self, joints: usize) -> Result<()> {
         let (place, message) = &self.other;
-        if joints == self.joints {
-            Ok(())
-        } else {
-            Err(Error::spec(
-                *place,
-                message.replace("{}", &joints.to_string()),
-            ))
-        }
+        let message = message.replace("{}", &joints.to_string());
+        let agrees = joints == self.joints;
+        agrees
+            .then_some(())
+            .ok_or_else(|| Error::spec(*place, message))
     }
+}
+
+fn file_text<'t>(label: &'t str, text: &'t str) -> RobotFileText<'t> {
+    RobotFileText { label, text }
 }
 
 fn read(path: &Path) -> Result<(String, String)> {
@@ -164,13 +140,12 @@ const EFFORT: &str = "drivers of ROS state torques or motor currents as effort";
 
 /// Whether the recordings are of torques: each has times, joints, and what drives them, and none has points. Then they are mapped as such.
 pub(super) fn of_torques(found: &mut [ExaminedFile]) -> bool {
-    let driven = |file: &ExaminedFile| {
-        !file.by_joint(TORQUES).is_empty() || !file.by_joint(CURRENTS).is_empty()
+    let driven = |file: &ExaminedFile, listed| !file.by_joint(listed).is_empty();
+    let fits = |file: &ExaminedFile| {
+        let moves = file.has("q") && file.has("time") && !file.has("x");
+        moves && (driven(file, TORQUES) || driven(file, CURRENTS))
     };
-    let moves = |file: &ExaminedFile| {
-        file.get("x").is_none() && file.get("q").is_some() && file.get("time").is_some()
-    };
-    let all = !found.is_empty() && found.iter().all(|file| moves(file) && driven(file));
+    let all = !found.is_empty() && found.iter().all(fits);
     if all {
         found.iter_mut().for_each(ExaminedFile::drives);
     }
@@ -185,13 +160,12 @@ impl ExaminedFile {
         };
         let others = [TORQUES, CURRENTS, VELOCITIES];
         let part = |column: usize| {
-            let name = &self.stated[column];
-            let named = || {
-                let (stem, joints) = (name.stem(), NAMED_JOINTS[2]);
-                let joint = joints.iter().position(|joint| stem.contains(joint))?;
-                Some((stem.replace(joints[joint], "#"), joint))
-            };
-            named().or_else(|| name.joint())
+            let (name, joints) = (&self.stated[column], NAMED_JOINTS[2]);
+            let stem = name.stem();
+            match joints.iter().position(|joint| stem.contains(joint)) {
+                Some(joint) => Some((stem.replace(joints[joint], "#"), joint)),
+                None => name.joint(),
+            }
         };
         let has = |key: &str, list| key.split(['_', '#']).any(|word| lists(list, word));
         let is_meant = |key: &str| {
@@ -200,8 +174,9 @@ impl ExaminedFile {
         };
         let numeric = (0..self.stated.len()).filter(|column| self.sheet.is_numeric(*column));
         let parts = numeric.filter_map(|column| Some((column, part(column)?)));
-        let runs = numbered(parts.filter(|(_, (key, _))| is_meant(key))).into_iter();
+        let runs = numbered(parts.filter(|(_, (key, _))| is_meant(key)));
         let mut rows: Vec<(bool, Vec<usize>)> = runs
+            .into_iter()
             .filter(|(_, run)| run.len() >= count)
             .map(|(key, run)| (has(&key, WANTED), run[..count].to_vec()))
             .collect();
@@ -214,25 +189,14 @@ impl ExaminedFile {
             .retain(|mapping| WITH_TORQUES.contains(&mapping.quantity));
         let [torques, currents, velocities] =
             [TORQUES, CURRENTS, VELOCITIES].map(|listed| self.by_joint(listed));
-        let degrees = self
-            .get("q")
-            .is_some_and(|joints| joints.choices[0].lines[0].contains("unit: deg"));
+        let joints = self.get("q").map(|joints| &joints.choices[0].lines[0]);
+        let degrees = joints.is_some_and(|line| line.contains("unit: deg"));
         if let Some(best) = torques.first() {
-            let unit = self.stated[best[0]].unit_of(&["Nm"]);
-            let effort = self.stated[best[0]]
-                .words
-                .iter()
-                .any(|word| word.starts_with("effort"));
-            let check = [
-                unit.is_none().then_some("the unit"),
-                Some(if effort { EFFORT } else { OF_MOTORS }),
-            ];
-            self.drive(
-                "torque",
-                &torques,
-                "Nm",
-                check.into_iter().flatten().collect(),
-            );
+            let name = &self.stated[best[0]];
+            let is_stated = name.unit_of(&["Nm"]).is_some();
+            let effort = name.words.iter().any(|word| word.starts_with("effort"));
+            let more = if effort { EFFORT } else { OF_MOTORS };
+            self.drive("torque", &torques, "Nm", is_stated, Some(more));
             if let (true, Some(mapping)) = (effort, self.mappings.last_mut()) {
                 let as_current = |line: &String| {
                     line.replacen("torque:", "current:", 1)
@@ -248,115 +212,80 @@ impl ExaminedFile {
                 "current",
                 &currents,
                 unit.unwrap_or("A"),
-                unit.is_none().then_some("the unit").into_iter().collect(),
+                unit.is_some(),
+                None,
             );
             if !torques.is_empty() {
                 self.drop("current", "torques are mapped; one of the two is used");
             }
         }
         if let Some(best) = velocities.first() {
-            let is_stated = |unit: &str| self.stated[best[0]].words.iter().any(|word| word == unit);
-            let named = is_stated("deg") || is_stated("rad");
-            let unit = if is_stated("deg") || (degrees && !named) {
-                "deg/s"
-            } else {
-                "rad/s"
+            let has = |unit: &str| self.stated[best[0]].words.iter().any(|word| word == unit);
+            let is_stated = has("deg") || has("rad");
+            let unit = match has("deg") || (degrees && !is_stated) {
+                true => "deg/s",
+                false => "rad/s",
             };
-            self.drive(
-                "velocity",
-                &velocities,
-                unit,
-                (!named).then_some("the unit").into_iter().collect(),
-            );
+            self.drive("velocity", &velocities, unit, is_stated, None);
         }
         let trajectories = |column: &usize| lists(TRAJECTORIES, &self.stated[*column].stem());
         let trajectories: Vec<usize> = (0..self.stated.len()).filter(trajectories).collect();
         self.map("trajectory", &trajectories, None, None);
     }
 
-    fn drive(&mut self, quantity: &'static str, rows: &[Vec<usize>], unit: &str, check: Vec<&str>) {
-        let checks = check.into_iter().map(String::from);
+    fn drive(
+        &mut self,
+        quantity: &'static str,
+        rows: &[Vec<usize>],
+        unit: &str,
+        is_stated: bool,
+        more: Option<&str>,
+    ) {
+        let unstated = (!is_stated).then_some("the unit");
+        let checks = unstated.into_iter().chain(more).map(String::from);
         self.propose_joints(quantity, rows, Some(unit), checks, quantity);
     }
 }
 
-/// What a robot file starts from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum RobotFileKind {
-    /// A typical arm, whose numbers are to be replaced.
-    Typical(&'static TypicalArm),
-    /// An arm of the library, as it is.
-    Arm(&'static LibraryArm),
-}
-
-/// A robot file with the numbers of a typical arm.
-#[derive(Debug, PartialEq, Eq)]
-pub(crate) struct TypicalArm {
-    pub(crate) name: &'static str,
-    pub(crate) help: &'static str,
-    pub(crate) text: &'static str,
-}
-
-/// The first is that of `calib init` without `--robot`.
-pub(crate) const TYPICAL: &[TypicalArm] = &[
-    TypicalArm {
-        name: "spherical6",
-        help: "Six joints, the last three axes meet in a point (most industrial arms)",
-        text: include_str!("robots/spherical6.yaml"),
-    },
-    TypicalArm {
-        name: "offset6",
-        help: "Six joints, offset wrist (most cobots)",
-        text: include_str!("robots/offset6.yaml"),
-    },
-    TypicalArm {
-        name: "seven",
-        help: "Seven joints, alternating axes",
-        text: include_str!("robots/seven.yaml"),
-    },
-    TypicalArm {
-        name: "dh6",
-        help: "Six joints as a table of DH parameters",
-        text: include_str!("robots/dh6.yaml"),
-    },
+/// Robot files with the numbers of typical arms, which are to be replaced, each with its line of help. The first is that of `calib init` without
+/// `--robot`.
+pub(crate) const TYPICAL: &[(LibraryArm, &str)] = &[
+    (
+        LibraryArm {
+            name: "spherical6",
+            text: include_str!("robots/spherical6.yaml"),
+        },
+        "Six joints, the last three axes meet in a point (most industrial arms)",
+    ),
+    (
+        LibraryArm {
+            name: "offset6",
+            text: include_str!("robots/offset6.yaml"),
+        },
+        "Six joints, offset wrist (most cobots)",
+    ),
+    (
+        LibraryArm {
+            name: "seven",
+            text: include_str!("robots/seven.yaml"),
+        },
+        "Seven joints, alternating axes",
+    ),
+    (
+        LibraryArm {
+            name: "dh6",
+            text: include_str!("robots/dh6.yaml"),
+        },
+        "Six joints as a table of DH parameters",
+    ),
 ];
 
-impl RobotFileKind {
-    /// By its name on the command line.
-    pub(crate) fn find(name: &str) -> Option<Self> {
-        let typical = TYPICAL.iter().find(|arm| arm.name == name);
-        let library = || LibraryArm::find(name).map(Self::Arm);
-        typical.map(Self::Typical).or_else(library)
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Typical(arm) => arm.name,
-            Self::Arm(arm) => arm.name,
-        }
-    }
-
-    fn text(self) -> &'static str {
-        match self {
-            Self::Typical(arm) => arm.text,
-            Self::Arm(arm) => arm.text,
-        }
-    }
-
-    fn joints(self) -> Result<usize> {
-        match self {
-            Self::Typical(arm) => Ok(arm.text.matches("\n  - {name: ").count()),
-            Self::Arm(arm) => Ok(arm.read()?.robot.joints.len()),
-        }
-    }
-
-    /// How the arm's controller counts its joints, as settings of `q`, where it differs from the robot file.
-    fn counting(self) -> Result<Option<String>> {
-        match self {
-            Self::Typical(_) => Ok(None),
-            Self::Arm(arm) => Ok(arm.read()?.about.counting()),
-        }
-    }
+/// The typical arm of that name.
+pub(crate) fn typical(name: &str) -> Option<&'static LibraryArm> {
+    TYPICAL
+        .iter()
+        .map(|(arm, _)| arm)
+        .find(|arm| arm.name == name)
 }
 
 /// A robot file on a URDF.

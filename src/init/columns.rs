@@ -2,11 +2,12 @@
 //!
 //! Which columns are the measured point: of a target, its difference, a nominal point and a measured one only the last is.
 
+use crate::error::first_of;
 use crate::init::names;
 use crate::init::names::{Name, pattern};
 use crate::init::sheet::{Sheet, number};
 use crate::yaml::quoted;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Columns that are named where they are not used.
@@ -31,11 +32,10 @@ pub(super) struct Choice {
 
 impl Choice {
     pub(crate) fn of(lines: Vec<String>, columns: Vec<usize>) -> Self {
-        let targets = None;
         Self {
             lines,
             columns,
-            targets,
+            targets: None,
         }
     }
 }
@@ -104,27 +104,28 @@ impl ExaminedFile {
             .find(|mapping| mapping.quantity == quantity)
     }
 
+    pub(crate) fn has(&self, quantity: &str) -> bool {
+        self.get(quantity).is_some()
+    }
+
+    /// How many columns of joints it has, where it has some.
+    pub(crate) fn joint_count(&self) -> Option<usize> {
+        Some(self.get("q")?.choices[0].columns.len())
+    }
+
     /// Takes a quantity out and leaves it as a remark.
     pub(crate) fn drop(&mut self, quantity: &str, why: &str) {
         let is_it = |mapping: &Mapping| mapping.quantity == quantity;
         let Some(at) = self.mappings.iter().position(is_it) else {
             return;
         };
-        let dropped = self.mappings.remove(at);
-        let lines = |choice: &Choice| {
-            choice
-                .targets
-                .iter()
-                .chain(&choice.lines)
-                .cloned()
-                .collect()
-        };
-        let mut lines: Vec<String> = dropped.choices.first().map(lines).unwrap_or_default();
-        lines
-            .iter_mut()
-            .take(1)
-            .for_each(|line| line.push_str(&format!("   # CHECK: {why}")));
-        self.remarks.extend(lines);
+        let first = self.mappings.remove(at).choices.into_iter().next();
+        let lines = first.map(|choice| choice.targets.into_iter().chain(choice.lines));
+        let first = self.remarks.len();
+        self.remarks.extend(lines.into_iter().flatten());
+        if let Some(line) = self.remarks.get_mut(first) {
+            line.push_str(&format!("   # CHECK: {why}"));
+        }
     }
 
     pub(crate) fn account(&self) -> String {
@@ -136,19 +137,10 @@ impl ExaminedFile {
             .cloned()
             .collect();
         parts.extend(self.mappings.iter().map(|mapping| mapping.account.clone()));
-        let unused = (0..self.stated.len())
-            .filter(|column| !self.is_taken(*column))
-            .collect::<Vec<usize>>();
+        let unused = (0..self.stated.len()).filter(|column| !self.is_taken(*column));
+        let unused: Vec<&str> = unused.map(|column| &*self.sheet.names[column]).collect();
         if !unused.is_empty() && self.sheet.trouble.is_none() {
-            let more = if unused.len() > MOST_NAMED {
-                format!(" and {} more", unused.len() - MOST_NAMED)
-            } else {
-                String::new()
-            };
-            parts.push(format!(
-                "not used: {}{more}",
-                self.shown(&unused[..unused.len().min(MOST_NAMED)])
-            ));
+            parts.push(format!("not used: {}", first_of(&unused, MOST_NAMED)));
         }
         parts.join("; ")
     }
@@ -179,15 +171,10 @@ impl ExaminedFile {
 
     /// Adds a setting to a quantity's line.
     pub(crate) fn add(&mut self, quantity: &str, setting: &str) {
-        let mapping = self
-            .mappings
-            .iter_mut()
-            .find(|mapping| mapping.quantity == quantity);
-        for line in mapping
-            .into_iter()
-            .flat_map(|mapping| &mut mapping.choices)
-            .flat_map(|choice| &mut choice.lines)
-        {
+        let mut mappings = self.mappings.iter_mut();
+        let mapping = mappings.find(|mapping| mapping.quantity == quantity);
+        let choices = mapping.into_iter().flat_map(|mapping| &mut mapping.choices);
+        for line in choices.flat_map(|choice| &mut choice.lines) {
             if let Some(open) = line.strip_suffix('}') {
                 *line = format!("{open}, {setting}}}");
             }
@@ -195,12 +182,8 @@ impl ExaminedFile {
     }
 
     pub(crate) fn is_taken(&self, column: usize) -> bool {
-        self.mappings.iter().any(|mapping| {
-            mapping
-                .choices
-                .first()
-                .is_some_and(|choice| choice.columns.contains(&column))
-        })
+        let mut used = self.mappings.iter().filter_map(|one| one.choices.first());
+        used.any(|choice| choice.columns.contains(&column))
     }
 
     /// A column as the pipeline names it: by its number where the name is not its alone.
@@ -214,19 +197,18 @@ impl ExaminedFile {
         }
     }
 
+    fn names_of(&self, columns: &[usize]) -> Vec<&str> {
+        let columns = columns.iter();
+        columns.map(|column| &*self.sheet.names[*column]).collect()
+    }
+
     pub(crate) fn shown(&self, columns: &[usize]) -> String {
-        columns
-            .iter()
-            .map(|column| self.sheet.names[*column].as_str())
-            .collect::<Vec<_>>()
-            .join(", ")
+        self.names_of(columns).join(", ")
     }
 
     pub(crate) fn line(&self, quantity: &str, column: usize, unit: Option<&str>) -> String {
-        let unit = unit
-            .map(|unit| format!(", unit: {unit}"))
-            .unwrap_or_default();
-        format!("{quantity}: {{column: {}{unit}}}", self.reference(column))
+        let (column, unit) = (self.reference(column), in_unit(unit));
+        format!("{quantity}: {{column: {column}{unit}}}")
     }
 
     pub(crate) fn lines(
@@ -242,10 +224,8 @@ impl ExaminedFile {
 
     /// Columns as a list of the pipeline.
     pub(crate) fn references(&self, columns: &[usize]) -> String {
-        let all: Vec<String> = columns
-            .iter()
-            .map(|column| self.reference(*column))
-            .collect();
+        let columns = columns.iter();
+        let all: Vec<String> = columns.map(|column| self.reference(*column)).collect();
         format!("[{}]", all.join(", "))
     }
 
@@ -279,28 +259,17 @@ impl ExaminedFile {
         columns: &[usize],
         unit: Option<&str>,
     ) -> String {
-        let unit = unit
-            .map(|unit| format!(", unit: {unit}"))
-            .unwrap_or_default();
-        let names: Vec<&str> = columns
-            .iter()
-            .map(|column| self.sheet.names[*column].as_str())
-            .collect();
-        let alone = columns
-            .iter()
-            .all(|column| self.reference(*column).starts_with('"'));
+        let (unit, names) = (in_unit(unit), self.names_of(columns));
+        let alone = |column: &usize| self.reference(*column).starts_with('"');
         // A pattern stands for all that are called so.
-        let more = |pattern: &String| {
-            self.named
-                .contains_key(&pattern.replace("{j}", &(names.len() + 1).to_string()))
+        let next = (names.len() + 1).to_string();
+        let more = |pattern: &String| self.named.contains_key(&pattern.replace("{j}", &next));
+        let pattern = pattern(&names).filter(|_| columns.iter().all(alone));
+        let columns = match pattern.filter(|pattern| !more(pattern)) {
+            Some(pattern) => format!("column: {}", quoted(&pattern)),
+            None => format!("columns: {}", self.references(columns)),
         };
-        match pattern(&names).filter(|pattern| alone && !more(pattern)) {
-            Some(pattern) => format!("{quantity}: {{column: {}{unit}}}", quoted(&pattern)),
-            None => format!(
-                "{quantity}: {{columns: {}{unit}}}",
-                self.references(columns)
-            ),
-        }
+        format!("{quantity}: {{{columns}{unit}}}")
     }
 
     /// Proposes rows of columns, one column a joint, best first.
@@ -313,25 +282,18 @@ impl ExaminedFile {
         what: &str,
     ) {
         let choice = |columns: &Vec<usize>| {
-            Choice::of(
-                vec![self.joints_line(quantity, columns, unit)],
-                columns.clone(),
-            )
+            let line = self.joints_line(quantity, columns, unit);
+            Choice::of(vec![line], columns.clone())
         };
         let choices: Vec<Choice> = rows.iter().map(choice).collect();
         let ends = [rows[0].first(), rows[0].last()].into_iter().flatten();
-        let ends: Vec<&str> = ends
-            .map(|column| self.sheet.names[*column].as_str())
-            .collect();
-        let account = format!("{what} ({})", ends.join(" to "));
+        let ends: Vec<usize> = ends.copied().collect();
+        let account = format!("{what} ({})", self.names_of(&ends).join(" to "));
         self.propose(quantity, choices, checks, account);
     }
 
     pub(crate) fn distinct(&self, column: usize) -> usize {
-        self.sheet
-            .texts(column)
-            .collect::<std::collections::BTreeSet<_>>()
-            .len()
+        self.sheet.texts(column).collect::<BTreeSet<_>>().len()
     }
 
     /// Columns that may name points by their header, whole, best first: texts before numbers, each of different cells.
@@ -354,6 +316,11 @@ impl ExaminedFile {
         columns.retain(|column| Some(rank(*column)) == best);
         columns
     }
+}
+
+/// The setting behind a column, where there is one.
+fn in_unit(unit: Option<&str>) -> String {
+    unit.map_or_else(String::new, |unit| format!(", unit: {unit}"))
 }
 
 /// Columns of x, y and z under one name, and what the name says of them.
@@ -439,13 +406,6 @@ fn role(words: &[String]) -> PointRole {
 /// The measured point among them.
 pub(super) fn points(names: &[Name]) -> Points {
     let mut families = families(names);
-    let of_families = |families: &[Family], role: PointRole| -> Vec<Family> {
-        families
-            .iter()
-            .filter(|family| family.role == role)
-            .cloned()
-            .collect()
-    };
     // `x_t` next to `x_dif` is the target; alone it may be the tracker's.
     let others = families
         .iter()
@@ -462,16 +422,17 @@ pub(super) fn points(names: &[Name]) -> Points {
         PointRole::Difference,
         PointRole::Sigma,
     ]
-    .map(|role| of_families(&families, role));
-    let direct = |family: &Family| PointColumns {
+    .map(|role| -> Vec<&Family> {
+        let of_role = families.iter().filter(|family| family.role == role);
+        of_role.collect()
+    });
+    let direct = |family: &&Family| PointColumns {
         columns: family.columns,
         difference: None,
     };
     let by = |target: &Family, difference: &Family| {
-        let minus = difference
-            .words
-            .iter()
-            .any(|word| names::lists(names::TARGET_LESS_MEASURED, word));
+        let mut words = difference.words.iter();
+        let minus = words.any(|word| names::lists(names::TARGET_LESS_MEASURED, word));
         PointColumns {
             columns: target.columns,
             difference: Some((difference.columns, minus)),
@@ -503,26 +464,20 @@ pub(super) fn points(names: &[Name]) -> Points {
             found.question = Some("is this the measured point, or the target?".into());
         }
     } else if candidates.is_empty()
-        && let (Some(target), Some(difference)) = (wanted.first(), differences.first())
+        && let (Some(target), false) = (wanted.first(), differences.is_empty())
     {
-        found.ways = vec![by(target, difference)];
+        let ways = differences.iter().map(|difference| by(target, difference));
+        found.ways = ways.collect();
         found.question = Some(format!(
             "the measured point by its target and the difference ({sides})"
         ));
-        found.ways.extend(
-            differences
-                .iter()
-                .skip(1)
-                .map(|difference| by(target, difference)),
-        );
     }
     found
 }
 
 /// Several points whose names differ in a number, or in a letter behind a word, alone: `X1` and `X2`, `SMR1_x` and `SMR2_x`.
-fn targets(candidates: &[Family]) -> Vec<(String, [usize; 3])> {
-    let mut named = Vec::new();
-    let mut stems = Vec::new();
+fn targets(candidates: &[&Family]) -> Vec<(String, [usize; 3])> {
+    let (mut named, mut stems) = (Vec::new(), Vec::new());
     for family in candidates {
         // In the order of the name: the words of a family are sorted, and numbers come first.
         let mut words: Vec<&str> = family.words.iter().map(String::as_str).collect();
@@ -532,28 +487,18 @@ fn targets(candidates: &[Family]) -> Vec<(String, [usize; 3])> {
         let letter = name
             .strip_suffix(|c: char| c.is_ascii_alphabetic())
             .filter(|stem| stem.len() > 1);
-        let stem = if stem.len() < name.len() {
-            Some(stem)
-        } else {
-            letter
-        };
-        let Some(stem) = stem.map(String::from) else {
+        let stem = Some(stem).filter(|stem| stem.len() < name.len());
+        let Some(stem) = stem.or(letter).map(String::from) else {
             return Vec::new();
         };
-        named.push((
-            if stem.is_empty() {
-                format!("target_{name}")
-            } else {
-                name
-            },
-            family.columns,
-        ));
+        let name = match stem.as_str() {
+            "" => format!("target_{name}"),
+            _ => name,
+        };
+        named.push((name, family.columns));
         stems.push(stem);
     }
-    let is_one = |(k, (name, _)): (usize, &(String, [usize; 3]))| {
-        named[..k].iter().all(|(other, _)| other != name)
-    };
-    let alike =
-        stems.windows(2).all(|pair| pair[0] == pair[1]) && named.iter().enumerate().all(is_one);
+    let names: BTreeSet<&String> = named.iter().map(|(name, _)| name).collect();
+    let alike = stems.windows(2).all(|pair| pair[0] == pair[1]) && names.len() == named.len();
     if alike { named } else { Vec::new() }
 }

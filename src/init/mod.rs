@@ -9,10 +9,11 @@ mod quantities;
 mod sheet;
 mod together;
 
-pub(crate) use arm::{RobotFileKind, TYPICAL};
+pub(crate) use arm::{TYPICAL, typical};
 pub(crate) use pipeline::{MarkedLines, marked};
 
 use crate::error::{Error, Result};
+use crate::robot::LibraryArm;
 use arm::StartingArm;
 use columns::ExaminedFile;
 use pipeline::missing;
@@ -25,7 +26,7 @@ pub(crate) struct InitRequest<'a> {
     /// Recordings: one file, or the controller's and the tracker's.
     pub(crate) data: &'a [PathBuf],
     /// The kind to start from; none where nobody asked for one: the folder's own robot.yaml, else the first kind.
-    pub(crate) robot: Option<RobotFileKind>,
+    pub(crate) robot: Option<&'static LibraryArm>,
     /// The robot instead, and its last link; of a robot.yaml that is there the URDF that it refers to.
     pub(crate) urdf: Option<&'a Path>,
     /// Last link of the chain in the URDF.
@@ -55,12 +56,10 @@ pub(crate) fn start(request: &InitRequest) -> Result<StarterFiles> {
     // Joints and points may stand in two sheets of one workbook.
     let places = if request.data.len() == 1 { 2 } else { 1 };
     let arm = StartingArm::of(request)?;
-    let tables = request
-        .data
-        .iter()
-        .map(|path| examine(path, places, arm.joints))
-        .collect::<Result<Vec<_>>>()?;
-    let mut found: Vec<ExaminedFile> = tables.into_iter().flatten().collect();
+    let mut found: Vec<ExaminedFile> = Vec::new();
+    for path in request.data {
+        found.extend(examine(path, places, arm.joints)?);
+    }
     let of_torques = arm::of_torques(&mut found);
     let more = together::other_reflectors(&mut found);
     if found.len() > 2 && !of_torques && !found.iter().all(together::is_whole) {
@@ -71,11 +70,7 @@ pub(crate) fn start(request: &InitRequest) -> Result<StarterFiles> {
         );
         return Err(Error::spec("--data", message));
     }
-    let joints = found
-        .iter()
-        .filter_map(|file| file.get("q"))
-        .map(|joints| joints.choices[0].columns.len())
-        .max();
+    let joints = found.iter().filter_map(ExaminedFile::joint_count).max();
     joints.map_or(Ok(()), |joints| arm.agrees(joints))?;
     let pipeline = if of_torques {
         pipeline::of_torques(request, &found, &arm)
@@ -84,25 +79,20 @@ pub(crate) fn start(request: &InitRequest) -> Result<StarterFiles> {
         joined.extend(pipeline::later(request.folder, &found, &more));
         pipeline::text(request, &found, (&joined, &arm))
     };
-    let unknown = ["columns of joints", "the measured point"]
-        .into_iter()
-        .zip(missing(&found));
+    let is_asked = !found.is_empty() && !of_torques;
+    let unknown = ["columns of joints", "the measured point"];
+    let unknown = unknown.into_iter().zip(missing(&found));
+    let files = found.iter().chain(more.iter().map(|(_, file)| file));
     Ok(StarterFiles {
         robot: arm.text,
         pipeline,
-        accounts: found
-            .iter()
-            .chain(more.iter().map(|(_, file)| file))
+        accounts: files
             .map(|file| (file.path.clone(), file.account()))
             .collect(),
-        missing: if found.is_empty() || of_torques {
-            Vec::new()
-        } else {
-            unknown
-                .filter(|(_, missing)| *missing)
-                .map(|(what, _)| what)
-                .collect()
-        },
+        missing: unknown
+            .filter(|(_, missing)| *missing && is_asked)
+            .map(|(what, _)| what)
+            .collect(),
         notes: arm.notes,
     })
 }

@@ -20,13 +20,10 @@ impl Name {
     pub(crate) fn of(text: &str) -> Self {
         let lower = text.trim().to_lowercase();
         let Header { stem, unit, ending } = Header::of(&lower);
-        let words = stem
-            .split(|c: char| !c.is_alphanumeric())
-            .filter(|word| !word.is_empty())
-            .map(str::to_string)
-            .collect();
+        let words = stem.split(|c: char| !c.is_alphanumeric());
+        let words = words.filter(|word| !word.is_empty());
         Self {
-            words,
+            words: words.map(str::to_string).collect(),
             unit: unit.map(Unit::symbol),
             ending: ending.map(str::to_string),
         }
@@ -42,71 +39,46 @@ impl Name {
 
     /// Whether the name is one of these, or one of them begins or ends it as a word of its own.
     pub(crate) fn is(&self, list: &str) -> bool {
-        let listed = |text: &str| lists(list, text);
         // A letter alone says little beside other words: `x_t` is no time.
-        let mut ends = [self.words.first(), self.words.last()]
-            .into_iter()
-            .flatten()
-            .filter(|word| word.len() > 1);
-        listed(&self.stem()) || ends.any(|word| listed(word))
+        let is_end =
+            |word: Option<&String>| word.is_some_and(|word| word.len() > 1 && lists(list, word));
+        lists(list, &self.stem()) || is_end(self.words.first()) || is_end(self.words.last())
     }
 
     /// What the joints are called here, `#` for the number, and which one this is: `q1`, `A1_deg`, `joint_3`, `wrist 4 act [deg]`.
     pub(crate) fn joint(&self) -> Option<(String, usize)> {
-        let at = self
-            .words
-            .iter()
-            .rposition(|word| word.ends_with(|c: char| c.is_ascii_digit()))?;
+        let is_numbered = |word: &String| word.ends_with(|c: char| c.is_ascii_digit());
+        let at = self.words.iter().rposition(is_numbered)?;
         let stem = self.words[at].trim_end_matches(|c: char| c.is_ascii_digit());
         let number: usize = self.words[at][stem.len()..].parse().ok()?;
         let before = self.words[..at].iter().map(String::as_str);
         // Yaskawa's URDFs say both: `joint_1_s`, `joint_2_l`.
         let letter = number.checked_sub(1).and_then(|k| NAMED_JOINTS[0].get(k));
-        let after = self.words[at + 1..]
-            .iter()
-            .map(String::as_str)
-            .filter(|word| Some(word) != letter);
+        let after = self.words[at + 1..].iter().map(String::as_str);
+        let after = after.filter(|word| Some(word) != letter);
         let place = format!("{stem}#");
-        Some((
-            before
-                .chain([place.as_str()])
-                .chain(after)
-                .collect::<Vec<_>>()
-                .join("_")
-                .replace("_#", "#"),
-            number,
-        ))
+        let all: Vec<&str> = before.chain([place.as_str()]).chain(after).collect();
+        Some((all.join("_").replace("_#", "#"), number))
     }
 
     /// The axis (0 to 2) that this is the coordinate of, and what else the name says: `x_ist`, `Goal X`, `dx`, `Xsoll`.
     pub(crate) fn axis(&self) -> Option<(usize, Vec<String>)> {
-        let (at, (axis, more)) = self
-            .words
-            .iter()
-            .enumerate()
-            .find_map(|(at, word)| Some((at, axis(word)?)))?;
-        let others = self
-            .words
-            .iter()
-            .enumerate()
-            .filter(|(k, _)| *k != at)
-            .map(|(_, word)| word.clone());
+        let mut words = self.words.iter().enumerate();
+        let (at, (axis, more)) = words.find_map(|(at, word)| Some((at, axis(word)?)))?;
         let lengthless = self.unit.is_some() && self.unit_of(&LENGTHS).is_none();
         // No length, so that a single letter behind the name is a word: the point A of `x_a`.
         let ending = self
             .ending
-            .clone()
+            .as_ref()
             .filter(|ending| lengthless && ending.len() == 1);
         if lengthless && ending.is_none() {
             return None;
         }
-        Some((
-            axis,
-            others
-                .chain((!more.is_empty()).then(|| more.to_string()))
-                .chain(ending)
-                .collect(),
-        ))
+        let mut others = self.words.clone();
+        others.remove(at);
+        others.extend((!more.is_empty()).then(|| more.to_string()));
+        others.extend(ending.cloned());
+        Some((axis, others))
     }
 }
 
@@ -120,24 +92,18 @@ fn axis(word: &str) -> Option<(usize, &str)> {
             || more.bytes().all(|byte| byte.is_ascii_digit())
             || groups.iter().any(|list| lists(list, more))
     };
-    let named = ["x", "y", "z"]
-        .iter()
-        .enumerate()
-        .find_map(|(axis, letter)| {
-            let more = [word.strip_prefix(letter), word.strip_suffix(letter)]
-                .into_iter()
-                .flatten()
-                .find(|more| known(more))?;
-            Some((axis, more))
-        });
-    named.filter(|(_, more)| more.len() < word.len())
+    let mut axes = ['x', 'y', 'z'].into_iter().enumerate();
+    axes.find_map(|(axis, letter)| {
+        let more = [word.strip_prefix(letter), word.strip_suffix(letter)];
+        let more = more.into_iter().flatten().find(|more| known(more))?;
+        Some((axis, more))
+    })
 }
 
 /// Whether a word says that a numbered column is no joint position.
 fn is_other(word: &str) -> bool {
-    [NO_JOINTS, TORQUES, CURRENTS, VELOCITIES]
-        .iter()
-        .any(|list| lists(list, word))
+    let others = [NO_JOINTS, TORQUES, CURRENTS, VELOCITIES];
+    others.iter().any(|list| lists(list, word))
 }
 
 /// Rows of columns that may be the joints, best first: those of usual names, else those of an arm's `count` that `angle` takes for angles.
@@ -146,10 +112,10 @@ pub(super) fn joints(
     count: usize,
     angle: impl Fn(usize) -> bool,
 ) -> Vec<Vec<usize>> {
-    let mut found: Vec<Vec<usize>> = NAMED_JOINTS
+    let found = NAMED_JOINTS
         .iter()
-        .filter_map(|listed| named(names, listed))
-        .collect();
+        .filter_map(|listed| named(names, listed));
+    let mut found: Vec<Vec<usize>> = found.collect();
     // The letters of a Yaskawa with seven axes hold those of one with six.
     found.sort_by_key(|columns| std::cmp::Reverse(columns.len()));
     found.truncate(1);
@@ -198,13 +164,9 @@ pub(super) fn numbered(
 fn named(names: &[Name], listed: &[&str]) -> Option<Vec<usize>> {
     let letters = listed.iter().all(|name| name.len() == 1);
     let column = |wanted: &&str| {
-        names.iter().position(|name| {
-            let stem = name.stem();
-            if letters {
-                stem == *wanted
-            } else {
-                stem.contains(wanted) && !name.words.iter().any(|word| is_other(word))
-            }
+        names.iter().position(|name| match letters {
+            true => name.stem() == *wanted,
+            false => name.stem().contains(wanted) && !name.words.iter().any(|word| is_other(word)),
         })
     };
     listed.iter().map(column).collect()
@@ -213,20 +175,15 @@ fn named(names: &[Name], listed: &[&str]) -> Option<Vec<usize>> {
 /// How plain a usual name of joints is: 0 for the name and number alone, 1 with `ist` or the like, 2 with `soll` or the like.
 fn usual_name(key: &str) -> Option<usize> {
     const OTHERS: &str = "pos position positions angle angles ang winkel value deg rad data";
-    let mut pieces: Vec<&str> = key
-        .split(['_', '#'])
-        .filter(|word| !word.is_empty() && !lists(OTHERS, word))
-        .collect();
-    let before = pieces.len();
-    pieces.retain(|word| !lists(MEASURED, word));
-    let measured = pieces.len() < before;
-    let before = pieces.len();
-    pieces.retain(|word| !lists(WANTED, word));
-    let wanted = pieces.len() < before;
-    let joined = pieces.join("_");
-    (lists(JOINTS, &joined) && key.contains('#')).then_some(match (measured, wanted) {
-        (_, true) => 2,
-        (true, false) => 1,
+    let pieces = key.split(['_', '#']);
+    let pieces = pieces.filter(|word| !word.is_empty() && !lists(OTHERS, word));
+    let (measured, pieces): (Vec<&str>, Vec<&str>) = pieces.partition(|word| lists(MEASURED, word));
+    let (wanted, pieces): (Vec<&str>, Vec<&str>) =
+        pieces.into_iter().partition(|word| lists(WANTED, word));
+    let is_usual = lists(JOINTS, &pieces.join("_")) && key.contains('#');
+    is_usual.then_some(match (measured.is_empty(), wanted.is_empty()) {
+        (_, false) => 2,
+        (false, true) => 1,
         _ => 0,
     })
 }
@@ -234,16 +191,12 @@ fn usual_name(key: &str) -> Option<usize> {
 /// The names of all joints in one: the 1 that becomes a 2 in the next name, and so on, is the joint's number.
 pub(super) fn pattern(names: &[&str]) -> Option<String> {
     let first = names.first()?;
-    let ones = first
-        .match_indices('1')
-        .map(|(at, _)| format!("{}{{j}}{}", &first[..at], &first[at + 1..]));
-    let fits = |pattern: &String| {
-        names
-            .iter()
-            .enumerate()
-            .all(|(k, name)| pattern.replace("{j}", &(k + 1).to_string()) == *name)
-    };
-    ones.into_iter().find(fits)
+    let ones = first.match_indices('1');
+    let mut patterns = ones.map(|(at, _)| format!("{}{{j}}{}", &first[..at], &first[at + 1..]));
+    patterns.find(|pattern| {
+        let mut named = (1..).zip(names);
+        named.all(|(number, name): (usize, _)| pattern.replace("{j}", &number.to_string()) == *name)
+    })
 }
 
 pub(super) fn lists(list: &str, word: &str) -> bool {

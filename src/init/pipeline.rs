@@ -5,7 +5,7 @@
 use super::InitRequest;
 use super::arm::StartingArm;
 use super::columns::{Choice, ExaminedFile, MOST_NAMED, Mapping};
-use crate::error::one_line;
+use crate::error::{listed, one_line};
 use crate::raw;
 use crate::stage::ingest::instruments;
 use crate::yaml::quoted;
@@ -30,25 +30,18 @@ fn head(request: &InitRequest) -> String {
         .folder
         .canonicalize()
         .unwrap_or_else(|_| request.folder.to_path_buf());
-    let name = folder
-        .file_name()
-        .map(|name| name.to_string_lossy().into_owned());
-    let name: String = name
-        .unwrap_or_default()
-        .chars()
-        .filter(|c| c.is_ascii_alphanumeric() || "_-".contains(*c))
-        .collect();
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let allowed = |c: &char| c.is_ascii_alphanumeric() || "_-".contains(*c);
+    let name: String = name.chars().filter(allowed).collect();
     let name = if name.is_empty() { "cell".into() } else { name };
     let mut out = format!(
         "# A calibration, step by step. `calib check` reports every fault with its line, `calib run` computes what is not yet done.\ncalib: 1\nname: {name}\nseed: 1                 # everything random derives from it\n\nstages:\n"
     );
-    let urdf = request
-        .urdf
-        .as_ref()
-        .map(|path| format!(", urdf: {}", from_folder(request.folder, path)));
+    let urdf = request.urdf.map_or_else(String::new, |path| {
+        format!(", urdf: {}", from_folder(request.folder, path))
+    });
     out.push_str(&format!(
-        "  - uses: robot\n    with: {{file: robot.yaml{}}}\n\n",
-        urdf.unwrap_or_default()
+        "  - uses: robot\n    with: {{file: robot.yaml{urdf}}}\n\n"
     ));
     out + "  # Which column holds what, in which unit. Nothing is guessed when this runs: only what is written here counts.\n"
 }
@@ -71,19 +64,14 @@ pub(super) fn text(
 ) -> String {
     let mut out = head(request) + "  - uses: ingest\n    with:\n      files:\n";
     if found.is_empty() {
-        out.push_str(
-            &EMPTY
-                .lines()
-                .map(|line| counted(line, counting(found, arm).as_deref()) + "\n")
-                .collect::<String>(),
-        );
+        out.push_str(&counted(EMPTY, counting(found, arm).as_deref()));
     }
     out.push_str(&files(request, found, arm, missing(found)));
     joined
         .iter()
         .for_each(|line| out.push_str(&format!("{line}\n")));
     out.push_str(&instrument());
-    let by_usage = found.iter().any(|file| file.get("usage").is_some());
+    let by_usage = found.iter().any(|file| file.has("usage"));
     out.push_str(if by_usage { BY_USAGE } else { EVERY });
     out + STAGES
 }
@@ -108,39 +96,32 @@ fn files(
             point: missing[1] && k + 1 == found.len(),
             count: arm.joints,
         };
-        let text = file_text(file, &lacks);
-        out.push_str(
-            &text
-                .lines()
-                .map(|line| counted(line, counting.as_deref()) + "\n")
-                .collect::<String>(),
-        );
+        out.push_str(&counted(&file_text(file, &lacks), counting.as_deref()));
     }
     out
 }
 
-/// The line of joints with how the arm's controller counts them; any other line as it is.
-fn counted(line: &str, counting: Option<&str>) -> String {
-    let (Some(counting), true) = (
-        counting,
-        line.trim_start()
-            .trim_start_matches("# ")
-            .starts_with("q: {"),
-    ) else {
-        return line.into();
+/// Lines, that of joints with how the arm's controller counts them.
+fn counted(lines: &str, counting: Option<&str>) -> String {
+    let one = |line: &str| {
+        let setting = line.trim_start().trim_start_matches("# ");
+        match counting.filter(|_| setting.starts_with("q: {")) {
+            None => format!("{line}\n"),
+            Some(counting) => {
+                // The map ends at the last brace before a comment: names of columns may hold both.
+                let end = line.find("}   #").unwrap_or(line.len() - 1);
+                format!("{}, {counting}{}\n", &line[..end], &line[end..])
+            }
+        }
     };
-    // The map ends at the last brace before a comment: names of columns may hold both.
-    let end = line.find("}   #").unwrap_or(line.len() - 1);
-    format!("{}, {counting}{}", &line[..end], &line[end..])
+    lines.lines().map(one).collect()
 }
 
 /// What else is to be said of joints, as settings of `q`.
 fn counting(found: &[ExaminedFile], arm: &StartingArm) -> Option<String> {
-    let settings: Vec<String> = linear(found, &arm.sliding)
-        .into_iter()
-        .chain(arm.counting.clone())
-        .collect();
-    Some(settings.join(", ")).filter(|settings| !settings.is_empty())
+    let settings = [linear(found, &arm.sliding), arm.counting.clone()];
+    let settings: Vec<String> = settings.into_iter().flatten().collect();
+    (!settings.is_empty()).then(|| settings.join(", "))
 }
 
 /// The unit of joints that slide, as a setting of `q`: by the first one's name, else by its size.
@@ -168,14 +149,10 @@ pub(super) fn later(
             .join(", ");
         format!("        - {{files: [{files}], target: {}}}", quoted(target))
     };
-    let head =
-        "      later:                  # CHECK: the other reflectors, measured in the same poses"
-            .to_string();
-    (!more.is_empty())
-        .then_some(head)
-        .into_iter()
-        .chain(more.iter().map(line))
-        .collect()
+    const HEAD: &str =
+        "      later:                  # CHECK: the other reflectors, measured in the same poses";
+    let head = more.first().map(|_| HEAD.to_string());
+    head.into_iter().chain(more.iter().map(line)).collect()
 }
 
 /// A line to fill in: nobody but the person knows what measured.
@@ -189,7 +166,7 @@ fn instrument() -> String {
 
 /// Whether no file has columns of joints, or of the measured point.
 pub(super) fn missing(found: &[ExaminedFile]) -> [bool; 2] {
-    ["q", "x"].map(|quantity| found.iter().all(|file| file.get(quantity).is_none()))
+    ["q", "x"].map(|quantity| !found.iter().any(|file| file.has(quantity)))
 }
 
 /// What the user must name in a file.
@@ -233,10 +210,9 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
         put("header: false");
     }
     if sheet.skip > 0 {
+        let (skip, below) = (sheet.skip, if sheet.header { "header" } else { "data" });
         put(&format!(
-            "skip: {}                 # lines above the {}",
-            sheet.skip,
-            if sheet.header { "header" } else { "data" }
+            "skip: {skip}                 # lines above the {below}"
         ));
     }
     if sheet.unit_row {
@@ -249,19 +225,14 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
         put("header_in_comment: true");
     }
     for mapping in &file.mappings {
-        if let Some(line) = mapping
-            .choices
-            .first()
-            .and_then(|choice| choice.targets.as_ref())
-        {
-            put(&format!(
-                "{line}   # CHECK: {}",
-                one_line(mapping.check.as_deref().unwrap_or("is it so?"))
-            ));
+        let first = mapping.choices.first();
+        if let Some(line) = first.and_then(|choice| choice.targets.as_ref()) {
+            let check = one_line(mapping.check.as_deref().unwrap_or("is it so?"));
+            put(&format!("{line}   # CHECK: {check}"));
         }
     }
     put("columns:");
-    for quantity in ORDER {
+    for quantity in ORDER.split(' ') {
         if let Some(mapping) = file.get(quantity) {
             out.push_str(&mapped(mapping));
         }
@@ -272,24 +243,18 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
         .iter()
         .for_each(|remark| put(&format!("# {}", one_line(remark))));
     if sheet.header && sheet.trouble.is_none() {
-        let unused = || {
-            sheet
-                .names
-                .iter()
-                .enumerate()
-                .filter(|(column, _)| !file.is_taken(*column))
-        };
-        let more = unused().count().saturating_sub(MOST_NAMED);
-        for (column, name) in unused().take(MOST_NAMED) {
-            let name = if name.is_empty() {
-                format!("column {}", column + 1)
-            } else {
-                quoted(name)
-            };
-            put(&format!("# not used: {name}"));
+        let names = sheet.names.iter().enumerate();
+        let unused: Vec<(usize, &String)> = names
+            .filter(|(column, _)| !file.is_taken(*column))
+            .collect();
+        for (column, name) in unused.iter().take(MOST_NAMED) {
+            match name.as_str() {
+                "" => put(&format!("# not used: column {}", column + 1)),
+                name => put(&format!("# not used: {}", quoted(name))),
+            }
         }
-        if more > 0 {
-            put(&format!("# not used: {more} more"));
+        if unused.len() > MOST_NAMED {
+            put(&format!("# not used: {} more", unused.len() - MOST_NAMED));
         }
     } else {
         (0..sheet.names.len().min(MOST_NAMED))
@@ -298,35 +263,19 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     out
 }
 
-const ORDER: [&str; 13] = [
-    "point_id",
-    "time",
-    "trajectory",
-    "q",
-    "usage",
-    "target",
-    "torque",
-    "current",
-    "direction",
-    "velocity",
-    "x",
-    "payload",
-    "temperature",
-];
+const ORDER: &str = "point_id time trajectory q usage target torque current direction velocity x payload temperature";
 
 /// A mapping with what else may stand for it.
 fn mapped(mapping: &Mapping) -> String {
     let mut out = String::new();
-    let check = |why: &str| format!("   # CHECK: {}", one_line(why));
     for (k, Choice { lines, .. }) in mapping.choices.iter().enumerate() {
-        let mark = match (k, &mapping.check) {
-            (0, Some(why)) => check(why),
-            (0, None) => String::new(),
-            _ => check("or this"),
+        let (comment, why) = match k {
+            0 => ("", mapping.check.as_deref()),
+            _ => ("# ", Some("or this")),
         };
-        for (n, line) in lines.iter().enumerate() {
-            let comment = if k > 0 { "# " } else { "" };
-            let mark = if n == 0 { mark.as_str() } else { "" };
+        let mut why = why.map(|why| format!("   # CHECK: {}", one_line(why)));
+        for line in lines {
+            let mark = why.take().unwrap_or_default();
             out.push_str(&format!("            {comment}{line}{mark}\n"));
         }
     }
@@ -341,19 +290,17 @@ fn lacking(file: &ExaminedFile, lacks: &Lacks, put: &mut impl FnMut(&str)) {
             "q: {column: \"A{j}\", unit: deg}   # REPLACE: no columns of joints were recognised; {j} is the joint's number",
         );
     } else if lacks.joints {
-        let list: Vec<String> = (1..=lacks.count).map(|number| number.to_string()).collect();
+        let list = listed((1..=lacks.count).map(|number| number.to_string()));
         put(&format!(
-            "q: {{columns: [{}], unit: deg}}   # REPLACE: the numbers of the joints' columns, and the unit",
-            list.join(", ")
+            "q: {{columns: [{list}], unit: deg}}   # REPLACE: the numbers of the joints' columns, and the unit"
         ));
     }
     if lacks.point {
         let first = if lacks.joints { lacks.count } else { 0 };
-        for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-            let column = if header {
-                axis.to_string()
-            } else {
-                (first + k + 1).to_string()
+        for (axis, number) in ["x", "y", "z"].into_iter().zip(first + 1..) {
+            let column = match header {
+                true => axis.to_string(),
+                false => number.to_string(),
             };
             put(&format!(
                 "{axis}: {{column: {column}, unit: mm}}   # REPLACE: the measured point was not recognised"
@@ -369,13 +316,9 @@ fn lacking(file: &ExaminedFile, lacks: &Lacks, put: &mut impl FnMut(&str)) {
 }
 
 const OF_TORQUES: &str = include_str!("of_torques.yaml");
-
 const EMPTY: &str = include_str!("no_recording.yaml");
-
 const EVERY: &str = include_str!("every.yaml");
-
 const BY_USAGE: &str = include_str!("by_usage.yaml");
-
 const STAGES: &str = include_str!("stages.yaml");
 
 /// What `calib init` writes behind lines to look at, the label of such lines, and what is to be done there.

@@ -4,7 +4,7 @@ use super::columns::{Choice, ExaminedFile, PointColumns, Points, points};
 use super::names;
 use super::names::{LENGTHS, joints};
 use super::sheet::{number, tables};
-use crate::error::Result;
+use crate::error::{Result, listed};
 use crate::stage::ingest::is_clock_time;
 use crate::yaml::quoted;
 use std::path::Path;
@@ -39,19 +39,15 @@ impl ExaminedFile {
     fn bare(&mut self) {
         let width = self.sheet.names.len();
         // A name in parts (collection, group, point) stands in columns of its own.
-        let texts = (0..width)
-            .take_while(|column| !self.sheet.is_numeric(*column))
-            .count();
+        let texts = (0..width).take_while(|column| !self.sheet.is_numeric(*column));
+        let texts = texts.count();
         let numbered = usize::from(self.may_be_names(0) && [4, 7, 8].contains(&width));
         let named = texts.max(numbered);
         let columns: Vec<usize> = (named..width).collect();
         if !columns.iter().all(|column| self.sheet.is_numeric(*column)) {
             return;
         }
-        let most = columns
-            .iter()
-            .map(|column| self.sheet.largest(*column))
-            .fold(0.0, f64::max);
+        let most = self.largest(&columns);
         let (quantity, lines, what) = match columns[..] {
             [x, y, z] => {
                 let unit = self.length_unit(&[x, y, z]).0;
@@ -76,44 +72,35 @@ impl ExaminedFile {
 
     fn joints(&mut self, count: usize) {
         let angle = |column: usize| {
+            let unit = self.stated[column].unit;
             self.sheet.is_numeric(column)
                 && self.sheet.largest(column) <= 400.0
-                && self.stated[column]
-                    .unit
-                    .is_none_or(|unit| ["deg", "rad"].contains(&unit))
+                && unit.is_none_or(|unit| ["deg", "rad"].contains(&unit))
         };
         let mut rows = joints(&self.stated, count, angle);
         rows.retain(|columns| {
             columns.iter().all(|column| self.sheet.is_numeric(*column)) && !self.is_unit(columns)
         });
         // A list holds what else an arm has beside its joints: a gripper.
-        let numbers = rows
+        let list = rows
             .first()
-            .filter(|row| self.sheet.names[row[0]].ends_with(']'))
-            .map_or(0, Vec::len);
-        rows.iter_mut()
-            .filter(|_| numbers > count)
-            .for_each(|row| row.truncate(count));
+            .filter(|row| self.sheet.names[row[0]].ends_with(']'));
+        let numbers = list.map_or(0, Vec::len);
+        if numbers > count {
+            rows.iter_mut().for_each(|row| row.truncate(count));
+        }
         let Some(best) = rows.first() else { return };
-        let turning = |column: &&usize| self.stated[**column].unit_of(&LENGTHS).is_none();
-        let degrees = best
-            .iter()
-            .filter(turning)
-            .any(|column| self.sheet.largest(*column) > MOST_RADIANS);
-        let named = best
-            .iter()
-            .find_map(|column| self.stated[*column].unit_of(&["deg", "rad"]));
-        let (unit, why) = match named {
+        let turns = |column: &usize| self.stated[*column].unit_of(&LENGTHS).is_none();
+        let turning: Vec<usize> = best.iter().copied().filter(turns).collect();
+        let mut units = best.iter().map(|column| &self.stated[*column]);
+        let (unit, why) = match units.find_map(|name| name.unit_of(&["deg", "rad"])) {
             Some(unit) => (unit, None),
-            None if degrees => (
-                "deg",
-                Some("values beyond 6.5 cannot be radians".to_string()),
-            ),
-            None => (
-                "rad",
-                Some("no value is beyond 6.5; are these degrees?".to_string()),
-            ),
+            None if self.largest(&turning) > MOST_RADIANS => {
+                ("deg", Some("values beyond 6.5 cannot be radians"))
+            }
+            None => ("rad", Some("no value is beyond 6.5; are these degrees?")),
         };
+        let why = why.map(String::from);
         let several = (rows.len() > 1).then(|| "several columns of joints fit".to_string());
         let of_list = (numbers > count)
             .then(|| format!("of the {numbers} numbers of the list the first {count}"));
@@ -124,47 +111,32 @@ impl ExaminedFile {
 
     /// Whether four columns are a quaternion.
     fn is_unit(&self, columns: &[usize]) -> bool {
-        let square = |row: &Vec<String>| {
-            columns
-                .iter()
-                .filter_map(|column| number(&row[*column]))
-                .map(|x| x * x)
-                .sum::<f64>()
+        let is_one = |row: &Vec<String>| {
+            let numbers = columns.iter().filter_map(|column| number(&row[*column]));
+            let square: f64 = numbers.map(|x| x * x).sum();
+            (square - 1.0).abs() < 1e-3
         };
-        columns.len() == 4
-            && self
-                .sheet
-                .rows
-                .iter()
-                .all(|row| (square(row) - 1.0).abs() < 1e-3)
+        columns.len() == 4 && self.sheet.rows.iter().all(is_one)
     }
 
     fn point(&mut self) {
         let found = points(&self.stated);
-        if found
-            .targets
-            .iter()
-            .flat_map(|(_, columns)| columns)
-            .all(|column| self.sheet.holds_numbers(*column))
-            && self.targets(&found)
-        {
+        let mut all = found.targets.iter().flat_map(|(_, columns)| columns);
+        if all.all(|column| self.sheet.holds_numbers(*column)) && self.targets(&found) {
             return;
         }
-        let numeric = |way: &PointColumns| {
+        let numeric = |way: &&PointColumns| {
             let more = way.difference.iter().flat_map(|(columns, _)| columns);
-            way.columns
-                .iter()
-                .chain(more)
-                .all(|column| self.sheet.is_numeric(*column))
+            let mut all = way.columns.iter().chain(more);
+            all.all(|column| self.sheet.is_numeric(*column))
         };
-        let ways: Vec<&PointColumns> = found.ways.iter().filter(|way| numeric(way)).collect();
+        let ways: Vec<&PointColumns> = found.ways.iter().filter(numeric).collect();
         let Some(best) = ways.first() else {
-            if let Some(wanted) = found.wanted {
-                self.remarks.push(format!(
-                    "only a target is there, no measured point: {}",
-                    quoted(&self.shown(&wanted))
-                ));
-            }
+            let only = found.wanted.map(|wanted| {
+                let names = quoted(&self.shown(&wanted));
+                format!("only a target is there, no measured point: {names}")
+            });
+            self.remarks.extend(only);
             return;
         };
         if let Some(sigma) = found.sigma {
@@ -183,24 +155,19 @@ impl ExaminedFile {
             ));
             self.remarks.extend(lines.into_iter().skip(1));
         }
-        let by_size = self
-            .length_unit(&best.columns)
-            .1
-            .then(|| "the unit, by the size of the numbers".to_string());
+        let (_, by_size) = self.length_unit(&best.columns);
+        let by_size = by_size.then(|| "the unit, by the size of the numbers".to_string());
         let checks = found.question.into_iter().chain(by_size);
-        let source = if found.is_stated {
-            "the measured point"
-        } else {
-            "the point"
+        let source = match found.is_stated {
+            true => "the measured point",
+            false => "the point",
         };
-        let less = best.difference.map(|(columns, minus)| {
-            format!(
-                "; {} {}",
-                if minus { "less" } else { "plus" },
-                self.shown(&columns)
-            )
-        });
-        let less = less.unwrap_or_default();
+        let less = best
+            .difference
+            .map_or_else(String::new, |(columns, minus)| {
+                let sign = if minus { "less" } else { "plus" };
+                format!("; {sign} {}", self.shown(&columns))
+            });
         let choices: Vec<Choice> = ways.iter().map(|way| self.way(way)).collect();
         let account = format!("{source} ({}{less})", self.shown(&best.columns));
         self.propose("x", choices, checks, account);
@@ -209,22 +176,17 @@ impl ExaminedFile {
     /// A quaternion beside the point, as lines to take in: with a standard deviation, which only the instrument's owner knows, rows are full
     /// poses.
     fn quaternion(&mut self) {
-        let column = |name: &str| {
-            (0..self.stated.len())
-                .find(|k| self.stated[*k].stem() == name && self.sheet.holds_numbers(*k))
+        let column = |name: String| {
+            let fits = |k: &usize| self.stated[*k].stem() == name && self.sheet.holds_numbers(*k);
+            (0..self.stated.len()).find(fits)
         };
-        let all =
-            |prefix: &&str| ["w", "x", "y", "z"].map(|axis| column(&format!("{prefix}{axis}")));
-        let found = names::QUATERNIONS
-            .iter()
-            .map(all)
-            .find_map(|columns| columns.into_iter().collect::<Option<Vec<usize>>>());
-        let unit = |columns: &Vec<usize>| {
-            columns
-                .iter()
-                .all(|column| self.sheet.largest(*column) <= 1.0 + 1e-3)
+        let all = |prefix: &&str| -> Option<Vec<usize>> {
+            let axes = ["w", "x", "y", "z"].into_iter();
+            axes.map(|axis| column(format!("{prefix}{axis}"))).collect()
         };
-        let Some(columns) = found.filter(unit).filter(|_| self.get("x").is_some()) else {
+        let found = names::QUATERNIONS.iter().find_map(all);
+        let is_unit = |columns: &Vec<usize>| self.largest(columns) <= 1.0 + 1e-3;
+        let Some(columns) = found.filter(is_unit).filter(|_| self.has("x")) else {
             return;
         };
         let names = self.references(&columns);
@@ -245,32 +207,18 @@ impl ExaminedFile {
             format!("{name}: {}", self.references(columns))
         };
         let all: Vec<String> = found.targets.iter().map(one).collect();
-        let columns = found
-            .targets
-            .iter()
-            .flat_map(|(_, columns)| *columns)
-            .collect();
-        let targets = Some(format!(
-            "targets: {{unit: {unit}, columns: {{{}}}}}",
-            all.join(", ")
-        ));
+        let columns = found.targets.iter().flat_map(|(_, columns)| *columns);
+        let all = all.join(", ");
         let all = Choice {
-            columns,
-            targets,
-            ..Choice::default()
+            lines: Vec::new(),
+            targets: Some(format!("targets: {{unit: {unit}, columns: {{{all}}}}}")),
+            columns: columns.collect(),
         };
         let ways = found.ways.iter().map(|way| self.way(way));
         let choices: Vec<Choice> = std::iter::once(all).chain(ways).collect();
-        let names: Vec<&str> = found
-            .targets
-            .iter()
-            .map(|(name, _)| name.as_str())
-            .collect();
-        let account = format!(
-            "the points of {} targets ({})",
-            names.len(),
-            names.join(", ")
-        );
+        let names = listed(found.targets.iter().map(|(name, _)| name));
+        let count = found.targets.len();
+        let account = format!("the points of {count} targets ({names})");
         let check =
             "are these several reflectors, each measured in every pose, and is the unit right?";
         self.propose("x", choices, [check.to_string()], account);
@@ -287,10 +235,9 @@ impl ExaminedFile {
         let lines = (["x", "y", "z"].iter().zip(way.columns).zip(difference)).map(
             |((name, target), column)| {
                 let other = self.stated[column].unit_of(&LENGTHS);
-                let other = other
-                    .filter(|other| *other != unit)
-                    .map(|other| format!(", difference_unit: {other}"))
-                    .unwrap_or_default();
+                let other = other.filter(|other| *other != unit);
+                let other = other.map(|other| format!(", difference_unit: {other}"));
+                let other = other.unwrap_or_default();
                 let [target, column] = [target, column].map(|column| self.reference(column));
                 format!("{name}: {{column: {target}, {key}: {column}, unit: {unit}{other}}}")
             },
@@ -300,22 +247,22 @@ impl ExaminedFile {
 
     /// The unit of coordinates, and whether their size alone says so.
     pub(super) fn length_unit(&self, columns: &[usize]) -> (&'static str, bool) {
-        if let Some(unit) = columns
-            .iter()
-            .find_map(|column| self.stated[*column].unit_of(&LENGTHS))
-        {
+        let mut units = columns.iter().map(|column| &self.stated[*column]);
+        if let Some(unit) = units.find_map(|name| name.unit_of(&LENGTHS)) {
             return (unit, false);
         }
-        let farthest = columns
-            .iter()
-            .map(|column| self.sheet.largest(*column))
-            .fold(0.0, f64::max);
-        (if farthest > MOST_METRES { "mm" } else { "m" }, true)
+        let is_far = self.largest(columns) > MOST_METRES;
+        (if is_far { "mm" } else { "m" }, true)
+    }
+
+    fn largest(&self, columns: &[usize]) -> f64 {
+        let all = columns.iter().map(|column| self.sheet.largest(*column));
+        all.fold(0.0, f64::max)
     }
 
     /// Motor currents, directions of approach and velocities under calib's own names.
     fn per_joint(&mut self) {
-        let Some(count) = self.get("q").map(|joints| joints.choices[0].columns.len()) else {
+        let Some(count) = self.joint_count() else {
             return;
         };
         for (quantity, pattern, unit) in [
@@ -324,10 +271,8 @@ impl ExaminedFile {
             ("velocity", "dq{j}_deg_s", Some("deg/s")),
         ] {
             let column = |n: usize| {
-                self.sheet
-                    .names
-                    .iter()
-                    .position(|name| *name == pattern.replace("{j}", &n.to_string()))
+                let wanted = pattern.replace("{j}", &n.to_string());
+                self.sheet.names.iter().position(|name| *name == wanted)
             };
             let columns: Vec<usize> = (1..).map_while(column).collect();
             if columns.len() == count {
@@ -345,17 +290,14 @@ impl ExaminedFile {
         ] {
             let fits = |column: &usize| {
                 let name = &self.stated[*column];
-                let named = if quantity == "payload" {
-                    names::lists(listed, &name.stem())
-                } else {
-                    name.is(listed)
+                let named = match quantity {
+                    "payload" => names::lists(listed, &name.stem()),
+                    _ => name.is(listed),
                 };
                 let plausible =
                     self.sheet.is_numeric(*column) && self.sheet.largest(*column) <= most;
-                named
-                    && plausible
-                    && !self.is_taken(*column)
-                    && name.unit.is_none_or(|other| other == unit)
+                let in_unit = name.unit.is_none_or(|other| other == unit);
+                named && plausible && in_unit && !self.is_taken(*column)
             };
             let columns: Vec<usize> = (0..self.stated.len()).filter(fits).collect();
             let Some(first) = columns.first() else {
@@ -371,36 +313,23 @@ impl ExaminedFile {
             |column: &usize| self.stated[*column].is(names::TIMES) && !self.is_taken(*column);
         let unit = |column: usize| match self.stated[column].unit {
             // Beyond what ms of a date are, it is finer than any unit that is read.
-            None => Some((
-                if self.sheet.largest(column) > 1e11 {
-                    "ms"
-                } else {
-                    "s"
-                },
-                false,
-            ))
-            .filter(|_| self.sheet.largest(column) < 1e14),
+            None => match self.sheet.largest(column) {
+                ..=1e11 => Some(("s", false)),
+                ..1e14 => Some(("ms", false)),
+                _ => None,
+            },
             Some(unit) => Some((unit, true)).filter(|(unit, _)| ["s", "ms"].contains(unit)),
         };
         let columns: Vec<usize> = (0..self.stated.len()).filter(named).collect();
-        let running: Vec<usize> = columns
-            .iter()
-            .copied()
-            .filter(|column| unit(*column).is_some() && self.runs(*column))
-            .collect();
+        let is_running = |column: &usize| unit(*column).is_some() && self.runs(*column);
         let is_clock = |column: &usize| {
-            let mut texts = self
-                .sheet
-                .texts(*column)
-                .filter(|text| !text.is_empty())
-                .peekable();
+            let mut texts = self.sheet.texts(*column).peekable();
             texts.peek().is_some() && texts.all(is_clock_time)
         };
+        let running: Vec<usize> = columns.iter().copied().filter(is_running).collect();
         let clocks: Vec<usize> = columns.iter().copied().filter(is_clock).collect();
-        for column in columns
-            .iter()
-            .filter(|column| !running.contains(column) && !clocks.contains(column))
-        {
+        let is_known = |column: &&usize| running.contains(column) || clocks.contains(column);
+        for column in columns.iter().filter(|column| !is_known(column)) {
             let name = quoted(&self.sheet.names[*column]);
             self.remarks.push(format!(
                 "{name} cannot be read as time; allowed: s or ms as numbers that never decrease, 08:15:03, or 2026-11-22T08:15:03"
@@ -411,12 +340,8 @@ impl ExaminedFile {
             return;
         };
         self.second = if unit == "ms" { 1e-3 } else { 1.0 };
-        self.map(
-            "time",
-            &running,
-            Some(unit),
-            (!is_stated).then(|| "the unit".to_string()),
-        );
+        let check = (!is_stated).then(|| "the unit".to_string());
+        self.map("time", &running, Some(unit), check);
     }
 
     /// Whether numbers do not fall, do not stand still, and are no dates in digits (20201103154500).
@@ -424,37 +349,25 @@ impl ExaminedFile {
         let times: Vec<f64> = self.sheet.numbers(column).collect();
         let falls = times.windows(2).filter(|pair| pair[1] < pair[0]).count();
         let dates = times.iter().all(|time| (1.9e13..2.2e13).contains(time));
-        let moves = times
-            .first()
-            .zip(times.last())
-            .is_some_and(|(first, last)| last > first);
+        let moves = times.last() > times.first();
         self.sheet.is_numeric(column) && moves && !dates && 20 * falls <= times.len()
     }
 
     /// What rows are for, which reflector they measured, and what points are called in a file that stands alone.
     fn texts(&mut self) {
-        let columns = 0..self.stated.len();
         let few = |column: usize| {
             let distinct = self.distinct(column);
             (2..=10).contains(&distinct)
                 && 3 * distinct <= self.sheet.rows.len()
                 && !self.sheet.is_numeric(column)
         };
-        let listed = |list, column: usize| names::lists(list, &self.stated[column].stem());
-        let usages: Vec<usize> = columns
-            .clone()
-            .filter(|column| listed(names::USAGES, *column) && few(*column))
-            .collect();
-        let reflectors: Vec<usize> = columns
-            .filter(|column| listed(names::REFLECTORS, *column) && few(*column))
-            .collect();
+        let [usages, reflectors] = [names::USAGES, names::REFLECTORS].map(|list| {
+            let is_listed = |column: &usize| names::lists(list, &self.stated[*column].stem());
+            let listed = (0..self.stated.len()).filter(is_listed);
+            listed.filter(|column| few(*column)).collect::<Vec<usize>>()
+        });
         self.map("usage", &usages, None, None);
-        self.map(
-            "target",
-            &reflectors,
-            None,
-            Some("which of several reflectors was measured?".into())
-                .filter(|_| !reflectors.is_empty()),
-        );
+        let question = "which of several reflectors was measured?";
+        self.map("target", &reflectors, None, Some(question.into()));
     }
 }

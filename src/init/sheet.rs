@@ -2,7 +2,7 @@
 //!
 //! A file of any kind as the tables that are in it.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, listed};
 use crate::raw::{
     self, BagTopic, DecimalMark, Delimiter, InputSource, Record, Workbook, bag_content, failed,
     fields, is_utf16, shown, unquoted_text,
@@ -98,10 +98,6 @@ impl Sheet {
         }
     }
 
-    pub(crate) fn of(lines: &[String]) -> Self {
-        Self::delimited(lines, None)
-    }
-
     /// A sheet of a workbook, with tabs between its cells.
     pub(crate) fn of_workbook(name: &str, lines: &[String]) -> Self {
         // What separates cells is the workbook's own.
@@ -141,7 +137,8 @@ impl Sheet {
         }
     }
 
-    fn delimited(lines: &[String], given: Option<char>) -> Self {
+    /// A text; what separates its cells where that is known.
+    pub(crate) fn delimited(lines: &[String], given: Option<char>) -> Self {
         let comment = comment(lines);
         let is_comment = |line: &str| comment.is_some_and(|mark| line.starts_with(mark));
         let content: Vec<Content> = (lines.iter().enumerate())
@@ -155,10 +152,8 @@ impl Sheet {
             header: true,
             ..Self::default()
         };
-        let table: Vec<Vec<String>> = content
-            .iter()
-            .map(|line| cells(line.text, delimiter))
-            .collect();
+        let lines_of_table = content.iter().map(|line| cells(line.text, delimiter));
+        let table: Vec<Vec<String>> = lines_of_table.collect();
         let begins = if let Some(k) = plain_header(&table) {
             sheet.skip = content[k].at;
             sheet.names = filled(table[k].clone());
@@ -166,65 +161,56 @@ impl Sheet {
         } else if let Some((at, names, mark)) = commented_header(lines, &sheet, &content, &table) {
             (sheet.skip, sheet.names, sheet.header_in_comment) = (at, names, mark);
             sheet.comment = sheet.comment.filter(|_| mark);
-            content
-                .iter()
-                .position(|line| line.at > at)
-                .unwrap_or(content.len())
+            content.partition_point(|line| line.at <= at)
         } else if let Some(k) = bare_rows(&table) {
             sheet.skip = content[k].at;
             sheet.header = false;
-            sheet.names = (1..=table[k].len())
-                .map(|number| number.to_string())
-                .collect();
+            let numbers = 1..=table[k].len();
+            sheet.names = numbers.map(|number| number.to_string()).collect();
             sheet.trouble = Some("no header found".into());
             k
         } else {
-            let seen = content.iter().take(3).map(|line| {
-                format!(
-                    "`{}`",
-                    line.text.trim().chars().take(60).collect::<String>()
-                )
-            });
-            let seen: Vec<String> = seen.collect();
-            let seen = if seen.is_empty() {
-                "the file is empty".into()
-            } else {
-                format!("it begins {}", seen.join(", "))
+            let begin = |line: &Content| -> String { line.text.trim().chars().take(60).collect() };
+            let seen = content.iter().take(3);
+            let seen = match content[..] {
+                [] => "the file is empty".into(),
+                _ => format!(
+                    "it begins {}",
+                    listed(seen.map(|line| format!("`{}`", begin(line))))
+                ),
             };
             sheet.trouble = Some(format!("no header found and no rows of numbers; {seen}"));
             return sheet;
         };
-        let first = begins
-            + usize::from(table.get(begins).is_some_and(|row| is_units(row)) && sheet.header);
-        sheet.unit_row = first > begins;
-        sheet.units = match table.get(begins).filter(|_| sheet.unit_row) {
-            Some(row) => row.iter().map(|cell| unit(cell)).collect(),
-            None => Vec::new(),
-        };
-        let width = sheet.names.len();
-        let rows = table
-            .into_iter()
-            .skip(first)
-            .map(filled)
-            .filter(|row| !row.is_empty() && row.len() <= width);
+        let units = table.get(begins);
+        let units = units.filter(|row| is_units(row) && sheet.header);
+        sheet.unit_row = units.is_some();
+        sheet.units = units.into_iter().flatten().map(|cell| unit(cell)).collect();
+        let (width, first) = (sheet.names.len(), begins + usize::from(sheet.unit_row));
+        let rows = table.into_iter().skip(first).map(filled);
         sheet.rows = rows
-            .map(|row| {
-                row.into_iter()
-                    .chain(std::iter::repeat(String::new()))
-                    .take(width)
-                    .collect()
+            .filter(|row| !row.is_empty() && row.len() <= width)
+            .map(|mut row| {
+                row.resize(width, String::new());
+                row
             })
             .collect();
         let marks = |mark: char| {
-            let numbers = sheet
-                .rows
-                .iter()
-                .flatten()
-                .filter(|cell| decimal_mark(cell) == Some(mark) && number(cell).is_some());
-            numbers.count()
+            let cells = sheet.rows.iter().flatten();
+            let marked = cells.filter(|cell| decimal_mark(cell) == Some(mark));
+            marked.filter(|cell| number(cell).is_some()).count()
         };
         sheet.comma = marks(',') > marks('.');
         sheet
+    }
+
+    /// Whether both are written alike, with the same columns.
+    pub(crate) fn is_laid_out_as(&self, other: &Self) -> bool {
+        let layout = |sheet: &Self| {
+            let lines = (sheet.skip, sheet.unit_row, sheet.comment, sheet.header);
+            (sheet.delimiter, sheet.comma, lines)
+        };
+        self.names == other.names && layout(self) == layout(other)
     }
 
     pub(crate) fn numbers(&self, column: usize) -> impl Iterator<Item = f64> + '_ {
@@ -265,11 +251,8 @@ impl Sheet {
                 .fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
             return format!("column {}: {lower} to {upper}", column + 1);
         }
-        let texts: Vec<String> = self
-            .texts(column)
-            .take(3)
-            .map(|text| text.chars().take(20).collect())
-            .collect();
+        let texts = self.texts(column).take(3);
+        let texts: Vec<String> = texts.map(|text| text.chars().take(20).collect()).collect();
         format!("column {}: {}, ...", column + 1, texts.join(", "))
     }
 }
@@ -286,27 +269,21 @@ fn comment(lines: &[String]) -> Option<&'static str> {
 /// What separates fields: what makes most lines rows of one width with most numbers in them.
 fn delimiter(content: &[Content]) -> char {
     let worth = |delimiter: char| {
-        let rows: Vec<Vec<String>> = content
-            .iter()
-            .take(ENOUGH)
-            .map(|line| cells(line.text, delimiter))
-            .collect();
+        let rows = content.iter().take(ENOUGH);
+        let rows: Vec<Vec<String>> = rows.map(|line| cells(line.text, delimiter)).collect();
         let mut widths = std::collections::BTreeMap::new();
-        rows.iter()
-            .for_each(|row| *widths.entry(row.len()).or_insert(0) += 1);
-        let usual = widths
-            .into_iter()
-            .filter(|(width, _)| *width >= NARROWEST)
-            .max_by_key(|(_, rows)| *rows);
+        for row in rows.iter().filter(|row| row.len() >= NARROWEST) {
+            *widths.entry(row.len()).or_insert(0) += 1;
+        }
+        let usual = widths.into_iter().max_by_key(|(_, rows)| *rows);
         let usual = usual.map_or(0, |(width, _)| width);
+        let worth = |row: &Vec<String>| {
+            // A cell that is left blank is of any kind.
+            let stated = row.iter().filter(|cell| !cell.is_empty()).count();
+            (1 + numeric(row)) as f64 / (1 + stated) as f64
+        };
         let of_width = rows.iter().filter(|row| row.len() == usual);
-        of_width
-            .map(|row| {
-                // A cell that is left blank is of any kind.
-                let stated = row.iter().filter(|cell| !cell.is_empty()).count();
-                (1 + numeric(row)) as f64 / (1 + stated) as f64
-            })
-            .sum::<f64>()
+        of_width.map(worth).sum::<f64>()
     };
     let mut best = (0.0, ',');
     for delimiter in [';', '\t', ',', '|', ' '] {
@@ -320,14 +297,12 @@ fn delimiter(content: &[Content]) -> char {
 
 /// Whether a row of numbers stands here, as wide as most below it.
 fn is_data(table: &[Vec<String>], k: usize, width: usize) -> bool {
-    let Some(row) = table.get(k) else {
+    let below = table.get(k..).unwrap_or_default();
+    let Some(row) = below.first() else {
         return false;
     };
-    let below = &table[k..];
-    let alike = below
-        .iter()
-        .filter(|other| other.len() == row.len())
-        .count();
+    let alike = below.iter().filter(|other| other.len() == row.len());
+    let alike = alike.count();
     row.len() >= NARROWEST
         && filled(row.clone()).len() <= width
         && numeric(row) >= 2
@@ -380,20 +355,15 @@ fn commented_header(
             && table[next].len() == names.len()
     };
     let first = content.first()?.at;
-    (0..first)
-        .rev()
-        .chain(first..lines.len())
-        .filter(|at| lines[*at].starts_with(mark))
-        .find_map(|at| {
-            let [bare, whole] = [&lines[at][mark.len()..], &lines[at]]
-                .map(|text| filled(cells(text, sheet.delimiter)));
-            let is_mark = fits(&bare, at);
-            (is_mark || fits(&whole, at)).then_some((
-                at,
-                if is_mark { bare } else { whole },
-                is_mark,
-            ))
-        })
+    let mut places = (0..first).rev().chain(first..lines.len());
+    places.find_map(|at| {
+        let bare = lines[at].strip_prefix(mark)?;
+        let [bare, whole] = [bare, &lines[at]].map(|text| filled(cells(text, sheet.delimiter)));
+        if fits(&bare, at) {
+            return Some((at, bare, true));
+        }
+        fits(&whole, at).then_some((at, whole, false))
+    })
 }
 
 /// The first row of a file without a header.
@@ -418,9 +388,7 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
     };
     match FileKind::of(&place, head) {
         FileKind::Workbook => return understood(sheets(reader, places)),
-        FileKind::Bag => {
-            return understood(topics(path, &place).map_err(|error| error.to_string()));
-        }
+        FileKind::Bag => return understood(in_words(topics(path, &place))),
         FileKind::NotRead(what) => return understood(Err(what.into())),
         FileKind::Text => {}
         // What says itself what its columns are.
@@ -437,7 +405,7 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
                     ..Sheet::of_columns(names, rows)
                 }]
             });
-            return understood(sheet.map_err(|error| error.to_string()));
+            return understood(in_words(sheet));
         }
     }
     if !is_utf16(head) && head.contains(&0) {
@@ -447,14 +415,15 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
     let text = raw::without_utf16(reader).map_err(failed)?;
     for line in BufReader::new(text).take(LOOKED).split(b'\n').take(LINES) {
         let line = line.map_err(failed)?;
-        lines.push(
-            shown(&line)
-                .trim_end_matches('\r')
-                .trim_start_matches('\u{feff}')
-                .to_string(),
-        );
+        let line = shown(&line);
+        let line = line.trim_end_matches('\r').trim_start_matches('\u{feff}');
+        lines.push(line.to_string());
     }
-    Ok(vec![Sheet::of(&lines)])
+    Ok(vec![Sheet::delimited(&lines, None)])
+}
+
+fn in_words<T>(found: Result<T>) -> Result<T, String> {
+    found.map_err(|error| error.to_string())
 }
 
 /// The names and the first rows of a table that says itself what its columns are.
@@ -481,27 +450,15 @@ fn first_rows(
 fn topics(path: &Path, place: &str) -> Result<Vec<Sheet>> {
     let opened = || raw::source(path).map_err(|error| failed(place, &error));
     let content = bag_content(opened()?, place)?;
-    let most = |wanted: &[&str]| {
+    let most = |wanted: &&[&str]| {
         let fits = |topic: &&BagTopic| {
             topic.messages > 0 && wanted.iter().any(|kind| topic.kind.ends_with(kind))
         };
-        content
-            .topics
-            .iter()
-            .filter(fits)
-            .max_by_key(|topic| topic.messages)
+        let found = content.topics.iter().filter(fits);
+        found.max_by_key(|topic| topic.messages)
     };
-    let chosen = [
-        most(&["/JointState"]),
-        most(&[
-            "/PointStamped",
-            "/PoseStamped",
-            "/TransformStamped",
-            "/TFMessage",
-        ]),
-    ];
     let mut sheets = Vec::new();
-    for topic in chosen.into_iter().flatten() {
+    for topic in [JOINTS, POINTS].iter().filter_map(most) {
         let (names, rows) = first_rows(opened()?, place, Some(&topic.name))?;
         sheets.push(Sheet::of_topic(topic, names, rows));
     }
@@ -513,22 +470,24 @@ fn topics(path: &Path, place: &str) -> Result<Vec<Sheet>> {
     Ok(sheets)
 }
 
+const JOINTS: &[&str] = &["/JointState"];
+const POINTS: &[&str] = &[
+    "/PointStamped",
+    "/PoseStamped",
+    "/TransformStamped",
+    "/TFMessage",
+];
+
 fn sheets(source: impl Read, places: usize) -> Result<Vec<Sheet>, String> {
     let mut book = Workbook::read(source)?;
     let tables = book.tables()?;
-    let one = [if (1..=places).contains(&tables.len()) {
-        String::new()
-    } else {
-        book.sheet(None)?
-    }];
-    let names = if one[0].is_empty() { &tables[..] } else { &one };
+    let names = match (1..=places).contains(&tables.len()) {
+        true => tables,
+        false => vec![book.sheet(None)?],
+    };
     let sheet = |name: &String| {
-        let lines: Vec<String> = book
-            .lines(name, DecimalMark::Point)?
-            .lines()
-            .take(LINES)
-            .map(String::from)
-            .collect();
+        let lines = book.lines(name, DecimalMark::Point)?;
+        let lines: Vec<String> = lines.lines().take(LINES).map(String::from).collect();
         Ok(Sheet::of_workbook(name, &lines))
     };
     names.iter().map(sheet).collect()

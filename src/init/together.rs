@@ -32,10 +32,7 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Vec<String> {
         return one_after_the_other(found);
     }
     let [one, two] = found else {
-        if let [only] = found {
-            return alone(only);
-        }
-        return Vec::new();
+        return found.first_mut().map(alone).unwrap_or_default();
     };
     // A file that was not understood says nothing; ids and points are written as lines to replace.
     let blind = [&*one, &*two]
@@ -55,11 +52,9 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Vec<String> {
         .filter(|_| !doubtful || timing.is_none())
         .cloned()
     {
-        if one.get("time").is_some() {
-            two.drop(
-                "time",
-                "rows are joined by name; time is that of the first file",
-            );
+        if one.has("time") {
+            let why = "rows are joined by name; time is that of the first file";
+            two.drop("time", why);
         }
         return by_id(one, two, &best, &pairs, running);
     }
@@ -67,7 +62,7 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Vec<String> {
         label(one, two);
         return by_time(&timing, [one, two]);
     }
-    if one.get("time").is_some() {
+    if one.has("time") {
         two.drop("time", "time is that of the first file");
     }
     label(one, two);
@@ -85,59 +80,28 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Vec<String> {
 
 /// Whether a file is a recording of its own: it has joints and points.
 pub(super) fn is_whole(file: &ExaminedFile) -> bool {
-    file.get("q").is_some() && file.get("x").is_some()
+    file.has("q") && file.has("x")
 }
 
 /// Takes out all lists of points but the first, with the reflectors' names, where the files are one of joints and lists of points in one
 /// layout, a reflector each; the first file has the joints then, the second the points of the first reflector. Nothing of other files.
 pub(super) fn other_reflectors(found: &mut Vec<ExaminedFile>) -> Vec<(String, ExaminedFile)> {
-    let is_list = |file: &ExaminedFile| {
-        file.get("x").is_some() && file.get("q").is_none() && file.get("target").is_none()
-    };
-    let Some(joints) = found
-        .iter()
-        .position(|file| file.get("q").is_some() && file.get("x").is_none())
-    else {
+    let is_list = |file: &ExaminedFile| file.has("x") && !file.has("q") && !file.has("target");
+    let of_joints = |file: &ExaminedFile| file.has("q") && !file.has("x");
+    let Some(joints) = found.iter().position(of_joints) else {
         return Vec::new();
     };
-    if found.len() < 3
-        || !found
-            .iter()
-            .enumerate()
-            .all(|(k, file)| k == joints || is_list(file))
-    {
-        return Vec::new();
-    }
     let lead = found.remove(joints);
-    let layout = |file: &ExaminedFile| {
-        let sheet = &file.sheet;
-        (
-            sheet.names.clone(),
-            sheet.delimiter,
-            sheet.comma,
-            sheet.skip,
-            sheet.unit_row,
-            sheet.comment,
-            sheet.header,
-        )
-    };
-    if !found.iter().all(|file| layout(file) == layout(&found[0])) {
+    let alike = |file: &ExaminedFile| is_list(file) && file.sheet.is_laid_out_as(&found[0].sheet);
+    if found.len() < 2 || !found.iter().all(alike) {
         found.insert(joints, lead);
         return Vec::new();
     }
-    let stems: Vec<String> = found
-        .iter()
-        .map(|file| {
-            file.path
-                .file_stem()
-                .map(|stem| stem.to_string_lossy().into_owned())
-                .unwrap_or_default()
-        })
-        .collect();
-    let mut named: Vec<(String, ExaminedFile)> = reflectors(&stems)
-        .into_iter()
-        .zip(found.drain(..))
-        .collect();
+    let stem = |file: &ExaminedFile| file.path.file_stem().unwrap_or_default().to_os_string();
+    let stems = found.iter().map(stem);
+    let stems: Vec<String> = stems.map(|stem| stem.to_string_lossy().into()).collect();
+    let names = reflectors(&stems).into_iter();
+    let mut named: Vec<(String, ExaminedFile)> = names.zip(found.drain(..)).collect();
     let (name, mut first) = named.remove(0);
     first.state(
         "target",
@@ -159,45 +123,35 @@ fn reflectors(stems: &[String]) -> Vec<String> {
     };
     let front = alike(&|stem, k| stem[k]);
     let back = alike(&|stem, k| stem[stem.len() - 1 - k]).min(shortest - front);
-    let trimmed = all
-        .iter()
-        .map(|stem| stem[front..stem.len() - back].iter().collect::<String>());
-    let names: Vec<String> = trimmed
-        .map(|name| name.trim_matches(['_', '-', ' ', '.']).to_string())
-        .collect();
-    if names.iter().any(String::is_empty) {
-        stems.to_vec()
-    } else {
-        names
+    let trimmed = |stem: &Vec<char>| {
+        let name: String = stem[front..stem.len() - back].iter().collect();
+        name.trim_matches(['_', '-', ' ', '.']).to_string()
+    };
+    let names: Vec<String> = all.iter().map(trimmed).collect();
+    match names.iter().any(String::is_empty) {
+        true => stems.to_vec(),
+        false => names,
     }
 }
 
 /// Several recordings, e.g. a grid and a check set: rows of the first are fitted to, those of the others judge, unless the files say so
 /// themselves. Points keep their names where no two files have the same.
 fn one_after_the_other(found: &mut [ExaminedFile]) -> Vec<String> {
-    let ids: Vec<Option<usize>> = found
-        .iter()
-        .map(|file| file.ids().first().copied())
-        .collect();
+    let ids = found.iter().map(|file| file.ids().first().copied());
+    let ids: Vec<Option<usize>> = ids.collect();
     let mut names = BTreeSet::new();
     let apart = found.iter().zip(&ids).all(|(file, id)| {
-        id.is_some_and(|id| {
-            cells(file, id)
-                .into_iter()
-                .all(|name| names.insert(name.to_string()))
-        })
+        let mut cells = id.iter().flat_map(|id| cells(file, *id));
+        id.is_some() && cells.all(|name| names.insert(name.to_string()))
     });
-    let silent = found.iter().all(|file| file.get("usage").is_none());
+    let silent = found.iter().all(|file| !file.has("usage"));
     for ((k, file), id) in found.iter_mut().enumerate().zip(ids) {
         if let Some(id) = id.filter(|_| apart) {
             file.map("point_id", &[id], None, None);
         }
         if silent {
-            file.state(
-                "usage",
-                if k == 0 { "fit" } else { "validate" },
-                "every row of this file",
-            );
+            let set = if k == 0 { "fit" } else { "validate" };
+            file.state("usage", set, "every row of this file");
         }
     }
     vec!["      join: {by: append}      # CHECK: separate recordings, one after the other".into()]
@@ -219,25 +173,12 @@ fn alone(found: &mut ExaminedFile) -> Vec<String> {
 
 /// Every quantity once: joints and what belongs to them from the first file that has them, the point from the file without joints.
 fn single(one: &mut ExaminedFile, two: &mut ExaminedFile) {
-    let both = |quantity: &str, one: &ExaminedFile, two: &ExaminedFile| {
-        one.get(quantity).is_some() && two.get(quantity).is_some()
-    };
-    for quantity in [
-        "q",
-        "current",
-        "direction",
-        "velocity",
-        "payload",
-        "temperature",
-        "usage",
-        "target",
-    ] {
-        if both(quantity, one, two) {
-            two.drop(quantity, "in both files; this one or that of the first?");
-        }
+    const ONCE: &str = "q current direction velocity payload temperature usage target";
+    for quantity in ONCE.split(' ').filter(|quantity| one.has(quantity)) {
+        two.drop(quantity, "in both files; this one or that of the first?");
     }
-    if both("x", one, two) {
-        let first = two.get("q").is_some() && one.get("q").is_none();
+    if one.has("x") && two.has("x") {
+        let first = two.has("q") && !one.has("q");
         let (from, other) = if first { (two, &*one) } else { (one, &*two) };
         let why = format!(
             "the measured point, or the controller's? that of {} is used",
@@ -259,20 +200,12 @@ fn pairs(one: &ExaminedFile, two: &ExaminedFile) -> Vec<Pair> {
 
 fn pairs_by(one: &ExaminedFile, two: &ExaminedFile, numbers: bool) -> Vec<Pair> {
     let [left, right] = [one, two].map(|file| {
-        (0..file.stated.len())
-            .filter(|column| may_name(file, *column))
-            .filter_map(|column| {
-                Some((
-                    column,
-                    if numbers {
-                        numbers_of(file, column)?
-                    } else {
-                        cells(file, column)
-                    },
-                ))
-            })
-            .take(MOST_NAMED)
-            .collect::<Vec<_>>()
+        let columns = (0..file.stated.len()).filter(|column| may_name(file, *column));
+        let named = columns.filter_map(|column| match numbers {
+            true => Some((column, numbers_of(file, column)?)),
+            false => Some((column, cells(file, column))),
+        });
+        named.take(MOST_NAMED).collect::<Vec<_>>()
     });
     let mut pairs = Vec::new();
     for (a, names) in &left {
@@ -301,11 +234,8 @@ fn pairs_by(one: &ExaminedFile, two: &ExaminedFile, numbers: bool) -> Vec<Pair> 
 
 /// The numbers in the names of a column; none where a name has none, or two have the same.
 fn numbers_of(file: &ExaminedFile, column: usize) -> Option<BTreeSet<&str>> {
-    let numbers: BTreeSet<&str> = file
-        .sheet
-        .texts(column)
-        .map(last_number)
-        .collect::<Option<_>>()?;
+    let texts = file.sheet.texts(column);
+    let numbers: BTreeSet<&str> = texts.map(last_number).collect::<Option<_>>()?;
     (numbers.len() == file.distinct(column)).then_some(numbers)
 }
 
@@ -341,10 +271,8 @@ fn by_id(
         |pair: &&Pair| (pair.text, pair.shared, pair.named) == (best.text, best.shared, best.named);
     let columns = |file: usize| {
         let fixed = 1 - file;
-        let fit = pairs
-            .iter()
-            .filter(alike)
-            .filter(|pair| pair.columns[fixed] == best.columns[fixed]);
+        let fit = |pair: &&Pair| alike(pair) && pair.columns[fixed] == best.columns[fixed];
+        let fit = pairs.iter().filter(fit);
         fit.map(|pair| pair.columns[file]).collect::<Vec<usize>>()
     };
     one.map("point_id", &columns(0), None, None);
@@ -359,11 +287,11 @@ fn by_id(
         );
         return vec![line];
     }
-    let [a, b] = [&*one, &*two].map(|file| file.sheet.rows.len());
-    let repeated = [&*one, &*two]
-        .iter()
-        .zip(best.columns)
-        .any(|(file, column)| file.distinct(column) < file.sheet.rows.len());
+    let files = [&*one, &*two];
+    let [a, b] = files.map(|file| file.sheet.rows.len());
+    let repeated =
+        |(file, column): (&ExaminedFile, usize)| file.distinct(column) < file.sheet.rows.len();
+    let repeated = files.into_iter().zip(best.columns).any(repeated);
     let question = if running && a == b {
         "CHECK: running numbers, which join row by row".into()
     } else if running {
@@ -381,14 +309,9 @@ fn by_id(
 /// Where files are not joined by id, the names of one of them may stand.
 fn label(one: &mut ExaminedFile, two: &mut ExaminedFile) {
     for file in [two, one] {
-        let ids = file.ids();
-        if let Some(first) = ids
-            .first()
-            .copied()
-            .filter(|first| file.distinct(*first) == file.sheet.rows.len())
-        {
-            file.map("point_id", &[first], None, None);
-            return;
+        let is_whole = |id: &usize| file.distinct(*id) == file.sheet.rows.len();
+        if let Some(first) = file.ids().first().copied().filter(is_whole) {
+            return file.map("point_id", &[first], None, None);
         }
     }
 }
@@ -407,29 +330,21 @@ struct Timing {
 fn timing(one: &ExaminedFile, two: &ExaminedFile) -> Option<Timing> {
     let times = |file: &ExaminedFile| -> Option<Vec<f64>> {
         let column = *file.get("time")?.choices.first()?.columns.first()?;
-        let mut times: Vec<f64> = file
-            .sheet
-            .numbers(column)
-            .map(|time| time * file.second)
-            .collect();
+        let times = file.sheet.numbers(column).map(|time| time * file.second);
+        let mut times: Vec<f64> = times.collect();
         times.sort_by(f64::total_cmp);
         (times.len() > 1).then_some(times)
     };
     let (first, second) = (times(one)?, times(two)?);
-    let (few, many) = if first.len() <= second.len() {
-        (&first, &second)
-    } else {
-        (&second, &first)
+    let (few, many) = match first.len() <= second.len() {
+        true => (&first, &second),
+        false => (&second, &first),
     };
     let nearest = |time: &f64| {
         let at = many.partition_point(|other| other < time);
-        let around = [at.checked_sub(1), Some(at)]
-            .into_iter()
-            .flatten()
-            .filter_map(|at| many.get(at));
-        around
-            .map(|other| (other - time).abs())
-            .fold(f64::INFINITY, f64::min)
+        let around = &many[at.saturating_sub(1)..many.len().min(at + 1)];
+        let apart = around.iter().map(|other| (other - time).abs());
+        apart.fold(f64::INFINITY, f64::min)
     };
     let median = |mut values: Vec<f64>| statistics::nearest(&mut values, 0.5);
     let near = median(few.iter().map(nearest).collect())?;
@@ -464,11 +379,8 @@ fn by_time(timing: &Timing, files: [&ExaminedFile; 2]) -> Vec<String> {
     };
     let mut lines = vec![line];
     let [a, b] = timing.rows;
-    let (many, few, name) = if a > b {
-        (a, b, &files[0].name)
-    } else {
-        (b, a, &files[1].name)
-    };
+    let (many, few) = (a.max(b), a.min(b));
+    let name = &files[usize::from(a <= b)].name;
     // Beyond a half, by default, a file is refused; here up to half of the other file's rows may lack their partner.
     if 5 * few < 3 * many {
         let fraction = ((1.0 - 0.5 * few as f64 / many as f64) * 1e4).ceil() / 1e4;

@@ -3,6 +3,7 @@
 //! An entry of the archive is an array (.npy) with its type and shape in a head of text; pickled objects are not read.
 
 use super::decoded;
+use crate::error::listed;
 use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray};
 use std::io::{Cursor, Read};
 use std::sync::Arc;
@@ -10,71 +11,44 @@ use std::sync::Arc;
 /// How an array begins, and its bytes at most.
 const MAGIC: &[u8] = b"\x93NUMPY";
 const MOST_BYTES: u64 = 1 << 30;
-/// Numbers of a row, at most.
+/// Numbers of a row, and letters of a text, at most.
 const WIDEST: usize = 256;
+const LONGEST: usize = 1 << 12;
 
 /// Whether a file that begins so is an archive of arrays: its first entry is called so.
 pub(super) fn is_arrays(head: &[u8]) -> bool {
-    let length = head
-        .get(26..28)
-        .map_or(0, |two| usize::from(two[0]) | usize::from(two[1]) << 8);
-    head.starts_with(b"PK\x03\x04")
-        && head
-            .get(30..30 + length)
-            .is_some_and(|name| name.ends_with(b".npy"))
+    let length = head.get(26..28).and_then(count).unwrap_or_default();
+    let name = head.get(30..30 + length);
+    head.starts_with(b"PK\x03\x04") && name.is_some_and(|name| name.ends_with(b".npy"))
 }
 
 struct PlainArray {
     name: String,
     rows: usize,
-    columns: Vec<ArrayRef>,
-    /// Whether rows are numbers alone.
-    is_plain: bool,
+    /// Each with its name, and that its cells may be blank.
+    columns: Vec<(String, ArrayRef, bool)>,
 }
 
 /// The arrays as one table, and what was left out.
 pub(super) fn arrays(content: Vec<u8>) -> Result<(RecordBatch, Option<String>), String> {
     let found = decoded(|| entries(content))??;
-    let rows = found
-        .iter()
-        .map(|array| array.rows)
-        .max()
-        .unwrap_or_default();
+    let rows = found.iter().map(|array| array.rows).max();
+    let rows = rows.unwrap_or_default();
     let (used, left): (Vec<PlainArray>, Vec<PlainArray>) = found
         .into_iter()
         .partition(|array| array.rows == rows && rows > 0);
-    let named = |array: &PlainArray| {
-        let name = |k: usize| {
-            if array.is_plain {
-                array.name.clone()
-            } else {
-                format!("{}[{}]", array.name, k + 1)
-            }
-        };
-        array
-            .columns
-            .iter()
-            .enumerate()
-            .map(|(k, column)| (name(k), column.clone()))
-            .collect::<Vec<_>>()
-    };
-    let columns: Vec<(String, ArrayRef)> = used.iter().flat_map(named).collect();
+    let columns: Vec<_> = used.into_iter().flat_map(|array| array.columns).collect();
     if columns.is_empty() {
         return Err("it has no array of numbers or texts in rows".into());
     }
-    let table = RecordBatch::try_from_iter_with_nullable(
-        columns
-            .into_iter()
-            .map(|(name, column)| (name, column, true)),
-    );
-    let left: Vec<String> = left
-        .iter()
-        .map(|array| format!("`{}` ({} rows)", array.name, array.rows))
-        .collect();
+    let table = RecordBatch::try_from_iter_with_nullable(columns);
     let remark = (!left.is_empty()).then(|| {
+        let left = left
+            .iter()
+            .map(|array| format!("`{}` ({} rows)", array.name, array.rows));
         format!(
             "arrays of another length than {rows} left out: {}",
-            left.join(", ")
+            listed(left)
         )
     });
     Ok((table.map_err(|error| error.to_string())?, remark))
@@ -83,8 +57,7 @@ pub(super) fn arrays(content: Vec<u8>) -> Result<(RecordBatch, Option<String>), 
 fn entries(content: Vec<u8>) -> Result<Vec<PlainArray>, String> {
     let broken = |error: zip::result::ZipError| error.to_string();
     let mut archive = zip::ZipArchive::new(Cursor::new(content)).map_err(broken)?;
-    let mut left = MOST_BYTES;
-    let mut found = Vec::new();
+    let (mut left, mut found) = (MOST_BYTES, Vec::new());
     for index in 0..archive.len() {
         let part = archive.by_index(index).map_err(broken)?;
         let name = part
@@ -116,25 +89,11 @@ fn array(name: String, bytes: &[u8]) -> Result<PlainArray, String> {
         .strip_prefix(MAGIC)
         .and_then(|tail| tail.first())
         .ok_or(BROKEN)?;
-    let (length, from) = match version {
-        1 => (
-            bytes
-                .get(8..10)
-                .map(|two| usize::from(two[0]) | usize::from(two[1]) << 8),
-            10,
-        ),
-        _ => (
-            bytes
-                .get(8..12)
-                .and_then(|four| four.first_chunk())
-                .map(|four| u32::from_le_bytes(*four) as usize),
-            12,
-        ),
-    };
-    let end = length.ok_or(BROKEN)? + from;
+    let from = if *version == 1 { 10 } else { 12 };
+    let end = bytes.get(8..from).and_then(count).ok_or(BROKEN)? + from;
     let head = String::from_utf8_lossy(bytes.get(from..end).ok_or(BROKEN)?).into_owned();
     let kind = value(&head, "descr", ',')
-        .map(|text| text.trim_matches([',', '\'', ' ']).to_string())
+        .map(|text| text.trim_matches([',', '\'', ' ']))
         .ok_or(BROKEN)?;
     let by_column = value(&head, "fortran_order", ',')
         .ok_or(BROKEN)?
@@ -155,28 +114,18 @@ fn array(name: String, bytes: &[u8]) -> Result<PlainArray, String> {
         // Pictures and the like are no columns.
         [rows, ..] => (rows, 0, false),
     };
-    let (order, code, size) = (
-        kind.chars().next(),
-        kind.chars().nth(1),
-        kind.get(2..).and_then(|size| size.parse::<usize>().ok()),
-    );
-    let (Some(order), Some(code), Some(size)) = (
-        order,
-        code,
-        size.filter(|size| (1..=1 << 12).contains(size)),
-    ) else {
-        return Err(format!(
-            "type {kind} is not read; allowed: numbers and texts"
-        ));
+    let unread = || format!("type {kind} is not read; allowed: numbers and texts");
+    let mut letters = kind.chars();
+    let parts = (letters.next(), letters.next(), letters.as_str().parse());
+    let (Some(order), Some(code), Ok(size @ 1..=LONGEST)) = parts else {
+        return Err(unread());
     };
     let size = if code == 'U' { 4 * size } else { size };
     let data = &bytes[end..];
-    if width > 0
-        && rows
-            .checked_mul(width)
-            .and_then(|cells| cells.checked_mul(size))
-            != Some(data.len())
-    {
+    let stated = rows
+        .checked_mul(width)
+        .and_then(|cells| cells.checked_mul(size));
+    if width > 0 && stated != Some(data.len()) {
         return Err(format!("{} bytes for {rows} rows of {width}", data.len()));
     }
     let cell = |row: usize, column: usize| {
@@ -192,51 +141,42 @@ fn array(name: String, bytes: &[u8]) -> Result<PlainArray, String> {
         }
         item
     };
-    let column = |column: usize| -> Result<ArrayRef, String> {
-        let cells = (0..rows).map(|row| cell(row, column));
-        Ok(match (code, size) {
-            ('f', 8) => Arc::new(
-                cells
-                    .map(|item| item.first_chunk().map(|first| f64::from_le_bytes(*first)))
-                    .collect::<Float64Array>(),
-            ),
-            ('f', 4) => Arc::new(
-                cells
-                    .map(|item| {
-                        item.first_chunk()
-                            .map(|first| f64::from(f32::from_le_bytes(*first)))
-                    })
-                    .collect::<Float64Array>(),
-            ),
-            ('i' | 'u' | 'b', 1 | 2 | 4 | 8) => Arc::new(
-                cells
-                    .map(|item| whole(&item, code == 'i'))
-                    .collect::<Int64Array>(),
-            ),
-            ('U', _) => {
-                let letters = |item: Vec<u8>| -> Option<String> {
-                    let codes = item.chunks_exact(4).filter_map(|four| {
-                        four.first_chunk().map(|four| u32::from_le_bytes(*four))
-                    });
-                    codes
-                        .take_while(|code| *code != 0)
-                        .map(char::from_u32)
-                        .collect()
-                };
-                Arc::new(cells.map(letters).collect::<StringArray>())
-            }
-            _ => {
-                return Err(format!(
-                    "type {kind} is not read; allowed: numbers and texts"
-                ));
-            }
-        })
+    let double = |item: Vec<u8>| item.first_chunk().map(|eight| f64::from_le_bytes(*eight));
+    let single = |item: Vec<u8>| {
+        let four = item.first_chunk()?;
+        Some(f64::from(f32::from_le_bytes(*four)))
     };
+    let integer = |item: Vec<u8>| whole(&item, code == 'i');
+    let text = |item: Vec<u8>| -> Option<String> {
+        let codes = item.chunks_exact(4).filter_map(<[u8]>::first_chunk);
+        let codes = codes.map(|four| u32::from_le_bytes(*four));
+        codes
+            .take_while(|code| *code != 0)
+            .map(char::from_u32)
+            .collect()
+    };
+    let column = |column: usize| -> Result<(String, ArrayRef, bool), String> {
+        let cells = (0..rows).map(|row| cell(row, column));
+        let column_name = match is_plain {
+            true => name.clone(),
+            false => format!("{name}[{}]", column + 1),
+        };
+        let values: ArrayRef = match (code, size) {
+            ('f', 8) => Arc::new(cells.map(double).collect::<Float64Array>()),
+            ('f', 4) => Arc::new(cells.map(single).collect::<Float64Array>()),
+            ('i' | 'u' | 'b', 1 | 2 | 4 | 8) => {
+                Arc::new(cells.map(integer).collect::<Int64Array>())
+            }
+            ('U', _) => Arc::new(cells.map(text).collect::<StringArray>()),
+            _ => return Err(unread()),
+        };
+        Ok((column_name, values, true))
+    };
+    let columns = (0..width).map(column).collect::<Result<_, _>>()?;
     Ok(PlainArray {
         name,
         rows,
-        columns: (0..width).map(column).collect::<Result<_, _>>()?,
-        is_plain,
+        columns,
     })
 }
 
@@ -252,4 +192,8 @@ fn whole(bytes: &[u8], signed: bool) -> Option<i64> {
     } else {
         i64::try_from(number).ok()
     }
+}
+
+fn count(bytes: &[u8]) -> Option<usize> {
+    usize::try_from(whole(bytes, false)?).ok()
 }

@@ -97,6 +97,9 @@ impl Messages {
             losses: Vec::new(),
         })
     }
+    fn loss(&self) -> Option<String> {
+        (!self.losses.is_empty()).then(|| self.losses.join("; "))
+    }
     fn lose(&mut self, what: &str) {
         let several = self.bounds.len() > 2;
         self.losses.push(if several {
@@ -130,13 +133,10 @@ impl Messages {
     }
     /// Opens the next part; false where there is none.
     fn begin(&mut self) -> bool {
-        let Some(bounds) = self
-            .bounds
-            .get(self.part..self.part + 2)
-            .map(|two| [two[0], two[1]])
-        else {
+        let Some([start, end]) = self.bounds.get(self.part..self.part + 2) else {
             return false;
         };
+        let bounds = [*start, *end];
         self.part += 1;
         match self.opened(bounds) {
             Ok(container) => self.container = Some(container),
@@ -164,15 +164,11 @@ impl Messages {
         }
     }
     fn position(&self) -> u64 {
-        let before = self
-            .bounds
-            .get(self.part)
-            .or(self.bounds.last())
-            .copied()
-            .unwrap_or_default();
-        self.container
-            .as_ref()
-            .map_or(before, |container| container.position())
+        let before = self.bounds.get(self.part).or(self.bounds.last());
+        match &self.container {
+            Some(container) => container.position(),
+            None => before.copied().unwrap_or_default(),
+        }
     }
 }
 
@@ -204,25 +200,22 @@ impl BagRows {
             Some(topic) => (source, topic.to_string()),
             None => only_topic(source, label)?,
         };
-        let (name, frames) = topic
-            .split_once(' ')
-            .map_or((topic.as_str(), None), |(name, frames)| {
-                (name, Some(frames))
-            });
+        let (name, frames) = match topic.split_once(' ') {
+            Some((name, frames)) => (name, Some(frames)),
+            None => (topic.as_str(), None),
+        };
         let mut messages = Messages::open(source).map_err(failed)?;
         let (mut head, mut cells, mut bytes) = (VecDeque::new(), MessageCells::default(), 0);
-        ["received", "stamp"]
-            .into_iter()
-            .for_each(|name| cells.set(name, FieldValue::Absent));
+        for name in ["received", "stamp"] {
+            cells.set(name, FieldValue::Absent);
+        }
         let (mut message, mut kind) = (Message::default(), None);
         while head.len() < HEAD
             && bytes < HEAD_BYTES
             && messages.next(&|other| other == name, &mut message)
         {
-            let found = message
-                .topic
-                .known()
-                .filter(|kind| kind.of_frames == frames.is_some());
+            let found = message.topic.known();
+            let found = found.filter(|kind| kind.of_frames == frames.is_some());
             let Some(found) = kind.or(found) else { break };
             kind = Some(found);
             bytes += message.data.len();
@@ -234,11 +227,8 @@ impl BagRows {
             }
         }
         let Some(kind) = kind.filter(|_| !head.is_empty()) else {
-            let source = messages.source.into_inner();
-            return Err(Error::data(
-                label,
-                no_topic(&topic, &bag_content(source, label)?),
-            ));
+            let content = bag_content(messages.source.into_inner(), label)?;
+            return Err(Error::data(label, no_topic(&topic, &content)));
         };
         cells.is_closed = true;
         let (topic, frames) = (name.to_string(), frames.map(String::from));
@@ -264,26 +254,17 @@ impl BagRows {
         if let Err(why) = read {
             return Some((RecordFault::Damaged, why));
         }
-        let needed = self
-            .wanted
-            .iter()
-            .flatten()
-            .zip(&self.cells.cells)
-            .enumerate();
-        if let Some((column, _)) = needed
-            .into_iter()
-            .find(|(_, (wanted, cell))| **wanted == Some(true) && **cell == FieldValue::Absent)
-        {
-            let names = self.cells.joints();
-            let has = if names.is_empty() {
-                String::new()
-            } else {
-                format!("; its joints: {names}")
+        let mut needed = self.wanted.iter().flatten().zip(&self.cells.cells);
+        let lacks =
+            needed.position(|(wanted, cell)| *wanted == Some(true) && *cell == FieldValue::Absent);
+        if let Some(column) = lacks {
+            let has = match self.cells.joints() {
+                names if names.is_empty() => names,
+                names => format!("; its joints: {names}"),
             };
-            return Some((
-                RecordFault::Foreign,
-                format!("the message has no `{}`{has}", self.cells.names[column]),
-            ));
+            let name = &self.cells.names[column];
+            let why = format!("the message has no `{name}`{has}");
+            return Some((RecordFault::Foreign, why));
         }
         let Some(FieldValue::Time(stamp)) = self.cells.cells.get(1) else {
             return None;
@@ -291,46 +272,35 @@ impl BagRows {
         let before = self.last.replace((*stamp, self.rows));
         let (_, number) = before.filter(|(before, _)| before == stamp)?;
         self.last = before;
-        Some((
-            RecordFault::DoubledStamp,
-            format!("message {number} has the same stamp, {} s", time(*stamp)),
-        ))
+        let why = format!("message {number} has the same stamp, {} s", time(*stamp));
+        Some((RecordFault::DoubledStamp, why))
     }
 }
 
 /// Nanoseconds as seconds, without rounding.
 fn time(ns: i64) -> String {
-    let (whole, fraction) = (
-        ns.unsigned_abs() / 1_000_000_000,
-        ns.unsigned_abs() % 1_000_000_000,
-    );
-    format!("{}{whole}.{fraction:09}", if ns < 0 { "-" } else { "" })
+    let (sign, ns) = (if ns < 0 { "-" } else { "" }, ns.unsigned_abs());
+    format!("{sign}{}.{:09}", ns / 1_000_000_000, ns % 1_000_000_000)
 }
 
 impl RecordReader for BagRows {
     fn next(&mut self, record: &mut Record) -> Result<bool> {
         record.begin(self.rows);
         if !std::mem::replace(&mut self.is_named, true) {
-            self.cells
-                .names
-                .iter()
-                .for_each(|name| record.push(name.as_bytes()));
+            for name in &self.cells.names {
+                record.push(name.as_bytes());
+            }
             return Ok(true);
         }
         let read = loop {
+            let is_topic = |name: &str| name == self.topic;
             match self.head.pop_front() {
                 Some(message) => self.message = message,
-                None if self
-                    .messages
-                    .next(&|name| name == self.topic, &mut self.message) => {}
+                None if self.messages.next(&is_topic, &mut self.message) => {}
                 None => return Ok(false),
             }
-            match message::read(
-                self.kind,
-                self.frames.as_deref(),
-                &self.message.data,
-                &mut self.cells,
-            ) {
+            let (frames, data) = (self.frames.as_deref(), &self.message.data);
+            match message::read(self.kind, frames, data, &mut self.cells) {
                 Ok(false) => {}
                 read => break read,
             }
@@ -340,17 +310,15 @@ impl RecordReader for BagRows {
         self.cells.cells[0] = FieldValue::Time(self.message.received);
         record.fault = self.fault(read);
         for (column, cell) in self.cells.cells.iter().enumerate() {
-            let is_asked = self
-                .wanted
-                .as_ref()
-                .is_none_or(|wanted| wanted.get(column).is_some_and(Option::is_some));
+            let wanted = self.wanted.as_ref();
             match cell {
-                FieldValue::Number(number) if is_asked => {
-                    record.push(self.text.format(*number).as_bytes())
+                _ if wanted.is_some_and(|all| all.get(column).is_none_or(Option::is_none)) => {
+                    record.push(b"")
                 }
-                FieldValue::Time(ns) if is_asked => record.push(time(*ns).as_bytes()),
-                FieldValue::Text(text) if is_asked => record.push(text.as_bytes()),
-                _ => record.push(b""),
+                FieldValue::Number(number) => record.push(self.text.format(*number).as_bytes()),
+                FieldValue::Time(ns) => record.push(time(*ns).as_bytes()),
+                FieldValue::Text(text) => record.push(text.as_bytes()),
+                FieldValue::Absent | FieldValue::Blank => record.push(b""),
             }
         }
         Ok(true)
@@ -363,20 +331,18 @@ impl RecordReader for BagRows {
     }
     fn only(&mut self, columns: &[(usize, bool)]) {
         let mut wanted = vec![None; self.cells.names.len()];
-        columns.iter().for_each(|(column, needed)| {
+        for (column, needed) in columns {
             if let Some(place) = wanted.get_mut(*column) {
                 *place = Some(place.unwrap_or(false) || *needed);
             }
-        });
+        }
         self.wanted = Some(wanted);
     }
     fn remark(&self) -> Option<String> {
-        self.messages
-            .container
-            .as_ref()
-            .and_then(|container| container.remark())
+        let container = self.messages.container.as_ref();
+        container.and_then(|container| container.remark())
     }
     fn loss(&self) -> Option<String> {
-        (!self.messages.losses.is_empty()).then(|| self.messages.losses.join("; "))
+        self.messages.loss()
     }
 }

@@ -85,13 +85,11 @@ impl ColumnRows {
             });
             ("an archive of NumPy arrays", table)
         } else if content.starts_with(STREAM) {
-            let file = bounded(&content)
-                .and_then(|()| decoded(|| StreamReader::try_new(Cursor::new(content), None)));
-            ("a stream of Arrow", file.and_then(in_memory))
+            let file = in_memory(content, |content| StreamReader::try_new(content, None));
+            ("a stream of Arrow", file)
         } else {
-            let file = bounded(&content)
-                .and_then(|()| decoded(|| FileReader::try_new(Cursor::new(content), None)));
-            ("a Feather file", file.and_then(in_memory))
+            let file = in_memory(content, |content| FileReader::try_new(content, None));
+            ("a Feather file", file)
         };
         let file = unfolded(opened.map_err(|error| broken(label, what, error))?);
         Ok(Self {
@@ -254,15 +252,17 @@ fn message(content: &[u8], at: usize) -> Option<(arrow_ipc::Message<'_>, usize)>
 }
 
 /// Columns of Arrow as they stand in memory, in a Feather file, as pandas, polars and R write them, or in a stream; uncompressed or by zstd.
-fn in_memory(
-    opened: std::result::Result<impl RecordBatchReader + Send + 'static, ArrowError>,
+fn in_memory<R: RecordBatchReader + Send + 'static>(
+    content: Vec<u8>,
+    open: impl FnOnce(Cursor<Vec<u8>>) -> std::result::Result<R, ArrowError>,
 ) -> std::result::Result<BatchFile, String> {
+    const LZ4: &str = "its columns are compressed by LZ4; allowed: none or zstd, e.g. `to_feather(FILE, compression=\"zstd\")`";
+    bounded(&content)?;
+    let opened = decoded(|| open(Cursor::new(content)))?;
     let file = BatchFile::of(opened.map_err(|error| error.to_string())?);
-    let advised = |message: String| {
-        match message.contains("lz4") {
-        true => "its columns are compressed by LZ4; allowed: none or zstd, e.g. `to_feather(FILE, compression=\"zstd\")`".into(),
+    let advised = |message: String| match message.contains("lz4") {
+        true => LZ4.into(),
         false => message,
-    }
     };
     let batches = file.batches.map(move |batch| batch.map_err(advised));
     Ok(BatchFile {

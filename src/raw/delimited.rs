@@ -271,10 +271,8 @@ impl<R: BufRead> TextRows<R> {
         } else if read as u64 == room {
             let message =
                 "a row of more than 1 MiB; allowed: rows ending in LF or CRLF, every quote closed";
-            return Err(Error::data(
-                format!("{}:{}", self.label, self.lines),
-                message,
-            ));
+            let place = format!("{}:{}", self.label, self.lines);
+            return Err(Error::data(place, message));
         }
         if text.last() == Some(&b'\r') {
             text.pop();
@@ -287,12 +285,8 @@ impl<R: BufRead> TextRows<R> {
             return Ok(());
         }
         self.layout.header_in_comment = false;
-        let mark = self
-            .layout
-            .comment
-            .as_deref()
-            .unwrap_or_default()
-            .as_bytes();
+        let mark = self.layout.comment.as_deref().unwrap_or_default();
+        let mark = mark.as_bytes();
         if !record.text.starts_with(mark) {
             let place = format!("{}:{}", self.label, self.lines);
             let mark = shown(mark);
@@ -306,11 +300,8 @@ impl<R: BufRead> TextRows<R> {
     }
     /// Whether a line is no row.
     fn is_passed_over(&self, line: &[u8]) -> bool {
-        let is_comment = self
-            .layout
-            .comment
-            .as_ref()
-            .is_some_and(|mark| line.starts_with(mark.as_bytes()));
+        let comment = self.layout.comment.as_ref();
+        let is_comment = comment.is_some_and(|mark| line.starts_with(mark.as_bytes()));
         // A line of delimiters alone is a blank row, also where the delimiter is a tab.
         let delimited = || matches!(self.layout.delimiter, Delimiter::Byte(byte) if byte != b' ' && line.contains(&byte));
         is_comment || (line.trim_ascii().is_empty() && !delimited())
@@ -336,10 +327,8 @@ impl<R: BufRead + Send> RecordReader for TextRows<R> {
         while splitter.open.is_some() {
             record.text.push(b'\n');
             if !self.line(&mut record.text)? {
-                return Err(Error::data(
-                    format!("{}:{}", self.label, record.line),
-                    "a quoted field is not closed",
-                ));
+                let place = format!("{}:{}", self.label, record.line);
+                return Err(Error::data(place, "a quoted field is not closed"));
             }
             splitter.split(&record.text, self.layout.delimiter, &mut record.fields);
         }
@@ -350,10 +339,8 @@ impl<R: BufRead + Send> RecordReader for TextRows<R> {
         if record.is_quoted {
             record.unquoted.clear();
             for place in &mut record.fields {
-                let start = record.unquoted.len();
-                record
-                    .unquoted
-                    .extend_from_slice(&unquoted(&record.text[place.clone()]));
+                let (start, field) = (record.unquoted.len(), &record.text[place.clone()]);
+                record.unquoted.extend_from_slice(&unquoted(field));
                 *place = start..record.unquoted.len();
             }
         }
@@ -398,66 +385,61 @@ mod tests {
         Ok(rows)
     }
 
-    fn rows(text: &str, delimiter: &str, comment: Option<&str>) -> Rows {
-        all(&mut opened(text.as_bytes(), delimiter, comment)).unwrap()
-    }
-
-    fn row(line: u64, fields: &[&str]) -> (u64, Vec<String>) {
-        (line, fields.iter().map(ToString::to_string).collect())
+    fn reads(text: &str, delimiter: &str, comment: Option<&str>, expected: &[(u64, &[&str])]) {
+        let rows = all(&mut opened(text.as_bytes(), delimiter, comment)).unwrap();
+        let found = rows
+            .iter()
+            .map(|(line, fields)| (*line, fields.iter().map(String::as_str).collect()));
+        let found: Vec<(u64, Vec<&str>)> = found.collect();
+        let expected = expected
+            .iter()
+            .map(|(line, fields)| (*line, fields.to_vec()));
+        assert_eq!(found, expected.collect::<Vec<_>>());
     }
 
     #[test]
     fn line_numbers_survive_crlf_comments_and_empty_lines() {
         let text = "a,b\r\n\r\n# no row\r\n1,2\r\n\n3, 4";
-        assert_eq!(
-            rows(text, ",", Some("#")),
-            [
-                row(1, &["a", "b"]),
-                row(4, &["1", "2"]),
-                row(6, &["3", "4"])
-            ]
-        );
-        assert_eq!(
-            rows("a\rb,c\r\n\r1\n", ",", None),
-            [row(1, &["a\rb", "c"]), row(2, &["1"])]
-        );
+        let expected = [(1, &["a", "b"][..]), (4, &["1", "2"]), (6, &["3", "4"])];
+        reads(text, ",", Some("#"), &expected);
+        let expected = [(1, &["a\rb", "c"][..]), (2, &["1"])];
+        reads("a\rb,c\r\n\r1\n", ",", None, &expected);
     }
 
     #[test]
     fn quoted_fields_hold_delimiters_quotes_and_line_ends() {
         let text = "\"a;\"\"b\"\"\";2\n \"x\ny\" ;3\n4;5;\n;;\n";
         let expected = [
-            row(1, &["a;\"b\"", "2"]),
-            row(2, &["x\ny", "3"]),
-            row(4, &["4", "5", ""]),
-            row(5, &["", "", ""]),
+            (1, &["a;\"b\"", "2"][..]),
+            (2, &["x\ny", "3"]),
+            (4, &["4", "5", ""]),
+            (5, &["", "", ""]),
         ];
-        assert_eq!(rows(text, ";", None), expected);
+        reads(text, ";", None, &expected);
         // A quote inside a field is text.
-        assert_eq!(
-            rows("5\" pipe,a,\"\"\n6\",\"\"\"\"", ",", None),
-            [row(1, &["5\" pipe", "a", ""]), row(2, &["6\"", "\""])]
-        );
-        assert_eq!(
-            rows("\"a\r\n\r\n# b\",1\n \"\"\"\nc\"\"\",2", ",", Some("#")),
-            [row(1, &["a\n\n# b", "1"]), row(4, &["\"\nc\"", "2"])]
-        );
+        let expected = [(1, &["5\" pipe", "a", ""][..]), (2, &["6\"", "\""])];
+        reads("5\" pipe,a,\"\"\n6\",\"\"\"\"", ",", None, &expected);
+        let expected = [(1, &["a\n\n# b", "1"][..]), (4, &["\"\nc\"", "2"])];
+        let text = "\"a\r\n\r\n# b\",1\n \"\"\"\nc\"\"\",2";
+        reads(text, ",", Some("#"), &expected);
     }
 
     #[test]
     fn runs_of_blanks_separate_where_whitespace_does() {
         let text = "  a\t b  \n1   \"two words\"  3\n \"c\nd\"  e \n f\"g h\"\n";
         let expected = [
-            row(1, &["a", "b"]),
-            row(2, &["1", "two words", "3"]),
-            row(3, &["c\nd", "e"]),
-            row(5, &["f\"g", "h\""]),
+            (1, &["a", "b"][..]),
+            (2, &["1", "two words", "3"]),
+            (3, &["c\nd", "e"]),
+            (5, &["f\"g", "h\""]),
         ];
         assert!(!has_fault("f\"g h\"\n", "whitespace"));
-        assert_eq!(rows(text, "whitespace", None), expected);
-        assert_eq!(
-            rows("a\tb\n\t\n", "tab", None),
-            [row(1, &["a", "b"]), row(2, &["", ""])]
+        reads(text, "whitespace", None, &expected);
+        reads(
+            "a\tb\n\t\n",
+            "tab",
+            None,
+            &[(1, &["a", "b"]), (2, &["", ""])],
         );
     }
 
@@ -474,23 +456,13 @@ mod tests {
         let mut reader = opened(text.as_bytes(), ",", None);
         let (mut record, mut faults) = (Record::default(), Vec::new());
         while reader.next(&mut record).unwrap() {
-            faults.extend(
-                record
-                    .fault
-                    .take()
-                    .map(|(kind, why)| (record.line, kind, why)),
-            );
+            if let Some((kind, why)) = record.fault.take() {
+                assert_eq!(kind, RecordFault::Damaged);
+                faults.push((record.line, why.split(':').next().unwrap().to_string()));
+            }
         }
-        let columns: Vec<(u64, &str)> = faults
-            .iter()
-            .map(|(line, _, why)| (*line, why.split(':').next().unwrap()))
-            .collect();
-        assert_eq!(columns, [(2, "column 2"), (4, "column 2"), (7, "column 1")]);
-        assert!(
-            faults
-                .iter()
-                .all(|(_, kind, _)| *kind == RecordFault::Damaged)
-        );
+        let column = |line: u64, number: usize| (line, format!("column {number}"));
+        assert_eq!(faults, [column(2, 2), column(4, 2), column(7, 1)]);
         for (text, delimiter, expected) in [
             ("\"a\"b\n", ";", true),
             ("\"a\"b c\n", "whitespace", true),
@@ -517,21 +489,17 @@ mod tests {
             refusal("a,b\n\"never closed\n1,2\n").contains("a.csv:2")
                 && refusal("a,b\n\"never").contains("a quoted field is not closed")
         );
-        for length in [LONGEST - 3, LONGEST - 2, LONGEST - 1, LONGEST, LONGEST + 1] {
-            let message = refusal(&format!(
-                "\"{}\n{}\n",
-                "a".repeat(length - 2),
-                "b".repeat(100)
-            ));
-            assert!(
-                message.contains("a row of more than 1 MiB"),
-                "{length}: {message}"
-            );
+        let is_long = |text: String| {
+            let message = refusal(&text);
+            assert!(message.contains("a row of more than 1 MiB"), "{message}");
+        };
+        for length in LONGEST - 3..=LONGEST + 1 {
+            let (a, b) = ("a".repeat(length - 2), "b".repeat(100));
+            is_long(format!("\"{a}\n{b}\n"));
         }
         // At once, however many lines and quotes it takes in.
         for line in ["a\n", "\"\"\n"] {
-            let message = refusal(&format!("\"{}", line.repeat(LONGEST)));
-            assert!(message.contains("a row of more than 1 MiB"), "{message}");
+            is_long(format!("\"{}", line.repeat(LONGEST)));
         }
     }
 }

@@ -106,86 +106,59 @@ fn read(text: &str) -> Result<f64, NumberFault> {
 mod tests {
     use super::*;
 
+    use DecimalMark::{Comma, Point};
+
+    /// A cell is this under a mark.
+    fn read(cell: &str, mark: DecimalMark, expected: Result<f64, NumberFault>) {
+        assert_eq!(number(cell.as_bytes(), mark), expected, "{cell}");
+    }
+
     #[test]
     fn the_announced_decimal_mark_is_the_only_one() {
-        assert_eq!(
-            number(b"-0,000212669", DecimalMark::Comma),
-            Ok(-0.000212669)
-        );
-        assert_eq!(number(b"2,02011E+13", DecimalMark::Comma), Ok(2.02011e13));
-        assert_eq!(number(b"17", DecimalMark::Comma), Ok(17.0));
-        assert_eq!(
-            number(b"0.365", DecimalMark::Comma),
-            Err(NumberFault::Point)
-        );
-        assert_eq!(number(b"+1.5e-3", DecimalMark::Point), Ok(1.5e-3));
-        assert_eq!(
-            number(b"0,365", DecimalMark::Point),
-            Err(NumberFault::Comma)
-        );
-        assert_eq!(
-            number(b"1,234,5", DecimalMark::Point),
-            Err(NumberFault::Text)
-        );
-        assert_eq!(
-            number(b"1,234,5", DecimalMark::Comma),
-            Err(NumberFault::Text)
-        );
+        read("-0,000212669", Comma, Ok(-0.000212669));
+        read("2,02011E+13", Comma, Ok(2.02011e13));
+        read("17", Comma, Ok(17.0));
+        read("0.365", Comma, Err(NumberFault::Point));
+        read("+1.5e-3", Point, Ok(1.5e-3));
+        read("0,365", Point, Err(NumberFault::Comma));
+        read("1,234,5", Point, Err(NumberFault::Text));
+        read("1,234,5", Comma, Err(NumberFault::Text));
     }
 
     #[test]
     fn marks_of_thousands_are_read_where_both_marks_stand_and_every_group_has_three_digits() {
-        assert_eq!(number(b"1.234,56", DecimalMark::Comma), Ok(1234.56));
-        assert_eq!(
-            number(b"-12.345.678,5", DecimalMark::Comma),
-            Ok(-12_345_678.5)
-        );
-        assert_eq!(number(b"1,234.56", DecimalMark::Point), Ok(1234.56));
+        read("1.234,56", Comma, Ok(1234.56));
+        read("-12.345.678,5", Comma, Ok(-12_345_678.5));
+        read("1,234.56", Point, Ok(1234.56));
         // One mark alone may be either.
-        assert_eq!(
-            number(b"1.234", DecimalMark::Comma),
-            Err(NumberFault::Point)
-        );
+        read("1.234", Comma, Err(NumberFault::Point));
         for cell in ["1.23,4", "1.2345,6", "1234.567,8", ".123,4", "1.234,5,6"] {
-            assert_eq!(
-                number(cell.as_bytes(), DecimalMark::Comma),
-                Err(NumberFault::Text),
-                "{cell}"
-            );
+            read(cell, Comma, Err(NumberFault::Text));
         }
     }
 
     #[test]
     fn what_is_not_finite_is_no_number() {
         for cell in ["NaN", "inf", "-Infinity", "1e999"] {
-            assert_eq!(
-                number(cell.as_bytes(), DecimalMark::Point),
-                Err(NumberFault::NotFinite),
-                "{cell}"
-            );
+            read(cell, Point, Err(NumberFault::NotFinite));
         }
-        assert_eq!(number(b"", DecimalMark::Point), Err(NumberFault::Blank));
-        assert_eq!(number(b"--", DecimalMark::Point), Err(NumberFault::Text));
-        assert_eq!(number(b"1\xb5", DecimalMark::Point), Err(NumberFault::Text));
+        read("", Point, Err(NumberFault::Blank));
+        read("--", Point, Err(NumberFault::Text));
+        assert_eq!(number(b"1\xb5", Point), Err(NumberFault::Text));
     }
 
     #[test]
     fn without_an_announcement_the_last_mark_is_the_decimal_one() {
-        let read = [
-            "1.234,56", "-1,234.5", "1,5", "1.5", "5,", "1.23,4", "1,2.3",
-        ]
-        .map(number_of_any_mark);
-        assert_eq!(
-            read,
-            [
-                Some(1234.56),
-                Some(-1234.5),
-                Some(1.5),
-                Some(1.5),
-                None,
-                None,
-                None
-            ]
-        );
+        for (cell, expected) in [
+            ("1.234,56", Some(1234.56)),
+            ("-1,234.5", Some(-1234.5)),
+            ("1,5", Some(1.5)),
+            ("1.5", Some(1.5)),
+            ("5,", None),
+            ("1.23,4", None),
+            ("1,2.3", None),
+        ] {
+            assert_eq!(number_of_any_mark(cell), expected, "{cell}");
+        }
     }
 }

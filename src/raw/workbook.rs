@@ -61,11 +61,8 @@ impl Workbook {
     /// The sheet that is read: the one of this name, else the only visible one with rows of numbers.
     pub(crate) fn sheet(&mut self, wanted: Option<&str>) -> Result<String, String> {
         let listed = |names: &[String]| {
-            names
-                .iter()
-                .map(|name| format!("`{name}`"))
-                .collect::<Vec<_>>()
-                .join(", ")
+            let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+            names.join(", ")
         };
         let Some(wanted) = wanted else {
             let tables = self.tables()?;
@@ -93,15 +90,11 @@ impl Workbook {
 
     /// The visible sheets with rows of numbers.
     pub(crate) fn tables(&mut self) -> Result<Vec<String>, String> {
-        let visible = self
-            .book
-            .sheets_metadata()
-            .iter()
-            .filter(|sheet| sheet.visible == SheetVisible::Visible);
+        let sheets = self.book.sheets_metadata().to_vec();
         let mut tables = Vec::new();
-        for name in visible.map(|sheet| sheet.name.clone()).collect::<Vec<_>>() {
-            if self.has_numbers(&name)? {
-                tables.push(name);
+        for sheet in sheets {
+            if sheet.visible == SheetVisible::Visible && self.has_numbers(&sheet.name)? {
+                tables.push(sheet.name);
             }
         }
         Ok(tables)
@@ -195,18 +188,14 @@ impl Workbook {
 
 /// Whether a cell holds a number, or a text that is one, with a decimal point or comma.
 fn is_number(value: &DataRef) -> bool {
-    let is_text_of = |text: &str| {
-        text.trim()
-            .replacen(',', ".", 1)
-            .parse()
-            .is_ok_and(f64::is_finite)
+    let text = match value {
+        DataRef::Float(_) | DataRef::Int(_) => return true,
+        DataRef::String(text) => text.as_str(),
+        DataRef::SharedString(text) => *text,
+        _ => return false,
     };
-    match value {
-        DataRef::Float(_) | DataRef::Int(_) => true,
-        DataRef::String(text) => is_text_of(text),
-        DataRef::SharedString(text) => is_text_of(text),
-        _ => false,
-    }
+    let number = text.trim().replacen(',', ".", 1).parse();
+    number.is_ok_and(f64::is_finite)
 }
 
 fn damaged(error: XlsxError) -> String {
@@ -281,14 +270,10 @@ fn texts(part: &mut impl Read, name: &str) -> Result<u64, String> {
     })?;
     let digits = |stated: &str| {
         let number = stated.trim_start_matches(|c: char| c.is_whitespace() || "='\"".contains(c));
-        let end = number
-            .find(|c: char| !c.is_ascii_digit())
-            .unwrap_or(number.len());
-        // No count of texts has more digits than fit.
-        if end == 0 {
-            0
-        } else {
-            number[..end].parse().unwrap_or(u64::MAX)
+        match number.split(|c: char| !c.is_ascii_digit()).next() {
+            None | Some("") => 0,
+            // No count of texts has more digits than fit.
+            Some(digits) => digits.parse().unwrap_or(u64::MAX),
         }
     };
     match text.split("uniqueCount").skip(1).map(digits).max() {

@@ -55,10 +55,9 @@ impl Stage for CellEvidence {
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
-        let below = |(place, file)| (format!("diagnose.{place}"), file);
-        Stage::files(&self.diagnose)
-            .into_iter()
-            .map(below)
+        let files = Stage::files(&self.diagnose).into_iter();
+        files
+            .map(|(place, file)| (format!("diagnose.{place}"), file))
             .collect()
     }
 

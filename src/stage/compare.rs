@@ -6,7 +6,7 @@ use crate::estimate::{Prior, align, changes};
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::doubtful::{FittedRows, fit_rows};
 use crate::stage::settings::Repeatability;
-use crate::stage::{Context, RawFile, Stage};
+use crate::stage::{Context, OpenedInput, RawFile, Stage};
 use crate::table::{ChangeRow, Changes, Parameters, Recording, Robot, Split, Table, from_parquet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -38,22 +38,16 @@ crate::stage::stage! {
 impl Stage for Compare {
     fn faults(&self, at: &mut Place) {
         let both = self.previous_parameters.is_some() == self.previous_recording.is_some();
-        at.at("previous_recording").must(
-            both,
-            "`previous_parameters` and `previous_recording` go together",
-        );
+        let message = "`previous_parameters` and `previous_recording` go together";
+        at.at("previous_recording").must(both, message);
         self.repeatability.faults(at);
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
-        let files = [
-            ("previous_parameters", &self.previous_parameters),
-            ("previous_recording", &self.previous_recording),
-        ];
-        files
-            .into_iter()
-            .filter_map(|(place, file)| Some((place.to_string(), file.clone()?)))
-            .collect()
+        let parameters = ("previous_parameters", &self.previous_parameters);
+        let files = [parameters, ("previous_recording", &self.previous_recording)];
+        let given = |(place, file): (&str, &Option<RawFile>)| Some((place.into(), file.clone()?));
+        files.into_iter().filter_map(given).collect()
     }
 
     fn run(&self, reads: CompareReads, context: &Context) -> Result<CompareWrites> {
@@ -68,28 +62,15 @@ impl Stage for Compare {
         let earlier: Parameters = table(context, parameters)?;
         let recording: Recording = table(context, recording)?;
         let robot = RobotModel::new(reads.robot.to_description()?);
+        let split = Some(&reads.split);
         let first = self.session(&robot, &earlier, &recording, None, context)?;
-        let second = self.session(
-            &robot,
-            &earlier,
-            &reads.recording,
-            Some(&reads.split),
-            context,
-        )?;
-        let (first, second) = (
-            first.fit.session(&first.data),
-            second.fit.session(&second.data),
-        );
+        let second = self.session(&robot, &earlier, &reads.recording, split, context)?;
+        let [first, second] = [&first, &second].map(|one| one.fit.session(&one.data));
         let (stack, specs) = (&first.model.stack, first.model.stack.specs());
-        let first_causes: Vec<Vec<usize>> = ORDER
-            .iter()
-            .map(|name| stack.parameters_of(name).collect())
-            .collect();
         let precedence = |k: usize| {
-            first_causes
-                .iter()
-                .position(|parameters| parameters.contains(&k))
-                .unwrap_or(ORDER.len())
+            let mut causes = ORDER.iter();
+            let cause = causes.position(|name| stack.parameters_of(name).any(|other| other == k));
+            cause.unwrap_or(ORDER.len())
         };
         let found = changes(&first, &second, precedence);
         let mut rows = Vec::new();
@@ -98,29 +79,24 @@ impl Stage for Compare {
             let Some(before) = earlier.0.iter().find(|row| row.name == spec.name) else {
                 continue;
             };
-            let show = |value: f64| spec.unit.from_si(value);
-            if let Some(rank) = change.rank {
-                context.note(format!(
-                    "{rank}. {} {}: {} by {:.4e} +- {:.1e} {}",
-                    effect(&before.effect),
-                    spec.place,
-                    spec.name,
-                    show(change.step),
-                    show(change.sigma),
-                    spec.unit.symbol()
-                ));
-            }
-            rows.push(ChangeRow {
+            let row = ChangeRow {
                 name: spec.name.clone(),
                 effect: effect(&before.effect).into(),
                 place: spec.place.to_string(),
                 unit: spec.unit.symbol().into(),
                 previous: before.value,
-                change: show(change.step),
-                sigma: show(change.sigma),
+                change: spec.unit.from_si(change.step),
+                sigma: spec.unit.from_si(change.sigma),
                 p_value: change.p_value,
                 rank: change.rank.map(|rank| rank as i64),
-            });
+            };
+            if let Some(rank) = row.rank {
+                context.note(format!(
+                    "{rank}. {} {}: {} by {:.4e} +- {:.1e} {}",
+                    row.effect, row.place, row.name, row.change, row.sigma, row.unit
+                ));
+            }
+            rows.push(row);
         }
         Ok(CompareWrites {
             changes: Changes(rows),
@@ -146,15 +122,14 @@ fn effect(name: &str) -> &str {
 }
 
 fn table<T: Table>(context: &Context, file: &RawFile) -> Result<T> {
-    let mut source = context.services.open(file)?;
+    let OpenedInput {
+        label, mut reader, ..
+    } = context.services.open(file)?;
     let mut bytes = Vec::new();
-    source
-        .reader
-        .read_to_end(&mut bytes)
-        .map_err(|error| crate::error::Error::data(&source.label, error.to_string()))?;
-    let loose = from_parquet(&source.label, bytes)?;
+    let read = reader.read_to_end(&mut bytes);
+    read.map_err(|error| Error::data(&label, error.to_string()))?;
+    let loose = from_parquet(&label, bytes)?;
     if !loose.vouched {
-        let label = &source.label;
         context.warn(format!(
             "{label} carries no content hash: its content cannot be verified"
         ));
@@ -181,11 +156,7 @@ impl Compare {
         let mut data = recording.measurements();
         let rows: Vec<usize> = (0..data.rows()).collect();
         if data.noise_basis == NoiseBasis::Inferred {
-            let which = if split.is_some() {
-                "this"
-            } else {
-                "the earlier"
-            };
+            let which = split.map_or("the earlier", |_| "this");
             context.note(format!(
                 "{which} recording states no noise: rows are weighted by an assumed one"
             ));
@@ -193,13 +164,8 @@ impl Compare {
         let placed = earlier.clone().standing_at(&align(robot, &data, &rows));
         let mut model = placed.model(robot.clone(), &[names::BASE_FRAME], Load::GravityTorque)?;
         let base: Vec<usize> = model.stack.parameters_of(names::BASE_FRAME).collect();
-        for (k, spec) in model
-            .stack
-            .specs()
-            .iter()
-            .enumerate()
-            .filter(|(k, _)| !base.contains(k))
-        {
+        let specs = model.stack.specs().iter().enumerate();
+        for (k, spec) in specs.filter(|(k, _)| !base.contains(k)) {
             let prior = Prior {
                 mean: model.x[k],
                 sigma: spec.prior_sigma,

@@ -38,12 +38,10 @@ pub(super) fn note(context: &Context, session: &Session, recording: &Recording) 
     }
     note_scale(context, session);
     context.warn_each(events(session, recording));
-    let weak: Vec<&str> = fitted
-        .prior_checks
-        .iter()
-        .filter(|(k, check)| matches!(fitted.statuses[**k], ParameterStatus::Free(sigma) if sigma > CARRIED * check.prior.sigma))
-        .map(|(k, _)| model.stack.specs()[*k].name.as_str())
-        .collect();
+    let is_weak = |k: &usize, prior: f64| matches!(fitted.statuses[*k], ParameterStatus::Free(sigma) if sigma > CARRIED * prior);
+    let checks = fitted.prior_checks.iter();
+    let weak = checks.filter(|(k, check)| is_weak(k, check.prior.sigma));
+    let weak: Vec<&str> = weak.map(|(k, _)| &*model.stack.specs()[*k].name).collect();
     if !weak.is_empty() {
         let shown = first_of(&weak, NAMED);
         context.note(format!(
@@ -107,11 +105,8 @@ pub(super) fn events(session: &Session, recording: &Recording) -> Vec<String> {
     if held.is_empty() {
         return Vec::new();
     }
-    let put_back = put_back(session, recording, &held);
-    put_back
-        .into_iter()
-        .chain(far(session, recording))
-        .collect()
+    let put_back = put_back(session, recording, &held).into_iter();
+    put_back.chain(far(session, recording)).collect()
 }
 
 fn put_back(session: &Session, recording: &Recording, held: &[usize]) -> Option<String> {
@@ -122,9 +117,8 @@ fn put_back(session: &Session, recording: &Recording, held: &[usize]) -> Option<
         ..
     } = *session;
     let stated = |row: &usize| {
-        contacts(data, *row)
-            .next()
-            .map_or(0.0, |(_, reading)| reading.sigma)
+        let first = contacts(data, *row).next();
+        first.map_or(0.0, |(_, reading)| reading.sigma)
     };
     let sigma = (held.iter().map(|row| stated(row).powi(2)).sum::<f64>() / held.len() as f64)
         .sqrt()
@@ -202,15 +196,9 @@ fn run_text(run: &[Far], recording: &Recording) -> String {
     let id = |far: &Far| recording.point_id[far.row].as_str();
     let most = 1e3 * run.iter().map(|far| far.off).fold(0.0, f64::max);
     let (first, last) = (&run[0], &run[run.len() - 1]);
-    let who = if run.len() == 1 {
-        id(first).to_string()
-    } else {
-        format!(
-            "{} to {} ({})",
-            id(first),
-            id(last),
-            counted(run.len(), "row")
-        )
+    let who = match run.len() {
+        1 => id(first).to_string(),
+        rows => format!("{} to {} ({})", id(first), id(last), counted(rows, "row")),
     };
     let why = match &first.other {
         Some(other) => format!(", where `{other}` is"),
@@ -222,22 +210,14 @@ fn run_text(run: &[Far], recording: &Recording) -> String {
 
 fn places(model: &Model) -> Vec<(String, Vector3<f64>)> {
     let setup = model.robot.setup();
-    let first = model
-        .stack
-        .parameters_of(names::ANCHOR)
-        .next()
-        .unwrap_or_default();
-    let all = setup
-        .anchors
-        .iter()
-        .enumerate()
-        .filter(|(_, anchor)| anchor.shape == Shape::Point);
+    let first = model.stack.parameters_of(names::ANCHOR).next();
+    let first = first.unwrap_or_default();
+    let anchors = setup.anchors.iter().enumerate();
+    let all = anchors.filter(|(_, anchor)| anchor.shape == Shape::Point);
     let place = |(number, anchor): (usize, &crate::robot::Anchor)| {
         let at = first + setup.first_of_anchor(number);
-        let shift = model
-            .x
-            .get(at..at + 3)
-            .map_or_else(Vector3::zeros, Vector3::from_column_slice);
+        let shift = model.x.get(at..at + 3);
+        let shift = shift.map_or_else(Vector3::zeros, Vector3::from_column_slice);
         (anchor.name.clone(), anchor.place + shift)
     };
     all.map(place).collect()

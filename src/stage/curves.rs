@@ -28,13 +28,12 @@ pub(super) fn curves(
 ) -> Result<Curves> {
     let specs = model.stack.specs();
     let named = sigmas(parameters);
-    let sigma: Vec<Option<f64>> = specs
+    let sigma = specs
         .iter()
-        .map(|spec| named.get(spec.name.as_str()).copied())
-        .collect();
-    let shown: Vec<usize> = (0..data.rows().min(prediction.0.len()))
-        .filter(|row| !prediction.0[*row].suspect)
-        .collect();
+        .map(|spec| named.get(spec.name.as_str()).copied());
+    let sigma: Vec<Option<f64>> = sigma.collect();
+    let shown = 0..data.rows().min(prediction.0.len());
+    let shown = shown.filter(|row| !prediction.0[*row].suspect);
     let whole = model.predict(data);
     let mut traced = Vec::new();
     for finding in &findings.0 {
@@ -48,30 +47,20 @@ pub(super) fn curves(
                     && specs[k].place.to_string() == finding.place
             }
         };
-        let parameters_of_finding: Vec<usize> = model
-            .stack
-            .effects()
+        let effects = model.stack.effects();
+        let of_finding: Vec<usize> = effects
             .flat_map(|(effect, range)| range.filter(move |k| is_of_finding(effect, *k)))
             .collect();
-        if !parameters_of_finding.is_empty() {
-            traced.push(TracedFinding::of(
-                finding,
-                forms,
-                parameters_of_finding,
-                model,
-                data,
-                &whole,
-            ));
+        if !of_finding.is_empty() {
+            let points = (data, &whole[..]);
+            traced.push(TracedFinding::of(finding, forms, of_finding, model, points));
         }
     }
     // All derivatives of a row come at once: each row is placed once for all findings.
-    let mut rows: Vec<Vec<CurveRow>> = traced
-        .iter()
-        .map(|_| Vec::with_capacity(shown.len()))
-        .collect();
+    let mut rows: Vec<Vec<CurveRow>> = vec![Vec::new(); traced.len()];
     let mut scratch = model.stack.scratch(&model.robot);
     let mut derivatives = vec![Vector3::zeros(); specs.len()];
-    for &row in &shown {
+    for row in shown {
         // A curve is drawn along the displacement of a point.
         let Some(measured) = data.point(row) else {
             continue;
@@ -111,11 +100,7 @@ pub(super) fn curves(
                 over,
                 x_unit: x_unit.map_or(ROW, Unit::symbol).into(),
                 x: x_unit.map_or(x, |unit| unit.from_si(x)),
-                unit: if finding.turns(model) {
-                    "rad".into()
-                } else {
-                    "mm".into()
-                },
+                unit: ["mm", "rad"][usize::from(finding.turns(model))].into(),
                 without: along(&residual) + fitted,
                 with: along(&residual),
                 fitted,
@@ -148,18 +133,14 @@ impl TracedFinding {
         forms: Vec<Form>,
         parameters: Vec<usize>,
         model: &Model,
-        data: &Measurements,
-        whole: &[Vector3<f64>],
+        (data, whole): (&Measurements, &[Vector3<f64>]),
     ) -> Self {
         let mut without = model.clone();
         parameters.iter().for_each(|k| without.x[*k] = 0.0);
         let bare = without.predict(data);
         let shift: Vec<Vector3<f64>> = whole.iter().zip(&bare).map(|(a, b)| a - b).collect();
-        let place = forms
-            .first()
-            .map_or(model.stack.specs()[parameters[0]].place, |form| {
-                form.place()
-            });
+        let place = forms.first().map(|form| form.place());
+        let place = place.unwrap_or(model.stack.specs()[parameters[0]].place);
         let joint = match place {
             Place::Joint(joint) if joint < data.joints => Some(joint),
             _ => None,
@@ -178,8 +159,8 @@ impl TracedFinding {
 
     /// Whether it is shown as an angle about its joint.
     fn turns(&self, model: &Model) -> bool {
-        self.joint
-            .is_some_and(|joint| model.robot.is_revolute(joint))
+        let joint = self.joint;
+        joint.is_some_and(|joint| model.robot.is_revolute(joint))
     }
 
     /// The direction along which a row shows it, and the factor to the column's unit: rad about the joint, or mm. None where the joint
@@ -190,29 +171,24 @@ impl TracedFinding {
         motion: &PointMotion,
         model: &Model,
     ) -> Option<(Vector3<f64>, f64)> {
-        match self.joint.filter(|_| self.turns(model)) {
-            Some(joint) if motion.by_joint[joint].norm() > LEVER => Some((
-                motion.by_joint[joint] / motion.by_joint[joint].norm_squared(),
-                1.0,
-            )),
-            Some(_) => None,
-            None if self.shift[row].norm() > SMALL * self.largest => {
-                Some((self.shift[row].normalize(), 1e3))
-            }
-            None => Some((self.principal, 1e3)),
+        if let Some(joint) = self.joint.filter(|_| self.turns(model)) {
+            let lever = motion.by_joint[joint];
+            return (lever.norm() > LEVER).then(|| (lever / lever.norm_squared(), 1.0));
+        }
+        let shift = self.shift[row];
+        match shift.norm() > SMALL * self.largest {
+            true => Some((shift.normalize(), 1e3)),
+            false => Some((self.principal, 1e3)),
         }
     }
 }
 
 /// One standard deviation (SI) of the parameters that have one, by name.
 fn sigmas(parameters: &Parameters) -> BTreeMap<&str, f64> {
-    let known = parameters
-        .0
-        .iter()
-        .filter_map(|row| Some((row, row.sigma?, Unit::parse(&row.unit)?)));
-    known
-        .map(|(row, sigma, unit)| (row.name.as_str(), unit.to_si(sigma)))
-        .collect()
+    let rows = parameters.0.iter();
+    let known =
+        rows.filter_map(|row| Some((&*row.name, Unit::parse(&row.unit)?.to_si(row.sigma?))));
+    known.collect()
 }
 
 /// What counts time where the recording has no clock.
@@ -221,10 +197,8 @@ const ROW: &str = "row";
 /// The forms of a finding. Fails where they cannot be read.
 fn forms(finding: &FindingRow) -> Result<Vec<Form>> {
     serde_json::from_str(&finding.forms).map_err(|error| {
-        Error::data(
-            "table findings",
-            format!("`{}` are no forms of effects: {error}", finding.forms),
-        )
+        let message = format!("`{}` are no forms of effects: {error}", finding.forms);
+        Error::data("table findings", message)
     })
 }
 
@@ -242,19 +216,15 @@ fn abscissa(
         false => ("place in the recording".to_string(), None, row as f64 + 1.0),
     };
     let position = |joint: usize| {
-        let unit = if robot.is_revolute(joint) {
-            Unit::Radian
-        } else {
-            Unit::Millimetre
+        let unit = match robot.is_revolute(joint) {
+            true => Unit::Radian,
+            false => Unit::Millimetre,
         };
         with(format!("joint {}", joint + 1), unit, data.q(row)[joint])
     };
     let load = |joint: usize| {
-        with(
-            format!("load torque of joint {}", joint + 1),
-            Unit::NewtonMetre,
-            torque[joint],
-        )
+        let over = format!("load torque of joint {}", joint + 1);
+        with(over, Unit::NewtonMetre, torque[joint])
     };
     let variables: Vec<Variable> = forms.iter().flat_map(|form| form.variables()).collect();
     let angle = joint.map(|joint| Variable::Angle { joint });

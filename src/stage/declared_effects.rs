@@ -40,12 +40,8 @@ pub(super) fn declared_effects(
                 let message = format!(
                     "`{name}` is declared in {other} already; give each effect a name of its own"
                 );
-                troubles.push(
-                    Trouble::new(message)
-                        .at(node.nearest_mark("name"))
-                        .below("name")
-                        .below(&path),
-                );
+                let trouble = Trouble::new(message).at(node.nearest_mark("name"));
+                troubles.push(trouble.below("name").below(&path));
             }
             causes.push(cause);
         }
@@ -62,12 +58,8 @@ fn read(text: &str, troubles: &mut Vec<Trouble>) -> Vec<(String, Node, &'static 
     let Some(root) = root else { return Vec::new() };
     let mut listed = Vec::new();
     let YamlValue::Map(entries) = &root.value else {
-        troubles.push(
-            Trouble::new(format!(
-                "expected a block of keys that begins with `{VERSION}: {FORMAT}`"
-            ))
-            .at(root.mark),
-        );
+        let message = format!("expected a block of keys that begins with `{VERSION}: {FORMAT}`");
+        troubles.push(Trouble::new(message).at(root.mark));
         return Vec::new();
     };
     match root.get(VERSION).map(|node| (&node.value, node.mark)) {
@@ -76,50 +68,30 @@ fn read(text: &str, troubles: &mut Vec<Trouble>) -> Vec<(String, Node, &'static 
             let message = format!("expected {FORMAT}, the format of effects that this calib knows");
             troubles.push(Trouble::new(message).at(mark).below(VERSION));
         }
-        None => troubles.push(
-            Trouble::new(format!(
-                "missing key `{VERSION}`; expected `{VERSION}: {FORMAT}`"
-            ))
-            .at(root.mark),
-        ),
+        None => {
+            let message = format!("missing key `{VERSION}`; expected `{VERSION}: {FORMAT}`");
+            troubles.push(Trouble::new(message).at(root.mark));
+        }
     }
     let one = match root.get(LIST) {
         Some(list) => {
-            for (key, mark, _) in entries
-                .iter()
-                .filter(|(key, ..)| key != VERSION && key != LIST)
-            {
-                troubles.push(
-                    Trouble::unknown_key(key, &[VERSION, LIST])
-                        .at(*mark)
-                        .below(key),
-                );
+            let is_other = |key: &str| key != VERSION && key != LIST;
+            for (key, mark, _) in entries.iter().filter(|(key, ..)| is_other(key)) {
+                let trouble = Trouble::unknown_key(key, &[VERSION, LIST]);
+                troubles.push(trouble.at(*mark).below(key));
             }
             if !matches!(list.value, YamlValue::List(_)) {
-                troubles.push(
-                    Trouble::new("expected a list of effects")
-                        .at(list.mark)
-                        .below(LIST),
-                );
+                let trouble = Trouble::new("expected a list of effects");
+                troubles.push(trouble.at(list.mark).below(LIST));
             }
-            listed.extend(
-                list.items()
-                    .iter()
-                    .enumerate()
-                    .map(|(k, node)| (format!("{LIST}[{k}]"), node.clone())),
-            );
+            let items = list.items().iter().enumerate();
+            listed.extend(items.map(|(k, node)| (format!("{LIST}[{k}]"), node.clone())));
             None
         }
         None => {
-            let settings = entries
-                .iter()
-                .filter(|(key, ..)| key != VERSION)
-                .cloned()
-                .collect();
-            Some((
-                String::new(),
-                Node::new(YamlValue::Map(settings), root.mark),
-            ))
+            let settings = entries.iter().filter(|(key, ..)| key != VERSION);
+            let settings = YamlValue::Map(settings.cloned().collect());
+            Some((String::new(), Node::new(settings, root.mark)))
         }
     };
     one.into_iter()
@@ -145,11 +117,8 @@ fn declared(
         Ok(cause) => Some((path, node, cause)),
         Err(found) => {
             troubles.extend(found.into_iter().map(|fault| {
-                let mark = node.nearest_mark(&fault.path);
-                Trouble::new(fault.message)
-                    .at(mark)
-                    .below(&fault.path)
-                    .below(&path)
+                let trouble = Trouble::new(fault.message).at(node.nearest_mark(&fault.path));
+                trouble.below(&fault.path).below(&path)
             }));
             None
         }

@@ -159,9 +159,8 @@ impl Stage for Diagnose {
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
-        self.effects
-            .iter()
-            .enumerate()
+        let files = self.effects.iter().enumerate();
+        files
             .map(|(k, file)| (format!("effects[{k}]"), file.clone()))
             .collect()
     }
@@ -181,13 +180,7 @@ impl Stage for Diagnose {
     fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<DiagnoseWrites> {
         let asked = AskedRows::of(self, &reads, context)?;
         let question = asked.question(self, context.seed);
-        let AskedRows {
-            data,
-            corrected,
-            fit,
-            ..
-        } = &asked;
-        let corrected = *corrected;
+        let (data, corrected) = (&asked.data, asked.corrected);
         context
             .services
             .begin("looking for what the model lacks", None, "steps");
@@ -208,14 +201,12 @@ impl Stage for Diagnose {
         }
         let step = context.id;
         let mut held_out = vec![true; data.rows()];
-        fit.iter().for_each(|row| held_out[*row] = false);
+        asked.fit.iter().for_each(|row| held_out[*row] = false);
         let parameters = Parameters::of(step, &diagnosis.model, &diagnosis.fitted, &[], None);
         let covariance = diagnosis.fitted.covariance.as_ref();
         let kept = &diagnosis.kept;
-        let errors = diagnosis
-            .folds
-            .iter()
-            .flat_map(|folds| kept.iter().zip(folds.random.iter().zip(&folds.blocks)));
+        let folds = diagnosis.folds.iter();
+        let errors = folds.flat_map(|all| kept.iter().zip(all.random.iter().zip(&all.blocks)));
         let unseen: Vec<usize> = (0..data.rows()).filter(|row| held_out[*row]).collect();
         let known = covariance.filter(|_| {
             corrected == Corrected::RobotFile && diagnosis.verdict != VerdictKind::WrongSetup
@@ -225,12 +216,13 @@ impl Stage for Diagnose {
             covariance: known,
             measured: data,
         };
+        let (recording, split) = (&reads.recording, &reads.split);
         let prediction = Prediction::of(
             step,
             &diagnosis.model,
             data,
-            &reads.recording,
-            &reads.split,
+            recording,
+            split,
             &held_out,
             covariance,
         )
@@ -254,7 +246,7 @@ impl Stage for Diagnose {
             parameters: parameters.correcting(corrected),
             covariance: CovarianceTable::of(&diagnosis.model, &diagnosis.fitted, None),
             prediction,
-            suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),
+            suspects: Suspects::of(step, &diagnosis.screening, recording, split),
         })
     }
 }
@@ -266,12 +258,8 @@ fn remark(
     recording: &Recording,
     context: &Context,
 ) {
-    let points: Vec<usize> = diagnosis
-        .kept
-        .iter()
-        .copied()
-        .filter(|row| data.has_point(*row))
-        .collect();
+    let kept = diagnosis.kept.iter().copied();
+    let points: Vec<usize> = kept.filter(|row| data.has_point(*row)).collect();
     let rounded = rounded_logs(&diagnosis.model, data, &points);
     let session = Session {
         data,
@@ -347,16 +335,11 @@ impl AskedRows {
             return Err(Error::data("table recording", message));
         }
         must_move(&data, &fit)?;
-        let validate: Vec<usize> = (0..data.rows())
-            .filter(|row| asked.binary_search(row).is_err() && measured(row))
-            .collect();
-        let (robot, _) = gauge(
-            RobotModel::new(reads.robot.to_description()?),
-            &data,
-            &fit,
-            &BTreeMap::new(),
-        )
-        .map_err(|message| Error::data("table recording", message))?;
+        let others = (0..data.rows()).filter(|row| asked.binary_search(row).is_err());
+        let validate: Vec<usize> = others.filter(measured).collect();
+        let robot = RobotModel::new(reads.robot.to_description()?);
+        let (robot, _) = gauge(robot, &data, &fit, &BTreeMap::new())
+            .map_err(|message| Error::data("table recording", message))?;
         let set = doubtful::numbered(&reads.split);
         Ok(Self {
             declared,

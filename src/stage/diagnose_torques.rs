@@ -135,10 +135,10 @@ impl Stage for DiagnoseTorques {
     fn run(&self, reads: DiagnoseTorquesReads, context: &Context) -> Result<DiagnoseTorquesWrites> {
         let (arm, recording, question) = self.asked(&reads, context)?;
         let diagnosis = diagnose(&arm, &recording, &question, &mut |line| context.note(line))?;
-        diagnosis
-            .remarks
-            .iter()
-            .for_each(|remark| context.note(remark.clone()));
+        for remark in &diagnosis.remarks {
+            context.note(remark);
+        }
+        let robot = reads.robot.to_description()?;
         let sequence = sequences(&reads.motion, &diagnosis.courses.row)?;
         Ok(DiagnoseTorquesWrites {
             verdict: TorqueVerdict::of(context.id, &diagnosis, recording.is_current()),
@@ -152,8 +152,7 @@ impl Stage for DiagnoseTorques {
             inertials: Inertials::of(&diagnosis),
             contacts: Contacts::of(&diagnosis),
             consistency: BodyConsistencies::of(&diagnosis),
-            parameters: TorqueParameters::of(&diagnosis.model)?
-                .of_robot(&reads.robot.to_description()?),
+            parameters: TorqueParameters::of(&diagnosis.model)?.of_robot(&robot),
             covariance: TorqueCovariance::of(&diagnosis.model)?,
         })
     }
@@ -210,13 +209,11 @@ impl MotionLabels {
                 labels.start = chunk.time.first().copied().unwrap_or_default();
             }
             labels.labelled |= chunk.usage.iter().any(Option::is_some);
-            let fresh: Vec<String> = chunk
-                .usages
-                .iter()
-                .filter(|label| !labels.usages.contains(label))
-                .cloned()
-                .collect();
-            labels.usages.extend(fresh);
+            for label in chunk.usages {
+                if !labels.usages.contains(&label) {
+                    labels.usages.push(label);
+                }
+            }
             labels.stretches.extend(&chunk.trajectory);
             Ok(())
         })?;
@@ -274,9 +271,8 @@ impl DiagnoseTorques {
         };
         let (mut judging, mut first) = (0, 0);
         motion.each(|chunk| {
-            judging += (0..chunk.rows())
-                .filter(|row| held_out(&chunk, first, *row))
-                .count();
+            let rows = (0..chunk.rows()).filter(|row| held_out(&chunk, first, *row));
+            judging += rows.count();
             first += chunk.rows();
             Ok(())
         })?;
@@ -338,8 +334,8 @@ impl Stage for CompareTorques {
         }
         let earlier = RecordedTorques::of(&reads.earlier_motion, &robot)?;
         let later = RecordedTorques::of(&reads.motion, &robot)?;
-        let (first_events, second_events) =
-            (reads.earlier_contacts.events(), reads.contacts.events());
+        let [first_events, second_events] =
+            [&reads.earlier_contacts, &reads.contacts].map(Contacts::events);
         let diagnosed = |recording, model, events| DiagnosedRecording {
             recording,
             model,
@@ -350,36 +346,26 @@ impl Stage for CompareTorques {
             &diagnosed(&earlier, &first, &first_events),
             &diagnosed(&later, &second, &second_events),
         )?;
-        let strongest = found.changes.iter().filter(|change| change.rank.is_some());
-        let ranked: Vec<&TorqueChange> = strongest.collect();
-        ranked
+        let (ranked, unchanged): (Vec<&TorqueChange>, Vec<&TorqueChange>) = found
+            .changes
             .iter()
-            .for_each(|change| context.note(sentence(change)));
+            .partition(|change| change.rank.is_some());
+        for change in &ranked {
+            context.note(sentence(change));
+        }
         if ranked.is_empty() {
             context.note("nothing changed beyond noise");
         }
-        for (joint, [before, after]) in (1..).zip(&found.rms) {
-            let joint: usize = joint;
+        for (joint, [before, after]) in (1..=found.rms.len()).zip(&found.rms) {
             context.note(format!(
                 "joint {joint}: {before:.3} Nm rms are left where nothing changed, {after:.3} Nm with the changes"
             ));
         }
-        let unchanged = found
-            .changes
-            .iter()
-            .filter(|change| change.rank.is_none())
-            .count();
-        context.note(format!(
-            "{} held to be unchanged",
-            counted(unchanged, "number")
-        ));
+        let unchanged = counted(unchanged.len(), "number");
+        context.note(format!("{unchanged} held to be unchanged"));
         let previous = |name: &str| {
-            reads
-                .earlier_parameters
-                .0
-                .iter()
-                .find(|row| row.name == name)
-                .map(|row| row.value)
+            let mut rows = reads.earlier_parameters.0.iter();
+            Some(rows.find(|row| row.name == name)?.value)
         };
         Ok(CompareTorquesWrites {
             changes: TorqueChangeTable::of(&found, previous),

@@ -65,10 +65,8 @@ pub(crate) fn named(rows: &[&PredictionRow]) -> String {
             names.push(&row.point_id);
         }
     }
-    let first = rows
-        .first()
-        .and_then(|row| row.remark.as_deref())
-        .unwrap_or_default();
+    let first = rows.first().and_then(|row| row.remark.as_deref());
+    let first = first.unwrap_or_default();
     let point = match names.as_slice() {
         [point, _, ..] => format!("{point}: "),
         _ => String::new(),
@@ -140,12 +138,11 @@ pub(crate) fn advice(context: &Context, session: &Session) -> BTreeMap<String, S
         sentences.insert(model.stack.specs()[*k].name.clone(), sentence);
     }
     for (remedy, count) in counts {
+        let what = match count {
+            1 => "one parameter".into(),
+            _ => format!("{count} parameters"),
+        };
         if let Some(measure) = measure(remedy, last) {
-            let what = if count == 1 {
-                "one parameter".into()
-            } else {
-                format!("{count} parameters")
-            };
             context.note(format!(
                 "{measure} would show {what} that these data do not"
             ));
@@ -209,14 +206,11 @@ pub(crate) fn fit_rows(
 /// The number of the set that each row belongs to.
 pub(crate) fn numbered(split: &Split) -> Vec<usize> {
     let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
-    split
-        .0
-        .iter()
-        .map(|row| {
-            let next = numbers.len();
-            *numbers.entry(&row.set).or_insert(next)
-        })
-        .collect()
+    let rows = split.0.iter().map(|row| {
+        let next = numbers.len();
+        *numbers.entry(&row.set).or_insert(next)
+    });
+    rows.collect()
 }
 
 /// So many cases of one kind are named; the table has all.
@@ -230,26 +224,18 @@ pub(crate) fn note_screened(context: &Context, screening: &Screening, recording:
         ));
     }
     let id = |row: usize| recording.point_id[row].as_str();
-    let (events, aside): (Vec<&Suspect>, Vec<&Suspect>) = screening
-        .suspects
-        .iter()
-        .partition(|suspect| suspect.used());
+    let all = screening.suspects.iter();
+    let (events, aside): (Vec<&Suspect>, Vec<&Suspect>) = all.partition(|suspect| suspect.used());
     if !aside.is_empty() {
         let mut by_kind: BTreeMap<u8, Vec<String>> = BTreeMap::new();
         for case in cases(&aside) {
-            let (first, last) = (case[0], case[case.len() - 1]);
-            let who = if case.len() == 1 {
-                id(first.row).to_string()
-            } else {
-                format!(
-                    "{} to {} ({} rows)",
-                    id(first.row),
-                    id(last.row),
-                    case.len()
-                )
+            let first = case[0];
+            let who = match case.len() {
+                1 => id(first.row).to_string(),
+                _ => run_of(case, id),
             };
             let partner = first.partner.map_or("another row", id);
-            let many = case.len() > 1;
+            let are = if case.len() > 1 { "are" } else { "is" };
             let (order, text) = match first.kind {
                 SuspectKind::Exchanged if first.partner > Some(first.row) => {
                     (0, format!("{who} and {partner} look exchanged"))
@@ -263,11 +249,8 @@ pub(crate) fn note_screened(context: &Context, screening: &Screening, recording:
                     2,
                     format!("{who} lies where the joints of {partner} put it"),
                 ),
-                SuspectKind::UnitSlip(factor) => (
-                    3,
-                    format!("{who} {} {}", if many { "are" } else { "is" }, slip(factor)),
-                ),
-                SuspectKind::Zero => (4, format!("{who} {} zero", if many { "are" } else { "is" })),
+                SuspectKind::UnitSlip(factor) => (3, format!("{who} {are} {}", slip(factor))),
+                SuspectKind::Zero => (4, format!("{who} {are} zero")),
                 SuspectKind::Outlier | SuspectKind::Event => {
                     (5, format!("{who} is {:.3} mm off", first.size * 1e3))
                 }
@@ -281,19 +264,13 @@ pub(crate) fn note_screened(context: &Context, screening: &Screening, recording:
             texts
         });
         let texts: Vec<String> = texts.collect();
-        let rows = if aside.len() == 1 { "row" } else { "rows" };
-        context.warn(format!(
-            "{} {rows} set aside: {}",
-            aside.len(),
-            texts.join("; ")
-        ));
+        let rows = counted(aside.len(), "row");
+        context.warn(format!("{rows} set aside: {}", texts.join("; ")));
     }
     for run in events.chunk_by(|a, b| a.row + 1 == b.row) {
         context.warn(format!(
-            "{} to {} ({} rows) stand out together: something happened there that the model does not know; they are kept",
-            id(run[0].row),
-            id(run[run.len() - 1].row),
-            run.len()
+            "{} stand out together: something happened there that the model does not know; they are kept",
+            run_of(run, id)
         ));
     }
     if screening.crowd > 0 {
@@ -302,6 +279,12 @@ pub(crate) fn note_screened(context: &Context, screening: &Screening, recording:
             if screening.crowd == 1 { "one row stands".into() } else { format!("{} rows stand", screening.crowd) }
         ));
     }
+}
+
+/// The first and the last of some rows, and how many they are.
+fn run_of<'r>(run: &[&Suspect], id: impl Fn(usize) -> &'r str) -> String {
+    let (first, last) = (id(run[0].row), id(run[run.len() - 1].row));
+    format!("{first} to {last} ({} rows)", run.len())
 }
 
 /// Suspects that are one thing to a person: consecutive rows with the same slip, zero or shift; all others one by one.

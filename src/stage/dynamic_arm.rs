@@ -17,11 +17,8 @@ const ASSUMED: InertialTolerance = InertialTolerance {
 
 /// The arm, and what a person should know of what the robot file leaves open. Fails with a joint that slides.
 pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<String>)> {
-    if let Some(joint) = robot
-        .joints
-        .iter()
-        .position(|joint| joint.kind == JointKind::Prismatic)
-    {
+    let slides = |joint: &JointDescription| joint.kind == JointKind::Prismatic;
+    if let Some(joint) = robot.joints.iter().position(slides) {
         let message = format!(
             "joint {} slides; torques are diagnosed of revolute joints alone",
             joint + 1
@@ -36,13 +33,9 @@ pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<S
             _ => Err(index),
         }
     };
-    let links = match robot
-        .joints
-        .iter()
-        .enumerate()
-        .map(declared)
-        .collect::<std::result::Result<Vec<_>, usize>>()
-    {
+    let joints = || robot.joints.iter();
+    let all: Result<Vec<_>, usize> = joints().enumerate().map(declared).collect();
+    let links = match all {
         Ok(links) => Some(links),
         Err(link) => {
             notes.push(format!(
@@ -76,24 +69,14 @@ pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<S
         inertial(robot.payload_mass, robot.payload_centre, &moments)
     });
     let arm = DynamicArm {
-        axes: robot
-            .joints
-            .iter()
-            .map(|joint| Vector3::from(joint.axis))
-            .collect(),
-        points: robot
-            .joints
-            .iter()
-            .map(|joint| Point3::from(joint.point))
-            .collect(),
+        axes: joints().map(|joint| Vector3::from(joint.axis)).collect(),
+        points: joints().map(|joint| Point3::from(joint.point)).collect(),
         prismatic: vec![false; robot.joints.len()],
         tool: Point3::from(robot.tool),
         links,
         payload,
         gravity: Vector3::from(robot.gravity),
-        ratio: robot
-            .joints
-            .iter()
+        ratio: joints()
             .map(|joint| joint.reduction_ratio.unwrap_or(1.0))
             .collect(),
         coupled: robot
@@ -135,11 +118,8 @@ fn inertial(mass: f64, centre: [f64; 3], [xx, xy, xz, yy, yz, zz]: &InertiaMomen
 pub(crate) fn torque_per_ampere(robot: &RobotDescription) -> Result<Vec<f64>> {
     let factor = |joint: &JointDescription| Some(joint.reduction_ratio? * joint.motor_constant?);
     let all: Vec<Option<f64>> = robot.joints.iter().map(factor).collect();
-    let missing: Vec<String> = (1..)
-        .zip(&all)
-        .filter(|(_, factor)| factor.is_none())
-        .map(|(joint, _): (usize, _)| joint.to_string())
-        .collect();
+    let missing = (1..=all.len()).filter(|joint| all[joint - 1].is_none());
+    let missing: Vec<String> = missing.map(|joint| joint.to_string()).collect();
     if missing.is_empty() {
         return Ok(all.into_iter().flatten().collect());
     }
@@ -168,22 +148,17 @@ impl<'a> RecordedTorques<'a> {
     pub fn of(motion: &'a Chunks<ArmMotion>, robot: &RobotDescription) -> Result<Self> {
         let mut seen = None;
         motion.each(|chunk| {
-            seen.get_or_insert((
-                chunk.joints,
-                chunk.torque.is_some(),
-                chunk.current.is_some(),
-            ));
+            let signals = (chunk.torque.is_some(), chunk.current.is_some());
+            seen.get_or_insert((chunk.joints, signals));
             Ok(())
         })?;
-        let (joints, torque, current) = seen.unwrap_or_default();
-        let factor = match (torque, current) {
+        let (joints, signals) = seen.unwrap_or_default();
+        let factor = match signals {
             (true, _) => None,
             (false, true) => Some(torque_per_ampere(robot)?),
             (false, false) => {
-                return Err(Error::data(
-                    "table motion",
-                    "has neither torques nor currents",
-                ));
+                let message = "has neither torques nor currents";
+                return Err(Error::data("table motion", message));
             }
         };
         Ok(Self {
@@ -214,14 +189,14 @@ impl<'a> RecordedTorques<'a> {
             None => vec![false; rows],
         };
         let torque = match (&self.factor, motion.current.take()) {
-            (Some(factor), Some(mut current)) => {
-                current
-                    .chunks_exact_mut(factor.len())
-                    .for_each(|row| row.iter_mut().zip(factor).for_each(|(i, k)| *i *= k));
-                current
+            (Some(factor), Some(current)) => {
+                let factors = factor.iter().cycle();
+                current.iter().zip(factors).map(|(i, k)| i * k).collect()
             }
             _ => motion.torque.take().unwrap_or_default(),
         };
+        let trajectory = motion.trajectory.iter();
+        let trajectory = trajectory.map(|number| u32::try_from(*number).unwrap_or(u32::MAX));
         TorqueRecording {
             joints: motion.joints,
             time: motion.time,
@@ -229,11 +204,7 @@ impl<'a> RecordedTorques<'a> {
             velocity: motion.velocity,
             torque,
             temperature: motion.temperature,
-            trajectory: motion
-                .trajectory
-                .iter()
-                .map(|number| u32::try_from(*number).unwrap_or(u32::MAX))
-                .collect(),
+            trajectory: trajectory.collect(),
             held_out,
             from_current: self.is_current(),
         }

@@ -1,7 +1,7 @@
 //! What identifications share: the choice of load, and what they hand back (model, course, visibility, residuals).
 
 use crate::effect::Load;
-use crate::error::{Result, counted};
+use crate::error::{Result, counted, listed};
 use crate::estimate::{CONFLICT, Covariance, ParameterStatus, Session};
 use crate::observation::noise;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
@@ -219,11 +219,8 @@ impl Identified {
         } = *fitting.asked;
         let screening = &fitting.fit.screening;
         let mut held_out: Vec<bool> = fitting.seen_before.iter().map(|seen| !seen).collect();
-        fitting
-            .asked
-            .rows
-            .iter()
-            .for_each(|row| held_out[*row] = false);
+        let asked = &fitting.asked.rows;
+        asked.iter().for_each(|row| held_out[*row] = false);
         let covariance = CovarianceTable::of(model, fitted, fitting.earlier_covariance);
         // Of a fit on top of another without its covariance only the last parameters' uncertainty is known, which would flatter.
         let known = fitting.earlier.is_none() || fitting.earlier_covariance.is_some();
@@ -244,15 +241,15 @@ impl Identified {
             covariance: of_model.as_ref(),
             measured: fitting.measured,
         };
-        let parameters =
-            |covariance: Option<&Covariance>| covariance.map_or(0, |all| all.parameters().len());
+        let parameters = |covariance: &Option<Covariance>| {
+            covariance.as_ref().map_or(0, |all| all.parameters().len())
+        };
         let fit_context = FitContext {
             geometry: fitting.geometry,
             repeatability: fitting.asked.repeatability,
             folds: folds.as_ref().map(|folds| folds.count),
             unfolded: dropped,
-            earlier: parameters(of_model.as_ref())
-                .saturating_sub(parameters(fitted.covariance.as_ref())),
+            earlier: parameters(&of_model).saturating_sub(parameters(&fitted.covariance)),
         };
         let prediction = Prediction::of(
             step,
@@ -268,17 +265,13 @@ impl Identified {
         .with_weights(rows, fitted)
         .with_folds(errors)
         .with_remarks(known.remarks(data, &fitting.doubtful));
-        let points = rows
-            .iter()
-            .map(|row| &prediction.0[*row])
-            .filter(|row| row.measured.is_none());
-        context.warn_each(suspicion(
-            points.map(|row| [row.error_mm, row.noise_mm]),
-            fitted.singular.len(),
-        ));
+        let points = rows.iter().map(|row| &prediction.0[*row]);
+        let points = points.filter(|row| row.measured.is_none());
+        let points = points.map(|row| [row.error_mm, row.noise_mm]);
+        context.warn_each(suspicion(points, fitted.singular.len()));
+        let parameters = Parameters::of(step, model, fitted, fitting.held, fitting.earlier);
         Self {
-            parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier)
-                .with_advice(&advice),
+            parameters: parameters.with_advice(&advice),
             covariance,
             fit: Fit::of(step, fitted),
             observability: Observability::of(step, fitted, &fit_context),
@@ -287,6 +280,8 @@ impl Identified {
         }
     }
 }
+
+const SATURATED: &str = "; nothing is left to judge the fit by, and its standard deviations rest on the weights' noise alone";
 
 fn note(context: &Context, fitting: &Fitting) {
     let Session {
@@ -315,9 +310,7 @@ fn note(context: &Context, fitting: &Fitting) {
     if fitted.values < 2 * free {
         let (points, parameters) = (counted(rows.len(), "point"), counted(free, "parameter"));
         let saturated = match fitted.values <= free {
-            true => {
-                "; nothing is left to judge the fit by, and its standard deviations rest on the weights' noise alone"
-            }
+            true => SATURATED,
             false => "",
         };
         context.warn(format!(
@@ -357,10 +350,9 @@ fn note(context: &Context, fitting: &Fitting) {
             ));
         }
     }
-    let stopped: Vec<&str> = (0..fitted.statuses.len())
-        .filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Bound(_)))
-        .map(|k| model.stack.specs()[k].name.as_str())
-        .collect();
+    let specs = fitted.statuses.iter().zip(model.stack.specs());
+    let stopped = specs.filter(|(status, _)| matches!(status, ParameterStatus::Bound(_)));
+    let stopped: Vec<&str> = stopped.map(|(_, spec)| &*spec.name).collect();
     if !stopped.is_empty() {
         context.note(format!("stopped by their bounds: {}", stopped.join(", ")));
     }
@@ -376,17 +368,11 @@ fn note(context: &Context, fitting: &Fitting) {
 fn downweighted(weights: &BTreeMap<usize, f64>, names: &[String]) -> String {
     let mut least: Vec<(&usize, &f64)> = weights.iter().collect();
     least.sort_by(|a, b| a.1.total_cmp(b.1));
-    let named: Vec<String> = least
-        .iter()
-        .take(NAMED)
-        .map(|(row, weight)| format!("{} to {weight:.2}", names[**row]))
-        .collect();
+    let named = least.iter().take(NAMED);
+    let named = listed(named.map(|(row, weight)| format!("{} to {weight:.2}", names[**row])));
     let more = if least.len() > NAMED { ", ..." } else { "" };
-    format!(
-        "far off and down-weighted: {} ({}{more})",
-        counted(weights.len(), "row"),
-        named.join(", ")
-    )
+    let rows = counted(weights.len(), "row");
+    format!("far off and down-weighted: {rows} ({named}{more})")
 }
 
 /// Down-weighted rows that are named.

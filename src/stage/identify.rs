@@ -104,26 +104,22 @@ impl Stage for Identify {
         let wanted =
             identified().filter(|cause| self.effects.iter().any(|name| name == cause.name()));
         for effect in wanted.filter_map(|cause| cause.arm_effect(&setting)) {
-            if effect.name() == names::ANCHOR && robot.setup().anchors.is_empty() {
+            let name = effect.name();
+            if name == names::ANCHOR && robot.setup().anchors.is_empty() {
                 continue;
             }
-            match effect.missing(&robot, data) {
-                Some(reason) => context.note(format!("{} is left out: {reason}", effect.name())),
-                None => {
-                    let by_weight = effect.name() == names::JOINT_COMPLIANCE
-                        && matches!(self.load, LoadSetting::Gravity);
-                    if let Some(links) = weightless_links(&robot, data, rows).filter(|_| by_weight)
-                    {
-                        context.warn(links.warning);
-                    }
-                    effects.push(effect);
-                }
+            if let Some(reason) = effect.missing(&robot, data) {
+                context.note(format!("{name} is left out: {reason}"));
+                continue;
             }
+            if name == names::JOINT_COMPLIANCE && matches!(self.load, LoadSetting::Gravity) {
+                let links = weightless_links(&robot, data, rows);
+                context.warn_each(links.map(|links| links.warning));
+            }
+            effects.push(effect);
         }
-        let mut model = Model::nominal(
-            robot.clone(),
-            EffectStack::new(&robot, setting.base, effects),
-        );
+        let stack = EffectStack::new(&robot, setting.base, effects);
+        let mut model = Model::nominal(robot.clone(), stack);
         let all: Vec<usize> = (0..model.x.len()).collect();
         let (candidates, held) = self.parameter_set().apply(&mut model, &all, context);
         known_cell::apply(&mut model, &self.known_cell(), context)?;
@@ -160,11 +156,8 @@ impl Identify {
             return;
         }
         context.warn_each(unmoved_remark(robot, data, rows));
-        let fit: Vec<usize> = rows
-            .iter()
-            .copied()
-            .filter(|row| data.has_point(*row))
-            .collect();
+        let fit = rows.iter().copied().filter(|row| data.has_point(*row));
+        let fit: Vec<usize> = fit.collect();
         let question = Question {
             robot,
             data,
@@ -180,13 +173,10 @@ impl Identify {
             seed: context.seed,
         };
         if let Some(wrong) = wrong_setup(&question) {
-            let found = wrong.findings.first().map(|finding| {
-                format!(
-                    "the set-up is wrong: {}",
-                    finding.statement.trim_end_matches('.')
-                )
+            context.warn(match wrong.findings.first().map(|found| &found.statement) {
+                Some(found) => format!("the set-up is wrong: {}", found.trim_end_matches('.')),
+                None => wrong.statement,
             });
-            context.warn(found.unwrap_or(wrong.statement));
         }
     }
 
@@ -207,16 +197,13 @@ impl Identify {
                 [] => "none; map a column to `target` in `ingest`".into(),
                 _ => listed(named),
             };
-            return Err(Error::spec(
-                format!("{}.with.targets.{unknown}", context.id),
-                format!("the recording has no such target; it has: {there}"),
-            ));
+            let place = format!("{}.with.targets.{unknown}", context.id);
+            let message = format!("the recording has no such target; it has: {there}");
+            return Err(Error::spec(place, message));
         }
-        let stated = self
-            .targets
-            .iter()
-            .map(|(name, place)| (name.clone(), Vector3::from(*place) * 1e-3))
-            .collect();
+        let places = self.targets.iter();
+        let places = places.map(|(name, place)| (name.clone(), Vector3::from(*place) * 1e-3));
+        let stated = places.collect();
         let (robot, base) = gauge(robot, data, rows, &stated)
             .map_err(|message| Error::data("table recording", message))?;
         Ok(known_cell::standing(robot, base, &self.points, data, rows))
@@ -253,35 +240,24 @@ fn geometric_rank(
     let mut needed = GEOMETRY
         .iter()
         .filter(|name| **name != names::ANCHOR || anchored);
-    let asked = needed.all(|name| {
-        model
-            .stack
-            .effects()
-            .any(|(effect, _)| effect.name() == *name)
-    });
-    let found = model
-        .stack
-        .effects()
-        .filter(|(effect, _)| GEOMETRY.contains(&effect.name()))
-        .flat_map(|(_, range)| range)
-        .filter(|k| {
-            matches!(
-                fitted.statuses[*k],
-                ParameterStatus::Free(_) | ParameterStatus::Bound(_)
-            )
-        })
-        .count();
+    let asked = needed.all(|name| has_effect(model, name));
+    use ParameterStatus::{Bound, Free};
+    let is_found = |k: &usize| matches!(fitted.statuses[*k], Free(_) | Bound(_));
+    let geometry = GEOMETRY
+        .iter()
+        .flat_map(|name| model.stack.parameters_of(name));
+    let found = geometry.filter(is_found).count();
     let held = model.stack.specs().len() != fitted.singular_all.len();
     // A prior makes its parameter known whatever the data see.
     let has_prior = model.known.values().any(|known| known.prior.is_some());
-    let expected = observation::rank(
-        &model.robot,
-        data,
-        rows,
-        !model.lengths.is_empty(),
-        known_places(model),
-    )?;
+    let (has_length, places) = (!model.lengths.is_empty(), known_places(model));
+    let expected = observation::rank(&model.robot, data, rows, has_length, places)?;
     (asked && !held && !has_prior).then_some((found, expected))
+}
+
+fn has_effect(model: &Model, name: &str) -> bool {
+    let mut effects = model.stack.effects();
+    effects.any(|(effect, _)| effect.name() == name)
 }
 
 /// A ratio is a quotient of tooth counts: errors beyond this are no manufacturing errors.
@@ -300,36 +276,26 @@ fn question_ratios(fitting: &Fitting, setting: &EffectContext, context: &Context
             ParameterStatus::Free(sigma) => model.x[*k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma),
             _ => false,
         };
-        model
-            .stack
-            .parameters_of(names::REDUCTION_RATIO)
-            .filter(beyond)
-            .collect()
+        let ratios = model.stack.parameters_of(names::REDUCTION_RATIO);
+        ratios.filter(beyond).collect()
     };
     let suspects = implausible(model, fitted);
     let Some(compliance) = arm_effect(names::JOINT_COMPLIANCE, setting) else {
         return;
     };
-    let asked = model
-        .stack
-        .effects()
-        .any(|(effect, _)| effect.name() == names::JOINT_COMPLIANCE);
-    if suspects.is_empty() || asked {
+    if suspects.is_empty() || has_effect(model, names::JOINT_COMPLIANCE) {
         return;
     }
-    let list = |model: &Model, which: &[usize]| -> String {
+    let list = |model: &Model| -> String {
         let one = |k: &usize| {
-            format!(
-                "{} {:+.1}e-4",
-                model.stack.specs()[*k].place,
-                model.x[*k] * 1e4
-            )
+            let place = model.stack.specs()[*k].place;
+            format!("{place} {:+.1}e-4", model.x[*k] * 1e4)
         };
-        which.iter().map(one).collect::<Vec<_>>().join(", ")
+        listed(suspects.iter().map(one))
     };
     let opening = format!(
         "reduction ratios are quotients of tooth counts, yet {}",
-        list(model, &suspects)
+        list(model)
     );
     if let Some(reason) = compliance.missing(&model.robot, data) {
         context.warn(format!(
@@ -338,16 +304,11 @@ fn question_ratios(fitting: &Fitting, setting: &EffectContext, context: &Context
         return;
     }
     // Known names first, compliance behind them: numbers of the first model stay valid in the second.
-    let mut effects: Vec<Box<dyn Effect>> = model
-        .stack
-        .effects()
-        .filter_map(|(effect, _)| arm_effect(effect.name(), setting))
-        .collect();
-    effects.push(compliance);
-    let mut rival = Model::nominal(
-        model.robot.clone(),
-        EffectStack::new(&model.robot, setting.base, effects),
-    );
+    let effects = model.stack.effects();
+    let effects = effects.filter_map(|(effect, _)| arm_effect(effect.name(), setting));
+    let effects: Vec<Box<dyn Effect>> = effects.chain([compliance]).collect();
+    let stack = EffectStack::new(&model.robot, setting.base, effects);
+    let mut rival = Model::nominal(model.robot.clone(), stack);
     rival.known.clone_from(&model.known);
     rival.lengths.clone_from(&model.lengths);
     let candidates: Vec<usize> = (0..rival.stack.specs().len())
@@ -360,7 +321,7 @@ fn question_ratios(fitting: &Fitting, setting: &EffectContext, context: &Context
             "{opening}; with `{}` {}, and {:.3} -> {:.3} mm per axis stays unexplained: the data favour compliance (BIC better \
              by {gain:.0})",
             names::JOINT_COMPLIANCE,
-            list(&rival, &suspects),
+            list(&rival),
             fitted.excess_sigma * 1e3,
             refitted.excess_sigma * 1e3
         ));
@@ -423,42 +384,33 @@ impl Stage for Stiffness {
             reads
                 .parameters
                 .model(robot, &[names::JOINT_COMPLIANCE], self.load.into())?;
-        let compliance = model
+        let is_compliance = |effect: &dyn Effect| effect.name() == names::JOINT_COMPLIANCE;
+        let missing = model
             .stack
             .effects()
-            .find(|(effect, _)| effect.name() == names::JOINT_COMPLIANCE);
-        if let Some(reason) =
-            compliance.and_then(|(effect, _)| effect.missing(&model.robot, &asked.data))
-        {
-            return Err(Error::data(
-                "with.load",
-                format!("no joint load is known: {reason}"),
-            ));
+            .find(|(effect, _)| is_compliance(*effect))
+            .and_then(|(effect, _)| effect.missing(&model.robot, &asked.data));
+        if let Some(reason) = missing {
+            let message = format!("no joint load is known: {reason}");
+            return Err(Error::data("with.load", message));
         }
-        let wanted: Vec<String> = self
-            .joints
-            .iter()
-            .map(|joint| format!("{}.j{joint}", names::JOINT_COMPLIANCE))
-            .collect();
+        let joints = self.joints.iter();
+        let wanted = joints.map(|joint| format!("{}.j{joint}", names::JOINT_COMPLIANCE));
+        let wanted: Vec<String> = wanted.collect();
         let specs = model.stack.specs();
-        if let Some(unknown) = wanted
-            .iter()
-            .find(|name| !specs.iter().any(|spec| spec.name == **name))
-        {
-            return Err(Error::spec(
-                "with.joints",
-                format!("this robot has no `{unknown}`: allowed are its revolute joints, from 1"),
-            ));
+        let is_unknown = |name: &&String| specs.iter().all(|spec| spec.name != **name);
+        if let Some(unknown) = wanted.iter().find(is_unknown) {
+            let message =
+                format!("this robot has no `{unknown}`: allowed are its revolute joints, from 1");
+            return Err(Error::spec("with.joints", message));
         }
         let chosen = |k: &usize| wanted.is_empty() || wanted.contains(&specs[*k].name);
         let all: Vec<usize> = model.stack.parameters_of(names::JOINT_COMPLIANCE).collect();
         let open: Vec<usize> = all.iter().copied().filter(chosen).collect();
         let (candidates, _) = self.parameter_set().apply(&mut model, &open, context);
         let fit = self.fit(&model, &candidates, &mut asked, context);
-        let held: Vec<usize> = all
-            .into_iter()
-            .filter(|k| !candidates.contains(k))
-            .collect();
+        let held = all.into_iter().filter(|k| !candidates.contains(k));
+        let held: Vec<usize> = held.collect();
         let seen_before: Vec<bool> = reads.prediction.0.iter().map(|row| !row.held_out).collect();
         let mut fitting = Fitting {
             earlier: Some(&reads.parameters),

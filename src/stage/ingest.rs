@@ -105,11 +105,7 @@ impl Stage for Ingest {
         check::faults(self, at);
     }
     fn files(&self) -> Vec<(String, RawFile)> {
-        let first = self
-            .files
-            .iter()
-            .enumerate()
-            .map(|(index, file)| (format!("files[{index}].file"), file.file.clone()));
+        let first = named_files(&self.files);
         let later = self.later.iter().enumerate().flat_map(|(set, later)| {
             let files = later.files.iter().enumerate();
             files.map(move |(index, file)| (format!("later[{set}].files[{index}]"), file.clone()))
@@ -171,27 +167,29 @@ impl Ingest {
         let Some(joints) = self.files.iter().find_map(|file| file.columns.joint("q")) else {
             return JointConvention::of_the_robot_file(arm.joints());
         };
-        let unit = |joint: usize| match arm.prismatic[joint] {
-            true => joints.linear_unit.as_deref(),
-            false => joints.unit.as_deref(),
+        let zero = |joint: usize| {
+            let unit = match arm.prismatic[joint] {
+                true => joints.linear_unit.as_deref(),
+                false => joints.unit.as_deref(),
+            };
+            Some(Unit::parse(unit?)?.to_si(*joints.zero.get(joint)?))
         };
-        let zero = |joint: usize| match (joints.zero.get(joint), unit(joint).and_then(Unit::parse))
-        {
-            (Some(zero), Some(unit)) => unit.to_si(*zero),
-            _ => 0.0,
-        };
-        let all = 0..arm.joints();
-        let sign = all
-            .clone()
-            .map(|joint| joints.sign.get(joint).copied().unwrap_or(1.0))
-            .collect();
+        let all = || 0..arm.joints();
+        let sign = all().map(|joint| joints.sign.get(joint).copied().unwrap_or(1.0));
+        let zero = all().map(|joint| zero(joint).unwrap_or(0.0));
         let coupled = joints.coupled.iter().map(|one| CountedCoupling {
             joint: one.joint - 1,
             by: one.by - 1,
             ratio: one.ratio,
         });
-        JointConvention::new(sign, all.map(zero).collect(), coupled.collect())
+        JointConvention::new(sign.collect(), zero.collect(), coupled.collect())
     }
+}
+
+/// The files of layouts, each with its path below `with`.
+fn named_files(files: &[FileLayout]) -> impl Iterator<Item = (String, RawFile)> {
+    let files = files.iter().enumerate();
+    files.map(|(index, file)| (format!("files[{index}].file"), file.file.clone()))
 }
 
 /// The files' own names, made different where two are the same: a folder is no part of a table.
@@ -205,14 +203,13 @@ fn names<'a>(labels: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut names: Vec<String> = Vec::with_capacity(all.len());
     for name in &all {
         // Another file may be called like a numbered one.
-        let numbered = (2..)
-            .map(|number| format!("{name} ({number})"))
-            .find(|other| !all.contains(other) && !names.contains(other));
-        names.push(if names.contains(name) {
-            numbered.unwrap_or_default()
-        } else {
-            name.clone()
-        });
+        let mut numbered = (2..).map(|number| format!("{name} ({number})"));
+        let is_new = |other: &String| !all.contains(other) && !names.contains(other);
+        let name = match names.contains(name) {
+            true => numbered.find(is_new).unwrap_or_default(),
+            false => name.clone(),
+        };
+        names.push(name);
     }
     names
 }

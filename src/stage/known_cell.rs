@@ -96,19 +96,14 @@ pub(super) fn standing(
     rows: &[usize],
 ) -> (RobotModel, Pose) {
     let setup = robot.setup();
-    let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = points
-        .iter()
-        .filter_map(|(name, known)| {
-            Some((
-                setup.anchors.get(setup.anchor(name)?)?.place,
-                Vector3::from(known.mm) * 1e-3,
-            ))
-        })
-        .collect();
-    if pairs.is_empty() || !only_contacts(data, rows) {
+    let pairs = points.iter().filter_map(|(name, known)| {
+        let place = setup.anchors.get(setup.anchor(name)?)?.place;
+        Some((place, Vector3::from(known.mm) * 1e-3))
+    });
+    let (from, to): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = pairs.unzip();
+    if from.is_empty() || !only_contacts(data, rows) {
         return (robot, base);
     }
-    let (from, to): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = pairs.into_iter().unzip();
     let turn = match from.len() {
         1 => Rotation3::identity(),
         2 => Rotation3::rotation_between(&(from[1] - from[0]), &(to[1] - to[0]))
@@ -136,16 +131,11 @@ pub(super) fn apply(model: &mut Model, known: &KnownCell, context: &Context) -> 
         points,
     } = *known;
     let setup = model.robot.setup().clone();
-    let names: Vec<&str> = setup
-        .anchors
-        .iter()
-        .map(|anchor| anchor.name.as_str())
-        .collect();
+    let anchors = setup.anchors.iter();
+    let names: Vec<&str> = anchors.map(|anchor| anchor.name.as_str()).collect();
     let wrong = |place: String, what: String| {
-        Error::spec(
-            format!("{}.with.{place}", context.id),
-            format!("{what}; the recording has: {}", listed(&names)),
-        )
+        let message = format!("{what}; the recording has: {}", listed(&names));
+        Error::spec(format!("{}.with.{place}", context.id), message)
     };
     for (index, known) in distances.iter().enumerate() {
         let [from, to] = &known.between;
@@ -164,68 +154,43 @@ pub(super) fn apply(model: &mut Model, known: &KnownCell, context: &Context) -> 
             }
         };
         if pairs.is_empty() || pairs.as_flattened().contains(&usize::MAX) {
-            return Err(wrong(
-                format!("distances[{index}].between"),
-                format!("no `{from}` and `{to}`"),
-            ));
+            let place = format!("distances[{index}].between");
+            return Err(wrong(place, format!("no `{from}` and `{to}`")));
         }
         // One print at several places has one error: all pairs of a pattern together know the length as well as one.
-        let (length, sigma) = (
-            1e-3 * known.mm,
-            1e-3 * known.sigma * (pairs.len() as f64).sqrt(),
-        );
-        model
-            .lengths
-            .extend(pairs.into_iter().map(|between| KnownLength {
-                between,
-                length,
-                sigma,
-            }));
+        let sigma = 1e-3 * known.sigma * (pairs.len() as f64).sqrt();
+        let lengths = pairs.into_iter().map(|between| KnownLength {
+            between,
+            length: 1e-3 * known.mm,
+            sigma,
+        });
+        model.lengths.extend(lengths);
     }
+    let mut believe = |parameter: String, mean: f64, sigma: f64| {
+        let mut specs = model.stack.specs().iter();
+        if let Some(k) = specs.position(|spec| spec.name == parameter) {
+            model.known.entry(k).or_default().prior = Some(Prior { mean, sigma });
+        }
+    };
     for (name, known) in points {
-        let socket = setup
-            .anchors
-            .iter()
-            .find(|anchor| anchor.name == *name && anchor.shape == Shape::Point);
+        let mut anchors = setup.anchors.iter();
+        let socket = anchors.find(|anchor| anchor.name == *name && anchor.shape == Shape::Point);
         let socket =
             socket.ok_or_else(|| wrong(format!("points.{name}"), format!("no socket `{name}`")))?;
         for (axis, ending) in ["x", "y", "z"].into_iter().enumerate() {
             let parameter = format!("{}{ending}", AnchorShift::prefix(name));
-            if let Some(k) = model
-                .stack
-                .specs()
-                .iter()
-                .position(|spec| spec.name == parameter)
-            {
-                let prior = Prior {
-                    mean: 1e-3 * known.mm[axis] - socket.place[axis],
-                    sigma: 1e-3 * known.sigma,
-                };
-                model.known.entry(k).or_default().prior = Some(prior);
-            }
+            let mean = 1e-3 * known.mm[axis] - socket.place[axis];
+            believe(parameter, mean, 1e-3 * known.sigma);
         }
     }
     for (name, known) in spheres {
         let sphere = setup.anchors.iter().find(|anchor| anchor.name == *name);
         let Some(Shape::Sphere(radius)) = sphere.map(|anchor| anchor.shape) else {
-            return Err(wrong(
-                format!("spheres.{name}"),
-                format!("no sphere `{name}`"),
-            ));
+            let what = format!("no sphere `{name}`");
+            return Err(wrong(format!("spheres.{name}"), what));
         };
-        let parameter = format!("anchor.{name}.radius");
-        if let Some(k) = model
-            .stack
-            .specs()
-            .iter()
-            .position(|spec| spec.name == parameter)
-        {
-            let prior = Prior {
-                mean: 0.5e-3 * known.diameter - radius,
-                sigma: 0.5e-3 * known.sigma,
-            };
-            model.known.entry(k).or_default().prior = Some(prior);
-        }
+        let mean = 0.5e-3 * known.diameter - radius;
+        believe(format!("anchor.{name}.radius"), mean, 0.5e-3 * known.sigma);
     }
     Ok(())
 }

@@ -216,26 +216,19 @@ impl Stage for Learn {
             parameters,
             prediction,
         } = reads;
-        if !prediction
-            .0
-            .iter()
-            .map(|row| row.sequence)
-            .eq(recording.sequence.iter().copied())
-        {
-            return Err(Error::data(
-                "table prediction",
-                "does not belong to this recording: their sequence numbers differ",
-            ));
+        let sequence = prediction.0.iter().map(|row| row.sequence);
+        if !sequence.eq(recording.sequence.iter().copied()) {
+            let message = "does not belong to this recording: their sequence numbers differ";
+            return Err(Error::data("table prediction", message));
         }
-        let arm = robot.zip(parameters).map(|(robot, parameters)| {
-            Ok::<ScrewArm, Error>(ScrewArm::of(
-                &RobotModel::new(robot.to_description()?),
-                &parameters.base_pose(),
-            ))
-        });
-        let arm = arm
-            .transpose()?
-            .filter(|arm| arm.hinges.len() == recording.joints);
+        let arm = match robot.zip(parameters) {
+            Some((robot, parameters)) => {
+                let robot = RobotModel::new(robot.to_description()?);
+                Some(ScrewArm::of(&robot, &parameters.base_pose()))
+            }
+            None => None,
+        };
+        let arm = arm.filter(|arm| arm.hinges.len() == recording.joints);
         let mut rows = split.rows(&recording, &self.on)?;
         // What is learnt are displacements of points: rows of fewer axes or of distances have none.
         let asked = rows.len();
@@ -271,27 +264,17 @@ impl Learn {
     /// Joints of each row, and the payload where all training rows have it: it bounds where the correction is valid even where the
     /// networks do not see it.
     fn sources(&self, recording: &Recording, trained: &[usize]) -> Result<Vec<Vec<f64>>> {
-        let mut sources: Vec<Vec<f64>> = (0..recording.rows())
-            .map(|row| recording.q(row).to_vec())
-            .collect();
-        let payload = recording
-            .payload
-            .as_ref()
-            .filter(|column| trained.iter().all(|row| column[*row].is_finite()));
-        match payload {
-            Some(payload) => sources
-                .iter_mut()
-                .zip(payload)
-                .for_each(|(row, value)| row.push(*value)),
-            None if self.payload => {
-                return Err(Error::data(
-                    "with.payload",
-                    "the recording has no payload in some of the rows to train on",
-                ));
-            }
-            None => (),
+        let is_whole = |column: &&Vec<f64>| trained.iter().all(|row| column[*row].is_finite());
+        let payload = recording.payload.as_ref().filter(is_whole);
+        if payload.is_none() && self.payload {
+            let message = "the recording has no payload in some of the rows to train on";
+            return Err(Error::data("with.payload", message));
         }
-        Ok(sources)
+        let source = |row: usize| {
+            let payload = payload.map(|payload| payload[row]);
+            recording.q(row).iter().copied().chain(payload).collect()
+        };
+        Ok((0..recording.rows()).map(source).collect())
     }
 
     fn recipe(&self, prismatic: &[bool], context: &Context) -> Recipe {
@@ -327,11 +310,7 @@ impl Learn {
                 "only {} to learn from, at least {FEWEST} are needed: no correction",
                 counted(rows, "row")
             ));
-            return (
-                Network::default(),
-                Corrections::default(),
-                Training::default(),
-            );
+            return Default::default();
         }
         let contest = self.contest(rows, arm, prismatic, context);
         context
@@ -381,29 +360,22 @@ impl Learn {
             iterations,
             ..recipe.clone()
         };
-        let mut rivals: Vec<Rival> = Vec::new();
-        for rival in &self.rivals {
-            match rival {
-                RivalSetting::Ridge => rivals.push(Rival::Ridge),
-                RivalSetting::GaussianProcess => rivals.push(Rival::Process),
-                RivalSetting::Curves => rivals.push(Rival::Curves),
-                RivalSetting::Mlp => rivals.extend(
-                    self.starts
-                        .iter()
-                        .map(|start| Rival::Network((*start).into())),
-                ),
-                RivalSetting::MlpJoints => rivals.extend(
-                    self.starts
-                        .iter()
-                        .map(|start| Rival::JointNetwork((*start).into())),
-                ),
-            }
-        }
-        let twice = |k: usize| rivals[..k].contains(&rivals[k]);
-        let once = (0..rivals.len())
-            .filter(|k| !twice(*k))
-            .map(|k| rivals[k])
-            .collect();
+        let started = |rival: fn(TrainingStart) -> Rival| -> Vec<Rival> {
+            self.starts
+                .iter()
+                .map(|start| rival((*start).into()))
+                .collect()
+        };
+        let of_setting = |rival: &RivalSetting| match rival {
+            RivalSetting::Ridge => vec![Rival::Ridge],
+            RivalSetting::GaussianProcess => vec![Rival::Process],
+            RivalSetting::Curves => vec![Rival::Curves],
+            RivalSetting::Mlp => started(Rival::Network),
+            RivalSetting::MlpJoints => started(Rival::JointNetwork),
+        };
+        let rivals: Vec<Rival> = self.rivals.iter().flat_map(of_setting).collect();
+        let first = |k: &usize| !rivals[..*k].contains(&rivals[*k]);
+        let once = (0..rivals.len()).filter(first).map(|k| rivals[k]).collect();
         RivalContest {
             rivals: once,
             arm,
@@ -421,11 +393,9 @@ impl Learn {
 fn within_reach(prediction: &Prediction, rows: &[usize], context: &Context) -> Vec<usize> {
     let mut errors: Vec<f64> = rows.iter().map(|row| prediction.0[*row].error_mm).collect();
     let limit = FAR * nearest(&mut errors, 0.5).unwrap_or(f64::INFINITY);
-    let near: Vec<usize> = rows
-        .iter()
-        .copied()
-        .filter(|row| prediction.0[*row].error_mm <= limit && !prediction.0[*row].suspect)
-        .collect();
+    let is_near = |row: &PredictionRow| row.error_mm <= limit && !row.suspect;
+    let near = rows.iter().copied();
+    let near: Vec<usize> = near.filter(|row| is_near(&prediction.0[*row])).collect();
     if near.len() < rows.len() {
         context.note(format!(
             "{} of {} rows are not learnt from: their error is over {limit:.3} mm, {FAR} times the median, or they are suspects",
@@ -448,13 +418,11 @@ pub(crate) fn sentence(comparison: &RivalComparison, learnt: bool) -> String {
         format!("{name} {:.3} mm", judged.mean() * 1e3)
     };
     let all: Vec<String> = comparison.judged.iter().map(tell).collect();
-    let kept = comparison.judged[comparison.chosen]
-        .rival
-        .filter(|_| learnt);
-    let what = kept.map_or_else(
-        || "no correction was kept".to_string(),
-        |rival| format!("`{}` was kept", rival.name()),
-    );
+    let kept = comparison.judged[comparison.chosen].rival;
+    let what = match kept.filter(|_| learnt) {
+        None => "no correction was kept".to_string(),
+        Some(rival) => format!("`{}` was kept", rival.name()),
+    };
     format!(
         "{what}; cross-validated error on its own training rows: {}",
         all.join(", ")
@@ -471,11 +439,8 @@ pub(crate) fn comparison_table(
     let best = &comparison.judged[chosen];
     let before = comparison.judged[0].mean() * 1e3;
     let row = |(j, judged): (usize, &JudgedRival)| {
-        let (gain, sigma, behind) = (
-            judged.gain * 1e3,
-            judged.sigma * 1e3,
-            (judged.mean() - best.mean()) * 1e3,
-        );
+        let behind = (judged.mean() - best.mean()) * 1e3;
+        let (gain, sigma) = (judged.gain * 1e3, judged.sigma * 1e3);
         let reason = match judged.rival {
             None if j == chosen => "nothing that was tried helps clearly".to_string(),
             None => format!("a correction gains {:.3} mm", best.gain * 1e3),
@@ -509,10 +474,8 @@ pub(crate) fn comparison_table(
     };
     let mut rows: Vec<CorrectionsRow> = comparison.judged.iter().enumerate().map(row).collect();
     let untried = contest.rivals.iter().filter(|rival| {
-        comparison
-            .judged
-            .iter()
-            .all(|judged| judged.rival != Some(**rival))
+        let mut judged = comparison.judged.iter();
+        judged.all(|judged| judged.rival != Some(**rival))
     });
     rows.extend(untried.map(|rival| CorrectionsRow {
         step: step.into(),
@@ -525,15 +488,7 @@ pub(crate) fn comparison_table(
             _ => "it could not be fitted to these rows".into(),
         },
         before_mm: before,
-        mean_mm: None,
-        rms_mm: None,
-        max_mm: None,
-        gain_mm: None,
-        gain_sigma_mm: None,
-        numbers: 0,
-        evaluations: 0,
-        hidden: None,
-        decay: None,
+        ..CorrectionsRow::default()
     }));
     Corrections(rows)
 }

@@ -33,11 +33,8 @@ impl Stage for Masses {
         let (arm, _) = dynamic_arm(&robot)?;
         let model = reads.parameters.to_model()?;
         let declared = |mass: Option<f64>| mass.filter(|mass| *mass > 0.0).unwrap_or(NOTIONAL);
-        let masses: Vec<f64> = robot
-            .joints
-            .iter()
-            .map(|joint| declared(joint.mass))
-            .collect();
+        let masses = robot.joints.iter().map(|joint| declared(joint.mass));
+        let masses: Vec<f64> = masses.collect();
         let links = model.links(&arm, &masses);
         robot.inertias.links.resize(links.len(), None);
         for (index, (joint, link)) in robot.joints.iter_mut().zip(&links).enumerate() {
@@ -45,14 +42,8 @@ impl Stage for Masses {
             joint.mass = Some(link.mass);
             joint.centre = Some(link.centre.into());
             if let Some(i) = &link.inertia {
-                robot.inertias.links[index] = Some([
-                    i[(0, 0)],
-                    i[(0, 1)],
-                    i[(0, 2)],
-                    i[(1, 1)],
-                    i[(1, 2)],
-                    i[(2, 2)],
-                ]);
+                let moments = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+                robot.inertias.links[index] = Some(moments.map(|place| i[place]));
             }
         }
         let friction = reads.parameters.dry_friction(links.len());
@@ -73,11 +64,9 @@ impl Stage for Masses {
 }
 
 fn friction_text(friction: &[Option<f64>]) -> String {
-    let shown = |friction: &Option<f64>| {
-        friction.map_or_else(
-            || "none found".into(),
-            |friction| format!("{friction:.3} Nm"),
-        )
+    let shown = |friction: &Option<f64>| match friction {
+        None => "none found".into(),
+        Some(friction) => format!("{friction:.3} Nm"),
     };
     let all: Vec<String> = friction.iter().map(shown).collect();
     format!(
@@ -96,19 +85,11 @@ fn change_text(
 ) -> String {
     let before = mass.map_or_else(|| "no mass".into(), |mass| format!("{mass:.3} kg"));
     let moved = centre.map_or_else(String::new, |centre| {
-        let off: f64 = centre
-            .iter()
-            .zip(link.centre.iter())
-            .map(|(a, b)| (a - b).powi(2))
-            .sum();
-        format!(
-            ", its centre {:.1} mm off the declared one",
-            1e3 * off.sqrt()
-        )
+        let apart = centre.iter().zip(link.centre.iter());
+        let off: f64 = apart.map(|(a, b)| (a - b).powi(2)).sum();
+        let off = 1e3 * off.sqrt();
+        format!(", its centre {off:.1} mm off the declared one")
     });
-    format!(
-        "link {}: {before} declared, {:.3} kg by the torques{moved}",
-        index + 1,
-        link.mass
-    )
+    let (number, mass) = (index + 1, link.mass);
+    format!("link {number}: {before} declared, {mass:.3} kg by the torques{moved}")
 }

@@ -135,20 +135,19 @@ impl Context<'_> {
     pub(crate) fn text(&self, file: &RawFile, what: &str, most: u64) -> Result<(String, String)> {
         let OpenedInput { label, reader, .. } = self.services.open(file)?;
         let mut bytes = Vec::new();
-        reader
-            .take(most + 1)
-            .read_to_end(&mut bytes)
-            .map_err(|error| Error::store(&label, error.to_string()))?;
-        if bytes.len() as u64 > most {
-            let message = format!("longer than {} MB; expected {what}", most >> 20);
-            return Err(Error::spec(label, message));
-        }
+        let read = reader.take(most + 1).read_to_end(&mut bytes);
+        read.map_err(|error| Error::store(&label, error.to_string()))?;
+        let is_long = bytes.len() as u64 > most;
         match String::from_utf8(bytes) {
+            _ if is_long => {
+                let message = format!("longer than {} MB; expected {what}", most >> 20);
+                Err(Error::spec(label, message))
+            }
             Ok(text) => Ok((label, text)),
-            Err(_) => Err(Error::spec(
-                label,
-                format!("not a text file in UTF-8; expected {what}"),
-            )),
+            Err(_) => {
+                let message = format!("not a text file in UTF-8; expected {what}");
+                Err(Error::spec(label, message))
+            }
         }
     }
 }
@@ -204,10 +203,8 @@ pub trait Stage:
 
 /// A setting `on` names a set; `example` is one.
 fn must_name_sets(sets: &[String], example: &str, at: &mut Place) {
-    at.at("on").must(
-        !sets.is_empty(),
-        format!("expected at least one set, e.g. [{example}]"),
-    );
+    let message = format!("expected at least one set, e.g. [{example}]");
+    at.at("on").must(!sets.is_empty(), message);
 }
 
 /// The sets of a setting `on`, as [`Stage::sets_named`].

@@ -120,9 +120,8 @@ impl Stage for Optimise {
         methods.sort_unstable();
         methods.dedup();
         let total = self.problems.len() * methods.len() * self.seeds;
-        context
-            .services
-            .begin("searching", Some(total as u64), "searches");
+        let services = context.services;
+        services.begin("searching", Some(total as u64), "searches");
         let done = Mutex::new((0_u64, f64::INFINITY));
         let (mut searches, mut course) = (Searches::default(), SearchCourse::default());
         for problem in &self.problems {
@@ -133,34 +132,26 @@ impl Stage for Optimise {
                         self.search(problem, *method, context.seed.wrapping_add(seed as u64));
                     let mut done = done.lock().expect("no search panics");
                     *done = (done.0 + 1, done.1.min(outcome.value));
-                    let what = format!(
-                        "{} on {}-D {}",
-                        method.name(),
-                        problem.dimensions,
-                        problem.function.name()
-                    );
-                    context
-                        .services
-                        .advance(done.0, &format!("{what}, best {:.6}", done.1));
+                    let (name, function) = (method.name(), problem.function.name());
+                    let what = format!("{name} on {}-D {function}", problem.dimensions);
+                    services.advance(done.0, &format!("{what}, best {:.6}", done.1));
                     outcome
                 });
-                searches
-                    .0
-                    .push(self.row(context.id, problem, *method, &outcomes));
+                let row = self.row(context.id, problem, *method, &outcomes);
+                searches.0.push(row);
                 for (seed, outcome) in outcomes.iter().enumerate().take(self.courses) {
-                    course
-                        .0
-                        .extend(outcome.history.iter().map(|generation| SearchCourseRow {
-                            step: context.id.into(),
-                            function: problem.function.name().into(),
-                            dimensions: problem.dimensions as i64,
-                            method: method.name().into(),
-                            seed: seed as i64,
-                            generation: generation.index as i64,
-                            best: generation.best,
-                            mean: Some(generation.mean).filter(|mean| mean.is_finite()),
-                            evaluations: generation.evaluations as i64,
-                        }));
+                    let rows = outcome.history.iter().map(|generation| SearchCourseRow {
+                        step: context.id.into(),
+                        function: problem.function.name().into(),
+                        dimensions: problem.dimensions as i64,
+                        method: method.name().into(),
+                        seed: seed as i64,
+                        generation: generation.index as i64,
+                        best: generation.best,
+                        mean: Some(generation.mean).filter(|mean| mean.is_finite()),
+                        evaluations: generation.evaluations as i64,
+                    });
+                    course.0.extend(rows);
                 }
             }
         }
@@ -174,10 +165,8 @@ impl Stage for Optimise {
 impl Optimise {
     /// One search on one thread.
     pub fn search(&self, problem: &BenchmarkProblem, method: Algorithm, seed: u64) -> SwarmResult {
-        let minimum = problem
-            .function
-            .minimum(problem.dimensions)
-            .unwrap_or(f64::NEG_INFINITY);
+        let (function, dimensions) = (&problem.function, problem.dimensions);
+        let minimum = function.minimum(dimensions).unwrap_or(f64::NEG_INFINITY);
         let budget = Budget {
             generations: method.generations(self.population, self.evaluations),
             evaluations: Some(self.evaluations),
@@ -185,9 +174,7 @@ impl Optimise {
             seed,
             jobs: 1,
         };
-        problem
-            .function
-            .search(problem.dimensions, method, self.population, &budget)
+        function.search(dimensions, method, self.population, &budget)
     }
 
     fn row(
@@ -198,15 +185,10 @@ impl Optimise {
         outcomes: &[SwarmResult],
     ) -> SearchesRow {
         let minimum = problem.function.minimum(problem.dimensions).unwrap_or(0.0);
-        let mut reached: Vec<f64> = outcomes
-            .iter()
-            .filter(|o| o.stop == SearchStop::Target)
-            .map(|o| o.evaluations as f64)
-            .collect();
-        let mut errors: Vec<f64> = outcomes
-            .iter()
-            .map(|o| (o.value - minimum).max(0.0))
-            .collect();
+        let reached = outcomes.iter().filter(|one| one.stop == SearchStop::Target);
+        let mut reached: Vec<f64> = reached.map(|one| one.evaluations as f64).collect();
+        let errors = outcomes.iter().map(|one| (one.value - minimum).max(0.0));
+        let mut errors: Vec<f64> = errors.collect();
         reached.sort_by(f64::total_cmp);
         errors.sort_by(f64::total_cmp);
         let stuck = outcomes.iter().filter(|outcome| stuck(outcome)).count();

@@ -1,8 +1,9 @@
 //! What a recording and the first fit to it show that a person should know, a sentence each: a payload column that is not filled, rows that are
 //! copies of each other, joints that never move, links without masses, a tool out of place, logs that are rounded.
 
+use crate::description::JointDescription;
 use crate::effect::{ToolOffset, figure};
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result, counted, listed};
 use crate::estimate::{Fitted, Model, ParameterStatus};
 use crate::robot::{Measurements, RobotModel};
 use crate::table::Recording;
@@ -37,23 +38,13 @@ pub(super) fn copied_rows(recording: &Recording) -> Vec<(usize, usize)> {
         let Some(point) = recording.point(row) else {
             continue;
         };
-        let values = recording
-            .q(row)
-            .iter()
-            .chain(&point)
-            .map(|value| value.to_bits())
-            .collect();
-        let target = recording
-            .target
-            .as_ref()
-            .and_then(|all| all[row].as_deref());
-        match first.entry((values, target)) {
-            std::collections::btree_map::Entry::Occupied(earlier) => {
-                copies.push((*earlier.get(), row))
-            }
-            std::collections::btree_map::Entry::Vacant(place) => {
-                place.insert(row);
-            }
+        let values = recording.q(row).iter().chain(&point);
+        let values = values.map(|value| value.to_bits()).collect();
+        let targets = recording.target.as_ref();
+        let target = targets.and_then(|all| all[row].as_deref());
+        let earlier = *first.entry((values, target)).or_insert(row);
+        if earlier != row {
+            copies.push((earlier, row));
         }
     }
     copies
@@ -62,29 +53,22 @@ pub(super) fn copied_rows(recording: &Recording) -> Vec<(usize, usize)> {
 /// What is said of them; none where there are none.
 pub(super) fn copies_remark(copies: &[(usize, usize)], recording: &Recording) -> Option<String> {
     let id = |row: usize| recording.point_id[row].as_str();
-    let named: Vec<String> = copies
-        .iter()
-        .take(COPIES_NAMED)
-        .map(|(one, copy)| format!("{} is {}", id(*copy), id(*one)))
-        .collect();
-    let more = if copies.len() > COPIES_NAMED {
-        ", ..."
-    } else {
-        ""
+    let named = copies.iter().take(COPIES_NAMED);
+    let named = listed(named.map(|(one, copy)| format!("{} is {}", id(*copy), id(*one))));
+    let more = match copies.len() > COPIES_NAMED {
+        true => ", ...",
+        false => "",
     };
-    let (rows, repeat) = (
-        counted(copies.len(), "row"),
-        if copies.len() == 1 {
-            "repeats"
-        } else {
-            "repeat"
-        },
-    );
+    let rows = counted(copies.len(), "row");
+    let repeat = if copies.len() == 1 {
+        "repeats"
+    } else {
+        "repeat"
+    };
     (!copies.is_empty()).then(|| {
         format!(
-            "{rows} {repeat} another row's joints and point to the last digit under an id of their own ({}{more}): copies, which look like \
-             perfect repeatability. They are in one set with that row; take them out of the file",
-            named.join(", ")
+            "{rows} {repeat} another row's joints and point to the last digit under an id of their own ({named}{more}): copies, which look like \
+             perfect repeatability. They are in one set with that row; take them out of the file"
         )
     })
 }
@@ -134,16 +118,11 @@ pub(super) fn must_move(data: &Measurements, rows: &[usize]) -> Result<()> {
 
 /// By how much the point moves along a straight line over time, or over the rows, from the first to the last, and its standard deviation, m.
 fn drift(data: &Measurements, rows: &[usize]) -> Option<[f64; 2]> {
-    let points: Vec<(f64, Vector3<f64>)> = rows
-        .iter()
-        .enumerate()
-        .filter_map(|(place, row)| {
-            Some((
-                data.time.as_ref().map_or(place as f64, |time| time[*row]),
-                data.point(*row)?,
-            ))
-        })
-        .collect();
+    let point = |(place, row): (usize, &usize)| {
+        let time = data.time.as_ref().map_or(place as f64, |time| time[*row]);
+        Some((time, data.point(*row)?))
+    };
+    let points: Vec<(f64, Vector3<f64>)> = rows.iter().enumerate().filter_map(point).collect();
     let count = points.len() as f64;
     let time = points.iter().map(|(time, _)| time).sum::<f64>() / count;
     let middle = points.iter().map(|(_, point)| point).sum::<Vector3<f64>>() / count;
@@ -156,15 +135,12 @@ fn drift(data: &Measurements, rows: &[usize]) -> Option<[f64; 2]> {
     if points.len() < DRIFT_FEWEST || square.is_nan() || square == 0.0 {
         return None;
     }
-    let slope = points
+    let moments = points
         .iter()
-        .map(|(at, point)| (point - middle) * (at - time))
-        .sum::<Vector3<f64>>()
-        / square;
-    let left: f64 = points
-        .iter()
-        .map(|(at, point)| (point - middle - slope * (at - time)).norm_squared())
-        .sum();
+        .map(|(at, point)| (point - middle) * (at - time));
+    let slope = moments.sum::<Vector3<f64>>() / square;
+    let off = |(at, point): &(f64, Vector3<f64>)| point - middle - slope * (at - time);
+    let left: f64 = points.iter().map(|one| off(one).norm_squared()).sum();
     let sigma = (left / (3.0 * (count - 2.0)) / square).sqrt();
     Some([slope.norm() * (most - least), sigma * (most - least)])
 }
@@ -180,21 +156,18 @@ pub(super) fn unmoved_remark(
         return None;
     }
     let at = |(joint, position): &(usize, f64)| {
-        let position = if robot.is_revolute(*joint) {
-            format!("{:.3} deg", position.to_degrees())
-        } else {
-            format!("{:.3} mm", position * 1e3)
+        let position = match robot.is_revolute(*joint) {
+            true => format!("{:.3} deg", position.to_degrees()),
+            false => format!("{:.3} mm", position * 1e3),
         };
         format!("joint {} (at {position})", joint + 1)
     };
-    let (all, verb) = (
-        unmoved_joints.iter().map(at).collect::<Vec<_>>().join(", "),
-        if unmoved_joints.len() == 1 {
-            "moves"
-        } else {
-            "move"
-        },
-    );
+    let verb = if unmoved_joints.len() == 1 {
+        "moves"
+    } else {
+        "move"
+    };
+    let all = listed(unmoved_joints.iter().map(at));
     Some(format!(
         "never {verb} in the {} to fit: {all}. What only its motion shows is not determined, and the model holds at this position alone: \
          measure poses with it elsewhere",
@@ -220,10 +193,8 @@ pub(super) fn weightless_links(
     rows: &[usize],
 ) -> Option<WeightlessLinks> {
     let joints = &robot.description().joints;
-    let bare = joints
-        .iter()
-        .filter(|joint| joint.mass.is_none() || joint.centre.is_none())
-        .count();
+    let is_bare = |joint: &&JointDescription| joint.mass.is_none() || joint.centre.is_none();
+    let bare = joints.iter().filter(is_bare).count();
     let gravity = Vector3::from(robot.description().gravity);
     let turned = |joint: usize| {
         let along = gravity.dot(robot.axis(joint)).abs() / gravity.norm().max(f64::MIN_POSITIVE);
@@ -234,24 +205,20 @@ pub(super) fn weightless_links(
     if bare == 0 || gravity.norm() == 0.0 || !(0..robot.joints()).any(turned) {
         return None;
     }
-    let (given, windup) = match joints.len() - bare {
-        0 => (
-            "no link masses".to_string(),
-            "shows at best as an angle, without a stiffness",
-        ),
-        some => (
-            format!("mass and centre of {some} of {} links alone", joints.len()),
-            "cannot be computed",
-        ),
+    const AN_ANGLE: &str = "shows at best as an angle, without a stiffness";
+    let links = joints.len();
+    let (given, windup) = match links - bare {
+        0 => ("no link masses".to_string(), AN_ANGLE),
+        some => {
+            let given = format!("mass and centre of {some} of {links} links alone");
+            (given, "cannot be computed")
+        }
     };
     let loaded = rows.iter().filter(|row| data.payload[**row] > 0.0).count();
+    let (all, some) = (rows.len(), counted(loaded, "row"));
     let load = match loaded {
         0 => String::new(),
-        _ => format!(
-            " ({} of {} carry a payload)",
-            counted(loaded, "row"),
-            rows.len()
-        ),
+        _ => format!(" ({some} of {all} carry a payload)"),
     };
     let missing =
         format!("the robot file gives {given}, yet gravity loads joints in these poses{load}");
@@ -269,40 +236,28 @@ const TOOL_CLEARLY: f64 = 5.0;
 
 /// What is said of the tool that has no name; none where the point is where the robot file has it.
 pub(super) fn misplaced_tool(model: &Model, fitted: &Fitted) -> Option<String> {
-    let estimate = |axis: &str| {
+    let estimate = |axis: &'static str| {
         let name = format!("{}{axis}", ToolOffset::prefix(""));
-        let k = model
-            .stack
-            .specs()
-            .iter()
-            .position(|spec| spec.name == name)?;
+        let mut specs = model.stack.specs().iter();
+        let k = specs.position(|spec| spec.name == name)?;
         match fitted.statuses[k] {
-            ParameterStatus::Free(sigma) => Some((model.x[k], sigma)),
+            ParameterStatus::Free(sigma) => Some((axis, model.x[k], sigma)),
             _ => None,
         }
     };
-    let axes = ["x", "y", "z"].map(|axis| (axis, estimate(axis)));
-    let known = || {
-        axes.iter()
-            .filter_map(|(axis, estimate)| Some((axis, (*estimate)?)))
+    let known: Vec<_> = ["x", "y", "z"].into_iter().filter_map(estimate).collect();
+    let length = |values: fn(&(&str, f64, f64)) -> f64| {
+        let squares = known.iter().map(|one| values(one) * values(one));
+        squares.sum::<f64>().sqrt()
     };
-    let off = known()
-        .map(|(_, (value, _))| value * value)
-        .sum::<f64>()
-        .sqrt();
-    let sigma = known()
-        .map(|(_, (_, sigma))| sigma * sigma)
-        .sum::<f64>()
-        .sqrt();
-    let each: Vec<String> = known()
-        .map(|(axis, (value, _))| format!("{axis} {:+.0}", 1e3 * value))
-        .collect();
+    let (off, sigma) = (length(|one| one.1), length(|one| one.2));
+    let each = known.iter();
+    let each = listed(each.map(|(axis, value, _)| format!("{axis} {:+.0}", 1e3 * value)));
     (off > TOOL_FAR && off > TOOL_CLEARLY * sigma).then(|| {
         format!(
-            "the measured point is {} mm from the `tool` of the robot file ({} mm, zero pose): is it that of this recording, with its signs \
+            "the measured point is {} mm from the `tool` of the robot file ({each} mm, zero pose): is it that of this recording, with its signs \
              and in the frame that the file asks for?",
-            figure(1e3 * off, 0),
-            each.join(", ")
+            figure(1e3 * off, 0)
         )
     })
 }
@@ -334,9 +289,10 @@ struct Rounding {
 /// What is said of rounded joints and points, a sentence each, where rounding is as large as what the model leaves.
 pub(super) fn rounded_logs(model: &Model, data: &Measurements, rows: &[usize]) -> Vec<String> {
     let predicted = model.predict(data);
-    let left = rms(rows
+    let residuals = rows
         .iter()
-        .map(|row| data.points.residual(*row, &predicted[*row]).norm()));
+        .map(|row| data.points.residual(*row, &predicted[*row]));
+    let left = rms(residuals.map(|residual| residual.norm()));
     let noise = rms(rows.iter().map(|row| data.noise(*row)));
     let sentence = |rounding: Rounding| {
         let Rounding { what, rms, most } = rounding;
@@ -350,11 +306,9 @@ pub(super) fn rounded_logs(model: &Model, data: &Measurements, rows: &[usize]) -
             )
         })
     };
-    rounded_joints(model, data, rows)
-        .into_iter()
-        .chain(rounded_points(data, rows))
-        .filter_map(sentence)
-        .collect()
+    let joints = rounded_joints(model, data, rows).into_iter();
+    let all = joints.chain(rounded_points(data, rows));
+    all.filter_map(sentence).collect()
 }
 
 fn rms(lengths: impl Iterator<Item = f64>) -> f64 {
@@ -382,19 +336,16 @@ fn step(values: &[f64]) -> Option<f64> {
 
 /// The step of a joint in the unit that makes it coarsest.
 fn of_joint(values: &[f64], revolute: bool) -> Option<(f64, Unit)> {
-    let units = if revolute {
-        [Unit::Degree, Unit::Radian]
-    } else {
-        [Unit::Millimetre, Unit::Metre]
+    let units = match revolute {
+        true => [Unit::Degree, Unit::Radian],
+        false => [Unit::Millimetre, Unit::Metre],
     };
     let step_in = |unit: Unit| {
         let values: Vec<f64> = values.iter().map(|value| unit.from_si(*value)).collect();
         step(&values).map(|step| (step, unit))
     };
-    units
-        .into_iter()
-        .filter_map(step_in)
-        .max_by(|a, b| a.1.to_si(a.0).total_cmp(&b.1.to_si(b.0)))
+    let steps = units.into_iter().filter_map(step_in);
+    steps.max_by(|a, b| a.1.to_si(a.0).total_cmp(&b.1.to_si(b.0)))
 }
 
 fn rounded_joints(model: &Model, data: &Measurements, rows: &[usize]) -> Option<Rounding> {
@@ -411,12 +362,9 @@ fn rounded_joints(model: &Model, data: &Measurements, rows: &[usize]) -> Option<
             coarsest = Some((step, unit));
         }
         let mut turned = data.clone();
-        turned
-            .q
-            .iter_mut()
-            .skip(joint)
-            .step_by(data.joints)
-            .for_each(|q| *q += TURN);
+        for q in turned.q.iter_mut().skip(joint).step_by(data.joints) {
+            *q += TURN;
+        }
         let moved = model.predict(&turned);
         for row in rows {
             let lever = (moved[*row] - start[*row]).norm() / TURN;
@@ -434,18 +382,15 @@ fn rounded_joints(model: &Model, data: &Measurements, rows: &[usize]) -> Option<
 
 fn rounded_points(data: &Measurements, rows: &[usize]) -> Option<Rounding> {
     let axis = |axis: usize| {
-        let values: Vec<f64> = rows
-            .iter()
-            .filter_map(|row| Some(Unit::Millimetre.from_si(data.point(*row)?[axis])))
+        let points = rows.iter().filter_map(|row| data.point(*row));
+        let values: Vec<f64> = points
+            .map(|point| Unit::Millimetre.from_si(point[axis]))
             .collect();
         step(&values)
     };
     // A point is as coarse as its finest axis says: one axis may be a multiple by chance.
-    let step = (0..3)
-        .map(axis)
-        .collect::<Option<Vec<f64>>>()?
-        .into_iter()
-        .fold(f64::INFINITY, f64::min);
+    let steps = (0..3).map(axis).collect::<Option<Vec<f64>>>()?;
+    let step = steps.into_iter().fold(f64::INFINITY, f64::min);
     let length = Unit::Millimetre.to_si(step) * 3f64.sqrt();
     Some(Rounding {
         what: format!("measured points are rounded to {step} mm"),

@@ -23,27 +23,20 @@ crate::stage::stage! {
 
 impl Stage for Report {
     fn sets_named(&self) -> Vec<(String, String)> {
-        self.set
-            .iter()
-            .map(|set| ("set".into(), set.clone()))
-            .collect()
+        let set = self.set.iter();
+        set.map(|set| ("set".into(), set.clone())).collect()
     }
 
     fn run(&self, mut reads: ReportReads, context: &Context) -> Result<ReportWrites> {
         let curves = reads.curves()?;
         let hashes = reads.hashes()?;
         // A diagnosis against an outside simulation speaks of that, not of this robot's model.
-        let diagnosed = reads
-            .findings
-            .last()
-            .filter(|_| reads.recording.simulated.is_none())
-            .map(|findings| &findings.stage);
+        let is_of_robot_file = reads.recording.simulated.is_none();
+        let diagnosed = reads.findings.last().filter(|_| is_of_robot_file);
+        let diagnosed = diagnosed.map(|findings| findings.stage.as_str());
         let model = |stage: &String| {
-            reads
-                .models
-                .iter()
-                .find(|model| model.stage == *stage)
-                .map(|model| model.table.clone())
+            let mut models = reads.models.iter();
+            Some(models.find(|model| model.stage == *stage)?.table.clone())
         };
         let step = |step: &Labelled<Prediction>| Step {
             id: match step.0.first() {
@@ -56,15 +49,13 @@ impl Stage for Report {
         let steps: Vec<Step> = reads.prediction.iter().map(step).collect();
         let wrong = reads.verdict.last().zip(reads.findings.last());
         let wrong = wrong.and_then(|(verdict, findings)| verdict.wrong_setup(findings));
-        let stands = standing(&steps, diagnosed.map(String::as_str));
-        let stands = stands.filter(|_| reads.recording.simulated.is_none() && wrong.is_none());
+        let stands = standing(&steps, diagnosed);
+        let stands = stands.filter(|_| is_of_robot_file && wrong.is_none());
         let withdrawn = stands.iter().flat_map(|stands| stands.withdrawn.clone());
         let withdrawn = withdrawn.collect();
         context.warn_each(stands.iter().flat_map(Standing::warnings));
         let counting = reads.counting()?;
-        let mut standing = stands
-            .as_ref()
-            .map(|stands| [stands.step.clone(), stands.model.clone()]);
+        let mut standing = stands.map(|stands| [stands.step, stands.model]);
         let step = standing.as_ref().map(|[step, _]| step);
         if let Some(carried) = carried(step, &reads.prediction, &reads.recording) {
             let prediction = &mut reads.prediction;
@@ -126,49 +117,33 @@ fn carried(
     prediction: &[Labelled<Prediction>],
     recording: &Recording,
 ) -> Option<String> {
-    let stands = prediction
-        .iter()
-        .find(|step| Some(&step.stage) == standing)?;
+    let mut steps = prediction.iter();
+    let stands = steps.find(|step| Some(&step.stage) == standing)?;
     let here = || prediction.iter().rfind(|step| step.is_of(recording));
-    if stands.is_of(recording) {
-        None
-    } else {
-        here().map(|step| step.stage.clone())
-    }
+    let carried = (!stands.is_of(recording)).then(here).flatten();
+    carried.map(|step| step.stage.clone())
 }
 
 impl ReportReads {
     /// Curves of the last diagnosis' findings; none without a diagnosis.
     fn curves(&self) -> Result<Curves> {
-        let Some(findings) = self
+        let found = self
             .findings
             .last()
-            .filter(|findings| !findings.0.is_empty())
-        else {
+            .filter(|findings| !findings.0.is_empty());
+        let diagnosis = found.and_then(|findings| {
+            let (mut models, mut steps) = (self.models.iter(), self.prediction.iter());
+            let parameters = models.find(|model| model.stage == findings.stage)?;
+            let prediction = steps.find(|step| step.stage == findings.stage)?;
+            Some((findings, parameters, prediction))
+        });
+        let Some((findings, parameters, prediction)) = diagnosis else {
             return Ok(Curves::default());
         };
-        let parameters = self
-            .models
-            .iter()
-            .find(|model| model.stage == findings.stage);
-        let prediction = self
-            .prediction
-            .iter()
-            .find(|prediction| prediction.stage == findings.stage);
-        let (Some(parameters), Some(prediction)) = (parameters, prediction) else {
-            return Ok(Curves::default());
-        };
-        let robot = RobotModel::new(self.robot.to_description()?);
-        let model = parameters.model(robot, &[], Load::GravityTorque)?;
-        let data = self.recording.measurements();
-        curves::curves(
-            findings,
-            parameters,
-            &model,
-            &self.recording,
-            &data,
-            prediction,
-        )
+        let (robot, recording) = (self.robot.to_description()?, &self.recording);
+        let model = parameters.model(RobotModel::new(robot), &[], Load::GravityTorque)?;
+        let data = recording.measurements();
+        curves::curves(findings, parameters, &model, recording, &data, prediction)
     }
 
     /// What the controller counts otherwise than the robot file, where it does.
@@ -196,15 +171,12 @@ impl ReportReads {
 
 /// Faults of the settings with the stage they belong to.
 fn placed(error: Error, stage: &str) -> Error {
-    match error {
-        Error::Spec(faults) => Error::Spec(
-            faults
-                .into_iter()
-                .map(|f| Fault::new(format!("{stage}.{}", f.place), f.message))
-                .collect(),
-        ),
-        other => other,
-    }
+    let Error::Spec(faults) = error else {
+        return error;
+    };
+    let faults = faults.into_iter();
+    let placed = faults.map(|fault| Fault::new(format!("{stage}.{}", fault.place), fault.message));
+    Error::Spec(placed.collect())
 }
 
 /// Writes `torques.html`.

@@ -51,13 +51,9 @@ impl Stage for ReadRobot {
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
-        let urdf = self
-            .urdf
-            .iter()
-            .map(|file| ("urdf".to_string(), file.clone()));
-        std::iter::once(("file".to_string(), self.file.clone()))
-            .chain(urdf)
-            .collect()
+        let urdf = self.urdf.iter().map(|file| ("urdf".into(), file.clone()));
+        let file = [("file".into(), self.file.clone())];
+        file.into_iter().chain(urdf).collect()
     }
 
     fn look(&self, reads: Option<RobotReads>, context: &Context) -> Result<Option<RobotWrites>> {
@@ -65,24 +61,16 @@ impl Stage for ReadRobot {
     }
 
     fn run(&self, _reads: RobotReads, context: &Context) -> Result<RobotWrites> {
-        let (label, text) = context.text(&self.file, WHAT, MOST_BYTES)?;
-        let file = RobotFileText {
-            label: &label,
-            text: &text,
-        };
+        fn labelled((label, text): &(String, String)) -> RobotFileText<'_> {
+            RobotFileText { label, text }
+        }
+        let read = |file: &RawFile| context.text(file, WHAT, MOST_BYTES);
+        let file = read(&self.file)?;
         let imported = match self.format {
-            RobotFormat::Case => read_case(file)?,
+            RobotFormat::Case => read_case(labelled(&file))?,
             RobotFormat::Calib => {
-                let urdf = self
-                    .urdf
-                    .as_ref()
-                    .map(|file| context.text(file, WHAT, MOST_BYTES))
-                    .transpose()?;
-                read_calib(
-                    file,
-                    urdf.as_ref()
-                        .map(|(label, text)| RobotFileText { label, text }),
-                )?
+                let urdf = self.urdf.as_ref().map(read).transpose()?;
+                read_calib(labelled(&file), urdf.as_ref().map(labelled))?
             }
         };
         for note in imported.notes {

@@ -44,14 +44,12 @@ impl ParameterSet<'_> {
             .free
             .unwrap_or_default()
             .iter()
-            .map(|pattern| ("free", pattern.as_str()));
-        let hold = self.hold.iter().map(|pattern| ("hold", pattern.as_str()));
-        let prior = self.prior.keys().map(|pattern| ("prior", pattern.as_str()));
-        free.chain(hold).chain(prior).chain(
-            self.bounds
-                .keys()
-                .map(|pattern| ("bounds", pattern.as_str())),
-        )
+            .map(|one| ("free", one));
+        let hold = self.hold.iter().map(|one| ("hold", one));
+        let prior = self.prior.keys().map(|one| ("prior", one));
+        let bounds = self.bounds.keys().map(|one| ("bounds", one));
+        let all = free.chain(hold).chain(prior).chain(bounds);
+        all.map(|(setting, pattern)| (setting, pattern.as_str()))
     }
 
     /// What is wrong with the settings whatever the robot.
@@ -102,10 +100,9 @@ impl ParameterSet<'_> {
     ) -> (Vec<usize>, Vec<usize>) {
         let specs = model.stack.specs();
         let names: Vec<&str> = open.iter().map(|k| specs[*k].name.as_str()).collect();
-        for (setting, pattern) in self
-            .patterns()
-            .filter(|(_, pattern)| !names.iter().any(|name| matches(pattern, name)))
-        {
+        let is_unknown =
+            |(_, pattern): &(&str, &str)| !names.iter().any(|name| matches(pattern, name));
+        for (setting, pattern) in self.patterns().filter(is_unknown) {
             let hint = did_you_mean(pattern, names.iter().copied());
             context.warn(format!(
                 "{setting}: `{pattern}` matches no parameter of this model{hint}"
@@ -142,12 +139,11 @@ impl ParameterSet<'_> {
 
 /// The entry of the longest pattern that matches.
 fn longest<'a, T>(patterns: &'a BTreeMap<String, T>, name: &str) -> Option<&'a T> {
-    let matching = patterns
+    let all = patterns
         .iter()
         .filter(|(pattern, _)| matches(pattern, name));
-    matching
-        .max_by_key(|(pattern, _)| pattern.len())
-        .map(|(_, value)| value)
+    let longest = all.max_by_key(|(pattern, _)| pattern.len());
+    longest.map(|(_, value)| value)
 }
 
 /// Whether a pattern with `*` for anything matches the whole name.
@@ -155,11 +151,8 @@ pub(crate) fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
         Some((head, tail)) => name.strip_prefix(head).is_some_and(|middle| {
-            middle
-                .char_indices()
-                .map(|(at, _)| &middle[at..])
-                .chain([""])
-                .any(|end| matches(tail, end))
+            let mut ends = middle.char_indices().map(|(at, _)| &middle[at..]);
+            ends.any(|end| matches(tail, end)) || matches(tail, "")
         }),
     }
 }
@@ -352,24 +345,23 @@ pub(crate) fn note_repeats(context: &Context, repeated: &Repeated) {
     } else {
         "noise (the arm stood still: no word on repeatability)"
     };
-    let floor = noise * 1e3;
-    let mut line = format!(
-        "measured more than once: {}, {floor:.3} mm per axis of {what}, {} of freedom",
+    let (floor, poses, degrees) = (
+        noise * 1e3,
         counted(poses, "pose"),
-        counted(freedom, "degree")
+        counted(freedom, "degree"),
     );
-    if let Some((ratio, chance)) = lack_of_fit {
-        line += &if *chance < UNLIKELY {
-            format!(
-                "; the residual between poses is {ratio:.1} times that in mean square: this model lacks something"
-            )
-        } else {
-            format!(
-                "; the residual between poses is no larger (F {ratio:.2}, p {chance:.2}): no lack of fit shows"
-            )
-        };
-    }
-    context.note(line);
+    let lack = match lack_of_fit {
+        None => String::new(),
+        Some((ratio, chance)) if *chance < UNLIKELY => format!(
+            "; the residual between poses is {ratio:.1} times that in mean square: this model lacks something"
+        ),
+        Some((ratio, chance)) => format!(
+            "; the residual between poses is no larger (F {ratio:.2}, p {chance:.2}): no lack of fit shows"
+        ),
+    };
+    context.note(format!(
+        "measured more than once: {poses}, {floor:.3} mm per axis of {what}, {degrees} of freedom{lack}"
+    ));
 }
 
 #[cfg(test)]

@@ -182,13 +182,10 @@ impl Stage for Simulate {
             seed: self.seed.unwrap_or(context.seed),
         };
         if !self.fixtures.is_empty() {
-            let touches = experiment
-                .touch(&self.fixtures)
-                .map_err(|message| Error::spec(place, message))?;
-            let (rows, things) = (
-                counted(touches.len(), "row"),
-                counted(self.fixtures.len(), "fixture"),
-            );
+            let touches = experiment.touch(&self.fixtures);
+            let touches = touches.map_err(|message| Error::spec(place, message))?;
+            let rows = counted(touches.len(), "row");
+            let things = counted(self.fixtures.len(), "fixture");
             context.note(format!("{rows} of joints at {things} of a twin"));
             let mut truth = truth(&robot, &self.truth, &self.tracker, effects);
             truth.0.extend(self.fixtures.iter().flat_map(fixture_truth));
@@ -198,9 +195,8 @@ impl Stage for Simulate {
             });
         }
         let points: usize = self.blocks.iter().map(Block::count).sum();
-        context
-            .services
-            .begin("measuring the twin", Some(points as u64), "points");
+        let services = context.services;
+        services.begin("measuring the twin", Some(points as u64), "points");
         let mut done = 0;
         let shots = match &self.motion {
             Some(way) => experiment.follow(way, || tick(&mut done)),
@@ -265,8 +261,9 @@ impl Simulate {
         for (joint, factor) in factors.filter(|(_, factor)| **factor != 0.0) {
             let mut at = at.at(format!("truth.compliance_rad_a[{joint}]"));
             let described = robot.joints.get(joint);
-            let known = described
-                .is_some_and(|j| j.reduction_ratio.is_some() && j.motor_constant.is_some());
+            let known = described.is_some_and(|joint| {
+                joint.reduction_ratio.is_some() && joint.motor_constant.is_some()
+            });
             let sign = self.motors.sign.get(joint).copied().unwrap_or(1.0);
             at.must(
                 known,
@@ -308,6 +305,7 @@ impl Simulate {
         let of_rows = |value: fn(&Shot) -> f64| Some(shots.iter().map(value).collect());
         let usage = |shot: &Shot| self.blocks[shot.block].usage.as_str();
         let sigma = |shot: &Shot| [figures.sigma(&shot.position.into()); 3];
+        let still = self.motion.is_none();
         let logs_velocity = self.motion.as_ref().is_some_and(|way| way.log_velocity);
         Recording {
             point_id: ids,
@@ -318,10 +316,7 @@ impl Simulate {
             time: of_rows(|shot| shot.time_s),
             payload: of_rows(|shot| shot.payload_kg),
             temperature: of_rows(|shot| shot.temperature_c),
-            current: self
-                .motion
-                .is_none()
-                .then(|| of_joints(|shot| &shot.current)),
+            current: still.then(|| of_joints(|shot| &shot.current)),
             velocity: logs_velocity.then(|| of_joints(|shot| &shot.velocity)),
             direction: Some(of_joints(|shot| &shot.direction)),
             ..blank(robot, shots.iter().map(usage))
@@ -351,11 +346,8 @@ fn truth(
     tracker: &Tracker,
     effects: &[Physical],
 ) -> Truth {
-    let values = truth
-        .values(robot)
-        .into_iter()
-        .chain(tracker.values())
-        .chain(effects.iter().flat_map(Physical::truth));
+    let values = truth.values(robot).into_iter().chain(tracker.values());
+    let values = values.chain(effects.iter().flat_map(Physical::truth));
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     let row = |one: TrueValue| {
         let count = seen.entry(one.name.clone()).or_default();
@@ -389,24 +381,16 @@ pub(super) fn contact_recording(
 ) -> Recording {
     let fixture_of = |touch: &Touch| &fixtures[touch.fixture];
     let (mut readings, mut names) = (BTreeMap::new(), BTreeMap::new());
-    for (kind, setting, sigma) in FIXTURES
-        .into_iter()
-        .filter(|(kind, ..)| fixtures.iter().any(|fixture| fixture.kind == *kind))
-    {
+    for (kind, setting, sigma) in FIXTURES {
+        if !fixtures.iter().any(|fixture| fixture.kind == kind) {
+            continue;
+        }
         let touched =
             |touch: &Touch| Some(fixture_of(touch)).filter(|fixture| fixture.kind == kind);
-        names.insert(
-            setting,
-            touches
-                .iter()
-                .map(|touch| touched(touch).map(|fixture| fixture.name.clone()))
-                .collect(),
-        );
-        let noise = |touch: &Touch| {
-            touched(touch).map_or(f64::NAN, |fixture| {
-                (1e-6 * fixture.sigma_um).max(LEAST_SIGMA)
-            })
-        };
+        let name = |touch: &Touch| Some(touched(touch)?.name.clone());
+        names.insert(setting, touches.iter().map(name).collect());
+        let stated = |fixture: &Fixture| (1e-6 * fixture.sigma_um).max(LEAST_SIGMA);
+        let noise = |touch: &Touch| touched(touch).map_or(f64::NAN, stated);
         readings.insert(sigma, touches.iter().map(noise).collect());
     }
     let mut counts = vec![0; fixtures.len()];
@@ -417,10 +401,7 @@ pub(super) fn contact_recording(
     let usage = touches.iter().map(|touch| fixture_of(touch).usage.as_str());
     Recording {
         point_id: touches.iter().map(&mut name).collect(),
-        q: touches
-            .iter()
-            .flat_map(|touch| touch.q.iter().copied())
-            .collect(),
+        q: touches.iter().flat_map(|touch| &touch.q).copied().collect(),
         position: vec![[f64::NAN; 3]; touches.len()],
         time: Some(touches.iter().map(|touch| touch.time_s).collect()),
         temperature: Some(touches.iter().map(|touch| touch.temperature_c).collect()),

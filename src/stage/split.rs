@@ -188,11 +188,7 @@ impl Stage for SplitBy {
 
     fn sets_dealt(&self) -> Option<Vec<String>> {
         if let Self::Usage { sets, blank } = self {
-            let sets = sets
-                .as_ref()?
-                .values()
-                .chain(blank)
-                .collect::<BTreeSet<_>>();
+            let sets: BTreeSet<&String> = sets.as_ref()?.values().chain(blank).collect();
             return Some(sets.into_iter().cloned().collect());
         }
         Some(self.names().into_iter().map(Into::into).collect())
@@ -203,35 +199,30 @@ impl Stage for SplitBy {
         let recording = &reads.recording;
         let mut sets = self.deal(recording, context.seed)?;
         let copies = copied_rows(recording);
-        copies
-            .iter()
-            .for_each(|(row, copy)| sets[*copy] = sets[*row].clone());
+        for (row, copy) in &copies {
+            sets[*copy] = sets[*row].clone();
+        }
         context.warn_each(copies_remark(&copies, recording));
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         for set in &sets {
             *counts.entry(set).or_default() += 1;
         }
-        for name in self.names() {
-            if !counts.contains_key(name) {
-                return Err(self.empty(name, recording.rows()));
-            }
+        let names = self.names();
+        if let Some(name) = names.iter().find(|name| !counts.contains_key(**name)) {
+            return Err(self.empty(name, recording.rows()));
         }
-        let listed: Vec<String> = counts
+        let all: Vec<String> = counts
             .iter()
             .map(|(set, rows)| format!("{set} {rows}"))
             .collect();
-        context.note(format!("rows: {}", listed.join(", ")));
-        let rows = sets
-            .into_iter()
-            .zip(&recording.sequence)
-            .zip(&recording.point_id);
-        let row = |((set, sequence), point_id): ((String, &i64), &String)| SplitRow {
-            sequence: *sequence,
-            point_id: point_id.clone(),
+        context.note(format!("rows: {}", all.join(", ")));
+        let row = |(row, set): (usize, String)| SplitRow {
+            sequence: recording.sequence[row],
+            point_id: recording.point_id[row].clone(),
             set,
         };
         Ok(SplitWrites {
-            split: Split(rows.map(row).collect()),
+            split: Split(sets.into_iter().enumerate().map(row).collect()),
         })
     }
 }
@@ -263,13 +254,9 @@ impl SplitBy {
             Self::Blocks { .. } => ("length", "say a smaller `length`, or fewer `sets`"),
             Self::Order { .. } | Self::Usage { .. } => ("sets", "give it rows, or leave it out"),
         };
-        Error::data(
-            format!("with.{setting}"),
-            format!(
-                "set `{name}` gets none of the {}; {advice}",
-                counted(rows, "row")
-            ),
-        )
+        let rows = counted(rows, "row");
+        let message = format!("set `{name}` gets none of the {rows}; {advice}");
+        Error::data(format!("with.{setting}"), message)
     }
 
     /// The set of each row.
@@ -284,25 +271,18 @@ impl SplitBy {
                 within,
             } => {
                 let offset = offset.unwrap_or(n - 1);
-                let names = within
-                    .map(|column| column.of(recording, "within"))
-                    .transpose()?;
+                let names = within.map(|column| column.of(recording, "within"));
+                let names = names.transpose()?;
                 let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
-                let dealt = stops(recording).into_iter().flat_map(|stop| {
-                    let count = counts
-                        .entry(names.as_ref().map_or("", |names| names[stop.start]))
-                        .or_default();
+                let mut dealt = Vec::with_capacity(rows);
+                for stop in stops(recording) {
+                    let name = names.as_ref().map_or("", |names| names[stop.start]);
+                    let count = counts.entry(name).or_default();
+                    let set = if *count % n == offset { set } else { rest };
                     *count += 1;
-                    std::iter::repeat_n(
-                        if (*count - 1) % n == offset {
-                            set
-                        } else {
-                            rest
-                        },
-                        stop.len(),
-                    )
-                });
-                Ok(dealt.cloned().collect())
+                    dealt.resize(stop.end, set.clone());
+                }
+                Ok(dealt)
             }
             Self::Named {
                 column,
@@ -311,26 +291,18 @@ impl SplitBy {
                 rest,
             } => {
                 let names = column.of(recording, "column")?;
-                if let Some(k) = wanted
-                    .iter()
-                    .position(|pattern| !names.iter().any(|name| matches(pattern, name)))
-                {
-                    let there: BTreeSet<&str> = names
-                        .iter()
-                        .copied()
-                        .filter(|name| !name.is_empty())
-                        .collect();
-                    let there = there.into_iter().collect::<Vec<_>>().join(", ");
-                    return Err(Error::data(
-                        format!("with.names[{k}]"),
-                        format!("no row has such a name; there are: {there}"),
-                    ));
+                let is_unknown =
+                    |pattern: &String| !names.iter().any(|name| matches(pattern, name));
+                if let Some(k) = wanted.iter().position(is_unknown) {
+                    let named = names.iter().copied().filter(|name| !name.is_empty());
+                    let there: Vec<&str> = named.collect::<BTreeSet<_>>().into_iter().collect();
+                    let message =
+                        format!("no row has such a name; there are: {}", there.join(", "));
+                    return Err(Error::data(format!("with.names[{k}]"), message));
                 }
                 let is_wanted = |name: &&str| wanted.iter().any(|pattern| matches(pattern, name));
-                Ok(names
-                    .iter()
-                    .map(|name| if is_wanted(name) { set } else { rest }.clone())
-                    .collect())
+                let set = |name: &&str| if is_wanted(name) { set } else { rest }.clone();
+                Ok(names.iter().map(set).collect())
             }
             Self::Blocks {
                 count,
@@ -346,11 +318,8 @@ impl SplitBy {
                         }
                         (None, length) => pose.start / length.unwrap_or(1).max(1) as usize,
                     };
-                    let set = sets
-                        .get(block % sets.len().max(1))
-                        .cloned()
-                        .unwrap_or_default();
-                    dealt.resize(pose.end, set);
+                    let set = sets.get(block % sets.len().max(1)).cloned();
+                    dealt.resize(pose.end, set.unwrap_or_default());
                 }
                 Ok(dealt)
             }
@@ -369,11 +338,7 @@ impl SplitBy {
                         continue;
                     }
                     drawn += pose.len();
-                    dealt
-                        .iter_mut()
-                        .take(pose.end)
-                        .skip(pose.start)
-                        .for_each(|dealt| dealt.clone_from(set));
+                    dealt[pose].fill(set.clone());
                 }
                 Ok(dealt)
             }
@@ -388,13 +353,8 @@ fn by_usage(
     sets: Option<&BTreeMap<String, String>>,
     blank: Option<&str>,
 ) -> Result<Vec<String>> {
-    let labels: BTreeSet<&str> = recording
-        .usage
-        .iter()
-        .flatten()
-        .map(String::as_str)
-        .collect();
-    let found = listed(&labels);
+    let labels: BTreeSet<&String> = recording.usage.iter().flatten().collect();
+    let found = listed(labels);
     let set = |(usage, row): (&Option<String>, usize)| {
         let point = || recording.point_id.get(row).map_or("", String::as_str);
         match (usage, sets) {
@@ -424,14 +384,9 @@ fn by_order(rows: usize, sets: &[Stretch]) -> Result<Vec<String>> {
         let left = rows - dealt.len();
         let wanted = stretch.rows.map_or(left as u64, |rows| rows);
         if wanted > left as u64 {
-            return Err(Error::data(
-                format!("with.sets[{k}].rows"),
-                format!(
-                    "set `{}` takes {}, but only {left} of {rows} remain",
-                    stretch.set,
-                    counted(wanted, "row")
-                ),
-            ));
+            let (set, wanted) = (&stretch.set, counted(wanted, "row"));
+            let message = format!("set `{set}` takes {wanted}, but only {left} of {rows} remain");
+            return Err(Error::data(format!("with.sets[{k}].rows"), message));
         }
         dealt.resize(dealt.len() + wanted as usize, stretch.set.clone());
     }
@@ -508,29 +463,18 @@ impl NamedColumn {
 
     /// The names of the rows; blank where a row has none. Fails where the recording has no such column.
     pub(super) fn of<'a>(self, recording: &'a Recording, place: &str) -> Result<Vec<&'a str>> {
-        let column = if self == Self::Target {
-            recording.target.as_ref()
-        } else {
-            recording.names.get(self.name())
+        let column = match self {
+            Self::Target => recording.target.as_ref(),
+            _ => recording.names.get(self.name()),
         };
         let column = column.ok_or_else(|| {
-            let there = recording
-                .names
-                .keys()
-                .copied()
-                .chain(recording.target.as_ref().map(|_| "target"));
-            Error::data(
-                format!("with.{place}"),
-                format!(
-                    "the recording has no names of `{}`; it has: {}",
-                    self.name(),
-                    listed(there)
-                ),
-            )
+            let target = recording.target.as_ref().map(|_| "target");
+            let there = listed(recording.names.keys().copied().chain(target));
+            let name = self.name();
+            let message = format!("the recording has no names of `{name}`; it has: {there}");
+            Error::data(format!("with.{place}"), message)
         })?;
-        Ok(column
-            .iter()
-            .map(|name| name.as_deref().unwrap_or_default())
-            .collect())
+        let names = column.iter().map(|name| name.as_deref());
+        Ok(names.map(Option::unwrap_or_default).collect())
     }
 }

@@ -79,9 +79,7 @@ impl Stage for Transfer {
         {
             (carried, covariance) = (geometry, None);
         }
-        let source_data = source
-            .as_ref()
-            .map(|source| source.recording.measurements());
+        let source_data = source.as_ref().map(|from| from.recording.measurements());
         let fitting = Fitting {
             earlier: Some(&carried.earlier),
             earlier_covariance: covariance,
@@ -90,11 +88,8 @@ impl Stage for Transfer {
             ..Fitting::of(&asked, &carried.fit, &carried.held, self.folds)
         };
         let identified = Identified::of(context, &fitting);
-        let remarked = identified
-            .prediction
-            .0
-            .iter()
-            .filter(|row| row.remark.is_some());
+        let predicted = identified.prediction.0.iter();
+        let remarked = predicted.filter(|row| row.remark.is_some());
         let (doubtful, rows) = (remarked.count(), counted(asked.data.rows(), "row"));
         if doubtful > 0 {
             context.note(format!(
@@ -123,10 +118,8 @@ impl Transfer {
         let robot = RobotModel::new(reads.robot.to_description()?);
         let there = earlier.model(robot.clone(), &[], self.load.into())?;
         let predicted = there.predict(&asked.data);
-        let points = asked
-            .rows
-            .iter()
-            .filter_map(|row| Some((predicted[*row], asked.data.point(*row)?)));
+        let rows = asked.rows.iter();
+        let points = rows.filter_map(|row| Some((predicted[*row], asked.data.point(*row)?)));
         let (carried, measured): (Vec<_>, Vec<_>) = points.unzip();
         let base = align_points(&carried, &measured) * there.base();
         earlier.model_standing(base, robot, &[], self.load.into())
@@ -158,20 +151,18 @@ impl Transfer {
         let sides = sides(data, rows, [&carried.fit.screening, &fit.screening]);
         let visited =
             source.map(|source| VisitedCells::of(&source.recording.measurements(), &source.rows));
-        let both = [
-            &carried.fit.model.predict(data)[..],
-            &fit.model.predict(data),
-        ];
+        let both = [&carried.fit.model, &fit.model].map(|model| model.predict(data));
+        let both = both.each_ref().map(Vec::as_slice);
         let comparison = Comparison::of(data, &sides, both, visited.as_ref());
         let words = comparison.words();
-        if comparison.is_worse() {
+        if comparison.chosen_by.is_worse(1) {
             context.warn(format!(
                 "{words}: what was identified besides it does not hold here and is not used"
             ));
             let (earlier, held) = (geometry, Vec::new());
             return Ok(Some(CarriedModel { earlier, fit, held }));
         }
-        match (comparison.is_worse_where_judged(), comparison.is_worse_outside()) {
+        match (comparison.all.is_worse(1), comparison.is_worse_outside()) {
             (true, _) => context.warn(format!(
                 "{words}: what was identified besides the geometry makes these points worse, though not those that placed the base, by which it was chosen"
             )),
@@ -193,23 +184,15 @@ fn is_geometry(row: &ParameterRow) -> bool {
 /// where there are none the same; without those that neither can follow.
 fn sides(data: &Measurements, asked: &[usize], screenings: [&Screening; 2]) -> ComparedRows {
     let aside = |row: usize| {
-        screenings
-            .iter()
-            .all(|one| one.set_aside().any(|other| other == row))
+        let mut all = screenings.iter();
+        all.all(|one| one.set_aside().any(|other| other == row))
     };
-    let whole: Vec<usize> = (0..data.rows())
-        .filter(|row| data.has_point(*row) && !aside(*row))
-        .collect();
-    let (choose, others): (Vec<usize>, Vec<usize>) =
-        whole.into_iter().partition(|row| asked.contains(row));
-    ComparedRows {
-        judge: if others.is_empty() {
-            choose.clone()
-        } else {
-            others
-        },
-        choose,
+    let whole = (0..data.rows()).filter(|row| data.has_point(*row) && !aside(*row));
+    let (choose, mut judge): (Vec<usize>, Vec<usize>) = whole.partition(|row| asked.contains(row));
+    if judge.is_empty() {
+        judge.clone_from(&choose);
     }
+    ComparedRows { choose, judge }
 }
 
 /// A recording that a model was fitted to.
@@ -223,33 +206,20 @@ pub(super) struct CarriedFrom<'a> {
 impl<'a> CarriedFrom<'a> {
     /// The recording of the carried model; none where the tables do not tell.
     pub fn of(reads: &'a TransferReads) -> Option<Self> {
-        let carried = reads
-            .models
-            .iter()
-            .rfind(|model| model.table == reads.parameters)?;
+        let mut models = reads.models.iter();
+        let carried = models.rfind(|model| model.table == reads.parameters)?;
         Self::of_stage(reads, &carried.stage)
     }
 
     fn of_stage(reads: &'a TransferReads, stage: &str) -> Option<Self> {
-        let prediction = &reads
-            .predictions
-            .iter()
-            .find(|one| one.stage == stage)?
-            .table;
-        let recording = reads
-            .recordings
-            .iter()
-            .map(|one| &one.table)
-            .find(|table| prediction.is_of(table))?;
-        let rows = (0..)
-            .zip(&prediction.0)
-            .filter(|(_, row)| !row.held_out && !row.suspect)
-            .map(|(at, _)| at)
-            .collect();
+        let mut predictions = reads.predictions.iter();
+        let prediction = &predictions.find(|one| one.stage == stage)?.table;
+        let mut recordings = reads.recordings.iter().map(|one| &one.table);
+        let is_fitted = |at: &usize| !prediction.0[*at].held_out && !prediction.0[*at].suspect;
         Some(Self {
             stage: stage.into(),
-            recording,
-            rows,
+            recording: recordings.find(|table| prediction.is_of(table))?,
+            rows: (0..prediction.0.len()).filter(is_fitted).collect(),
         })
     }
 
@@ -266,18 +236,15 @@ impl<'a> CarriedFrom<'a> {
         let here = |stage: &str| {
             CarriedFrom::of_stage(reads, stage).is_some_and(|one| one.recording == self.recording)
         };
-        let identified = reads
-            .models
-            .iter()
-            .rfind(|model| model.stage != self.stage && alone(&model.table) && here(&model.stage));
+        let fits = |model: &&Labelled<Parameters>| {
+            model.stage != self.stage && alone(&model.table) && here(&model.stage)
+        };
+        let identified = reads.models.iter().rfind(fits);
         if let Some(identified) = identified {
             return Ok(identified.table.clone());
         }
-        let start = stripped(&reads.parameters).model(
-            RobotModel::new(reads.robot.to_description()?),
-            &[],
-            load,
-        )?;
+        let robot = RobotModel::new(reads.robot.to_description()?);
+        let start = stripped(&reads.parameters).model(robot, &[], load)?;
         let candidates: Vec<usize> = (0..start.x.len()).collect();
         let data = self.recording.measurements();
         let (model, fitted) = fit(&start, &data, &self.rows, &candidates);
@@ -287,14 +254,8 @@ impl<'a> CarriedFrom<'a> {
 
 /// The geometry as it stands among what else was found, which it makes up for in part.
 pub(super) fn stripped(parameters: &Parameters) -> Parameters {
-    Parameters(
-        parameters
-            .0
-            .iter()
-            .filter(|row| is_geometry(row))
-            .cloned()
-            .collect(),
-    )
+    let rows = parameters.0.iter().filter(|row| is_geometry(row));
+    Parameters(rows.cloned().collect())
 }
 
 /// Beyond this the difference is not that of two ways to place a base.
@@ -340,8 +301,9 @@ struct Compared {
 }
 
 impl Compared {
-    fn words(&self) -> String {
-        format!("{} against {}", self.whole.words(), self.geometry.words())
+    /// Whether the geometry alone is better at these points, of which there are so many at least.
+    fn is_worse(&self, fewest: usize) -> bool {
+        self.points >= fewest && self.whole.is_worse(&self.geometry)
     }
 }
 
@@ -373,10 +335,9 @@ impl Comparison {
             geometry: CarriedErrors::of(data, geometry, rows),
         };
         let parts = visited.map(|visited| {
-            let (inside, outside): (Vec<usize>, Vec<usize>) = rows
-                .judge
-                .iter()
-                .partition(|row| visited.has(data.q(**row)));
+            let is_inside = |row: &&usize| visited.has(data.q(**row));
+            let (inside, outside): (Vec<usize>, Vec<usize>) =
+                rows.judge.iter().partition(is_inside);
             [compared(&inside), compared(&outside)]
         });
         Self {
@@ -386,47 +347,31 @@ impl Comparison {
         }
     }
 
-    /// Whether the geometry alone is better at the points that choose.
-    pub(crate) fn is_worse(&self) -> bool {
-        self.chosen_by.points > 0 && self.chosen_by.whole.is_worse(&self.chosen_by.geometry)
-    }
-
-    /// Whether it is better at the points that judge.
-    pub(crate) fn is_worse_where_judged(&self) -> bool {
-        self.all.points > 0 && self.all.whole.is_worse(&self.all.geometry)
-    }
-
     /// Whether it is better where the joints had not been.
-    pub(crate) fn is_worse_outside(&self) -> bool {
+    fn is_worse_outside(&self) -> bool {
         let outside = self.parts.as_ref().map(|[_, outside]| outside);
-        outside.is_some_and(|outside| {
-            outside.points >= FEWEST && outside.whole.is_worse(&outside.geometry)
-        })
+        outside.is_some_and(|outside| outside.is_worse(FEWEST))
     }
 
     /// Both, with their figures.
     pub(crate) fn words(&self) -> String {
-        let Compared {
-            points,
-            whole,
-            geometry,
-        } = &self.all;
+        let [whole, geometry] = [&self.all.whole, &self.all.geometry].map(CarriedErrors::words);
+        let points = counted(self.all.points, "point");
         let mut text = format!(
-            "the carried model leaves {} at {} of this recording, the geometry alone, carried likewise, {}",
-            whole.words(),
-            counted(*points, "point"),
-            geometry.words()
+            "the carried model leaves {whole} at {points} of this recording, the geometry alone, carried likewise, {geometry}"
         );
         let part = |part: &Compared| match part.points {
             0 => "none".to_string(),
-            points => format!("{}, {}", counted(points, "point"), part.words()),
+            points => format!(
+                "{}, {} against {}",
+                counted(points, "point"),
+                part.whole.words(),
+                part.geometry.words()
+            ),
         };
         if let Some([inside, outside]) = &self.parts {
-            text += &format!(
-                " (visited cells of the joint space: {}; unvisited: {})",
-                part(inside),
-                part(outside)
-            );
+            let [inside, outside] = [inside, outside].map(part);
+            text += &format!(" (visited cells of the joint space: {inside}; unvisited: {outside})");
         }
         text
     }

@@ -67,22 +67,16 @@ impl Stage for Validate {
         let mut statistics = Statistics::default();
         let mut suspected = None;
         for (order, step) in (0..).zip(&reads.prediction) {
-            let fit = reads
-                .observability
-                .iter()
-                .find(|fit| fit.stage == step.stage);
+            let mut fits = reads.observability.iter();
+            let fit = fits.find(|fit| fit.stage == step.stage);
             let value = |quantity: &str| {
-                fit.and_then(|fit| fit.table.0.iter().find(|row| row.quantity == quantity))
-                    .map(|row| row.value)
+                let mut rows = fit?.table.0.iter();
+                Some(rows.find(|row| row.quantity == quantity)?.value)
             };
             // A step on top of another carries that one's covariance, which scales with that one's residuals.
             let unmodelled = value("unmodelled_mm").filter(|_| value("earlier").is_none());
-            let fitted = step
-                .table
-                .0
-                .iter()
-                .filter(|row| row.fold_error_mm.is_some())
-                .count();
+            let folded = |row: &&PredictionRow| row.fold_error_mm.is_some();
+            let fitted = step.table.0.iter().filter(folded).count();
             // Without a k-th part of the rows, three values each.
             let inflation = value("folds").zip(value("free")).map(|(folds, free)| {
                 let values = 3.0 * fitted as f64 * (1.0 - 1.0 / folds);
@@ -95,20 +89,16 @@ impl Stage for Validate {
                 let line = suspicion(whole.map(|row| [row.error_mm, row.noise_mm]), 0);
                 suspected =
                     suspected.or(line.map(|line| format!("{name} on {set}, held out: {line}")));
-                let row = describe(order, name, &set, held_out, &rows);
-                let row = StatisticsRow {
-                    expected_rms_mm: expected(held_out, &rows, unmodelled),
-                    ..row
-                };
-                statistics.0.push(cross_validated(row, &rows, inflation));
+                let mut row = describe(order, name, &set, held_out, &rows);
+                row.expected_rms_mm = expected(held_out, &rows, unmodelled);
+                cross_validate(&mut row, &rows, inflation);
+                statistics.0.push(row);
             }
         }
         for row in statistics.0.iter().filter(|row| row.held_out) {
             if let Some(without) = row.mean_without_mm {
-                let (suspects, them) = (
-                    counted(row.suspects, "suspect"),
-                    if row.suspects == 1 { "it" } else { "them" },
-                );
+                let suspects = counted(row.suspects, "suspect");
+                let them = if row.suspects == 1 { "it" } else { "them" };
                 context.note(format!(
                     "{} on {}: the held-out mean of {:.3} mm includes {suspects}; without {them} {without:.3} mm",
                     row.step, row.set, row.mean_mm
@@ -119,16 +109,13 @@ impl Stage for Validate {
             }
         }
         for reference in &self.reference {
-            let mut matching = statistics
-                .0
-                .iter_mut()
-                .filter(|row| row.step == reference.step && row.set == reference.set)
+            let PublishedErrors { step, set, .. } = reference;
+            let rows = statistics.0.iter_mut();
+            let mut matching = rows
+                .filter(|row| row.step == *step && row.set == *set)
                 .peekable();
             if matching.peek().is_none() {
-                let message = format!(
-                    "reference: no statistics of step `{}` on set `{}`",
-                    reference.step, reference.set
-                );
+                let message = format!("reference: no statistics of step `{step}` on set `{set}`");
                 return Err(Error::spec(context.id, message));
             }
             for row in matching {
@@ -184,32 +171,27 @@ fn describe(
     held_out: bool,
     rows: &[&PredictionRow],
 ) -> StatisticsRow {
-    let mut error: Vec<f64> = rows.iter().map(|row| row.error_mm).collect();
-    error.sort_by(f64::total_cmp);
+    let sorted = |keep: fn(&PredictionRow) -> bool| {
+        let rows = rows.iter().filter(|row| keep(row));
+        let mut errors: Vec<f64> = rows.map(|row| row.error_mm).collect();
+        errors.sort_by(f64::total_cmp);
+        errors
+    };
+    let (error, without) = (sorted(|_| true), sorted(|row| !row.suspect));
     let count = error.len() as f64;
     let mean = error.iter().sum::<f64>() / count;
     let spread: f64 = error.iter().map(|e| (e - mean).powi(2)).sum();
     let rms = |value: fn(&PredictionRow) -> f64| {
         (rows.iter().map(|row| value(row).powi(2)).sum::<f64>() / count).sqrt()
     };
-    let mut without: Vec<f64> = rows
-        .iter()
-        .filter(|row| !row.suspect)
-        .map(|row| row.error_mm)
-        .collect();
-    without.sort_by(f64::total_cmp);
     let suspects = rows.len() - without.len();
-    let remarked: Vec<&PredictionRow> = rows
-        .iter()
-        .copied()
-        .filter(|row| row.remark.is_some())
-        .collect();
+    let remarked = rows.iter().copied().filter(|row| row.remark.is_some());
+    let remarked: Vec<&PredictionRow> = remarked.collect();
+    let errors_of_remarked = || remarked.iter().map(|row| row.error_mm);
     let at = |share: f64| quantile(&error, share).unwrap_or(f64::NAN);
     let some = suspects > 0 && !without.is_empty();
-    let basis = rows
-        .iter()
-        .filter_map(|row| NoiseBasis::parse(row.noise_basis.as_deref()?))
-        .max();
+    let basis = |row: &&PredictionRow| NoiseBasis::parse(row.noise_basis.as_deref()?);
+    let basis = rows.iter().filter_map(basis).max();
     let average =
         |power: i32| without.iter().map(|e| e.powi(power)).sum::<f64>() / without.len() as f64;
     StatisticsRow {
@@ -233,39 +215,21 @@ fn describe(
         rms_z_mm: rms(|row| row.dz_mm),
         noise_rms_mm: rms(|row| row.noise_mm),
         noise_basis: basis.map(|basis| basis.name().into()),
-        expected_rms_mm: None,
         suspects: suspects as i64,
         mean_without_mm: some.then(|| average(1)),
         rms_without_mm: some.then(|| average(2).sqrt()),
         max_without_mm: without.last().copied().filter(|_| some),
         remarked: Some(remarked.len() as i64),
         mean_remarked_mm: (!remarked.is_empty())
-            .then(|| remarked.iter().map(|row| row.error_mm).sum::<f64>() / remarked.len() as f64),
-        max_remarked_mm: remarked
-            .iter()
-            .map(|row| row.error_mm)
-            .max_by(f64::total_cmp),
+            .then(|| errors_of_remarked().sum::<f64>() / remarked.len() as f64),
+        max_remarked_mm: errors_of_remarked().max_by(f64::total_cmp),
         remarked_points: (!remarked.is_empty()).then(|| named(&remarked)),
-        fold_mean_mm: None,
-        fold_rms_mm: None,
-        fold_max_mm: None,
-        block_mean_mm: None,
-        block_rms_mm: None,
-        block_max_mm: None,
-        fold_expected_mm: None,
-        reference: None,
-        reference_mean_mm: None,
-        reference_std_mm: None,
-        reference_max_mm: None,
+        ..StatisticsRow::default()
     }
 }
 
-/// The row with what cross-validation says of its points; `inflation` of the noise is to be expected.
-fn cross_validated(
-    row: StatisticsRow,
-    points: &[&PredictionRow],
-    inflation: Option<f64>,
-) -> StatisticsRow {
+/// What cross-validation says of the points of a row; `inflation` of the noise is to be expected.
+fn cross_validate(row: &mut StatisticsRow, points: &[&PredictionRow], inflation: Option<f64>) {
     let figures = |error: fn(&PredictionRow) -> Option<f64>| {
         let errors: Vec<f64> = points.iter().filter_map(|point| error(point)).collect();
         let count = errors.len() as f64;
@@ -273,21 +237,13 @@ fn cross_validated(
         let rms = (errors.iter().map(|error| error * error).sum::<f64>() / count).sqrt();
         (!errors.is_empty()).then(|| (mean, rms, errors.iter().copied().fold(0.0, f64::max)))
     };
-    let (fold, block) = (
-        figures(|point| point.fold_error_mm),
-        figures(|point| point.block_error_mm),
-    );
-    StatisticsRow {
-        fold_mean_mm: fold.map(|figures| figures.0),
-        fold_rms_mm: fold.map(|figures| figures.1),
-        fold_max_mm: fold.map(|figures| figures.2),
-        block_mean_mm: block.map(|figures| figures.0),
-        block_rms_mm: block.map(|figures| figures.1),
-        block_max_mm: block.map(|figures| figures.2),
-        fold_expected_mm: fold
-            .and(inflation)
-            .map(|inflation| row.noise_rms_mm * inflation),
-        ..row
+    if let Some((mean, rms, max)) = figures(|point| point.fold_error_mm) {
+        (row.fold_mean_mm, row.fold_rms_mm, row.fold_max_mm) = (Some(mean), Some(rms), Some(max));
+        row.fold_expected_mm = inflation.map(|inflation| row.noise_rms_mm * inflation);
+    }
+    if let Some((mean, rms, max)) = figures(|point| point.block_error_mm) {
+        (row.block_mean_mm, row.block_rms_mm, row.block_max_mm) =
+            (Some(mean), Some(rms), Some(max));
     }
 }
 
@@ -305,10 +261,9 @@ fn expected(held_out: bool, rows: &[&PredictionRow], unmodelled: Option<f64>) ->
         let noise = row.noise_mm.powi(2);
         let leverage = row.sigma_mm?.powi(2) / (noise + beyond);
         sum += noise
-            * if held_out {
-                1.0 + leverage
-            } else {
-                (1.0 - leverage).max(0.0)
+            * match held_out {
+                true => 1.0 + leverage,
+                false => (1.0 - leverage).max(0.0),
             };
     }
     Some((sum / rows.len() as f64).sqrt())

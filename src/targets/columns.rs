@@ -5,7 +5,7 @@
 use super::Layout;
 use crate::compensate::{CommandTarget, Stated, turns, unstated_payload};
 use crate::description::{JointKind, RobotDescription};
-use crate::error::{Error, Fault, Result, counted};
+use crate::error::{Error, Fault, Result, counted, listed};
 use crate::robot::{Bound, ONE_AND_A_HALF_TURNS};
 use crate::units::{Header, Quantity, Unit};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -104,31 +104,22 @@ impl TargetColumns {
         units: Units,
     ) -> Result<Self> {
         let (columns, mut faults) = read_columns(place, header, |name| role(name, robot, units));
+        let mut fault = |message: String| faults.push(Fault::new(place, message));
         let n = robot.joints.len();
-        let joint = |j: usize| {
-            let mut columns = columns.iter();
-            let found = columns.find(|(_, role, _)| *role == ColumnRole::Joint(j))?;
-            Some((found.0, found.2))
-        };
+        let of = |wanted: ColumnRole| columns.iter().find(|(_, role, _)| *role == wanted);
+        let joint = |j: usize| of(ColumnRole::Joint(j)).map(|found| (found.0, found.2));
         let joints: Vec<(usize, Unit)> = (0..n).filter_map(joint).collect();
-        let count = |role_of: fn(usize) -> ColumnRole, most: usize| {
-            let has = |k: &usize| columns.iter().any(|(_, role, _)| *role == role_of(*k));
-            (0..most).filter(has).count()
+        let count = |role: fn(usize) -> ColumnRole, most: usize| {
+            (0..most).filter(|k| of(role(*k)).is_some()).count()
         };
         let point = count(ColumnRole::Axis, 3);
         let quaternion = count(ColumnRole::Quaternion, 4);
         let turns = count(ColumnRole::Turn, 3);
         if !joints.is_empty() && joints.len() < n {
-            let missing: Vec<String> = (0..n)
-                .filter(|j| joint(*j).is_none())
-                .map(|j| format!("q{}", j + 1))
-                .collect();
-            faults.push(Fault::new(
-                place,
-                format!(
-                    "has no column for {} of the robot's {n} joints",
-                    missing.join(", ")
-                ),
+            let missing = (0..n).filter(|j| joint(*j).is_none());
+            let missing = listed(missing.map(|j| format!("q{}", j + 1)));
+            fault(format!(
+                "has no column for {missing} of the robot's {n} joints"
             ));
         }
         for (found, whole, what) in [
@@ -137,27 +128,22 @@ impl TargetColumns {
             (turns, 3, "a, b, c"),
         ] {
             if found != 0 && found != whole {
-                faults.push(Fault::new(
-                    place,
-                    format!("has only {found} of the columns {what}"),
-                ));
+                fault(format!("has only {found} of the columns {what}"));
             }
         }
         if faults.is_empty() && joints.is_empty() && point == 0 {
-            let names = header
+            let names: Vec<String> = header
                 .iter()
                 .take(12)
                 .map(|name| format!("`{name}`"))
-                .collect::<Vec<_>>()
-                .join(", ");
+                .collect();
+            let names = names.join(", ");
             faults.push(Fault::new(
                 place,
                 format!("no targets found in the columns {names}; expected q1_deg..q{n}_deg (joints), or x_mm, y_mm, z_mm with qw, qx, qy, qz or a_deg, b_deg, c_deg, in a header line"),
             ));
         }
-        if !faults.is_empty() {
-            return Err(Error::Spec(faults));
-        }
+        Error::if_spec(faults)?;
         Ok(Self {
             count: header.len(),
             read: columns,
@@ -212,34 +198,25 @@ fn role(
             .and_then(|number| number.parse::<usize>().ok())
             .filter(|n| (1..=robot.joints.len()).contains(n))
     };
-    let joint = named(stem).or_else(|| {
-        JOINT_NAMES
-            .iter()
-            .find_map(|prefix| numbered(prefix))
-            .map(|n| n - 1)
-    });
-    if let Some(joint) = joint {
+    let angle = || of_quantity(Quantity::Angle, units.angle, "--angle deg");
+    let length = || of_quantity(Quantity::Length, units.length, "--length mm");
+    let place = |names: &[&str]| names.iter().position(|name| *name == stem);
+    let of_prefix = || JOINT_NAMES.iter().find_map(|prefix| numbered(prefix));
+    if let Some(joint) = named(stem).or_else(|| Some(of_prefix()? - 1)) {
         let unit = match robot.joints[joint].kind {
-            JointKind::Revolute => of_quantity(Quantity::Angle, units.angle, "--angle deg")?,
-            JointKind::Prismatic => of_quantity(Quantity::Length, units.length, "--length mm")?,
+            JointKind::Revolute => angle()?,
+            JointKind::Prismatic => length()?,
         };
         return Ok(unit.map(|unit| (ColumnRole::Joint(joint), unit)));
     }
-    if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == stem) {
-        return Ok(of_quantity(Quantity::Length, units.length, "--length mm")?
-            .map(|unit| (ColumnRole::Axis(axis), unit)));
+    if let Some(axis) = place(&["x", "y", "z"]) {
+        return Ok(length()?.map(|unit| (ColumnRole::Axis(axis), unit)));
     }
-    if let (Some(part), None) = (
-        ["qw", "qx", "qy", "qz"]
-            .iter()
-            .position(|part| *part == stem),
-        unit,
-    ) {
+    if let (Some(part), None) = (place(&["qw", "qx", "qy", "qz"]), unit) {
         return Ok(Some((ColumnRole::Quaternion(part), Unit::One)));
     }
-    if let Some(turn) = ["a", "b", "c"].iter().position(|turn| *turn == stem) {
-        return Ok(of_quantity(Quantity::Angle, units.angle, "--angle deg")?
-            .map(|unit| (ColumnRole::Turn(turn), unit)));
+    if let Some(turn) = place(&["a", "b", "c"]) {
+        return Ok(angle()?.map(|unit| (ColumnRole::Turn(turn), unit)));
     }
     let role = match (stem, unit) {
         ("payload", Some(Unit::Kilogram)) => Some(ColumnRole::Payload),
@@ -287,25 +264,14 @@ impl TargetRow {
         layout: &Layout,
     ) -> Result<CommandTarget, String> {
         let joints = self.target.q.iter().flatten().zip(&columns.joints);
-        let joints = joints.map(|(q, (_, unit))| {
-            (
-                if unit.quantity() == Quantity::Length {
-                    Bound::Length
-                } else {
-                    Bound::Angle
-                },
-                *q,
-            )
+        let joints = joints.map(|(q, (_, unit))| match unit.quantity() {
+            Quantity::Length => (Bound::Length, *q),
+            _ => (Bound::Angle, *q),
         });
-        let others = self
-            .point
-            .iter()
-            .map(|x| (Bound::Length, *x))
-            .chain(self.turns.iter().map(|turn| (Bound::Angle, *turn)));
-        if let Some(message) = joints
-            .chain(others)
-            .find_map(|(bound, value)| bound.fault(value))
-        {
+        let point = self.point.iter().map(|x| (Bound::Length, *x));
+        let turned = self.turns.iter().map(|turn| (Bound::Angle, *turn));
+        let mut all = joints.chain(point).chain(turned);
+        if let Some(message) = all.find_map(|(bound, value)| bound.fault(value)) {
             return Err(message);
         }
         if let (Some(load), None) = (layout.load, self.target.payload) {

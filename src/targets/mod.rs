@@ -11,7 +11,7 @@ use crate::description::{JointKind, RobotDescription};
 use crate::error::{Error, Fault, Result};
 pub use crate::targets::columns::Units;
 use crate::targets::columns::{FarTurned, TargetColumns};
-use crate::targets::text::{fields, row, table};
+use crate::targets::text::{fields, row, table, texts};
 pub use crate::targets::trajectory::Trajectory;
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -169,10 +169,8 @@ impl Unreached {
     fn push(&mut self, place: impl FnOnce() -> String, remark: &str) {
         self.count += 1;
         if self.faults.len() < LIMIT {
-            self.faults.push(Fault::new(
-                place(),
-                format!("{remark}: no joints are written"),
-            ));
+            let message = format!("{remark}: no joints are written");
+            self.faults.push(Fault::new(place(), message));
         }
     }
 }
@@ -188,23 +186,14 @@ pub struct MeasuredTarget {
 pub fn measured(text: &str, layout: &Layout) -> Result<Vec<MeasuredTarget>> {
     let expected = "a header line and targets with their measured points";
     let table = table(text, layout.place, expected)?;
-    let names: Vec<String> = table
-        .names
-        .into_iter()
-        .map(|field| field.1.into_owned())
-        .collect();
-    let columns = layout.columns(&names)?;
+    let columns = layout.columns(&texts(&table.names))?;
     if columns.joints.is_empty() || !columns.point {
         let message = "has no columns of joints (the targets before correction), or no x_mm, y_mm, z_mm (the measured points)";
         return Err(Error::spec(layout.place, message));
     }
     let read = |line: &str| {
-        let row = row(
-            &fields(line, table.delimiter)?,
-            table.delimiter,
-            &columns,
-            layout,
-        )?;
+        let cells = fields(line, table.delimiter)?;
+        let row = row(&cells, table.delimiter, &columns, layout)?;
         let point = row.point.into();
         row.target(&columns, layout)
             .map(|target| MeasuredTarget { target, point })
@@ -216,11 +205,7 @@ pub fn measured(text: &str, layout: &Layout) -> Result<Vec<MeasuredTarget>> {
             Err(message) => faults.push(Fault::new(format!("{}:{number}", layout.place), message)),
         }
     }
-    if faults.is_empty() {
-        Ok(rows)
-    } else {
-        Err(Error::Data(faults))
-    }
+    Error::if_data(faults).map(|()| rows)
 }
 
 /// The error of an output file that could not be written.
@@ -233,25 +218,19 @@ pub fn unwritten(out: &Path, error: &std::io::Error) -> Error {
 
 /// A file appears only when it is whole; a pipe or a device is written as it stands.
 pub fn whole<T>(out: &Path, fill: impl FnOnce(File) -> Result<T>) -> Result<T> {
-    if out
-        .metadata()
-        .is_ok_and(|found| !found.is_file() && !found.is_dir())
-    {
-        return fill(
-            File::options()
-                .write(true)
-                .open(out)
-                .map_err(|error| unwritten(out, &error))?,
-        );
+    let refused = |error: std::io::Error| unwritten(out, &error);
+    let is_device = |found: std::fs::Metadata| !found.is_file() && !found.is_dir();
+    if out.metadata().is_ok_and(is_device) {
+        let device = File::options().write(true).open(out);
+        return fill(device.map_err(refused)?);
     }
-    let mut name = out.to_path_buf().into_os_string();
+    let mut name = out.as_os_str().to_owned();
     name.push(".part");
     let aside = PathBuf::from(name);
-    let file = File::create(&aside).map_err(|error| unwritten(out, &error))?;
+    let file = File::create(&aside).map_err(refused)?;
     let result = fill(file).and_then(|filled| {
-        std::fs::rename(&aside, out)
-            .map(|()| filled)
-            .map_err(|error| unwritten(out, &error))
+        let renamed = std::fs::rename(&aside, out).map_err(refused);
+        renamed.map(|()| filled)
     });
     if result.is_err() {
         let _ = std::fs::remove_file(&aside);

@@ -96,18 +96,14 @@ impl<W: Write + Send> TargetTable for ParquetTable<'_, W> {
         });
         let appended = self.appended.iter().map(|column| -> ArrayRef {
             match column {
-                Appended::Iterations => Arc::new(
-                    answers
-                        .iter()
-                        .map(|answer| answer.iterations as i64)
-                        .collect::<Int64Array>(),
-                ),
-                Appended::Remark => Arc::new(
-                    answers
-                        .iter()
-                        .map(|answer| Some(answer.remark()))
-                        .collect::<StringArray>(),
-                ),
+                Appended::Iterations => {
+                    let counts = answers.iter().map(|answer| answer.iterations as i64);
+                    Arc::new(counts.collect::<Int64Array>())
+                }
+                Appended::Remark => {
+                    let remarks = answers.iter().map(|answer| Some(answer.remark()));
+                    Arc::new(remarks.collect::<StringArray>())
+                }
                 column => numbers(*column),
             }
         });
@@ -128,10 +124,10 @@ fn described(schema: &Schema, columns: &TargetColumns, appended: &[Appended]) ->
         .enumerate()
         .map(|(index, field)| match joint(index) {
             // Null where a target is not reached.
-            true => Arc::new(
-                Field::new(field.name(), DataType::Float64, true)
-                    .with_metadata(field.metadata().clone()),
-            ),
+            true => {
+                let field = Field::clone(field).with_data_type(DataType::Float64);
+                Arc::new(field.with_nullable(true))
+            }
             false => field.clone(),
         });
     let appended = appended.iter().map(|column| {
@@ -155,44 +151,37 @@ fn targets(
     layout: &Layout,
     before: usize,
 ) -> Result<Vec<CommandTarget>> {
-    let mut numbers = Vec::new();
+    let faulty = |message: String| Error::data(layout.place, message);
+    let (mut numbers, schema) = (Vec::new(), batch.schema());
     for (index, role, unit) in &columns.read {
-        let column = batch.column(*index);
-        let name = batch.schema().field(*index).name().clone();
-        let cast = cast(column, &DataType::Float64).map_err(|_| {
-            Error::data(
-                layout.place,
-                format!(
-                    "column `{name}` holds {}, expected numbers",
-                    column.data_type()
-                ),
-            )
-        })?;
-        numbers.push((*role, *unit, name, cast));
+        let (column, name) = (batch.column(*index), schema.field(*index).name());
+        let kind = column.data_type();
+        let cast = cast(column, &DataType::Float64)
+            .map_err(|_| faulty(format!("column `{name}` holds {kind}, expected numbers")))?;
+        numbers.push((
+            *role,
+            *unit,
+            name,
+            cast.as_primitive::<Float64Type>().clone(),
+        ));
     }
-    (0..batch.num_rows())
-        .map(|row| {
-            let mut taken = TargetRow::default();
-            for (role, unit, name, column) in &numbers {
-                let values = column.as_primitive::<Float64Type>();
-                if !values.is_null(row) && values.value(row).is_finite() {
-                    if let Some(message) = role.fault(values.value(row)) {
-                        let place = format!("row {}: column `{name}`", before + row + 1);
-                        return Err(Error::data(layout.place, format!("{place}: {message}")));
-                    }
-                    let number = unit.to_si(values.value(row));
-                    taken.take(*role, number, layout.robot.joints.len());
-                } else if role.is_needed() {
-                    return Err(Error::data(
-                        layout.place,
-                        format!("row {}: column `{name}` is empty", before + row + 1),
-                    ));
+    let target = |row: usize| {
+        let mut taken = TargetRow::default();
+        for (role, unit, name, values) in &numbers {
+            if !values.is_null(row) && values.value(row).is_finite() {
+                if let Some(message) = role.fault(values.value(row)) {
+                    return Err(format!("column `{name}`: {message}"));
                 }
+                let number = unit.to_si(values.value(row));
+                taken.take(*role, number, layout.robot.joints.len());
+            } else if role.is_needed() {
+                return Err(format!("column `{name}` is empty"));
             }
-            let faulty = |message: String| {
-                Error::data(layout.place, format!("row {}: {message}", before + row + 1))
-            };
-            taken.target(columns, layout).map_err(faulty)
-        })
-        .collect()
+        }
+        taken.target(columns, layout)
+    };
+    let placed = |row: usize| {
+        target(row).map_err(|message| faulty(format!("row {}: {message}", before + row + 1)))
+    };
+    (0..batch.num_rows()).map(placed).collect()
 }

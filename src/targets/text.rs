@@ -50,11 +50,7 @@ pub(crate) fn stream(
         layout.place,
         number,
     )?;
-    let names: Vec<String> = names
-        .into_iter()
-        .map(|field| field.1.into_owned())
-        .collect();
-    let columns = layout.columns(&names)?;
+    let columns = layout.columns(&texts(&names))?;
     let joints = columns.joints.iter().enumerate();
     let mut joints: Vec<(usize, usize, Unit)> = joints
         .map(|(joint, (index, unit))| (*index, joint, *unit))
@@ -83,8 +79,7 @@ pub(crate) fn stream(
         rows: Vec::new(),
     };
     let unreached = corrected(&mut table, &columns, layout, corrector)?;
-    let head = std::mem::take(&mut table.head);
-    put(table.output, &head)?;
+    put(table.output, &table.head)?;
     match table.output.flush() {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(refused(&error)),
         _ => Ok(unreached),
@@ -136,6 +131,11 @@ pub(super) fn fields(line: &str, delimiter: char) -> Result<Vec<TextField<'_>>, 
             .map(|place| (place.clone(), unquoted_text(&line[place])))
             .collect()),
     }
+}
+
+/// The texts of fields.
+pub(super) fn texts(fields: &[TextField]) -> Vec<String> {
+    fields.iter().map(|field| field.1.to_string()).collect()
 }
 
 pub(super) struct TableText<'t> {
@@ -209,13 +209,8 @@ struct TextTable<'a> {
 impl TargetTable for TextTable<'_> {
     fn read(&mut self) -> Result<Option<Vec<(usize, CommandTarget)>>> {
         let first = self.number + 1;
-        let mut lines = Vec::new();
-        while lines.len() < BATCH {
-            let Some(line) = next(self.input, self.form.layout.place)? else {
-                break;
-            };
-            lines.push(line);
-        }
+        let lines = std::iter::from_fn(|| next(self.input, self.form.layout.place).transpose());
+        let lines = lines.take(BATCH).collect::<Result<Vec<String>>>()?;
         self.number += lines.len();
         if lines.is_empty() {
             return Ok(None);
@@ -250,9 +245,8 @@ impl TargetTable for TextTable<'_> {
         let form = &self.form;
         let mut answers = answers.iter();
         let rows = self.rows.iter().map(|(line, spans)| {
-            let answered = spans
-                .as_ref()
-                .and_then(|spans| Some((spans, answers.next()?)));
+            let spans = spans.as_ref();
+            let answered = spans.and_then(|spans| Some((spans, answers.next()?)));
             (line.as_str(), answered)
         });
         let rows: Vec<(&str, Option<(&Spans, &CorrectedCommand)>)> = rows.collect();

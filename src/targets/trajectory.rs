@@ -1,7 +1,7 @@
 //! A planned motion as delimited text: times and joints in even steps; what it needs of torque is appended, all else stays.
 
 use super::columns::{ColumnRole, ReadColumn, read_columns};
-use super::text::{TableText, TextField, fields, parse, table};
+use super::text::{TableText, TextField, fields, parse, table, texts};
 use super::{LIMIT, text};
 use crate::description::RobotDescription;
 use crate::dynamics::{JudgedRow, NeededTorques, PlannedMotion};
@@ -32,39 +32,29 @@ impl<'a> Trajectory<'a> {
     /// be read, times that do not grow in even steps, and where calib wrote the torques of the text already; `force`: its columns are
     /// written anew.
     pub fn read(place: &str, text: &'a str, robot: &RobotDescription, force: bool) -> Result<Self> {
-        let table = table(text, place, "a header line and a motion")?;
         let TableText {
             delimiter,
             header,
             names,
             rows: lines,
-        } = table;
+        } = table(text, place, "a header line and a motion")?;
         let everything = names.len();
         let kept = kept(place, &names, robot.joints.len(), force)?;
-        let header = kept
-            .checked_sub(1)
-            .map_or(header, |last| &header[..names[last].0.end]);
-        let names: Vec<String> = names
-            .into_iter()
-            .take(kept)
-            .map(|field| field.1.into_owned())
-            .collect();
-        let columns = columns(place, &names, robot)?;
+        let last = kept.checked_sub(1);
+        let header = last.map_or(header, |last| &header[..names[last].0.end]);
+        let columns = columns(place, &texts(&names)[..kept], robot)?;
         let mut trajectory = Self {
-            motion: empty_motion(robot.joints.len(), &columns),
+            motion: empty_motion(robot.joints.len(), lines.len(), &columns),
             header,
             lines,
             delimiter,
             point: '.',
         };
-        for (_, line) in &mut trajectory.lines {
+        for (_, line) in trajectory.lines.iter_mut().filter(|_| kept < everything) {
             // What cannot be split is told where the line is read.
-            let end = fields(line, delimiter)
-                .ok()
-                .and_then(|cells| cells.get(kept.checked_sub(1)?).map(|cell| cell.0.end));
-            *line = end
-                .filter(|_| kept < everything)
-                .map_or(*line, |end| &line[..end]);
+            let cells = fields(line, delimiter).ok();
+            let end = cells.and_then(|cells| Some(cells.get(last?)?.0.end));
+            *line = end.map_or(*line, |end| &line[..end]);
         }
         trajectory.fill(place, &columns)?;
         trajectory.check_clock(place)?;
@@ -73,37 +63,21 @@ impl<'a> Trajectory<'a> {
 
     /// Reads all rows.
     fn fill(&mut self, place: &str, columns: &[MotionColumn]) -> Result<()> {
-        let (n, rows) = (self.motion.joints, self.lines.len());
         let mut faults = Vec::new();
-        for list in [&mut self.motion.velocity, &mut self.motion.acceleration]
-            .into_iter()
-            .flatten()
-        {
-            list.resize(n * rows, 0.0);
-        }
-        self.motion
-            .temperature
-            .iter_mut()
-            .for_each(|list| list.resize(rows, 0.0));
-        self.motion.time.resize(rows, 0.0);
-        self.motion.position.resize(n * rows, 0.0);
-        for row in 0..rows {
-            let (number, line) = self.lines[row];
+        for (row, (number, line)) in self.lines.iter().enumerate() {
             let mut fault = |message: String| {
                 if faults.len() < LIMIT {
                     faults.push(Fault::new(format!("{place}:{number}"), message));
                 }
             };
-            let cells = match fields(line, self.delimiter) {
-                Ok(cells) if cells.len() == columns.len() => cells,
-                Ok(cells) => {
-                    fault(format!(
-                        "has {} cells, the header {}",
-                        cells.len(),
-                        columns.len()
-                    ));
-                    continue;
-                }
+            let cells = fields(line, self.delimiter).and_then(|cells| {
+                let (found, expected) = (cells.len(), columns.len());
+                let is_whole = found == expected;
+                let message = || format!("has {found} cells, the header {expected}");
+                is_whole.then_some(cells).ok_or_else(message)
+            });
+            let cells = match cells {
+                Ok(cells) => cells,
                 Err(message) => {
                     fault(message);
                     continue;
@@ -120,11 +94,7 @@ impl<'a> Trajectory<'a> {
                 put(&mut self.motion, row, *role, unit * value);
             }
         }
-        if faults.is_empty() {
-            Ok(())
-        } else {
-            Err(Error::Data(faults))
-        }
+        Error::if_data(faults)
     }
 
     /// Times must grow in even steps: derivatives are by differences of rows.
@@ -132,34 +102,25 @@ impl<'a> Trajectory<'a> {
         let time = &self.motion.time;
         let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let usual = crate::statistics::nearest(&mut steps, 0.5).unwrap_or(0.0);
-        let wrong = |row: usize, message: String| {
-            Err(Error::data(
-                format!("{place}:{}", self.lines[row + 1].0),
-                message,
-            ))
-        };
-        if let Some((row, pair)) = time
-            .windows(2)
-            .enumerate()
-            .find(|(_, pair)| pair[1] <= pair[0])
+        let uneven = |step: f64| (step - usual).abs() > UNEVEN * usual;
+        let steps = || (1..).zip(time.windows(2).map(|pair| pair[1] - pair[0]));
+        let (row, message) = if let Some(row) =
+            (1..time.len()).find(|row| time[*row] <= time[row - 1])
         {
-            return wrong(
+            let (now, before) = (time[row], time[row - 1]);
+            (
                 row,
-                format!(
-                    "the time does not increase: {} s after {} s",
-                    pair[1], pair[0]
-                ),
-            );
-        }
-        let uneven = |pair: &[f64]| (pair[1] - pair[0] - usual).abs() > UNEVEN * usual;
-        if let Some((row, pair)) = time.windows(2).enumerate().find(|(_, pair)| uneven(pair)) {
-            let step = pair[1] - pair[0];
+                format!("the time does not increase: {now} s after {before} s"),
+            )
+        } else if let Some((row, step)) = steps().find(|(_, step)| uneven(*step)) {
             let message = format!(
                 "the clock is uneven: a step of {step:.6} s, usual are {usual:.6} s; give the motion in even steps"
             );
-            return wrong(row, message);
-        }
-        Ok(())
+            (row, message)
+        } else {
+            return Ok(());
+        };
+        Err(Error::data(self.place(row, place), message))
     }
 
     /// The lines with torques (Nm), currents (A) where `per_ampere` says what an ampere is, uncertainties (Nm) where they are known, and
@@ -188,20 +149,13 @@ impl<'a> Trajectory<'a> {
                 }
             };
             let allowed = |value: f64| (!judged.is_refused()).then_some(value);
-            needed.torque[cells.clone()]
-                .iter()
-                .for_each(|torque| number(allowed(*torque)));
-            if let Some(factors) = per_ampere {
-                needed.torque[cells.clone()]
-                    .iter()
-                    .zip(factors)
-                    .for_each(|(torque, factor)| number(allowed(torque / factor)));
+            let torque = &needed.torque[cells.clone()];
+            torque.iter().for_each(|torque| number(allowed(*torque)));
+            for (torque, factor) in torque.iter().zip(per_ampere.unwrap_or_default()) {
+                number(allowed(torque / factor));
             }
-            needed
-                .u95
-                .iter()
-                .flat_map(|all| &all[cells.clone()])
-                .for_each(|u95| number(Some(*u95)));
+            let u95 = needed.u95.iter().flat_map(|all| &all[cells.clone()]);
+            u95.for_each(|u95| number(Some(*u95)));
             text.push(between);
             text::push_text(&mut text, &judged.to_string(), between);
             text.push('\n');
@@ -228,19 +182,15 @@ fn appended(joints: usize, currents: bool, u95: bool) -> impl Iterator<Item = St
 
 /// How many columns are the person's own: all, or those before the ones that calib appended. Fails where there are such, unless `force`.
 fn kept(place: &str, names: &[TextField], joints: usize, force: bool) -> Result<usize> {
-    let is = |at: usize, name: &str| names.get(at).is_some_and(|field| field.1 == name);
-    let Some(first) = (0..names.len()).find(|at| is(*at, "tau1_nm")) else {
+    let Some(first) = names.iter().position(|field| field.1 == "tau1_nm") else {
         return Ok(names.len());
     };
-    let ours = |currents: bool, u95: bool| {
-        let all: Vec<String> = appended(joints, currents, u95).collect();
-        first + all.len() == names.len()
-            && all.iter().enumerate().all(|(k, name)| is(first + k, name))
+    let ours = |(currents, u95)| {
+        let names = names[first..].iter().map(|field| &*field.1);
+        names.eq(appended(joints, currents, u95))
     };
-    let written = [(true, true), (true, false), (false, true), (false, false)]
-        .into_iter()
-        .any(|(i, u)| ours(i, u));
-    if !written {
+    let written = [(true, true), (true, false), (false, true), (false, false)];
+    if !written.into_iter().any(ours) {
         return Ok(names.len());
     }
     if !force {
@@ -250,16 +200,20 @@ fn kept(place: &str, names: &[TextField], joints: usize, force: bool) -> Result<
     Ok(first)
 }
 
-/// A motion of so many joints without rows, with the lists that the columns fill.
-fn empty_motion(joints: usize, columns: &[MotionColumn]) -> PlannedMotion {
-    let has = |role| columns.iter().any(|column| column.1 == role).then(Vec::new);
+/// A motion of so many joints and rows, with the lists that the columns fill.
+fn empty_motion(joints: usize, rows: usize, columns: &[MotionColumn]) -> PlannedMotion {
+    let list = |role, count: usize| {
+        let mut columns = columns.iter();
+        let is_there = columns.any(|column| column.1 == role);
+        is_there.then(|| vec![0.0; count * rows])
+    };
     PlannedMotion {
         joints,
-        time: Vec::new(),
-        position: Vec::new(),
-        velocity: has(ColumnRole::Velocity(0)),
-        acceleration: has(ColumnRole::Acceleration(0)),
-        temperature: has(ColumnRole::Temperature),
+        time: vec![0.0; rows],
+        position: vec![0.0; joints * rows],
+        velocity: list(ColumnRole::Velocity(0), joints),
+        acceleration: list(ColumnRole::Acceleration(0), joints),
+        temperature: list(ColumnRole::Temperature, 1),
         since_start: None,
     }
 }
@@ -281,14 +235,21 @@ fn put(motion: &mut PlannedMotion, row: usize, role: ColumnRole, value: f64) {
 /// Endings of a column's name, with what a unit is in SI.
 const DEG: f64 = std::f64::consts::PI / 180.0;
 const TIMES: [(&str, f64); 2] = [("time_s", 1.0), ("time_ms", 1e-3)];
-const PER_JOINT: [(&str, &str, f64); 6] = [
-    ("ddq", "_deg_s2", DEG),
-    ("ddq", "_rad_s2", 1.0),
-    ("dq", "_deg_s", DEG),
-    ("dq", "_rad_s", 1.0),
-    ("q", "_deg", DEG),
-    ("q", "_rad", 1.0),
+const PER_JOINT: [(&str, RoleOfJoint, [(&str, f64); 2]); 3] = [
+    ("q", ColumnRole::Joint, [("_deg", DEG), ("_rad", 1.0)]),
+    (
+        "dq",
+        ColumnRole::Velocity,
+        [("_deg_s", DEG), ("_rad_s", 1.0)],
+    ),
+    (
+        "ddq",
+        ColumnRole::Acceleration,
+        [("_deg_s2", DEG), ("_rad_s2", 1.0)],
+    ),
 ];
+
+type RoleOfJoint = fn(usize) -> ColumnRole;
 
 fn columns(place: &str, names: &[String], robot: &RobotDescription) -> Result<Vec<MotionColumn>> {
     let n = robot.joints.len();
@@ -305,15 +266,7 @@ fn columns(place: &str, names: &[String], robot: &RobotDescription) -> Result<Ve
     if faults.is_empty() && !has(ColumnRole::Time) {
         faults.push(Fault::new(place, "has no column time_s"));
     }
-    let roles = [
-        ColumnRole::Joint,
-        ColumnRole::Velocity,
-        ColumnRole::Acceleration,
-    ];
-    for (what, role) in ["q", "dq", "ddq"]
-        .into_iter()
-        .zip(roles as [fn(usize) -> ColumnRole; 3])
-    {
+    for (what, role, _) in PER_JOINT {
         let found = (0..n).filter(|joint| has(role(*joint))).count();
         if faults.is_empty() && found != n && (what == "q" || found > 0) {
             let message = format!(
@@ -322,11 +275,7 @@ fn columns(place: &str, names: &[String], robot: &RobotDescription) -> Result<Ve
             faults.push(Fault::new(place, message));
         }
     }
-    if faults.is_empty() {
-        Ok(columns)
-    } else {
-        Err(Error::Spec(faults))
-    }
+    Error::if_spec(faults).map(|()| columns)
 }
 
 fn column(name: &str, robot: &RobotDescription) -> Option<(ColumnRole, f64)> {
@@ -337,30 +286,21 @@ fn column(name: &str, robot: &RobotDescription) -> Option<(ColumnRole, f64)> {
     if lower == "temp_c" {
         return Some((ColumnRole::Temperature, 1.0));
     }
-    for (what, ending, unit) in PER_JOINT {
-        let Some(stem) = lower.strip_suffix(ending) else {
-            continue;
-        };
-        let number = stem
-            .strip_prefix(what)
-            .and_then(|number| number.parse::<usize>().ok());
-        let numbered = number
-            .filter(|number| (1..=robot.joints.len()).contains(number))
-            .map(|number| number - 1);
-        let named = || {
-            robot
-                .joints
-                .iter()
-                .position(|joint| what == "q" && joint.name.to_lowercase() == stem)
-        };
-        if let Some(joint) = numbered.or_else(named) {
-            let role = match what {
-                "q" => ColumnRole::Joint(joint),
-                "dq" => ColumnRole::Velocity(joint),
-                _ => ColumnRole::Acceleration(joint),
-            };
-            return Some((role, unit));
-        }
-    }
-    None
+    let named = |stem: &str| {
+        let mut joints = robot.joints.iter();
+        joints.position(|joint| joint.name.to_lowercase() == stem)
+    };
+    let in_unit = |what: &str, stem: &str| {
+        let number = stem.strip_prefix(what)?.parse::<usize>().ok()?;
+        (1..=robot.joints.len())
+            .contains(&number)
+            .then(|| number - 1)
+    };
+    PER_JOINT.iter().rev().find_map(|(what, role, units)| {
+        units.iter().find_map(|(ending, unit)| {
+            let stem = lower.strip_suffix(ending)?;
+            let joint = in_unit(what, stem).or_else(|| named(stem).filter(|_| *what == "q"))?;
+            Some((role(joint), *unit))
+        })
+    })
 }

@@ -2,7 +2,7 @@
 
 use super::message::{self, KINDS};
 use super::{Message, Messages, Topic};
-use crate::error::{Error, Result, counted};
+use crate::error::{self, Error, Result, counted};
 use crate::raw::{InputSource, failed};
 use std::collections::BTreeMap;
 
@@ -33,32 +33,16 @@ impl BagTopic {
     }
     /// In a line: type, number, rate, longest gap.
     pub(crate) fn account(&self) -> String {
-        let Self {
-            name,
-            kind,
-            messages,
-            received: [first, last],
-            gap,
-            ..
-        } = self;
-        let span = last - first;
+        let span = self.received[1] - self.received[0];
         let rate = if span > 0.0 {
-            format!(
-                ", {:.4} Hz, longest gap {gap:.4} s",
-                (*messages - 1) as f64 / span
-            )
+            let (hertz, gap) = ((self.messages - 1) as f64 / span, self.gap);
+            format!(", {hertz:.4} Hz, longest gap {gap:.4} s")
         } else {
             String::new()
         };
-        let not = if self.is_read {
-            ""
-        } else {
-            "; this type is not read"
-        };
-        format!(
-            "topic `{name}`: {kind}, {}{rate}{not}",
-            counted(*messages, "message")
-        )
+        let not = ["; this type is not read", ""][usize::from(self.is_read)];
+        let (name, messages) = (&self.name, counted(self.messages, "message"));
+        format!("topic `{name}`: {}, {messages}{rate}{not}", self.kind)
     }
 }
 
@@ -73,8 +57,8 @@ pub struct BagContent {
 pub fn bag_content(source: Box<dyn InputSource>, label: &str) -> Result<BagContent> {
     let mut messages = Messages::open(source).map_err(|error| failed(label, &error))?;
     let (mut message, mut found) = (Message::default(), BTreeMap::<String, BagTopic>::new());
-    let unseen = |name: &str, topic: &Topic| BagTopic {
-        name: name.into(),
+    let unseen = |name: String, topic: &Topic| BagTopic {
+        name,
         kind: topic.kind.clone(),
         is_read: topic.known().is_some(),
         ..BagTopic::default()
@@ -90,19 +74,19 @@ pub fn bag_content(source: Box<dyn InputSource>, label: &str) -> Result<BagConte
             false => vec![topic.name.clone()],
         };
         for name in names {
-            let seen = unseen(&name, topic);
-            let seen = found.entry(name).or_insert(seen);
-            seen.see(message.received as f64 * 1e-9);
+            let seen = found.entry(name.clone());
+            seen.or_insert_with(|| unseen(name, topic))
+                .see(message.received as f64 * 1e-9);
         }
     }
     for topic in messages.topics.iter().filter(|topic| !of_frames(topic)) {
-        let unseen = unseen(&topic.name, topic);
-        found.entry(topic.name.clone()).or_insert(unseen);
+        let name = topic.name.clone();
+        let seen = found.entry(name.clone());
+        seen.or_insert_with(|| unseen(name, topic));
     }
-    let loss = (!messages.losses.is_empty()).then(|| messages.losses.join("; "));
     Ok(BagContent {
         topics: found.into_values().collect(),
-        loss,
+        loss: messages.loss(),
         source: messages.source.into_inner(),
     })
 }
@@ -131,11 +115,8 @@ pub(super) fn only_topic(
 }
 
 fn listed(found: &[BagTopic]) -> String {
-    let allowed: Vec<String> = found
-        .iter()
-        .filter(|topic| topic.is_read)
-        .map(|topic| format!("`{}`", topic.name))
-        .collect();
+    let allowed = found.iter().filter(|topic| topic.is_read);
+    let allowed: Vec<String> = allowed.map(|topic| format!("`{}`", topic.name)).collect();
     if allowed.is_empty() {
         "none of its topics is read".into()
     } else {
@@ -146,37 +127,27 @@ fn listed(found: &[BagTopic]) -> String {
 /// Why nothing is read of a topic.
 pub(super) fn no_topic(topic: &str, content: &BagContent) -> String {
     let found = &content.topics;
-    let kinds = || {
-        KINDS
-            .iter()
-            .map(|kind| kind.name)
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
     let message = match found.iter().find(|other| other.name == topic) {
         Some(other) if !other.is_read => {
             format!(
                 "topic `{topic}` holds {}, which is not read; allowed: {}",
                 other.kind,
-                kinds()
+                error::listed(KINDS.iter().map(|kind| kind.name))
             )
         }
         _ if found.is_empty() => "holds no message".into(),
         _ => {
-            let others: Vec<String> = found
-                .iter()
-                .filter(|topic| !topic.is_read)
+            let others = found.iter().filter(|topic| !topic.is_read);
+            let others: Vec<String> = others
                 .map(|one| format!("`{}` ({})", one.name, one.kind))
                 .collect();
-            let others = if others.is_empty() {
-                String::new()
-            } else {
-                format!("; of other types: {}", others.join(", "))
+            let others = match others[..] {
+                [] => String::new(),
+                _ => format!("; of other types: {}", others.join(", ")),
             };
-            let first = if topic.is_empty() {
-                "has no topic that is read".into()
-            } else {
-                format!("has no messages of a topic `{topic}`")
+            let first = match topic {
+                "" => "has no topic that is read".into(),
+                _ => format!("has no messages of a topic `{topic}`"),
             };
             format!("{first}; {}{others}", listed(found))
         }

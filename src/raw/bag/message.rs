@@ -6,12 +6,12 @@ use std::collections::HashMap;
 
 /// A part of a message, in the order in which they stand.
 enum FieldType {
-    /// A time of the header: the column `stamp`.
-    Stamp,
+    /// The time of the header and its frame: the columns `stamp` and `frame_id`.
+    Header,
     /// A text: a column of this name.
     Text(&'static str),
-    /// A number of 64 bits: a column of this name.
-    Number(&'static str),
+    /// Numbers of 64 bits: columns of these names.
+    Numbers(&'static [&'static str]),
     Names,
     /// A list of numbers, one for each name: columns `NAME.position`, and so on. It may be empty.
     OfNames(&'static str),
@@ -28,90 +28,57 @@ pub(super) struct MessageKind {
     parts: &'static [FieldType],
 }
 
-use FieldType::{Dimensions, List, Names, Number, OfNames, Stamp, Text};
+use FieldType::{Dimensions, Header, List, Names, Numbers, OfNames, Text};
 
+const POSITION: FieldType = Numbers(&["position.x", "position.y", "position.z"]);
+const ORIENTATION: FieldType = Numbers(&[
+    "orientation.x",
+    "orientation.y",
+    "orientation.z",
+    "orientation.w",
+]);
 const TRANSFORM: &[FieldType] = &[
-    Stamp,
-    Text("frame_id"),
+    Header,
     Text("child_frame_id"),
-    Number("translation.x"),
-    Number("translation.y"),
-    Number("translation.z"),
-    Number("rotation.x"),
-    Number("rotation.y"),
-    Number("rotation.z"),
-    Number("rotation.w"),
+    Numbers(&["translation.x", "translation.y", "translation.z"]),
+    Numbers(&["rotation.x", "rotation.y", "rotation.z", "rotation.w"]),
 ];
+const STATE: &[FieldType] = &[
+    Header,
+    Names,
+    OfNames("position"),
+    OfNames("velocity"),
+    OfNames("effort"),
+];
+const POINT: &[FieldType] = &[Header, Numbers(&["point.x", "point.y", "point.z"])];
+const TEMPERATURE: &[FieldType] = &[Header, Numbers(&["temperature", "variance"])];
+
+const fn kind(name: &'static str, parts: &'static [FieldType]) -> MessageKind {
+    MessageKind {
+        name,
+        of_frames: false,
+        parts,
+    }
+}
 
 pub(super) const KINDS: &[MessageKind] = &[
+    kind("sensor_msgs/msg/JointState", STATE),
+    kind("geometry_msgs/msg/PointStamped", POINT),
+    kind(
+        "geometry_msgs/msg/PoseStamped",
+        &[Header, POSITION, ORIENTATION],
+    ),
+    kind("geometry_msgs/msg/TransformStamped", TRANSFORM),
     MessageKind {
-        name: "sensor_msgs/msg/JointState",
-        of_frames: false,
-        parts: &[
-            Stamp,
-            Text("frame_id"),
-            Names,
-            OfNames("position"),
-            OfNames("velocity"),
-            OfNames("effort"),
-        ],
-    },
-    MessageKind {
-        name: "geometry_msgs/msg/PointStamped",
-        of_frames: false,
-        parts: &[
-            Stamp,
-            Text("frame_id"),
-            Number("point.x"),
-            Number("point.y"),
-            Number("point.z"),
-        ],
-    },
-    MessageKind {
-        name: "geometry_msgs/msg/PoseStamped",
-        of_frames: false,
-        parts: &[
-            Stamp,
-            Text("frame_id"),
-            Number("position.x"),
-            Number("position.y"),
-            Number("position.z"),
-            Number("orientation.x"),
-            Number("orientation.y"),
-            Number("orientation.z"),
-            Number("orientation.w"),
-        ],
-    },
-    MessageKind {
-        name: "geometry_msgs/msg/TransformStamped",
-        of_frames: false,
-        parts: TRANSFORM,
-    },
-    MessageKind {
-        name: "tf2_msgs/msg/TFMessage",
         of_frames: true,
-        parts: TRANSFORM,
+        ..kind("tf2_msgs/msg/TFMessage", TRANSFORM)
     },
-    MessageKind {
-        name: "sensor_msgs/msg/Temperature",
-        of_frames: false,
-        parts: &[
-            Stamp,
-            Text("frame_id"),
-            Number("temperature"),
-            Number("variance"),
-        ],
-    },
-    MessageKind {
-        name: "std_msgs/msg/Float64",
-        of_frames: false,
-        parts: &[Number("data")],
-    },
-    MessageKind {
-        name: "std_msgs/msg/Float64MultiArray",
-        of_frames: false,
-        parts: &[Dimensions, List("data")],
-    },
+    kind("sensor_msgs/msg/Temperature", TEMPERATURE),
+    kind("std_msgs/msg/Float64", &[Numbers(&["data"])]),
+    kind(
+        "std_msgs/msg/Float64MultiArray",
+        &[Dimensions, List("data")],
+    ),
 ];
 
 /// Elements of a list, at most.
@@ -212,8 +179,10 @@ impl MessageCells {
             self.cells[place] = cell;
         }
     }
-    pub(super) fn clear(&mut self) {
-        self.cells.fill(FieldValue::Absent);
+    fn set_text(&mut self, name: &str, cdr: &mut Cdr) -> Result<(), FieldFault> {
+        let text = String::from_utf8_lossy(cdr.text(name)?).into_owned();
+        self.set(name, FieldValue::Text(text));
+        Ok(())
     }
     pub(super) fn joints(&self) -> String {
         let mut cdr = Cdr {
@@ -221,12 +190,9 @@ impl MessageCells {
             at: 0,
             is_big: false,
         };
-        let names = std::iter::from_fn(|| cdr.text("").ok());
-        names
-            .take(20)
-            .map(|name| String::from_utf8_lossy(name).into_owned())
-            .collect::<Vec<_>>()
-            .join(", ")
+        let names = std::iter::from_fn(|| cdr.text("").ok()).take(20);
+        let names: Vec<_> = names.map(String::from_utf8_lossy).collect();
+        names.join(", ")
     }
     fn place(&mut self, name: &str) -> Option<usize> {
         if let Some(place) = self.places.get(name) {
@@ -281,28 +247,21 @@ fn parts(kind: &MessageKind, cdr: &mut Cdr, cells: &mut MessageCells) -> Result<
     let (mut joints, mut list) = (0, 0);
     for part in kind.parts {
         match part {
-            Stamp => {
-                let stamp = seconds(cdr)?;
+            Header => {
                 // A publisher that does not know the time leaves it at 0.
-                cells.set(
-                    "stamp",
-                    if stamp == 0 {
-                        FieldValue::Blank
-                    } else {
-                        FieldValue::Time(stamp)
-                    },
-                );
+                let stamp = match seconds(cdr)? {
+                    0 => FieldValue::Blank,
+                    stamp => FieldValue::Time(stamp),
+                };
+                cells.set("stamp", stamp);
+                cells.set_text("frame_id", cdr)?;
             }
-            Text(name) => {
-                let text = cdr.text(name)?;
-                cells.set(
-                    name,
-                    FieldValue::Text(String::from_utf8_lossy(text).into_owned()),
-                );
-            }
-            Number(name) => {
-                let number = cdr.number(name)?;
-                cells.set(name, FieldValue::Number(number));
+            Text(name) => cells.set_text(name, cdr)?,
+            Numbers(names) => {
+                for name in *names {
+                    let number = cdr.number(name)?;
+                    cells.set(name, FieldValue::Number(number));
+                }
             }
             Names => {
                 joints = cdr.list("name")?;
@@ -354,7 +313,7 @@ pub(super) fn read(
     message: &[u8],
     cells: &mut MessageCells,
 ) -> Result<bool, FieldFault> {
-    cells.clear();
+    cells.cells.fill(FieldValue::Absent);
     let mut cdr = Cdr::open(message)?;
     let Some(wanted) = frames else {
         return parts(kind, &mut cdr, cells).map(|()| true);

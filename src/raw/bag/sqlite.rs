@@ -208,21 +208,17 @@ fn cell_of(bytes: &[u8], usable: usize) -> Option<PageCell> {
     let length = usize::try_from(length)
         .ok()
         .filter(|length| *length as u64 <= LONGEST)?;
-    if length <= usable - 35 {
-        return Some(PageCell {
-            id: id as i64,
-            local: bytes.get(..length)?.to_vec(),
-            length,
-            overflow: 0,
-        });
-    }
-    let least = (usable - 12) * 32 / 255 - 23;
-    let fits = least + (length - least) % (usable - 4);
-    let local = if fits <= usable - 35 { fits } else { least };
-    let overflow = big(bytes.get(local..local + 4)?) as u32;
+    let (local, overflow) = if length <= usable - 35 {
+        (length, 0)
+    } else {
+        let least = (usable - 12) * 32 / 255 - 23;
+        let fits = least + (length - least) % (usable - 4);
+        let local = if fits <= usable - 35 { fits } else { least };
+        (local, big(bytes.get(local..local + 4)?) as u32)
+    };
     Some(PageCell {
         id: id as i64,
-        local: bytes[..local].to_vec(),
+        local: bytes.get(..local)?.to_vec(),
         length,
         overflow,
     })
@@ -244,15 +240,16 @@ fn value(row: &[u8], column: usize) -> Option<Value<'_>> {
             _ => usize::try_from((kind - 12) / 2).ok()?,
         };
         if index == column {
+            let bytes = row.get(start..start.checked_add(width)?);
             return Some(match kind {
                 0 | 7 => Value::Nothing,
                 8 | 9 => Value::Integer(kind as i64 - 8),
                 1..=6 => {
-                    let bytes = row.get(start..start.checked_add(width)?)?;
+                    let bytes = bytes?;
                     let unused = 64 - 8 * width as u32;
                     Value::Integer(((big(bytes) << unused) as i64) >> unused)
                 }
-                _ => Value::Bytes(row.get(start..start.checked_add(width)?)?),
+                _ => Value::Bytes(bytes?),
             });
         }
         start = start.checked_add(width)?;
@@ -280,6 +277,22 @@ fn columns(statement: &str) -> Vec<String> {
     inside.split(',').map(name).collect()
 }
 
+/// Hands on the rows of a table that are there, each with its number.
+fn each_row(
+    source: &mut Source,
+    pages: &mut DatabasePages,
+    root: u64,
+    mut take: impl FnMut(i64, &[u8]),
+) -> Result<(), String> {
+    let mut rows = TableRows::new(root);
+    while let Some(cell) = rows.next(source, pages)? {
+        if let Some(row) = pages.whole(source, &cell)? {
+            take(cell.id, &row);
+        }
+    }
+    Ok(())
+}
+
 pub(super) struct SqliteMessages {
     pages: DatabasePages,
     topics: BTreeMap<i64, Arc<Topic>>,
@@ -294,17 +307,13 @@ impl SqliteMessages {
     pub(super) fn open(source: &mut Source, bounds: [u64; 2]) -> Result<Self, String> {
         let mut pages = DatabasePages::open(source, bounds)?;
         let mut tables: BTreeMap<String, (u64, Vec<String>)> = BTreeMap::new();
-        let mut rows = TableRows::new(1);
-        while let Some(cell) = rows.next(source, &mut pages)? {
-            let Some(row) = pages.whole(source, &cell)? else {
-                continue;
-            };
+        each_row(source, &mut pages, 1, |_, row| {
             if let (Some(name), Some(Value::Integer(root)), Some(statement)) =
-                (text(&row, 1), value(&row, 3), text(&row, 4))
+                (text(row, 1), value(row, 3), text(row, 4))
             {
                 tables.insert(name, (root as u64, columns(&statement)));
             }
-        }
+        })?;
         let table = |name: &str, wanted: &[&str]| {
             let (root, columns) = tables
                 .get(name)
@@ -319,24 +328,19 @@ impl SqliteMessages {
             ))
         };
         let (root, places) = table("topics", &["name", "type", "serialization_format"])?;
-        let (mut topics, mut rows) = (BTreeMap::new(), TableRows::new(root));
-        while let Some(cell) = rows.next(source, &mut pages)? {
-            let Some(row) = pages.whole(source, &cell)? else {
-                continue;
-            };
+        let mut topics = BTreeMap::new();
+        each_row(source, &mut pages, root, |id, row| {
             if let [Some(name), Some(kind), Some(encoding)] =
-                [0, 1, 2].map(|k| text(&row, places[k]))
+                [0, 1, 2].map(|k| text(row, places[k]))
             {
-                topics.insert(
-                    cell.id,
-                    Arc::new(Topic {
-                        name,
-                        kind,
-                        encoding,
-                    }),
-                );
+                let topic = Topic {
+                    name,
+                    kind,
+                    encoding,
+                };
+                topics.insert(id, Arc::new(topic));
             }
-        }
+        })?;
         let (root, places) = table("messages", &["topic_id", "timestamp", "data"])?;
         Ok(Self {
             pages,

@@ -6,6 +6,8 @@ use crate::observation::{DeclaredColumn, KINDS, MeasurementKind, Part};
 use crate::table::{Robot, recording_columns};
 use std::ops::Range;
 
+pub(super) const UNLIMITED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
 pub(super) struct RobotJoints {
     /// Names of the joints; none where no robot is known.
     pub(crate) names: Vec<String>,
@@ -20,21 +22,16 @@ impl RobotJoints {
     pub(super) fn of(robot: &Robot) -> Result<Self> {
         let (mut names, mut kinds, mut limits) = (Vec::new(), Vec::new(), Vec::new());
         for row in &robot.0 {
+            let metres = |mm: Option<f64>| mm.map(|mm| mm * 1e-3);
             let (prismatic, lower, upper) = match row.kind.as_str() {
                 "revolute" => (false, row.lower_rad, row.upper_rad),
-                "prismatic" => (
-                    true,
-                    row.lower_mm.map(|mm| mm * 1e-3),
-                    row.upper_mm.map(|mm| mm * 1e-3),
-                ),
+                "prismatic" => (true, metres(row.lower_mm), metres(row.upper_mm)),
                 _ => continue,
             };
             names.push(row.name.clone());
             kinds.push(prismatic);
-            limits.push([
-                lower.unwrap_or(f64::NEG_INFINITY),
-                upper.unwrap_or(f64::INFINITY),
-            ]);
+            let [lowest, highest] = UNLIMITED;
+            limits.push([lower.unwrap_or(lowest), upper.unwrap_or(highest)]);
         }
         if kinds.is_empty() {
             return Err(Error::data("robot", "has no joint"));
@@ -54,31 +51,22 @@ impl RobotJoints {
     }
     /// A joint (from 0) at `value`, rad or m, beyond which limit it is, in deg or mm.
     pub(super) fn beyond(&self, joint: usize, value: f64) -> String {
-        let [lower, upper] = self
-            .limits
-            .get(joint)
-            .copied()
-            .unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let [lower, upper] = self.limits.get(joint).copied().unwrap_or(UNLIMITED);
         let (scale, unit) = self.shown_in(joint);
-        let (side, limit) = if value < lower {
-            ("below its lower", lower)
-        } else {
-            ("above its upper", upper)
+        let (side, limit) = match value < lower {
+            true => ("below its lower", lower),
+            false => ("above its upper", upper),
         };
-        let name = self
-            .names
-            .get(joint)
-            .map(|name| format!(" (`{name}`)"))
-            .unwrap_or_default();
+        let name = self.names.get(joint).map(|name| format!(" (`{name}`)"));
+        let name = name.unwrap_or_default();
         let (number, value, limit) = (joint + 1, value * scale, limit * scale);
         format!("joint {number}{name} at {value:.4} {unit}, {side} limit of {limit:.4} {unit}")
     }
     /// What positions of a joint (from 0) are multiplied by for people, and their unit then.
     pub(super) fn shown_in(&self, joint: usize) -> (f64, &'static str) {
-        if self.prismatic.get(joint) == Some(&true) {
-            (1e3, "mm")
-        } else {
-            (1f64.to_degrees(), "deg")
+        match self.prismatic.get(joint) {
+            Some(true) => (1e3, "mm"),
+            _ => (1f64.to_degrees(), "deg"),
         }
     }
     pub(super) fn joints(&self) -> usize {
@@ -130,8 +118,8 @@ impl Slots {
             point: 0..0,
             kinds: Vec::new(),
         };
-        (slots.time, slots.q, slots.velocity) =
-            (slots.of("time").start, slots.of("q"), slots.of("velocity"));
+        slots.time = slots.of("time").start;
+        (slots.q, slots.velocity) = (slots.of("q"), slots.of("velocity"));
         slots.point = slots.of("x").start..slots.of("z").end;
         let part = |kind: &dyn MeasurementKind, part: Part| -> Vec<usize> {
             kind.columns(part)
@@ -140,10 +128,8 @@ impl Slots {
         };
         let name = |kind: &dyn MeasurementKind| {
             let column = kind.telling().next().filter(|_| kind.is_contact())?;
-            slots
-                .texts
-                .iter()
-                .position(|setting| *setting == column.setting)
+            let mut texts = slots.texts.iter();
+            texts.position(|setting| *setting == column.setting)
         };
         let kinds = KINDS.iter().map(|kind| KindSlots {
             kind: *kind,
@@ -156,10 +142,8 @@ impl Slots {
         slots
     }
     pub(super) fn of(&self, setting: &str) -> Range<usize> {
-        let found = self
-            .columns
-            .iter()
-            .find(|(column, _)| column.setting == setting);
+        let mut columns = self.columns.iter();
+        let found = columns.find(|(column, _)| column.setting == setting);
         found.map_or(0..0, |(_, places)| places.clone())
     }
     /// All columns with numbers, and their places.

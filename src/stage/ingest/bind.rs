@@ -84,13 +84,11 @@ impl Binding {
         let kept = kept.flat_map(|(places, ..)| places.clone());
         let filled: BTreeSet<usize> = self.slots().into_iter().chain(kept).collect();
         self.filled = filled.into_iter().collect();
-        self.worded = (0..self.texts.len())
+        let places = 0..self.texts.len();
+        self.worded = places
             .filter(|place| self.texts[*place].is_some())
             .collect();
-        let is_named = |kind: &KindSlots| {
-            kind.name
-                .is_some_and(|name| self.texts.get(name).is_some_and(Option::is_some))
-        };
+        let is_named = |kind: &KindSlots| kind.name.is_some_and(|name| self.worded.contains(&name));
         let is_read = |kind: &KindSlots| {
             let mut cells = self.cells.iter();
             cells.any(|cell| kind.values.contains(&cell.index))
@@ -100,14 +98,11 @@ impl Binding {
     }
     /// Columns that are read, and whether a row may lack them.
     pub(super) fn columns(&self) -> Vec<(usize, bool)> {
-        let texts = self
-            .id
-            .iter()
-            .chain(self.texts.iter().flatten())
-            .filter_map(|text| match text {
-                TextBinding::Column(column, text) => Some((*column, !text.optional)),
-                TextBinding::Value(_) => None,
-            });
+        let texts = self.id.iter().chain(self.texts.iter().flatten());
+        let texts = texts.filter_map(|text| match text {
+            TextBinding::Column(column, text) => Some((*column, !text.optional)),
+            TextBinding::Value(_) => None,
+        });
         let numbers = self.cells.iter().flat_map(|cell| {
             let other = cell.difference.as_ref().map(|other| other.column);
             let columns = [Some(cell.column), other].into_iter().flatten();
@@ -120,11 +115,9 @@ impl Binding {
     }
     /// Slots that this file fills.
     pub(super) fn slots(&self) -> Vec<usize> {
-        self.cells
-            .iter()
-            .map(|cell| cell.index)
-            .chain(self.constants.iter().map(|constant| constant.0))
-            .collect()
+        let cells = self.cells.iter().map(|cell| cell.index);
+        let constants = self.constants.iter().map(|constant| constant.0);
+        cells.chain(constants).collect()
     }
 }
 
@@ -174,10 +167,9 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
     }
     for (declared, scalar) in columns.numbers() {
         let is_clock = scalar.unit.as_deref() == Some(CLOCK);
-        let unit = if is_clock {
-            Unit::Second
-        } else {
-            unit(scalar.unit.as_deref())?
+        let unit = match is_clock {
+            true => Unit::Second,
+            false => unit(scalar.unit.as_deref())?,
         };
         let index = arm.slots.of(declared.setting).start;
         if let Some(value) = scalar.value {
@@ -211,10 +203,8 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
                 });
             }
         }
-        binder
-            .binding
-            .conventions
-            .push((places, declared, convention));
+        let found = (places, declared, convention);
+        binder.binding.conventions.push(found);
     }
     for (declared, mapped) in columns.joints() {
         binder.joints(declared, mapped, arm)?;
@@ -223,15 +213,11 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
         binder.points(targets)?;
     }
     binder.binding.settle(arm, layout.targets.is_some());
-    if binder.faults.is_empty() {
-        Ok(binder.binding)
-    } else {
-        let found = binder.found();
-        if let Some(last) = binder.faults.last_mut() {
-            last.message.push_str(&found);
-        }
-        Err(Error::Data(binder.faults))
+    let found = binder.found();
+    if let Some(last) = binder.faults.last_mut() {
+        last.message.push_str(&found);
     }
+    Error::if_data(binder.faults).map(|()| binder.binding)
 }
 
 fn unit(symbol: Option<&str>) -> Result<Unit> {
@@ -245,36 +231,30 @@ impl Binder<'_> {
     fn fault(&mut self, message: String) {
         let FileHeader { label, line, .. } = self.head;
         // Column names of a Parquet file stand on no line.
-        let place = if *line == 0 {
-            label.clone()
-        } else {
-            format!("{label}:{line}")
+        let place = match line {
+            0 => label.clone(),
+            line => format!("{label}:{line}"),
         };
         self.faults.push(Fault::new(place, message));
     }
     fn name(&self, column: usize) -> String {
-        let name = self
-            .head
-            .names
-            .as_ref()
-            .and_then(|names| names.get(column))
-            .filter(|name| !name.is_empty());
-        name.cloned()
-            .unwrap_or_else(|| format!("column {}", column + 1))
+        let names = self.head.names.as_ref();
+        match names.and_then(|names| names.get(column)) {
+            Some(name) if !name.is_empty() => name.clone(),
+            _ => format!("column {}", column + 1),
+        }
     }
     fn find(&self, reference: &ColumnRef) -> Vec<usize> {
         match reference {
-            ColumnRef::Number(number) => (*number as usize)
-                .checked_sub(1)
-                .filter(|index| *index < self.head.width)
-                .into_iter()
-                .collect(),
+            ColumnRef::Number(number) => {
+                let index = (*number as usize).checked_sub(1);
+                let index = index.filter(|index| *index < self.head.width);
+                index.into_iter().collect()
+            }
             ColumnRef::Name(name) => {
                 let names = self.head.names.iter().flatten().enumerate();
-                names
-                    .filter(|(_, found)| *found == name.trim())
-                    .map(|(index, _)| index)
-                    .collect()
+                let named = names.filter(|(_, found)| *found == name.trim());
+                named.map(|(index, _)| index).collect()
             }
         }
     }
@@ -326,17 +306,14 @@ impl Binder<'_> {
             return String::new();
         };
         let mut text = format!("; found: {}", first_of(names, SHOWN));
+        let is_number = |name: &String| name.replace(',', ".").parse::<f64>().is_ok();
+        let mut marks = [";", "\t", ",", "|"].into_iter();
         if let [only] = names.as_slice()
-            && let Some(mark) = [";", "\t", ",", "|"]
-                .into_iter()
-                .find(|mark| only.contains(mark))
+            && let Some(mark) = marks.find(|mark| only.contains(mark))
         {
             let mark = if mark == "\t" { "tab" } else { mark };
             text.push_str(&format!(" (one column; `delimiter: \"{mark}\"`?)"));
-        } else if names
-            .iter()
-            .all(|name| name.replace(',', ".").parse::<f64>().is_ok())
-        {
+        } else if names.iter().all(is_number) {
             text.push_str(" (all numbers; `header: false`?)");
         }
         text
@@ -345,14 +322,12 @@ impl Binder<'_> {
     fn uncertainties(&mut self, columns: &Columns, arm: &RobotJoints) -> Result<()> {
         for (declared, mapped, own_columns, divisor) in columns.uncertainties() {
             let unit = unit(mapped.unit.as_deref())?;
-            let places = own_columns
-                .iter()
-                .map(|setting| arm.slots.of(setting).start);
+            let places = own_columns.iter();
+            let places = places.map(|setting| arm.slots.of(setting).start);
             if let Some(value) = mapped.value {
                 let value = unit.to_si(value) / divisor;
-                self.binding
-                    .constants
-                    .extend(places.map(|index| (index, value)));
+                let all = places.map(|index| (index, value));
+                self.binding.constants.extend(all);
             } else if let Some(reference) = &mapped.column
                 && let Some(column) = self.column(reference, declared.setting, mapped.optional)
             {
@@ -377,9 +352,8 @@ impl Binder<'_> {
             return Err(Error::Bug("a recording without points".into()));
         };
         for (target, references) in &targets.columns {
-            let found = references
-                .each_ref()
-                .map(|reference| self.column(reference, target, false));
+            let references = references.each_ref();
+            let found = references.map(|reference| self.column(reference, target, false));
             if let [Some(a), Some(b), Some(c)] = found {
                 let cells = [(x, a), (y, b), (z, c)].map(|(declared, column)| NumberBinding {
                     optional: true,
@@ -421,84 +395,60 @@ impl Binder<'_> {
         arm: &RobotJoints,
     ) -> Result<()> {
         let name = declared.setting;
-        let count = arm.joints();
+        let (count, all) = (arm.joints(), counted(arm.joints(), "joint"));
+        let numbered = |pattern: &str, joint: usize| {
+            let called = arm.names.get(joint).map_or("", String::as_str);
+            let name = pattern.replace("{j}", &(joint + 1).to_string());
+            ColumnRef::Name(name.replace("{name}", called))
+        };
         let references: Vec<ColumnRef> = match (&joints.columns, &joints.column) {
             (Some(list), _) => list.clone(),
-            (None, Some(pattern)) => {
-                let called = |joint: usize| arm.names.get(joint).map_or("", String::as_str);
-                let named = |joint: usize| {
-                    pattern
-                        .replace("{j}", &(joint + 1).to_string())
-                        .replace("{name}", called(joint))
-                };
-                (0..count)
-                    .map(|joint| ColumnRef::Name(named(joint)))
-                    .collect()
-            }
+            (None, Some(pattern)) => (0..count).map(|joint| numbered(pattern, joint)).collect(),
             (None, None) => return Err(Error::Bug("unchecked joint columns".into())),
         };
         if references.len() != count {
-            self.fault(format!(
-                "`{name}` lists {}; the robot has {}",
-                counted(references.len(), "column"),
-                counted(count, "joint")
-            ));
+            let found = counted(references.len(), "column");
+            self.fault(format!("`{name}` lists {found}; the robot has {all}"));
             return Ok(());
         }
         if !self.are_of_the_robot(joints, name, count) {
             return Ok(());
         }
-        if let Some(pattern) = joints
-            .column
-            .as_ref()
-            .filter(|pattern| pattern.contains("{j}"))
-        {
+        let pattern = joints.column.as_ref();
+        if let Some(pattern) = pattern.filter(|pattern| pattern.contains("{j}")) {
             let next = ColumnRef::Name(pattern.replace("{j}", &(count + 1).to_string()));
             if !self.find(&next).is_empty() {
                 self.fault(format!(
-                    "{next}, by the pattern of `{name}`: the robot has {} only",
-                    counted(count, "joint")
+                    "{next}, by the pattern of `{name}`: the robot has {all} only"
                 ));
                 return Ok(());
             }
         }
-        let there = references
-            .iter()
-            .filter(|reference| !self.find(reference).is_empty())
-            .count();
+        let is_there = |reference: &&ColumnRef| !self.find(reference).is_empty();
+        let there = references.iter().filter(is_there).count();
         if there == 0 && joints.optional {
-            let first = references
-                .first()
-                .map(ToString::to_string)
-                .unwrap_or_default();
-            self.binding
-                .missing
-                .push(format!("no {first} and so on; `{name}` is left out"));
+            let first = references.first().map(ToString::to_string);
+            let first = first.unwrap_or_default();
+            let missing = format!("no {first} and so on; `{name}` is left out");
+            self.binding.missing.push(missing);
             return Ok(());
         }
         if there > 0 && there < count {
             self.fault(format!(
-                "`{name}` has {there} of its columns; the robot has {}",
-                counted(count, "joint")
+                "`{name}` has {there} of its columns; the robot has {all}"
             ));
         }
         for (joint, reference) in references.iter().enumerate() {
             let is_prismatic = arm.prismatic.get(joint).copied().unwrap_or(false);
             let linear = is_prismatic && declared.of_joint(true).0 != declared.quantity;
-            let symbol = if linear {
-                &joints.linear_unit
-            } else {
-                &joints.unit
+            let (symbol, kind, setting) = match linear {
+                true => (&joints.linear_unit, "prismatic", "linear_unit"),
+                false => (&joints.unit, "revolute", "unit"),
             };
             if symbol.is_none() && declared.quantity != Quantity::Number {
-                let (kind, setting) = if linear {
-                    ("prismatic", "linear_unit")
-                } else {
-                    ("revolute", "unit")
-                };
+                let number = joint + 1;
                 self.fault(format!(
-                    "joint {} is {kind}; say `{setting}` for `{name}`",
-                    joint + 1
+                    "joint {number} is {kind}; say `{setting}` for `{name}`"
                 ));
                 continue;
             }
@@ -516,33 +466,26 @@ impl Binder<'_> {
                 });
             }
         }
-        self.binding.coupled.extend(
-            joints
-                .coupled
-                .iter()
-                .map(|one| (one.joint - 1, one.by - 1, one.ratio)),
-        );
+        let coupled = joints.coupled.iter();
+        let coupled = coupled.map(|one| (one.joint - 1, one.by - 1, one.ratio));
+        self.binding.coupled.extend(coupled);
         Ok(())
     }
     /// Whether signs, zeros and couplings are those of this robot's joints.
     fn are_of_the_robot(&mut self, joints: &JointColumns, name: &str, count: usize) -> bool {
-        let before = self.faults.len();
+        let (before, all) = (self.faults.len(), counted(count, "joint"));
         for (list, given) in [("sign", joints.sign.len()), ("zero", joints.zero.len())] {
             if given > 0 && given != count {
-                let (given, count) = (counted(given, "number"), counted(count, "joint"));
+                let given = counted(given, "number");
                 self.fault(format!(
-                    "`{name}.{list}` lists {given}; the robot has {count}"
+                    "`{name}.{list}` lists {given}; the robot has {all}"
                 ));
             }
         }
-        if joints
-            .coupled
-            .iter()
-            .any(|one| one.joint.max(one.by) > count)
-        {
+        let mut coupled = joints.coupled.iter();
+        if coupled.any(|one| one.joint.max(one.by) > count) {
             self.fault(format!(
-                "`{name}.coupled` names a joint beyond the last; the robot has {}",
-                counted(count, "joint")
+                "`{name}.coupled` names a joint beyond the last; the robot has {all}"
             ));
         }
         self.faults.len() == before

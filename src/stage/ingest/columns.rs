@@ -51,7 +51,25 @@ macro_rules! mapped {
     )*};
 }
 
+type MappedConventions<'c> = (
+    &'static DeclaredColumn,
+    &'static Conventions,
+    &'c ConventionColumns,
+);
+type MappedUncertainty<'c> = (
+    &'static DeclaredColumn,
+    &'c UncertaintyColumn,
+    &'static [&'static str],
+    f64,
+);
+
 impl Columns {
+    /// All mapped quantities by their settings.
+    fn by_setting(&self) -> impl Iterator<Item = (&'static str, &Mapped)> {
+        let all = self.0.iter();
+        all.map(|(column, mapped)| (column.setting, mapped))
+    }
+
     mapped! {
         texts, text: Text(TextColumn);
         counts, count: Count(CountColumn);
@@ -60,97 +78,60 @@ impl Columns {
     }
 
     /// The mapped quantities of several numbers.
-    pub(super) fn conventions(
-        &self,
-    ) -> impl Iterator<
-        Item = (
-            &'static DeclaredColumn,
-            &'static Conventions,
-            &ConventionColumns,
-        ),
-    > {
-        self.0
-            .iter()
-            .filter_map(|(column, mapped)| match (column.shape, mapped) {
-                (ColumnShape::Conventions(conventions), Mapped::Conventions(mapped)) => {
-                    Some((*column, conventions, mapped))
-                }
-                _ => None,
-            })
+    pub(super) fn conventions(&self) -> impl Iterator<Item = MappedConventions<'_>> {
+        let all = self.0.iter();
+        all.filter_map(|(column, mapped)| match (column.shape, mapped) {
+            (ColumnShape::Conventions(conventions), Mapped::Conventions(mapped)) => {
+                Some((*column, conventions, mapped))
+            }
+            _ => None,
+        })
     }
 
     /// The mapped uncertainties, with the settings that each stands for and how many standard deviations it is.
-    pub(super) fn uncertainties(
-        &self,
-    ) -> impl Iterator<
-        Item = (
-            &'static DeclaredColumn,
-            &UncertaintyColumn,
-            &'static [&'static str],
-            f64,
-        ),
-    > {
-        self.0
-            .iter()
-            .filter_map(|(column, mapped)| match (column.shape, mapped) {
-                (ColumnShape::Uncertainty { columns, coverage }, Mapped::Uncertainty(mapped)) => {
-                    Some((
-                        *column,
-                        mapped,
-                        columns,
-                        mapped.coverage_factor.unwrap_or(coverage),
-                    ))
-                }
-                _ => None,
-            })
+    pub(super) fn uncertainties(&self) -> impl Iterator<Item = MappedUncertainty<'_>> {
+        let all = self.0.iter();
+        all.filter_map(|(column, mapped)| match (column.shape, mapped) {
+            (ColumnShape::Uncertainty { columns, coverage }, Mapped::Uncertainty(mapped)) => {
+                let factor = mapped.coverage_factor.unwrap_or(coverage);
+                Some((*column, mapped, columns, factor))
+            }
+            _ => None,
+        })
     }
 
     pub(super) fn has(&self, setting: &str) -> bool {
-        self.0.iter().any(|(column, _)| column.setting == setting)
+        self.by_setting().any(|(other, _)| other == setting)
     }
 
     /// Names of all mapped quantities.
     pub(super) fn names(&self) -> Vec<&'static str> {
-        self.0.iter().map(|(column, _)| column.setting).collect()
+        self.by_setting().map(|(setting, _)| setting).collect()
     }
 
     /// The same with another target in every row, where one is mapped.
     pub(super) fn of_target(&self, name: &str) -> Self {
-        let with_target = |(column, mapped): &(&'static DeclaredColumn, Mapped)| match mapped {
-            Mapped::Text(text) if column.setting == "target" => (
-                *column,
-                Mapped::Text(TextColumn {
-                    column: None,
-                    path: None,
-                    value: Some(name.into()),
-                    ..text.clone()
-                }),
-            ),
-            other => (*column, other.clone()),
-        };
-        Self(self.0.iter().map(with_target).collect())
+        let mut all = self.clone();
+        for (column, mapped) in &mut all.0 {
+            if let ("target", Mapped::Text(text)) = (column.setting, mapped) {
+                (text.column, text.path, text.value) = (None, None, Some(name.into()));
+            }
+        }
+        all
     }
 
     /// What does not depend on the robot's joints.
     pub(super) fn without_joints(&self) -> Self {
-        let others = self
-            .0
-            .iter()
-            .filter(|(_, mapped)| !matches!(mapped, Mapped::Joints(_)));
-        Self(others.cloned().collect())
+        let mut all = self.clone();
+        all.0
+            .retain(|(_, mapped)| !matches!(mapped, Mapped::Joints(_)));
+        all
     }
 }
 
 impl PartialEq for Columns {
     fn eq(&self, other: &Self) -> bool {
-        let pairs = self
-            .0
-            .iter()
-            .map(|(column, mapped)| (column.setting, mapped));
-        pairs.eq(other
-            .0
-            .iter()
-            .map(|(column, mapped)| (column.setting, mapped)))
+        self.by_setting().eq(other.by_setting())
     }
 }
 
@@ -162,21 +143,15 @@ impl ConventionColumns {
     ) -> Option<(&'static Convention, &[ColumnRef])> {
         let mut given = self.columns.iter();
         let (name, columns) = given.next().filter(|_| given.next().is_none())?;
-        let convention = conventions
-            .all
-            .iter()
-            .find(|convention| convention.name == *name)?;
+        let mut all = conventions.all.iter();
+        let convention = all.find(|convention| convention.name == *name)?;
         Some((convention, columns.as_slice()))
     }
 }
 
 impl Serialize for Columns {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(
-            self.0
-                .iter()
-                .map(|(column, mapped)| (column.setting, mapped)),
-        )
+        serializer.collect_map(self.by_setting())
     }
 }
 
@@ -184,18 +159,14 @@ impl Serialize for Columns {
 static SETTINGS: LazyLock<Vec<&'static str>> =
     LazyLock::new(|| recording_columns().map(|column| column.setting).collect());
 static CONVENTIONS: LazyLock<BTreeMap<&'static str, Vec<&'static str>>> = LazyLock::new(|| {
-    let named = |column: &DeclaredColumn| match column.shape {
-        ColumnShape::Conventions(conventions) => conventions
-            .all
-            .iter()
-            .map(|one| one.name)
-            .chain(["unit", "optional"])
-            .collect(),
-        _ => Vec::new(),
+    let named = |column: &'static DeclaredColumn| match column.shape {
+        ColumnShape::Conventions(conventions) => {
+            let names = conventions.all.iter().map(|one| one.name);
+            Some((column.setting, names.chain(["unit", "optional"]).collect()))
+        }
+        _ => None,
     };
-    recording_columns()
-        .map(|column| (column.setting, named(column)))
-        .collect()
+    recording_columns().filter_map(named).collect()
 });
 
 impl<'de> Deserialize<'de> for Columns {
@@ -233,11 +204,9 @@ impl<'de> Visitor<'de> for Block {
                 return Err(A::Error::duplicate_field(column.setting));
             }
         }
-        Ok(Columns(
-            recording_columns()
-                .filter_map(|column| Some((column, found.remove(column.setting)?)))
-                .collect(),
-        ))
+        let all = recording_columns();
+        let all = all.filter_map(|column| Some((column, found.remove(column.setting)?)));
+        Ok(Columns(all.collect()))
     }
 }
 
@@ -248,11 +217,8 @@ impl<'de> DeserializeSeed<'de> for KnownKey {
     type Value = &'static str;
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<&'static str, D::Error> {
         let name = Cow::<str>::deserialize(deserializer)?;
-        self.0
-            .iter()
-            .copied()
-            .find(|known| *known == name)
-            .ok_or_else(|| D::Error::unknown_field(&name, self.0))
+        let known = self.0.iter().copied().find(|known| *known == name);
+        known.ok_or_else(|| D::Error::unknown_field(&name, self.0))
     }
 }
 
@@ -279,10 +245,8 @@ impl<'de> Visitor<'de> for OneConvention {
     }
     fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Self::Value, A::Error> {
         let mut out = ConventionColumns::default();
-        let known = CONVENTIONS
-            .get(self.0.setting)
-            .map(Vec::as_slice)
-            .unwrap_or_default();
+        let known = CONVENTIONS.get(self.0.setting);
+        let known = known.map(Vec::as_slice).unwrap_or_default();
         while let Some(key) = access.next_key_seed(KnownKey(known))? {
             match key {
                 "unit" => out.unit = access.next_value()?,
@@ -340,27 +304,26 @@ fn convention_schema(
     conventions: &Conventions,
     generator: &mut SchemaGenerator,
 ) -> Schema {
-    let described = |mut schema: Schema, about: &str, default: serde_json::Value| {
+    let mut properties = serde_json::Map::new();
+    let mut describe = |name: &str, mut schema: Schema, about: &str, default| {
         schema.insert("description".into(), about.into());
         schema.insert("default".into(), default);
-        schema.to_value()
+        properties.insert(name.into(), schema.to_value());
     };
-    let mut properties = serde_json::Map::new();
     for convention in conventions.all {
         let columns = generator.subschema_for::<Option<Vec<ColumnRef>>>();
-        properties.insert(
-            convention.name.into(),
-            described(columns, convention.about, serde_json::Value::Null),
+        describe(
+            convention.name,
+            columns,
+            convention.about,
+            serde_json::Value::Null,
         );
     }
     let unit = generator.subschema_for::<Option<String>>();
-    properties.insert(
-        "unit".into(),
-        described(unit, conventions.unit, serde_json::Value::Null),
-    );
+    describe("unit", unit, conventions.unit, serde_json::Value::Null);
     let optional = generator.subschema_for::<bool>();
     let about = format!("The cells may be blank: the row has no {setting}.");
-    properties.insert("optional".into(), described(optional, &about, false.into()));
+    describe("optional", optional, &about, false.into());
     json_schema!({
         "description": conventions.about,
         "type": "object",

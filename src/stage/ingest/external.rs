@@ -4,19 +4,8 @@ use crate::error::{Error, Result};
 use crate::raw::{DecimalMark, Record, number};
 
 /// What such columns are called at controllers, without a number and a unit.
-const NAMES: [&str; 11] = [
-    "e",
-    "eax",
-    "ext",
-    "extaxis",
-    "external",
-    "externalaxis",
-    "track",
-    "rail",
-    "linearaxis",
-    "positioner",
-    "gantry",
-];
+const NAMES: &str =
+    "e eax ext extaxis external externalaxis track rail linearaxis positioner gantry";
 const UNITS: [&str; 4] = ["deg", "mm", "rad", "m"];
 /// An axis that moves by less stands: deg or mm, and rad or m.
 const STILL: [f64; 2] = [0.1, 1e-3];
@@ -25,23 +14,21 @@ const NONE: f64 = 9e8;
 
 /// The unit that a name ends in, where it is that of an axis beside the arm's own.
 fn external(name: &str) -> Option<&'static str> {
-    let words: Vec<String> = name
-        .split(|c: char| !c.is_ascii_alphanumeric())
-        .filter(|word| !word.is_empty())
-        .map(|word| word.to_ascii_lowercase())
-        .collect();
-    let unit = words
-        .last()
-        .and_then(|last| UNITS.into_iter().find(|unit| unit == last));
+    let name = name.to_ascii_lowercase();
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric());
+    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+    let last = words.last();
+    let unit = last.and_then(|last| UNITS.into_iter().find(|unit| unit == last));
     let words = &words[..words.len() - usize::from(unit.is_some())];
     let joined = words.concat();
     let numbered = joined.trim_end_matches(|c: char| c.is_ascii_digit());
     // RAPID numbers its axes by letters; a bare `e` is no axis.
-    let bare = numbered
+    let letter = numbered
         .strip_prefix("eax")
-        .filter(|letter| letter.len() == 1)
-        .map_or(numbered, |_| "eax");
-    let is_one = NAMES.contains(&bare) && (bare != "e" || joined.len() == 2);
+        .filter(|letter| letter.len() == 1);
+    let bare = letter.map_or(numbered, |_| "eax");
+    let is_known = NAMES.split(' ').any(|name| name == bare);
+    let is_one = is_known && (bare != "e" || joined.len() == 2);
     is_one.then(|| unit.unwrap_or("deg"))
 }
 
@@ -59,16 +46,10 @@ impl ExternalAxes {
         has_joints: bool,
         decimal: DecimalMark,
     ) -> Self {
-        let axes = unmapped
-            .filter(|_| has_joints)
-            .filter_map(|(column, name)| {
-                Some((
-                    column,
-                    name.clone(),
-                    external(name)?,
-                    [f64::INFINITY, f64::NEG_INFINITY],
-                ))
-            });
+        const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+        let axes = unmapped.filter(|_| has_joints);
+        let axes = axes
+            .filter_map(|(column, name)| Some((column, name.clone(), external(name)?, NOTHING)));
         Self {
             columns: axes.collect(),
             decimal,
@@ -77,11 +58,11 @@ impl ExternalAxes {
 
     pub(super) fn see(&mut self, record: &Record) {
         for (column, .., [least, most]) in &mut self.columns {
-            if let Some(number) = number(record.field(*column), self.decimal)
-                .ok()
-                .filter(|number| number.abs() < NONE)
-            {
-                (*least, *most) = (least.min(number), most.max(number));
+            match number(record.field(*column), self.decimal) {
+                Ok(number) if number.abs() < NONE => {
+                    (*least, *most) = (least.min(number), most.max(number));
+                }
+                _ => {}
             }
         }
     }

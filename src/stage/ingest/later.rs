@@ -77,33 +77,25 @@ impl Ingest {
 
 /// Paths without what does not change them, as `./`.
 fn paths<'a>(files: impl Iterator<Item = &'a RawFile>) -> Vec<PathBuf> {
-    files
-        .map(|file| {
-            file.0
-                .components()
-                .filter(|part| *part != Component::CurDir)
-                .collect()
-        })
-        .collect()
+    let plain = |file: &RawFile| {
+        let parts = file.0.components();
+        parts.filter(|part| *part != Component::CurDir).collect()
+    };
+    files.map(plain).collect()
 }
 
 pub(super) fn faults(settings: &Ingest, at: &mut Place) {
     let expected = settings.files.len();
     let named = |layout: &FileLayout| {
-        layout
-            .columns
-            .text("target")
-            .is_some_and(|text| text.value.is_some())
+        let target = layout.columns.text("target");
+        target.is_some_and(|text| text.value.is_some())
     };
     for (index, later) in settings.later.iter().enumerate() {
         let mut at = at.at(format!("later[{index}]"));
-        at.at("files").must(
-            later.files.len() == expected,
-            format!(
-                "{} here; allowed: one for each of the {expected} under `files`",
-                counted(later.files.len(), "file")
-            ),
-        );
+        let files = counted(later.files.len(), "file");
+        let message =
+            format!("{files} here; allowed: one for each of the {expected} under `files`");
+        at.at("files").must(later.files.len() == expected, message);
         if let Some(earlier) = settings.earlier_of_the_same_files(index) {
             at.at("files").fault(format!(
                 "the files of `{earlier}` again: every row would be used twice, and copies look like perfect repeatability; name the files \
@@ -114,10 +106,8 @@ pub(super) fn faults(settings: &Ingest, at: &mut Place) {
             later.target.is_none() || settings.files.iter().any(named),
             "the reflector of `files` has no name; say it there, e.g. `columns: {target: {value: A}, ..}`",
         );
-        at.at("gap_s").must(
-            later.gap_s >= 0.0 && later.gap_s.is_finite(),
-            "allowed: 0 or more, s",
-        );
+        let possible = later.gap_s >= 0.0 && later.gap_s.is_finite();
+        at.at("gap_s").must(possible, "allowed: 0 or more, s");
     }
 }
 
@@ -154,18 +144,14 @@ impl Continuation {
     /// the row does not follow it.
     pub(crate) fn next(&mut self, sequence: i64, time: f64) -> Result<(i64, f64), (i64, i64)> {
         if let Some(gap) = self.begun.take() {
-            self.sequence_by = self
-                .last
-                .filter(|last| sequence <= *last)
-                .map_or(0, |last| last.saturating_sub(sequence - 1));
+            let last = self.last.filter(|last| sequence <= *last);
+            self.sequence_by = last.map_or(0, |last| last.saturating_sub(sequence - 1));
             if let Some(gap) = gap.filter(|_| time <= self.latest) {
                 self.time_by = self.latest + gap - time;
             }
         }
-        let (sequence, time) = (
-            sequence.saturating_add(self.sequence_by),
-            time + self.time_by,
-        );
+        let sequence = sequence.saturating_add(self.sequence_by);
+        let time = time + self.time_by;
         self.latest = self.latest.max(time);
         match self.last.replace(sequence) {
             Some(last) if sequence <= last => Err((sequence, last)),

@@ -94,30 +94,23 @@ impl JointSamples {
         context: &Context,
     ) -> Result<Track> {
         let joints = arm.joints();
-        let mut steps: Vec<f64> = self
-            .time
-            .windows(2)
-            .map(|pair| pair[1] - pair[0])
-            .filter(|step| *step > 0.0 && step.is_finite())
-            .collect();
+        let steps = self.time.windows(2).map(|pair| pair[1] - pair[0]);
+        let steps = steps.filter(|step| *step > 0.0 && step.is_finite());
+        let mut steps: Vec<f64> = steps.collect();
         let middle = steps.len() / 2;
         let given = self.given.iter().any(|value| value.is_finite());
-        if steps.is_empty() && (given || motion.is_none()) {
-            return Ok(Track {
-                joints,
-                rates: Vec::new(),
-            });
-        }
         if steps.is_empty() {
-            return Err(Error::data(
-                label,
-                "no two consecutive rows have increasing times: joint velocities cannot be derived",
-            ));
+            let rates = Vec::new();
+            let message =
+                "no two consecutive rows have increasing times: joint velocities cannot be derived";
+            return match given || motion.is_none() {
+                true => Ok(Track { joints, rates }),
+                false => Err(Error::data(label, message)),
+            };
         }
         let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-        let gap = motion
-            .and_then(|motion| motion.gap_s)
-            .unwrap_or(GAP * usual);
+        let gap = motion.and_then(|motion| motion.gap_s);
+        let gap = gap.unwrap_or(GAP * usual);
         let reach = (0.5 * motion.map_or(0.0, |motion| motion.over_s) / usual - 1e-9)
             .ceil()
             .max(1.0) as usize;
@@ -130,34 +123,27 @@ impl JointSamples {
                 (0.0..=gap).contains(&(self.time[*k] - self.time[*k - 1]))
                     && self.time[*k] > self.time[*k - 1]
             };
-            let end = (start + 1..self.time.len())
-                .take_while(connected)
-                .last()
-                .unwrap_or(start);
+            let end = (start + 1..self.time.len()).take_while(connected).last();
+            let end = end.unwrap_or(start);
             for i in start..=end {
                 let Some(near) = self.around(i, [start, end], reach) else {
                     isolated += 1;
                     continue;
                 };
-                let far = self
-                    .around(i, [start, end], 2 * reach)
-                    .filter(|far| far[0] < near[0] && far[2] > near[2]);
+                let far = self.around(i, [start, end], 2 * reach);
+                let far = far.filter(|far| far[0] < near[0] && far[2] > near[2]);
                 let at = self.rows[i] * 2 * joints;
                 for joint in 0..joints {
                     let [velocity, acceleration] = self.rate(joints, joint, i, near);
                     rates[at + joint] = velocity;
                     rates[at + joints + joint] = acceleration;
                     if let Some(far) = far {
+                        let [wide, _] = self.rate(joints, joint, i, far);
                         squares[joint] += velocity * velocity;
-                        errors[joint] +=
-                            ((self.rate(joints, joint, i, far)[0] - velocity) / 3.0).powi(2);
+                        errors[joint] += ((wide - velocity) / 3.0).powi(2);
                     }
-                    let given = self
-                        .given
-                        .get(i * joints + joint)
-                        .copied()
-                        .unwrap_or(f64::NAN);
-                    if given.is_finite() {
+                    let given = self.given.get(i * joints + joint);
+                    if let Some(given) = given.filter(|given| given.is_finite()) {
                         reported[joint] += given * given;
                         both[joint] += given * velocity;
                     }
@@ -168,17 +154,12 @@ impl JointSamples {
         let fastest = |sums: &[f64]| sums.iter().copied().fold(0.0, f64::max);
         // The joint that moves most of each kind speaks for the others.
         let rough = |prismatic: bool| {
-            let of_kind = |sums: &[f64]| -> Vec<f64> {
-                sums.iter()
-                    .zip(&arm.prismatic)
-                    .filter(|(_, slides)| **slides == prismatic)
-                    .map(|(sum, _)| *sum)
-                    .collect()
+            let of_kind = |sums: &[f64]| -> f64 {
+                let all = sums.iter().zip(&arm.prismatic);
+                let of_kind = all.filter(|(_, slides)| **slides == prismatic);
+                of_kind.map(|(sum, _)| *sum).sum()
             };
-            let (all, wrong) = (
-                of_kind(&squares).iter().sum::<f64>(),
-                of_kind(&errors).iter().sum::<f64>(),
-            );
+            let (all, wrong) = (of_kind(&squares), of_kind(&errors));
             if all > 0.0 { (wrong / all).sqrt() } else { 0.0 }
         };
         let rough = rough(false).max(rough(true));
@@ -206,27 +187,23 @@ impl JointSamples {
         label: &str,
         context: &Context,
     ) -> Result<()> {
-        let (ms, gap) = (1e3 * usual, 1e3 * gap);
+        let (ms, gap, off) = (1e3 * usual, 1e3 * gap, 100.0 * rough);
         if rough > TOO_ROUGH {
             let message = format!(
-                "rows are {ms:.1} ms apart, too far for the joints' velocities, which would be off by some {:.0} %; where the arm stood at every point leave `motion` out, else log more often or map `velocity`",
-                100.0 * rough
+                "rows are {ms:.1} ms apart, too far for the joints' velocities, which would be off by some {off:.0} %; where the arm stood at every point leave `motion` out, else log more often or map `velocity`"
             );
             return Err(Error::data(label, message));
         }
-        let alone = if isolated > 0 {
-            format!("; none for {} between gaps", counted(isolated, "row"))
-        } else {
-            String::new()
+        let alone = match isolated {
+            0 => String::new(),
+            rows => format!("; none for {} between gaps", counted(rows, "row")),
         };
         context.note(format!(
-            "{label}: joint velocities by parabolas through neighbouring rows, {ms:.1} ms apart, never across gaps above {gap:.0} ms; right to about {:.2} %{alone}",
-            100.0 * rough
+            "{label}: joint velocities by parabolas through neighbouring rows, {ms:.1} ms apart, never across gaps above {gap:.0} ms; right to about {off:.2} %{alone}"
         ));
         if rough > ROUGH {
             context.warn(format!(
-                "{label}: the velocities are right to {:.0} % only: log more often, or try `motion: {{over_s: ...}}` where joints are logged coarsely",
-                100.0 * rough
+                "{label}: the velocities are right to {off:.0} % only: log more often, or try `motion: {{over_s: ...}}` where joints are logged coarsely"
             ));
         }
         Ok(())
@@ -255,12 +232,8 @@ fn same_unit(joint: usize, reported: f64, both: f64, label: &str) -> Result<()> 
 
 impl Track {
     fn of(&self, row: usize) -> Option<(&[f64], &[f64])> {
-        let at = row * 2 * self.joints;
-        Some(
-            self.rates
-                .get(at..at + 2 * self.joints)?
-                .split_at(self.joints),
-        )
+        let (at, joints) = (row * 2 * self.joints, self.joints);
+        Some(self.rates.get(at..at + 2 * joints)?.split_at(joints))
     }
 
     /// Velocities of a row into those of `velocity` that are not known.
@@ -268,21 +241,17 @@ impl Track {
         let Some((derived, _)) = self.of(row) else {
             return;
         };
-        for (known, derived) in velocity
-            .iter_mut()
-            .zip(derived)
-            .filter(|(known, _)| known.is_nan())
-        {
-            *known = *derived;
+        for (known, derived) in velocity.iter_mut().zip(derived) {
+            if known.is_nan() {
+                *known = *derived;
+            }
         }
     }
 
     /// Acceleration of a joint in a row, zero where it is not known.
     pub(super) fn acceleration(&self, row: usize, joint: usize) -> f64 {
-        self.of(row)
-            .and_then(|(_, all)| all.get(joint))
-            .copied()
-            .filter(|value| value.is_finite())
-            .unwrap_or(0.0)
+        let found = self.of(row).and_then(|(_, all)| all.get(joint));
+        let known = found.copied().filter(|value| value.is_finite());
+        known.unwrap_or(0.0)
     }
 }

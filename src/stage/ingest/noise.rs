@@ -90,10 +90,9 @@ impl JsonSchema for InstrumentSetting {
 /// joined by one of them.
 pub(super) fn faults(settings: &Ingest, at: &mut Place) {
     if let Some(InstrumentSetting::Figures(figures)) = &settings.instrument {
-        figures
-            .fault()
-            .into_iter()
-            .for_each(|fault| at.at("instrument").fault(fault));
+        if let Some(fault) = figures.fault() {
+            at.at("instrument").fault(fault);
+        }
     }
     let appended = settings.join == Some(Join::Append {});
     let mut stated: BTreeMap<&str, &str> = BTreeMap::new();
@@ -101,10 +100,8 @@ pub(super) fn faults(settings: &Ingest, at: &mut Place) {
         if appended {
             stated.clear();
         }
-        let direct = file
-            .columns
-            .numbers()
-            .filter(|(declared, _)| declared.part == Part::Sigma);
+        let numbers = file.columns.numbers();
+        let direct = numbers.filter(|(declared, _)| declared.part == Part::Sigma);
         let direct = direct.map(|(declared, _)| (declared.setting, declared.setting));
         let by = file.columns.uncertainties();
         let by = by.flat_map(|(declared, _, sigmas, _)| {
@@ -112,17 +109,16 @@ pub(super) fn faults(settings: &Ingest, at: &mut Place) {
         });
         let mut twice: Vec<(&str, &str)> = Vec::new();
         for (sigma, setting) in direct.chain(by) {
-            let other = stated
-                .insert(sigma, setting)
-                .filter(|other| *other != setting);
+            let other = stated.insert(sigma, setting);
+            let other = other.filter(|other| *other != setting);
             twice.extend(other.map(|other| (setting, other)));
         }
         twice.dedup();
         for (setting, other) in twice {
-            at.at(format!("files[{index}].columns.{setting}"))
-                .fault(format!(
-                    "states the standard deviation that `{other}` states already; map one of them"
-                ));
+            let mut at = at.at(format!("files[{index}].columns.{setting}"));
+            at.fault(format!(
+                "states the standard deviation that `{other}` states already; map one of them"
+            ));
         }
     }
 }

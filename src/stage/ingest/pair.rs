@@ -89,20 +89,15 @@ fn duplicates(
     if duplicates == Duplicates::Keep {
         return given_up;
     }
-    let mut rows: Vec<(&str, usize, usize)> = group
-        .flat_map(|file| {
-            files[file]
-                .usable()
-                .map(move |row| (files[file].id(row), file, row))
-        })
-        .filter(|(id, ..)| !id.is_empty())
-        .collect();
+    let rows = group.flat_map(|file| {
+        let rows = files[file].usable();
+        rows.map(move |row| (files[file].id(row), file, row))
+    });
+    let mut rows: Vec<(&str, usize, usize)> = rows.filter(|(id, ..)| !id.is_empty()).collect();
     // Ids that count upwards are in this order already.
     rows.sort_by_key(|(id, ..)| (id.len(), *id));
-    for same in rows
-        .chunk_by(|a, b| a.0 == b.0)
-        .filter(|same| same.len() > 1)
-    {
+    let of_one_id = rows.chunk_by(|a, b| a.0 == b.0);
+    for same in of_one_id.filter(|same| same.len() > 1) {
         let copies = |k: usize, other: usize| {
             let ((_, a, row), (_, b, twin)) = (same[k], same[other]);
             files[a].says_same(row, &files[b], twin)
@@ -115,16 +110,12 @@ fn duplicates(
         for (k, (_, file, row)) in same.iter().enumerate().filter(|(k, _)| Some(*k) != stays) {
             let other = stays.unwrap_or(if k == 0 { same.len() - 1 } else { 0 });
             let (_, of_other, twin) = same[other];
-            let copied = stays.is_some() && copies(k, other);
-            given_up.push((
-                *file,
-                *row,
-                GivenUp::Duplicate {
-                    file: of_other,
-                    row: twin,
-                    copied,
-                },
-            ));
+            let why = GivenUp::Duplicate {
+                file: of_other,
+                row: twin,
+                copied: stays.is_some() && copies(k, other),
+            };
+            given_up.push((*file, *row, why));
         }
     }
     given_up
@@ -132,20 +123,13 @@ fn duplicates(
 
 /// Pairs of rows with one id; every id stands once in a file.
 fn by_id(first: &FileRows, second: &FileRows) -> Vec<(usize, usize)> {
-    let used = |rows: &FileRows| {
-        let used = rows
-            .usable()
-            .filter(|row| rows.is_used(*row) && !rows.id(*row).is_empty());
-        used.collect::<Vec<usize>>()
-    };
-    let others: HashMap<&str, usize> = used(second)
-        .into_iter()
-        .map(|row| (second.id(row), row))
-        .collect();
-    let pairs = used(first).into_iter();
-    pairs
-        .filter_map(|row| Some((row, *others.get(first.id(row))?)))
-        .collect()
+    fn used(rows: &FileRows) -> impl Iterator<Item = usize> {
+        let used = rows.usable();
+        used.filter(move |row| rows.is_used(*row) && !rows.id(*row).is_empty())
+    }
+    let others: HashMap<&str, usize> = used(second).map(|row| (second.id(row), row)).collect();
+    let pair = |row: usize| Some((row, *others.get(first.id(row))?));
+    used(first).filter_map(pair).collect()
 }
 
 /// Pairs of rows that are each other's nearest in time, not further apart than the tolerance. Of equally near rows the
@@ -172,27 +156,21 @@ fn by_time(
 /// For each time of `from` the index of the nearest in `to`; both sorted.
 fn nearest(from: &[(f64, usize)], to: &[(f64, usize)]) -> Vec<Option<usize>> {
     // Of equal times the first stands for all: clocks that stand still must not cost a search of all rows for each row.
-    let heads: Vec<usize> = (0..to.len())
-        .filter(|index| *index == 0 || to[index - 1].0 != to[*index].0)
-        .collect();
+    let is_head = |index: &usize| *index == 0 || to[index - 1].0 != to[*index].0;
+    let heads: Vec<usize> = (0..to.len()).filter(is_head).collect();
     let mut start = 0;
-    from.iter()
-        .map(|(time, _)| {
-            while heads.get(start).is_some_and(|head| to[*head].0 < *time) {
-                start += 1;
-            }
-            let around = [start.checked_sub(1), Some(start)]
-                .into_iter()
-                .flatten()
-                .filter_map(|index| heads.get(index).copied());
-            around.min_by(|a, b| {
-                (to[*a].0 - time)
-                    .abs()
-                    .total_cmp(&(to[*b].0 - time).abs())
-                    .then(to[*a].1.cmp(&to[*b].1))
-            })
+    let nearest = |(time, _): &(f64, usize)| {
+        while heads.get(start).is_some_and(|head| to[*head].0 < *time) {
+            start += 1;
+        }
+        let around = &heads[start.saturating_sub(1)..heads.len().min(start + 1)];
+        let apart = |index: usize| (to[index].0 - time).abs();
+        around.iter().copied().min_by(|a, b| {
+            let nearer = apart(*a).total_cmp(&apart(*b));
+            nearer.then(to[*a].1.cmp(&to[*b].1))
         })
-        .collect()
+    };
+    from.iter().map(nearest).collect()
 }
 
 /// All files of a measurement, as they were read, and what they decide together.
@@ -231,20 +209,16 @@ impl Measurement<'_> {
                 row: twin,
                 copied,
             } => {
-                let line = self.files[other].line(twin);
-                let there = match other == file {
-                    true => String::new(),
-                    false => format!(" of {}", self.names[other]),
-                };
-                match copied {
-                    true => (
-                        Reason::DuplicateRow,
-                        format!("a copy of line {line}{there}: the same id, the same values"),
-                    ),
-                    false => (
-                        Reason::DuplicateId,
-                        format!("point id `{id}` also stands on line {line}{there}"),
-                    ),
+                let mut line = self.files[other].line(twin).to_string();
+                if other != file {
+                    line.push_str(&format!(" of {}", self.names[other]));
+                }
+                if copied {
+                    let detail = format!("a copy of line {line}: the same id, the same values");
+                    (Reason::DuplicateRow, detail)
+                } else {
+                    let detail = format!("point id `{id}` also stands on line {line}");
+                    (Reason::DuplicateId, detail)
                 }
             }
             GivenUp::Unmatched { file: other } => {
@@ -291,10 +265,8 @@ impl Measurement<'_> {
         })?;
         let all = (1..).zip(targets.columns.keys()).zip(points);
         let seen = all.filter(|(_, point)| !point[0].is_nan());
-        Some(
-            seen.map(|((at, name), point)| (at, name.as_str(), *point))
-                .collect(),
-        )
+        let named = seen.map(|((at, name), point)| (at, name.as_str(), *point));
+        Some(named.collect())
     }
 }
 

@@ -6,7 +6,7 @@ use crate::raw::{
     self, BagRows, ColumnRows, DecimalMark, Delimiter, InputSource, Record, RecordReader,
     TextLayout, TextRows, Workbook, failed, has_columns, is_bag, is_workbook, not_read,
 };
-use crate::stage::ingest::arm::RobotJoints;
+use crate::stage::ingest::arm::{RobotJoints, UNLIMITED};
 use crate::stage::ingest::bind::{Binding, FileHeader, bind};
 use crate::stage::ingest::columns::{FileLayout, LimitPolicy};
 use crate::stage::ingest::external::ExternalAxes;
@@ -148,19 +148,20 @@ impl<'a> OpenedFile<'a> {
             decimal: layout.decimal,
         };
         let (label, mut reader) = records(source.reader, &source.label, table)?;
-        let (header, decimal) = if reader.obeys_layout() {
-            (layout.header, layout.decimal)
-        } else {
-            (true, DecimalMark::Point)
+        let (header, decimal) = match reader.obeys_layout() {
+            true => (layout.header, layout.decimal),
+            false => (true, DecimalMark::Point),
         };
         let mut record = Record::default();
         if !reader.next(&mut record)? {
             let lines = counted(reader.lines(), "line");
-            let message = match (reader.bytes(), header) {
-                (0, true) => "is empty; allowed: a header and at least one data row".to_string(),
-                (0, false) => "is empty; allowed: at least one data row".to_string(),
-                (_, true) => format!("has no header: {lines}, all empty, comments or skipped"),
-                (_, false) => format!("has no data row: {lines}, all empty, comments or skipped"),
+            let (all, first) = match header {
+                true => ("a header and at least one data row", "header"),
+                false => ("at least one data row", "data row"),
+            };
+            let message = match reader.bytes() {
+                0 => format!("is empty; allowed: {all}"),
+                _ => format!("has no {first}: {lines}, all empty, comments or skipped"),
             };
             return Err(Error::data(label, message));
         }
@@ -186,38 +187,30 @@ impl<'a> OpenedFile<'a> {
         let binding = bind(layout, &head, arm)?;
         reader.only(&binding.columns());
         let row = RecordedRow::empty(arm);
+        let is_mapped = |column: usize| binding.cells.iter().any(|cell| cell.column == column);
         let names = head.names.iter().flatten().enumerate();
-        let unmapped =
-            names.filter(|(column, _)| binding.cells.iter().all(|cell| cell.column != *column));
+        let unmapped = names.filter(|(column, _)| !is_mapped(*column));
         let external = ExternalAxes::among(unmapped, layout.columns.has("q"), decimal);
-        let (remark, judge) = (
-            reader.remark(),
-            RowReader::new(binding, decimal, limits, arm),
-        );
         Ok(Self {
             label,
+            remark: reader.remark(),
             reader,
-            judge,
+            judge: RowReader::new(binding, decimal, limits, arm),
             record,
             is_ahead: !header,
-            remark,
             external,
             row,
         })
     }
     /// What was left out of the file as a whole, and what it lacks.
     pub(super) fn remarks(&self) -> Vec<String> {
-        self.remark
-            .iter()
-            .chain(&self.binding().missing)
-            .cloned()
-            .collect()
+        let remarks = self.remark.iter().chain(&self.binding().missing);
+        remarks.cloned().collect()
     }
     /// What could not be read of the file, once its last row was.
     pub(super) fn loss(&self) -> Option<String> {
-        self.reader
-            .loss()
-            .map(|loss| format!("{}: {loss}", self.label))
+        let loss = self.reader.loss();
+        loss.map(|loss| format!("{}: {loss}", self.label))
     }
     pub(super) fn binding(&self) -> &Binding {
         &self.judge.binding
@@ -253,7 +246,7 @@ pub(super) fn headers<'l>(
 ) -> Result<()> {
     let arm = match robot {
         Some(robot) => RobotJoints::of(robot)?,
-        None => RobotJoints::new(vec![false], vec![[f64::NEG_INFINITY, f64::INFINITY]]),
+        None => RobotJoints::new(vec![false], vec![UNLIMITED]),
     };
     let mut faults = Vec::new();
     for layout in layouts {
@@ -346,7 +339,7 @@ impl ListedRows {
             let external = used.iter().map(|k| row.external[*k]);
             let numbers = row.joints.iter().map(|joint| Some(*joint)).chain(external);
             let cells =
-                numbers.map(|number| number.map_or_else(String::new, |number| number.to_string()));
+                numbers.map(|number| number.as_ref().map_or_else(String::new, f64::to_string));
             let cells = std::iter::once(row.name.clone()).chain(cells);
             (row.line as u64, cells.collect())
         }));
@@ -366,10 +359,9 @@ fn none(list: &JointList, language: Language) -> String {
         Language::UrScript => "wp1_q = [0.0, -1.57, 1.57, 0.0, 1.57, 0.0]",
         Language::Rapid => "CONST jointtarget p10:=[[0,-10,20,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]];",
     };
-    let poses = if list.poses > 0 {
-        format!(" ({} without joints)", counted(list.poses, "pose"))
-    } else {
-        String::new()
+    let poses = match list.poses {
+        0 => String::new(),
+        poses => format!(" ({} without joints)", counted(poses, "pose")),
     };
     format!("declares no joint position{poses}; allowed: declarations such as `{example}`")
 }

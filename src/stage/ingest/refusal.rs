@@ -131,10 +131,8 @@ impl<'a> Rejections<'a> {
         })
     }
     pub(super) fn push(&mut self, row: RejectedRow) -> Result<()> {
-        let goes_on = self
-            .rows
-            .last()
-            .is_some_and(|last| (&last.file, last.line) == (&row.file, row.line));
+        let last = self.rows.last();
+        let goes_on = last.is_some_and(|last| (&last.file, last.line) == (&row.file, row.line));
         if self.ordered && self.rows.len() >= REJECTED_CHUNK && !goes_on {
             self.flush()?;
         }

@@ -4,7 +4,7 @@ use super::arm::{KindSlots, RobotJoints};
 use super::bind::{Binding, NumberBinding, TextBinding};
 use super::columns::LimitPolicy;
 use super::refusal::{Reason, RowRefusal, refuse};
-use super::stretch::{ALLOWED, CLOCK, ClockColumn, ClockTime};
+use super::stretch::{ALLOWED, ClockColumn, ClockTime};
 use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
 use crate::robot::ONE_AND_A_HALF_TURNS;
 
@@ -85,19 +85,15 @@ impl<'a> RowReader<'a> {
         row: &mut RecordedRow,
     ) -> Result<(), RowRefusal> {
         row.id.clear();
-        self.binding
-            .worded
-            .iter()
-            .for_each(|place| row.texts[*place].clear());
-        row.sequence = None;
-        row.beyond = None;
-        row.turned = None;
-        row.line = record.line;
         row.points.clear();
-        self.binding
-            .filled
-            .iter()
-            .for_each(|place| row.values[*place] = f64::NAN);
+        for place in &self.binding.worded {
+            row.texts[*place].clear();
+        }
+        for place in &self.binding.filled {
+            row.values[*place] = f64::NAN;
+        }
+        (row.sequence, row.beyond, row.turned) = (None, None, None);
+        row.line = record.line;
         row.is_blank = record.is_blank(0);
         if let Some((fault, detail)) = &record.fault {
             return refuse((*fault).into(), detail.clone());
@@ -108,26 +104,16 @@ impl<'a> RowReader<'a> {
         let width = self.binding.width;
         let complete = record.len() >= width;
         text(&self.binding.id, record, "point_id", complete, &mut row.id)?;
-        if !complete {
-            return refuse(
-                Reason::ShortRow,
-                format!("{} fields; allowed: {width}", record.len()),
-            );
-        }
-        if !record.is_blank(width) {
-            return refuse(
-                Reason::LongRow,
-                format!("{} fields; allowed: {width}", record.len()),
-            );
+        if !complete || !record.is_blank(width) {
+            let reason = match complete {
+                true => Reason::LongRow,
+                false => Reason::ShortRow,
+            };
+            return refuse(reason, format!("{} fields; allowed: {width}", record.len()));
         }
         for place in &self.binding.worded {
-            text(
-                &self.binding.texts[*place],
-                record,
-                self.arm.slots.texts()[*place],
-                true,
-                &mut row.texts[*place],
-            )?;
+            let (source, name) = (&self.binding.texts[*place], self.arm.slots.texts()[*place]);
+            text(source, record, name, true, &mut row.texts[*place])?;
         }
         for (index, value) in &self.binding.constants {
             if let Some(slot) = row.values.get_mut(*index) {
@@ -158,10 +144,8 @@ impl<'a> RowReader<'a> {
                 *slot = value;
             }
         }
-        let q = row
-            .values
-            .get_mut(self.arm.slots.q.clone())
-            .unwrap_or_default();
+        let q = row.values.get_mut(self.arm.slots.q.clone());
+        let q = q.unwrap_or_default();
         for (joint, by, ratio) in &self.binding.coupled {
             q[*joint] -= ratio * q[*by];
         }
@@ -180,16 +164,12 @@ impl<'a> RowReader<'a> {
             }
             let blank = point.iter().filter(|value| value.is_nan()).count();
             if blank == 1 || blank == 2 {
-                return refuse(
-                    Reason::Blank,
-                    format!("the point of {target} is incomplete"),
-                );
+                let detail = format!("the point of {target} is incomplete");
+                return refuse(Reason::Blank, detail);
             }
-            row.points.push(if point == [0.0; 3] {
-                [f64::NAN; 3]
-            } else {
-                point
-            });
+            let was_seen = point != [0.0; 3];
+            row.points
+                .push(if was_seen { point } else { [f64::NAN; 3] });
         }
         Ok(())
     }
@@ -205,10 +185,8 @@ impl<'a> RowReader<'a> {
                 continue;
             }
             if given.iter().any(|number| number.is_nan()) {
-                return refuse(
-                    Reason::OutOfRange,
-                    format!("the {} is incomplete", declared.setting),
-                );
+                let detail = format!("the {} is incomplete", declared.setting);
+                return refuse(Reason::OutOfRange, detail);
             }
             match (convention.read)(given) {
                 Ok(kept) => {
@@ -226,17 +204,12 @@ impl<'a> RowReader<'a> {
         let there = |index: &usize| row.values.get(*index).is_some_and(|value| !value.is_nan());
         let kinds = self.arm.slots.kinds.iter();
         let is_named = |kind: &KindSlots| {
-            kind.name
-                .and_then(|name| row.texts.get(name))
-                .is_some_and(|name| !name.is_empty())
+            let name = kind.name.and_then(|name| row.texts.get(name));
+            name.is_some_and(|name| !name.is_empty())
         };
-        let seen = row.points.iter().any(|point| !point[0].is_nan());
-        if self.binding.measures
-            && !seen
-            && !kinds
-                .clone()
-                .any(|kind| kind.values.iter().any(there) || is_named(kind))
-        {
+        let is_there = |kind: &KindSlots| kind.values.iter().any(there) || is_named(kind);
+        let seen = row.points.iter().any(|point| !point[0].is_nan()) || kinds.clone().any(is_there);
+        if self.binding.measures && !seen {
             return refuse(Reason::Blank, "nothing was measured in this row".into());
         }
         for slots in kinds.filter(|slots| slots.own_sigma) {
@@ -275,12 +248,10 @@ impl<'a> RowReader<'a> {
                 row.beyond = Some(joint);
                 if self.limits == LimitPolicy::Reject {
                     let (scale, unit) = self.arm.shown_in(joint);
+                    let [at, lower, upper] = [q, lower, upper].map(|value| value * scale);
                     let detail = format!(
-                        "joint {} at {:.4} {unit}; allowed: {:.4} to {:.4} {unit}",
-                        joint + 1,
-                        q * scale,
-                        lower * scale,
-                        upper * scale
+                        "joint {} at {at:.4} {unit}; allowed: {lower:.4} to {upper:.4} {unit}",
+                        joint + 1
                     );
                     return refuse(Reason::OutOfRange, detail);
                 }
@@ -296,24 +267,17 @@ impl<'a> RowReader<'a> {
             return refuse(Reason::Blank, "sequence is blank".into());
         }
         let Ok(value) = shown.parse::<i64>() else {
-            return refuse(
-                Reason::NotANumber,
-                format!("sequence: `{shown}` is not a whole number"),
-            );
+            let detail = format!("sequence: `{shown}` is not a whole number");
+            return refuse(Reason::NotANumber, detail);
         };
         if value.abs() > LARGEST_SEQUENCE {
-            return refuse(
-                Reason::OutOfRange,
-                format!("sequence {value} is out of range; allowed: up to {LARGEST_SEQUENCE}"),
-            );
+            let detail =
+                format!("sequence {value} is out of range; allowed: up to {LARGEST_SEQUENCE}");
+            return refuse(Reason::OutOfRange, detail);
         }
-        if let Some(last) = self.last_sequence
-            && value <= last
-        {
-            return refuse(
-                Reason::OutOfOrder,
-                format!("sequence {value} does not follow {last}"),
-            );
+        if let Some(last) = self.last_sequence.filter(|last| value <= *last) {
+            let detail = format!("sequence {value} does not follow {last}");
+            return refuse(Reason::OutOfOrder, detail);
         }
         self.last_sequence = Some(value);
         Ok(value)
@@ -360,11 +324,8 @@ fn moment(
         None if field.is_empty() && cell.optional => Ok(None),
         None if field.is_empty() => refuse(Reason::Blank, format!("{} is blank", cell.name)),
         None => {
-            let found = shown(record, cell.column);
-            let message = format!(
-                "{}: `{found}` is no clock time; allowed: {ALLOWED}",
-                cell.name
-            );
+            let (name, found) = (&cell.name, shown(record, cell.column));
+            let message = format!("{name}: `{found}` is no clock time; allowed: {ALLOWED}");
             refuse(Reason::NotANumber, message)
         }
     }
@@ -403,24 +364,19 @@ fn no_number<T>(
     name: &str,
     fault: NumberFault,
 ) -> Result<T, RowRefusal> {
-    let shown = shown(record, column);
-    let detail = match fault {
+    let is_clock = ClockTime::parse(record.field(column)).is_some();
+    let why = match fault {
         NumberFault::Blank => return refuse(Reason::Blank, format!("{name} is blank")),
-        NumberFault::Text if ClockTime::parse(record.field(column)).is_some() => {
-            format!(
-                "{name}: `{shown}` is a clock time, not a number; `unit: {CLOCK}` reads such times"
-            )
+        NumberFault::Text if is_clock => {
+            "is a clock time, not a number; `unit: clock` reads such times"
         }
-        NumberFault::Text => format!("{name}: `{shown}` is not a number"),
-        NumberFault::Comma => format!(
-            "{name}: `{shown}` has a decimal comma; allowed: `decimal: comma` in the settings"
-        ),
-        NumberFault::Point => format!(
-            "{name}: `{shown}` has a decimal point; allowed: `decimal: point` in the settings"
-        ),
-        NumberFault::NotFinite => format!("{name}: `{shown}` is not a finite number"),
+        NumberFault::Text => "is not a number",
+        NumberFault::Comma => "has a decimal comma; allowed: `decimal: comma` in the settings",
+        NumberFault::Point => "has a decimal point; allowed: `decimal: point` in the settings",
+        NumberFault::NotFinite => "is not a finite number",
     };
-    refuse(Reason::NotANumber, detail)
+    let shown = shown(record, column);
+    refuse(Reason::NotANumber, format!("{name}: `{shown}` {why}"))
 }
 
 /// A field for people, cut at 40 characters.
@@ -442,35 +398,28 @@ fn text(
     complete: bool,
     into: &mut String,
 ) -> Result<(), RowRefusal> {
-    match source {
-        Some(TextBinding::Value(value)) => into.push_str(value),
-        Some(TextBinding::Column(column, mapped)) => {
-            let bytes = record.field(*column);
-            match decoded_text(bytes).as_deref() {
-                Some("") if !mapped.optional && complete => {
-                    return refuse(Reason::Blank, format!("{name} is blank"));
-                }
-                Some("") => {}
-                Some(text) => match mapped.counts(text) {
-                    Some(counts) => into.push_str(counts),
-                    None => {
-                        return refuse(
-                            Reason::NotANumber,
-                            format!(
-                                "{name}: `{text}` holds no number, and `match: number` asks for one"
-                            ),
-                        );
-                    }
-                },
-                None => {
-                    return refuse(
-                        Reason::NotText,
-                        format!("{name} is neither UTF-8 nor Windows-1252 text"),
-                    );
-                }
-            }
+    let (column, mapped) = match source {
+        None => return Ok(()),
+        Some(TextBinding::Value(value)) => {
+            into.push_str(value);
+            return Ok(());
         }
-        None => {}
+        Some(TextBinding::Column(column, mapped)) => (*column, mapped),
+    };
+    let Some(text) = decoded_text(record.field(column)) else {
+        let detail = format!("{name} is neither UTF-8 nor Windows-1252 text");
+        return refuse(Reason::NotText, detail);
+    };
+    if text.is_empty() {
+        return match mapped.optional || !complete {
+            true => Ok(()),
+            false => refuse(Reason::Blank, format!("{name} is blank")),
+        };
     }
+    let Some(counts) = mapped.counts(&text) else {
+        let detail = format!("{name}: `{text}` holds no number, and `match: number` asks for one");
+        return refuse(Reason::NotANumber, detail);
+    };
+    into.push_str(counts);
     Ok(())
 }

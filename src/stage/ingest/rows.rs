@@ -16,6 +16,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+/// What is said of a file without rows.
+pub(super) const NO_ROW: &str = "has a header but no data row; allowed: at least one";
+
 /// Texts one behind the other.
 #[derive(Default)]
 struct Texts {
@@ -160,17 +163,12 @@ impl FileRows {
     }
     /// Whether a row says what a row of another file does, but for its place in the recording.
     pub(super) fn says_same(&self, at: usize, other: &Self, of_other: usize) -> bool {
+        let bits = |points: &[[f64; 3]]| {
+            let numbers = points.as_flattened().iter();
+            numbers.map(|number| number.to_bits()).collect::<Vec<u64>>()
+        };
         self.numbers(at).eq(other.numbers(of_other))
-            && self
-                .points(at)
-                .iter()
-                .flatten()
-                .map(|number| number.to_bits())
-                .eq(other
-                    .points(of_other)
-                    .iter()
-                    .flatten()
-                    .map(|number| number.to_bits()))
+            && bits(self.points(at)) == bits(other.points(of_other))
             && self.all_texts(at).eq(other.all_texts(of_other))
     }
     fn numbers(&self, at: usize) -> impl Iterator<Item = (usize, u64)> {
@@ -195,12 +193,8 @@ impl FileRows {
     fn samples(&self, slots: &Slots, gives_velocity: bool) -> JointSamples {
         let mut samples = JointSamples::default();
         for row in self.usable() {
-            let all = |places: &Range<usize>| {
-                places
-                    .clone()
-                    .map(|place| self.value(row, place))
-                    .collect::<Vec<_>>()
-            };
+            let all =
+                |places: &Range<usize>| places.clone().map(move |place| self.value(row, place));
             let time = self.value(row, slots.time);
             if time.is_finite() {
                 samples.rows.push(row);
@@ -235,10 +229,8 @@ impl FileRows {
 
     fn odd(&mut self, row: &RecordedRow, arm: &RobotJoints) {
         let q = row.values.get(arm.slots.q.clone()).unwrap_or_default();
-        let turning = q
-            .iter()
-            .zip(&arm.prismatic)
-            .filter(|(_, prismatic)| !**prismatic);
+        let joints = q.iter().zip(&arm.prismatic);
+        let turning = joints.filter(|(_, prismatic)| !**prismatic);
         self.largest = turning.fold(self.largest, |largest, (q, _)| largest.max(q.abs()));
         self.ranges
             .resize(q.len(), [f64::INFINITY, f64::NEG_INFINITY]);
@@ -246,8 +238,8 @@ impl FileRows {
             (*least, *most) = (least.min(*value), most.max(*value));
         }
         if let Some(joint) = row.beyond {
-            self.beyond
-                .count(row.line, joint, q.get(joint).copied().unwrap_or(f64::NAN));
+            let value = q.get(joint).copied().unwrap_or(f64::NAN);
+            self.beyond.count(row.line, joint, value);
         }
     }
 }
@@ -263,26 +255,23 @@ pub(super) fn read(
         let source = context.services.open(&layout.file)?;
         sizes.push(source.size);
         let open = OpenedFile::open(source, layout, arm, settings.limits)?;
-        open.remarks()
-            .iter()
-            .for_each(|remark| context.note(format!("{}: {remark}", open.label)));
+        for remark in open.remarks() {
+            context.note(format!("{}: {remark}", open.label));
+        }
         opened.push(open);
     }
     let labels: Vec<&str> = opened.iter().map(|open| open.label.as_str()).collect();
     let what = format!("reading {}", labels.join(", "));
-    context
-        .services
-        .begin(&what, sizes.into_iter().sum(), "bytes");
+    let services = context.services;
+    services.begin(&what, sizes.into_iter().sum(), "bytes");
     let done = AtomicU64::new(0);
     let advance = |more: u64| {
         let all = done.fetch_add(more, Ordering::Relaxed) + more;
-        context.services.advance(all, "");
+        services.advance(all, "");
     };
-    let all: Vec<Result<FileRows>> = opened
-        .into_par_iter()
-        .zip(&settings.files)
-        .map(|(open, layout)| file(settings, layout, open, arm, &advance))
-        .collect();
+    let files = opened.into_par_iter().zip(&settings.files);
+    let read = files.map(|(open, layout)| file(settings, layout, open, arm, &advance));
+    let all: Vec<Result<FileRows>> = read.collect();
     // Of several faults that of the first file.
     let mut all = all.into_iter().collect::<Result<Vec<_>>>()?;
     for (rows, layout) in all.iter_mut().zip(&settings.files) {
@@ -335,14 +324,8 @@ fn file(
             rows.filled = row.number;
         }
         rows.sequence.extend(says_sequence.then_some(row.sequence));
-        rows.push(
-            row,
-            &if shown {
-                beginning(open.text())
-            } else {
-                "".into()
-            },
-        );
+        let begin = shown.then(|| beginning(open.text()));
+        rows.push(row, &begin.unwrap_or_default());
         if row.number.is_multiple_of(STRIDE) {
             tell(open.bytes());
         }
@@ -350,13 +333,10 @@ fn file(
     tell(open.bytes());
     open.external.must_stand(&open.label, arm.joints())?;
     (rows.lines, rows.loss) = (open.lines(), open.loss());
-    if rows.count() == 0 {
-        return Err(Error::data(
-            rows.label,
-            "has a header but no data row; allowed: at least one",
-        ));
+    match rows.count() {
+        0 => Err(Error::data(rows.label, NO_ROW)),
+        _ => Ok(rows),
     }
-    Ok(rows)
 }
 
 /// Whether velocities, or what they change by, follow from this file's joints over time.

@@ -107,26 +107,20 @@ impl Stretches {
     fn went_on(&self, moved: &[f64]) -> bool {
         let Some(step) = &self.step else { return false };
         let size = step.iter().fold(0.0, |most: f64, one| most.max(one.abs()));
-        size > MOVES
-            && moved
-                .iter()
-                .zip(step)
-                .all(|(moved, step)| (moved - step).abs() < NEAR * size)
+        let mut both = moved.iter().zip(step);
+        size > MOVES && both.all(|(moved, step)| (moved - step).abs() < NEAR * size)
     }
 
     /// What a person should know of a gap that was just met.
     pub(super) fn warning(&mut self, label: &str) -> Option<String> {
         let (line, gap) = self.gap.take()?;
         self.warned += 1;
-        match self.warned {
-            1..TOLD => Some(format!(
-                "{label}:{line}: no rows for {gap:.3} s; another stretch begins"
-            )),
-            TOLD => Some(format!(
-                "{label}:{line}: no rows for {gap:.3} s; further gaps are not listed"
-            )),
-            _ => None,
-        }
+        let more = match self.warned {
+            1..TOLD => "another stretch begins",
+            TOLD => "further gaps are not listed",
+            _ => return None,
+        };
+        Some(format!("{label}:{line}: no rows for {gap:.3} s; {more}"))
     }
 }
 
@@ -178,28 +172,22 @@ pub(super) enum ClockTime {
 impl ClockTime {
     /// None of other text. Some trackers write a quote before the time, so that spreadsheets leave it alone.
     pub fn parse(cell: &[u8]) -> Option<Self> {
-        let text = std::str::from_utf8(cell)
-            .ok()?
-            .trim_matches(['\'', '"', ' ']);
+        let text = std::str::from_utf8(cell).ok()?;
+        let text = text.trim_matches(['\'', '"', ' ']);
         if let Ok(time) = text.parse::<Timestamp>() {
             return Some(Self::Dated(time.as_duration().as_secs_f64()));
         }
         if !text.contains(':') {
             return None;
         }
-        let day = text.contains('-');
-        if day {
-            let time = text
-                .parse::<DateTime>()
-                .ok()?
-                .to_zoned(TimeZone::UTC)
-                .ok()?;
-            return Some(Self::Dated(time.timestamp().as_duration().as_secs_f64()));
+        if text.contains('-') {
+            let time: DateTime = text.parse().ok()?;
+            let time = time.to_zoned(TimeZone::UTC).ok()?.timestamp();
+            return Some(Self::Dated(time.as_duration().as_secs_f64()));
         }
         let time: Time = text.parse().ok()?;
-        Some(Self::OfDay(
-            time.duration_since(Time::midnight()).as_secs_f64(),
-        ))
+        let of_day = time.duration_since(Time::midnight());
+        Some(Self::OfDay(of_day.as_secs_f64()))
     }
 }
 

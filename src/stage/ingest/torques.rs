@@ -9,13 +9,14 @@ use crate::stage::ingest::arm::RobotJoints;
 use crate::stage::ingest::columns::{FileLayout, LimitPolicy};
 use crate::stage::ingest::reading::{OpenedFile, STRIDE};
 use crate::stage::ingest::refusal::{
-    Reason, RefusalCounts, Rejections, RowRefusal, beginning, tally,
+    Reason, RefusalCounts, Rejections, RowRefusal, beginning, refuse, tally,
 };
 use crate::stage::ingest::row::RecordedRow;
+use crate::stage::ingest::rows::NO_ROW;
 use crate::stage::ingest::stretch::Stretches;
 use crate::stage::ingest::{check, reading};
 use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable};
-use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, Robot, Table};
+use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, Robot, RobotRow, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -53,16 +54,7 @@ fn few() -> f64 {
 }
 
 /// Quantities that a recording of torques may have.
-const USED: [&str; 8] = [
-    "q",
-    "time",
-    "torque",
-    "current",
-    "trajectory",
-    "usage",
-    "velocity",
-    "temperature",
-];
+const USED: &str = "q, time, torque, current, trajectory, usage, velocity, temperature";
 /// Rows of the table in memory at once.
 const CHUNK: usize = 1 << 16;
 /// More labels than these are no labels: another column is mapped.
@@ -90,21 +82,18 @@ impl Stage for IngestTorques {
             let at = &mut at.at(format!("files[{index}]"));
             check::file(file, at);
             let at = &mut at.at("columns");
-            for name in file.names().into_iter().filter(|name| !USED.contains(name)) {
-                at.at(name).fault(format!(
-                    "is not used of a recording of torques; allowed: {}",
-                    USED.join(", ")
-                ));
+            for name in file.names() {
+                let is_used = USED.split(", ").any(|used| used == name);
+                let message = format!("is not used of a recording of torques; allowed: {USED}");
+                at.at(name).must(is_used, message);
             }
-            let has_drive = file.has("torque") || file.has("current");
-            let missing: Vec<&str> = [
-                ("q", file.has("q")),
-                ("time", file.has("time")),
-                ("torque or current", has_drive),
-            ]
-            .into_iter()
-            .filter_map(|(name, has)| (!has).then_some(name))
-            .collect();
+            let drive = (
+                file.has("torque") || file.has("current"),
+                "torque or current",
+            );
+            let needed = [(file.has("q"), "q"), (file.has("time"), "time"), drive];
+            let missing = needed.into_iter().filter(|(has, _)| !has);
+            let missing: Vec<&str> = missing.map(|(_, name)| name).collect();
             if !missing.is_empty() {
                 at.fault(format!("not mapped: {}", missing.join(", ")));
             }
@@ -112,11 +101,7 @@ impl Stage for IngestTorques {
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
-        self.files
-            .iter()
-            .enumerate()
-            .map(|(index, file)| (format!("files[{index}].file"), file.file.clone()))
-            .collect()
+        super::named_files(&self.files).collect()
     }
 
     fn look(
@@ -131,11 +116,11 @@ impl Stage for IngestTorques {
     fn run(&self, reads: IngestTorquesReads, context: &Context) -> Result<IngestTorquesWrites> {
         Error::if_spec(self.check())?;
         let arm = RobotJoints::of(&reads.robot)?;
-        let labels: Vec<String> = self
+        let labels = self
             .files
             .iter()
-            .map(|file| file.file.0.display().to_string())
-            .collect();
+            .map(|file| file.file.0.display().to_string());
+        let labels: Vec<String> = labels.collect();
         let names = super::names(labels.iter().map(String::as_str));
         let mut rejected = Rejections::new(&names, context)?;
         let mut rows = MotionRows::new(self, &reads.robot, &arm, context)?;
@@ -176,10 +161,8 @@ impl<'a> MotionRows<'a> {
         arm: &'a RobotJoints,
         context: &Context<'a>,
     ) -> Result<Self> {
-        let joints = robot
-            .0
-            .iter()
-            .filter(|row| row.kind == "revolute" || row.kind == "prismatic");
+        let is_joint = |row: &&RobotRow| row.kind == "revolute" || row.kind == "prismatic";
+        let joints = robot.0.iter().filter(is_joint);
         let ratio = joints.map(|row| match (settings.torque_side, row.reduction_ratio) {
             (TorqueSide::Joint, _) => Ok(1.0),
             (TorqueSide::Motor, Some(ratio)) => Ok(ratio),
@@ -190,11 +173,8 @@ impl<'a> MotionRows<'a> {
             }
         });
         let place = |name: &str| {
-            arm.slots
-                .texts()
-                .iter()
-                .position(|text| *text == name)
-                .unwrap_or(usize::MAX)
+            let place = arm.slots.texts().iter().position(|text| *text == name);
+            place.unwrap_or(usize::MAX)
         };
         Ok(Self {
             settings,
@@ -221,18 +201,12 @@ impl<'a> MotionRows<'a> {
         let source = context.services.open(&layout.file)?;
         let size = source.size;
         let mut open = OpenedFile::open(source, layout, self.arm, self.settings.limits)?;
-        let label = open.label.clone();
-        open.remarks()
-            .iter()
-            .for_each(|remark| context.note(format!("{label}: {remark}")));
-        context
-            .services
-            .begin(&format!("reading {label}"), size, "bytes");
-        self.signal_of(&open, &label)?;
-        let given = open.binding().slots();
-        let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);
-        let optional = [has("velocity"), has("temperature")];
-        self.agree(optional, &label)?;
+        let (label, services) = (open.label.clone(), context.services);
+        for remark in open.remarks() {
+            context.note(format!("{label}: {remark}"));
+        }
+        services.begin(&format!("reading {label}"), size, "bytes");
+        self.agree(&open, &label)?;
         self.stretches.begin();
         let (mut refused, mut accepted) = (RefusalCounts::new(), 0);
         while let Some(judged) = open.next()? {
@@ -248,7 +222,7 @@ impl<'a> MotionRows<'a> {
                 }
             }
             if open.row.number.is_multiple_of(STRIDE) {
-                context.services.advance(open.bytes(), "");
+                services.advance(open.bytes(), "");
             }
         }
         let read = open.row.number;
@@ -258,53 +232,44 @@ impl<'a> MotionRows<'a> {
         Ok(reading::intake(name, open.lines(), counts, context))
     }
 
-    /// Which of currents and torques a file has: one of them, and the same in each file.
-    fn signal_of(&mut self, open: &OpenedFile, label: &str) -> Result<()> {
+    /// Every file has the same quantities: one of currents and torques, and the same beside.
+    fn agree(&mut self, open: &OpenedFile, label: &str) -> Result<()> {
         let given = open.binding().slots();
         let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);
+        let wrong = |message: String| Err(Error::data(label, message));
         let signal = match (has("torque"), has("current")) {
             (true, false) => "torque",
             (false, true) => "current",
             (true, true) => {
-                return Err(Error::data(
-                    label,
-                    "has torques and currents; map one of them: the other would not be used",
-                ));
+                return wrong(
+                    "has torques and currents; map one of them: the other would not be used".into(),
+                );
             }
             (false, false) => {
                 let lacks = open.binding().missing.join("; ");
-                return Err(Error::data(
-                    label,
-                    format!("has neither torques nor motor currents of the joints: {lacks}"),
+                return wrong(format!(
+                    "has neither torques nor motor currents of the joints: {lacks}"
                 ));
             }
         };
-        match self.signal.replace(signal) {
-            Some(first) if first != signal => Err(Error::data(
-                label,
-                format!(
-                    "holds {signal}s, the files before hold {first}s; allowed: the same in each"
-                ),
-            )),
-            _ => Ok(()),
+        let first = *self.signal.get_or_insert(signal);
+        if first != signal {
+            return wrong(format!(
+                "holds {signal}s, the files before hold {first}s; allowed: the same in each"
+            ));
         }
-    }
-
-    /// Every file has the same quantities beside.
-    fn agree(&mut self, [velocity, temperature]: [bool; 2], label: &str) -> Result<()> {
         if self.written == 0 && self.chunk.rows() == 0 {
-            self.chunk.velocity = velocity.then(Vec::new);
-            self.chunk.temperature = temperature.then(Vec::new);
+            self.chunk.velocity = has("velocity").then(Vec::new);
+            self.chunk.temperature = has("temperature").then(Vec::new);
         }
-        for (name, first, has) in [
-            ("velocity", self.chunk.velocity.is_some(), velocity),
-            ("temperature", self.chunk.temperature.is_some(), temperature),
+        for (name, first) in [
+            ("velocity", self.chunk.velocity.is_some()),
+            ("temperature", self.chunk.temperature.is_some()),
         ] {
-            if first != has {
-                let which = if has { "has" } else { "lacks" };
-                return Err(Error::data(
-                    label,
-                    format!("{which} the quantity `{name}`, other than the files before"),
+            if first != has(name) {
+                let which = if has(name) { "has" } else { "lacks" };
+                return wrong(format!(
+                    "{which} the quantity `{name}`, other than the files before"
                 ));
             }
         }
@@ -314,84 +279,62 @@ impl<'a> MotionRows<'a> {
     /// Refuses a row without the torque of a joint: columns may be missing, cells may not.
     fn complete(&self, row: &RecordedRow) -> Result<(), RowRefusal> {
         let signal = self.signal.unwrap_or("torque");
-        let blank = |setting: &str| {
-            row.values
-                .get(self.arm.slots.of(setting))
-                .unwrap_or_default()
-                .iter()
-                .position(|value| value.is_nan())
+        let blank = |what: &str| {
+            let mut values = self.values(row, what).iter();
+            let joint = values.position(|value| value.is_nan())?;
+            Some(format!("the {what} of joint {} is blank", joint + 1))
         };
-        let velocity = self
-            .chunk
-            .velocity
-            .as_ref()
-            .and_then(|_| blank("velocity").map(|joint| ("velocity", joint)));
-        let lacking = blank(signal).map(|joint| (signal, joint)).or(velocity);
-        let time = row
-            .values
-            .get(self.arm.slots.time)
-            .is_some_and(|time| time.is_nan());
-        let lacking =
-            lacking.map(|(what, joint)| format!("the {what} of joint {} is blank", joint + 1));
-        match lacking.or_else(|| time.then(|| "time is blank".into())) {
-            Some(detail) => Err(RowRefusal {
-                reason: Reason::Blank,
-                detail,
-            }),
+        let has_velocity = self.chunk.velocity.is_some();
+        let velocity = || has_velocity.then(|| blank("velocity")).flatten();
+        let is_timed = row.values.get(self.arm.slots.time);
+        let time = || {
+            is_timed
+                .filter(|time| time.is_nan())
+                .map(|_| "time is blank".into())
+        };
+        match blank(signal).or_else(velocity).or_else(time) {
+            Some(detail) => refuse(Reason::Blank, detail),
             None => Ok(()),
         }
     }
 
+    fn values<'r>(&self, row: &'r RecordedRow, setting: &str) -> &'r [f64] {
+        let values = row.values.get(self.arm.slots.of(setting));
+        values.unwrap_or_default()
+    }
+
     fn push(&mut self, row: &RecordedRow, label: &str, context: &Context) -> Result<()> {
-        let values = |setting: &str| {
-            row.values
-                .get(self.arm.slots.of(setting))
-                .unwrap_or_default()
-        };
-        let (q, time) = (
-            values("q"),
-            row.values
-                .get(self.arm.slots.time)
-                .copied()
-                .unwrap_or(f64::NAN),
-        );
+        let faulty = |message: String| Error::data(format!("{label}:{}", row.line), message);
+        let [q, velocity, temperature] =
+            ["q", "velocity", "temperature"].map(|setting| self.values(row, setting));
+        let signal = self.values(row, self.signal.unwrap_or("torque"));
+        let time = row.values.get(self.arm.slots.time).copied();
+        let time = time.unwrap_or(f64::NAN);
         let trajectory = row.texts.get(self.trajectory).map_or("", String::as_str);
-        let stretch = self
-            .stretches
-            .next(trajectory, time, q, row.line)
-            .map_err(|message| Error::data(format!("{label}:{}", row.line), message))?;
-        if let Some(warning) = self.stretches.warning(label) {
-            context.warn(warning);
+        let stretch = self.stretches.next(trajectory, time, q, row.line);
+        let stretch = stretch.map_err(faulty)?;
+        context.warn_each(self.stretches.warning(label));
+        for (channel, value) in self.channels.iter_mut().zip(signal) {
+            channel.push(*value);
         }
-        let signal = values(self.signal.unwrap_or("torque"));
-        self.channels
-            .iter_mut()
-            .zip(signal)
-            .for_each(|(channel, value)| channel.push(*value));
         let chunk = &mut self.chunk;
         chunk.time.push(time);
         chunk.trajectory.push(stretch);
         chunk.q.extend_from_slice(q);
         if self.signal == Some("current") {
-            chunk
-                .current
-                .get_or_insert_default()
-                .extend_from_slice(signal);
+            let all = chunk.current.get_or_insert_default();
+            all.extend_from_slice(signal);
         } else {
-            let joint_side = signal
-                .iter()
-                .zip(&self.ratio)
-                .map(|(torque, ratio)| torque * ratio);
+            let joint_side = signal.iter().zip(&self.ratio);
+            let joint_side = joint_side.map(|(torque, ratio)| torque * ratio);
             chunk.torque.get_or_insert_default().extend(joint_side);
         }
-        chunk
-            .velocity
-            .iter_mut()
-            .for_each(|all| all.extend_from_slice(values("velocity")));
-        chunk
-            .temperature
-            .iter_mut()
-            .for_each(|all| all.extend_from_slice(values("temperature")));
+        for (all, more) in [
+            (&mut chunk.velocity, velocity),
+            (&mut chunk.temperature, temperature),
+        ] {
+            all.iter_mut().for_each(|all| all.extend_from_slice(more));
+        }
         let usage = row.texts.get(self.usage).map_or("", String::as_str);
         let known = chunk.usages.iter().position(|known| known == usage);
         let usage = match (usage.is_empty(), known) {
@@ -401,7 +344,7 @@ impl<'a> MotionRows<'a> {
                 let message = format!(
                     "`usage` has more than {MOST_LABELS} labels; allowed: such as fit and validate"
                 );
-                return Err(Error::data(format!("{label}:{}", row.line), message));
+                return Err(faulty(message));
             }
             (false, None) => {
                 chunk.usages.push(usage.into());
@@ -440,10 +383,7 @@ impl<'a> MotionRows<'a> {
     ) -> Result<()> {
         let share = self.settings.max_rejected_fraction;
         if read == 0 {
-            return Err(Error::data(
-                label,
-                "has a header but no data row; allowed: at least one",
-            ));
+            return Err(Error::data(label, NO_ROW));
         }
         if accepted > 0 && (read - accepted) as f64 <= share * read as f64 {
             return Ok(());
@@ -462,29 +402,27 @@ impl<'a> MotionRows<'a> {
 
     fn finish(mut self, context: &Context) -> Result<StreamedTable<ArmMotion>> {
         let (signal, rows) = (self.signal.unwrap_or("torque"), self.written);
-        let dead: Vec<Fault> = (1..)
+        let named = (1..)
             .zip(&self.channels)
-            .filter_map(|(joint, channel)| Some((joint, channel.constant()?)))
-            .map(|(joint, value)| {
-                let message = format!("the {signal} of joint {joint} is {value} in each of {rows} rows: a dead channel");
-                Fault::new(format!("table motion, {signal} of joint {joint}"), message)
-            })
-            .collect();
-        Error::if_data(dead)?;
-        for (joint, channel) in (1..).zip(&self.channels) {
-            if let Some(clipped) = channel.clipped() {
-                context.warn(format!(
-                    "the {signal} of joint {joint} {clipped}: saturated?"
-                ));
-            }
+            .map(|(joint, channel)| (format!("{signal} of joint {joint}"), channel));
+        let named: Vec<(String, &TorqueChannel)> = named.collect();
+        let dead = named.iter().filter_map(|(name, channel)| {
+            let value = channel.constant()?;
+            let message = format!("the {name} is {value} in each of {rows} rows: a dead channel");
+            Some(Fault::new(format!("table motion, {name}"), message))
+        });
+        Error::if_data(dead.collect())?;
+        for (name, channel) in &named {
+            let clipped = channel.clipped();
+            context.warn_each(clipped.map(|clipped| format!("the {name} {clipped}: saturated?")));
         }
         if self.chunk.rows() > 0 || self.written == 0 {
             self.flush()?;
         }
         context.note(format!(
             "{} of {signal}s, {}",
-            counted(self.written as u64, "row"),
-            counted(self.stretches.count() as u64, "stretch").replace("stretchs", "stretches")
+            counted(self.written, "row"),
+            counted(self.stretches.count(), "stretch")
         ));
         Ok(StreamedTable::new(self.sink.finish()?))
     }
@@ -540,28 +478,25 @@ pub(super) struct TorqueChannel {
 impl TorqueChannel {
     pub(super) fn push(&mut self, value: f64) {
         self.rows += 1;
-        self.low
-            .push(value, self.low.value.is_none_or(|low| value < low));
-        self.high
-            .push(value, self.high.value.is_none_or(|high| value > high));
+        let is_low = self.low.value.is_none_or(|low| value < low);
+        let is_high = self.high.value.is_none_or(|high| value > high);
+        self.low.push(value, is_low);
+        self.high.push(value, is_high);
     }
 
     /// The one value of a channel that never changes.
     pub(super) fn constant(&self) -> Option<f64> {
-        self.low
-            .value
-            .filter(|low| Some(*low) == self.high.value && self.rows >= FEWEST)
+        let is_one = self.low.value == self.high.value && self.rows >= FEWEST;
+        self.low.value.filter(|_| is_one)
     }
 
     /// Where it stands at the ends of its range, in words.
     pub(super) fn clipped(&self) -> Option<String> {
         let held = self.low.held + self.high.held;
-        let (low, high) = self.low.value.zip(self.high.value)?;
-        (held as f64 > SHARE * self.rows as f64 && self.rows >= FEWEST).then(|| {
-            format!(
-                "stands at {low} or {high}, the ends of its range, for {held} of {} rows",
-                self.rows
-            )
+        let (low, high, rows) = (self.low.value?, self.high.value?, self.rows);
+        let stands = held as f64 > SHARE * rows as f64 && rows >= FEWEST;
+        stands.then(|| {
+            format!("stands at {low} or {high}, the ends of its range, for {held} of {rows} rows")
         })
     }
 }

@@ -33,14 +33,13 @@ pub(super) fn judge(all: &Measurement, context: &Context) -> Result<()> {
         faults.extend(fault);
     }
     // What a file lacks is said once, not by every file that is joined to it.
-    let mut seen = Vec::new();
-    faults.retain(|fault| {
-        !seen.contains(fault) && {
-            seen.push(fault.clone());
-            true
+    let mut once: Vec<Fault> = Vec::new();
+    for fault in faults {
+        if !once.contains(&fault) {
+            once.push(fault);
         }
-    });
-    Error::if_data(faults)
+    }
+    Error::if_data(once)
 }
 
 /// Rows that belong together by their order alone are as many in each file, whatever became of them.
@@ -84,10 +83,9 @@ fn implausible(
         // Joints that turn this far are in the unit that is declared, whatever they are counted from.
         && (arm.prismatic.get(joint) == Some(&true) || unit != "deg" && rows.largest_turn() < FAR)
     {
-        let degrees = if unit == "deg" {
-            ""
-        } else {
-            "; if the file holds degrees, say `unit: deg`"
+        let degrees = match unit {
+            "deg" => "",
+            _ => "; if the file holds degrees, say `unit: deg`",
         };
         let message = format!(
             "{} of {judged} rows are beyond the robot's joint limits, here {}; allowed: the unit and order of columns that the file has, or \
@@ -101,11 +99,8 @@ fn implausible(
 }
 
 fn too_many_rejected(all: &Measurement, index: usize) -> Option<Fault> {
-    let (files, rows, allowed) = (
-        &all.files,
-        &all.files[index],
-        all.settings.max_rejected_fraction,
-    );
+    let (files, rows) = (&all.files, &all.files[index]);
+    let allowed = all.settings.max_rejected_fraction;
     let (read, accepted) = (rows.count() as u64, rows.count_used());
     let rejected = read - accepted;
     if accepted > 0 && rejected as f64 <= allowed * read as f64 {
@@ -118,10 +113,8 @@ fn too_many_rejected(all: &Measurement, index: usize) -> Option<Fault> {
             }
             _ => None,
         });
-        (
-            lines.clone().count() as u64,
-            lines.min().unwrap_or_default(),
-        )
+        let count = lines.clone().count() as u64;
+        (count, lines.min().unwrap_or_default())
     };
     let ((ids, first_id), (copies, first_copy)) = (duplicates(false), duplicates(true));
     let unmatched = rows.given_up.len() as u64 - ids - copies;
@@ -135,61 +128,44 @@ fn too_many_rejected(all: &Measurement, index: usize) -> Option<Fault> {
     for (row, refusal) in &rows.refused {
         tally(&mut counts, rows.line(*row), refusal);
     }
-    let without_partner = partner.map_or_else(
-        || "no partner in another file".to_string(),
-        |other| {
+    let without_partner = match partner {
+        None => "no partner in another file".to_string(),
+        Some(other) => {
             let by_id = matches!(all.settings.join, Some(Join::Id {}));
             let unlike = by_id.then(|| unlike(all, [index, other])).flatten();
             let unlike = unlike.unwrap_or_default();
             format!("no partner in {}{unlike}", files[other].label)
-        },
-    );
-    for (reason, rows, first_line, detail) in [
-        (
-            Reason::DuplicateId,
-            ids,
-            first_id,
-            "point ids that occur more than once",
-        ),
-        (Reason::DuplicateRow, copies, first_copy, "duplicate rows"),
-        (Reason::Unmatched, unmatched, 0, &without_partner),
-    ] {
-        if rows > 0 {
-            let first_detail = detail.to_string();
-            let count = RefusalCount {
-                rows,
-                first_line,
-                first_detail,
-            };
-            counts.insert(reason, count);
         }
-    }
+    };
+    let mut count = |reason: Reason, rows: u64, first_line: u64, detail: &str| {
+        let count = RefusalCount {
+            rows,
+            first_line,
+            first_detail: detail.into(),
+        };
+        counts.extend((rows > 0).then_some((reason, count)));
+    };
+    let of_ids = "point ids that occur more than once";
+    count(Reason::DuplicateId, ids, first_id, of_ids);
+    count(Reason::DuplicateRow, copies, first_copy, "duplicate rows");
+    count(Reason::Unmatched, unmatched, 0, &without_partner);
     let mut reasons: Vec<_> = counts.iter().collect();
     reasons.sort_by_key(|(_, count)| std::cmp::Reverse(count.rows));
-    let listed: Vec<String> = reasons
-        .iter()
-        .map(|(reason, count)| {
-            let place = if count.first_line == 0 {
-                String::new()
-            } else {
-                format!("line {}: ", count.first_line)
-            };
-            format!(
-                "{} {} ({place}{})",
-                count.rows,
-                reason.word(),
-                count.first_detail
-            )
-        })
-        .collect();
+    let listed = reasons.iter().map(|(reason, count)| {
+        let place = match count.first_line {
+            0 => String::new(),
+            line => format!("line {line}: "),
+        };
+        let (rows, word) = (count.rows, reason.word());
+        format!("{rows} {word} ({place}{})", count.first_detail)
+    });
+    let listed: Vec<String> = listed.collect();
     let share = match (accepted, cut) {
         (0, _) => "no row is left".to_string(),
         (_, Some(_)) => {
+            let (matched, label) = (read - unmatched, &rows.label);
             format!(
-                "has partners for {} of the {} rows of {}, {rejected} of which are rejected",
-                read - unmatched,
-                read,
-                rows.label
+                "has partners for {matched} of the {read} rows of {label}, {rejected} of which are rejected"
             )
         }
         _ => format!("{rejected} of {read} rows are rejected"),
@@ -202,24 +178,19 @@ fn too_many_rejected(all: &Measurement, index: usize) -> Option<Fault> {
         }
         _ => rows.label.clone(),
     };
-    Some(Fault::new(
-        place,
-        format!(
-            "{share}; allowed: up to {allowed} % (`max_rejected_fraction`); reasons: {}{}",
-            listed.join("; "),
-            smaller(rows, &all.settings.files[index].columns)
-        ),
-    ))
+    let smaller = smaller(rows, &all.settings.files[index].columns);
+    let message = format!(
+        "{share}; allowed: up to {allowed} % (`max_rejected_fraction`); reasons: {}{smaller}",
+        listed.join("; ")
+    );
+    Some(Fault::new(place, message))
 }
 
 /// What points that are too large for their unit usually are, where most are.
 fn smaller(rows: &FileRows, columns: &Columns) -> &'static str {
     let most = 2 * out_of_range(rows) > rows.count() as u64;
-    match columns
-        .number("x")
-        .filter(|_| most)
-        .and_then(|x| x.unit.as_deref())
-    {
+    let x = columns.number("x").filter(|_| most);
+    match x.and_then(|x| x.unit.as_deref()) {
         Some("mm") => "; if the file holds micrometres, say `unit: um`",
         Some("m") => "; if the file holds millimetres, say `unit: mm`",
         _ => "",
@@ -231,31 +202,25 @@ fn unlike(all: &Measurement, files: [usize; 2]) -> Option<String> {
     let without_partner = |file: usize| -> Vec<&str> {
         let rows = &all.files[file];
         let named = rows.usable().filter(|row| !rows.id(*row).is_empty());
-        let alone = named
-            .take(EXAMPLES)
-            .filter(|row| matches!(rows.given_up.get(row), Some(GivenUp::Unmatched { .. })));
+        let is_alone =
+            |row: &usize| matches!(rows.given_up.get(row), Some(GivenUp::Unmatched { .. }));
+        let alone = named.take(EXAMPLES).filter(is_alone);
         alone.map(|row| rows.id(row)).collect()
     };
     let [here, there] = files.map(without_partner);
     // Of three files a row may lack its partner in the third.
-    let (ours, known): (BTreeSet<&str>, BTreeSet<&str>) = (
-        here.iter().copied().collect(),
-        there.iter().copied().collect(),
-    );
+    let [ours, known] = [&here, &there].map(|ids| ids.iter().copied().collect::<BTreeSet<&str>>());
     let by_case: BTreeMap<String, &str> = there.iter().map(|id| (id.to_lowercase(), *id)).collect();
     let mut strangers = here.iter().filter(|id| !known.contains(*id));
-    if let Some((one, other)) = strangers
-        .clone()
-        .find_map(|id| Some((*id, *by_case.get(&id.to_lowercase())?)))
-    {
+    let cased = strangers.clone();
+    let mut cased = cased.filter_map(|id| Some((*id, *by_case.get(&id.to_lowercase())?)));
+    if let Some((one, other)) = cased.next() {
         return Some(format!(
             ", e.g. `{one}` here and `{other}` there: ids that differ in upper and lower case are different ids"
         ));
     }
-    let (one, other) = (
-        strangers.next()?,
-        there.iter().find(|id| !ours.contains(*id))?,
-    );
+    let one = strangers.next()?;
+    let other = there.iter().find(|id| !ours.contains(*id))?;
     Some(format!(
         ", e.g. `{one}` here and `{other}` there: ids must be the same in both files"
     ))
@@ -279,18 +244,13 @@ fn warn(
             if 2 * rows.beyond.rows > rows.count_usable() { COUNTED } else { "" }
         ));
     }
-    let degrees = columns
-        .joint("q")
-        .is_some_and(|q| q.unit.as_deref() == Some("deg"));
-    if degrees
-        && rows.largest > 0.0
-        && rows.largest.to_degrees() < SMALL_IN_DEGREES
-        && rows.count_usable() >= 10
-    {
+    let unit = columns.joint("q").and_then(|q| q.unit.as_deref());
+    let largest = rows.largest.to_degrees();
+    let is_small = largest > 0.0 && largest < SMALL_IN_DEGREES;
+    if unit == Some("deg") && is_small && rows.count_usable() >= 10 {
         context.warn(format!(
-            "{}: no joint is ever beyond {:.2} deg; if the file holds rad, say `unit: rad`",
-            rows.label,
-            rows.largest.to_degrees()
+            "{}: no joint is ever beyond {largest:.2} deg; if the file holds rad, say `unit: rad`",
+            rows.label
         ));
     }
 }
@@ -318,14 +278,11 @@ pub(super) fn no_copies(read: &[Measurement]) -> Result<()> {
     let all: Vec<(String, &Measurement, &FileRows)> = all.collect();
     let mut faults = Vec::new();
     for (k, (place, one, rows)) in all.iter().enumerate() {
-        let twice = |(_, of_other, other): &&(String, &Measurement, &FileRows)| {
-            let rows_twice = used_twice([*one, *of_other], [*rows, *other]);
-            (rows_twice > 0).then_some(rows_twice)
-        };
-        if let Some((other, rows_twice)) = all[..k]
-            .iter()
-            .find_map(|other| Some((other, twice(&other)?)))
-        {
+        let mut others = all[..k].iter().map(|other| {
+            let rows_twice = used_twice([*one, other.1], [*rows, other.2]);
+            (other, rows_twice)
+        });
+        if let Some((other, rows_twice)) = others.find(|(_, rows_twice)| *rows_twice > 0) {
             let message = format!(
                 "`{}` measured what `{}` of `{}` did, and {} would be used twice: copies look like perfect repeatability; name the                  file of another measurement, or take this one out",
                 rows.label,

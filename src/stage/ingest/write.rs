@@ -1,5 +1,6 @@
 //! The recording in chunks, and every row that is not part of it with its reason.
 
+use super::columns::FileLayout;
 use super::later::Continuation;
 use super::noise::NoiseSlots;
 use super::pair::{JoinedRow, Measurement};
@@ -27,9 +28,8 @@ pub(super) fn write(
 ) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
     let leading = all.iter().flat_map(|one| one.leading());
     let rows = leading.map(FileRows::count_used).sum();
-    context
-        .services
-        .begin("writing the recording", Some(rows), "rows");
+    let services = context.services;
+    services.begin("writing the recording", Some(rows), "rows");
     let mut recording = RecordingChunks::new(all, context)?;
     let mut rejected = Rejections::new(names, context)?;
     let gaps = std::iter::once(None).chain(gaps.iter().map(Some));
@@ -48,7 +48,7 @@ pub(super) fn write(
                     None if leads => {
                         recording.push(one, file, row)?;
                         if recording.written.is_multiple_of(STRIDE) {
-                            context.services.advance(recording.written, "");
+                            services.advance(recording.written, "");
                         }
                     }
                     None => {}
@@ -104,11 +104,8 @@ impl<'a> RecordingChunks<'a> {
         };
         let slots = &first.arm.slots;
         let mut has = vec![false; slots.count];
-        for slot in all
-            .iter()
-            .flat_map(|one| &one.files)
-            .flat_map(|rows| &rows.slots)
-        {
+        let read = all.iter().flat_map(|one| &one.files);
+        for slot in read.flat_map(|rows| &rows.slots) {
             has[*slot] = true;
         }
         if first.settings.motion.is_some() {
@@ -117,14 +114,10 @@ impl<'a> RecordingChunks<'a> {
         let noise = NoiseSlots::new(slots, first.settings.instrument);
         let files = &first.settings.files;
         let points = || KINDS[..1].iter().flat_map(|kind| kind.columns(Part::Value));
-        let measured = files
-            .iter()
-            .any(|file| points().any(|column| file.has(column.setting)));
-        if measured {
-            noise
-                .sigma()
-                .into_iter()
-                .for_each(|place| has[place] = true);
+        let has_points = |file: &FileLayout| points().any(|column| file.has(column.setting));
+        let measured = files.iter().any(has_points);
+        for place in noise.sigma() {
+            has[place] |= measured;
         }
         // Every recording has points and the names of its rows.
         let always: Vec<&str> = points().map(|column| column.setting).collect();
@@ -134,11 +127,8 @@ impl<'a> RecordingChunks<'a> {
         };
         let mut numbers = Vec::new();
         for (column, places) in slots.numbers() {
-            for ((name, unit), place) in column
-                .columns(&first.arm.prismatic)
-                .into_iter()
-                .zip(places.clone())
-            {
+            let stored = column.columns(&first.arm.prismatic).into_iter();
+            for ((name, unit), place) in stored.zip(places.clone()) {
                 if has[place] || always.contains(&column.setting) {
                     numbers.push(Stored {
                         name,
@@ -149,6 +139,9 @@ impl<'a> RecordingChunks<'a> {
                 }
             }
         }
+        let moving = files.iter().position(|file| file.columns.has("q"));
+        let targets = files.iter().filter_map(|file| file.targets.as_ref());
+        let widths = targets.map(|targets| targets.columns.len() as i64);
         Ok(Self {
             sink: context.services.sink(Recording::KIND)?,
             sequence: Vec::new(),
@@ -159,20 +152,12 @@ impl<'a> RecordingChunks<'a> {
             noise,
             sources: measured.then(TextCells::default),
             inferred: 0,
-            moving: files
-                .iter()
-                .position(|file| file.columns.has("q"))
-                .unwrap_or_default(),
+            moving: moving.unwrap_or_default(),
             carried: 0.0,
             rows: Continuation::default(),
             written: 0,
             before: 0,
-            widest: files
-                .iter()
-                .filter_map(|file| file.targets.as_ref())
-                .map(|targets| targets.columns.len() as i64)
-                .max()
-                .unwrap_or(1),
+            widest: widths.max().unwrap_or(1),
         })
     }
     /// A used row of a file that leads.
@@ -189,31 +174,27 @@ impl<'a> RecordingChunks<'a> {
         let mut ids = parts().rev().map(|(rows, row)| rows.id(row));
         let id = ids.find(|id| !id.is_empty());
         let text = |place: usize| {
-            let mut texts = parts()
-                .rev()
-                .filter_map(|(rows, row)| rows.text(row, place));
-            texts.next().unwrap_or_default()
+            let mut parts = parts().rev();
+            let text = parts.find_map(|(rows, row)| rows.text(row, place));
+            text.unwrap_or_default()
         };
         self.carry(all, &joined);
         let number = self.before + row + 1;
         let sequence = rows.sequence(row).unwrap_or(number as i64);
-        let (sequence, time) =
-            self.rows
-                .next(sequence, self.merged[slots.time])
-                .map_err(|(sequence, last)| {
-                    // Within a file such a row is refused: this is the first row of a file that continues another.
-                    let message = format!(
-                        "sequence {sequence} does not follow {last}, the last of the file before"
-                    );
-                    Error::data(format!("{}:{}", rows.label, rows.line(row)), message)
-                })?;
+        let next = self.rows.next(sequence, self.merged[slots.time]);
+        let (sequence, time) = next.map_err(|(sequence, last)| {
+            // Within a file such a row is refused: this is the first row of a file that continues another.
+            let message =
+                format!("sequence {sequence} does not follow {last}, the last of the file before");
+            Error::data(format!("{}:{}", rows.label, rows.line(row)), message)
+        })?;
         self.merged[slots.time] = time;
         let unnamed = || {
             let mut names = slots.kinds.iter().filter_map(|kind| kind.name).map(text);
-            names.find(|name| !name.is_empty()).map_or_else(
-                || format!("row {number}"),
-                |name| format!("{name} row {}", row + 1),
-            )
+            match names.find(|name| !name.is_empty()) {
+                None => format!("row {number}"),
+                Some(name) => format!("{name} row {}", row + 1),
+            }
         };
         let id = id.map_or_else(|| unnamed().into(), Cow::Borrowed);
         let Some(points) = all.points(&joined) else {
@@ -221,19 +202,14 @@ impl<'a> RecordingChunks<'a> {
         };
         // Numbered through: the targets of a row follow each other.
         let first = sequence.saturating_sub(1).saturating_mul(self.widest);
-        let (merged, of_target) = (
-            self.merged.clone(),
-            self.texts.iter().position(|(name, _)| *name == "target"),
-        );
+        let merged = self.merged.clone();
+        let of_target = self.texts.iter().position(|(name, _)| *name == "target");
         for (at, target, point) in points {
             self.merged.clone_from(&merged);
             self.merged[slots.point.clone()].copy_from_slice(&point);
-            let text = |place| {
-                if Some(place) == of_target {
-                    target
-                } else {
-                    text(place)
-                }
+            let text = |place| match Some(place) == of_target {
+                true => target,
+                false => text(place),
             };
             self.one(first.saturating_add(at), &id, text)?;
         }
@@ -291,34 +267,20 @@ impl<'a> RecordingChunks<'a> {
         }
     }
     fn flush(&mut self) -> Result<()> {
-        let texts = self
-            .texts
-            .iter_mut()
-            .filter_map(|(name, texts)| Some((*name, texts.as_mut()?.take())));
+        let texts = self.texts.iter_mut();
+        let texts = texts.filter_map(|(name, texts)| Some((*name, texts.as_mut()?.take())));
         let texts = texts.chain(self.sources.as_mut().map(|all| (SIGMA_SOURCE, all.take())));
         // As much again follows a whole chunk.
-        let room = if self.sequence.len() >= CHUNK {
-            CHUNK
-        } else {
-            0
+        let room = match self.sequence.len() >= CHUNK {
+            true => CHUNK,
+            false => 0,
         };
-        let numbers = self.numbers.iter_mut().map(
-            |Stored {
-                 name, unit, values, ..
-             }| {
-                (
-                    name.clone(),
-                    *unit,
-                    std::mem::replace(values, Vec::with_capacity(room)).into_iter(),
-                )
-            },
-        );
-        let frame = recording_frame(
-            std::mem::take(&mut self.sequence),
-            self.ids.take(),
-            texts,
-            numbers,
-        )?;
+        let numbers = self.numbers.iter_mut().map(|stored| {
+            let values = std::mem::replace(&mut stored.values, Vec::with_capacity(room));
+            (stored.name.clone(), stored.unit, values.into_iter())
+        });
+        let sequence = std::mem::take(&mut self.sequence);
+        let frame = recording_frame(sequence, self.ids.take(), texts, numbers)?;
         self.sink.push(frame)
     }
     fn finish(mut self, context: &Context) -> Result<StreamedTable<Recording>> {

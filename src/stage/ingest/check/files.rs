@@ -20,7 +20,7 @@ fn needed(settings: &Ingest) -> Vec<&'static str> {
         kind.telling().any(|column| columns.has(column.setting))
     };
     let other = |file: &FileLayout| others.iter().any(|kind| is_mapped(kind, &file.columns));
-    let axes = match &settings.axes {
+    let axes: Vec<&str> = match &settings.axes {
         Some(axes) => axes.iter().map(|axis| axis.name()).collect(),
         None if settings.files.iter().any(other) => Vec::new(),
         None => first
@@ -40,31 +40,25 @@ fn axes(settings: &Ingest, at: &mut Place) {
             .fault("no axis; name those that were measured, e.g. [z], or leave `axes` out");
     }
     for (k, axis) in axes.iter().enumerate() {
-        if axes[..k].contains(axis) {
-            at.at("axes")
-                .item(k)
-                .fault(format!("`{}` is named twice", axis.name()));
-        }
+        let message = format!("`{}` is named twice", axis.name());
+        let is_new = !axes[..k].contains(axis);
+        at.at(format!("axes[{k}]")).must(is_new, message);
     }
     let names: Vec<&str> = axes.iter().map(|axis| axis.name()).collect();
     let all = KINDS[..1].iter().flat_map(|kind| kind.columns(Part::Value));
-    let left: Vec<&str> = all
-        .map(|column| column.setting)
-        .filter(|name| !names.contains(name))
-        .collect();
+    let all = all.map(|column| column.setting);
+    let left: Vec<&str> = all.filter(|name| !names.contains(name)).collect();
     for (index, file) in settings.files.iter().enumerate() {
-        let mut files = at.at("files");
-        let at = &mut files.item(index);
+        let at = &mut at.at(format!("files[{index}]"));
         for name in left.iter().filter(|name| file.columns.has(name)) {
             at.at("columns").at(name).fault(format!(
                 "`axes: [{}]` says that {name} was not measured; take `{name}` out of `columns`, or add it to `axes`",
                 names.join(", ")
             ));
         }
-        if file.targets.is_some() && !left.is_empty() {
-            at.at("targets")
-                .fault("the points of targets have all axes; leave `axes` out");
-        }
+        let possible = file.targets.is_none() || left.is_empty();
+        let message = "the points of targets have all axes; leave `axes` out";
+        at.at("targets").must(possible, message);
     }
 }
 
@@ -84,9 +78,8 @@ fn together(settings: &Ingest, at: &mut Place) {
     };
     if let Join::Append {} = join {
         for (index, file) in files.iter().enumerate() {
-            let mut list = at.at("files");
-            let mut at = list.item(index);
-            complete(std::slice::from_ref(file), &needed, &mut at.at("columns"));
+            let at = &mut at.at(format!("files[{index}].columns"));
+            complete(std::slice::from_ref(file), &needed, at);
         }
         return;
     }
@@ -107,10 +100,9 @@ fn together(settings: &Ingest, at: &mut Place) {
                 at.at(name).fault("mapped in two files; map it in one");
             }
         }
-        if file.columns.has("sequence") {
-            at.at("sequence")
-                .fault("rows keep the order of the first file; map it there");
-        }
+        let message = "rows keep the order of the first file; map it there";
+        at.at("sequence")
+            .must(!file.columns.has("sequence"), message);
     }
     for (index, file) in files.iter().enumerate() {
         let Some(key) = key else { continue };
@@ -129,12 +121,11 @@ fn together(settings: &Ingest, at: &mut Place) {
             tolerance_s,
             offset_s,
         } => {
-            if !(tolerance_s.is_finite() && *tolerance_s >= 0.0) {
-                at.at("join.tolerance_s").fault("allowed: 0 and above");
-            }
-            if !offset_s.is_finite() {
-                at.at("join.offset_s").fault("not a finite number");
-            }
+            let possible = tolerance_s.is_finite() && *tolerance_s >= 0.0;
+            at.at("join.tolerance_s")
+                .must(possible, "allowed: 0 and above");
+            at.at("join.offset_s")
+                .must(offset_s.is_finite(), "not a finite number");
         }
         _ => {}
     }
@@ -142,10 +133,9 @@ fn together(settings: &Ingest, at: &mut Place) {
 
 fn is_optional(file: &FileLayout, key: &str) -> bool {
     let (id, time) = (file.columns.text("point_id"), file.columns.number("time"));
-    if key == "time" {
-        time.is_some_and(|time| time.optional || time.column.is_none())
-    } else {
-        id.is_some_and(|id| id.optional)
+    match key {
+        "time" => time.is_some_and(|time| time.optional || time.column.is_none()),
+        _ => id.is_some_and(|id| id.optional),
     }
 }
 
@@ -154,16 +144,14 @@ fn motion(settings: &Ingest, at: &mut Place) {
     let Some(motion) = &settings.motion else {
         return;
     };
-    if !motion.gap_s.is_none_or(|gap| gap > 0.0 && gap.is_finite()) {
-        at.at("motion.gap_s").fault("allowed: above 0, e.g. 0.1");
-    }
-    if !(motion.over_s >= 0.0 && motion.over_s.is_finite()) {
-        at.at("motion.over_s")
-            .fault("allowed: 0 and above, e.g. 0.02");
-    }
-    if !motion.later_s.is_finite() {
-        at.at("motion.later_s").fault("not a finite number");
-    }
+    let possible = motion.gap_s.is_none_or(|gap| gap > 0.0 && gap.is_finite());
+    at.at("motion.gap_s")
+        .must(possible, "allowed: above 0, e.g. 0.1");
+    let possible = motion.over_s >= 0.0 && motion.over_s.is_finite();
+    at.at("motion.over_s")
+        .must(possible, "allowed: 0 and above, e.g. 0.02");
+    at.at("motion.later_s")
+        .must(motion.later_s.is_finite(), "not a finite number");
     let columns = || settings.files.iter().map(|file| &file.columns);
     let given = columns().any(|columns| columns.has("velocity"));
     let timed = |columns: &Columns| {

@@ -35,20 +35,18 @@ pub(super) fn file(file: &FileLayout, at: &mut Place) {
             file.delimiter
         ));
     }
-    if file.comment.as_deref() == Some("") {
-        at.at("comment")
-            .fault("an empty text; every line would be a comment");
-    }
+    let has_mark = file.comment.as_deref() != Some("");
+    let message = "an empty text; every line would be a comment";
+    at.at("comment").must(has_mark, message);
     if file.header_in_comment && (file.comment.is_none() || !file.header) {
         at.at("header_in_comment").fault(match file.header {
             true => "say how a comment begins, e.g. `comment: \"//\"`",
             false => "there is no header",
         });
     }
-    if !file.header && file.skip_below_header > 0 {
-        at.at("skip_below_header")
-            .fault("there is no header; use `skip`");
-    }
+    let possible = file.header || file.skip_below_header == 0;
+    let message = "there is no header; use `skip`";
+    at.at("skip_below_header").must(possible, message);
     if let Some(targets) = &file.targets {
         wide(targets, file, at);
     }
@@ -58,10 +56,8 @@ pub(super) fn file(file: &FileLayout, at: &mut Place) {
     mapped(file, &mut at.at("columns"));
     twice(file, at);
     let (columns, at) = (&file.columns, &mut at.at("columns"));
-    if columns
-        .number("distance")
-        .is_some_and(|distance| distance.value == Some(0.0))
-    {
+    let distance = columns.number("distance").and_then(|mapped| mapped.value);
+    if distance == Some(0.0) {
         at.at("distance").fault(
             "a distance of 0 to an anchor has no direction; a ball that lies in a socket is `socket: {column: ...}` with \
              `sigma_socket`",
@@ -71,9 +67,8 @@ pub(super) fn file(file: &FileLayout, at: &mut Place) {
         measured(*kind, columns, at);
     }
     // Each group at its first column.
-    for group in
-        recording_columns().filter(|column| column.together.first() == Some(&column.setting))
-    {
+    let is_first = |column: &&DeclaredColumn| column.together.first() == Some(&column.setting);
+    for group in recording_columns().filter(is_first) {
         let all = group.together;
         let mapped = all.iter().filter(|setting| columns.has(setting)).count();
         if mapped > 0 && mapped < all.len() {
@@ -91,31 +86,21 @@ fn mapped(file: &FileLayout, at: &mut Place) {
         column(Some(&counted.column), file, &mut at.at(declared.setting));
     }
     for (declared, mapped) in columns.numbers() {
-        scalar(
-            mapped,
-            declared.quantity,
-            file,
-            &mut at.at(declared.setting),
-        );
+        let at = &mut at.at(declared.setting);
+        scalar(mapped, declared.quantity, file, at);
     }
     for (declared, mapped, _, coverage) in columns.uncertainties() {
         let at = &mut at.at(declared.setting);
         let given = [mapped.column.is_some(), mapped.value.is_some()];
         one_of(given, "`column` or `value`", at);
         column(mapped.column.as_ref(), file, at);
-        unit(
-            mapped.unit.as_deref(),
-            declared.quantity,
-            &mut at.at("unit"),
-        );
-        if !(coverage > 0.0 && coverage.is_finite()) {
-            at.at("coverage_factor")
-                .fault("allowed: above 0, e.g. 2 for 95 %");
-        }
+        let symbol = mapped.unit.as_deref();
+        unit(symbol, declared.quantity, &mut at.at("unit"));
         let is_allowed = |value: f64| value > 0.0 && value.is_finite();
-        if !mapped.value.is_none_or(is_allowed) {
-            at.at("value").fault("allowed: above 0");
-        }
+        let message = "allowed: above 0, e.g. 2 for 95 %";
+        at.at("coverage_factor").must(is_allowed(coverage), message);
+        let possible = mapped.value.is_none_or(is_allowed);
+        at.at("value").must(possible, "allowed: above 0");
     }
     for (declared, mapped) in columns.joints() {
         joints(declared, mapped, file, &mut at.at(declared.setting));
@@ -128,15 +113,16 @@ fn mapped(file: &FileLayout, at: &mut Place) {
 /// Columns of several targets in a row.
 fn wide(targets: &WideTargets, file: &FileLayout, at: &mut Place) {
     let others = file.columns.names();
-    for name in others.iter().filter(|name| HELD.contains(name)) {
-        at.at("columns")
-            .at(name)
-            .fault("also in `targets`; map it in one of them");
-    }
-    for name in others.iter().filter(|name| SIMULATED.contains(name)) {
-        at.at("columns")
-            .at(name)
-            .fault("one simulated point and several targets; put each target in a separate file");
+    for (group, message) in [
+        (&HELD[..], "also in `targets`; map it in one of them"),
+        (
+            &SIMULATED,
+            "one simulated point and several targets; put each target in a separate file",
+        ),
+    ] {
+        for name in others.iter().filter(|name| group.contains(name)) {
+            at.at("columns").at(name).fault(message);
+        }
     }
     let at = &mut at.at("targets");
     if targets.columns.len() < 2 {
@@ -177,19 +163,12 @@ fn text(declared: &DeclaredColumn, text: &TextColumn, file: &FileLayout, at: &mu
         one_of(given, "`column`, `value` or `path`", at);
     }
     let is_id = declared.setting == "point_id";
-    if is_id && text.value.is_some() {
-        at.at("value")
-            .fault("points cannot all have the same id; name a `column`");
-    }
-    for (key, given) in [
-        ("match", text.matching.is_some()),
-        ("strip", text.strip.is_some()),
-    ] {
-        if given && !is_id {
-            at.at(key)
-                .fault("a rule for names of points; allowed for `point_id` alone");
-        }
-    }
+    let message = "points cannot all have the same id; name a `column`";
+    at.at("value").must(!is_id || text.value.is_none(), message);
+    let message = "a rule for names of points; allowed for `point_id` alone";
+    at.at("match")
+        .must(is_id || text.matching.is_none(), message);
+    at.at("strip").must(is_id || text.strip.is_none(), message);
     column(text.column.as_ref(), file, at);
 }
 
@@ -224,13 +203,9 @@ fn conventions(
     let Some((convention, references)) = mapped.chosen(conventions) else {
         return at.fault(conventions.allowed);
     };
-    if references.len() != convention.numbers {
-        at.fault(format!(
-            "{}; allowed: {}",
-            counted(references.len(), "column"),
-            convention.numbers
-        ));
-    }
+    let (found, allowed) = (references.len(), convention.numbers);
+    let message = format!("{}; allowed: {allowed}", counted(found, "column"));
+    at.must(found == allowed, message);
     for reference in references {
         column(Some(reference), file, at);
     }
@@ -256,11 +231,9 @@ fn scalar(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayout, at: &mut
         at.at("value").fault("not a finite number");
     }
     let Some((other, sign)) = scalar.difference() else {
-        if scalar.difference_unit.is_some() {
-            at.at("difference_unit")
-                .fault("there is no `minus` or `plus`");
-        }
-        return;
+        let unneeded = scalar.difference_unit.is_none();
+        let mut at = at.at("difference_unit");
+        return at.must(unneeded, "there is no `minus` or `plus`");
     };
     let name = if sign < 0.0 { "minus" } else { "plus" };
     if quantity != Quantity::Length {
@@ -283,11 +256,8 @@ fn scalar(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayout, at: &mut
 fn joints(declared: &DeclaredColumn, joints: &JointColumns, file: &FileLayout, at: &mut Place) {
     let quantity = declared.quantity;
     let given = [joints.column.is_some(), joints.columns.is_some()];
-    one_of(
-        given,
-        "`column` (a pattern with {j}) or `columns` (a list)",
-        at,
-    );
+    let names = "`column` (a pattern with {j}) or `columns` (a list)";
+    one_of(given, names, at);
     match &joints.column {
         Some(pattern) if !["{j}", "{name}"].iter().any(|mark| pattern.contains(mark)) => {
             at.at("column").fault(format!(
@@ -323,40 +293,33 @@ fn joints(declared: &DeclaredColumn, joints: &JointColumns, file: &FileLayout, a
     } else if turning.is_some() {
         at.at("unit").fault("a direction (1, -1, 0) has no unit");
     }
-    if sliding.is_some() {
-        at.at("linear_unit")
-            .fault("for the positions and velocities of prismatic joints only");
-    }
+    let message = "for the positions and velocities of prismatic joints only";
+    at.at("linear_unit").must(sliding.is_none(), message);
 }
 
 /// How the file is said to count its joints.
 fn counting(joints: &JointColumns, are_positions: bool, at: &mut Place) {
     for (index, sign) in joints.sign.iter().enumerate() {
-        if sign.abs() != 1.0 {
-            at.at("sign").item(index).fault("allowed: 1 and -1");
-        }
+        let mut at = at.at(format!("sign[{index}]"));
+        at.must(sign.abs() == 1.0, "allowed: 1 and -1");
     }
     for (index, zero) in joints.zero.iter().enumerate() {
-        if !zero.is_finite() {
-            at.at("zero").item(index).fault("not a finite number");
-        }
+        let mut at = at.at(format!("zero[{index}]"));
+        at.must(zero.is_finite(), "not a finite number");
     }
     for (index, one) in joints.coupled.iter().enumerate() {
-        let mut list = at.at("coupled");
-        let mut at = list.item(index);
+        let mut at = at.at(format!("coupled[{index}]"));
         if one.joint == 0 || one.by == 0 {
             at.fault("joints count from 1");
         } else if one.joint == one.by {
             at.fault("a joint cannot hold itself; expected two different joints");
         }
-        if !one.ratio.is_finite() {
-            at.at("ratio").fault("not a finite number, e.g. 1 or -1");
-        }
+        let message = "not a finite number, e.g. 1 or -1";
+        at.at("ratio").must(one.ratio.is_finite(), message);
     }
     let is_plain = joints.zero.is_empty() && joints.coupled.is_empty();
-    if !are_positions && !is_plain {
-        at.fault("`zero` and `coupled` are for positions; say them at `q`");
-    }
+    let message = "`zero` and `coupled` are for positions; say them at `q`";
+    at.must(are_positions || is_plain, message);
 }
 
 fn one_of([first, second]: [bool; 2], names: &str, at: &mut Place) {
@@ -399,7 +362,11 @@ fn unit(symbol: Option<&str>, quantity: Quantity, at: &mut Place) {
     }
 }
 
+/// A column that a quantity is read from.
 struct Use {
+    /// Below the file.
+    place: String,
+    reference: ColumnRef,
     /// As people call it, e.g. `x`.
     name: String,
     /// Quantities of one group never share a column; those of two may where one is the sum of two columns, as a target is next to the
@@ -412,56 +379,62 @@ struct Use {
 /// Columns that are mapped to two quantities: joints and what was measured need a column each. Circumstances and uncertainties may share
 /// columns, also with each other.
 fn twice(file: &FileLayout, at: &mut Place) {
-    let mut uses: BTreeMap<String, Vec<Use>> = BTreeMap::new();
-    let mut take = |reference: &ColumnRef, used: Use, at: &mut Place| {
+    let mut all: BTreeMap<String, Vec<Use>> = BTreeMap::new();
+    for used in uses(file) {
         // Where names are the same, so are the columns: `A{j}` stands for a name of each joint.
-        let written = match reference {
-            ColumnRef::Number(_) => reference.to_string(),
+        let written = match &used.reference {
+            ColumnRef::Number(_) => used.reference.to_string(),
             ColumnRef::Name(name) => format!("`{}", name.trim()),
         };
-        let earlier = uses.entry(written).or_default();
-        if let Some(other) = earlier
-            .iter()
-            .find(|other| other.group == used.group || (other.alone && used.alone))
-        {
-            let both = if other.name == used.name {
-                format!("{} twice", used.name)
-            } else {
-                format!("{} and {}", other.name, used.name)
+        let earlier = all.entry(written).or_default();
+        let clashes = |other: &&Use| other.group == used.group || (other.alone && used.alone);
+        if let Some(other) = earlier.iter().find(clashes) {
+            let both = match other.name == used.name {
+                true => format!("{} twice", used.name),
+                false => format!("{} and {}", other.name, used.name),
             };
-            at.fault(format!(
-                "{reference} is mapped to {both}; allowed: a column for each"
+            at.at(&used.place).fault(format!(
+                "{} is mapped to {both}; allowed: a column for each",
+                used.reference
             ));
         }
         earlier.push(used);
+    }
+}
+
+fn uses(file: &FileLayout) -> Vec<Use> {
+    let (columns, mut uses) = (&file.columns, Vec::new());
+    let mut take = |place: String, reference: &ColumnRef, name: String, group, alone| {
+        uses.push(Use {
+            place,
+            reference: reference.clone(),
+            name,
+            group,
+            alone,
+        });
     };
-    let single = |name: String, group: &'static str| Use {
-        name,
-        group,
-        alone: true,
-    };
-    let columns = &file.columns;
     for (declared, joints) in columns
         .joints()
         .filter(|(declared, _)| declared.quantity != Quantity::Number)
     {
         let setting = declared.setting;
-        let mut list = at.at("columns");
-        let at = &mut list.at(setting);
         if let Some(pattern) = &joints.column {
-            let reference = ColumnRef::Name(pattern.clone());
-            let used = single(format!("`{setting}`"), setting);
-            take(&reference, used, &mut at.at("column"));
+            let (place, reference) = (
+                format!("columns.{setting}.column"),
+                ColumnRef::Name(pattern.clone()),
+            );
+            take(place, &reference, format!("`{setting}`"), setting, true);
         }
         for (k, reference) in joints.columns.iter().flatten().enumerate() {
-            let used = single(format!("joint {} of `{setting}`", k + 1), setting);
-            take(reference, used, &mut at.at("columns").item(k));
+            let place = format!("columns.{setting}.columns[{k}]");
+            let name = format!("joint {} of `{setting}`", k + 1);
+            take(place, reference, name, setting, true);
         }
     }
     let measured = |setting: &str| {
         let has = |kind: &&&dyn MeasurementKind| {
-            kind.columns(Part::Value)
-                .any(|column| column.setting == setting)
+            let mut values = kind.columns(Part::Value);
+            values.any(|column| column.setting == setting)
         };
         KINDS.iter().find(has).map(|kind| kind.about().name)
     };
@@ -473,19 +446,12 @@ fn twice(file: &FileLayout, at: &mut Place) {
         let Some(group) = measured(setting).or(simulated).filter(|_| !is_wide) else {
             continue;
         };
-        let key = if scalar.minus.is_some() {
-            "minus"
-        } else {
-            "plus"
-        };
+        let key = scalar.minus.as_ref().map_or("plus", |_| "minus");
         let difference = scalar.difference().map(|(reference, _)| reference);
         for (key, reference) in [("column", scalar.column.as_ref()), (key, difference)] {
             let Some(reference) = reference else { continue };
-            let used = Use {
-                alone: difference.is_none(),
-                ..single(format!("`{setting}`"), group)
-            };
-            take(reference, used, &mut at.at("columns").at(setting).at(key));
+            let (place, name) = (format!("columns.{setting}.{key}"), format!("`{setting}`"));
+            take(place, reference, name, group, difference.is_none());
         }
     }
     for (declared, conventions, mapped) in columns.conventions() {
@@ -493,18 +459,22 @@ fn twice(file: &FileLayout, at: &mut Place) {
         let chosen = mapped.chosen(conventions);
         if let (Some(group), Some((convention, references))) = (measured(setting), chosen) {
             for (k, reference) in references.iter().enumerate() {
-                let used = single(format!("`{setting}`"), group);
-                let mut list = at.at("columns");
-                let mut at = list.at(setting);
-                take(reference, used, &mut at.at(convention.name).item(k));
+                let place = format!("columns.{setting}.{}[{k}]", convention.name);
+                take(place, reference, format!("`{setting}`"), group, true);
             }
         }
     }
     for (target, references) in file.targets.iter().flat_map(|targets| &targets.columns) {
         for (k, reference) in references.iter().enumerate() {
-            let used = single(format!("target `{target}`"), "targets");
-            let mut at = at.at("targets.columns");
-            take(reference, used, &mut at.at(target).item(k));
+            let place = format!("targets.columns.{target}[{k}]");
+            take(
+                place,
+                reference,
+                format!("target `{target}`"),
+                "targets",
+                true,
+            );
         }
     }
+    uses
 }
