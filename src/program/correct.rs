@@ -151,7 +151,7 @@ pub fn has_mark(bytes: &[u8], language: Language) -> bool {
                 || language == Language::Fanuc && (byte.is_ascii_digit() || *byte == b':')
         };
         let line = &line[line.iter().take_while(|byte| is_before(byte)).count()..];
-        line.strip_prefix(sign(language).as_bytes())
+        line.strip_prefix(language.grammar().comment.as_bytes())
             .is_some_and(|tail| tail.trim_ascii_start().starts_with(MARK.as_bytes()))
     })
 }
@@ -176,19 +176,11 @@ pub fn with_mark(program: &[u8], source: &[u8], language: Language, remarks: &[&
         Language::Fanuc => format!("{before}   :  !{MARK} from {} ;{ending}", &hash[..8]),
         _ => format!(
             "{before}{} {MARK} from {}{remarks}{ending}",
-            sign(language),
+            language.grammar().comment,
             &hash[..16]
         ),
     };
     [&program[..at], comment.as_bytes(), &program[at..]].concat()
-}
-
-fn sign(language: Language) -> &'static str {
-    match language {
-        Language::Krl => ";",
-        Language::Rapid | Language::Fanuc => "!",
-        Language::UrScript => "#",
-    }
 }
 
 fn lines(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
@@ -197,12 +189,7 @@ fn lines(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
 
 /// The byte before which the comment goes.
 fn place(bytes: &[u8], language: Language) -> usize {
-    let heads: &[&str] = match language {
-        Language::Krl => &["DEF", "DEFDAT", "DEFFCT", "GLOBAL"],
-        Language::Rapid => &["MODULE"],
-        Language::Fanuc => &["/MN"],
-        Language::UrScript => &[],
-    };
+    let heads = language.grammar().heads;
     let (mut end, mut first) = (0, 0);
     let mut leading = true;
     for line in lines(bytes) {
