@@ -10,8 +10,8 @@ use crate::twin::plan::{Block, Climate, Poses, given};
 use crate::twin::recorder::{Experiment, Motors, Shot};
 use crate::twin::touch::{Fixture, FixtureKind, Touch};
 use crate::twin::tracker::Tracker;
-use crate::twin::true_value::TrueValue;
 use crate::twin::truth::TrueRobot;
+use crate::twin::truth::TrueValue;
 use crate::twin::way::Way;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -355,7 +355,7 @@ fn truth(
         .values(robot)
         .into_iter()
         .chain(tracker.values())
-        .chain(effects.iter().flat_map(Physical::truth));
+        .chain(effects.iter().flat_map(|effect| effect.truth()));
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     let row = |one: TrueValue| {
         let count = seen.entry(one.name.clone()).or_default();

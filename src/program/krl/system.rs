@@ -329,11 +329,11 @@ impl SystemData {
     fn use_tool(&self, number: i64, by: &str, state: &mut SystemState) {
         state.force.tool = Setting::Known(self.tool_of(number), by.into());
         let by = format!("LOAD_DATA[{number}], by {by},");
-        state.force.load = Setting::Known(of(&self.loads, &number), by);
+        state.force.load = Setting::Known(sole(&self.loads, &number), by);
     }
 
     fn point(&self, name: &str) -> Option<PointData> {
-        of(&self.points, name)
+        sole(&self.points, name)
     }
 
     /// The data of the point in `NAME(FP1)` or `NAME(FP1.MEMBER)`.
@@ -349,7 +349,7 @@ impl SystemData {
         if number == 0 {
             Some(Pose::identity())
         } else {
-            of(&self.bases, &number)
+            sole(&self.bases, &number)
         }
     }
 
@@ -357,7 +357,7 @@ impl SystemData {
         let frame = if number == 0 {
             Some(Pose::identity())
         } else {
-            of(&self.tools, &number)
+            sole(&self.tools, &number)
         };
         ToolInForce {
             name: format!("TOOL_DATA[{number}]"),
@@ -393,13 +393,13 @@ impl SystemData {
         }
         let of_point = || Some(self.point_in(value, &["SLOAD"])?.tool);
         let number = indexed(value, "LOAD_DATA").or_else(of_point);
-        number.map(|number| of(&self.loads, &number))
+        number.map(|number| sole(&self.loads, &number))
     }
 
     /// A frame by its numbers, or one that is declared with them.
     fn plain(&self, value: &[Token]) -> Option<Pose> {
         let named = || match value {
-            [word] => of(&self.frames, word.upper().as_str()),
+            [word] => sole(&self.frames, word.upper().as_str()),
             _ => None,
         };
         frame(value).or_else(named)
@@ -407,7 +407,7 @@ impl SystemData {
 }
 
 /// What is declared by a name or number, if one thing is.
-fn of<K, Q, T>(known: &BTreeMap<K, Option<T>>, key: &Q) -> Option<T>
+fn sole<K, Q, T>(known: &BTreeMap<K, Option<T>>, key: &Q) -> Option<T>
 where
     K: Ord + Borrow<Q>,
     Q: Ord + ?Sized,

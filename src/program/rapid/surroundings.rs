@@ -275,8 +275,8 @@ pub(super) fn in_force(lines: &[&[Token]], companions: &[Companion], found: &mut
     let mut reached = Reached::default();
     let named = others.iter().flatten();
     named.for_each(|statement| known.reach(statement, false, &mut reached));
-    let own = lines.iter();
-    own.for_each(|statement| known.reach(statement, true, &mut reached));
+    let corrected = lines.iter();
+    corrected.for_each(|statement| known.reach(statement, true, &mut reached));
     settle(found, &reached, &WORDS);
     found.tools = known.tools().collect();
 }
