@@ -8,7 +8,7 @@ use crate::pipeline::{
     self, Manifest, Observer, Override, Purpose, RunOptions, Selection, Surroundings, checked_plan,
     find_run,
 };
-use crate::poses::{PoseAnswer, PoseRequest, proposal};
+use crate::poses::{PoseRequest, proposal};
 use crate::stage::DIAGNOSES;
 use crate::store::Store;
 use crate::store::frame::Frame;
@@ -141,18 +141,17 @@ pub fn propose_poses(
     }
     let description = robot.description.clone();
     let answer = proposal(request, description, &robot.description.name, pair, None)?;
-    let drive = answer.drive();
-    let poses = drive.map(|drive| Poses {
+    let poses = answer.drive.map(|drive| Poses {
         joints_rad: robot.from_si(&drive.poses.q),
         columns: [
-            ("payload_kg".to_string(), drive.poses.payload.clone()),
-            ("dir".to_string(), drive.direction.to_vec()),
+            ("payload_kg".to_string(), drive.poses.payload),
+            ("dir".to_string(), drive.direction),
         ]
         .into(),
     });
     Ok(ProposedPoses {
         poses: poses.unwrap_or_default(),
-        text: answer.text(),
-        document: answer.document(),
+        text: answer.text,
+        document: answer.document,
     })
 }

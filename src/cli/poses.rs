@@ -111,17 +111,10 @@ impl PosesArguments {
         match (&self.run, &self.robot) {
             (Some(run), _) => {
                 let store = open_store(self.store.as_deref())?;
+                let step = self.step.as_deref();
                 show(
                     self,
-                    &apart(
-                        &request,
-                        &store,
-                        &RunStage {
-                            run,
-                            step: self.step.as_deref(),
-                        },
-                        pair,
-                    )?,
+                    &apart(&request, &store, &RunStage { run, step }, pair)?,
                 )
             }
             (None, Some(file)) => {
@@ -154,17 +147,17 @@ fn request(arguments: &PosesArguments) -> PoseRequest {
     }
 }
 
-fn show(arguments: &PosesArguments, answer: &impl PoseAnswer) -> Result<()> {
-    for warning in answer.warnings() {
+fn show(arguments: &PosesArguments, answer: &PoseAnswer) -> Result<()> {
+    for warning in &answer.warnings {
         let _ = writeln!(std::io::stderr(), "warning: {warning}");
     }
-    if let (Some(path), Some(poses)) = (&arguments.out, answer.drive()) {
-        write(path, &poses)?;
+    if let (Some(path), Some(poses)) = (&arguments.out, &answer.drive) {
+        write(path, poses)?;
     }
     if arguments.json {
-        emit_json(&answer.document())
+        emit_json(&answer.document)
     } else {
-        emit(&answer.text())
+        emit(&answer.text)
     }
 }
 
@@ -222,11 +215,7 @@ fn check(arguments: &PosesArguments, request: &PoseRequest, pair: &[String]) -> 
     if let Some(path) = &arguments.out {
         faults.extend(fault(path).map(|fault| Fault::new("--out", fault)));
     }
-    if faults.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::Spec(faults))
-    }
+    Error::if_spec(faults)
 }
 
 /// Propose a motion from which torques tell most of masses and friction.

@@ -85,19 +85,14 @@ impl RecordArguments {
     pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let place = self.pipeline.display().to_string();
         let plan = Plan::load(&self.pipeline, &self.set, STAGES)?;
-        let stage = plan
-            .stages
-            .iter()
-            .position(|stage| stage.entry.name == Simulate::NAME);
-        let Some(stage) = stage else {
+        let mut stages = plan.stages.iter();
+        let Some(stage) = stages.position(|stage| stage.entry.name == Simulate::NAME) else {
             return Err(Error::spec(place, "has no stage `simulate`"));
         };
         vacant(&self.out)?;
         let plan = plan.needed_for(stage);
-        let moves = plan
-            .stages
-            .last()
-            .is_some_and(|stage| stage.stage.settings().get("motion").is_some());
+        let last = plan.stages.last();
+        let moves = last.is_some_and(|last| last.stage.settings().get("motion").is_some());
         let means = ExecutionArguments::of(&self.set, self.store.as_deref());
         let store = means.store()?;
         let task = CommandTask {
@@ -117,10 +112,9 @@ impl RecordArguments {
         std::fs::create_dir_all(&self.out).map_err(fault)?;
         for (name, text) in files {
             let file = self.out.join(name);
-            file.parent()
-                .map_or(Ok(()), std::fs::create_dir_all)
-                .map_err(fault)?;
-            std::fs::write(file, text).map_err(fault)?;
+            let folder = file.parent().map_or(Ok(()), std::fs::create_dir_all);
+            let written = folder.and_then(|()| std::fs::write(file, text));
+            written.map_err(fault)?;
         }
         if self.json {
             return emit_json(
@@ -268,81 +262,66 @@ impl ConcealArguments {
         let row = if self.dynamics { "row" } else { "point" };
         let (recordings, seal) = (self.out.join(RECORDINGS), self.out.join(SEAL));
         if self.json {
+            let rows_of = format!("{row}s");
             return emit_json(
-                &json!({ "cases": design.cases, (format!("{row}s")): rows, "recordings": recordings, "seal": seal }),
+                &json!({ "cases": design.cases, (rows_of): rows, "recordings": recordings, "seal": seal }),
             );
         }
-        emit(&format!(
-            "{}, {}: {}\nseal: {}\n",
-            counted(design.cases, "recording"),
-            counted(rows, row),
-            recordings.display(),
-            seal.display()
-        ))
+        let (cases, rows) = (counted(design.cases, "recording"), counted(rows, row));
+        let (recordings, seal) = (recordings.display(), seal.display());
+        emit(&format!("{cases}, {rows}: {recordings}\nseal: {seal}\n"))
     }
 }
 
 /// The design that the options state; fails with every fault of them.
 pub(crate) fn design(arguments: &ConcealArguments) -> Result<Design> {
     let mut faults = Vec::new();
-    let mut within =
-        |option: &str, value: f64, [least, most]: [f64; 2], [what, unit]: [&str; 2]| {
-            if !(least..=most).contains(&value) {
-                let message = format!("{value}{what}; allowed: {least} to {most}{unit}");
-                faults.push(Fault::new(option, message));
-            }
-        };
-    for (option, share) in [
-        ("--nulls", arguments.nulls),
-        ("--pairs", arguments.pairs),
-        ("--open", arguments.open),
-        ("--foreign", arguments.foreign),
-        ("--other-forms", arguments.other_forms),
-        ("--natural", arguments.natural),
-        ("--faulty", arguments.faulty),
+    let mut wrong = |is_wrong: bool, option: &str, message: String| {
+        faults.extend(is_wrong.then(|| Fault::new(option, message)));
+    };
+    let share = |option, value| (option, value, [0.0, 1.0], [" is no share", ""]);
+    let tool = [" is no mass of a tool", " kg"];
+    for (option, value, [least, most], [what, unit]) in [
+        share("--nulls", arguments.nulls),
+        share("--pairs", arguments.pairs),
+        share("--open", arguments.open),
+        share("--foreign", arguments.foreign),
+        share("--other-forms", arguments.other_forms),
+        share("--natural", arguments.natural),
+        share("--faulty", arguments.faulty),
+        ("--seconds", arguments.seconds, [16.0, 3600.0], ["", ""]),
+        ("--rate", arguments.rate, [20.0, 5000.0], ["", ""]),
+        ("--tool-mass", arguments.tool_mass, [0.0, 500.0], tool),
+        (
+            "--log-step",
+            arguments.log_step,
+            [0.0, 1.0],
+            [" is no step of a log", " deg"],
+        ),
     ] {
-        within(option, share, [0.0, 1.0], [" is no share", ""]);
+        let message = format!("{value}{what}; allowed: {least} to {most}{unit}");
+        wrong(!(least..=most).contains(&value), option, message);
     }
-    within("--seconds", arguments.seconds, [16.0, 3600.0], ["", ""]);
-    within("--rate", arguments.rate, [20.0, 5000.0], ["", ""]);
-    within(
-        "--tool-mass",
-        arguments.tool_mass,
-        [0.0, 500.0],
-        [" is no mass of a tool", " kg"],
-    );
-    within(
-        "--log-step",
-        arguments.log_step,
-        [0.0, 1.0],
-        [" is no step of a log", " deg"],
-    );
     let singled = arguments.pairs + arguments.open + arguments.foreign;
     let collection = match arguments.families {
         Families::Library => Collection::Library,
         Families::Beyond => Collection::Beyond,
     };
-    for (wrong, options, message) in [
-        (
-            arguments.nulls + singled > 1.0 + 1e-9,
-            "--nulls, --pairs, --open, --foreign",
-            "add up to more than 1",
-        ),
-        (
-            arguments.dynamics && arguments.foreign > 0.0,
-            "--foreign",
-            "foreign effects move points; torques have none",
-        ),
-        (
-            collection == Collection::Beyond && singled > 0.0,
-            "--pairs, --open, --foreign",
-            "need `--families library`; with `--families beyond` every recording has one cause",
-        ),
-    ] {
-        if wrong {
-            faults.push(Fault::new(options, message));
-        }
-    }
+    wrong(
+        arguments.nulls + singled > 1.0 + 1e-9,
+        "--nulls, --pairs, --open, --foreign",
+        "add up to more than 1".into(),
+    );
+    wrong(
+        arguments.dynamics && arguments.foreign > 0.0,
+        "--foreign",
+        "foreign effects move points; torques have none".into(),
+    );
+    wrong(
+        collection == Collection::Beyond && singled > 0.0,
+        "--pairs, --open, --foreign",
+        "need `--families library`; with `--families beyond` every recording has one cause".into(),
+    );
     let mut names: Vec<(&str, ())> = Vec::new();
     for family in collection.families() {
         if !names.contains(&(family.name, ())) {
@@ -353,22 +332,24 @@ pub(crate) fn design(arguments: &ConcealArguments) -> Result<Design> {
         named("--family", name, &names, &mut faults);
     }
     let kinds = ALL_KINDS.map(|kind| (kind.name(), kind));
-    for name in &arguments.robot {
-        named("--robot", name, &kinds, &mut faults);
-    }
+    let chosen = arguments.robot.iter();
+    let chosen = chosen.filter_map(|name| named("--robot", name, &kinds, &mut faults));
+    let chosen: Vec<Kind> = chosen.collect();
     let scatters = SCATTERS.map(|one| (one.name(), one));
     let scatter = arguments.scatter.as_deref();
     let scatter = scatter.and_then(|name| named("--scatter", name, &scatters, &mut faults));
     let layouts = LAYOUTS.map(|one| (one.name(), one));
     let layout = named("--layout", &arguments.layout, &layouts, &mut faults);
     Error::if_spec(faults)?;
-    let is_chosen = |kind: &Kind| arguments.robot.iter().any(|name| name == kind.name());
     Ok(Design {
         seed: arguments.seed,
         cases: arguments.cases as usize,
         collection,
         families: arguments.family.clone(),
-        robots: ALL_KINDS.into_iter().filter(is_chosen).collect(),
+        robots: ALL_KINDS
+            .into_iter()
+            .filter(|kind| chosen.contains(kind))
+            .collect(),
         points: arguments.points.map(|points| points as usize),
         nulls: arguments.nulls,
         pairs: arguments.pairs,
@@ -398,9 +379,10 @@ fn named<T: Copy>(
     let found = all.iter().find(|(known, _)| *known == name);
     if found.is_none() {
         let allowed: Vec<&str> = all.iter().map(|(known, _)| *known).collect();
-        let hint =
-            nearest(name, allowed.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
-        let hint = hint.unwrap_or_else(|| ".".into());
+        let hint = match nearest(name, allowed.iter().copied()) {
+            Some(near) => format!("; did you mean `{near}`?"),
+            None => ".".into(),
+        };
         let message = format!("no `{name}`{hint} Allowed: {}", allowed.join(", "));
         faults.push(Fault::new(option, message));
     }

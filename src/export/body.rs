@@ -5,7 +5,6 @@
 //! XML as exports write it: a template, and at the head, as comments, what the reader must know of the model.
 
 use super::Export;
-use super::model::{PLACEHOLDER, placeholder_inertia};
 use crate::description::{JointDescription, JointKind};
 use crate::dynamics::Inertial;
 use crate::error::{Error, Result};
@@ -13,6 +12,14 @@ use crate::spatial::Pose;
 use minijinja::{UndefinedBehavior, Value};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use quick_xml::escape::escape;
+
+/// What is to be said of [`placeholder_inertia`].
+const PLACEHOLDER: &str = "the inertia is a placeholder: recordings at rest do not show it";
+
+/// The inertia of a ball of 0.1 m, kg m2.
+fn placeholder_inertia(mass: f64) -> f64 {
+    0.4 * mass * 0.01
+}
 
 /// A body in a frame at its joint's point, parallel to the base at the zero pose.
 pub(super) struct LinkBody {
@@ -36,17 +43,11 @@ impl LinkBody {
 impl Export {
     /// The body that joint `index` (from 0) moves; none where it has no mass.
     pub(super) fn body(&self, index: usize) -> Option<LinkBody> {
-        if let Some((body, is_identified)) = self
-            .identified
-            .torques
-            .as_ref()
-            .and_then(|torques| torques.model.nearest_body(index))
-        {
-            return Some(identified(
-                &body,
-                is_identified,
-                index + 1 == self.corrected.joints.len(),
-            ));
+        let torques = self.identified.torques.as_ref();
+        let nearest = torques.and_then(|torques| torques.model.nearest_body(index));
+        if let Some((body, is_identified)) = nearest {
+            let last = index + 1 == self.corrected.joints.len();
+            return Some(identified(&body, is_identified, last));
         }
         let joint = &self.corrected.joints[index];
         let (mass, centre) = joint.mass.filter(|mass| *mass > 0.0).zip(joint.centre)?;
@@ -74,18 +75,11 @@ fn identified(body: &Inertial, is_identified: bool, last: bool) -> LinkBody {
         (false, false) => "as the torques show it; its inertia is that of the nearest body",
     };
     let i = &body.inertia;
-    let inertia = [
-        i[(0, 0)],
-        i[(0, 1)],
-        i[(0, 2)],
-        i[(1, 1)],
-        i[(1, 2)],
-        i[(2, 2)],
-    ];
+    let moments = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
     LinkBody {
         mass: body.mass,
         centre: body.centre.into(),
-        inertia,
+        inertia: moments.map(|place| i[place]),
         remark: Some(remark),
     }
 }
@@ -146,11 +140,8 @@ pub(super) fn offset(point: [f64; 3], from: [f64; 3]) -> String {
 
 /// Numbers with blanks between them, each the shortest text that reads as the same number.
 pub(super) fn numbers(values: impl IntoIterator<Item = f64>) -> String {
-    values
-        .into_iter()
-        .map(|value| format!("{value:?}"))
-        .collect::<Vec<_>>()
-        .join(" ")
+    let texts = values.into_iter().map(|value| format!("{value:?}"));
+    texts.collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

@@ -27,17 +27,11 @@ fn text(export: &Export) -> Result<String> {
     );
     text.push_str("quantity,where,value,unit,sigma,status\n");
     text.extend(lines(&export.identified));
-    for (axis, (now, nominal)) in ["x", "y", "z"].iter().zip(
-        export
-            .corrected
-            .tool
-            .iter()
-            .zip(&export.identified.robot.tool),
-    ) {
+    let tools = [export.corrected.tool, export.identified.robot.tool];
+    for (k, axis) in ["x", "y", "z"].iter().enumerate() {
+        let [now, nominal] = tools.map(|tool| tool[k] * 1e3);
         text.push_str(&format!(
-            "tool {axis} (zero pose; base frame),tool,{:.6},mm,,was {:.6}\n",
-            now * 1e3,
-            nominal * 1e3
+            "tool {axis} (zero pose; base frame),tool,{now:.6},mm,,was {nominal:.6}\n"
         ));
     }
     Ok(text)
@@ -79,24 +73,17 @@ fn lines(identified: &IdentifiedModel) -> Vec<String> {
         .unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
     let shares = shares(identified, &convention);
     let line = |entry: DeviationEntry| {
-        let at_joint: Vec<(&Share, f64)> = shares
-            .iter()
-            .filter(|share| share.by.holds(entry))
-            .map(|share| (share, share.by.at(entry)))
-            .collect();
+        let known = shares.iter().filter(|share| share.by.holds(entry));
+        let at_joint: Vec<(&Share, f64)> = known.map(|share| (share, share.by.at(entry))).collect();
         if at_joint.is_empty() {
             return None;
         }
         let (quantity, scale, unit, decimals) = shown(entry, robot);
-        let value = at_joint
-            .iter()
-            .map(|(share, by)| share.value * by)
-            .sum::<f64>()
-            * scale;
+        let values = at_joint.iter().map(|(share, by)| share.value * by);
+        let value = values.sum::<f64>() * scale;
         let sigma = sigma(&at_joint, identified.covariance.as_ref());
-        let sigma = sigma
-            .map(|sigma| format!("{:.3e}", sigma * scale))
-            .unwrap_or_default();
+        let sigma = sigma.map(|sigma| format!("{:.3e}", sigma * scale));
+        let sigma = sigma.unwrap_or_default();
         let statuses: BTreeSet<&str> = at_joint.iter().map(|(share, _)| share.status).collect();
         let status = statuses.into_iter().collect::<Vec<_>>().join(" and ");
         Some(format!(
@@ -112,12 +99,9 @@ fn lines(identified: &IdentifiedModel) -> Vec<String> {
 /// What a number is called, what it is multiplied with from SI, its unit, and the decimals that keep a joint within 1e-9 rad.
 fn shown(entry: DeviationEntry, robot: &RobotModel) -> (&'static str, f64, String, usize) {
     // People enter degrees.
-    let unit = |joint: usize| {
-        if robot.is_revolute(joint) {
-            Unit::Degree
-        } else {
-            Unit::Millimetre
-        }
+    let unit = |joint: usize| match robot.is_revolute(joint) {
+        true => Unit::Degree,
+        false => Unit::Millimetre,
     };
     match entry {
         DeviationEntry::Zero(joint) => {
@@ -129,12 +113,8 @@ fn shown(entry: DeviationEntry, robot: &RobotModel) -> (&'static str, f64, Strin
         }
         DeviationEntry::Coupling { by, moved } => {
             let scale = unit(moved).from_si(1.0) / unit(by).from_si(1.0);
-            (
-                "coupling",
-                scale,
-                format!("{}/{}", unit(moved), unit(by)),
-                12,
-            )
+            let unit = format!("{}/{}", unit(moved), unit(by));
+            ("coupling", scale, unit, 12)
         }
     }
 }
@@ -142,28 +122,21 @@ fn shown(entry: DeviationEntry, robot: &RobotModel) -> (&'static str, f64, Strin
 /// Standard deviation of a sum of parameters, each times a factor: of those that were estimated. None where none was, and of several
 /// where their covariance is not known.
 fn sigma(shares: &[(&Share, f64)], covariance: Option<&Covariance>) -> Option<f64> {
-    let estimated: Vec<(&Share, f64, f64)> = shares
-        .iter()
-        .filter_map(|(share, by)| share.sigma.map(|sigma| (*share, *by, sigma)))
-        .collect();
+    let with_sigma = |(share, by): &(&Share, f64)| Some((share.position, *by, share.sigma?));
+    let estimated: Vec<(Option<usize>, f64, f64)> = shares.iter().filter_map(with_sigma).collect();
     if let [(_, by, sigma)] = estimated[..] {
         return Some(sigma * by.abs());
     }
     let covariance = covariance?;
-    let known = |share: &Share| {
-        share
-            .position
-            .is_some_and(|position| covariance.parameters().contains(&position))
+    let known = |(position, ..): &(Option<usize>, f64, f64)| {
+        position.is_some_and(|position| covariance.parameters().contains(&position))
     };
-    if estimated.is_empty() || !estimated.iter().all(|(share, ..)| known(share)) {
+    if estimated.is_empty() || !estimated.iter().all(known) {
         return None;
     }
     let by = |position: usize| -> f64 {
-        estimated
-            .iter()
-            .filter(|(share, ..)| share.position == Some(position))
-            .map(|(_, by, _)| by)
-            .sum()
+        let same = estimated.iter().filter(|one| one.0 == Some(position));
+        same.map(|(_, by, _)| by).sum()
     };
     let part = |(a, b, value, _): (usize, usize, f64, f64)| {
         by(a) * by(b) * value * if a == b { 1.0 } else { 2.0 }
@@ -189,13 +162,11 @@ impl DeviationEntry {
     /// All of so many joints: zeros, factors, couplings.
     pub fn all(joints: usize) -> impl Iterator<Item = Self> {
         let pairs = (0..joints).flat_map(move |by| (0..joints).map(move |moved| (by, moved)));
-        let couplings = pairs
-            .filter(|(by, moved)| by != moved)
-            .map(|(by, moved)| Self::Coupling { by, moved });
-        (0..joints)
-            .map(Self::Zero)
-            .chain((0..joints).map(Self::Factor))
-            .chain(couplings)
+        let couplings = pairs.filter(|(by, moved)| by != moved);
+        let couplings = couplings.map(|(by, moved)| Self::Coupling { by, moved });
+        let joints = || 0..joints;
+        let alone = joints().map(Self::Zero).chain(joints().map(Self::Factor));
+        alone.chain(couplings)
     }
 
     /// The one that a parameter is; none of an effect that no such map holds.
@@ -216,55 +187,49 @@ impl DeviationEntry {
     }
 }
 
-/// q_true - q = slope q + zero, SI.
+/// q_true - q = slope q + zero, SI; the zero is a column behind those of the slope.
 #[derive(Debug, Clone)]
-pub(super) struct JointDeviation {
-    slope: DMatrix<f64>,
-    zero: DVector<f64>,
-}
+pub(super) struct JointDeviation(DMatrix<f64>);
 
 impl JointDeviation {
     /// One number of 1, all others 0, in the robot file's counting.
     pub(crate) fn unit(entry: DeviationEntry, joints: usize) -> Self {
-        let mut out = Self {
-            slope: DMatrix::zeros(joints, joints),
-            zero: DVector::zeros(joints),
-        };
-        match entry {
-            DeviationEntry::Zero(joint) => out.zero[joint] = 1.0,
-            DeviationEntry::Factor(joint) => out.slope[(joint, joint)] = 1.0,
-            DeviationEntry::Coupling { by, moved } => out.slope[(moved, by)] = 1.0,
-        }
+        let mut out = Self(DMatrix::zeros(joints, joints + 1));
+        let place = out.place(entry);
+        out.0[place] = 1.0;
         out
     }
 
-    pub(crate) fn at(&self, entry: DeviationEntry) -> f64 {
+    fn place(&self, entry: DeviationEntry) -> (usize, usize) {
         match entry {
-            DeviationEntry::Zero(joint) => self.zero[joint],
-            DeviationEntry::Factor(joint) => self.slope[(joint, joint)],
-            DeviationEntry::Coupling { by, moved } => self.slope[(moved, by)],
+            DeviationEntry::Zero(joint) => (joint, self.0.nrows()),
+            DeviationEntry::Factor(joint) => (joint, joint),
+            DeviationEntry::Coupling { by, moved } => (moved, by),
         }
+    }
+
+    pub(crate) fn at(&self, entry: DeviationEntry) -> f64 {
+        self.0[self.place(entry)]
     }
 
     /// Whether a number is more than rounding.
     pub(crate) fn holds(&self, entry: DeviationEntry) -> bool {
-        self.at(entry).abs() > ROUNDING * self.slope.amax().max(self.zero.amax())
+        self.at(entry).abs() > ROUNDING * self.0.amax()
     }
 
     /// In the controller's numbers c: with q = A (c - z), c_true - c = B slope A (c - z) + B zero, B the inverse of A.
     pub(crate) fn counted(&self, convention: &JointConvention) -> Self {
         let shown = DVector::from_column_slice(convention.zero());
         let joints = shown.len();
+        let (slope, zero) = (self.0.columns(0, joints), self.0.column(joints));
         let matrix = |change: &dyn Fn(&mut DVector<f64>)| {
-            let columns: Vec<DVector<f64>> = (0..joints)
-                .map(|joint| {
-                    let mut unit = DVector::zeros(joints);
-                    unit[joint] = 1.0;
-                    change(&mut unit);
-                    unit
-                })
-                .collect();
-            DMatrix::from_columns(&columns)
+            let column = |joint: usize| {
+                let mut unit = DVector::zeros(joints);
+                unit[joint] = 1.0;
+                change(&mut unit);
+                unit
+            };
+            DMatrix::from_columns(&(0..joints).map(column).collect::<Vec<_>>())
         };
         let to_robot = matrix(&|unit| {
             *unit += &shown;
@@ -274,8 +239,10 @@ impl JointDeviation {
             convention.to_controller(unit.as_mut_slice());
             *unit -= &shown;
         });
-        let slope = &back * &self.slope * to_robot;
-        let zero = back * &self.zero - &slope * shown;
-        Self { slope, zero }
+        let slope = &back * slope * to_robot;
+        let zero = back * zero - &slope * shown;
+        let mut out = slope.insert_column(joints, 0.0);
+        out.set_column(joints, &zero);
+        Self(out)
     }
 }

@@ -36,28 +36,18 @@ pub(super) const MDH: Format = Format {
 /// The table with what its reader must know, and how well it stands for the corrected geometry when read back.
 fn text(export: &Export, modified: bool) -> Result<String> {
     let format = if modified { &MDH } else { &DH };
+    let then = RobotModel::new(export.corrected.clone());
+    let table = DhTable::of(&then);
     if !export.insisted {
-        refuse_far(
-            &DhTable::of(&RobotModel::new(export.corrected.clone())),
-            &export.identified.origin,
-        )?;
+        refuse_far(&table, &export.identified.origin)?;
     }
-    let body = body(export, modified);
-    let back = read_calib(
-        RobotFileText {
-            label: "exported table",
-            text: &body,
-        },
-        None,
-    )?
-    .robot;
-    let (now, then) = (
-        RobotModel::new(back),
-        RobotModel::new(export.corrected.clone()),
-    );
+    let body = body(export, &table, modified);
+    let (label, text) = ("exported table", body.as_str());
+    let now = RobotModel::new(read_calib(RobotFileText { label, text }, None)?.robot);
     let poses = spread(&then, POSES);
     let apart = (0..poses.rows()).map(|row| {
-        (now.forward(poses.q(row)).translation - then.forward(poses.q(row)).translation).norm()
+        let point = |robot: &RobotModel| robot.forward(poses.q(row)).translation;
+        (point(&now) - point(&then)).norm()
     });
     let most = apart.fold(0.0, f64::max) * 1e3;
     let mut out: String = export.head(format);
@@ -91,70 +81,40 @@ fn refuse_far(rows: &DhTable, place: &str) -> Result<()> {
     Err(Error::data(place, message))
 }
 
-fn body(export: &Export, modified: bool) -> String {
+fn body(export: &Export, rows: &DhTable, modified: bool) -> String {
     let robot = &export.corrected;
-    let rows = DhTable::of(&RobotModel::new(robot.clone()));
     let mut out = String::new();
-    if let Some((joint, angle)) = rows
+    let flattest = rows
         .flattest()
-        .filter(|(_, angle)| angle.to_degrees() * 3600.0 < FLAT_ARCSEC)
-    {
-        out.push_str(&format!(
-            "# axes {} and {} are {:.0} arcsec from parallel: their common normal, and with it d, is far from the arm (the table is exact all the same)\n",
-            joint + 1,
-            joint + 2,
-            angle.to_degrees() * 3600.0
-        ));
+        .map(|(joint, angle)| (joint, angle.to_degrees() * 3600.0));
+    if let Some((joint, arcsec)) = flattest.filter(|(_, arcsec)| *arcsec < FLAT_ARCSEC) {
+        let (first, second) = (joint + 1, joint + 2);
+        out += &format!(
+            "# axes {first} and {second} are {arcsec:.0} arcsec from parallel: their common normal, and with it d, is far from the arm (the table is exact all the same)\n"
+        );
     }
-    out.push_str("calib_robot: 1\n");
-    out.push_str(&format!("name: {}\n", quoted(&one_line(&robot.name))));
-    out.push_str("units: {length: mm, angle: deg}\n");
-    out.push_str(&format!(
-        "kinematics:\n  {}:\n",
-        if modified { "mdh" } else { "dh" }
-    ));
-    let kind = |joint: usize| {
-        if robot.joints[joint].kind == JointKind::Prismatic {
-            ", kind: prismatic"
-        } else {
-            ""
-        }
-    };
-    if modified {
-        let DhRow { theta, d, .. } = rows.base;
-        out.push_str(&line(
-            &[
-                ("alpha", 0.0),
-                ("a", 0.0),
-                ("theta", deg(theta)),
-                ("d", mm(d)),
-            ],
-            ", kind: fixed",
-        ));
-        let mut before = rows.base;
-        for (joint, row) in rows.joints.iter().enumerate() {
-            let numbers = [
-                ("alpha", deg(before.alpha)),
-                ("a", mm(before.a)),
-                ("theta", deg(row.theta)),
-                ("d", mm(row.d)),
-            ];
-            out.push_str(&line(&numbers, kind(joint)));
-            before = *row;
-        }
-    } else {
-        let numbers = |row: &DhRow| {
-            [
-                ("theta", deg(row.theta)),
-                ("d", mm(row.d)),
-                ("a", mm(row.a)),
-                ("alpha", deg(row.alpha)),
-            ]
+    let (name, kind) = (
+        quoted(&one_line(&robot.name)),
+        if modified { "mdh" } else { "dh" },
+    );
+    out += &format!(
+        "calib_robot: 1\nname: {name}\nunits: {{length: mm, angle: deg}}\nkinematics:\n  {kind}:\n"
+    );
+    // The base stands before the joints, fixed; a modified row turns and shifts about the x axis of the row before.
+    let kinds = robot.joints.iter().map(|joint| match joint.kind {
+        JointKind::Prismatic => ", kind: prismatic",
+        JointKind::Revolute => "",
+    });
+    let all = std::iter::once((&rows.base, ", kind: fixed")).chain(rows.joints.iter().zip(kinds));
+    let mut before = [("alpha", 0.0), ("a", 0.0)];
+    for (row, more) in all {
+        let (turn, d) = (("theta", deg(row.theta)), ("d", mm(row.d)));
+        let [a, alpha] = [("a", mm(row.a)), ("alpha", deg(row.alpha))];
+        out += &match modified {
+            true => line(&[before[0], before[1], turn, d], more),
+            false => line(&[turn, d, a, alpha], more),
         };
-        out.push_str(&line(&numbers(&rows.base), ", kind: fixed"));
-        for (joint, row) in rows.joints.iter().enumerate() {
-            out.push_str(&line(&numbers(row), kind(joint)));
-        }
+        before = [alpha, a];
     }
     let [x, y, z]: [f64; 3] = rows.tool.translation.map(mm).into();
     let turn =
@@ -163,36 +123,33 @@ fn body(export: &Export, modified: bool) -> String {
         "tool: {{point: [{x:?}, {y:?}, {z:?}], orientation: {{quaternion: [{:?}, {:?}, {:?}, {:?}]}}}}\n",
         turn.w, turn.i, turn.j, turn.k
     ));
-    out.push_str("joints:\n");
+    out += "joints:\n";
     for joint in &robot.joints {
-        let scale = if joint.kind == JointKind::Prismatic {
-            mm
-        } else {
-            deg
+        let scale = match joint.kind {
+            JointKind::Prismatic => mm,
+            JointKind::Revolute => deg,
         };
-        let limits = joint
-            .limits
-            .map(|[lower, upper]| format!(", limits: [{:?}, {:?}]", scale(lower), scale(upper)));
-        let ratio = joint
-            .reduction_ratio
-            .map(|ratio| format!(", reduction_ratio: {ratio:?}"));
-        let constant = joint
-            .motor_constant
-            .map(|constant| format!(", motor_constant: {constant:?}"));
-        let more: String = [limits, ratio, constant].into_iter().flatten().collect();
-        out.push_str(&format!(
-            "  - {{name: {}{more}}}\n",
-            quoted(&one_line(&joint.name))
-        ));
+        let limits = joint.limits.map(|limits| limits.map(scale));
+        let more = [
+            limits.map(|limits| format!(", limits: {limits:?}")),
+            joint
+                .reduction_ratio
+                .map(|ratio| format!(", reduction_ratio: {ratio:?}")),
+            joint
+                .motor_constant
+                .map(|constant| format!(", motor_constant: {constant:?}")),
+        ];
+        let (name, more) = (quoted(&one_line(&joint.name)), more.into_iter().flatten());
+        out += &format!("  - {{name: {name}{}}}\n", more.collect::<String>());
     }
     out
 }
 
 fn line(numbers: &[(&str, f64)], more: &str) -> String {
-    let cells: Vec<String> = numbers
+    let cells = numbers
         .iter()
-        .map(|(name, value)| format!("{name}: {value:?}"))
-        .collect();
+        .map(|(name, value)| format!("{name}: {value:?}"));
+    let cells: Vec<String> = cells.collect();
     format!("    - {{{}{more}}}\n", cells.join(", "))
 }
 

@@ -32,39 +32,27 @@ pub(super) fn stands_alone(torques: &IdentifiedTorques, term: &TorqueTerm) -> bo
         return value > 0.0 && value >= *NAMED * sigma;
     }
     let place = term.place.to_string();
-    let mut numbers = torques
-        .parameters
-        .0
-        .iter()
-        .filter(|row| row.effect == term.effect && row.place == place && row.form.is_some());
+    let rows = torques.parameters.0.iter();
+    let mut numbers =
+        rows.filter(|row| row.effect == term.effect && row.place == place && row.form.is_some());
     let drives = [DAMPING, FRICTION].contains(&term.effect.as_str()) && term.coefficients[0] <= 0.0;
-    !drives
-        && numbers.any(|row| {
-            row.sigma
-                .is_none_or(|sigma| row.value.abs() >= *NAMED * sigma)
-        })
+    let is_sure = |value: f64, sigma: f64| value.abs() >= *NAMED * sigma;
+    !drives && numbers.any(|row| row.sigma.is_none_or(|sigma| is_sure(row.value, sigma)))
 }
 
 /// The coefficient of a cause of one number at a joint (from 0), SI; none where it was not found or does not stand alone. Of a law with a shape
 /// it is the number that formats can hold, see [`as_one_number`].
 pub(super) fn coefficient(torques: &IdentifiedTorques, effect: &str, joint: usize) -> Option<f64> {
-    let single = torques
-        .model
-        .terms
-        .iter()
-        .find(|term| term.effect == effect && term.place == Place::Joint(joint))?;
-    if !stands_alone(torques, single) {
-        return None;
-    }
-    let (value, seen) = (
-        single.coefficients.first().copied()?,
-        torques.model.range.get(joint)?,
-    );
-    let held = of_line(torques, single).map(|line| line.value);
-    Some(
-        held.or_else(|| as_one_number(single, value, seen, None).map(|(held, _)| held))
-            .unwrap_or(value),
-    )
+    let mut terms = torques.model.terms.iter();
+    let is_it = |term: &&TorqueTerm| term.effect == effect && term.place == Place::Joint(joint);
+    let single = terms
+        .find(is_it)
+        .filter(|single| stands_alone(torques, single))?;
+    let value = *single.coefficients.first()?;
+    let seen = torques.model.range.get(joint)?;
+    let held = || as_one_number(single, value, seen, None).map(|(held, _)| held);
+    let line = of_line(torques, single).map(|line| line.value);
+    Some(line.or_else(held).unwrap_or(value))
 }
 
 /// What formats of one number hold of a law that has a shape, and what must be remark of it: of friction that grows with another power of speed
@@ -79,21 +67,18 @@ fn as_one_number(
     match (term.effect.as_str(), *term.shape.first()?) {
         (DAMPING, exponent) if exponent != 1.0 => {
             let held = line?.value;
-            let law = format!("grows with the power {exponent:.2} of speed");
-            let line = format!(
-                "{held:.4} Nm s/rad is written, the line up to {:.3} rad/s",
+            let remark = format!(
+                "{DAMPING} at {place} grows with the power {exponent:.2} of speed: {held:.4} Nm s/rad is written, the line up to {:.3} rad/s",
                 seen.speed
             );
-            Some((held, format!("{DAMPING} at {place} {law}: {line}")))
+            Some((held, remark))
         }
         (DRIVE, half) if seen.load.is_finite() => {
             let (load, held) = (0.5 * seen.load, value / (1.0 + 0.5 * seen.load / half));
-            Some((
-                held,
-                format!(
-                    "{DRIVE} at {place} changes with torque: what is written is right at {load:.3} Nm"
-                ),
-            ))
+            let remark = format!(
+                "{DRIVE} at {place} changes with torque: what is written is right at {load:.3} Nm"
+            );
+            Some((held, remark))
         }
         _ => None,
     }
@@ -109,12 +94,8 @@ pub(super) fn spring(torques: &IdentifiedTorques, joint: usize) -> Option<[f64; 
     let at = |term: &&TorqueTerm| {
         SPRINGS.contains(&term.effect.as_str()) && term.place == Place::Joint(joint)
     };
-    let single = torques
-        .model
-        .terms
-        .iter()
-        .find(at)
-        .filter(|term| stands_alone(torques, term))?;
+    let single = torques.model.terms.iter().find(at);
+    let single = single.filter(|term| stands_alone(torques, term))?;
     let [stiffness, at_zero] = single.coefficients[..] else {
         return None;
     };
@@ -139,10 +120,9 @@ impl Export {
         let attributes = match format.carries {
             CarriedTorques::All => return lines,
             CarriedTorques::Nothing => {
-                lines.push(
-                    "not carried: the identified torques (formats urdf, mjcf, json, dynamics)"
-                        .into(),
-                );
+                let line =
+                    "not carried: the identified torques (formats urdf, mjcf, json, dynamics)";
+                lines.push(line.into());
                 return lines;
             }
             CarriedTorques::Causes(attributes) => attributes,
@@ -173,12 +153,8 @@ impl Export {
                 term.effect, term.place, term.rms
             )
         }));
-        lines.extend(
-            torques
-                .of_the_recording
-                .iter()
-                .map(|statement| format!("of the recording alone: {statement}")),
-        );
+        let statements = torques.of_the_recording.iter();
+        lines.extend(statements.map(|one| format!("of the recording alone: {one}")));
         lines
     }
 }

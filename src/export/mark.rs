@@ -85,17 +85,11 @@ impl Export {
 
     fn hash(&self) -> String {
         let robot = Robot::from_description(&self.identified.robot).to_frame();
-        let torques = self
-            .identified
-            .torques
-            .as_ref()
-            .map(|torques| torques.parameters.to_frame());
+        let parameters = self.identified.parameters.to_frame();
+        let torques = self.identified.torques.as_ref();
+        let torques = torques.map(|torques| torques.parameters.to_frame());
         let mut hasher = blake3::Hasher::new();
-        for table in [robot, self.identified.parameters.to_frame()]
-            .into_iter()
-            .chain(torques)
-            .flatten()
-        {
+        for table in [robot, parameters].into_iter().chain(torques).flatten() {
             hasher.update(table.table_hash().as_str().as_bytes());
         }
         hasher.finalize().to_hex().chars().take(DIGITS).collect()
@@ -109,15 +103,11 @@ impl Export {
 
     /// Whether a file is this model's export. Fails where it carries no mark.
     pub(crate) fn check(&self, label: &str, text: &str) -> Result<Belonging> {
-        let none = || {
-            Error::data(
-                label,
-                "carries no mark of calib: it is no export, or one of a version before marks",
-            )
-        };
+        let message = "carries no mark of calib: it is no export, or one of a version before marks";
+        let none = || Error::data(label, message);
         let found = ExportMark::of(text).ok_or_else(none)?;
-        let format = FORMATS
-            .iter()
+        let mut formats = FORMATS.iter();
+        let format = formats
             .find(|format| format.name == found.format)
             .ok_or_else(none)?;
         let mark = self.mark(format.name);
@@ -130,12 +120,10 @@ impl Export {
             .find(|k| theirs.get(*k).map(|line| line.1) != ours.get(*k).map(|line| line.1));
         Ok(match differs {
             None => Belonging::Same(mark),
-            Some(k) => Belonging::Edited(
-                mark,
-                theirs
-                    .get(k)
-                    .map_or(text.lines().count() + 1, |line| line.0),
-            ),
+            Some(k) => {
+                let end = text.lines().count() + 1;
+                Belonging::Edited(mark, theirs.get(k).map_or(end, |line| line.0))
+            }
         })
     }
 }

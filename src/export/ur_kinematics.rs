@@ -56,17 +56,11 @@ fn frames(robot: &RobotDescription) -> [Pose; 6] {
     std::array::from_fn(|index| {
         let joint = &robot.joints[index];
         let (z, point) = (Vector3::from(joint.axis), Vector3::from(joint.point));
-        let next = Vector3::from(
-            robot
-                .joints
-                .get(index + 1)
-                .map_or(robot.tool, |next| next.point),
-        );
+        let next = robot.joints.get(index + 1);
+        let next = Vector3::from(next.map_or(robot.tool, |next| next.point));
         let x = Vector3::x();
-        Pose::new(
-            Matrix3::from_columns(&[x, z.cross(&x), z]),
-            point + z * z.dot(&(next - point)),
-        )
+        let turn = Matrix3::from_columns(&[x, z.cross(&x), z]);
+        Pose::new(turn, point + z * z.dot(&(next - point)))
     })
 }
 
@@ -80,11 +74,8 @@ fn text(export: &Export) -> Result<String> {
     let mut out: String = export.head(&UR_KINEMATICS);
     let (mut before, mut links) = (base, String::new());
     for (index, (link, frame)) in LINKS.iter().zip(&nominal).enumerate() {
-        let placed = moved(
-            frame,
-            &frame.rotation.column(2).into(),
-            &corrected.joints[index],
-        );
+        let axis = frame.rotation.column(2).into();
+        let placed = moved(frame, &axis, &corrected.joints[index]);
         let ([x, y, z], [roll, pitch, yaw]) = origin(&before, &placed);
         links.push_str(&format!(
             "  {link}:\n    x: {x:?}\n    y: {y:?}\n    z: {z:?}\n    roll: {roll:?}\n    pitch: {pitch:?}\n    yaw: {yaw:?}\n"

@@ -11,6 +11,7 @@ use minijinja::context;
 use nalgebra::{Rotation3, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 pub(super) const XACRO: Format = Format {
     name: "xacro",
@@ -30,42 +31,33 @@ struct OwnJoint<'a> {
 }
 
 fn text(export: &Export) -> Result<String> {
-    let place = |wanted: &[&str]| {
-        export
-            .identified
-            .sources
-            .iter()
-            .find(|source| wanted.contains(&ending(source).as_str()))
+    let sources = &export.identified.sources;
+    let with_ending = |wanted: [&'static str; 2]| {
+        let is = move |source: &&PathBuf| wanted.contains(&ending(source).as_str());
+        sources.iter().filter(is)
     };
-    let own = place(&["urdf", "xml"]).ok_or_else(|| {
+    let own = with_ending(["urdf", "xml"]).next().ok_or_else(|| {
         let message = "no URDF stands behind this model; allowed: a robot file with `kinematics: {urdf: ...}`, or --format urdf, which writes a whole arm";
         Error::data(&export.identified.origin, message)
     })?;
     let label = own.display().to_string();
-    let read = |path: &std::path::Path| {
+    let read = |path: &PathBuf| {
         raw::text(path).map_err(|error| Error::unreadable(path.display().to_string(), &error))
     };
     let urdf = read(own)?;
     let mut base = None;
-    for file in export
-        .identified
-        .sources
-        .iter()
-        .filter(|source| ["yaml", "yml"].contains(&ending(source).as_str()))
-    {
-        base = base.or(yaml::parse(&read(file)?)
-            .0
-            .and_then(|tree| tree.at("kinematics.urdf.base")?.text()));
+    for file in with_ending(["yaml", "yml"]) {
+        let tree = yaml::parse(&read(file)?).0;
+        base = base.or(tree.and_then(|tree| tree.at("kinematics.urdf.base")?.text()));
     }
     let document =
         Document::parse(&urdf).map_err(|error| Error::data(&label, error.to_string()))?;
-    let origins =
-        origins(export, &document, base.as_deref().unwrap_or("base_link")).ok_or_else(|| {
-            Error::data(
-                &label,
-                "is not the description that the model was identified with: its joints are others",
-            )
-        })?;
+    let origins = origins(export, &document, base.as_deref().unwrap_or("base_link"));
+    let origins = origins.ok_or_else(|| {
+        let message =
+            "is not the description that the model was identified with: its joints are others";
+        Error::data(&label, message)
+    })?;
     let mut remarks = export.remarks_in(&XACRO);
     remarks.push(format!(
         "in {}: include this file, and in each joint below have",
@@ -75,11 +67,9 @@ fn text(export: &Export) -> Result<String> {
     remarks.push(origins.tool.clone());
     let quoted =
         |[place, turn]: &[[f64; 3]; 2]| format!("('{}', '{}')", numbers(*place), numbers(*turn));
-    let all: Vec<String> = origins
-        .joints
-        .iter()
-        .map(|(name, origin)| format!("('{name}', {})", quoted(origin)))
-        .collect();
+    let joints = origins.joints.iter();
+    let all = joints.map(|(name, origin)| format!("('{name}', {})", quoted(origin)));
+    let all: Vec<String> = all.collect();
     // xacro ends an expression at the first brace.
     let origins = format!("${{dict([{}])}}", all.join(", "));
     body::document(&remarks, include_str!("xacro.xml"), context! { origins })
@@ -97,62 +87,48 @@ fn three(node: Option<Node>, name: &str, otherwise: [f64; 3]) -> Option<[f64; 3]
     let Some(text) = node.and_then(|node| node.attribute(name)) else {
         return Some(otherwise);
     };
-    let numbers: Vec<f64> = text
-        .split_whitespace()
-        .map(|word| word.parse().ok())
-        .collect::<Option<_>>()?;
-    numbers.try_into().ok()
+    let numbers = text.split_whitespace().map(|word| word.parse().ok());
+    let numbers: Option<Vec<f64>> = numbers.collect();
+    numbers?.try_into().ok()
 }
 
 /// The corrected origins of the moving joints; none where the description has not the model's joints.
 fn origins(export: &Export, document: &Document, base: &str) -> Option<Origins> {
     let mut urdf_joints: BTreeMap<&str, OwnJoint> = BTreeMap::new();
-    for node in document
-        .root_element()
-        .children()
-        .filter(|node| node.has_tag_name("joint"))
-    {
+    let nodes = document.root_element().children();
+    for node in nodes.filter(|node| node.has_tag_name("joint")) {
         let child = |name: &str| node.children().find(|child| child.has_tag_name(name));
         let end = |name: &str| child(name).and_then(|end| end.attribute("link"));
         let [roll, pitch, yaw] = three(child("origin"), "rpy", [0.0; 3])?;
         let place = three(child("origin"), "xyz", [0.0; 3])?;
-        let origin = Pose::new(
-            Rotation3::from_euler_angles(roll, pitch, yaw).into_inner(),
-            place.into(),
-        );
-        let axis =
-            Vector3::from(three(child("axis"), "xyz", [1.0, 0.0, 0.0])?).try_normalize(0.0)?;
+        let turn = Rotation3::from_euler_angles(roll, pitch, yaw);
+        let axis = three(child("axis"), "xyz", [1.0, 0.0, 0.0])?;
+        let axis = Vector3::from(axis).try_normalize(0.0)?;
         let (Some(parent), Some(child), Some(name)) =
             (end("parent"), end("child"), node.attribute("name"))
         else {
             continue;
         };
-        urdf_joints.insert(
+        let joint = OwnJoint {
+            name,
+            parent,
             child,
-            OwnJoint {
-                name,
-                parent,
-                child,
-                origin,
-                axis,
-            },
-        );
+            origin: Pose::new(turn.into_inner(), place.into()),
+            axis,
+        };
+        urdf_joints.insert(child, joint);
     }
     let robot = &export.corrected;
     // From the last joint back to the base.
-    let last = urdf_joints.values().find(|joint| {
-        robot
-            .joints
-            .last()
-            .is_some_and(|last| last.name == joint.name)
-    })?;
-    let mut path: Vec<&OwnJoint> = std::iter::successors(Some(last), |joint| {
-        urdf_joints
-            .get(joint.parent)
-            .filter(|_| joint.parent != base)
-    })
-    .take(urdf_joints.len())
-    .collect();
+    let name = robot.joints.last().map(|last| last.name.as_str());
+    let last = urdf_joints
+        .values()
+        .find(|joint| name == Some(joint.name))?;
+    let path = std::iter::successors(Some(last), |joint| {
+        let before = urdf_joints.get(joint.parent);
+        before.filter(|_| joint.parent != base)
+    });
+    let mut path: Vec<&OwnJoint> = path.take(urdf_joints.len()).collect();
     path.reverse();
     let (mut nominal, mut corrected) = (Pose::identity(), Pose::identity());
     let mut joints = Vec::new();
@@ -162,17 +138,12 @@ fn origins(export: &Export, document: &Document, base: &str) -> Option<Origins> 
             corrected = corrected * joint.origin;
             continue;
         };
-        let placed = moved(
-            &nominal,
-            &(nominal.rotation * joint.axis),
-            &robot.joints[at],
-        );
+        let axis = nominal.rotation * joint.axis;
+        let placed = moved(&nominal, &axis, &robot.joints[at]);
         let (place, turn) = origin(&corrected, &placed);
         // Names stand in an expression between quotes.
-        let plain = joint
-            .name
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || "_-./ ".contains(c));
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./ ".contains(c);
+        let plain = joint.name.chars().all(is_plain);
         joints.push((plain.then(|| joint.name.to_string())?, [place, turn]));
         corrected = placed;
     }

@@ -3,11 +3,11 @@
 mod standing;
 mod torques;
 
-use standing::unexplained_of;
 pub use standing::{
     Achieved, RepeatedPose, achieved, convention_of, counted_otherwise, robot_file, standing_of,
     wrong_setup_of,
 };
+use standing::{last, output, unexplained_of, written};
 pub use torques::IdentifiedTorques;
 
 use crate::compensate::{Gate, GateLimits, IdentifiedArm, Scatter, Uncertainty, load_matters};
@@ -77,19 +77,21 @@ pub struct Files {
     pub unchecked: bool,
 }
 
+/// Whether a stage of a plan writes a table of a kind.
+fn writes(plan: &Plan, at: usize, kind: &str) -> bool {
+    let mut outputs = plan.stages[at].outputs.iter();
+    outputs.any(|port| port.kind == kind)
+}
+
 /// The stages of a plan that identify or learn: which of them stands is known once all have predicted.
 pub(crate) fn steps_of(plan: &Plan) -> Result<Vec<usize>> {
-    let writes =
-        |at: usize, kind: &str| plan.stages[at].outputs.iter().any(|port| port.kind == kind);
     let kinds = [Parameters::KIND, Network::KIND, TorqueParameters::KIND];
     let steps: Vec<usize> = (0..plan.stages.len())
-        .filter(|at| kinds.iter().any(|kind| writes(*at, kind)))
+        .filter(|at| kinds.iter().any(|kind| writes(plan, *at, kind)))
         .collect();
     if steps.is_empty() {
-        return Err(Error::spec(
-            plan.file.display().to_string(),
-            "identifies nothing; put a stage `identify` after the split, or `diagnose_torques` after `ingest_torques`",
-        ));
+        let message = "identifies nothing; put a stage `identify` after the split, or `diagnose_torques` after `ingest_torques`";
+        return Err(Error::spec(plan.file.display().to_string(), message));
     }
     Ok(steps)
 }
@@ -101,32 +103,23 @@ pub(crate) fn judges_of(plan: &Plan) -> Vec<usize> {
         let limits = settings.get("limits").and_then(|limits| limits.as_object());
         limits.is_some_and(|limits| limits.values().any(|limit| !limit.is_null()))
     };
-    let report = |at: &usize| {
-        plan.stages[*at]
-            .outputs
-            .iter()
-            .any(|port| port.kind == Document::KIND)
-    };
-    (0..plan.stages.len())
-        .filter(report)
-        .filter(limited)
-        .collect()
+    let reports = |at: &usize| writes(plan, *at, Document::KIND);
+    let stages = 0..plan.stages.len();
+    stages.filter(reports).filter(limited).collect()
 }
 
 impl IdentifiedModel {
     /// The model of a run that is done: of `step`, else of the step that stands for it, else of the last stage that writes parameters.
     pub fn of_run(store: &Store, manifest: &Manifest, step: Option<&str>) -> Result<Self> {
         let run = &manifest.run_id;
-        if manifest.status != RunStatus::Done {
-            let status = if manifest.status == RunStatus::Failed {
-                "failed"
-            } else {
-                "running or was killed"
-            };
-            return Err(Error::spec(
-                run,
-                format!("the run {status}, it is not done"),
-            ));
+        let status = match manifest.status {
+            RunStatus::Done => None,
+            RunStatus::Failed => Some("failed"),
+            RunStatus::Running => Some("running or was killed"),
+        };
+        if let Some(status) = status {
+            let message = format!("the run {status}, it is not done");
+            return Err(Error::spec(run, message));
         }
         let wrong = wrong_setup_of(manifest, store)?;
         if let (None, Some(wrong)) = (step, &wrong) {
@@ -135,35 +128,22 @@ impl IdentifiedModel {
             );
             return Err(Error::data(run, message));
         }
-        let stands = if step.is_none() {
-            standing_of(manifest, store)?
-        } else {
-            None
+        let stands = match step {
+            None => standing_of(manifest, store)?,
+            Some(_) => None,
         };
         let load = |table: &TableRef| load(store, table, manifest);
-        let last = |kind: &str| {
-            manifest
-                .stages
-                .iter()
-                .flat_map(|stage| &stage.outputs)
-                .rfind(|output| output.kind == kind)
-        };
-        let robot =
-            last(Robot::KIND).ok_or_else(|| Error::spec(run, "the run has no table `robot`"))?;
-        let robot = Robot::from_frame(&load(&robot.table)?)?.to_description()?;
-        let read = manifest
-            .stages
-            .iter()
-            .flat_map(|stage| &stage.files)
-            .map(|file| &file.path);
-        let sources: Vec<PathBuf> = read
-            .chain(std::iter::once(&manifest.pipeline.file))
-            .map(PathBuf::from)
-            .collect();
-        let alone = step.is_some() || last(Parameters::KIND).is_none();
+        let robot = last::<Robot>(manifest, store)?;
+        let robot = robot.ok_or_else(|| Error::spec(run, "the run has no table `robot`"))?;
+        let robot = robot.to_description()?;
+        let files = manifest.stages.iter().flat_map(|stage| &stage.files);
+        let files = files.map(|file| &file.path);
+        let sources = files.chain([&manifest.pipeline.file]);
+        let sources = sources.map(PathBuf::from).collect();
+        let serial = serial(&manifest.pipeline.resolved);
+        let alone = step.is_some() || manifest.tables(Parameters::KIND).next().is_none();
         let torques = match IdentifiedTorques::of_run(manifest, step, &robot, load)? {
             Some(torques) if alone => {
-                let serial = serial(&manifest.pipeline.resolved);
                 return Ok(Self {
                     sources,
                     serial,
@@ -174,95 +154,51 @@ impl IdentifiedModel {
         };
         let (stage, table) = chosen(manifest, step, stands.as_ref())?;
         // A correction was learned on top of one model and belongs to no other.
-        let withdrawn = |id: &str| {
-            stands
-                .iter()
-                .flat_map(|stands| &stands.withdrawn)
-                .any(|gone| gone.step == id)
+        let is_learned = |stage: &&StageReport| {
+            let mut withdrawn = stands.iter().flat_map(|stands| &stands.withdrawn);
+            let mut inputs = stage.inputs.iter();
+            !withdrawn.any(|gone| gone.step == stage.id)
+                && inputs.any(|input| input.table.table_hash == table.table_hash)
+                && output(stage, Network::KIND).is_some()
         };
-        let learned = manifest
-            .stages
-            .iter()
-            .filter(|stage| !withdrawn(&stage.id))
-            .rfind(|stage| {
-                stage
-                    .inputs
-                    .iter()
-                    .any(|input| input.table.table_hash == table.table_hash)
-                    && stage
-                        .outputs
-                        .iter()
-                        .any(|output| output.kind == Network::KIND)
-            });
-        let network = learned.and_then(|stage| {
-            stage
-                .outputs
-                .iter()
-                .find(|output| output.kind == Network::KIND)
-        });
+        let learned = manifest.stages.iter().rfind(is_learned);
+        let network = learned.map(|stage| written::<Network>(stage, load));
         let convention = convention_of(manifest, store)?
             .unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints.len()));
-        let recording = last(Recording::KIND)
-            .map(|output| Recording::from_frame(&load(&output.table)?))
-            .transpose()?;
-        let prismatic: Vec<bool> = (0..robot.joints.len())
-            .map(|joint| !RobotModel::new(robot.clone()).is_revolute(joint))
-            .collect();
-        let correction = match network {
-            Some(network) => Network::from_frame(&load(&network.table)?)?.correction(&prismatic)?,
+        let data = last::<Recording>(manifest, store)?.map(|table| table.measurements());
+        let is_prismatic = |joint: &JointDescription| joint.kind == JointKind::Prismatic;
+        let prismatic: Vec<bool> = robot.joints.iter().map(is_prismatic).collect();
+        let correction = match network.transpose()?.flatten() {
+            Some(network) => network.correction(&prismatic)?,
             None => None,
         };
-        let data = recording.map(|table| table.measurements());
-        let origin = format!("run {run}, stage {}", stage.id);
         let unexplained = unexplained_of(manifest, store)?;
-        let warnings = stands
-            .iter()
-            .flat_map(Standing::warnings)
-            .chain(unexplained.clone())
-            .collect();
-        let reason = manifest
-            .stages
-            .iter()
-            .flat_map(|stage| &stage.warnings)
-            .find(|line| line.starts_with(WRONG_SETUP))
-            .cloned();
-        let refusals = wrong.or(reason).into_iter().collect();
+        let warnings = stands.iter().flat_map(Standing::warnings);
+        let warnings = warnings.chain(unexplained.clone()).collect();
+        let mut stated = manifest.stages.iter().flat_map(|stage| &stage.warnings);
+        let reason = stated.find(|line| line.starts_with(WRONG_SETUP)).cloned();
         let learned = learned.filter(|_| correction.is_some());
-        let warnings_of = |stage: &StageReport| {
-            stage
-                .warnings
-                .iter()
-                .map(|line| format!("{}: {line}", stage.id))
-                .collect::<Vec<_>>()
+        let warnings_of = |stage: &StageReport| -> Vec<String> {
+            let lines = stage.warnings.iter();
+            lines.map(|line| format!("{}: {line}", stage.id)).collect()
         };
-        let stage_warnings = std::iter::once(stage)
-            .chain(learned)
-            .flat_map(warnings_of)
-            .collect();
-        let of_stage = |stage: &StageReport, kind: &str| {
-            let written = stage.outputs.iter().find(|output| output.kind == kind);
-            written.map(|output| load(&output.table)).transpose()
-        };
+        let stages = [Some(stage), learned].into_iter().flatten();
+        let of_stage = |stage: &StageReport, kind: &str| output(stage, kind).map(load).transpose();
         let of_learned = learned.map(|learned| move |kind: &str| of_stage(learned, kind));
         let of_learned = of_learned.as_ref().map(|tables| tables as &TablesByKind);
-        let model = Self::of_tables(robot, origin, &|kind| of_stage(stage, kind), of_learned)?;
-        let convention = Some(convention);
-        let serial = serial(&manifest.pipeline.resolved);
-        let known = Self {
+        let origin = format!("run {run}, stage {}", stage.id);
+        Ok(Self {
             serial,
             torques,
             correction,
             data,
-            convention,
-            ..model
-        };
-        Ok(Self {
+            convention: Some(convention),
             unexplained,
             warnings,
-            stage_warnings,
-            refusals,
+            stage_warnings: stages.flat_map(warnings_of).collect(),
+            refusals: wrong.or(reason).into_iter().collect(),
             sources,
-            ..known
+            ..Self::of_tables(robot, origin, &|kind| of_stage(stage, kind), of_learned)?
         })
     }
 
@@ -330,57 +266,49 @@ impl IdentifiedModel {
 
     /// The model of a table of parameters; robots come as a table `robot`, in the practice layout, or as calib's YAML.
     pub fn of_files(files: &Files) -> Result<Self> {
-        let mut warnings = Vec::new();
+        let (mut warnings, place) = (Vec::new(), files.parameters.display().to_string());
         let torques = from_file::<TorqueParameters>(&files.parameters).ok();
         let parameters = match &torques {
             Some(_) => Parameters::default(),
-            None => files.vouched(
-                &files.parameters,
-                from_file::<Parameters>(&files.parameters)?,
-                &mut warnings,
-            )?,
+            None => {
+                let loose = from_file::<Parameters>(&files.parameters)?;
+                files.vouched(&files.parameters, loose, &mut warnings)?
+            }
         };
-        if torques
-            .as_ref()
-            .map_or(!parameters.says_its_robot(), |torques| {
-                !torques.table.says_its_robot()
-            })
-        {
+        let says = torques.as_ref().map_or_else(
+            || parameters.says_its_robot(),
+            |torques| torques.table.says_its_robot(),
+        );
+        if !says {
             let message =
                 "does not say which robot it is the model of, as tables of an earlier calib do not";
             if !files.unchecked {
                 let message = format!(
                     "{message}: identify anew, or take it as the model of this robot with --unchecked"
                 );
-                return Err(Error::data(files.parameters.display().to_string(), message));
+                return Err(Error::data(place, message));
             }
-            warnings.push(format!("{} {message}", files.parameters.display()));
+            warnings.push(format!("{place} {message}"));
         }
         let robot = if ending(&files.robot) == "parquet" {
             let loose = from_file::<Robot>(&files.robot)?;
-            files
-                .vouched(&files.robot, loose, &mut warnings)?
-                .to_description()?
+            let table = files.vouched(&files.robot, loose, &mut warnings)?;
+            table.to_description()?
         } else {
             robot_file(&files.robot, None)?
         };
-        let origin = format!("table {}", files.parameters.display());
-        let sources = vec![files.parameters.clone(), files.robot.clone()];
-        if let Some(loose) = torques {
-            let table = files.vouched(&files.parameters, loose, &mut warnings)?;
-            let by_torques =
-                Self::of_torques(robot.clone(), IdentifiedTorques::of(&robot, table, origin)?)?;
-            return Ok(Self {
-                warnings: [warnings, by_torques.warnings].concat(),
-                sources,
-                ..by_torques
-            });
-        }
-        Ok(Self {
-            warnings,
-            sources,
-            ..Self::of(robot, parameters, origin)?
-        })
+        let origin = format!("table {place}");
+        let mut model = match torques {
+            Some(loose) => {
+                let table = files.vouched(&files.parameters, loose, &mut warnings)?;
+                let torques = IdentifiedTorques::of(&robot, table, origin)?;
+                Self::of_torques(robot, torques)?
+            }
+            None => Self::of(robot, parameters, origin)?,
+        };
+        model.warnings = [warnings, model.warnings].concat();
+        model.sources = vec![files.parameters.clone(), files.robot.clone()];
+        Ok(model)
     }
 
     fn of(robot: RobotDescription, parameters: Parameters, origin: String) -> Result<Self> {
@@ -390,7 +318,6 @@ impl IdentifiedModel {
             return Err(Error::spec(origin, message));
         }
         let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)?;
-        let scatter = Scatter::default();
         Ok(Self {
             robot,
             parameters,
@@ -398,7 +325,7 @@ impl IdentifiedModel {
             torques: None,
             correction: None,
             covariance: None,
-            scatter,
+            scatter: Scatter::default(),
             data: None,
             convention: None,
             serial: None,
@@ -437,22 +364,22 @@ impl IdentifiedModel {
 
     /// Refuses to write over a file that the model was made from.
     pub(crate) fn spare(&self, out: Option<&Path>) -> Result<()> {
-        let Some(out) = out else { return Ok(()) };
-        let Ok(place) = out.canonicalize() else {
+        let place = |path: &Path| path.canonicalize().ok();
+        let Some((out, there)) = out.and_then(|out| Some((out, place(out)?))) else {
             return Ok(());
         };
-        if self
+        if !self
             .sources
             .iter()
-            .any(|source| source.canonicalize().is_ok_and(|source| source == place))
+            .any(|source| place(source).as_ref() == Some(&there))
         {
-            let message = format!(
-                "{} is a file that the model was made from: name another file",
-                out.display()
-            );
-            return Err(Error::spec("--out", message));
+            return Ok(());
         }
-        Ok(())
+        let message = format!(
+            "{} is a file that the model was made from: name another file",
+            out.display()
+        );
+        Err(Error::spec("--out", message))
     }
 
     /// What the uncertainty of a target is made of; none where a table alone was given.
@@ -463,11 +390,8 @@ impl IdentifiedModel {
 
     /// How far a commanded position may be off, from the rows that the model was fitted to; none for a table of parameters alone.
     pub(crate) fn uncertainty(&self, arm: &IdentifiedArm) -> Option<Uncertainty> {
-        let uncertainty = self
-            .covariance
-            .clone()
-            .map(|covariance| Uncertainty::new(arm, covariance, self.scatter));
-        uncertainty.map(|uncertainty| match &self.data {
+        let uncertainty = Uncertainty::new(arm, self.covariance.clone()?, self.scatter);
+        Some(match &self.data {
             Some(data) => uncertainty.with_recording(arm, data),
             None => uncertainty,
         })
@@ -494,34 +418,20 @@ fn chosen<'m>(
     step: Option<&str>,
     stands: Option<&Standing>,
 ) -> Result<(&'m StageReport, &'m TableRef)> {
-    let with = |stage: &'m StageReport| {
-        stage
-            .outputs
-            .iter()
-            .find(|output| output.kind == Parameters::KIND)
-            .map(|output| (stage, &output.table))
-    };
+    let with = |stage: &'m StageReport| Some((stage, output(stage, Parameters::KIND)?));
     let found: Vec<(&StageReport, &TableRef)> = manifest.stages.iter().filter_map(with).collect();
-    let Some(step) = step else {
-        let standing =
-            stands.and_then(|stands| found.iter().find(|(stage, _)| stage.id == stands.model));
-        let diagnosed = found
-            .iter()
-            .rfind(|(stage, _)| stage.uses == Diagnose::NAME);
-        let taken = standing.or(diagnosed).or(found.last()).copied();
-        return taken.ok_or_else(|| Error::spec(&manifest.run_id, "the run identified nothing"));
-    };
-    found
-        .iter()
-        .find(|(stage, _)| stage.id == *step)
-        .copied()
-        .ok_or_else(|| {
-            let ids: Vec<&str> = found.iter().map(|(stage, _)| stage.id.as_str()).collect();
-            Error::spec(
-                "--step",
-                format!("no stage `{step}` writes parameters{}", instead(step, &ids)),
-            )
-        })
+    let of_id = |id: &str| found.iter().find(|(stage, _)| stage.id == id);
+    if let Some(step) = step {
+        let ids: Vec<&str> = found.iter().map(|(stage, _)| stage.id.as_str()).collect();
+        let message = || format!("no stage `{step}` writes parameters{}", instead(step, &ids));
+        let taken = of_id(step).copied();
+        return taken.ok_or_else(|| Error::spec("--step", message()));
+    }
+    let standing = stands.and_then(|stands| of_id(&stands.model));
+    let mut diagnosed = found.iter().rev();
+    let diagnosed = diagnosed.find(|(stage, _)| stage.uses == Diagnose::NAME);
+    let taken = standing.or(diagnosed).or(found.last()).copied();
+    taken.ok_or_else(|| Error::spec(&manifest.run_id, "the run identified nothing"))
 }
 
 /// A table of a run, of which nothing is made anew here: one that is damaged or gone is refused.

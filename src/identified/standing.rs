@@ -47,11 +47,8 @@ pub(super) fn unexplained_of(manifest: &Manifest, store: &Store) -> Result<Optio
 
 /// Verdict and findings of the last diagnosis.
 fn diagnosed(manifest: &Manifest, store: &Store) -> Result<Option<(Verdict, Findings)>> {
-    let mut diagnosed = manifest
-        .stages
-        .iter()
-        .filter(|stage| stage.uses == Diagnose::NAME && !stage.outputs.is_empty());
-    let Some(stage) = diagnosed.next_back() else {
+    let is_it = |stage: &&StageReport| stage.uses == Diagnose::NAME && !stage.outputs.is_empty();
+    let Some(stage) = manifest.stages.iter().rfind(is_it) else {
         return Ok(None);
     };
     let load = |table: &TableRef| store.load(table);
@@ -63,43 +60,30 @@ fn diagnosed(manifest: &Manifest, store: &Store) -> Result<Option<(Verdict, Find
 /// The step that stands for a run; none where nothing predicts, the last diagnosis speaks of an outside simulation, or the set-up is
 /// wrong. Fails where a table has left the store.
 pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing>> {
-    let output = |stage: &StageReport, kind: &str| -> Option<TableRef> {
-        stage
-            .outputs
-            .iter()
-            .find(|output| output.kind == kind)
-            .map(|output| output.table.clone())
-    };
-    let steps = manifest
-        .stages
-        .iter()
-        .filter_map(|stage| Some((stage, output(stage, Prediction::KIND)?)));
+    let stages = manifest.stages.iter();
+    let steps = stages.filter_map(|stage| Some((stage, output(stage, Prediction::KIND)?)));
     let diagnosed = steps
         .clone()
         .rfind(|(stage, _)| stage.uses == Diagnose::NAME);
-    if let Some(table) = diagnosed
-        .as_ref()
-        .and_then(|(stage, _)| output(stage, Parameters::KIND))
-        && Parameters::from_frame(&store.load(&table)?)?.corrected() == Corrected::OutsideSimulation
+    let diagnosed = diagnosed.map(|(stage, _)| stage);
+    if let Some(stage) = diagnosed
+        && let Some(parameters) = written::<Parameters>(stage, |table| store.load(table))?
+        && parameters.corrected() == Corrected::OutsideSimulation
     {
         return Ok(None);
     }
     if wrong_setup_of(manifest, store)?.is_some() {
         return Ok(None);
     }
-    let step = |(stage, prediction): (&StageReport, TableRef)| -> Result<Step> {
-        let unseen = Unseen::of_frame(&store.load(&prediction)?)?;
+    let step = |(stage, prediction): (&StageReport, &TableRef)| -> Result<Step> {
         Ok(Step {
             id: stage.id.clone(),
             is_identified: output(stage, Parameters::KIND).is_some(),
-            unseen,
+            unseen: Unseen::of_frame(&store.load(prediction)?)?,
         })
     };
     let steps = steps.map(step).collect::<Result<Vec<Step>>>()?;
-    Ok(standing(
-        &steps,
-        diagnosed.map(|(stage, _)| stage.id.as_str()),
-    ))
+    Ok(standing(&steps, diagnosed.map(|stage| stage.id.as_str())))
 }
 
 /// The convention of a run's recording, none where nothing was ingested: the twin logs its joints as its robot file counts them.
@@ -108,12 +92,8 @@ pub fn convention_of(manifest: &Manifest, store: &Store) -> Result<Option<JointC
     let convention = last::<JointConventions>(manifest, store)?
         .map(|table| table.to_convention())
         .transpose()?;
-    if convention.is_none()
-        && manifest
-            .stages
-            .iter()
-            .any(|stage| stage.uses == Ingest::NAME)
-    {
+    let mut stages = manifest.stages.iter();
+    if convention.is_none() && stages.any(|stage| stage.uses == Ingest::NAME) {
         let message = format!(
             "the run does not say how the controller counts its joints: an earlier calib made it. `calib run {}` writes it anew",
             manifest.pipeline.file
@@ -131,19 +111,21 @@ pub fn counted_otherwise(manifest: &Manifest, store: &Store) -> Result<Option<St
     let Some(robot) = last::<Robot>(manifest, store)? else {
         return Ok(None);
     };
-    Ok(table
-        .to_convention()?
-        .difference(&RobotModel::new(robot.to_description()?)))
+    let robot = RobotModel::new(robot.to_description()?);
+    Ok(table.to_convention()?.difference(&robot))
 }
 
-fn last<T: Table>(manifest: &Manifest, store: &Store) -> Result<Option<T>> {
-    let mut outputs = manifest.stages.iter().flat_map(|stage| &stage.outputs);
-    let table: Option<&TableRef> = outputs
-        .rfind(|output| output.kind == T::KIND)
-        .map(|output| &output.table);
-    table
-        .map(|table| T::from_frame(&load(store, table, manifest)?))
-        .transpose()
+/// The last table of a kind that a run wrote.
+pub(super) fn last<T: Table>(manifest: &Manifest, store: &Store) -> Result<Option<T>> {
+    let output = manifest.tables(T::KIND).last();
+    let frame = output.map(|output| load(store, &output.table, manifest));
+    frame.map(|frame| T::from_frame(&frame?)).transpose()
+}
+
+/// Where the table of a kind is that a stage wrote.
+pub(super) fn output<'s>(stage: &'s StageReport, kind: &str) -> Option<&'s TableRef> {
+    let output = stage.outputs.iter().find(|output| output.kind == kind);
+    output.map(|output| &output.table)
 }
 
 /// The table of a kind that a stage wrote, if it wrote one.
@@ -151,10 +133,8 @@ pub(super) fn written<T: Table>(
     stage: &StageReport,
     load: impl Fn(&TableRef) -> Result<Frame>,
 ) -> Result<Option<T>> {
-    let output = stage.outputs.iter().find(|output| output.kind == T::KIND);
-    output
-        .map(|output| T::from_frame(&load(&output.table)?))
-        .transpose()
+    let frame = output(stage, T::KIND).map(load);
+    frame.map(|frame| T::from_frame(&frame?)).transpose()
 }
 
 /// The scatter by the stage whose model stands, and by the one that learned a correction on top of it.
@@ -163,20 +143,16 @@ pub(super) fn of(stage: &TablesByKind, learned: Option<&TablesByKind>) -> Result
     let fitted: Option<Observability> = of_kind(stage)?;
     let prediction: Option<Prediction> = of_kind(stage)?;
     let corrections: Option<Corrections> = learned.map_or(Ok(None), of_kind)?;
-    let repeatability = diagnosed
-        .and_then(|verdict| verdict.0.first().map(|row| row.repeatability_rad))
-        .or_else(|| {
-            fitted?
-                .0
-                .iter()
-                .find(|row| row.quantity == "joint_repeatability_rad")
-                .map(|row| row.value)
-        });
+    let of_verdict = diagnosed.and_then(|verdict| Some(verdict.0.first()?.repeatability_rad));
+    let of_fit = || {
+        let rows = fitted?.0.into_iter();
+        let mut rows = rows.filter(|row| row.quantity == "joint_repeatability_rad");
+        rows.next().map(|row| row.value)
+    };
+    let repeatability = of_verdict.or_else(of_fit);
     let mut unexplained = prediction.as_ref().map_or(0.0, Prediction::unexplained_mm);
-    if let (Some(rms), Some(prediction)) = (
-        corrections.as_ref().and_then(Corrections::rms_mm),
-        &prediction,
-    ) {
+    let learned = corrections.as_ref().and_then(Corrections::rms_mm);
+    if let (Some(rms), Some(prediction)) = (learned, &prediction) {
         // The errors of a correction's folds hold the noise, the parameters' uncertainty and the remaining error.
         let left = rms.powi(2) - prediction.mean_square_noise_mm2();
         unexplained = unexplained.min((left / 3.0).max(0.0).sqrt());
@@ -204,12 +180,9 @@ pub fn robot_file(path: &Path, urdf: Option<&Path>) -> Result<RobotDescription> 
         return Ok(read_case(file)?.robot);
     }
     let urdf = urdf.map(read).transpose()?;
-    Ok(read_calib(
-        file,
-        urdf.as_ref()
-            .map(|(label, text)| RobotFileText { label, text }),
-    )?
-    .robot)
+    let urdf = urdf.as_ref();
+    let urdf = urdf.map(|(label, text)| RobotFileText { label, text });
+    Ok(read_calib(file, urdf)?.robot)
 }
 
 /// Cycles of a pose from which ISO 9283 speaks of accuracy and repeatability.
@@ -264,9 +237,8 @@ pub fn achieved(
     } else {
         *arm.base()
     };
-    let off: Vec<Vector3<f64>> = wanted
-        .iter()
-        .zip(&points)
+    let pairs = wanted.iter().zip(&points);
+    let off: Vec<Vector3<f64>> = pairs
         .map(|(wanted, point)| point - base.point(wanted))
         .collect();
     let mut found = Achieved {
@@ -283,20 +255,12 @@ pub fn achieved(
     let mut repeated: BTreeMap<Vec<i64>, Vec<Vector3<f64>>> = BTreeMap::new();
     for (row, off) in rows.iter().zip(&off) {
         // Commands are the same where they agree to a nanoradian.
-        let key = row
-            .target
-            .q
-            .iter()
-            .flatten()
-            .map(|q| (q * 1e9).round() as i64)
-            .collect();
+        let q = row.target.q.iter().flatten();
+        let key = q.map(|q| (q * 1e9).round() as i64).collect();
         repeated.entry(key).or_default().push(*off);
     }
-    found.poses = repeated
-        .into_values()
-        .filter(|cycles| cycles.len() >= CYCLES)
-        .map(|cycles| repeated_pose(&cycles))
-        .collect();
+    let poses = repeated.values().filter(|cycles| cycles.len() >= CYCLES);
+    found.poses = poses.map(|cycles| repeated_pose(cycles)).collect();
     Ok(found)
 }
 
@@ -306,8 +270,8 @@ fn repeated_pose(off: &[Vector3<f64>]) -> RepeatedPose {
     let mean = off.iter().sum::<Vector3<f64>>() / count;
     let from: Vec<f64> = off.iter().map(|one| (one - mean).norm()).collect();
     let average = from.iter().sum::<f64>() / count;
-    let deviation =
-        (from.iter().map(|one| (one - average).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
+    let squares = from.iter().map(|one| (one - average).powi(2));
+    let deviation = (squares.sum::<f64>() / (count - 1.0)).sqrt();
     RepeatedPose {
         cycles: off.len(),
         accuracy: mean.norm(),
@@ -318,18 +282,14 @@ fn repeated_pose(off: &[Vector3<f64>]) -> RepeatedPose {
 /// The rigid motion that brings points of the base onto measured ones, least squares (Kabsch).
 fn placed(base: &[Vector3<f64>], measured: &[Vector3<f64>]) -> Result<Pose> {
     if base.len() < FEWEST {
-        return Err(Error::spec(
-            "--new-base",
-            format!("needs {FEWEST} points or more, found {}", base.len()),
-        ));
+        let message = format!("needs {FEWEST} points or more, found {}", base.len());
+        return Err(Error::spec("--new-base", message));
     }
     let mean = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let (from, to) = (mean(base), mean(measured));
-    let spread: Matrix3<f64> = base
-        .iter()
-        .zip(measured)
-        .map(|(a, b)| (b - to) * (a - from).transpose())
-        .sum();
+    let pairs = base.iter().zip(measured);
+    let parts = pairs.map(|(a, b)| (b - to) * (a - from).transpose());
+    let spread: Matrix3<f64> = parts.sum();
     let svd = spread.svd(true, true);
     let (Some(u), Some(v)) = (svd.u, svd.v_t) else {
         return Err(Error::Bug("a 3 x 3 SVD without vectors".into()));

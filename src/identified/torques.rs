@@ -1,6 +1,6 @@
 //! What a run identified of the arm's torques: the model that motions are fed forward with and exports are made of.
 
-use super::standing::written;
+use super::standing::{output, written};
 use crate::description::RobotDescription;
 use crate::dynamics::{DynamicArm, TorqueModel};
 use crate::error::Result;
@@ -47,30 +47,25 @@ impl IdentifiedTorques {
         let model = parameters.to_model()?;
         let mut warnings = Vec::new();
         if !(0..model.joints()).all(|link| model.is_whole(link)) {
-            warnings
-                .push("masses are identified as base parameters: no link has masses of its own, and none are exported".into());
+            let warning = "masses are identified as base parameters: no link has masses of its own, and none are exported";
+            warnings.push(warning.into());
         }
-        for body in model
-            .consistency()
-            .iter()
-            .filter(|body| !body.is_consistent())
-        {
-            warnings.push(format!(
-                "no body has the identified inertia of link {} (table body_consistency): files hold that of the nearest body",
-                body.link + 1
-            ));
-        }
-        let per_ampere = torque_per_ampere(robot).ok();
-        let (of_the_recording, refusals) = (Vec::new(), Vec::new());
+        let bodies = model.consistency().into_iter();
+        warnings.extend(bodies.filter(|body| !body.is_consistent()).map(|body| {
+            let link = body.link + 1;
+            format!(
+                "no body has the identified inertia of link {link} (table body_consistency): files hold that of the nearest body"
+            )
+        }));
         Ok(Self {
             arm,
             model,
             parameters,
-            per_ampere,
-            of_the_recording,
+            per_ampere: torque_per_ampere(robot).ok(),
+            of_the_recording: Vec::new(),
             origin,
             warnings,
-            refusals,
+            refusals: Vec::new(),
         })
     }
 
@@ -81,66 +76,45 @@ impl IdentifiedTorques {
         robot: &RobotDescription,
         load: impl Fn(&TableRef) -> Result<Frame>,
     ) -> Result<Option<Self>> {
-        let writes = |stage: &&StageReport| {
-            stage
-                .outputs
-                .iter()
-                .any(|output| output.kind == TorqueParameters::KIND)
+        let is_it = |stage: &&StageReport| {
+            step.is_none_or(|step| stage.id == step)
+                && output(stage, TorqueParameters::KIND).is_some()
         };
-        let mut stages = manifest
-            .stages
-            .iter()
-            .filter(writes)
-            .filter(|stage| step.is_none_or(|step| stage.id == step));
-        let Some(stage) = stages.next_back() else {
+        let Some(stage) = manifest.stages.iter().rfind(is_it) else {
             return Ok(None);
         };
         let Some(parameters) = written::<TorqueParameters>(stage, &load)? else {
             return Ok(None);
         };
         // A stage behind it may have written the robot once more, with the masses that these torques show.
-        let mut robots = manifest
-            .stages
-            .iter()
-            .flat_map(|stage| &stage.outputs)
-            .filter(|output| output.kind == Robot::KIND);
-        let read = |table: &TableRef| {
-            stage
-                .inputs
-                .iter()
-                .any(|input| input.table.table_hash == table.table_hash)
+        let read = |table: &&TableRef| {
+            let mut inputs = stage.inputs.iter();
+            inputs.any(|input| input.table.table_hash == table.table_hash)
         };
-        let read = robots.rfind(|output| read(&output.table));
+        let robots = manifest.tables(Robot::KIND).map(|output| &output.table);
+        let read = robots.filter(read).last();
         let read = read
-            .map(|output| Robot::from_frame(&load(&output.table)?)?.to_description())
+            .map(|table| Robot::from_frame(&load(table)?)?.to_description())
             .transpose()?;
         let robot = read.as_ref().unwrap_or(robot);
-        let mut torques = Self::of(
-            robot,
-            parameters,
-            format!("run {}, stage {}", manifest.run_id, stage.id),
-        )?;
+        let origin = format!("run {}, stage {}", manifest.run_id, stage.id);
+        let mut torques = Self::of(robot, parameters, origin)?;
         if let Some(covariance) = written::<TorqueCovariance>(stage, &load)? {
             torques.model.covariance = covariance.of_model(&torques.model)?;
         }
         let findings = written::<TorqueFindings>(stage, &load)?.unwrap_or_default();
-        let outside = findings
-            .0
-            .into_iter()
-            .filter(|row| OF_THE_RECORDING.contains(&row.effect.as_str()));
-        torques.of_the_recording = outside.map(|row| row.statement).collect();
-        for row in written::<TorqueVerdict>(stage, &load)?
-            .unwrap_or_default()
-            .0
-        {
-            match row.verdict.as_str() {
-                "unexplained" => torques
-                    .warnings
-                    .push(format!("the verdict is `unexplained`: {}", row.statement)),
-                _ if row.is_wrong_setup() => torques
-                    .refusals
-                    .push(format!("the set-up is wrong: {}", row.statement)),
-                _ => (),
+        let mut outside = findings.0;
+        outside.retain(|row| OF_THE_RECORDING.contains(&row.effect.as_str()));
+        torques.of_the_recording = outside.into_iter().map(|row| row.statement).collect();
+        let verdict = written::<TorqueVerdict>(stage, &load)?.unwrap_or_default();
+        for row in verdict.0 {
+            let statement = &row.statement;
+            if row.verdict == "unexplained" {
+                let warning = format!("the verdict is `unexplained`: {statement}");
+                torques.warnings.push(warning);
+            } else if row.is_wrong_setup() {
+                let refusal = format!("the set-up is wrong: {statement}");
+                torques.refusals.push(refusal);
             }
         }
         Ok(Some(torques))

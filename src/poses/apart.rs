@@ -2,8 +2,9 @@
 //!
 //! What the poses promise of a finding against its rival, as text and as JSON.
 
+use super::site::site;
+use super::{Drive, PoseAnswer, PoseRequest, closing, drive, wish};
 use crate::audit::{POSITIONS, diagnosis};
-use crate::description::RobotDescription;
 use crate::diagnose::{DiagnosedModel, discrimination_problem, other_means};
 use crate::effect::{CAUSES, Form, Load, Place, cause};
 use crate::error::{Error, Result, counted, nearest};
@@ -12,41 +13,22 @@ use crate::estimate::choose::{
 };
 use crate::identified::convention_of;
 use crate::pipeline::StageReport;
-use crate::poses::proposal::closing;
-use crate::poses::site::site;
-use crate::poses::{Drive, PoseAnswer, PoseRequest, drive, wish};
 use crate::robot::{JointConvention, Measurements, RobotModel};
 use crate::store::{Store, TableRef};
-use crate::table::{FindingRow, Findings, Parameters, Prediction, Recording, Rivals, Robot, Table};
+use crate::table::{
+    FindingRow, Findings, Parameters, Prediction, Recording, RivalRow, Rivals, Robot, Table,
+};
 use crate::text::filled;
 use minijinja::context;
 use minijinja::value::Serde;
 use nalgebra::Vector3;
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// Payloads of the recording that are asked for at most.
 const PAYLOADS: usize = 4;
 
 /// An effect at a place.
 type EffectAtPlace = (String, Place);
-
-/// A finding and a rival, and what tells them apart.
-pub struct Apart<'a> {
-    request: &'a PoseRequest,
-    run: String,
-    finding: FindingRow,
-    rival: EffectAtPlace,
-    /// None where the two are one by an identity.
-    form: Option<Form>,
-    robot: RobotDescription,
-    ranges: Vec<[f64; 2]>,
-    convention: JointConvention,
-    rows: usize,
-    /// mm.
-    sigma: f64,
-    circumstances: Circumstances,
-    discrimination: Discrimination,
-}
 
 /// A run by its name, and which of its diagnoses.
 pub struct RunStage<'a> {
@@ -57,12 +39,12 @@ pub struct RunStage<'a> {
 }
 
 /// Proposes poses that tell a finding from a rival; `names` say which, or nothing for the first that has one.
-pub fn apart<'a>(
-    request: &'a PoseRequest,
+pub fn apart(
+    request: &PoseRequest,
     store: &Store,
     run_stage: &RunStage,
     names: &[String],
-) -> Result<Apart<'a>> {
+) -> Result<PoseAnswer> {
     let (manifest, stage) = diagnosis(store, run_stage.run, run_stage.step, &POSITIONS)?;
     let place = format!("run {}", manifest.run_id);
     let findings: Findings = written(store, &stage)?;
@@ -86,15 +68,12 @@ pub fn apart<'a>(
     let mut data = recording.measurements();
     let predicted = model.predict(&data);
     let rows = as_fitted(&mut data, &written(store, &stage)?, &predicted);
-    let estimated = |name: &String| {
-        parameters
-            .0
-            .iter()
-            .any(|row| row.name == *name && row.status == "free")
+    let estimated = |k: &usize| {
+        let name = &model.stack.specs()[*k].name;
+        let mut rows = parameters.0.iter();
+        rows.any(|row| row.name == *name && row.status == "free")
     };
-    let free: Vec<usize> = (0..model.x.len())
-        .filter(|k| estimated(&model.stack.specs()[*k].name))
-        .collect();
+    let free: Vec<usize> = (0..model.x.len()).filter(estimated).collect();
     let diagnosed = DiagnosedModel {
         model: &model,
         data: &data,
@@ -109,16 +88,12 @@ pub fn apart<'a>(
     let usual = median(rows.iter().map(|row| data.points.sigma[*row].x).collect());
     let sigma = request.sigma.map_or(usual, |sigma| sigma * 1e-3);
     let circumstances = circumstances(&data, &rows);
-    let listed = rivals
-        .0
-        .iter()
-        .any(|row| row.rank == finding.rank && row.effect == rival.0 && is_at(&row.place, rival.1));
-    if cause(&rival.0).is_none()
-        && !model
-            .stack
-            .effects()
-            .any(|(effect, _)| effect.name() == rival.0)
-    {
+    let is_rival = |row: &RivalRow| {
+        row.rank == finding.rank && row.effect == rival.0 && is_at(&row.place, rival.1)
+    };
+    let listed = rivals.0.iter().any(is_rival);
+    let mut effects = model.stack.effects();
+    if cause(&rival.0).is_none() && !effects.any(|(effect, _)| effect.name() == rival.0) {
         let message = format!(
             "`{}` is a declared effect; a run keeps only those that it found, and it did not find this one",
             rival.0
@@ -129,11 +104,8 @@ pub fn apart<'a>(
     let discrimination = match discrimination_problem(&diagnosed, &forms, (&rival.0, rival.1)) {
         Ok((problem, form)) => {
             // A free curve is known where points were fitted, and nowhere else.
-            if forms
-                .iter()
-                .chain([&form])
-                .any(|form| form.cause().is_nameless())
-            {
+            let is_free = |form: &Form| form.cause().is_nameless();
+            if is_free(&form) || forms.iter().any(is_free) {
                 within(&mut site, &recorded);
             }
             tried = Some(form);
@@ -149,46 +121,87 @@ pub fn apart<'a>(
         },
         Err(fault) => return Err(Error::spec("--separate", fault)),
     };
-    Ok(Apart {
-        request,
-        run: manifest.run_id,
-        finding,
-        rival,
-        form: tried,
-        robot,
-        ranges: site.ranges,
-        convention,
-        rows: rows.len(),
-        sigma: sigma * 1e3,
-        circumstances,
-        discrimination,
+    let names = [
+        format!("{} at {}", finding.effect, finding.place),
+        format!("{} at {}", rival.0, rival.1),
+    ];
+    let proposed = discrimination.proposed.as_ref();
+    let drive = proposed.map(|proposed| Drive {
+        robot: robot.clone(),
+        ranges: site.ranges.clone(),
+        poses: proposed.poses.clone(),
+        direction: proposed.direction.clone(),
+        convention: convention.clone(),
+    });
+    let before = discrimination.before;
+    let separation = [0, 1].map(|k: usize| {
+        json!({
+            "if": names[k], "fitted": names[1 - k], "recorded": before[k], "imitated": discrimination.alike[k],
+            "random": proposed.map(|proposed| proposed.random[k]),
+            "proposed": proposed.map(|proposed| proposed.after[k]),
+        })
+    });
+    let other = other_means(&finding.effect, &rival.0);
+    let document = json!({
+        "robot": robot.name,
+        "run": manifest.run_id,
+        "seed": request.seed,
+        "finding": { "rank": finding.rank, "effect": finding.effect, "where": finding.place },
+        "rival": { "effect": rival.0, "where": rival.1.to_string(), "form": tried },
+        "sigma_mm": sigma * 1e3,
+        "temperature_c": circumstances.temperature,
+        "points": rows.len(),
+        "told_from": MIN_SEPARATION_L,
+        "separation": separation,
+        "conclusion": conclusion(&names, other, &discrimination),
+        "approach_visible_share": proposed.map(|proposed| proposed.approach_seen),
+        "self_collision_checked": false,
+        "counting": drive::counting(&convention, &robot),
+        "out": request.out.as_ref().map(|out| out.to_string_lossy()),
+        "poses": drive.as_ref().map_or_else(Vec::new, drive::objects),
+    });
+    let mut lines = vec![(
+        format!("the recording, {}", counted(rows.len(), "point")),
+        before,
+    )];
+    if let Some(proposed) = proposed {
+        let count = proposed.poses.rows();
+        lines.extend([
+            (
+                format!("and {count} random poses, median of 200"),
+                proposed.random,
+            ),
+            (format!("and the {count} proposed"), proposed.after),
+        ]);
+    }
+    let about = context! {
+        of => Serde(&document), statement => &finding.statement, rival => &names[1],
+        least => MIN_SEPARATION_L.to_string(), width => lines.iter().map(|(name, _)| name.len()).max(),
+        rows => Serde(lines), heads => names.map(|name| format!("if {name}")),
+        counts_otherwise => !convention.is_of_the_robot_file(), closing => closing(request),
+    };
+    Ok(PoseAnswer {
+        text: filled(include_str!("apart.txt"), about),
+        document,
+        drive,
+        warnings: Vec::new(),
     })
 }
 
 fn written<T: Table>(store: &Store, stage: &StageReport) -> Result<T> {
-    let reference = stage
-        .outputs
-        .iter()
-        .find(|output| output.kind == T::KIND)
-        .map(|output| &output.table);
-    table(store, reference)
+    let mut outputs = stage.outputs.iter();
+    let output = outputs.find(|output| output.kind == T::KIND);
+    table(store, output.map(|output| &output.table))
 }
 
 fn read<T: Table>(store: &Store, stage: &StageReport) -> Result<T> {
-    table(
-        store,
-        stage
-            .inputs
-            .iter()
-            .find(|input| input.port == T::KIND)
-            .map(|input| &input.table),
-    )
+    let input = stage.inputs.iter().find(|input| input.port == T::KIND);
+    table(store, input.map(|input| &input.table))
 }
 
 fn table<T: Table>(store: &Store, table: Option<&TableRef>) -> Result<T> {
-    let table =
-        table.ok_or_else(|| Error::Bug(format!("a diagnosis without a table `{}`", T::KIND)))?;
-    T::from_frame(&store.load(table)?)
+    let none = || Error::Bug(format!("a diagnosis without a table `{}`", T::KIND));
+    T::from_frame(&store.load(table.ok_or_else(none)?)?)
 }
 
 /// `joint_compliance@joint 2`, `joint_compliance at joint 2` or `joint_compliance` -> effect and place; effects of the library, and those
@@ -198,28 +211,24 @@ fn name<'t>(text: &'t str, found: &[&str]) -> Result<(&'t str, Option<Place>)> {
         Some((effect, place)) => (effect.trim(), Some(place.trim())),
         None => (text.trim(), None),
     };
-    let known = || {
-        CAUSES
-            .iter()
-            .map(|cause| cause.name())
-            .chain(found.iter().copied())
-    };
+    let listed = CAUSES.iter().map(|cause| cause.name());
+    let known: Vec<&str> = listed.chain(found.iter().copied()).collect();
     let named = |place: &str| {
         let allowed = "allowed are e.g. `joint 2`, `joint 4->5`, `link 3`, `link 2-4`, `base`, `tool`, `tracker`, `recording`";
+        let message = || format!("`{place}` is no place; {allowed}");
         place
             .parse()
-            .map_err(|()| Error::spec("--separate", format!("`{place}` is no place; {allowed}")))
+            .map_err(|()| Error::spec("--separate", message()))
     };
-    if known().any(|name| name == effect) {
+    if known.contains(&effect) {
         return Ok((effect, place.map(named).transpose()?));
     }
-    let near = nearest(effect, known())
+    let near = nearest(effect, known.into_iter());
+    let near = near
         .map(|near| format!("did you mean `{near}`? "))
         .unwrap_or_default();
-    Err(Error::spec(
-        "--separate",
-        format!("unknown effect `{effect}`; {near}`calib effects` lists them"),
-    ))
+    let message = format!("unknown effect `{effect}`; {near}`calib effects` lists them");
+    Err(Error::spec("--separate", message))
 }
 
 /// The finding that is meant, and what to tell it from.
@@ -229,57 +238,43 @@ fn pair(
     rivals: &Rivals,
     names: &[String],
 ) -> Result<(FindingRow, EffectAtPlace)> {
-    let list: Vec<String> = findings
-        .0
-        .iter()
-        .map(|row| format!("{} ({}@{})", row.rank, row.effect, row.place))
-        .collect();
+    let wrong = |message: String| Error::spec("--separate", message);
+    let all = || findings.0.iter();
+    let listed = all().map(|row| format!("{} ({}@{})", row.rank, row.effect, row.place));
+    let list: Vec<String> = listed.collect();
     if list.is_empty() {
-        return Err(Error::spec(
-            place,
-            "has no finding that could be separated from another cause",
-        ));
+        let message = "has no finding that could be separated from another cause";
+        return Err(Error::spec(place, message));
     }
+    let list = list.join(", ");
     // The first by name of equally close rivals, as the table is sorted.
     let closest = |row: &FindingRow| {
         let of_finding = rivals.0.iter().filter(|rival| rival.rank == row.rank);
-        of_finding
-            .min_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic))
-            .and_then(|rival| Some((rival.effect.clone(), rival.place.parse().ok()?)))
-    };
-    let name_one = |found: &FindingRow| {
-        let message = format!(
-            "{} at {} has no rival: this recording separates it from all others; name one as a second, e.g. 'link_compliance@link 2'",
-            found.effect, found.place
-        );
-        Error::spec("--separate", message)
+        let rival = of_finding.min_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic))?;
+        Some((rival.effect.clone(), rival.place.parse().ok()?))
     };
     let Some(first) = names.first() else {
-        let found = findings
-            .0
-            .iter()
-            .find_map(|row| Some((row.clone(), closest(row)?)));
+        let found = all().find_map(|row| Some((row.clone(), closest(row)?)));
         let message = format!(
-            "no finding has a rival; name a finding and the cause to separate it from: --separate {list:?}"
+            "no finding has a rival; name a finding and the cause to separate it from: --separate {list}"
         );
-        return found.ok_or_else(|| Error::spec(place, message.replace(['[', ']', '"'], "")));
+        return found.ok_or_else(|| Error::spec(place, message));
     };
-    let named: Vec<&str> = findings
-        .0
-        .iter()
-        .map(|row| row.effect.as_str())
+    let rank = first.trim().parse::<i64>();
+    let effects = all().map(|row| row.effect.as_str());
+    let named: Vec<&str> = effects
         .chain(rivals.0.iter().map(|row| row.effect.as_str()))
         .collect();
-    let fits = |row: &&FindingRow| match (first.trim().parse::<i64>(), name(first, &named)) {
-        (Ok(rank), _) => row.rank == rank,
+    let fits = |row: &&FindingRow| match (&rank, name(first, &named)) {
+        (Ok(rank), _) => row.rank == *rank,
         (_, Ok((effect, place))) => {
             row.effect == effect && place.is_none_or(|place| is_at(&row.place, place))
         }
         _ => false,
     };
-    let fitting: Vec<&FindingRow> = findings.0.iter().filter(fits).collect();
+    let fitting: Vec<&FindingRow> = all().filter(fits).collect();
     let [found] = fitting[..] else {
-        if first.trim().parse::<i64>().is_err() {
+        if rank.is_err() {
             name(first, &named)?;
         }
         let many = if fitting.is_empty() {
@@ -287,32 +282,25 @@ fn pair(
         } else {
             "several findings"
         };
-        return Err(Error::spec(
-            "--separate",
-            format!(
-                "`{first}` matches {many} of {place}; its findings: {}",
-                list.join(", ")
-            ),
-        ));
+        let message = format!("`{first}` matches {many} of {place}; its findings: {list}");
+        return Err(wrong(message));
     };
+    let (effect, at) = (&found.effect, &found.place);
     let Some(second) = names.get(1) else {
-        let rival = closest(found).ok_or_else(|| name_one(found))?;
-        return Ok((found.clone(), rival));
+        let none = || {
+            wrong(format!(
+                "{effect} at {at} has no rival: this recording separates it from all others; name one as a second, e.g. 'link_compliance@link 2'"
+            ))
+        };
+        return Ok((found.clone(), closest(found).ok_or_else(none)?));
     };
-    let (effect, at) = name(second, &named)?;
-    let Some(at) = at else {
-        return Err(Error::spec(
-            "--separate",
-            format!("`{second}`: say where, e.g. '{effect}@{}'", found.place),
-        ));
-    };
-    if effect == found.effect && is_at(&found.place, at) {
-        return Err(Error::spec(
-            "--separate",
-            format!("`{second}` is the finding itself"),
-        ));
+    match name(second, &named)? {
+        (rival, None) => Err(wrong(format!("`{second}`: say where, e.g. '{rival}@{at}'"))),
+        (rival, Some(place)) if rival == effect && is_at(at, place) => {
+            Err(wrong(format!("`{second}` is the finding itself")))
+        }
+        (rival, Some(place)) => Ok((found.clone(), (rival.into(), place))),
     }
-    Ok((found.clone(), (effect.into(), at)))
 }
 
 /// Whether a table means this place.
@@ -369,9 +357,10 @@ fn payloads(data: &Measurements, rows: &[usize]) -> Vec<f64> {
     let last = all.len().saturating_sub(1);
     match all.len() {
         0..=PAYLOADS => all,
-        _ => (0..PAYLOADS)
-            .map(|k| all[k * last / (PAYLOADS - 1)])
-            .collect(),
+        _ => {
+            let some = (0..PAYLOADS).map(|k| all[k * last / (PAYLOADS - 1)]);
+            some.collect()
+        }
     }
 }
 
@@ -384,169 +373,70 @@ fn circumstances(data: &Measurements, rows: &[usize]) -> Circumstances {
     Circumstances {
         time: Some(last + 1.0),
         temperature: temperatures().max_by(|a, b| away(a).total_cmp(&away(b))),
-        target: data
-            .target
-            .as_ref()
-            .and_then(|_| rows.first().map(|row| data.target(*row).to_string())),
+        target: rows
+            .first()
+            .filter(|_| data.target.is_some())
+            .map(|row| data.target(*row).to_string()),
     }
 }
 
 /// Nobody measures more poses than these.
 const LIMIT: f64 = 10_000.0;
 
-impl Apart<'_> {
-    /// Finding and rival in words.
-    fn names(&self) -> [String; 2] {
-        [
-            format!("{} at {}", self.finding.effect, self.finding.place),
-            format!("{} at {}", self.rival.0, self.rival.1),
-        ]
-    }
-
-    /// What becomes of it, a sentence a line.
-    fn conclusion(&self) -> Vec<String> {
-        let [finding, rival] = self.names();
-        let other = other_means(&self.finding.effect, &self.rival.0);
-        let Discrimination {
-            before,
-            alike,
-            proposed,
-        } = &self.discrimination;
-        let Some(proposed) = proposed else {
-            let means =
-                other.unwrap_or("measure something else: another payload, another temperature, a second target off the first");
-            return vec![
-                format!(
-                    "no pose separates {finding} from {rival}: they move the point identically at every pose"
-                ),
-                format!("instead: {means}"),
-            ];
-        };
-        let mut out = Vec::new();
-        for (k, (true_one, fitted)) in [(&finding, &rival), (&rival, &finding)]
-            .into_iter()
-            .enumerate()
-        {
-            if alike[k] {
-                out.push(format!("{fitted} can imitate {true_one} completely: only if {fitted} is true are they separable"));
-            }
+/// What becomes of a finding and its rival, a sentence a line; `other`: what else tells them apart.
+fn conclusion(
+    [finding, rival]: &[String; 2],
+    other: Option<&str>,
+    discrimination: &Discrimination,
+) -> Vec<String> {
+    let alike = discrimination.alike;
+    let Some(proposed) = &discrimination.proposed else {
+        let means = other.unwrap_or("measure something else: another payload, another temperature, a second target off the first");
+        return vec![
+            format!(
+                "no pose separates {finding} from {rival}: they move the point identically at every pose"
+            ),
+            format!("instead: {means}"),
+        ];
+    };
+    let mut out = Vec::new();
+    for (k, (true_one, fitted)) in [(finding, rival), (rival, finding)].into_iter().enumerate() {
+        if alike[k] {
+            out.push(format!("{fitted} can imitate {true_one} completely: only if {fitted} is true are they separable"));
         }
-        // What can show at all must.
-        let least = |l: &[f64; 2]| {
-            (0..2)
-                .filter(|k| !alike[*k])
-                .map(|k| l[k])
-                .fold(f64::INFINITY, f64::min)
-        };
-        let (was, will, count) = (least(before), least(&proposed.after), proposed.poses.rows());
-        if will >= MIN_SEPARATION_L {
-            let already = if was >= MIN_SEPARATION_L {
-                "; the recording alone should do"
-            } else {
-                ""
-            };
-            out.push(format!(
-                "measured at {}, they are separable{already}",
-                counted(count, "pose")
-            ));
+    }
+    // What can show at all must.
+    let least = |l: &[f64; 2]| {
+        let shown = (0..2).filter(|k| !alike[*k]).map(|k| l[k]);
+        shown.fold(f64::INFINITY, f64::min)
+    };
+    let (was, will, count) = (
+        least(&discrimination.before),
+        least(&proposed.after),
+        proposed.poses.rows(),
+    );
+    let measured = format!("measured at {}, they are", counted(count, "pose"));
+    if will >= MIN_SEPARATION_L {
+        let already = if was >= MIN_SEPARATION_L {
+            "; the recording alone should do"
         } else {
-            let needed = ((MIN_SEPARATION_L - was) / (will - was) * count as f64).ceil();
-            let more = if needed < LIMIT {
-                format!("some {needed:.0} such poses would")
-            } else {
-                "no number of poses would".into()
-            };
-            let size = if alike.contains(&true) {
-                ", if the effect is as large as this recording estimates"
-            } else {
-                ""
-            };
-            out.push(format!(
-                "measured at {}, they are not separable: {more}{size}",
-                counted(count, "pose")
-            ));
-            out.extend(other.map(|means| format!("instead: {means}")));
-        }
-        out
-    }
-}
-
-impl PoseAnswer for Apart<'_> {
-    fn drive(&self) -> Option<Drive<'_>> {
-        let proposed = self.discrimination.proposed.as_ref()?;
-        let Self {
-            robot,
-            ranges,
-            convention,
-            ..
-        } = self;
-        Some(Drive {
-            robot,
-            ranges,
-            poses: &proposed.poses,
-            direction: &proposed.direction,
-            convention,
-        })
-    }
-
-    fn text(&self) -> String {
-        let count = self
-            .discrimination
-            .proposed
-            .as_ref()
-            .map_or(0, |proposed| proposed.poses.rows());
-        let mut rows = vec![(
-            format!("the recording, {}", counted(self.rows, "point")),
-            self.discrimination.before,
-        )];
-        if let Some(proposed) = &self.discrimination.proposed {
-            rows.push((
-                format!("and {count} random poses, median of 200"),
-                proposed.random,
-            ));
-            rows.push((format!("and the {count} proposed"), proposed.after));
-        }
-        let names = self.names();
-        let about = context! {
-            of => Serde(self.document()), statement => &self.finding.statement, rival => &names[1],
-            least => MIN_SEPARATION_L.to_string(), width => rows.iter().map(|(name, _)| name.len()).max(),
-            rows => Serde(rows), heads => names.map(|name| format!("if {name}")),
-            counts_otherwise => !self.convention.is_of_the_robot_file(), closing => closing(self.request),
+            ""
         };
-        filled(include_str!("apart.txt"), about)
+        out.push(format!("{measured} separable{already}"));
+        return out;
     }
-
-    fn document(&self) -> Value {
-        let names = self.names();
-        let Discrimination {
-            before,
-            alike,
-            proposed,
-        } = &self.discrimination;
-        let separation = [0, 1].map(|k: usize| {
-            json!({
-                "if": names[k], "fitted": names[1 - k], "recorded": before[k], "imitated": alike[k],
-                "random": proposed.as_ref().map(|proposed| proposed.random[k]),
-                "proposed": proposed.as_ref().map(|proposed| proposed.after[k]),
-            })
-        });
-        json!({
-            "robot": self.robot.name,
-            "run": self.run,
-            "seed": self.request.seed,
-            "finding": { "rank": self.finding.rank, "effect": self.finding.effect, "where": self.finding.place },
-            "rival": { "effect": self.rival.0, "where": self.rival.1.to_string(), "form": self.form },
-            "sigma_mm": self.sigma,
-            "temperature_c": self.circumstances.temperature,
-            "points": self.rows,
-            "told_from": MIN_SEPARATION_L,
-            "separation": separation,
-            "conclusion": self.conclusion(),
-            "approach_visible_share": proposed.as_ref().map(|proposed| proposed.approach_seen),
-            "self_collision_checked": false,
-            "counting": drive::counting(&self.convention, &self.robot),
-            "out": self.request.out.as_ref().map(|out| out.to_string_lossy()),
-            "poses": self.drive().map_or_else(Vec::new, |poses| drive::objects(&poses)),
-        })
-    }
+    let needed = ((MIN_SEPARATION_L - was) / (will - was) * count as f64).ceil();
+    let more = if needed < LIMIT {
+        format!("some {needed:.0} such poses would")
+    } else {
+        "no number of poses would".into()
+    };
+    let size = if alike.contains(&true) {
+        ", if the effect is as large as this recording estimates"
+    } else {
+        ""
+    };
+    out.push(format!("{measured} not separable: {more}{size}"));
+    out.extend(other.map(|means| format!("instead: {means}")));
+    out
 }

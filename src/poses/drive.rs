@@ -11,17 +11,17 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Poses to drive to.
-pub struct Drive<'a> {
+pub struct Drive {
     /// Whose joint names the file carries.
-    pub robot: &'a RobotDescription,
+    pub robot: RobotDescription,
     /// rad or m.
-    pub ranges: &'a [[f64; 2]],
+    pub ranges: Vec<[f64; 2]>,
     /// In the order of driving.
-    pub poses: &'a Measurements,
+    pub poses: Measurements,
     /// +1 or -1, row-major.
-    pub direction: &'a [f64],
+    pub direction: Vec<f64>,
     /// How the controller that drives them counts.
-    pub convention: &'a JointConvention,
+    pub convention: JointConvention,
 }
 
 /// In which counting joints stand, in the words of a JSON document.
@@ -50,7 +50,7 @@ fn columns(drive: &Drive) -> Vec<DriveColumn> {
         direction,
         convention,
         ..
-    } = *drive;
+    } = drive;
     let n = poses.joints;
     let rows = 0..poses.rows();
     let column = |name: String, decimals, value: &dyn Fn(usize) -> f64| DriveColumn {
@@ -61,16 +61,8 @@ fn columns(drive: &Drive) -> Vec<DriveColumn> {
     let shown: Vec<Vec<f64>> = rows.clone().map(|row| shown(drive, poses.q(row))).collect();
     let mut out = vec![column("sequence".into(), 0, &|row| (row + 1) as f64)];
     for (j, joint) in robot.joints.iter().enumerate() {
-        let ending = if joint.kind == JointKind::Revolute {
-            "deg"
-        } else {
-            "mm"
-        };
-        out.push(column(
-            format!("q{}_{ending}", j + 1),
-            JOINT_DECIMALS,
-            &|row| shown[row][j],
-        ));
+        let name = format!("q{}_{}", j + 1, joint_unit(joint.kind));
+        out.push(column(name, JOINT_DECIMALS, &|row| shown[row][j]));
     }
     out.push(column("payload_kg".into(), 3, &|row| poses.payload[row]));
     for j in 0..n {
@@ -79,19 +71,19 @@ fn columns(drive: &Drive) -> Vec<DriveColumn> {
         }));
     }
     for (axis, name) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
-        let values = poses
-            .points
-            .position
-            .iter()
-            .map(|point| Unit::Millimetre.from_si(point[axis]))
-            .collect();
-        out.push(DriveColumn {
-            name: name.into(),
-            values,
-            decimals: 3,
-        });
+        let position = &poses.points.position;
+        let millimetres = |row: usize| Unit::Millimetre.from_si(position[row][axis]);
+        out.push(column(name.into(), 3, &millimetres));
     }
     out
+}
+
+/// In which joints are entered.
+pub(super) fn joint_unit(kind: JointKind) -> Unit {
+    match kind {
+        JointKind::Revolute => Unit::Degree,
+        JointKind::Prismatic => Unit::Millimetre,
+    }
 }
 
 /// Joints in the controller's numbers, deg or mm, rounded so that what is written keeps within the limits of every joint.
@@ -101,15 +93,9 @@ fn shown(drive: &Drive, q: &[f64]) -> Vec<f64> {
         ranges,
         convention,
         ..
-    } = *drive;
+    } = drive;
     let scale = 10f64.powi(JOINT_DECIMALS as i32);
-    let unit = |j: usize| {
-        if robot.joints[j].kind == JointKind::Revolute {
-            Unit::Degree
-        } else {
-            Unit::Millimetre
-        }
-    };
+    let unit = |j: usize| joint_unit(robot.joints[j].kind);
     let exact = |change: &dyn Fn(&mut [f64]), values: &[f64]| {
         let mut values = values.to_vec();
         change(&mut values);
@@ -144,30 +130,20 @@ fn shown(drive: &Drive, q: &[f64]) -> Vec<f64> {
 
 /// What is wrong with the ending, if anything.
 pub fn fault(path: &Path) -> Option<String> {
-    kind(path)
-        .is_none()
-        .then(|| format!("`{}` ends in neither .csv nor .parquet", path.display()))
-}
-
-fn kind(path: &Path) -> Option<&'static str> {
-    let ending = ending(path);
-    ["csv", "parquet"]
-        .into_iter()
-        .find(|known| *known == ending)
+    let known = ["csv", "parquet"].contains(&ending(path).as_str());
+    (!known).then(|| format!("`{}` ends in neither .csv nor .parquet", path.display()))
 }
 
 /// Writes the poses to a .csv or .parquet file. Fails where the file cannot be written.
 pub fn write(path: &Path, drive: &Drive) -> Result<()> {
-    let bytes = if kind(path) == Some("parquet") {
+    let bytes = if ending(path) == "parquet" {
         parquet(drive)?
     } else {
         csv(drive).into_bytes()
     };
     std::fs::write(path, bytes).map_err(|error| {
-        Error::store(
-            path.display().to_string(),
-            format!("cannot be written: {error}"),
-        )
+        let message = format!("cannot be written: {error}");
+        Error::store(path.display().to_string(), message)
     })
 }
 
@@ -187,39 +163,28 @@ pub(super) fn objects(drive: &Drive) -> Vec<serde_json::Value> {
 
 fn csv(drive: &Drive) -> String {
     let columns = columns(drive);
-    let mut text = columns
-        .iter()
-        .map(|column| column.name.as_str())
-        .collect::<Vec<_>>()
-        .join(",")
-        + "\n";
-    for row in 0..drive.poses.rows() {
-        let cells = columns
-            .iter()
-            .map(|column| format!("{:.*}", column.decimals, column.values[row]));
-        text.push_str(&(cells.collect::<Vec<_>>().join(",") + "\n"));
-    }
-    text
+    let line = |cell: &dyn Fn(&DriveColumn) -> String| {
+        columns.iter().map(cell).collect::<Vec<_>>().join(",") + "\n"
+    };
+    let row = |row: usize| line(&|column| format!("{:.*}", column.decimals, column.values[row]));
+    let rows: String = (0..drive.poses.rows()).map(row).collect();
+    line(&|column| column.name.clone()) + &rows
 }
 
 fn parquet(drive: &Drive) -> Result<Vec<u8>> {
     let bug = |error: &dyn std::fmt::Display| Error::Bug(error.to_string());
     let arrays = columns(drive).into_iter().map(|column| {
+        let whole = column.values.iter().map(|value| *value as i64);
         let array: ArrayRef = match column.name.as_str() {
-            "sequence" => Arc::new(
-                column
-                    .values
-                    .iter()
-                    .map(|value| *value as i64)
-                    .collect::<Int64Array>(),
-            ),
+            "sequence" => Arc::new(whole.collect::<Int64Array>()),
             _ => Arc::new(Float64Array::from(column.values)),
         };
         (column.name, array)
     });
     let batch = RecordBatch::try_from_iter(arrays).map_err(|error| bug(&error))?;
-    let mut writer =
-        ArrowWriter::try_new(Vec::new(), batch.schema(), None).map_err(|error| bug(&error))?;
-    writer.write(&batch).map_err(|error| bug(&error))?;
-    writer.into_inner().map_err(|error| bug(&error))
+    let written = ArrowWriter::try_new(Vec::new(), batch.schema(), None).and_then(|mut writer| {
+        writer.write(&batch)?;
+        writer.into_inner()
+    });
+    written.map_err(|error| bug(&error))
 }

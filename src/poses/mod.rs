@@ -10,7 +10,7 @@ mod sockets;
 pub use apart::{RunStage, apart};
 pub use drive::{Drive, fault, write};
 pub use proposal::proposal;
-pub use sockets::{SocketProposal, places, sockets};
+pub use sockets::{places, sockets};
 
 use crate::effect::identified;
 use crate::error::{Fault, instead};
@@ -133,14 +133,23 @@ impl PoseRequest {
 }
 
 /// Poses and what they promise.
-pub(crate) trait PoseAnswer {
+pub struct PoseAnswer {
     /// None where no pose helps.
-    fn drive(&self) -> Option<Drive<'_>>;
-    fn text(&self) -> String;
-    fn document(&self) -> serde_json::Value;
+    pub drive: Option<Drive>,
+    /// As people read it.
+    pub text: String,
+    /// As programs do.
+    pub document: serde_json::Value,
     /// What a person must not overlook, a sentence each.
-    fn warnings(&self) -> &[String] {
-        &[]
+    pub warnings: Vec<String>,
+}
+
+/// What every proposal ends with.
+fn closing(request: &PoseRequest) -> String {
+    let text = "self-collision and collision with the cell are not checked: drive the poses slowly first\n";
+    match &request.out {
+        Some(path) => format!("{text}poses: {}\n", path.display()),
+        None => format!("{text}no file was written: give --out poses.csv (or .parquet)\n"),
     }
 }
 

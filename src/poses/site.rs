@@ -3,6 +3,7 @@
 //! Recordings that proposed poses are compared with.
 
 use super::PoseRequest;
+use super::drive::joint_unit;
 use crate::description::{JointKind, RobotDescription};
 use crate::error::{Error, Fault, Result, counted};
 use crate::estimate::choose::{Site, median};
@@ -18,29 +19,18 @@ pub(super) fn site(
     place: &str,
     recorded: Option<&[[f64; 2]]>,
 ) -> Result<Site> {
-    let unit = |kind| {
-        if kind == JointKind::Revolute {
-            Unit::Degree
-        } else {
-            Unit::Millimetre
-        }
-    };
     let mut ranges = Vec::new();
     let mut faults = Vec::new();
     let given = request.limits.as_ref();
     if let Some(given) = given.filter(|given| given.len() != robot.joints.len()) {
-        return Err(Error::spec(
-            "--limits",
-            format!(
-                "has {}, the robot {}",
-                counted(given.len(), "range"),
-                counted(robot.joints.len(), "joint")
-            ),
-        ));
+        let [ranges, joints] = [(given.len(), "range"), (robot.joints.len(), "joint")]
+            .map(|(count, what)| counted(count, what));
+        let message = format!("has {ranges}, the robot {joints}");
+        return Err(Error::spec("--limits", message));
     }
     for (index, joint) in robot.joints.iter().enumerate() {
         let limits = match given.and_then(|given| given.get(index)) {
-            Some(range) => Some(range.map(|value| unit(joint.kind).to_si(value))),
+            Some(range) => Some(range.map(|value| joint_unit(joint.kind).to_si(value))),
             None => joint.limits,
         };
         match limits {
@@ -49,29 +39,26 @@ pub(super) fn site(
                 ranges.push([lower + free, upper - free]);
             }
             _ if recorded.is_some() => ranges.extend(recorded.and_then(|all| all.get(index))),
-            _ => faults.push(Fault::new(
-                place,
-                format!(
-                    "joint {} has no limits; put them into the robot file, or give --limits with a range for every joint",
-                    index + 1
-                ),
-            )),
+            _ => {
+                let number = index + 1;
+                let message = format!(
+                    "joint {number} has no limits; put them into the robot file, or give --limits with a range for every joint"
+                );
+                faults.push(Fault::new(place, message));
+            }
         }
     }
-    if !faults.is_empty() {
-        return Err(Error::Spec(faults));
-    }
+    Error::if_spec(faults)?;
     let mut bounds = [[f64::NEG_INFINITY, f64::INFINITY]; 3];
     if let Some(given) = &request.bounds {
         for (bound, range) in bounds.iter_mut().zip(given) {
             *bound = range.map(|value| Unit::Millimetre.to_si(value));
         }
     }
-    let mut payloads = if request.payloads.is_empty() {
-        vec![0.0]
-    } else {
-        request.payloads.clone()
-    };
+    let mut payloads = request.payloads.clone();
+    if payloads.is_empty() {
+        payloads.push(0.0);
+    }
     payloads.sort_by(f64::total_cmp);
     payloads.dedup();
     let floor = request
@@ -87,14 +74,8 @@ pub(super) fn site(
 
 /// The usual standard deviation of an axis, m; none where no point was measured, or nobody stated it.
 pub(super) fn usual_sigma(data: &Measurements) -> Option<f64> {
-    let measured: Vec<f64> = data
-        .points
-        .sigma
-        .iter()
-        .flatten()
-        .copied()
-        .filter(|sigma| sigma.is_finite())
-        .collect();
+    let all = data.points.sigma.iter().flatten().copied();
+    let measured: Vec<f64> = all.filter(|sigma| sigma.is_finite()).collect();
     let stated = data.noise_basis != NoiseBasis::Inferred && !measured.is_empty();
     stated.then(|| median(measured))
 }
@@ -105,26 +86,21 @@ pub(super) fn recording(
     robot: &RobotDescription,
 ) -> Result<(Measurements, Option<String>)> {
     let label = path.display().to_string();
-    let Loose { table, vouched } = from_file::<Recording>(path).map_err(|error| match error {
-        Error::Data(faults) => Error::Data(
-            faults
-                .into_iter()
-                .map(|fault| Fault {
-                    message: format!(
-                        "{}; `ingest` makes a `recording` table of any recording",
-                        fault.message
-                    ),
-                    ..fault
-                })
-                .collect(),
+    let more = |fault: Fault| Fault {
+        message: format!(
+            "{}; `ingest` makes a `recording` table of any recording",
+            fault.message
         ),
+        ..fault
+    };
+    let Loose { table, vouched } = from_file::<Recording>(path).map_err(|error| match error {
+        Error::Data(faults) => Error::Data(faults.into_iter().map(more).collect()),
         other => other,
     })?;
     let warning = (!vouched)
         .then(|| format!("{label} carries no content hash: its content cannot be verified"));
-    let prismatic: Vec<bool> = robot
-        .joints
-        .iter()
+    let joints = robot.joints.iter();
+    let prismatic: Vec<bool> = joints
         .map(|joint| joint.kind == JointKind::Prismatic)
         .collect();
     if table.prismatic != prismatic {

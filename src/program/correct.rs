@@ -37,20 +37,15 @@ impl ProgramFile<'_> {
 
     fn refused(&self, refusal: ProgramRefusal) -> Error {
         let shown = refusal.faults.iter().take(MOST_FAULTS);
-        let mut faults: Vec<Fault> = shown
-            .map(|note| Fault::new(self.at(note), &note.message))
-            .collect();
+        let fault = |note: &Note| Fault::new(self.at(note), &note.message);
+        let mut faults: Vec<Fault> = shown.map(fault).collect();
         if refusal.faults.len() > MOST_FAULTS {
-            faults.push(Fault::new(
-                self.place,
-                format!("and {} more", refusal.faults.len() - MOST_FAULTS),
-            ));
+            let message = format!("and {} more", refusal.faults.len() - MOST_FAULTS);
+            faults.push(Fault::new(self.place, message));
         }
         if refusal.partial > 0 {
-            faults.push(Fault::new(
-                self.place,
-                "partial targets stay as they are with --leave-partial",
-            ));
+            let message = "partial targets stay as they are with --leave-partial";
+            faults.push(Fault::new(self.place, message));
         }
         Error::Data(faults)
     }
@@ -95,10 +90,8 @@ pub fn corrected(
     } = rules;
     let robot = RobotModel::new(robot.clone());
     if robot.joints() != JOINTS {
-        let message = format!(
-            "programs have targets of {JOINTS} joints, the robot has {}",
-            robot.joints()
-        );
+        let joints = robot.joints();
+        let message = format!("programs have targets of {JOINTS} joints, the robot has {joints}");
         return Err(Error::spec(source.place, message));
     }
     let mut program = Program::parse_with(source.text, source.language, partial, source.companions)
@@ -110,10 +103,8 @@ pub fn corrected(
         .relate_tools(&robot, tool.as_ref())
         .map_err(|message| Error::spec(source.place, message))?;
     // Joint targets are the same in every frame.
-    let cartesian = program
-        .literals()
-        .iter()
-        .any(|literal| !literal.kind.is_of_joints());
+    let mut literals = program.literals().iter();
+    let cartesian = literals.any(|literal| !literal.kind.is_of_joints());
     if frames == Frames::Refused && cartesian && !program.frames().is_empty() {
         let refused = |note: &Note| Note {
             message: format!("{}; --assume-frames accepts it", note.message),
@@ -122,14 +113,10 @@ pub fn corrected(
         let faults = program.frames().iter().map(refused).collect();
         return Err(source.refused(ProgramRefusal { faults, partial: 0 }));
     }
+    let mut literals = program.literals().iter();
     match load {
         ProgramLoad::Stated(payload) => program.carries(payload),
-        ProgramLoad::Needed(most)
-            if program
-                .literals()
-                .iter()
-                .any(|literal| literal.payload.is_none()) =>
-        {
+        ProgramLoad::Needed(most) if literals.any(|literal| literal.payload.is_none()) => {
             return Err(Error::data(source.place, unstated_payload(most)));
         }
         ProgramLoad::Needed(_) | ProgramLoad::Optional => {}
@@ -151,7 +138,7 @@ pub fn has_mark(bytes: &[u8], language: Language) -> bool {
                 || language == Language::Fanuc && (byte.is_ascii_digit() || *byte == b':')
         };
         let line = &line[line.iter().take_while(|byte| is_before(byte)).count()..];
-        line.strip_prefix(sign(language).as_bytes())
+        line.strip_prefix(language.grammar().comment.as_bytes())
             .is_some_and(|tail| tail.trim_ascii_start().starts_with(MARK.as_bytes()))
     })
 }
@@ -160,35 +147,22 @@ pub fn has_mark(bytes: &[u8], language: Language) -> bool {
 pub fn with_mark(program: &[u8], source: &[u8], language: Language, remarks: &[&str]) -> Vec<u8> {
     let hash = blake3::hash(source).to_hex();
     let at = place(program, language);
-    let ending = if program.windows(2).any(|two| two == b"\r\n") {
-        "\r\n"
-    } else {
-        "\n"
+    let ending = match program.windows(2).any(|two| two == b"\r\n") {
+        true => "\r\n",
+        false => "\n",
     };
     // A head that no line ends.
-    let before = if at > 0 && !program[..at].ends_with(b"\n") {
-        ending
-    } else {
-        ""
-    };
+    let is_open = at > 0 && !program[..at].ends_with(b"\n");
+    let before = if is_open { ending } else { "" };
     let remarks: String = remarks.iter().map(|remark| format!(", {remark}")).collect();
     let comment = match language {
         Language::Fanuc => format!("{before}   :  !{MARK} from {} ;{ending}", &hash[..8]),
-        _ => format!(
-            "{before}{} {MARK} from {}{remarks}{ending}",
-            sign(language),
-            &hash[..16]
-        ),
+        _ => {
+            let (sign, hash) = (language.grammar().comment, &hash[..16]);
+            format!("{before}{sign} {MARK} from {hash}{remarks}{ending}")
+        }
     };
     [&program[..at], comment.as_bytes(), &program[at..]].concat()
-}
-
-fn sign(language: Language) -> &'static str {
-    match language {
-        Language::Krl => ";",
-        Language::Rapid | Language::Fanuc => "!",
-        Language::UrScript => "#",
-    }
 }
 
 fn lines(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
@@ -197,12 +171,7 @@ fn lines(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
 
 /// The byte before which the comment goes.
 fn place(bytes: &[u8], language: Language) -> usize {
-    let heads: &[&str] = match language {
-        Language::Krl => &["DEF", "DEFDAT", "DEFFCT", "GLOBAL"],
-        Language::Rapid => &["MODULE"],
-        Language::Fanuc => &["/MN"],
-        Language::UrScript => &[],
-    };
+    let heads = language.grammar().heads;
     let (mut end, mut first) = (0, 0);
     let mut leading = true;
     for line in lines(bytes) {

@@ -5,8 +5,8 @@
 //! F), the elbow (U, D) and the turns of J1, J4 and J6 are read; the arm behind its base (B) and arms with left and right are refused.
 
 use super::literal::ToolInForce;
-use super::token::{ProgramText, Token, TokenKind, tokens};
-use super::{Declared, Gathered, Language, Literal, PostureStatement, TargetKind, quoted};
+use super::token::{Token, TokenKind, number, tokens};
+use super::{Gathered, Grammar, Language, Literal, PostureStatement, TargetKind};
 use crate::spatial::Pose;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -21,66 +21,66 @@ const MOST_TURNS: f64 = 8.0;
 const MOTIONS: [&str; 5] = ["J", "L", "C", "A", "S"];
 const DISPLACED: [&str; 5] = ["OFFSET", "TOOL_OFFSET", "VOFFSET", "INC", "STITCH"];
 
-pub(super) fn read(bytes: &[u8]) -> Gathered {
-    let mut found = Gathered::default();
-    if positions(bytes, &mut found, &mut Vec::new()) {
-        motions(bytes, &mut found);
-    }
-    found
-}
+pub(super) const GRAMMAR: Grammar = Grammar {
+    endings: &["ls"],
+    comment: "!",
+    heads: &["/MN"],
+    begins: &["/PROG"],
+    read: |bytes, _| {
+        let mut found = Gathered::default();
+        if positions(bytes, &mut found) {
+            motions(bytes, &mut found);
+        }
+        found
+    },
+    listed,
+};
 
 /// The joint positions that a listing holds.
-pub(super) fn listed(bytes: &[u8]) -> Declared {
-    let (mut found, mut names) = (Gathered::default(), Vec::new());
-    positions(bytes, &mut found, &mut names);
-    let all = found.literals.len();
-    let kept: Vec<(Literal, String)> = found
-        .literals
-        .drain(..)
-        .zip(names)
-        .filter(|(literal, _)| literal.kind == TargetKind::Joints)
-        .collect();
-    let poses = all - kept.len();
-    let (literals, names) = kept.into_iter().unzip();
-    Declared {
-        found: Gathered { literals, ..found },
-        names,
-        poses,
+fn listed(bytes: &[u8]) -> Gathered {
+    let mut found = Gathered::default();
+    positions(bytes, &mut found);
+    let (literals, names) = (found.literals.split_off(0), found.names.split_off(0));
+    for (literal, (_, name)) in literals.into_iter().zip(names) {
+        if literal.kind == TargetKind::Joints {
+            found.literals.push(literal);
+            found.held_by(name, found.literals.len() - 1);
+        } else {
+            found.poses += 1;
+        }
     }
+    found
 }
 
 /// The lines of a file with the bytes at which each begins.
 fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
     let mut at = 0;
-    bytes
-        .split_inclusive(|byte| *byte == b'\n')
-        .map(move |line| {
-            at += line.len();
-            (at - line.len(), line)
-        })
+    let lines = bytes.split_inclusive(|byte| *byte == b'\n');
+    lines.map(move |line| {
+        at += line.len();
+        (at - line.len(), line)
+    })
 }
 
 /// Where a section begins, behind its line.
 fn section(bytes: &[u8], name: &str) -> Option<usize> {
-    lines(bytes)
-        .find(|(_, line)| line.trim_ascii().eq_ignore_ascii_case(name.as_bytes()))
-        .map(|(at, line)| at + line.len())
+    let is_it =
+        |(_, line): &(usize, &[u8])| line.trim_ascii().eq_ignore_ascii_case(name.as_bytes());
+    let (at, line) = lines(bytes).find(is_it)?;
+    Some(at + line.len())
 }
 
 /// Reads the section of positions; false where there is none.
-fn positions(bytes: &[u8], found: &mut Gathered, names: &mut Vec<String>) -> bool {
+fn positions(bytes: &[u8], found: &mut Gathered) -> bool {
     let (Some(start), Some(end)) = (section(bytes, "/POS"), section(bytes, "/END")) else {
         found.fault(0, "no listing of a TP program: expected the sections /MN, /POS and /END, each on a separate line");
         return false;
     };
-    let end = bytes[..end]
-        .windows(4)
-        .rposition(|four| four.eq_ignore_ascii_case(b"/END"))
-        .unwrap_or(end);
-    if let Some((at, _)) = lines(bytes)
-        .filter(|(at, _)| *at > end)
-        .find(|(_, line)| !line.trim_ascii().is_empty())
-    {
+    let mut fours = bytes[..end].windows(4);
+    let begin = fours.rposition(|four| four.eq_ignore_ascii_case(b"/END"));
+    let end = begin.unwrap_or(end);
+    let is_text = |(at, line): &(usize, &[u8])| *at > end && !line.trim_ascii().is_empty();
+    if let Some((at, _)) = lines(bytes).find(is_text) {
         found.fault(at, "text behind /END is not understood");
         return false;
     }
@@ -97,28 +97,20 @@ fn positions(bytes: &[u8], found: &mut Gathered, names: &mut Vec<String>) -> boo
         }
     };
     let blanked: Vec<u8> = bytes.iter().enumerate().map(blank).collect();
-    let source = ProgramText {
-        bytes: &blanked,
-        language: Language::Fanuc,
-    };
-    let all = tokens(source, found);
+    let all = tokens(&blanked, Language::Fanuc, found);
     let mut reader = Reader {
-        source,
         tokens: &all,
         at: 0,
         found,
-        names,
     };
     while reader.at < all.len() && reader.position().is_some() {}
     true
 }
 
 struct Reader<'a, 'p> {
-    source: ProgramText<'p>,
-    tokens: &'a [Token],
+    tokens: &'a [Token<'p>],
     at: usize,
     found: &'a mut Gathered,
-    names: &'a mut Vec<String>,
 }
 
 /// A number of a position, and where it stands.
@@ -126,101 +118,95 @@ type Number = (f64, Range<usize>);
 
 /// What a motion group of a position states.
 #[derive(Default)]
-struct Group {
+struct Group<'p> {
     numbers: BTreeMap<String, (Number, &'static str)>,
     user_frame: Option<(String, usize)>,
     tool: Option<String>,
-    config: Option<Range<usize>>,
+    config: Option<Token<'p>>,
 }
 
-impl Reader<'_, '_> {
+impl<'p> Reader<'_, 'p> {
     /// Reports a fault here; the rest is not read.
     fn fault<T>(&mut self, expected: &str) -> Option<T> {
         let token = self.tokens.get(self.at).or(self.tokens.last());
-        let (at, text) = token.map_or((0, String::new()), |token| {
-            (
-                token.span.start,
-                quoted(self.source.bytes, token.span.clone()),
-            )
-        });
-        self.found.fault(
-            at,
-            format!("{text} in the positions is not understood; expected {expected}"),
-        );
+        let (at, text) = token.map_or((0, String::new()), |token| (token.start, token.quoted()));
+        let message = format!("{text} in the positions is not understood; expected {expected}");
+        self.found.fault(at, message);
         None
     }
-    fn word(&self, words: &[&str]) -> bool {
-        self.tokens
-            .get(self.at)
-            .is_some_and(|token| self.source.is_word(token, words))
+    /// Goes on behind the next token, if it is such a one.
+    fn take(&mut self, is: impl Fn(&Token) -> bool) -> Option<Token<'p>> {
+        let token = self.tokens.get(self.at).copied().filter(is)?;
+        self.at += 1;
+        Some(token)
+    }
+    fn word(&mut self, word: &str) -> bool {
+        self.take(|token| token.is_word(&[word])).is_some()
     }
     fn sign(&mut self, sign: u8) -> Option<()> {
-        if self.tokens.get(self.at).is_some_and(|token| token.is(sign)) {
-            self.at += 1;
-            return Some(());
+        match self.take(|token| token.is(sign)) {
+            Some(_) => Some(()),
+            None => self.fault(&format!("`{}`", char::from(sign))),
         }
-        self.fault(&format!("`{}`", char::from(sign)))
     }
     fn number(&mut self) -> Option<Number> {
         for count in [2, 1] {
-            if let Some(number) = self
-                .tokens
-                .get(self.at..self.at + count)
-                .and_then(|tokens| self.source.number(tokens))
-            {
+            let tokens = self.tokens.get(self.at..self.at + count);
+            if let Some(number) = tokens.and_then(number) {
                 self.at += count;
                 return Some(number);
             }
         }
         self.fault("a number (a position that was not taught has none)")
     }
+    /// What may stand once in a group.
+    fn once(&mut self, at: usize, name: &str, before: bool) {
+        if before {
+            let message = format!("{name} stands twice in a group");
+            self.found.fault(at, message);
+        }
+    }
 
     /// `P[1:"name"]{ GP1: ... };`
     fn position(&mut self) -> Option<()> {
-        if !self.word(&["P"]) {
+        let Some(head) = self.take(|token| token.is_word(&["P"])) else {
             return self.fault("`P[NUMBER]{...};`");
-        }
-        let at = self.tokens[self.at].span.start;
-        self.at += 1;
+        };
         self.sign(b'[')?;
         let (number, _) = self.number()?;
-        if self.tokens.get(self.at).is_some_and(|token| token.is(b':')) {
-            self.at += 1;
-            if self
-                .tokens
-                .get(self.at)
-                .is_none_or(|token| token.sort != TokenKind::Text)
-            {
-                return self.fault("a name in quotes");
-            }
-            self.at += 1;
+        let is_text = |token: &Token| token.sort == TokenKind::Text;
+        if self.take(|token| token.is(b':')).is_some() && self.take(is_text).is_none() {
+            return self.fault("a name in quotes");
         }
         self.sign(b']')?;
         self.sign(b'{')?;
         let name = format!("P[{number}]");
-        if self.names.contains(&name) {
-            self.found.fault(at, format!("{name} stands twice"));
+        if self.found.names.iter().any(|(_, known)| *known == name) {
+            self.found.fault(head.start, format!("{name} stands twice"));
         }
         let mut groups = 0;
         while let Some(token) = self.tokens.get(self.at).filter(|token| !token.is(b'}')) {
-            let head = self.source.upper(token);
-            let Some(group) = head
+            let head = token.upper();
+            let number = head
                 .strip_prefix("GP")
-                .and_then(|number| number.parse::<usize>().ok())
-                .filter(|group| *group > 0)
-            else {
+                .and_then(|number| number.parse().ok());
+            let Some(group) = number.filter(|group: &usize| *group > 0) else {
                 return self.fault("`GP1:`");
             };
-            let place = token.span.start;
+            let place = token.start;
             self.at += 1;
             self.sign(b':')?;
             let stated = self.group()?;
             groups += 1;
             if group == 1 {
-                self.target(place, &stated)?;
-                self.names.push(name.clone());
+                let before = self.found.literals.len();
+                self.target(place, &stated);
+                self.found.held_by(name.clone(), before);
             } else {
-                self.found.warn(place, format!("group {group} stays as it is: calib assumed that it does not move the robot"));
+                let message = format!(
+                    "group {group} stays as it is: calib assumed that it does not move the robot"
+                );
+                self.found.warn(place, message);
             }
         }
         if groups == 0 {
@@ -231,109 +217,82 @@ impl Reader<'_, '_> {
     }
 
     /// The entries of a group, up to the next one or the end of the position.
-    fn group(&mut self) -> Option<Group> {
+    fn group(&mut self) -> Option<Group<'p>> {
+        const ENTRIES: &str = "UF, UT, CONFIG, J1 to J6, or X, Y, Z, W, P, R";
         let mut group = Group::default();
         loop {
-            let Some(token) = self
-                .tokens
-                .get(self.at)
-                .filter(|token| token.sort == TokenKind::Word)
-            else {
-                return self.fault("UF, UT, CONFIG, J1 to J6, or X, Y, Z, W, P, R");
+            let Some(token) = self.take(|token| token.sort == TokenKind::Word) else {
+                return self.fault(ENTRIES);
             };
-            let (name, at) = (self.source.upper(token), token.span.start);
-            self.at += 1;
+            let (name, at) = (token.upper(), token.start);
             match name.as_str() {
                 "UF" | "UT" => {
                     self.sign(b':')?;
-                    let is_current = self.word(&["F"]);
-                    let value = if is_current {
-                        self.at += 1;
-                        "F".to_string()
-                    } else {
-                        self.number()?.0.to_string()
+                    let value = match self.word("F") {
+                        true => "F".to_string(),
+                        false => self.number()?.0.to_string(),
                     };
                     let before = if name == "UF" {
                         group.user_frame.replace((value, at)).is_some()
                     } else {
                         group.tool.replace(value).is_some()
                     };
-                    if before {
-                        self.found
-                            .fault(at, format!("{name} stands twice in a group"));
-                    }
+                    self.once(at, &name, before);
                 }
                 "CONFIG" => {
                     self.sign(b':')?;
-                    let text = self
-                        .tokens
-                        .get(self.at)
-                        .filter(|token| token.sort == TokenKind::Text)
-                        .map(|token| token.span.clone());
-                    let Some(text) = text else {
+                    let Some(text) = self.take(|token| token.sort == TokenKind::Text) else {
                         return self.fault("a configuration, e.g. 'N U T, 0, 0, 0'");
                     };
-                    self.at += 1;
-                    if group.config.replace(text).is_some() {
-                        self.found.fault(at, "CONFIG stands twice in a group");
-                    }
+                    let before = group.config.replace(text).is_some();
+                    self.once(at, &name, before);
                 }
-                _ if JOINTS.contains(&&*name)
-                    || POSE.contains(&&*name)
-                    || EXTERNAL.contains(&&*name)
-                    || name == "J7" =>
+                entry
+                    if [&JOINTS[..], &POSE, &EXTERNAL, &["J7"]]
+                        .concat()
+                        .contains(&entry) =>
                 {
                     self.sign(b'=')?;
                     let number = self.number()?;
-                    let unit = ["mm", "deg"].into_iter().find(|unit| self.word(&[*unit]));
+                    let unit = ["mm", "deg"].into_iter().find(|unit| self.word(unit));
                     let Some(unit) = unit else {
                         return self.fault("mm or deg");
                     };
-                    self.at += 1;
-                    if group.numbers.insert(name.clone(), (number, unit)).is_some() {
-                        self.found
-                            .fault(at, format!("{name} stands twice in a group"));
-                    }
+                    let before = group.numbers.insert(name.clone(), (number, unit)).is_some();
+                    self.once(at, &name, before);
                 }
                 _ => {
                     self.at -= 1;
-                    return self.fault("UF, UT, CONFIG, J1 to J6, or X, Y, Z, W, P, R");
+                    return self.fault(ENTRIES);
                 }
             }
-            let next = self.tokens.get(self.at);
-            if next.is_some_and(|token| token.is(b',')) {
-                self.at += 1;
-                // The maker's listings end the line of UF and UT in a comma; a group may end there.
+            // The maker's listings end the line of UF and UT in a comma; a group may end there.
+            if self.take(|token| token.is(b',')).is_some() {
                 continue;
             }
-            let begins =
-                |token: &Token| token.is(b'}') || self.source.upper(token).starts_with("GP");
-            return if next.is_some_and(begins) {
-                Some(group)
-            } else {
-                self.fault("`,`, the next group or `}`")
+            let next = self.tokens.get(self.at);
+            let begins = |token: &Token| token.is(b'}') || token.upper().starts_with("GP");
+            return match next.is_some_and(begins) {
+                true => Some(group),
+                false => self.fault("`,`, the next group or `}`"),
             };
         }
     }
 
     /// The target that group 1 of a position is.
-    fn target(&mut self, at: usize, group: &Group) -> Option<()> {
+    fn target(&mut self, at: usize, group: &Group) {
         let is_pose = POSE.iter().any(|name| group.numbers.contains_key(*name));
-        let (wanted, units) = if is_pose {
-            (POSE, ["mm", "mm", "mm", "deg", "deg", "deg"])
+        let (wanted, units, kind) = if is_pose {
+            let units = ["mm", "mm", "mm", "deg", "deg", "deg"];
+            (POSE, units, TargetKind::Frame)
         } else {
-            (JOINTS, ["deg"; 6])
+            (JOINTS, ["deg"; 6], TargetKind::Joints)
         };
+        let all = wanted.join(", ");
         let known = |name: &str| wanted.contains(&name) || EXTERNAL.contains(&name);
         if let Some(other) = group.numbers.keys().find(|name| !known(name)) {
-            self.found.fault(
-                at,
-                format!(
-                    "{other} in a position of {}; calib knows arms of six joints",
-                    wanted.join(", ")
-                ),
-            );
-            return Some(());
+            let message = format!("{other} in a position of {all}; calib knows arms of six joints");
+            return self.found.fault(at, message);
         }
         let (mut values, mut spans) = (Vec::new(), Vec::new());
         for (name, unit) in wanted.iter().zip(units) {
@@ -342,121 +301,105 @@ impl Reader<'_, '_> {
                     values.push(*value);
                     spans.push(span.clone());
                 }
-                Some(((_, span), stated)) => self
-                    .found
-                    .fault(span.start, format!("{name} in {stated}, expected {unit}")),
-                None => self.found.fault(
-                    at,
-                    format!("{name} is missing; expected {}", wanted.join(", ")),
-                ),
+                Some(((_, span), stated)) => {
+                    let message = format!("{name} in {stated}, expected {unit}");
+                    self.found.fault(span.start, message);
+                }
+                None => {
+                    let message = format!("{name} is missing; expected {all}");
+                    self.found.fault(at, message);
+                }
             }
         }
-        let external = EXTERNAL.map(|name| {
-            group
-                .numbers
-                .get(name)
-                .map(|((value, span), _)| (*value, span.start))
-        });
-        for (value, place) in external.iter().flatten() {
-            self.found.warn(*place, format!("external axis at {value}: calib assumed that external axes do not move the robot"));
+        let external = EXTERNAL.map(|name| group.numbers.get(name).map(|(number, _)| number));
+        for (value, span) in external.into_iter().flatten() {
+            let message = format!(
+                "external axis at {value}: calib assumed that external axes do not move the robot"
+            );
+            self.found.warn(span.start, message);
         }
-        let external = external.map(|axis| axis.map(|(value, _)| value)).to_vec();
-        let (posture, posture_spans) = match (&group.config, is_pose) {
-            (Some(span), true) => self.config(span.clone()),
+        let external = external.map(|axis| axis.map(|(value, _)| *value)).to_vec();
+        let posture = match (&group.config, is_pose) {
+            (Some(text), true) => self.config(text),
             (None, true) => {
-                self.found.fault(
-                    at,
-                    "CONFIG is missing: it says in which posture the pose is reached",
-                );
-                return Some(());
+                let message = "CONFIG is missing: it says in which posture the pose is reached";
+                return self.found.fault(at, message);
             }
             (_, false) => (PostureStatement::Unstated, Vec::new()),
         };
         if values.len() < wanted.len() {
-            return Some(());
+            return;
         }
-        match group.user_frame.as_ref().filter(|(frame, _)| is_pose && frame != "0") {
-            Some((frame, place)) => self.found.frame(
-                *place,
-                format!("user frame {frame} is in no listing: calib assumed that it is the robot's world, as UF 0"),
-            ),
-            None if is_pose && group.user_frame.is_none() => {
-                self.found.fault(at, "UF is missing: it says in which frame the pose stands")
+        match &group.user_frame {
+            Some((frame, place)) if is_pose && frame != "0" => {
+                let message = format!(
+                    "user frame {frame} is in no listing: calib assumed that it is the robot's world, as UF 0"
+                );
+                self.found.frame(*place, message);
             }
-            None => {}
+            None if is_pose => {
+                let message = "UF is missing: it says in which frame the pose stands";
+                self.found.fault(at, message);
+            }
+            _ => {}
         }
-        let kind = if is_pose {
-            TargetKind::Frame
-        } else {
-            TargetKind::Joints
-        };
-        let mut literal = Literal::read(kind, (values, spans), external, (posture, posture_spans));
-        let frame = |tool: &String| (tool == "0").then(Pose::identity);
+        let mut literal = Literal::read(kind, (values, spans), external, posture);
         literal.tool_in_force = group.tool.as_ref().map(|tool| ToolInForce {
             name: format!("UTOOL[{tool}]"),
-            frame: frame(tool),
+            frame: (tool == "0").then(Pose::identity),
         });
         self.found.literals.push(literal);
-        Some(())
     }
 
     /// `'N U T, 0, 0, 0'`: the posture, and where its turns stand.
-    fn config(&mut self, span: Range<usize>) -> (PostureStatement, Vec<Range<usize>>) {
-        const EXPECTED: &str =
-            "expected N or F, U or D, T, and the turns of J1, J4 and J6, as in 'N U T, 0, 0, 0'";
-        let inner = span.start + 1..span.end.saturating_sub(1).max(span.start + 1);
-        let text = &self.source.bytes[inner.clone()];
+    fn config(&mut self, quoted: &Token) -> (PostureStatement, Vec<Range<usize>>) {
+        let text = quoted.text();
+        let inner = text
+            .get(1..text.len().saturating_sub(1))
+            .unwrap_or_default();
         let mut parts = Vec::new();
-        let mut from = inner.start;
-        for part in text.split(|byte| *byte == b',') {
-            let blanks = part.len() - part.trim_ascii_start().len();
-            parts.push(from + blanks..from + blanks + part.trim_ascii().len());
+        let mut from = quoted.start + 1;
+        for part in inner.split(|byte| *byte == b',') {
+            let start = from + part.len() - part.trim_ascii_start().len();
+            let text = String::from_utf8_lossy(part.trim_ascii()).to_ascii_uppercase();
+            parts.push((text, start..start + part.trim_ascii().len()));
             from += part.len() + 1;
         }
-        let of_span = |span: &Range<usize>| {
-            String::from_utf8_lossy(&self.source.bytes[span.clone()]).to_ascii_uppercase()
-        };
         let read = || {
-            let [letters, turns @ ..] = parts.as_slice() else {
+            let [(letters, _), turns @ ..] = parts.as_slice() else {
                 return None;
             };
-            let [one, four, six] = turns else { return None };
-            let turn = |span: &Range<usize>| {
-                of_span(span)
-                    .parse::<i32>()
-                    .ok()
-                    .filter(|turn| f64::from(turn.abs()) <= MOST_TURNS)
+            let turn = |(text, _): &(String, Range<usize>)| {
+                let turn = text.parse::<i32>().ok()?;
+                (f64::from(turn.abs()) <= MOST_TURNS).then_some(turn)
             };
-            let turns = [turn(one)?, turn(four)?, turn(six)?];
-            let letters = of_span(letters);
-            let [wrist @ ("N" | "F"), elbow @ ("U" | "D"), "T"] =
-                letters.split_whitespace().collect::<Vec<_>>()[..]
-            else {
-                return None;
-            };
-            Some(PostureStatement::Config {
-                flip: wrist == "F",
-                up: elbow == "U",
-                turns,
-            })
+            let turns: Option<Vec<i32>> = turns.iter().map(turn).collect();
+            let letters: Vec<&str> = letters.split_whitespace().collect();
+            match letters[..] {
+                [wrist @ ("N" | "F"), elbow @ ("U" | "D"), "T"] => Some(PostureStatement::Config {
+                    flip: wrist == "F",
+                    up: elbow == "U",
+                    turns: turns?.try_into().ok()?,
+                }),
+                _ => None,
+            }
         };
-        match read() {
-            Some(posture) => {
-                // Once a listing: what the letters mean stands in no file.
-                if !self.found.frames.iter().any(|(_, known)| known == POSTURES) {
-                    self.found.frame(span.start, POSTURES);
-                }
-                (posture, parts[1..].to_vec())
-            }
-            None => {
-                let text = quoted(self.source.bytes, span.clone());
-                self.found.fault(
-                    span.start,
-                    format!("configuration {text} is not read; {EXPECTED}"),
-                );
-                (PostureStatement::Unstated, Vec::new())
-            }
+        let Some(posture) = read() else {
+            let text = quoted.quoted();
+            let message = format!(
+                "configuration {text} is not read; expected N or F, U or D, T, and the turns of J1, J4 and J6, as in 'N U T, 0, 0, 0'"
+            );
+            self.found.fault(quoted.start, message);
+            return (PostureStatement::Unstated, Vec::new());
+        };
+        // Once a listing: what the letters mean stands in no file.
+        if !self.found.frames.iter().any(|(_, known)| known == POSTURES) {
+            self.found.frame(quoted.start, POSTURES);
         }
+        (
+            posture,
+            parts.into_iter().skip(1).map(|(_, span)| span).collect(),
+        )
     }
 }
 
@@ -472,35 +415,29 @@ fn motions(bytes: &[u8], found: &mut Gathered) {
         let text = String::from_utf8_lossy(line).to_ascii_uppercase();
         // Names of positions may hold any sign; behind `!` is a remark.
         let unnamed: String = text.split('"').step_by(2).collect();
-        let plain = unnamed.split('!').next().unwrap_or_default();
+        let plain = unnamed.split('!').next().unwrap_or_default().trim_start();
         let body = plain
-            .trim_start()
             .trim_start_matches(|c: char| c.is_ascii_digit())
             .trim_start();
         let Some(body) = body.strip_prefix(':').map(str::trim_start) else {
             continue;
         };
-        let (head, tail) = body.split_at(
-            body.find(|c: char| !c.is_ascii_alphanumeric())
-                .unwrap_or(body.len()),
-        );
+        let end = body.find(|c: char| !c.is_ascii_alphanumeric());
+        let (head, tail) = body.split_at(end.unwrap_or(body.len()));
         if !MOTIONS.contains(&head) {
             continue;
         }
         if tail.trim_start().starts_with("PR[") {
-            found.warn(
-                at,
-                "left as it is: moves to a position register, which is not in the listing",
-            );
+            let message =
+                "left as it is: moves to a position register, which is not in the listing";
+            found.warn(at, message);
         }
         let words = tail.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
         if let Some(word) = words.into_iter().find(|word| DISPLACED.contains(word)) {
-            found.frame(
-                at,
-                format!(
-                    "{word} displaces the target: calib assumed that it is reached where it stands"
-                ),
+            let message = format!(
+                "{word} displaces the target: calib assumed that it is reached where it stands"
             );
+            found.frame(at, message);
         }
     }
 }

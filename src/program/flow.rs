@@ -120,9 +120,8 @@ impl Flow {
             };
             step(at, &mut state);
             for next in &self.next[at] {
-                let joined = states[*next]
-                    .as_ref()
-                    .map_or_else(|| state.clone(), |known| known.joined(&state));
+                let known = states[*next].as_ref();
+                let joined = known.map_or_else(|| state.clone(), |known| known.joined(&state));
                 if states[*next].as_ref() != Some(&joined) {
                     states[*next] = Some(joined);
                     waiting.insert(*next);
@@ -153,11 +152,8 @@ impl Builder {
                 return sound.then_some(());
             }
             FlowStep::EndRoutine => {
-                let from = [
-                    std::mem::take(&mut self.open),
-                    std::mem::take(&mut self.returns),
-                ]
-                .concat();
+                let mut from = std::mem::take(&mut self.open);
+                from.append(&mut self.returns);
                 self.link(&from, at);
                 let (name, first) = self.inside.take()?;
                 self.routines.insert(name, (first, at));
@@ -244,17 +240,12 @@ impl Builder {
     fn with_calls(mut self, lines: &[FlowLine]) -> Flow {
         let mut setters: BTreeSet<&String> = BTreeSet::new();
         loop {
-            let sets = |(first, last): &(usize, usize)| {
-                lines[*first..=*last]
-                    .iter()
-                    .any(|line| line.sets || line.calls.iter().any(|name| setters.contains(name)))
-            };
-            let found: BTreeSet<&String> = self
-                .routines
-                .iter()
-                .filter(|(_, span)| sets(span))
-                .map(|(name, _)| name)
-                .collect();
+            let sets =
+                |line: &FlowLine| line.sets || line.calls.iter().any(|name| setters.contains(name));
+            let routines = self.routines.iter();
+            let found =
+                routines.filter(|(_, (first, last))| lines[*first..=*last].iter().any(sets));
+            let found: BTreeSet<&String> = found.map(|(name, _)| name).collect();
             if found.len() == setters.len() {
                 break;
             }
@@ -276,11 +267,11 @@ impl Builder {
         }
         // The first routine is the program's own, others may be called from elsewhere where nothing here does.
         let earliest = self.routines.values().map(|(first, _)| *first).min();
-        let routines = self
-            .routines
-            .iter()
-            .filter(|(name, (first, _))| !called.contains(name) || Some(*first) == earliest);
-        let mut entries: Vec<usize> = routines.map(|(_, (first, _))| *first).collect();
+        let is_entry =
+            |name: &&String, first: usize| !called.contains(name) || Some(first) == earliest;
+        let routines = self.routines.iter();
+        let entries = routines.filter(|(name, (first, _))| is_entry(name, *first));
+        let mut entries: Vec<usize> = entries.map(|(_, (first, _))| *first).collect();
         if !lines.is_empty() && !matches!(lines[0].step, FlowStep::Routine(_)) {
             entries.push(0);
         }

@@ -1,12 +1,15 @@
 //! A target as a program states it: its numbers, where they stand, and how corrected ones are written there.
 //!
-//! What is in force where a target is reached: the frame in which it stands, the tool that goes there, the load that is carried.
+//! What is in force where a target is reached: the frame in which it stands, the tool that goes there, the load that is carried. It is gathered
+//! from all motions of a program and given to the literals.
 
-use super::SolvedLiteral;
 use super::flow::JoinedState;
 use super::stated::{self, PostureStatement};
+use super::token::{Token, words};
+use super::{Gathered, Messages, SolvedLiteral};
 use crate::robot::Bound;
 use crate::spatial::Pose;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// What the numbers of a target mean.
@@ -64,7 +67,6 @@ impl Literal {
         external: Vec<Option<f64>>,
         (posture, posture_spans): (PostureStatement, Vec<Range<usize>>),
     ) -> Self {
-        let (frame, tool, tool_in_force, payload) = (None, None, None, None);
         Self {
             kind,
             values,
@@ -72,10 +74,10 @@ impl Literal {
             external,
             posture,
             posture_spans,
-            frame,
-            tool,
-            tool_in_force,
-            payload,
+            frame: None,
+            tool: None,
+            tool_in_force: None,
+            payload: None,
         }
     }
 
@@ -99,11 +101,8 @@ impl Literal {
 
     /// The byte at which its first number stands.
     pub(crate) fn at(&self) -> usize {
-        self.spans
-            .iter()
-            .map(|span| span.start)
-            .min()
-            .unwrap_or_default()
+        let starts = self.spans.iter().map(|span| span.start);
+        starts.min().unwrap_or_default()
     }
 
     /// Decimals of value `k`: 1e-6 deg is 0.04 um at 2.5 m, 1e-8 rad 0.03 um, 1e-5 mm is 0.01 um.
@@ -123,9 +122,7 @@ impl Literal {
         bytes: &[u8],
         solved: &SolvedLiteral,
     ) -> Vec<(Range<usize>, String)> {
-        let SolvedLiteral {
-            values, posture, ..
-        } = solved;
+        let (values, posture) = (&solved.values, solved.posture);
         assert_eq!(values.len(), self.values.len(), "a number for every number");
         let mut out: Vec<(Range<usize>, String)> = Vec::new();
         for (k, (new, old)) in values.iter().zip(&self.values).enumerate() {
@@ -135,17 +132,12 @@ impl Literal {
                 out.push((self.spans[k].clone(), fixed(*new, decimals)));
             }
         }
-        let numbers = self
-            .posture
-            .numbers()
-            .into_iter()
-            .zip(posture.numbers())
-            .zip(&self.posture_spans);
-        let changed = numbers.filter(|((old, new), _)| old != new);
-        out.extend(
-            changed
-                .map(|((_, new), span)| (span.clone(), stated::written(&bytes[span.clone()], new))),
-        );
+        let numbers = self.posture.numbers().into_iter().zip(posture.numbers());
+        for ((old, new), span) in numbers.zip(&self.posture_spans) {
+            if old != new {
+                out.push((span.clone(), stated::written(&bytes[span.clone()], new)));
+            }
+        }
         out.sort_by_key(|(span, _)| span.start);
         out
     }
@@ -194,6 +186,16 @@ impl PartialEq for ToolInForce {
         match (&self.frame, &other.frame) {
             (Some(one), Some(others)) => one == others,
             _ => self.name == other.name,
+        }
+    }
+}
+
+impl<T> Setting<T> {
+    /// The value where it is known, set as `by` says; else it is open, and why.
+    pub(super) fn or_open(value: Option<T>, by: String, why: impl FnOnce() -> String) -> Self {
+        match value {
+            Some(value) => Self::Known(value, by),
+            None => Self::Open(why()),
         }
     }
 }
@@ -248,11 +250,120 @@ impl InForce {
 
     /// Where nothing is known, for one reason.
     pub(crate) fn open(why: &str) -> Self {
-        let why = || why.to_string();
         Self {
-            base: Setting::Open(why()),
-            tool: Setting::Open(why()),
-            load: Setting::Open(why()),
+            base: Setting::Open(why.into()),
+            tool: Setting::Open(why.into()),
+            load: Setting::Open(why.into()),
         }
+    }
+}
+
+/// What is in force wherever the files of a program move to targets.
+#[derive(Debug, Default)]
+pub(super) struct Reached {
+    /// By the name of a target, in capitals.
+    pub(crate) named: BTreeMap<String, Vec<InForce>>,
+    /// By the bytes of a target that stands in a motion of the file that is corrected.
+    pub(crate) placed: Vec<(Range<usize>, InForce)>,
+    /// Names that are used otherwise than by motions.
+    pub(crate) mentioned: BTreeMap<String, InForce>,
+    /// What was assumed of other files, at the bytes of the file that is corrected.
+    pub(crate) assumed: Messages,
+}
+
+impl Reached {
+    /// Takes note of what is in force where a motion leads to a name.
+    pub(crate) fn moved_to(&mut self, name: &Token, force: &InForce) {
+        let uses = self.named.entry(name.upper()).or_default();
+        uses.push(force.clone());
+    }
+
+    /// Takes note of names whose targets are handed on in `place`: where these go is not followed.
+    pub(crate) fn handed_on(&mut self, tokens: &[Token], place: &str) {
+        for word in words(tokens) {
+            let force = InForce::open(&format!("is not followed: {place} hands the target on"));
+            self.mentioned.entry(word.upper()).or_insert(force);
+        }
+    }
+
+    /// For each literal what is in force wherever it is reached; `names`: numbers of literals that a variable holds, and its name. Both are in the
+    /// order of the program.
+    pub(crate) fn uses(
+        &self,
+        literals: &[Literal],
+        names: &[(Range<usize>, String)],
+    ) -> Vec<Vec<InForce>> {
+        let of_k = |(k, literal): (usize, &Literal)| -> Vec<InForce> {
+            let name = names.get(names.partition_point(|(literals, _)| literals.end <= k));
+            if let Some((_, name)) = name.filter(|(literals, _)| literals.contains(&k)) {
+                let named = self.named.get(name).into_iter().flatten();
+                return named.chain(self.mentioned.get(name)).cloned().collect();
+            }
+            let at = literal.at();
+            let before = self.placed.partition_point(|(span, _)| span.end <= at);
+            let placed = self.placed.get(before).into_iter();
+            let placed = placed.filter(|(span, _)| span.contains(&at));
+            placed.map(|(_, force)| force.clone()).collect()
+        };
+        literals.iter().enumerate().map(of_k).collect()
+    }
+}
+
+/// How the language calls what is in force.
+pub(super) struct Words {
+    pub(crate) base: &'static str,
+    pub(crate) tool: &'static str,
+    /// What is assumed where nothing is set.
+    pub(crate) no_base: &'static str,
+}
+
+/// Gives literals their frames, tools and payloads, by what is in force wherever they are reached, and says which they are.
+pub(super) fn settle(found: &mut Gathered, reached: &Reached, words: &Words) {
+    let uses = reached.uses(&found.literals, &found.names);
+    let mut reported = BTreeSet::new();
+    let mut notes: Vec<(bool, usize, String)> = Vec::new();
+    for (literal, uses) in found.literals.iter_mut().zip(uses) {
+        let at = literal.at();
+        let cartesian = !literal.kind.is_of_joints();
+        let Some(all) = uses.into_iter().reduce(|all, one| all.joined(&one)) else {
+            if cartesian {
+                let note = "is moved to in none of the files that were read, which would state its frame and tool; --with names others";
+                notes.push((true, at, note.into()));
+            }
+            continue;
+        };
+        let mut tell = |refuses: bool, note: String| {
+            if refuses || reported.insert(note.clone()) {
+                notes.push((refuses, at, note));
+            }
+        };
+        if cartesian {
+            match all.base {
+                Setting::Known(pose, by) => {
+                    literal.frame = Some(pose).filter(|pose| *pose != Pose::identity());
+                    if literal.frame.is_some() {
+                        tell(false, format!("{by} is applied, in the robot's base"));
+                    }
+                }
+                Setting::Unset => tell(false, words.no_base.into()),
+                Setting::Open(why) => tell(true, format!("its {} {why}", words.base)),
+            }
+        }
+        match all.tool {
+            Setting::Known(tool, _) => literal.tool_in_force = Some(tool),
+            Setting::Open(why) if cartesian => tell(true, format!("its {} {why}", words.tool)),
+            Setting::Open(_) | Setting::Unset => {}
+        }
+        match all.load {
+            Setting::Known(Some(mass), by) => {
+                literal.payload = Some(mass);
+                tell(false, format!("payload {mass} kg, as {by} states"));
+            }
+            Setting::Open(why) => tell(false, format!("no payload is stated: it {why}")),
+            _ => {}
+        }
+    }
+    for (refuses, at, note) in notes {
+        found.say(refuses, at, note);
     }
 }

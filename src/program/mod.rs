@@ -17,9 +17,10 @@ use crate::program::literal::ToolInForce;
 pub use crate::program::literal::{Literal, TargetKind};
 pub use crate::program::pose::solve;
 pub use crate::program::stated::PostureStatement;
-use crate::program::token::ProgramText;
+use crate::program::token::{Token, tokens};
 pub use crate::program::tools::RobotTool;
 use crate::robot::RobotModel;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 mod correct;
@@ -29,7 +30,6 @@ mod krl;
 mod literal;
 mod pose;
 mod rapid;
-mod settle;
 mod stated;
 mod token;
 mod tools;
@@ -48,16 +48,39 @@ pub enum Language {
     UrScript,
 }
 
+/// What is to be known of a language.
+struct Grammar {
+    /// Endings of its files.
+    endings: &'static [&'static str],
+    /// What a comment begins with.
+    comment: &'static str,
+    /// First words of the lines behind which a comment may stand; none: it stands at the head of the file.
+    heads: &'static [&'static str],
+    /// What stands at the begin of a file that declares positions, in capitals.
+    begins: &'static [&'static str],
+    /// Reads a file by what the others declare.
+    read: fn(&[u8], &[Companion]) -> Gathered,
+    /// Reads the joint positions that a file declares, and counts its poses.
+    listed: fn(&[u8]) -> Gathered,
+}
+
 impl Language {
+    const ALL: [Self; 4] = [Self::Krl, Self::Rapid, Self::Fanuc, Self::UrScript];
+
+    fn grammar(self) -> &'static Grammar {
+        match self {
+            Self::Krl => &krl::GRAMMAR,
+            Self::Rapid => &rapid::GRAMMAR,
+            Self::Fanuc => &fanuc::GRAMMAR,
+            Self::UrScript => &urscript::GRAMMAR,
+        }
+    }
+
     /// By the ending of a file's name, in any case.
     pub fn of_ending(ending: &str) -> Option<Self> {
-        match ending.to_ascii_lowercase().as_str() {
-            "src" | "dat" | "sub" => Some(Self::Krl),
-            "mod" | "modx" | "sys" | "sysx" | "prg" => Some(Self::Rapid),
-            "ls" => Some(Self::Fanuc),
-            "script" | "urscript" => Some(Self::UrScript),
-            _ => None,
-        }
+        let ending = ending.to_ascii_lowercase();
+        let has = |language: &Self| language.grammar().endings.contains(&ending.as_str());
+        Self::ALL.into_iter().find(has)
     }
 }
 
@@ -70,13 +93,10 @@ pub struct Companion<'a> {
     pub text: &'a [u8],
 }
 
-impl<'a> Companion<'a> {
-    fn text(&self, language: Language) -> ProgramText<'a> {
-        ProgramText {
-            bytes: self.text,
-            language,
-        }
-    }
+/// The tokens of other files. What is wrong with the writing of another file is no fault of the one that is corrected.
+fn others<'a>(companions: &[Companion<'a>], language: Language) -> Vec<Vec<Token<'a>>> {
+    let read = |file: &Companion<'a>| tokens(file.text, language, &mut Gathered::default());
+    companions.iter().map(read).collect()
 }
 
 /// What becomes of a target that states some of its numbers, as `LIN {X 10}`: the controller keeps the others.
@@ -156,23 +176,24 @@ pub struct Rewritten {
     pub warnings: Vec<Note>,
 }
 
-/// What a language's reader gathers, by byte.
+/// Messages by the bytes that they are of.
+type Messages = Vec<(usize, String)>;
+
+/// What a language's reader gathers.
 #[derive(Debug, Default)]
 struct Gathered {
     literals: Vec<Literal>,
-    warnings: Vec<(usize, String)>,
-    faults: Vec<(usize, String)>,
-    partial: Vec<(usize, String)>,
-    frames: Vec<(usize, String)>,
+    /// Literals that a variable holds, by their numbers, and its name.
+    names: Vec<(Range<usize>, String)>,
+    /// Variable -> types it is declared with anywhere in the file, in capitals.
+    types: BTreeMap<String, Vec<String>>,
+    warnings: Messages,
+    faults: Messages,
+    partial: Messages,
+    frames: Messages,
     /// Tools that its files declare.
     tools: Vec<ToolInForce>,
-}
-
-/// What a language's reader finds declared under names: one for each literal.
-struct Declared {
-    found: Gathered,
-    names: Vec<String>,
-    /// Positions that are poses.
+    /// Positions that are poses, where joints are listed.
     poses: usize,
 }
 
@@ -193,6 +214,53 @@ impl Gathered {
     fn partial(&mut self, at: usize, message: impl Into<String>) {
         self.partial.push((at, message.into()));
     }
+
+    /// Something that should not stand where it does.
+    fn stray(&mut self, token: &Token, place: &str) {
+        let message = format!("{} {place} is not understood", token.quoted());
+        self.fault(token.start, message);
+    }
+
+    /// A frame that is not applied where it `refuses`, else a warning.
+    fn say(&mut self, refuses: bool, at: usize, message: String) {
+        let messages = if refuses {
+            &mut self.frames
+        } else {
+            &mut self.warnings
+        };
+        messages.push((at, message));
+    }
+
+    /// What was read since there were `before` literals is held by a variable.
+    fn held_by(&mut self, name: String, before: usize) {
+        self.names.push((before..self.literals.len(), name));
+    }
+
+    fn declare(&mut self, name: String, kind: String) {
+        let known = self.types.entry(name).or_default();
+        if !known.contains(&kind) {
+            known.push(kind);
+        }
+    }
+
+    fn types(&self, name: &str) -> &[String] {
+        self.types.get(name).map_or(&[], Vec::as_slice)
+    }
+
+    /// The one type that a variable has in this file.
+    fn stated(&self, name: &str) -> Option<&str> {
+        match self.types(name) {
+            [one] => Some(one),
+            _ => None,
+        }
+    }
+
+    /// All its faults in the order of the program.
+    fn placed_faults(&mut self, bytes: &[u8]) -> Vec<Note> {
+        let beyond = self.literals.iter().flat_map(Literal::beyond_any_robot);
+        self.faults.extend(beyond);
+        placed(bytes, std::mem::take(&mut self.faults))
+    }
 }
 
 impl<'p> Program<'p> {
@@ -212,44 +280,44 @@ impl<'p> Program<'p> {
         partial: Partial,
         companions: &[Companion],
     ) -> Result<Self, ProgramRefusal> {
-        let mut found = match language {
-            Language::Krl => krl::read(bytes, companions),
-            Language::Rapid => rapid::read(bytes, companions),
-            Language::Fanuc => fanuc::read(bytes),
-            Language::UrScript => urscript::read(bytes),
-        };
-        let mut refusal = ProgramRefusal::default();
+        let mut found = (language.grammar().read)(bytes, companions);
+        let parts = std::mem::take(&mut found.partial);
+        let mut refused = 0;
         match partial {
             Partial::Refused => {
-                refusal.partial = found.partial.len();
-                found.faults.append(&mut found.partial);
+                refused = parts.len();
+                found.faults.extend(parts);
             }
-            Partial::Left => found.warnings.extend(
-                found
-                    .partial
-                    .into_iter()
-                    .map(|(at, what)| (at, format!("left as it is: {what}"))),
-            ),
+            Partial::Left => {
+                let left = |(at, what)| (at, format!("left as it is: {what}"));
+                found.warnings.extend(parts.into_iter().map(left));
+            }
         }
-        found
-            .faults
-            .extend(found.literals.iter().flat_map(Literal::beyond_any_robot));
-        refusal.faults = placed(bytes, found.faults);
-        if !refusal.faults.is_empty() {
-            return Err(refusal);
+        let faults = found.placed_faults(bytes);
+        if !faults.is_empty() {
+            let partial = refused;
+            return Err(ProgramRefusal { faults, partial });
         }
         found.literals.sort_by_key(Literal::at);
-        let frames = placed(bytes, found.frames);
-        let mut warnings = placed(bytes, found.warnings);
-        warnings.extend(frames.iter().cloned());
-        warnings.sort_by_key(|note| (note.line, note.column));
-        Ok(Self {
+        let mut program = Self {
             bytes,
             literals: found.literals,
-            warnings,
-            frames,
+            warnings: Vec::new(),
+            frames: Vec::new(),
             tools: found.tools,
-        })
+        };
+        program.note(found.warnings, found.frames);
+        Ok(program)
+    }
+
+    fn note(&mut self, warnings: Messages, frames: Messages) {
+        let frames = placed(self.bytes, frames);
+        self.warnings.extend(placed(self.bytes, warnings));
+        self.warnings.extend(frames.iter().cloned());
+        self.frames.extend(frames);
+        for notes in [&mut self.warnings, &mut self.frames] {
+            notes.sort_by_key(|note| (note.line, note.column));
+        }
     }
 
     /// The targets that are to be corrected.
@@ -270,35 +338,23 @@ impl<'p> Program<'p> {
         };
         let related = tools::relate(&mut found, robot, stated, &self.tools);
         self.literals = found.literals;
-        let frames = placed(self.bytes, found.frames);
-        self.warnings.extend(placed(self.bytes, found.warnings));
-        self.warnings.extend(frames.iter().cloned());
-        self.frames.extend(frames);
-        for notes in [&mut self.warnings, &mut self.frames] {
-            notes.sort_by_key(|note| (note.line, note.column));
-        }
+        self.note(found.warnings, found.frames);
         related
     }
 
     /// Takes `payload` (kg) as what all targets carry, and says where the program states another one.
     fn carries(&mut self, payload: f64) {
-        let differ = |literal: &&Literal| literal.payload.is_some_and(|stated| stated != payload);
-        let other = self
-            .literals
-            .iter()
-            .find(differ)
-            .map(|literal| (literal.at(), literal.payload.unwrap_or_default()));
-        if let Some((at, stated)) = other {
+        let differs = |literal: &Literal| {
+            let stated = literal.payload.filter(|stated| *stated != payload)?;
             let message = format!(
                 "the program states a payload of {stated} kg, --payload {payload} kg, which is used"
             );
-            self.warnings
-                .extend(placed(self.bytes, vec![(at, message)]));
-            self.warnings.sort_by_key(|note| (note.line, note.column));
-        }
-        self.literals
-            .iter_mut()
-            .for_each(|literal| literal.payload = Some(payload));
+            Some((literal.at(), message))
+        };
+        let other = self.literals.iter().find_map(differs);
+        self.note(other.into_iter().collect(), Vec::new());
+        let literals = self.literals.iter_mut();
+        literals.for_each(|literal| literal.payload = Some(payload));
     }
 
     /// The lines that use frames which are not applied; they are among the warnings, too.
@@ -344,10 +400,8 @@ impl<'p> Program<'p> {
             }
         }
         if !faults.is_empty() {
-            return Err(ProgramRefusal {
-                faults: placed(self.bytes, faults),
-                partial: 0,
-            });
+            let (faults, partial) = (placed(self.bytes, faults), 0);
+            return Err(ProgramRefusal { faults, partial });
         }
         bytes.extend_from_slice(&self.bytes[from..]);
         let mut warnings = self.warnings.clone();
@@ -358,45 +412,22 @@ impl<'p> Program<'p> {
 }
 
 /// Bytes as lines and columns, in order.
-fn placed(bytes: &[u8], mut messages: Vec<(usize, String)>) -> Vec<Note> {
+fn placed(bytes: &[u8], mut messages: Messages) -> Vec<Note> {
     messages.sort();
     let (mut line, mut start, mut from) = (1, 0, 0);
-    messages
-        .into_iter()
-        .map(|(at, message)| {
-            for (k, _) in bytes[from..at]
-                .iter()
-                .enumerate()
-                .filter(|(_, byte)| **byte == b'\n')
-            {
-                (line, start) = (line + 1, from + k + 1);
-            }
-            from = at;
-            Note {
-                line,
-                column: at - start + 1,
-                message,
-            }
-        })
-        .collect()
-}
-
-/// A piece of a program for a message: on one line, and not without end.
-fn quoted(bytes: &[u8], span: Range<usize>) -> String {
-    const LIMIT: usize = 40;
-    let text = String::from_utf8_lossy(&bytes[span]);
-    let words: Vec<&str> = text.split_whitespace().collect();
-    let text: String = words
-        .join(" ")
-        .chars()
-        .map(|c| if c.is_control() { '?' } else { c })
-        .collect();
-    let short: String = text.chars().take(LIMIT).collect();
-    if short.len() < text.len() {
-        format!("`{short}..`")
-    } else {
-        format!("`{short}`")
-    }
+    let place = |(at, message): (usize, String)| {
+        for k in (from..at).filter(|k| bytes[*k] == b'\n') {
+            (line, start) = (line + 1, k + 1);
+        }
+        from = at;
+        let column = at - start + 1;
+        Note {
+            line,
+            column,
+            message,
+        }
+    };
+    messages.into_iter().map(place).collect()
 }
 
 /// Bytes of a program that lists joints, at most.
@@ -427,80 +458,34 @@ pub struct JointList {
 /// The language of a file that declares positions, by the ending of its name and by how it begins: tables of text end in `.dat`, too.
 pub fn listing(ending: &str, head: &[u8]) -> Option<Language> {
     let language = Language::of_ending(ending)?;
-    let words: &[&str] = match language {
-        Language::Krl => &[
-            "DEFDAT",
-            "DEF ",
-            "E6AXIS",
-            "E3AXIS",
-            "DECL AXIS",
-            "E6POS",
-            "&ACCESS",
-        ],
-        Language::Rapid => &["JOINTTARGET", "ROBTARGET", "MODULE"],
-        Language::Fanuc => &["/PROG"],
-        Language::UrScript => &["DEF ", "MOVEJ", "MOVEL"],
-    };
     let head = String::from_utf8_lossy(head).to_ascii_uppercase();
-    words
-        .iter()
-        .any(|word| head.contains(word))
-        .then_some(language)
+    let mut begins = language.grammar().begins.iter();
+    begins.any(|word| head.contains(word)).then_some(language)
 }
 
 /// Reads what a program declares; fails with every fault of that.
 pub fn joint_list(bytes: &[u8], language: Language) -> Result<JointList, Vec<Note>> {
     if bytes.len() > MOST_BYTES {
-        let message = format!(
-            "a program of more than {} MB; allowed: shorter ones",
-            MOST_BYTES >> 20
-        );
-        return Err(vec![Note {
-            line: 1,
-            column: 1,
-            message,
-        }]);
+        let most = MOST_BYTES >> 20;
+        let message = format!("a program of more than {most} MB; allowed: shorter ones");
+        return Err(placed(bytes, vec![(0, message)]));
     }
-    let Declared {
-        mut found,
-        names,
-        poses,
-    } = match language {
-        Language::Krl => krl::listed(bytes),
-        Language::Rapid => rapid::listed(bytes),
-        Language::Fanuc => fanuc::listed(bytes),
-        Language::UrScript => urscript::listed(bytes),
-    };
-    found.faults.append(&mut found.partial);
-    found
-        .faults
-        .extend(found.literals.iter().flat_map(Literal::beyond_any_robot));
-    let faults = placed(bytes, found.faults);
+    let mut found = (language.grammar().listed)(bytes);
+    let parts = std::mem::take(&mut found.partial);
+    found.faults.extend(parts);
+    let faults = found.placed_faults(bytes);
     if !faults.is_empty() {
         return Err(faults);
     }
     // By the line at which each stands; positions are declared one after the other.
-    let lines = placed(
-        bytes,
-        found
-            .literals
-            .iter()
-            .zip(names)
-            .map(|(literal, name)| (literal.at(), name))
-            .collect(),
-    );
+    let names = found.names.into_iter();
+    let names = names.flat_map(|(literals, name)| literals.map(move |_| name.clone()));
+    let places = found.literals.iter().map(Literal::at).zip(names);
+    let lines = placed(bytes, places.collect());
     found.literals.sort_by_key(Literal::at);
-    let rows = found.literals.into_iter().zip(lines);
-    let row = |(
-        literal,
-        Note {
-            line,
-            message: name,
-            ..
-        },
-    ): (Literal, Note)| ListedJoints {
-        line,
-        name,
+    let row = |(literal, note): (Literal, Note)| ListedJoints {
+        line: note.line,
+        name: note.message,
         joints: match literal.kind {
             TargetKind::Radians => literal.values.iter().map(|rad| rad.to_degrees()).collect(),
             _ => literal.values,
@@ -508,7 +493,7 @@ pub fn joint_list(bytes: &[u8], language: Language) -> Result<JointList, Vec<Not
         external: literal.external,
     };
     Ok(JointList {
-        rows: rows.map(row).collect(),
-        poses,
+        rows: found.literals.into_iter().zip(lines).map(row).collect(),
+        poses: found.poses,
     })
 }

@@ -19,64 +19,46 @@ pub fn solve(
     robot: &RobotModel,
     corrector: &mut Corrector,
 ) -> Vec<Result<SolvedLiteral, String>> {
-    let targets = {
-        let reader = PostureReader {
-            robot,
-            convention: corrector.convention(),
-            sides: corrector.sides(),
-        };
-        literals
-            .iter()
-            .map(|literal| target(literal, &reader))
-            .collect()
-    };
-    let answers = corrector.batch(targets);
+    let convention = corrector.convention().clone();
+    let sides = corrector.sides().cloned();
     let reader = PostureReader {
         robot,
-        convention: corrector.convention(),
-        sides: corrector.sides(),
+        convention: &convention,
+        sides: sides.as_ref(),
     };
-    let first = literals.iter().position(is_unstated);
+    let targets = literals.iter().map(|literal| target(literal, &reader));
+    let answers = corrector.batch(targets.collect());
     let unchecked = |literal: &Literal| reader.unchecked(literal.posture);
+    let first = literals.iter().position(is_unstated);
     let first_unchecked = literals
         .iter()
         .position(|literal| unchecked(literal).is_some());
-    let solved = |(k, (literal, answer)): (usize, (&Literal, &CorrectedCommand))| match &answer.q {
-        Some(q) => {
-            let posture = reader.restated(literal.posture, q);
-            let changed = (posture != literal.posture).then(|| {
-                format!(
-                    "posture {} of the corrected joints, was {}",
-                    posture, literal.posture
-                )
+    let solved = |(k, (literal, answer)): (usize, (&Literal, &CorrectedCommand))| {
+        let Some(q) = &answer.q else {
+            let is_other = answer.remarks.contains(&Remark::OtherPosture);
+            return Err(match is_other {
+                true => format!("{} ({})", answer.remark(), literal.posture),
+                false => answer.remark(),
             });
-            let nearest = (Some(k) == first).then(|| NEAREST.to_string());
-            let unchecked = unchecked(literal).filter(|_| Some(k) == first_unchecked);
-            let known = Some(answer.remark()).filter(|remark| !remark.is_empty());
-            let remark = known
-                .into_iter()
-                .chain(changed)
-                .chain(nearest)
-                .chain(unchecked)
-                .collect::<Vec<_>>()
-                .join("; ");
-            Ok(SolvedLiteral {
-                values: values(literal, robot, corrector.convention(), q),
-                posture,
-                remark,
-            })
-        }
-        None if answer.remarks.contains(&Remark::OtherPosture) => {
-            Err(format!("{} ({})", answer.remark(), literal.posture))
-        }
-        None => Err(answer.remark()),
+        };
+        let posture = reader.restated(literal.posture, q);
+        let was = literal.posture;
+        let changed = (posture != was)
+            .then(|| format!("posture {posture} of the corrected joints, was {was}"));
+        let remarks = [
+            Some(answer.remark()).filter(|remark| !remark.is_empty()),
+            changed,
+            (Some(k) == first).then(|| NEAREST.to_string()),
+            unchecked(literal).filter(|_| Some(k) == first_unchecked),
+        ];
+        Ok(SolvedLiteral {
+            values: values(literal, robot, &convention, q),
+            posture,
+            remark: remarks.into_iter().flatten().collect::<Vec<_>>().join("; "),
+        })
     };
-    literals
-        .iter()
-        .zip(&answers)
-        .enumerate()
-        .map(solved)
-        .collect()
+    let answered = literals.iter().zip(&answers).enumerate();
+    answered.map(solved).collect()
 }
 
 /// Once a program, at its first such target.
@@ -96,10 +78,9 @@ fn target(literal: &Literal, reader: &PostureReader) -> CommandTarget {
         let pose = literal.frame.unwrap_or_else(Pose::identity)
             * Pose::new(rotation, Vector3::new(v[0], v[1], v[2]) * unit);
         let pose = pose * literal.tool.unwrap_or_else(Pose::identity).inverse();
-        let (point, rotation) = (Some(pose.translation), Some(pose.rotation));
         CommandTarget {
-            point,
-            rotation,
+            point: Some(pose.translation),
+            rotation: Some(pose.rotation),
             posture: reader.posture(literal.posture),
             ..stated.clone()
         }
@@ -113,14 +94,14 @@ fn target(literal: &Literal, reader: &PostureReader) -> CommandTarget {
             q: Some(v.clone()),
             ..stated
         },
-        TargetKind::Frame => posed(
-            turns(v[3].to_radians(), v[4].to_radians(), v[5].to_radians()),
-            1e-3,
-        ),
-        TargetKind::RotationVector => posed(
-            Rotation3::new(Vector3::new(v[3], v[4], v[5])).into_inner(),
-            1.0,
-        ),
+        TargetKind::Frame => {
+            let [a, b, c] = [v[3], v[4], v[5]].map(f64::to_radians);
+            posed(turns(a, b, c), 1e-3)
+        }
+        TargetKind::RotationVector => {
+            let turn = Rotation3::new(Vector3::new(v[3], v[4], v[5]));
+            posed(turn.into_inner(), 1.0)
+        }
         TargetKind::Quaternion => {
             let turn = UnitQuaternion::from_quaternion(Quaternion::new(v[3], v[4], v[5], v[6]));
             posed(turn.to_rotation_matrix().into_inner(), 1e-3)
@@ -144,16 +125,12 @@ fn values(
     let pose =
         literal.frame.unwrap_or_else(Pose::identity).inverse() * Nominal::new(robot).place(&joints);
     let pose = pose * literal.tool.unwrap_or_else(Pose::identity);
-    let unit = if literal.kind == TargetKind::RotationVector {
-        1.0
-    } else {
-        1e3
+    let unit = match literal.kind {
+        TargetKind::RotationVector => 1.0,
+        _ => 1e3,
     };
-    let mut out: Vec<f64> = pose
-        .translation
-        .iter()
-        .map(|metres| metres * unit)
-        .collect();
+    let place = pose.translation.iter();
+    let mut out: Vec<f64> = place.map(|metres| metres * unit).collect();
     let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
     let given = &literal.values[3..];
     if literal.kind == TargetKind::RotationVector {
@@ -173,28 +150,20 @@ fn values(
         // One rotation has several sets of angles: those nearest to the given are taken, so that 180 does not become -180.
         let near = |angle: f64, given: f64| angle + 360.0 * ((given - angle) / 360.0).round();
         let alike = [[a, b, c], [a + PI, PI - b, c + PI]].map(|angles| {
-            let angles: Vec<f64> = angles
-                .iter()
-                .zip(given)
-                .map(|(angle, given)| near(angle.to_degrees(), *given))
-                .collect();
+            let pairs = angles.iter().zip(given);
+            let near = pairs.map(|(angle, given)| near(angle.to_degrees(), *given));
+            let angles: Vec<f64> = near.collect();
             let apart: f64 = angles.iter().zip(given).map(|(a, b)| (a - b).abs()).sum();
             (apart, angles)
         });
         let [first, second] = alike;
-        out.extend(if second.0 < first.0 {
-            second.1
-        } else {
-            first.1
-        });
+        let is_nearer = second.0 < first.0;
+        out.extend(if is_nearer { second.1 } else { first.1 });
     } else {
         let turn = UnitQuaternion::from_rotation_matrix(&rotation);
         let new = [turn.w, turn.i, turn.j, turn.k];
-        let sign = if new.iter().zip(given).map(|(a, b)| a * b).sum::<f64>() < 0.0 {
-            -1.0
-        } else {
-            1.0
-        };
+        let along: f64 = new.iter().zip(given).map(|(a, b)| a * b).sum();
+        let sign = if along < 0.0 { -1.0 } else { 1.0 };
         out.extend(new.iter().map(|part| sign * part));
     }
     out

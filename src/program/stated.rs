@@ -64,11 +64,10 @@ impl PostureStatement {
             Self::Unstated | Self::Near(_) => Vec::new(),
             Self::Config { turns, .. } => turns.to_vec(),
             Self::Configuration(numbers) => numbers.to_vec(),
-            Self::StatusTurn { status, turn } => [status, turn]
-                .into_iter()
-                .flatten()
-                .map(|bits| *bits as i32)
-                .collect(),
+            Self::StatusTurn { status, turn } => {
+                let stated = [status, turn].into_iter().flatten();
+                stated.map(|bits| *bits as i32).collect()
+            }
         }
     }
 
@@ -99,11 +98,7 @@ impl PostureReader<'_> {
                 status: Some(_), ..
             } => "S",
             PostureStatement::Config { .. } => "CONFIG",
-            PostureStatement::Unstated
-            | PostureStatement::Near(_)
-            | PostureStatement::StatusTurn { status: None, .. } => {
-                return None;
-            }
+            _ => return None,
         };
         if self.sides.is_none() {
             return Some(format!(
@@ -115,58 +110,48 @@ impl PostureReader<'_> {
     }
 
     fn uses_sides(&self, stated: PostureStatement) -> bool {
-        let parallelogram = self
-            .convention
-            .coupled()
-            .iter()
-            .any(|coupling| (coupling.joint, coupling.by) == (2, 1));
-        self.sides.is_some()
-            && !(parallelogram && matches!(stated, PostureStatement::Configuration(_)))
+        let mut coupled = self.convention.coupled().iter();
+        let parallelogram = coupled.any(|coupling| (coupling.joint, coupling.by) == (2, 1));
+        let is_configuration = matches!(stated, PostureStatement::Configuration(_));
+        self.sides.is_some() && !(parallelogram && is_configuration)
     }
 
     /// What a target states as a posture; none where it states nothing.
     pub(crate) fn posture(&self, stated: PostureStatement) -> Option<StatedPosture> {
-        let sides = if self.uses_sides(stated) {
-            stated.sides()
-        } else {
-            [None; 3]
+        let sides = match self.uses_sides(stated) {
+            true => stated.sides(),
+            false => [None; 3],
         };
-        match stated {
-            PostureStatement::Unstated
-            | PostureStatement::StatusTurn {
-                status: None,
-                turn: None,
-            } => None,
+        let wrist = |[one, four, six]: [i32; 3]| [(0, one), (3, four), (5, six)];
+        Some(match stated {
             PostureStatement::Near(q) => {
-                Some(StatedPosture::near(&q.map(|micro| f64::from(micro) * 1e-6)))
+                StatedPosture::near(&q.map(|micro| f64::from(micro) * 1e-6))
             }
-            PostureStatement::Config {
-                turns: [one, four, six],
-                ..
-            } => Some(StatedPosture::of_turns(JOINTS, &[(0, one), (3, four), (5, six)]).on(sides)),
-            PostureStatement::Configuration([one, four, six, _]) => Some(
-                StatedPosture::of_quadrants(JOINTS, &[(0, one), (3, four), (5, six)]).on(sides),
-            ),
+            PostureStatement::Config { turns, .. } => {
+                StatedPosture::of_turns(JOINTS, &wrist(turns)).on(sides)
+            }
+            PostureStatement::Configuration([one, four, six, _]) => {
+                StatedPosture::of_quadrants(JOINTS, &wrist([one, four, six])).on(sides)
+            }
             PostureStatement::StatusTurn {
                 turn: Some(turn), ..
             } => {
                 let below: Vec<bool> = (0..JOINTS).map(|joint| turn >> joint & 1 == 1).collect();
-                Some(StatedPosture::of_signs(&below).on(sides))
+                StatedPosture::of_signs(&below).on(sides)
             }
-            PostureStatement::StatusTurn { turn: None, .. } => {
-                Some(StatedPosture::of_sides(JOINTS, sides))
-            }
-        }
+            PostureStatement::StatusTurn {
+                status: Some(_), ..
+            } => StatedPosture::of_sides(JOINTS, sides),
+            PostureStatement::Unstated | PostureStatement::StatusTurn { .. } => return None,
+        })
     }
 
     /// What a target states once its joints are `q` (rad, as the controller counts); what it does not state stays unstated.
     pub(crate) fn restated(&self, stated: PostureStatement, q: &[f64]) -> PostureStatement {
         let mut joints = q.to_vec();
         self.convention.to_robot(&mut joints);
-        let shares = self
-            .sides
-            .filter(|_| self.uses_sides(stated))
-            .map(|sides| sides.at(self.robot, &joints));
+        let sides = self.sides.filter(|_| self.uses_sides(stated));
+        let shares = sides.map(|sides| sides.at(self.robot, &joints));
         // Whether side `side` is above zero, as it was stated at a border.
         let above = |side: usize, was: bool| match shares {
             Some(shares) if shares[side].abs() > AT_BORDER => shares[side] > 0.0,
@@ -203,24 +188,16 @@ impl PostureReader<'_> {
             }
             PostureStatement::StatusTurn { status, turn } => {
                 let bits = u32::from(!shoulder) + 2 * u32::from(elbow) + 4 * u32::from(!wrist);
-                let status = status.map(|status| {
-                    if shares.is_some() {
-                        status & !7 | bits
-                    } else {
-                        status
-                    }
-                });
-                let turn = turn.map(|turn| {
-                    (0..JOINTS)
-                        .filter(|joint| q[*joint].abs() > AT_BORDER)
-                        .fold(turn, |turn, joint| {
-                            if q[joint] < 0.0 {
-                                turn | 1 << joint
-                            } else {
-                                turn & !(1 << joint)
-                            }
-                        })
-                });
+                let known = |status: u32| match shares {
+                    Some(_) => status & !7 | bits,
+                    None => status,
+                };
+                let sign = |turn: u32, joint: usize| match q[joint] < 0.0 {
+                    true => turn | 1 << joint,
+                    false => turn & !(1 << joint),
+                };
+                let far = || (0..JOINTS).filter(|joint| q[*joint].abs() > AT_BORDER);
+                let (status, turn) = (status.map(known), turn.map(|turn| far().fold(turn, sign)));
                 PostureStatement::StatusTurn { status, turn }
             }
         }
@@ -237,20 +214,15 @@ impl fmt::Display for PostureStatement {
                 up,
                 turns: [one, four, six],
             } => {
-                write!(
-                    f,
-                    "{} {} T, {one}, {four}, {six}",
-                    if *flip { 'F' } else { 'N' },
-                    if *up { 'U' } else { 'D' }
-                )
+                let (wrist, elbow) = (if *flip { 'F' } else { 'N' }, if *up { 'U' } else { 'D' });
+                write!(f, "{wrist} {elbow} T, {one}, {four}, {six}")
             }
             Self::Configuration([one, four, six, x]) => write!(f, "[{one},{four},{six},{x}]"),
             Self::StatusTurn { status, turn } => {
+                let given =
+                    |(name, bits): (&str, &Option<u32>)| Some(format!("{name} {}", (*bits)?));
                 let named = [("S", status), ("T", turn)].into_iter();
-                let given: Vec<String> = named
-                    .filter_map(|(name, bits)| bits.map(|bits| format!("{name} {bits}")))
-                    .collect();
-                f.write_str(&given.join(", "))
+                f.write_str(&named.filter_map(given).collect::<Vec<_>>().join(", "))
             }
         }
     }

@@ -12,8 +12,8 @@ use std::ops::Range;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TokenKind {
     Word,
-    /// Not yet known to be a number of the language.
-    Number,
+    /// Whether it is a number of the language.
+    Number(bool),
     /// `"..."`, or `'...'` of KRL and FANUC.
     Text,
     /// A sign, of one byte.
@@ -24,24 +24,61 @@ pub(super) enum TokenKind {
     LineEnd,
 }
 
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Token {
-    pub(crate) sort: TokenKind,
-    pub(crate) span: Range<usize>,
+/// A token, with the bytes of the program that it stands in.
+#[derive(Clone, Copy)]
+pub(super) struct Token<'p> {
+    pub(super) sort: TokenKind,
+    pub(super) start: usize,
+    pub(super) end: usize,
+    bytes: &'p [u8],
 }
 
-impl Token {
-    pub(crate) fn is(&self, sign: u8) -> bool {
+impl<'p> Token<'p> {
+    pub(super) fn is(&self, sign: u8) -> bool {
         self.sort == TokenKind::Sign(sign)
     }
 
+    /// `:=`.
+    pub(super) fn assigns(&self) -> bool {
+        self.sort == TokenKind::Pair(b':')
+    }
+
+    /// A word that is one of these, in any case.
+    pub(super) fn is_word(&self, words: &[&str]) -> bool {
+        let is = |word: &&str| word.as_bytes().eq_ignore_ascii_case(self.text());
+        self.sort == TokenKind::Word && words.iter().any(is)
+    }
+
     /// +1 where a bracket opens, -1 where it closes.
-    pub(crate) fn opens(&self) -> i32 {
+    pub(super) fn opens(&self) -> i32 {
         match self.sort {
             TokenKind::Sign(b'{' | b'[' | b'(') => 1,
             TokenKind::Sign(b'}' | b']' | b')') => -1,
             _ => 0,
         }
+    }
+
+    pub(super) fn span(&self) -> Range<usize> {
+        self.start..self.end
+    }
+
+    pub(super) fn text(&self) -> &'p [u8] {
+        &self.bytes[self.span()]
+    }
+
+    /// As it is written.
+    pub(super) fn name(&self) -> String {
+        String::from_utf8_lossy(self.text()).into_owned()
+    }
+
+    /// In capitals.
+    pub(super) fn upper(&self) -> String {
+        self.name().to_ascii_uppercase()
+    }
+
+    /// For a message.
+    pub(super) fn quoted(&self) -> String {
+        quoted(&[*self])
     }
 }
 
@@ -64,8 +101,23 @@ pub(super) fn closing(tokens: &[Token], open: usize) -> usize {
     place.map_or(tokens.len() - 1, |length| open + length)
 }
 
+/// Where these open from `from` on with the sign, and where they close, one behind the other.
+pub(super) fn enclosed<'t>(
+    tokens: &'t [Token],
+    from: usize,
+    sign: u8,
+) -> impl Iterator<Item = (usize, usize)> + 't {
+    let mut at = from;
+    std::iter::from_fn(move || {
+        let open = at + tokens.get(at..)?.iter().position(|token| token.is(sign))?;
+        let close = closing(tokens, open);
+        at = close + 1;
+        Some((open, close))
+    })
+}
+
 /// What stands between commas that are outside of brackets.
-pub(super) fn arguments(tokens: &[Token]) -> impl Iterator<Item = &[Token]> {
+pub(super) fn arguments<'t, 'p>(tokens: &'t [Token<'p>]) -> impl Iterator<Item = &'t [Token<'p>]> {
     let mut depth = 0;
     tokens.split(move |token| {
         depth += token.opens();
@@ -73,12 +125,16 @@ pub(super) fn arguments(tokens: &[Token]) -> impl Iterator<Item = &[Token]> {
     })
 }
 
+/// The words among some tokens.
+pub(super) fn words<'t, 'p>(tokens: &'t [Token<'p>]) -> impl Iterator<Item = &'t Token<'p>> {
+    let is_word = |token: &&Token| token.sort == TokenKind::Word;
+    tokens.iter().filter(is_word)
+}
+
 /// Lines with something on them.
-pub(super) fn lines(tokens: &[Token]) -> Vec<&[Token]> {
-    tokens
-        .split(|token| token.sort == TokenKind::LineEnd)
-        .filter(|line| !line.is_empty())
-        .collect()
+pub(super) fn lines<'t, 'p>(tokens: &'t [Token<'p>]) -> Vec<&'t [Token<'p>]> {
+    let lines = tokens.split(|token| token.sort == TokenKind::LineEnd);
+    lines.filter(|line| !line.is_empty()).collect()
 }
 
 /// Whether every bracket of these closes, none of them too deep; what does not is a fault. They stand in `whole`, e.g. `on its line`.
@@ -94,71 +150,62 @@ pub(super) fn brackets_match(
         if let Some((opens, closes)) = brackets.iter().find(|(opens, _)| token.is(*opens)) {
             open.push((token, *opens, *closes));
             if open.len() == DEPTH {
-                found.fault(token.span.start, "brackets are nested too deep");
+                found.fault(token.start, "brackets are nested too deep");
             }
         } else if let Some((opens, closes)) = brackets.iter().find(|(_, end)| token.is(*end))
             && open.pop().is_none_or(|(_, last, _)| last != *opens)
         {
             let [opens, closes] = [*opens, *closes].map(char::from);
-            found.fault(token.span.start, format!("`{closes}` without `{opens}`"));
+            found.fault(token.start, format!("`{closes}` without `{opens}`"));
         }
     }
     for (token, opens, closes) in open {
         let [opens, closes] = [opens, closes].map(char::from);
         let message = format!("`{opens}` without `{closes}` {whole}");
-        found.fault(token.span.start, message);
+        found.fault(token.start, message);
     }
     found.faults.len() == before
 }
 
-/// What is read, and how its words are compared: KRL and RAPID know no case.
-#[derive(Clone, Copy)]
-pub(super) struct ProgramText<'p> {
-    pub(crate) bytes: &'p [u8],
-    pub(crate) language: Language,
+/// The number that these tokens are, sign included, and its bytes; none where they are anything else.
+pub(super) fn number(tokens: &[Token]) -> Option<(f64, Range<usize>)> {
+    let (negative, token) = match tokens {
+        [token] => (false, token),
+        [sign, token] if sign.is(b'-') => (true, token),
+        [sign, token] if sign.is(b'+') => (false, token),
+        _ => return None,
+    };
+    if token.sort != TokenKind::Number(true) {
+        return None;
+    }
+    let value: f64 = std::str::from_utf8(token.text()).ok()?.parse().ok()?;
+    let signed = if negative { -value } else { value };
+    value
+        .is_finite()
+        .then_some((signed, tokens[0].start..token.end))
 }
 
-impl ProgramText<'_> {
-    /// A token's text in capitals.
-    pub(crate) fn upper(&self, token: &Token) -> String {
-        String::from_utf8_lossy(&self.bytes[token.span.clone()]).to_ascii_uppercase()
+/// The bytes from the first to the last of some tokens; where there are none, at `otherwise`.
+pub(super) fn over(tokens: &[Token], otherwise: usize) -> Range<usize> {
+    match (tokens.first(), tokens.last()) {
+        (Some(first), Some(last)) => first.start..last.end,
+        _ => otherwise..otherwise,
     }
+}
 
-    pub(crate) fn is_word(&self, token: &Token, words: &[&str]) -> bool {
-        let text = &self.bytes[token.span.clone()];
-        token.sort == TokenKind::Word
-            && words
-                .iter()
-                .any(|word| word.as_bytes().eq_ignore_ascii_case(text))
-    }
-
-    /// The number that these tokens are, sign included, and its bytes; none where they are anything else.
-    pub fn number(&self, tokens: &[Token]) -> Option<(f64, Range<usize>)> {
-        let (negative, token) = match tokens {
-            [token] => (false, token),
-            [sign, token] if sign.is(b'-') => (true, token),
-            [sign, token] if sign.is(b'+') => (false, token),
-            _ => return None,
-        };
-        let text = &self.bytes[token.span.clone()];
-        if token.sort != TokenKind::Number || !is_number(text, self.language) {
-            return None;
-        }
-        let value = std::str::from_utf8(text)
-            .ok()?
-            .parse::<f64>()
-            .ok()
-            .filter(|value| value.is_finite())?;
-        let start = tokens[0].span.start;
-        Some((if negative { -value } else { value }, start..token.span.end))
-    }
-
-    /// The bytes from the first to the last of some tokens.
-    pub(crate) fn over(&self, tokens: &[Token], otherwise: usize) -> Range<usize> {
-        match (tokens.first(), tokens.last()) {
-            (Some(first), Some(last)) => first.span.start..last.span.end,
-            _ => otherwise..otherwise,
-        }
+/// A piece of a program for a message: on one line, and not without end.
+pub(super) fn quoted(tokens: &[Token]) -> String {
+    const LIMIT: usize = 40;
+    let bytes = tokens.first().map_or(&[][..], |first| first.bytes);
+    let text = String::from_utf8_lossy(&bytes[over(tokens, 0)]);
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let plain = |c: char| if c.is_control() { '?' } else { c };
+    let text: String = words.join(" ").chars().map(plain).collect();
+    let short: String = text.chars().take(LIMIT).collect();
+    if short.len() < text.len() {
+        format!("`{short}..`")
+    } else {
+        format!("`{short}`")
     }
 }
 
@@ -193,17 +240,14 @@ fn in_word(byte: u8) -> bool {
 }
 
 /// The tokens of a program; what makes their reading doubtful is a fault.
-pub(super) fn tokens(source: ProgramText, found: &mut Gathered) -> Vec<Token> {
-    let ProgramText { bytes, language } = source;
+pub(super) fn tokens<'p>(
+    bytes: &'p [u8],
+    language: Language,
+    found: &mut Gathered,
+) -> Vec<Token<'p>> {
     let krl = language == Language::Krl;
     let by_line = krl || language == Language::UrScript;
     let apostrophes = krl || language == Language::Fanuc;
-    let comment = match language {
-        Language::Krl => Some(b';'),
-        Language::Rapid => Some(b'!'),
-        Language::UrScript => Some(b'#'),
-        Language::Fanuc => None,
-    };
     let byte = |at: usize| bytes.get(at).copied();
     let mut out: Vec<Token> = Vec::with_capacity(bytes.len() / 4);
     let mut at = if bytes.starts_with(b"\xEF\xBB\xBF") {
@@ -225,7 +269,10 @@ pub(super) fn tokens(source: ProgramText, found: &mut Gathered) -> Vec<Token> {
                 at = line_end(bytes, at);
                 continue;
             }
-            here if Some(here) == comment => {
+            // A listing of FANUC's has its remarks elsewhere.
+            here if language != Language::Fanuc
+                && [here] == *language.grammar().comment.as_bytes() =>
+            {
                 at = line_end(bytes, at);
                 continue;
             }
@@ -234,10 +281,8 @@ pub(super) fn tokens(source: ProgramText, found: &mut Gathered) -> Vec<Token> {
                 match bytes[at..end].iter().position(|byte| *byte == here) {
                     Some(length) => at += length + 1,
                     None => {
-                        found.fault(
-                            start,
-                            format!("`{}` is not closed on its line", here as char),
-                        );
+                        let message = format!("`{}` is not closed on its line", here as char);
+                        found.fault(start, message);
                         at = end;
                     }
                 }
@@ -247,13 +292,11 @@ pub(super) fn tokens(source: ProgramText, found: &mut Gathered) -> Vec<Token> {
                 if here != b'.' || byte(at).is_some_and(|next| next.is_ascii_digit()) =>
             {
                 at = number_end(bytes, start);
-                TokenKind::Number
+                TokenKind::Number(is_number(&bytes[start..at], language))
             }
             here if in_word(here) => {
-                at += bytes[at..]
-                    .iter()
-                    .take_while(|byte| in_word(**byte))
-                    .count();
+                let more = bytes[at..].iter().take_while(|byte| in_word(**byte));
+                at += more.count();
                 TokenKind::Word
             }
             _ => match (here, byte(at)) {
@@ -270,7 +313,9 @@ pub(super) fn tokens(source: ProgramText, found: &mut Gathered) -> Vec<Token> {
         };
         out.push(Token {
             sort,
-            span: start..at,
+            start,
+            end: at,
+            bytes,
         });
     }
     out
@@ -294,10 +339,8 @@ fn doubtful(bytes: &[u8], found: &mut Gathered) {
 }
 
 fn line_end(bytes: &[u8], from: usize) -> usize {
-    bytes[from..]
-        .iter()
-        .position(|byte| *byte == b'\n')
-        .map_or(bytes.len(), |length| from + length)
+    let length = bytes[from..].iter().position(|byte| *byte == b'\n');
+    length.map_or(bytes.len(), |length| from + length)
 }
 
 fn number_end(bytes: &[u8], start: usize) -> usize {

@@ -29,32 +29,24 @@ pub enum RobotTool {
 impl RobotTool {
     /// The tool by a name, a number, or `X,Y,Z,A,B,C` in mm and deg; fails where the text is none of them.
     pub fn parse(text: &str) -> Result<Self, String> {
-        if !text.contains(',') {
-            let named = !text.is_empty()
-                && text
-                    .bytes()
-                    .all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
-            return if named {
-                Ok(Self::Named(text.into()))
-            } else {
-                Err(format!("expected {EXPECTED}, found `{text}`"))
-            };
+        let is_named = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_';
+        if !text.is_empty() && text.bytes().all(is_named) {
+            return Ok(Self::Named(text.into()));
         }
         let numbers: Option<Vec<f64>> = text
             .split(',')
-            .map(|part| part.trim().parse().ok())
+            .map(|part| {
+                part.trim()
+                    .parse()
+                    .ok()
+                    .filter(|number: &f64| number.is_finite())
+            })
             .collect();
         match numbers.as_deref() {
-            Some([x, y, z, a, b, c])
-                if [x, y, z, a, b, c]
-                    .into_iter()
-                    .all(|number| number.is_finite()) =>
-            {
+            Some([x, y, z, a, b, c]) => {
                 let turn = turns(a.to_radians(), b.to_radians(), c.to_radians());
-                Ok(Self::Frame(Pose::new(
-                    turn,
-                    Vector3::new(*x, *y, *z) * 1e-3,
-                )))
+                let place = Vector3::new(*x, *y, *z) * 1e-3;
+                Ok(Self::Frame(Pose::new(turn, place)))
             }
             _ => Err(format!("expected {EXPECTED}, found `{text}`")),
         }
@@ -72,21 +64,20 @@ impl RobotTool {
         if ["TOOL0", "TOOL_DATA[0]"].contains(&name.as_str()) {
             return Ok(Pose::identity());
         }
-        let known: Vec<(&str, &Pose)> = known
-            .iter()
-            .filter_map(|tool| Some((tool.name.as_str(), tool.frame.as_ref()?)))
-            .collect();
-        let found = known
-            .iter()
-            .find(|(there, _)| *there == name)
-            .map(|(_, frame)| **frame);
-        found.ok_or_else(|| {
-            let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
-            let names = if names.is_empty() { "none".into() } else { names.join(", ") };
-            format!(
-                "--tool {name}: no file that was read declares the frame of such a tool; declared: {names}, or give X,Y,Z,A,B,C"
-            )
-        })
+        let named = |tool: &ToolInForce| Some((tool.name.clone(), tool.frame?));
+        let known: Vec<(String, Pose)> = known.iter().filter_map(named).collect();
+        if let Some((_, frame)) = known.iter().find(|(there, _)| *there == name) {
+            return Ok(*frame);
+        }
+        let names: Vec<&str> = known.iter().map(|(name, _)| name.as_str()).collect();
+        let names = if names.is_empty() {
+            "none".into()
+        } else {
+            names.join(", ")
+        };
+        Err(format!(
+            "--tool {name}: no file that was read declares the frame of such a tool; declared: {names}, or give X,Y,Z,A,B,C"
+        ))
     }
 }
 
@@ -98,26 +89,26 @@ pub(super) fn relate(
     known: &[ToolInForce],
 ) -> Result<(), String> {
     let of_the_file = stated.map(|stated| stated.frame(known)).transpose()?;
-    let is_cartesian = |literal: &&Literal| !literal.kind.is_of_joints();
-    let Some(first) = found.literals.iter().find(is_cartesian).map(Literal::at) else {
+    let is_cartesian = |literal: &Literal| !literal.kind.is_of_joints();
+    let first = found
+        .literals
+        .iter()
+        .find(|literal| is_cartesian(literal))
+        .map(Literal::at);
+    let Some(first) = first else {
         return Ok(());
     };
     let mut notes: Vec<(bool, usize, String)> = Vec::new();
+    let mut say = |refuses: bool, at: usize, note: String| notes.push((refuses, at, note));
     let mut one: Option<ToolInForce> = None;
-    let mut unset = None;
-    let of_joints: Vec<(usize, ToolInForce)> = found
-        .literals
-        .iter_mut()
-        .filter(|literal| literal.kind.is_of_joints())
-        .filter_map(|literal| Some((literal.at(), literal.tool_in_force.take()?)))
-        .collect();
-    for literal in found
-        .literals
-        .iter_mut()
-        .filter(|literal| !literal.kind.is_of_joints())
-    {
-        let at = literal.at();
-        let Some(tool) = literal.tool_in_force.take() else {
+    let (mut unset, mut of_joints) = (None, Vec::new());
+    for literal in &mut found.literals {
+        let (at, tool) = (literal.at(), literal.tool_in_force.take());
+        if !is_cartesian(literal) {
+            of_joints.extend(tool.map(|tool| (at, tool)));
+            continue;
+        }
+        let Some(tool) = tool else {
             unset.get_or_insert(at);
             continue;
         };
@@ -128,74 +119,59 @@ pub(super) fn relate(
             }
             (Some(_), None) => {
                 let name = &tool.name;
-                notes.push((true, at, format!("is reached with the tool {name}, whose frame no file that was read declares")));
+                let note = format!(
+                    "is reached with the tool {name}, whose frame no file that was read declares"
+                );
+                say(true, at, note);
             }
             (None, _) => {
                 if let Some(one) = one.as_ref().filter(|one| **one != tool) {
                     let (tool, one) = (&tool.name, &one.name);
-                    let message = format!(
+                    let note = format!(
                         "is reached with the tool {tool}, another target with {one}: --tool says which of them is the robot file's"
                     );
-                    notes.push((true, at, message));
+                    say(true, at, note);
                 }
             }
         }
         one.get_or_insert(tool);
     }
-    let carried = found
-        .literals
-        .iter()
-        .find_map(|literal| Some((literal.at(), literal.tool?.translation.norm())));
-    if let Some((at, far)) = carried {
-        let message = format!(
+    let far = |literal: &Literal| Some((literal.at(), literal.tool?.translation.norm()));
+    if let Some((at, far)) = found.literals.iter().find_map(far) {
+        let note = format!(
             "its tool stands {:.1} mm from the robot file's: the correction there rests on how well orientations are identified",
             far * 1e3
         );
-        notes.push((false, at, message));
+        say(false, at, note);
     }
     let is_other = |tool: &ToolInForce| match of_the_file {
         Some(frame) => tool.frame.is_some_and(|its_frame| its_frame != frame),
         None => one.as_ref().is_some_and(|one| one != tool),
     };
     if let Some((at, tool)) = of_joints.into_iter().find(|(_, tool)| is_other(tool)) {
-        let message = format!(
-            "joints with the tool {}: they are corrected where the robot file's tool is",
-            tool.name
+        let name = &tool.name;
+        let note = format!(
+            "joints with the tool {name}: they are corrected where the robot file's tool is"
         );
-        notes.push((false, at, message));
+        say(false, at, note);
     }
     let frame = of_the_file.or_else(|| one.as_ref().and_then(|tool| tool.frame));
     if let Some(apart) = frame.and_then(|frame| apart(robot, &frame)) {
-        notes.push((true, first, apart));
-    } else if let Some(tool) = one.as_ref().filter(|_| of_the_file.is_none()) {
-        notes.push((
-            false,
-            first,
-            format!(
-                "the tool {} is taken as the robot file's; --tool states another one",
-                tool.name
-            ),
-        ));
+        say(true, first, apart);
+    } else if let Some(ToolInForce { name, .. }) = one.as_ref().filter(|_| of_the_file.is_none()) {
+        let note =
+            format!("the tool {name} is taken as the robot file's; --tool states another one");
+        say(false, first, note);
     }
-    if let (Some(at), true) = (unset, one.is_some()) {
-        notes.push((
-            true,
-            at,
-            "no tool is set before this target, and others are reached with one".into(),
-        ));
-    } else if let Some(at) = unset {
-        notes.push((
-            false,
-            at,
-            "no tool is set before this target: calib assumed that it is the robot file's".into(),
-        ));
+    if let Some(at) = unset {
+        let note = match one {
+            Some(_) => "no tool is set before this target, and others are reached with one",
+            None => "no tool is set before this target: calib assumed that it is the robot file's",
+        };
+        say(one.is_some(), at, note.into());
     }
     for (refuses, at, note) in notes {
-        if refuses {
-            found.frame(at, note)
-        } else {
-            found.warn(at, note)
-        }
+        found.say(refuses, at, note);
     }
     Ok(())
 }

@@ -59,29 +59,32 @@ pub struct Posture {
     pub tool: Vector,
 }
 
+impl Posture {
+    /// Whether no joint is lower than this, m; joints up to the second stand on the base, which may reach to the floor.
+    pub(crate) fn is_above(&self, floor: f64) -> bool {
+        let mut frames = self.frames.iter().skip(2);
+        frames.all(|frame| frame[2][3] >= floor)
+    }
+}
+
 impl Arm {
     /// The description with the errors of `truth` in.
     pub fn new(robot: &RobotDescription, truth: &TrueRobot) -> Arm {
         let last = robot.joints.len().saturating_sub(1);
         let links = robot.joints.iter().enumerate().map(|(index, joint)| {
-            let end = robot
-                .joints
-                .get(index + 1)
-                .map_or(robot.tool, |next| next.point);
+            let next = robot.joints.get(index + 1);
+            let end = next.map_or(robot.tool, |next| next.point);
             let error = truth.link_error(index);
             Link {
                 revolute: joint.kind == JointKind::Revolute,
                 axis: joint.axis,
                 span: matrix::add(matrix::minus(end, joint.point), error.shift),
-                tilt: if index == last {
-                    matrix::IDENTITY
-                } else {
-                    matrix::turn_by(error.tilt)
+                tilt: match index == last {
+                    true => matrix::IDENTITY,
+                    false => matrix::turn_by(error.tilt),
                 },
                 mass: joint.mass.unwrap_or(0.0),
-                centre: joint
-                    .centre
-                    .map_or([0.0; 3], |centre| matrix::minus(centre, joint.point)),
+                centre: matrix::minus(joint.centre.unwrap_or(joint.point), joint.point),
                 gear: joint.reduction_ratio.unwrap_or(1.0),
                 motor_constant: joint.motor_constant.unwrap_or(1.0),
             }
@@ -126,10 +129,8 @@ impl Arm {
 /// A share of a rigid step: a shift (um) after a rotation vector (arcsec).
 pub(crate) fn step(shift_um: Vector, turn_arcsec: Vector, share: f64) -> Matrix {
     let moved = matrix::shift(matrix::scale(shift_um, 1e-6 * share));
-    matrix::times(
-        &moved,
-        &matrix::turn_by(matrix::scale(turn_arcsec, ARCSEC * share)),
-    )
+    let turned = matrix::turn_by(matrix::scale(turn_arcsec, ARCSEC * share));
+    matrix::times(&moved, &turned)
 }
 
 /// What effects do to the arm.
@@ -195,9 +196,8 @@ impl Motion {
     fn numbers(&self) -> impl Iterator<Item = f64> {
         let matrices = self.link_end.iter().chain([&self.base, &self.tracker]);
         let joints = self.joint.iter().chain(&self.load);
-        joints
-            .chain(matrices.flat_map(|matrix| matrix.as_flattened()))
-            .copied()
+        let numbers = joints.chain(matrices.flat_map(|matrix| matrix.as_flattened()));
+        numbers.copied()
     }
 }
 
@@ -211,18 +211,17 @@ pub(crate) struct Loads {
 impl Loads {
     /// The links and the declared payload (kg) of an arm in `posture`.
     pub(crate) fn new(arm: &Arm, posture: &Posture, payload: f64) -> Loads {
-        let mut bodies: Vec<(usize, f64, Vector)> =
-            (arm.links.iter().zip(&posture.frames).enumerate())
-                .map(|(index, (link, frame))| (index, link.mass, matrix::place(frame, link.centre)))
-                .collect();
-        if let Some(hand) = posture.frames.last() {
-            // Beyond the last link: it bends that link too.
-            bodies.push((
-                arm.links.len(),
-                payload * arm.payload_share,
-                matrix::place(hand, arm.payload_centre),
-            ));
-        }
+        let links = arm.links.iter().zip(&posture.frames);
+        let links = links.map(|(link, frame)| (link.mass, matrix::place(frame, link.centre)));
+        // Beyond the last link: it bends that link too.
+        let carried = posture.frames.last().map(|hand| {
+            let centre = matrix::place(hand, arm.payload_centre);
+            (payload * arm.payload_share, centre)
+        });
+        let all = links.chain(carried).enumerate();
+        let bodies = all
+            .map(|(link, (mass, centre))| (link, mass, centre))
+            .collect();
         Loads {
             bodies,
             gravity: arm.gravity,
@@ -242,18 +241,12 @@ impl Loads {
 
     /// What gravity does to each joint along its axis, Nm (N for a prismatic joint).
     pub(crate) fn torques(&self, arm: &Arm, posture: &Posture) -> Vec<f64> {
-        let joints = arm
-            .links
-            .iter()
-            .zip(&posture.frames)
-            .zip(&posture.axes)
-            .enumerate();
-        joints
-            .map(|(index, ((link, frame), axis))| {
-                let (force, moment) = self.wrench(index, matrix::origin(frame));
-                matrix::dot(*axis, if link.revolute { moment } else { force })
-            })
-            .collect()
+        let along = |(index, link): (usize, &Link)| {
+            let (force, moment) = self.wrench(index, matrix::origin(&posture.frames[index]));
+            let pull = if link.revolute { moment } else { force };
+            matrix::dot(posture.axes[index], pull)
+        };
+        arm.links.iter().enumerate().map(along).collect()
     }
 }
 

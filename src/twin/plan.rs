@@ -9,7 +9,7 @@ use crate::arm::{Arm, Motion, Row};
 use crate::matrix;
 use crate::matrix::Vector;
 use crate::noise::{Noise, Purpose};
-use calib_foundation::description::{JointKind, RobotDescription};
+use calib_foundation::description::{JointDescription, JointKind, RobotDescription};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -63,13 +63,20 @@ impl Block {
     }
 }
 
+/// The keys and messages of rules that are not kept.
+pub(super) fn broken<const N: usize>(
+    rules: [(bool, &'static str, &'static str); N],
+) -> Vec<(&'static str, &'static str)> {
+    let broken = rules.into_iter().filter(|(kept, ..)| !kept);
+    broken.map(|(_, key, message)| (key, message)).collect()
+}
+
 /// Given poses of all blocks, with their places.
 pub fn given(blocks: &[Block]) -> impl Iterator<Item = (String, &GivenPose)> {
     blocks.iter().enumerate().flat_map(|(block, all)| {
-        all.given
-            .iter()
-            .enumerate()
-            .map(move |(pose, given)| (format!("blocks[{block}].given[{pose}]"), given))
+        let place = move |pose| format!("blocks[{block}].given[{pose}]");
+        let poses = all.given.iter().enumerate();
+        poses.map(move |(pose, given)| (place(pose), given))
     })
 }
 
@@ -189,10 +196,9 @@ pub fn plan(
     seed: u64,
 ) -> Result<Vec<Point>, String> {
     // Nothing is drawn where all poses are given: then the robot needs no limits.
-    let ranges = if blocks.iter().all(|block| block.points == 0) {
-        Vec::new()
-    } else {
-        ranges(robot, poses)?
+    let ranges = match blocks.iter().all(|block| block.points == 0) {
+        true => Vec::new(),
+        false => ranges(robot, poses)?,
     };
     let mut draw = Noise::new(seed, Purpose::Poses);
     let mut clock = Noise::new(seed, Purpose::Clock);
@@ -226,10 +232,8 @@ pub fn plan(
             let mut best: Option<(f64, Vec<f64>, Vector)> = None;
             for _ in 0..poses.candidates.max(1) {
                 let (q, tool) = allowed(arm, poses, &ranges, &mut draw)?;
-                let room = taken
-                    .iter()
-                    .map(|other| matrix::norm(matrix::minus(tool, *other)))
-                    .fold(f64::INFINITY, f64::min);
+                let away = |other: &Vector| matrix::norm(matrix::minus(tool, *other));
+                let room = taken.iter().map(away).fold(f64::INFINITY, f64::min);
                 if best.as_ref().is_none_or(|(most, _, _)| room > *most) {
                     best = Some((room, q, tool));
                 }
@@ -247,24 +251,21 @@ pub fn plan(
 /// The range of every joint, rad or m; fails where the robot has no limits and the poses no ranges.
 pub(super) fn ranges(robot: &RobotDescription, poses: &Poses) -> Result<Vec<[f64; 2]>, String> {
     if poses.range_deg.is_empty() {
-        let limits = robot.joints.iter().enumerate().map(|(index, joint)| {
-            joint
-                .limits
-                .ok_or_else(|| format!("joint {} has no limits; give poses.range_deg", index + 1))
-        });
-        return limits.collect();
+        let limits = |(index, joint): (usize, &JointDescription)| {
+            let none = || format!("joint {} has no limits; give poses.range_deg", index + 1);
+            joint.limits.ok_or_else(none)
+        };
+        return robot.joints.iter().enumerate().map(limits).collect();
     }
-    if poses.range_deg.len() != robot.joints.len() {
+    let (ranges, joints) = (poses.range_deg.len(), robot.joints.len());
+    if ranges != joints {
         return Err(format!(
-            "poses.range_deg has {} ranges, the robot {} joints",
-            poses.range_deg.len(),
-            robot.joints.len()
+            "poses.range_deg has {ranges} ranges, the robot {joints} joints"
         ));
     }
-    let joints = poses.range_deg.iter().zip(&robot.joints);
-    Ok(joints
-        .map(|(range, joint)| range.map(|x| si(x, joint.kind)))
-        .collect())
+    let pairs = poses.range_deg.iter().zip(&robot.joints);
+    let ranges = pairs.map(|(range, joint)| range.map(|x| si(x, joint.kind)));
+    Ok(ranges.collect())
 }
 
 /// A position of a joint in deg or mm, in rad or m.
@@ -285,19 +286,11 @@ pub fn allowed(
     let floor = 1e-3 * poses.floor_mm;
     let at_rest = Motion::none(arm.links.len());
     for _ in 0..TRIES {
-        let q: Vec<f64> = ranges
-            .iter()
-            .map(|range| draw.uniform(range[0], range[1]))
-            .collect();
+        let drawn = ranges.iter().map(|range| draw.uniform(range[0], range[1]));
+        let q: Vec<f64> = drawn.collect();
         let posture = arm.posture(&q, &at_rest);
         let far = posture.tool[0].hypot(posture.tool[1]) >= 1e-3 * poses.clearance_mm;
-        // Joints up to the second stand on the base, which may reach to the floor.
-        let high = posture
-            .frames
-            .iter()
-            .skip(2)
-            .all(|frame| frame[2][3] >= floor)
-            && posture.tool[2] >= floor;
+        let high = posture.is_above(floor) && posture.tool[2] >= floor;
         if far && high {
             return Ok((q, posture.tool));
         }
@@ -360,8 +353,7 @@ impl GivenPose {
                 "expected a mass, 0 or more",
             ),
         ];
-        let broken = rules.into_iter().filter(|(kept, ..)| !kept);
-        broken.map(|(_, key, message)| (key, message)).collect()
+        broken(rules)
     }
 
     /// What this robot cannot do.
@@ -373,28 +365,22 @@ impl GivenPose {
             ("direction", self.direction.len()),
         ] {
             if count != joints && (name == "joints_deg" || count > 0) {
-                out.push((
-                    name,
-                    format!("has {count} numbers, the robot {joints} joints"),
-                ));
+                let message = format!("has {count} numbers, the robot {joints} joints");
+                out.push((name, message));
             }
         }
         let (q, _) = self.postures(robot);
         for (index, (at, joint)) in q.iter().zip(&robot.joints).enumerate() {
             // A limit that was rounded to the decimals of a pose is no breach of it.
-            let beyond = joint
-                .limits
-                .filter(|[low, high]| *at < low - 1e-6 || *at > high + 1e-6);
-            if let Some(limits) = beyond {
+            let is_beyond = |[low, high]: &[f64; 2]| *at < low - 1e-6 || *at > high + 1e-6;
+            if let Some(limits) = joint.limits.filter(is_beyond) {
                 let (unit, [low, high]) = match joint.kind {
                     JointKind::Revolute => ("deg", limits.map(f64::to_degrees)),
                     JointKind::Prismatic => ("mm", limits.map(|metres| 1e3 * metres)),
                 };
-                let message = format!(
-                    "joint {} is at {} {unit}; allowed: {low:.3} to {high:.3}",
-                    index + 1,
-                    self.joints_deg[index]
-                );
+                let (number, at) = (index + 1, self.joints_deg[index]);
+                let message =
+                    format!("joint {number} is at {at} {unit}; allowed: {low:.3} to {high:.3}");
                 out.push(("joints_deg", message));
             }
         }

@@ -1,20 +1,21 @@
 //! The experiment: every planned point settled, seen by the tracker, with the currents that the controller would log; or a way of
 //! the moving arm, on which statics hold all the same: it is slow against its own vibrations.
+//!
+//! The posture in which the deflected arm carries its loads.
 
-use super::arm::Arm;
-use super::effect::{self, JointCompliance, Physical};
-use super::equilibrium::{Equilibrium, settle, sighted};
-use super::matrix::{Matrix, Vector};
+use super::arm::{Arm, Link, Loads, Motion, Posture, Row};
+use super::effect::{self, JointCompliance, Physical, State};
+use super::matrix::{self, Matrix, Vector};
 use super::memory;
 use super::noise::{Noise, Purpose};
 use super::plan::{self, Block, Climate, Point, Poses};
 use super::tracker::{Beam, Tracker};
 use super::truth::{ARCSEC, TrueRobot};
 use super::way::{JointState, Path, Way};
-use crate::arm::{Motion, Row};
 use calib_foundation::description::RobotDescription;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::iter::repeat_n;
 
 /// The motors as the controller logs them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -114,14 +115,8 @@ impl Experiment<'_> {
     /// All points in order; `tick` hears of each. Fails with what is wrong where no pose is allowed.
     pub fn record(&self, tick: impl FnMut()) -> Result<Vec<Shot>, String> {
         let arm = Arm::new(self.robot, self.truth);
-        let points = plan::plan(
-            self.robot,
-            &arm,
-            self.poses,
-            self.blocks,
-            self.climate,
-            self.seed,
-        )?;
+        let (poses, blocks, climate) = (self.poses, self.blocks, self.climate);
+        let points = plan::plan(self.robot, &arm, poses, blocks, climate, self.seed)?;
         Ok(self.measure(points, tick))
     }
 
@@ -129,15 +124,9 @@ impl Experiment<'_> {
     pub fn follow(&self, way: &Way, mut tick: impl FnMut()) -> Result<Vec<Shot>, String> {
         let scene = self.scene();
         let rows: usize = self.blocks.iter().map(|block| block.points).sum();
-        let path = Path::draw(
-            way,
-            self.robot,
-            &Arm::new(self.robot, self.truth),
-            self.poses,
-            rows as f64 / way.rate_hz,
-            self.seed,
-        )?;
-        let later: f64 = scene.effects.iter().map(Physical::later).sum();
+        let (arm, seconds) = (Arm::new(self.robot, self.truth), rows as f64 / way.rate_hz);
+        let path = Path::draw(way, self.robot, &arm, self.poses, seconds, self.seed)?;
+        let later: f64 = scene.effects.iter().map(|effect| effect.later()).sum();
         let times = (0..rows).map(|row| row as f64 / way.rate_hz);
         let begin_s = self.climate.begin_s;
         let warmth = |since_s: f64| self.climate.temperature(begin_s + since_s);
@@ -148,32 +137,26 @@ impl Experiment<'_> {
         let mut memories = effect::recall(&scene.effects, &memory::along(course));
         let mut beam = Beam::new(self.seed);
         let mut play = Noise::new(self.seed, Purpose::Repeatability);
-        let lasts = if way.wander_s > 0.0 {
-            (-1.0 / (way.rate_hz * way.wander_s)).exp()
-        } else {
-            0.0
+        let lasts = match way.wander_s > 0.0 {
+            true => (-1.0 / (way.rate_hz * way.wander_s)).exp(),
+            false => 0.0,
         };
         let joints = self.repeatability_arcsec.iter();
         let mut deviations: Vec<f64> = joints.map(|_| play.normal()).collect();
         let mut direction = vec![0.0; scene.arm.links.len()];
         let blocks = self.blocks.iter().enumerate();
-        let blocks =
-            blocks.flat_map(|(number, block)| std::iter::repeat_n((number, block), block.points));
+        let blocks = blocks.flat_map(|(number, block)| repeat_n((number, block), block.points));
         let mut shots = Vec::with_capacity(rows);
         for (row, (block, load)) in blocks.enumerate() {
             let since_s = row as f64 / way.rate_hz;
-            let JointState { q, v: logged, .. } = path.at(since_s);
-            let JointState {
-                q: command,
-                v: velocity,
-                ..
-            } = path.at(since_s + later);
+            let (logged, JointState { q: command, v, .. }) =
+                (path.at(since_s), path.at(since_s + later));
             let mut drive = self.truth.drive(self.robot, &command);
             for deviation in &mut deviations {
                 *deviation = lasts * *deviation + (1.0 - lasts * lasts).sqrt() * play.normal();
             }
             self.scatter(&mut drive, &scene.arm, |joint| deviations[joint]);
-            for (side, speed) in direction.iter_mut().zip(&velocity) {
+            for (side, speed) in direction.iter_mut().zip(&v) {
                 *side = if *speed == 0.0 { *side } else { speed.signum() };
             }
             let row = Row {
@@ -183,12 +166,12 @@ impl Experiment<'_> {
                 time_s: begin_s + since_s,
                 temperature_c: warmth(since_s),
                 payload_kg: load.payload_kg,
-                velocity,
+                velocity: v,
                 memory: std::mem::take(&mut memories[row]),
             };
-            let before = q.clone();
-            let (shot, _) = scene.shot((block, row), q, &before, &mut beam);
-            let velocity = if way.log_velocity { logged } else { Vec::new() };
+            let before = logged.q.clone();
+            let (shot, _) = scene.shot((block, row), logged.q, &before, &mut beam);
+            let velocity = if way.log_velocity { logged.v } else { vec![] };
             shots.push(Shot { velocity, ..shot });
             tick();
         }
@@ -234,29 +217,93 @@ impl Experiment<'_> {
 
     /// Moves joints (rad or m) by their repeatability, so many standard deviations each.
     fn scatter(&self, drive: &mut [f64], arm: &Arm, mut by: impl FnMut(usize) -> f64) {
-        let joints = drive
-            .iter_mut()
-            .zip(self.repeatability_arcsec)
-            .zip(&arm.links);
-        for (joint, ((position, sigma), link)) in joints.enumerate() {
+        let sigmas = self.repeatability_arcsec.iter().zip(&arm.links);
+        for (joint, (position, (sigma, link))) in drive.iter_mut().zip(sigmas).enumerate() {
             *position += sigma * if link.revolute { ARCSEC } else { 1e-6 } * by(joint);
         }
     }
 
     /// Holding currents: the motor carries what gravity and springs do to the joint, plus what friction adds.
     fn currents(&self, arm: &Arm, torque: &[f64], motion: &Motion, meter: &mut Noise) -> Vec<f64> {
-        let joints = arm
-            .links
-            .iter()
-            .zip(torque)
-            .zip(&motion.motor_torque)
-            .enumerate();
-        joints
-            .map(|(joint, ((link, gravity), extra))| {
-                let sign = self.motors.sign.get(joint).copied().unwrap_or(1.0);
-                let held = (extra - gravity) / (link.gear * link.motor_constant);
-                sign * held + self.motors.noise_a * meter.normal()
-            })
-            .collect()
+        let carried = torque.iter().zip(&motion.motor_torque);
+        let current = |(joint, (link, (gravity, extra))): (usize, (&Link, (&f64, &f64)))| {
+            let sign = self.motors.sign.get(joint).copied().unwrap_or(1.0);
+            let held = (extra - gravity) / (link.gear * link.motor_constant);
+            sign * held + self.motors.noise_a * meter.normal()
+        };
+        let joints = arm.links.iter().zip(carried).enumerate();
+        joints.map(current).collect()
     }
+}
+
+/// The arm at rest under its loads.
+#[derive(Debug, Clone)]
+pub struct Equilibrium {
+    /// Where everything is.
+    pub posture: Posture,
+    /// What the effects move.
+    pub motion: Motion,
+    /// Torque of gravity and of other loads on each joint in the deflected posture, Nm.
+    pub torque: Vec<f64>,
+}
+
+/// A change of less than this (rad, m or Nm) is rest; a picometre at 3 m.
+const REST: f64 = 1e-13;
+/// Every round shrinks the change by the wind-up itself, about 1e-3: six are usual, more than this many mean a collapsing arm.
+const ROUNDS: usize = 60;
+
+/// Lets the arm sag until loads and deflections agree.
+pub fn settle(arm: &Arm, row: &Row, effects: &[Physical]) -> Equilibrium {
+    let mut motion = Motion::none(arm.links.len());
+    for _ in 0..ROUNDS {
+        let held = hold(arm, row, motion);
+        let mut next = Motion::none(arm.links.len());
+        for (index, effect) in effects.iter().enumerate() {
+            let state = State {
+                arm,
+                row,
+                posture: &held.0,
+                loads: &held.1,
+                torque: &held.2,
+                memory: remembered(row, index),
+            };
+            effect.act(&state, &mut next);
+        }
+        let change = next.distance(&held.3);
+        motion = next;
+        if change < REST {
+            break;
+        }
+    }
+    let (posture, _, torque, motion) = hold(arm, row, motion);
+    Equilibrium {
+        posture,
+        motion,
+        torque,
+    }
+}
+
+/// What the tracker reads of the measured point, m in its frame, without its noise; `base` is the base frame as it sees it at first.
+pub fn sighted(at_rest: &Equilibrium, base: &Matrix, row: &Row, effects: &[Physical]) -> Vector {
+    let frame = matrix::times(&at_rest.motion.tracker, base);
+    let there = matrix::place(&frame, at_rest.posture.tool);
+    let sight = |point, (index, effect): (usize, &Physical)| {
+        effect.sight(row, remembered(row, index), point)
+    };
+    effects.iter().enumerate().fold(there, sight)
+}
+
+fn remembered(row: &Row, effect: usize) -> f64 {
+    row.memory.get(effect).copied().unwrap_or(0.0)
+}
+
+fn hold(arm: &Arm, row: &Row, motion: Motion) -> (Posture, Loads, Vec<f64>, Motion) {
+    let pairs = row.drive.iter().zip(&motion.joint);
+    let angle: Vec<f64> = pairs.map(|(drive, extra)| drive + extra).collect();
+    let posture = arm.posture(&angle, &motion);
+    let loads = Loads::new(arm, &posture, row.payload_kg);
+    let gravity = loads.torques(arm, &posture);
+    let pairs = gravity.iter().zip(&motion.load);
+    let torque = pairs.map(|(gravity, load)| gravity + load).collect();
+    (posture, loads, torque, motion)
 }

@@ -3,13 +3,12 @@
 //!
 //! A posture is found by Newton's steps on the settled arm, by differences of its own tool point, from a random one.
 
-use super::arm::Arm;
-use super::equilibrium::settle;
 use super::matrix::{self, Vector};
 use super::noise::{Noise, Purpose};
 use super::plan::{self, Climate, Poses};
+use super::recorder::settle;
 use super::recorder::{Experiment, Scene};
-use crate::arm::Row;
+use crate::arm::{Motion, Row};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -108,8 +107,7 @@ impl Fixture {
                 "planes and spheres have one above 0, sockets none",
             ),
         ];
-        let broken = rules.into_iter().filter(|(kept, ..)| !kept);
-        broken.map(|(_, key, message)| (key, message)).collect()
+        plan::broken(rules)
     }
 
     /// A point at which the ball may lie, m: drawn over what is touched, with the noise of coming back.
@@ -154,13 +152,8 @@ impl Experiment<'_> {
                 let temperature_c = self.climate.temperature(time_s);
                 let there = fixture.point(&mut draw, &mut noise);
                 let before = touches.last().map(|touch: &Touch| touch.q.clone());
-                let q = self.reach(
-                    &scene,
-                    &ranges,
-                    (there, before.as_deref()),
-                    [time_s, temperature_c],
-                    &mut draw,
-                );
+                let (there, at) = ((there, before.as_deref()), [time_s, temperature_c]);
+                let q = self.reach(&scene, &ranges, there, at, &mut draw);
                 let q = q.ok_or_else(|| {
                     let [x, y, z] = fixture.centre_mm;
                     format!(
@@ -190,18 +183,17 @@ impl Experiment<'_> {
     ) -> Option<Vec<f64>> {
         let joints = ranges.len();
         let ball = |q: &[f64]| -> Vector {
+            let mut direction = vec![0.0; joints];
+            for (side, (q, before)) in direction
+                .iter_mut()
+                .zip(q.iter().zip(before.unwrap_or(&[])))
+            {
+                *side = (q - before).signum();
+            }
             let row = Row {
                 command: q.to_vec(),
                 drive: self.truth.drive(self.robot, q),
-                direction: before.map_or_else(
-                    || vec![0.0; joints],
-                    |before| {
-                        q.iter()
-                            .zip(before)
-                            .map(|(q, before)| (q - before).signum())
-                            .collect()
-                    },
-                ),
+                direction,
                 time_s,
                 temperature_c,
                 payload_kg: 0.0,
@@ -221,7 +213,10 @@ impl Experiment<'_> {
                 let tool = ball(&q);
                 let left = matrix::minus(there, tool);
                 if matrix::norm(left) < THERE {
-                    if within(&q, ranges, 0.0) && self.is_above_floor(arm, &q) {
+                    // The ball may lie below the floor.
+                    let posture = arm.posture(&q, &Motion::none(joints));
+                    let is_above = posture.is_above(1e-3 * self.poses.floor_mm);
+                    if within(&q, ranges, 0.0) && is_above {
                         return Some(q);
                     }
                     break;
@@ -237,25 +232,14 @@ impl Experiment<'_> {
                 };
                 let largest = step.iter().fold(0.0f64, |most, turn| most.max(turn.abs()));
                 let share = (FAR / largest.max(1e-12)).min(1.0);
-                q.iter_mut()
-                    .zip(&step)
-                    .for_each(|(q, turn)| *q += share * turn);
+                let turns = q.iter_mut().zip(&step);
+                turns.for_each(|(q, turn)| *q += share * turn);
                 if !within(&q, ranges, FAR) {
                     break;
                 }
             }
         }
         None
-    }
-
-    /// Joints up to the second stand on the base, which may reach to the floor; the ball may lie below it.
-    fn is_above_floor(&self, arm: &Arm, q: &[f64]) -> bool {
-        let posture = arm.posture(q, &crate::arm::Motion::none(arm.links.len()));
-        posture
-            .frames
-            .iter()
-            .skip(2)
-            .all(|frame| frame[2][3] >= 1e-3 * self.poses.floor_mm)
     }
 }
 
@@ -276,18 +260,10 @@ fn least_step(columns: &[Vector], left: Vector) -> Option<Vec<f64>> {
         return None;
     }
     // Cramer's rule on the symmetric square.
-    let [first, second, third] = [
-        matrix::cross(b, c),
-        matrix::cross(c, a),
-        matrix::cross(a, b),
-    ];
+    let [first, second, third] = [(b, c), (c, a), (a, b)].map(|(u, v)| matrix::cross(u, v));
     let pull: Vector = std::array::from_fn(|i| {
         (first[i] * left[0] + second[i] * left[1] + third[i] * left[2]) / volume
     });
-    Some(
-        columns
-            .iter()
-            .map(|column| matrix::dot(*column, pull))
-            .collect(),
-    )
+    let step = columns.iter().map(|column| matrix::dot(*column, pull));
+    Some(step.collect())
 }

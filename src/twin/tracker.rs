@@ -2,11 +2,11 @@
 //!
 //! A point as a tracker measures it: range, azimuth about its standing axis z from x, elevation above its horizon.
 
+use crate::lists::named;
 use crate::matrix;
 use crate::matrix::{Matrix, Vector};
-use crate::names::named;
 use crate::noise::{Noise, Purpose};
-use crate::true_value::{TrueValue, true_value};
+use crate::truth::{TrueValue, true_values};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -99,18 +99,15 @@ impl Tracker {
 
     /// The true pose of the tracker under names of its own; a fit's base frame is a correction of an alignment.
     pub fn values(&self) -> Vec<TrueValue> {
-        let value = |number: String, unit, value| {
-            true_value("tracker", "pose", "tracker".into(), &number, unit, value)
-        };
         let axes = ["x", "y", "z"].into_iter().enumerate();
-        axes.flat_map(|(index, axis)| {
+        let numbers = axes.flat_map(|(index, axis)| {
             let turned = self.roll_pitch_yaw_deg[index].to_radians();
             [
-                value(axis.into(), "mm", self.position_mm[index]),
-                value(format!("r{axis}"), "rad", turned),
+                (axis.to_string(), "mm", self.position_mm[index]),
+                (format!("r{axis}"), "rad", turned),
             ]
-        })
-        .collect()
+        });
+        true_values("tracker", "pose", "tracker", numbers)
     }
 
     /// Standard deviation of a coordinate of `point` (m, tracker frame), m.

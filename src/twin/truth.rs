@@ -2,9 +2,10 @@
 //!
 //! Joint i stands at `offset_i + k_i (q_i - sum c_ij q_j) + sum k_j (c_ij + e_ij) q_j`, where c_ij is the nominal coupling (the
 //! motion of joint i caused by joint j, which the controller takes out) and e_ij its error.
+//!
+//! What is true of a recording, number by number.
 
 use super::matrix::Vector;
-use super::true_value::{TrueValue, true_value, true_values};
 use calib_foundation::description::{JointKind, RobotDescription};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -125,41 +126,34 @@ impl TrueRobot {
     pub fn values(&self, robot: &RobotDescription) -> Vec<TrueValue> {
         let mut out = Vec::new();
         for (joint, described) in robot.joints.iter().enumerate() {
-            let (tag, place) = (format!("j{}", joint + 1), format!("joint {}", joint + 1));
-            let mut push = |effect, number: &str, unit, value| {
-                out.push(true_value(effect, &tag, place.clone(), number, unit, value))
+            let number = joint + 1;
+            let mut push = |effect, word: &str, unit, value| {
+                let (tag, place) = (format!("j{number}"), format!("joint {number}"));
+                out.extend(true_values(effect, &tag, &place, [(word, unit, value)]));
             };
             let offset = self.offset(robot, joint);
             match described.kind {
                 JointKind::Revolute => push("joint_offset", "", "rad", offset),
                 JointKind::Prismatic => push("joint_offset", "", "mm", 1e3 * offset),
             }
-            push(
-                "reduction_ratio",
-                "",
-                "1",
-                self.ratio.get(joint).map_or(0.0, |ratio| ratio - 1.0),
-            );
+            let ratio = self.ratio.get(joint).map_or(0.0, |ratio| ratio - 1.0);
+            push("reduction_ratio", "", "1", ratio);
             if let Some(factor) = self.compliance_rad_a.get(joint) {
                 push("joint_compliance", "", "rad/A", *factor);
             }
             let per_ampere =
                 described.reduction_ratio.unwrap_or(1.0) * described.motor_constant.unwrap_or(1.0);
-            push(
-                "joint_compliance",
-                "torque",
-                "rad/Nm",
-                self.compliance(joint, per_ampere),
-            );
+            let compliance = self.compliance(joint, per_ampere);
+            push("joint_compliance", "torque", "rad/Nm", compliance);
             let error = self.link_error(joint);
             for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
                 let (shift, tilt) = (1e3 * error.shift[axis], error.tilt[axis]);
-                if joint + 1 == robot.joints.len() {
+                if number == robot.joints.len() {
                     let numbers = [("", "mm", shift)];
                     out.extend(true_values("tool_offset", letter, "tool", numbers));
                     continue;
                 }
-                let (tag, place) = (format!("l{}", joint + 1), format!("link {}", joint + 1));
+                let (tag, place) = (format!("l{number}"), format!("link {number}"));
                 let turned = format!("r{letter}");
                 let numbers = [(letter, "mm", shift), (turned.as_str(), "rad", tilt)];
                 out.extend(true_values("link_geometry", &tag, &place, numbers));
@@ -208,4 +202,35 @@ impl TrueRobot {
         }
         out
     }
+}
+
+/// A true number under its canonical name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrueValue {
+    pub name: String,
+    pub effect: &'static str,
+    pub place: String,
+    pub unit: &'static str,
+    pub value: f64,
+}
+
+/// Numbers of the effect `effect` at `place`: name, unit and value of each, whose canonical name is `effect.tag.number`.
+pub(crate) fn true_values<N: AsRef<str>>(
+    effect: &'static str,
+    tag: &str,
+    place: &str,
+    numbers: impl IntoIterator<Item = (N, &'static str, f64)>,
+) -> Vec<TrueValue> {
+    let value = |(number, unit, value): (N, _, _)| {
+        let number = number.as_ref();
+        let dot = if number.is_empty() { "" } else { "." };
+        TrueValue {
+            name: format!("{effect}.{tag}{dot}{number}"),
+            effect,
+            place: place.into(),
+            unit,
+            value,
+        }
+    };
+    numbers.into_iter().map(value).collect()
 }

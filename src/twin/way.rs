@@ -1,4 +1,6 @@
 //! A way through joint space, smooth and at random: waves that never stop, or moves from pose to pose by polynomials of fifth degree.
+//!
+//! How joints move while torques are recorded: sums of sines that begin and end at rest, and moves from point to point with pauses.
 
 use super::arm::Arm;
 use super::noise::{Noise, Purpose};
@@ -74,10 +76,10 @@ pub(crate) enum Path {
 /// From a pose to the next.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Move {
-    pub(crate) start_s: f64,
-    pub(crate) duration_s: f64,
-    pub(crate) from: Vec<f64>,
-    pub(crate) to: Vec<f64>,
+    start_s: f64,
+    duration_s: f64,
+    from: Vec<f64>,
+    to: Vec<f64>,
 }
 
 /// Amplitudes of the three waves as shares of half the range, and their frequencies as multiples of the first.
@@ -86,7 +88,7 @@ const FREQUENCIES: [f64; 3] = [1.0, 1.7, 2.9];
 /// Time before the first row and after the last one, s: the arm moves already, and clocks may be apart.
 const MARGIN_S: f64 = 2.0;
 /// The fastest moment of a move of fifth degree, in travel over duration.
-pub(crate) const PEAK: f64 = 1.875;
+const PEAK: f64 = 1.875;
 /// Time in which waves that begin and end at a standstill come up, s.
 const RAMP_S: f64 = 1.0;
 /// No move is shorter, s.
@@ -209,4 +211,59 @@ fn waves([low, high]: [f64; 2], speed: f64, draw: &mut Noise) -> (f64, Vec<[f64;
         0.5 * (low + high),
         vec![wave(0, draw), wave(1, draw), wave(2, draw)],
     )
+}
+
+/// Turns of the slowest sine in a stretch, and sines of a joint.
+const TURNS: [usize; 5] = [1, 2, 3, 5, 7];
+
+/// Sines that stay inside `ranges` (rad) and below `speed` (rad/s), for so many seconds.
+pub(crate) fn sines(noise: &mut Noise, ranges: &[[f64; 2]], speed: f64, duration: f64) -> Path {
+    let joint = |[lower, upper]: &[f64; 2]| {
+        let reach = 0.5 * (upper - lower);
+        let wave = |k: &usize| {
+            let rate = TAU / duration * *k as f64 * noise.uniform(0.9, 1.1);
+            [
+                noise.uniform(0.2, 1.0) / *k as f64,
+                rate,
+                noise.uniform(0.0, TAU),
+            ]
+        };
+        let mut waves: Vec<[f64; 3]> = TURNS.iter().map(wave).collect();
+        let far: f64 = waves.iter().map(|wave| wave[0]).sum();
+        let fast: f64 = waves.iter().map(|wave| wave[0] * wave[1]).sum();
+        let share = (0.8 * reach / far).min(speed / fast);
+        waves.iter_mut().for_each(|wave| wave[0] *= share);
+        let room = (reach - share * far).max(0.0);
+        (
+            0.5 * (lower + upper) + noise.uniform(-1.0, 1.0) * room,
+            waves,
+        )
+    };
+    Path::Waves(ranges.iter().map(joint).collect(), Some(duration))
+}
+
+/// Moves between points inside `ranges`, each with a pause after it.
+pub(crate) fn moves(noise: &mut Noise, ranges: &[[f64; 2]], speed: f64, duration: f64) -> Path {
+    let point = |noise: &mut Noise| -> Vec<f64> {
+        ranges
+            .iter()
+            .map(|[lower, upper]| noise.uniform(*lower, *upper))
+            .collect()
+    };
+    let (mut moves, mut start_s, mut from) = (Vec::new(), 0.4, point(noise));
+    while start_s < duration {
+        let to = point(noise);
+        let joints = from.iter().zip(&to);
+        let far = joints.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let duration_s = (PEAK * far / (speed * noise.uniform(0.4, 1.0))).max(0.5);
+        moves.push(Move {
+            start_s,
+            duration_s,
+            from,
+            to: to.clone(),
+        });
+        start_s += duration_s + noise.uniform(0.3, 0.7);
+        from = to;
+    }
+    Path::Moves(moves)
 }

@@ -10,11 +10,11 @@ use calib::twin::effect::{
     Circle, GearLoad, Heat, JointWarming, Physical, Presliding, TrackerCircle, TrackerElevation,
     TrackerOffset, TrackerRefraction, recall,
 };
-use calib::twin::equilibrium::{Equilibrium, settle, sighted};
 use calib::twin::matrix::IDENTITY;
 use calib::twin::memory::{Moment, past};
 use calib::twin::plan::Point;
 use calib::twin::recorder::Shot;
+use calib::twin::recorder::{Equilibrium, settle, sighted};
 use calib::twin::truth::TrueRobot;
 use std::f64::consts::PI;
 

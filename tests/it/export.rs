@@ -14,6 +14,22 @@ fn exported(format: &str) -> String {
     output.out
 }
 
+/// Joint positions here and there.
+fn postures(count: usize) -> impl Iterator<Item = Vec<f64>> {
+    let joint = |k: usize, j: usize| (1.3 * k as f64 + 0.7 * j as f64).sin();
+    (0..count).map(move |k| (0..6).map(|j| joint(k, j)).collect())
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Numbers with blanks between them.
+fn split(text: &str) -> Vec<f64> {
+    let words = text.split(' ');
+    words.map(|number| number.parse().unwrap()).collect()
+}
+
 /// The tool at a joint position by the exported JSON: product of exponentials written out here.
 fn by_json(model: &Value, q: &[f64]) -> [f64; 3] {
     let three = |value: &Value| -> [f64; 3] { [0, 1, 2].map(|k| value[k].as_f64().unwrap()) };
@@ -59,15 +75,8 @@ fn tables_and_urdf_are_the_arm_that_was_identified() {
         read_calib(label(&exported("mdh")), None).unwrap(),
     ];
     for robot in robots.map(|imported| RobotModel::new(imported.robot)) {
-        for k in 0..50 {
-            let q: Vec<f64> = (0..6)
-                .map(|j| (1.3 * k as f64 + 0.7 * j as f64).sin())
-                .collect();
-            let (found, wanted) = (robot.forward(&q).translation, by_json(&model, &q));
-            let apart = (0..3)
-                .map(|k| (found[k] - wanted[k]).powi(2))
-                .sum::<f64>()
-                .sqrt();
+        for q in postures(50) {
+            let apart = distance(robot.forward(&q).translation.into(), by_json(&model, &q));
             assert!(apart < 1e-9, "{apart} m");
         }
     }
@@ -79,16 +88,9 @@ fn an_sdf_is_the_arm_that_was_identified_and_states_no_limit_that_is_not_known()
     let text = exported("sdf");
     let document = roxmltree::Document::parse(&text).unwrap();
     let child = |node: roxmltree::Node<'_, '_>, name: &str| -> Vec<f64> {
-        let found = node
-            .descendants()
-            .find(|child| child.has_tag_name(name))
-            .unwrap_or_else(|| panic!("no {name}"));
-        found
-            .text()
-            .unwrap()
-            .split(' ')
-            .map(|number| number.parse().unwrap())
-            .collect()
+        let mut inner = node.descendants();
+        let found = inner.find(|child| child.has_tag_name(name));
+        split(found.unwrap_or_else(|| panic!("no {name}")).text().unwrap())
     };
     let moving = |node: &roxmltree::Node| {
         node.has_tag_name("joint") && node.attribute("type") != Some("fixed")
@@ -134,7 +136,19 @@ fn a_file_says_whose_it_is_and_whether_it_was_edited() {
         );
         (output.code, output.both())
     };
-    for format in ["urdf", "dh", "mdh", "json", "mjcf", "sdf", "controller"] {
+    // All formats, as the program lists them, and those that this arm cannot have.
+    let listed = calib(cell(), "export latest --format none").err;
+    let (_, listed) = listed.split_once("[possible values: ").unwrap();
+    let formats = listed.split_once(']').unwrap().0.split(", ");
+    let of_others = ["xacro", "ur_kinematics", "dynamics"];
+    assert_eq!(
+        formats
+            .clone()
+            .filter(|format| of_others.contains(format))
+            .count(),
+        3
+    );
+    for format in formats.filter(|format| !of_others.contains(format)) {
         let text = exported(format);
         let (code, printed) = held(format, &text);
         assert!(
@@ -209,11 +223,8 @@ fn a_drivers_kinematics_are_those_of_the_arm_near_the_frames_of_its_meshes() {
     let model: Value = serde_json::from_str(&export("json")).unwrap();
     let text = export("ur_kinematics");
     let tool = text.split_once("in tool0 it stands at ").unwrap().1;
-    let tool: Vec<f64> = tool
-        .split(' ')
-        .take(3)
-        .map(|number| number.parse().unwrap())
-        .collect();
+    let tool = tool.split(' ').take(3).collect::<Vec<_>>().join(" ");
+    let tool = split(&tool);
     let value = |line: &str| {
         line.trim()
             .split_once(": ")
@@ -238,10 +249,7 @@ fn a_drivers_kinematics_are_those_of_the_arm_near_the_frames_of_its_meshes() {
     for (number, shipped) in numbers.iter().zip(shipped.as_flattened()) {
         assert!((number - shipped).abs() < 3e-3, "{number} {shipped}");
     }
-    for k in 0..50 {
-        let q: Vec<f64> = (0..6)
-            .map(|j| (1.3 * k as f64 + 0.7 * j as f64).sin())
-            .collect();
+    for q in postures(50) {
         let mut point: [f64; 3] = [tool[0], tool[1], tool[2]];
         for (origin, angle) in numbers.chunks(6).zip(&q).rev() {
             let turned_by = |axis, angle| about(axis, angle);
@@ -290,11 +298,7 @@ fn numbers<const N: usize>(element: roxmltree::Node, name: &str) -> [f64; N] {
     let text = element
         .attribute(name)
         .unwrap_or_else(|| panic!("no {name}"));
-    let all: Vec<f64> = text
-        .split(' ')
-        .map(|number| number.parse().unwrap())
-        .collect();
-    all.try_into().unwrap()
+    split(text).try_into().unwrap()
 }
 
 /// Place and orientation of the site `tool0`, from body to body as MuJoCo's documentation has them.
@@ -378,11 +382,7 @@ fn a_mujoco_model_is_the_arm_that_was_identified_with_its_limits_and_known_masse
         let q: Vec<f64> = (0..6)
             .map(|j| 2.0 * (1.7 * k as f64 + 0.9 * j as f64).sin())
             .collect();
-        let (found, wanted) = (by_mjcf(&text, &q).0, by_json(&model, &q));
-        let apart = (0..3)
-            .map(|k| (found[k] - wanted[k]).powi(2))
-            .sum::<f64>()
-            .sqrt();
+        let apart = distance(by_mjcf(&text, &q).0, by_json(&model, &q));
         assert!(apart < 1e-9, "{apart} m");
     }
     let at_zero = by_mjcf(&text, &[0.0; 6]).1;

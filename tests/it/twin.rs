@@ -11,7 +11,7 @@ use calib::twin::arm::{Arm, Motion, Row};
 use calib::twin::effect::{
     Backlash, BaseCompliance, GearCyclic, JointCompliance, LinkCompliance, Physical,
 };
-use calib::twin::equilibrium::{Equilibrium, settle};
+use calib::twin::recorder::{Equilibrium, settle};
 use calib::twin::tracker::{Beam, Scatter, Tracker};
 use calib::twin::truth::{CouplingError, LinkError, TrueRobot};
 use std::f64::consts::{FRAC_PI_2, PI};

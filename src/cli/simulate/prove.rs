@@ -55,17 +55,13 @@ impl ProveArguments {
         };
         let pipeline = self.pipeline.clone().unwrap_or_else(|| usual.into());
         if !pipeline.is_file() {
-            return Err(Error::spec(
-                "--pipeline",
-                format!("no such file: {}", pipeline.display()),
-            ));
+            let message = format!("no such file: {}", pipeline.display());
+            return Err(Error::spec("--pipeline", message));
         }
         if folder.join(SEAL).is_file() {
             if !Seal::read(folder)?.is_of(&design) {
-                return Err(Error::spec(
-                    folder.display().to_string(),
-                    "holds a set made with other options; name a new folder, or give the same options",
-                ));
+                let message = "holds a set made with other options; name a new folder, or give the same options";
+                return Err(Error::spec(folder.display().to_string(), message));
             }
         } else {
             proof::vacant(folder)?;
@@ -152,39 +148,30 @@ impl BlindDiagnosis<'_> {
             std::path::absolute(self.folder.join(RECORDINGS).join(name)).map_err(fault)?;
         let tables = verdicts.join(name).with_extension("store");
         let mut command = Command::new(self.program);
-        command
-            .arg("diagnose")
-            .arg(self.pipeline)
-            .arg("--set")
-            .arg(format!("case={}", recording.display()));
+        command.arg("diagnose").arg(self.pipeline);
+        command.args(["--set", &format!("case={}", recording.display())]);
         if let Some(cause) = without {
-            command
-                .arg("--set")
-                .arg(format!("diagnose.without=[{cause}]"));
+            command.args(["--set", &format!("diagnose.without=[{cause}]")]);
         }
-        command
-            .args(["--json", "--quiet", "--jobs", "1", "--store"])
-            .arg(&tables)
-            .stdin(Stdio::null());
+        command.args(["--json", "--quiet", "--jobs", "1", "--store"]);
+        command.arg(&tables).stdin(Stdio::null());
         let done = command.output().map_err(fault)?;
         let _ = std::fs::remove_dir_all(&tables);
         if !done.status.success() {
             let why = String::from_utf8_lossy(&done.stderr);
-            return Ok(format!(
-                "no verdict: {}",
-                why.lines().next().unwrap_or("the process failed")
-            ));
+            let why = why.lines().next().unwrap_or("the process failed");
+            return Ok(format!("no verdict: {why}"));
         }
         // Renamed when whole: an interruption leaves no half verdict.
         let part = verdict.with_extension("part");
-        std::fs::write(&part, &done.stdout)
-            .and_then(|()| std::fs::rename(&part, &verdict))
-            .map_err(fault)?;
+        let written = std::fs::write(&part, &done.stdout);
+        let renamed = written.and_then(|()| std::fs::rename(&part, &verdict));
+        renamed.map_err(fault)?;
         let answer: Option<serde_json::Value> = serde_json::from_slice(&done.stdout).ok();
-        let message = answer
+        let stated = answer
             .as_ref()
-            .and_then(|answer| answer.get("verdict")?.as_str())
-            .unwrap_or("a verdict that is no JSON");
+            .and_then(|answer| answer.get("verdict")?.as_str());
+        let message = stated.unwrap_or("a verdict that is no JSON");
         Ok(message.chars().filter(|c| !c.is_control()).collect())
     }
 }

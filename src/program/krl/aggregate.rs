@@ -1,11 +1,11 @@
 //! `{[TYPE:] NAME value, ...}`: the fields of a target, each known, named once, and one number.
 
-use super::super::token::{ProgramText, Token, TokenKind, arguments};
-use super::super::{Gathered, Literal, PostureStatement, TargetKind, quoted};
+use super::super::token::{Token, TokenKind, arguments, number, over, quoted};
+use super::super::{Gathered, Literal, PostureStatement, TargetKind};
 use std::ops::Range;
 
-const AXES: [&str; 6] = ["A1", "A2", "A3", "A4", "A5", "A6"];
-const FRAME: [&str; 6] = ["X", "Y", "Z", "A", "B", "C"];
+pub(super) const AXES: [&str; 6] = ["A1", "A2", "A3", "A4", "A5", "A6"];
+pub(super) const FRAME: [&str; 6] = ["X", "Y", "Z", "A", "B", "C"];
 const EXTERNALS: [&str; 6] = ["E1", "E2", "E3", "E4", "E5", "E6"];
 const STATUS: [&str; 2] = ["S", "T"];
 /// Bit of S.
@@ -52,54 +52,48 @@ impl Type {
         if self.axes { AXES } else { FRAME }
     }
 
-    fn others(self) -> impl Iterator<Item = &'static str> {
-        STATUS
-            .into_iter()
-            .filter(move |_| self.status)
-            .chain(EXTERNALS.into_iter().take(self.externals))
+    /// Names of its fields.
+    fn fields(self) -> Vec<&'static str> {
+        let status = if self.status { &STATUS[..] } else { &[] };
+        [&self.coordinates(), status, &EXTERNALS[..self.externals]].concat()
     }
 }
 
 /// The tokens of an aggregate, braces included.
-pub(super) struct Aggregate<'t> {
-    source: ProgramText<'t>,
-    tokens: &'t [Token],
-    prefix: Option<String>,
+pub(super) struct Aggregate<'t, 'p> {
+    tokens: &'t [Token<'p>],
+    /// The type before the colon, in capitals.
+    pub(super) prefix: Option<String>,
     /// Between the commas.
-    fields: Vec<&'t [Token]>,
+    fields: Vec<&'t [Token<'p>]>,
 }
 
-impl<'t> Aggregate<'t> {
-    pub(crate) fn new(source: ProgramText<'t>, tokens: &'t [Token]) -> Self {
+/// The name of a field, its number and where that stands.
+type Field = (String, f64, Range<usize>);
+
+impl<'t, 'p> Aggregate<'t, 'p> {
+    pub(crate) fn new(tokens: &'t [Token<'p>]) -> Self {
         let mut inner = &tokens[1..tokens.len() - 1];
         let mut prefix = None;
         if let [name, colon, tail @ ..] = inner
             && name.sort == TokenKind::Word
             && colon.is(b':')
         {
-            (prefix, inner) = (Some(source.upper(name)), tail);
+            (prefix, inner) = (Some(name.upper()), tail);
         }
         let fields = arguments(inner).collect();
         Self {
-            source,
             tokens,
             prefix,
             fields,
         }
     }
 
-    /// The type before the colon, in capitals.
-    pub(crate) fn prefix(&self) -> Option<String> {
-        self.prefix.clone()
-    }
-
     /// Names of the fields that have one, in capitals.
     fn names(&self) -> impl Iterator<Item = String> {
-        self.fields
-            .iter()
-            .filter_map(|field| field.first())
-            .filter(|token| token.sort == TokenKind::Word)
-            .map(|token| self.source.upper(token))
+        let firsts = self.fields.iter().filter_map(|field| field.first());
+        let words = firsts.filter(|token| token.sort == TokenKind::Word);
+        words.map(Token::upper)
     }
 
     fn has_axes(&self) -> bool {
@@ -126,23 +120,16 @@ impl<'t> Aggregate<'t> {
     /// Whether its fields are those of a target.
     pub(crate) fn may_be_target(&self) -> bool {
         let names: Vec<String> = self.names().collect();
-        let is_of =
-            |sets: &[&[&str]], name: &String| sets.iter().any(|set| set.contains(&name.as_str()));
+        let is_of = |sets: &[&[&str]], name: &String| sets.concat().contains(&name.as_str());
+        let all = |sets: &[&[&str]]| names.iter().all(|name| is_of(sets, name));
         names.iter().any(|name| is_of(&[&AXES, &FRAME[..3]], name))
-            || (!names.is_empty()
-                && names
-                    .iter()
-                    .all(|name| is_of(&[&FRAME, &STATUS, &EXTERNALS], name)))
+            || !names.is_empty() && all(&[&FRAME, &STATUS, &EXTERNALS])
     }
 
     /// The number of a field, in capitals, where it is one.
     pub fn number(&self, name: &str) -> Option<f64> {
-        let field = self.fields.iter().find(|field| {
-            field
-                .first()
-                .is_some_and(|first| self.source.is_word(first, &[name]))
-        })?;
-        self.source.number(&field[1..]).map(|(number, _)| number)
+        let is = |field: &&&[Token]| field.first().is_some_and(|first| first.is_word(&[name]));
+        number(&self.fields.iter().find(is)?[1..]).map(|(number, _)| number)
     }
 
     /// How its type is stated.
@@ -154,26 +141,20 @@ impl<'t> Aggregate<'t> {
         }
     }
 
-    /// The bytes of a field's value.
-    fn value(&self, field: &[Token]) -> Range<usize> {
-        self.source.over(&field[1..], field[0].span.end)
-    }
-
     /// Takes it as a target of type `kind`, or says everything that is wrong with it.
     pub(crate) fn take(&self, kind: Type, found: &mut Gathered) {
-        let open = self.tokens[0].span.start;
         let before = found.faults.len();
-        let mut numbers: Vec<(String, f64, Range<usize>)> = Vec::new();
-        let mut at = self.tokens[0].span.end;
+        let mut numbers: Vec<Field> = Vec::new();
+        let mut at = self.tokens[0].end;
         for field in &self.fields {
             let Some(first) = field.first() else {
                 found.fault(at, "a field is empty");
                 continue;
             };
-            at = field.last().map_or(at, |token| token.span.end);
-            if let Some(number) = self.field(kind, field, first, found) {
+            at = field.last().map_or(at, |token| token.end);
+            if let Some(number) = read(kind, field, found) {
                 if numbers.iter().any(|(name, ..)| *name == number.0) {
-                    found.fault(first.span.start, format!("{} is given twice", number.0));
+                    found.fault(first.start, format!("{} is given twice", number.0));
                 }
                 numbers.push(number);
             }
@@ -181,15 +162,17 @@ impl<'t> Aggregate<'t> {
         if found.faults.len() > before {
             return;
         }
-        let given = |name: &str| numbers.iter().find(|(given, ..)| given == name);
-        for (name, value, span) in numbers
-            .iter()
-            .filter(|(name, value, _)| EXTERNALS.contains(&name.as_str()) && *value != 0.0)
-        {
-            let message = format!(
-                "{name} is {value}: calib assumed that external axes stand at 0 and do not move the robot"
-            );
-            found.warn(span.start, message);
+        let given = |name: &str| {
+            let of_name = numbers.iter().find(|(given, ..)| given == name);
+            of_name.map(|(_, value, span)| (*value, span.clone()))
+        };
+        for (name, value, span) in &numbers {
+            if EXTERNALS.contains(&name.as_str()) && *value != 0.0 {
+                let message = format!(
+                    "{name} is {value}: calib assumed that external axes stand at 0 and do not move the robot"
+                );
+                found.warn(span.start, message);
+            }
         }
         let names = kind.coordinates();
         let missing: Vec<&str> = names
@@ -197,121 +180,77 @@ impl<'t> Aggregate<'t> {
             .filter(|name| given(name).is_none())
             .collect();
         if !missing.is_empty() {
-            found.partial(
-                open,
-                format!(
-                    "the target has no {}; a target is corrected whole or not at all",
-                    missing.join(", ")
-                ),
-            );
-            return;
+            let missing = missing.join(", ");
+            let message =
+                format!("the target has no {missing}; a target is corrected whole or not at all");
+            return found.partial(self.tokens[0].start, message);
         }
-        let (values, spans) = names
-            .into_iter()
-            .filter_map(given)
-            .map(|(_, value, span)| (*value, span.clone()))
-            .unzip();
-        let external = EXTERNALS
-            .into_iter()
-            .map(|name| given(name).map(|(_, value, _)| *value))
-            .collect();
+        let numbers = names.into_iter().filter_map(given).unzip();
+        let external = EXTERNALS.map(|name| given(name).map(|(value, _)| value));
+        let [status, turn] = STATUS.map(given);
+        let bits = |stated: &Option<(f64, Range<usize>)>| stated.as_ref().map(|(x, _)| *x as u32);
+        let posture = match [bits(&status), bits(&turn)] {
+            [None, None] => PostureStatement::Unstated,
+            [status, turn] => PostureStatement::StatusTurn { status, turn },
+        };
+        if let Some((value, span)) = &status
+            && *value as u32 & ACCURATE != 0
+        {
+            let message = "S says that the point was taught at an absolutely accurate robot: calib assumed that the controller's own model of the robot's errors is off";
+            found.warn(span.start, message);
+        }
+        let spans = [status, turn].into_iter().flatten();
+        let posture = (posture, spans.map(|(_, span)| span).collect());
         let kind = if kind.axes {
             TargetKind::Joints
         } else {
             TargetKind::Frame
         };
-        let [status, turn] =
-            STATUS.map(|name| given(name).map(|(_, value, span)| (*value as u32, span)));
-        if let Some((_, span)) = status.filter(|(status, _)| status & ACCURATE != 0) {
-            let message = "S says that the point was taught at an absolutely accurate robot: calib assumed that the controller's own model of the robot's errors is off";
-            found.warn(span.start, message);
-        }
-        let posture_spans: Vec<Range<usize>> = [&status, &turn]
-            .into_iter()
-            .flatten()
-            .map(|(_, span)| (*span).clone())
-            .collect();
-        let posture = match [status, turn].map(|stated| stated.map(|(bits, _)| bits)) {
-            [None, None] => PostureStatement::Unstated,
-            [status, turn] => PostureStatement::StatusTurn { status, turn },
-        };
-        found.literals.push(Literal::read(
-            kind,
-            (values, spans),
-            external,
-            (posture, posture_spans),
-        ));
-    }
-
-    /// Name and number of a field; status and turn may be bit patterns.
-    fn field(
-        &self,
-        kind: Type,
-        field: &[Token],
-        first: &Token,
-        found: &mut Gathered,
-    ) -> Option<(String, f64, Range<usize>)> {
-        let bytes = self.source.bytes;
-        if first.sort != TokenKind::Word {
-            found.fault(
-                first.span.start,
-                format!("{} has no name", quoted(bytes, self.source.over(field, 0))),
-            );
-            return None;
-        }
-        let name = self.source.upper(first);
-        if !kind
-            .coordinates()
-            .into_iter()
-            .chain(kind.others())
-            .any(|known| known == name)
-        {
-            let allowed: Vec<&str> = kind
-                .coordinates()
-                .into_iter()
-                .chain(kind.others())
-                .collect();
-            let given = quoted(bytes, first.span.clone());
-            found.fault(
-                first.span.start,
-                format!("unknown field {given} (allowed: {})", allowed.join(", ")),
-            );
-            return None;
-        }
-        let value = &field[1..];
-        let bits = STATUS.contains(&name.as_str());
-        let number = self
-            .source
-            .number(value)
-            .or_else(|| if bits { pattern(bytes, value) } else { None });
-        if let Some((number, span)) =
-            number.filter(|(number, _)| !bits || (number.fract() == 0.0 && *number >= 0.0))
-        {
-            return Some((name, number, span));
-        }
-        let span = self.value(field);
-        let message = if value.is_empty() {
-            format!("{name} has no number")
-        } else {
-            let expected = if bits {
-                "a whole number or a bit pattern"
-            } else {
-                "a number"
-            };
-            format!(
-                "{name} is {}, expected {expected}",
-                quoted(bytes, span.clone())
-            )
-        };
-        found.fault(span.start, message);
-        None
+        let literal = Literal::read(kind, numbers, external.to_vec(), posture);
+        found.literals.push(literal);
     }
 }
 
+/// A field of a target; status and turn may be bit patterns.
+fn read(kind: Type, field: &[Token], found: &mut Gathered) -> Option<Field> {
+    let (first, value) = field.split_first()?;
+    if first.sort != TokenKind::Word {
+        found.fault(first.start, format!("{} has no name", quoted(field)));
+        return None;
+    }
+    let (name, known) = (first.upper(), kind.fields());
+    if !known.contains(&name.as_str()) {
+        let (given, allowed) = (first.quoted(), known.join(", "));
+        let message = format!("unknown field {given} (allowed: {allowed})");
+        found.fault(first.start, message);
+        return None;
+    }
+    let bits = STATUS.contains(&name.as_str());
+    let pattern = || if bits { pattern(value) } else { None };
+    let fits = |number: f64| !bits || (number.fract() == 0.0 && number >= 0.0);
+    if let Some((number, span)) = number(value).or_else(pattern)
+        && fits(number)
+    {
+        return Some((name, number, span));
+    }
+    let message = if value.is_empty() {
+        format!("{name} has no number")
+    } else {
+        let expected = if bits {
+            "a whole number or a bit pattern"
+        } else {
+            "a number"
+        };
+        format!("{name} is {}, expected {expected}", quoted(value))
+    };
+    found.fault(over(value, first.end).start, message);
+    None
+}
+
 /// `'B101010'`, `'H2A'`: the number that it is.
-fn pattern(bytes: &[u8], value: &[Token]) -> Option<(f64, Range<usize>)> {
+fn pattern(value: &[Token]) -> Option<(f64, Range<usize>)> {
     let [only] = value else { return None };
-    let text = std::str::from_utf8(&bytes[only.span.clone()]).ok()?;
+    let text = std::str::from_utf8(only.text()).ok()?;
     let inner = text.strip_prefix('\'')?.strip_suffix('\'')?;
     let (base, digits) = inner.split_at_checked(1)?;
     let radix = match base {
@@ -319,7 +258,6 @@ fn pattern(bytes: &[u8], value: &[Token]) -> Option<(f64, Range<usize>)> {
         "H" | "h" => 16,
         _ => return None,
     };
-    u32::from_str_radix(digits, radix)
-        .ok()
-        .map(|number| (f64::from(number), only.span.clone()))
+    let number = u32::from_str_radix(digits, radix).ok()?;
+    Some((f64::from(number), only.span()))
 }

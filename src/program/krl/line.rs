@@ -3,20 +3,22 @@
 //! Lines of KRL as steps of the order of execution.
 
 use super::super::flow::{FlowLine, FlowStep};
-use super::super::token::{ProgramText, Token, TokenKind};
+use super::super::token::{Token, TokenKind};
 
 /// Types that need no DECL.
 const PREDEFINED: [&str; 11] = [
     "INT", "REAL", "BOOL", "CHAR", "FRAME", "POS", "E3POS", "E6POS", "AXIS", "E3AXIS", "E6AXIS",
 ];
 
+/// How many of these words a line begins with, and what follows them.
+fn behind<'t, 'p>(line: &'t [Token<'p>], words: &[&str]) -> (usize, &'t [Token<'p>]) {
+    let count = line.iter().take_while(|token| token.is_word(words)).count();
+    (count, &line[count..])
+}
+
 /// The type and the names that a line declares, in capitals.
-pub(super) fn declared(source: ProgramText, line: &[Token]) -> Option<(String, Vec<String>)> {
-    let skipped = line
-        .iter()
-        .take_while(|token| source.is_word(token, &["DECL", "GLOBAL", "CONST"]))
-        .count();
-    let tail = &line[skipped..];
+pub(super) fn declared(line: &[Token]) -> Option<(String, Vec<String>)> {
+    let (skipped, tail) = behind(line, &["DECL", "GLOBAL", "CONST"]);
     let [kind, first, ..] = tail else { return None };
     let plain = tail
         .get(2)
@@ -24,40 +26,35 @@ pub(super) fn declared(source: ProgramText, line: &[Token]) -> Option<(String, V
     if kind.sort != TokenKind::Word || first.sort != TokenKind::Word || !plain {
         return None;
     }
-    let kind = source.upper(kind);
+    let kind = kind.upper();
     if skipped == 0 && !PREDEFINED.contains(&kind.as_str()) {
         return None;
     }
-    let mut names = vec![source.upper(first)];
+    let mut names = vec![first.upper()];
     let mut depth = 0;
     for pair in tail.windows(2) {
         depth += pair[0].opens();
         if depth == 0 && pair[0].is(b',') && pair[1].sort == TokenKind::Word {
-            names.push(source.upper(&pair[1]));
+            names.push(pair[1].upper());
         }
     }
     Some((kind, names))
 }
 
 /// The type that a line declares as a structure: `[GLOBAL] STRUC NAME ...`.
-pub(super) fn structure(source: ProgramText, line: &[Token]) -> Option<String> {
-    let skipped = line
-        .iter()
-        .take_while(|token| source.is_word(token, &["GLOBAL"]))
-        .count();
-    match &line[skipped..] {
-        [word, name, ..] if source.is_word(word, &["STRUC"]) && name.sort == TokenKind::Word => {
-            Some(source.upper(name))
+pub(super) fn structure(line: &[Token]) -> Option<String> {
+    match behind(line, &["GLOBAL"]).1 {
+        [word, name, ..] if word.is_word(&["STRUC"]) && name.sort == TokenKind::Word => {
+            Some(name.upper())
         }
         _ => None,
     }
 }
 
 /// Behind a name: the last member of `[1].FRAME.X`, and what follows `=`; the second is none where nothing is set.
-pub(super) fn member<'t>(
-    source: ProgramText,
-    tail: &'t [Token],
-) -> Option<(Option<String>, Option<&'t [Token]>)> {
+pub(super) fn member<'t, 'p>(
+    tail: &'t [Token<'p>],
+) -> Option<(Option<String>, Option<&'t [Token<'p>]>)> {
     let mut member = None;
     let mut k = 0;
     loop {
@@ -66,7 +63,7 @@ pub(super) fn member<'t>(
                 k += tail[k..].iter().position(|token| token.is(b']'))? + 1
             }
             Some(TokenKind::Sign(b'.')) => {
-                member = Some(source.upper(tail.get(k + 1)?));
+                member = Some(tail.get(k + 1)?.upper());
                 k += 2;
             }
             Some(TokenKind::Sign(b'=')) => return Some((member, Some(&tail[k + 1..]))),
@@ -76,7 +73,7 @@ pub(super) fn member<'t>(
 }
 
 /// The variable that is set where `before` ends in `NAME[1].MEMBER =`: its name, and whether a member of it.
-pub(super) fn variable(source: ProgramText, before: &[Token]) -> Option<(String, Option<String>)> {
+pub(super) fn variable(before: &[Token]) -> Option<(String, Option<String>)> {
     let (last, mut tail) = before.split_last()?;
     if !last.is(b'=') {
         return None;
@@ -89,10 +86,10 @@ pub(super) fn variable(source: ProgramText, before: &[Token]) -> Option<(String,
             tail = &front[..open];
         } else if last.sort == TokenKind::Word {
             if front.last().is_some_and(|token| token.is(b'.')) {
-                subject = subject.or_else(|| Some(source.upper(last)));
+                subject = subject.or_else(|| Some(last.upper()));
                 tail = &front[..front.len() - 1];
             } else {
-                return Some((source.upper(last), subject));
+                return Some((last.upper(), subject));
             }
         } else {
             return None;
@@ -100,79 +97,59 @@ pub(super) fn variable(source: ProgramText, before: &[Token]) -> Option<(String,
     }
 }
 
+/// Names before a bracket, in capitals: what a line calls, if it calls anything.
+pub(super) fn called(line: &[Token]) -> impl Iterator<Item = String> {
+    let calls = |w: &&[Token]| w[0].sort == TokenKind::Word && w[1].is(b'(');
+    line.windows(2).filter(calls).map(|w| w[0].upper())
+}
+
 /// Heads of lines behind whose `DEF` a routine begins.
 const ROUTINES: [&str; 2] = ["DEF", "DEFFCT"];
 
+/// What such lines name runs at another time.
+const DECLARING: [&str; 7] = [
+    "EXT",
+    "EXTFCT",
+    "EXTP",
+    "EXTFCTP",
+    "INTERRUPT",
+    "GLOBAL",
+    "TRIGGER",
+];
+
+/// The routines of a file, in capitals.
+pub(super) fn routines(lines: &[&[Token]]) -> Vec<String> {
+    let name = |line: &&[Token]| match step(line) {
+        FlowStep::Routine(name) => Some(name),
+        _ => None,
+    };
+    lines.iter().filter_map(name).collect()
+}
+
 /// The lines of a file as steps; `sets`: whether a line sets what is in force.
-pub(super) fn steps(
-    source: ProgramText,
-    lines: &[&[Token]],
-    sets: impl Fn(&[Token]) -> bool,
-) -> Vec<FlowLine> {
-    let all: Vec<FlowStep> = lines.iter().map(|line| step(source, line)).collect();
-    let routines: Vec<&String> = all
-        .iter()
-        .filter_map(|step| {
-            if let FlowStep::Routine(name) = step {
-                Some(name)
-            } else {
-                None
-            }
-        })
-        .collect();
-    let called = |line: &[Token], step: &FlowStep| -> Vec<String> {
-        let calls = line
-            .windows(2)
-            .filter(|w| w[0].sort == TokenKind::Word && w[1].is(b'('));
-        let named = calls
-            .map(|w| source.upper(&w[0]))
-            .filter(|name| routines.contains(&name));
-        if matches!(step, FlowStep::Routine(_)) || is_declared(source, line) {
-            Vec::new()
-        } else {
-            named.collect()
+pub(super) fn steps(lines: &[&[Token]], sets: impl Fn(&[Token]) -> bool) -> Vec<FlowLine> {
+    let routines = routines(lines);
+    let of_line = |line: &&[Token]| {
+        let step = step(line);
+        let none = matches!(step, FlowStep::Routine(_)) || line[0].is_word(&DECLARING);
+        let calls = called(line).filter(|name| !none && routines.contains(name));
+        FlowLine {
+            calls: calls.collect(),
+            sets: sets(line),
+            step,
         }
     };
-    let of_line = |(line, step): (&&[Token], FlowStep)| FlowLine {
-        calls: called(line, &step),
-        sets: sets(line),
-        step,
-    };
-    lines.iter().zip(all.clone()).map(of_line).collect()
+    lines.iter().map(of_line).collect()
 }
 
-/// `EXT`, `INTERRUPT DECL` and `TRIGGER`: what they name runs at another time.
-fn is_declared(source: ProgramText, line: &[Token]) -> bool {
-    source.is_word(
-        &line[0],
-        &[
-            "EXT",
-            "EXTFCT",
-            "EXTP",
-            "EXTFCTP",
-            "INTERRUPT",
-            "GLOBAL",
-            "TRIGGER",
-        ],
-    )
-}
-
-pub(super) fn step(source: ProgramText, line: &[Token]) -> FlowStep {
-    let word = source.upper(&line[0]);
-    let second = line
-        .get(1)
-        .map(|token| source.upper(token))
-        .unwrap_or_default();
-    if let Some(at) = line
-        .iter()
-        .take(3)
-        .position(|token| source.is_word(token, &ROUTINES))
-    {
+pub(super) fn step(line: &[Token]) -> FlowStep {
+    let word = line[0].upper();
+    let second = line.get(1).map(Token::upper).unwrap_or_default();
+    let mut heads = line.iter().take(3);
+    if let Some(at) = heads.position(|token| token.is_word(&ROUTINES)) {
         // A function has its type before its name.
-        let name = line[at + 1..]
-            .windows(2)
-            .find(|w| w[1].is(b'('))
-            .map(|w| source.upper(&w[0]));
+        let mut pairs = line[at + 1..].windows(2);
+        let name = pairs.find(|w| w[1].is(b'(')).map(|w| w[0].upper());
         return FlowStep::Routine(name.unwrap_or(second));
     }
     if line.len() == 2 && line[0].sort == TokenKind::Word && line[1].is(b':') {

@@ -9,17 +9,32 @@
 
 mod aggregate;
 mod line;
-mod reached;
 mod system;
 
-use super::settle::{Reached, Words, settle};
-use super::token::{ProgramText, Token, TokenKind, brackets_match, closing, lines, tokens};
-use super::{Companion, Declared, Gathered, Language, quoted};
-use aggregate::{Aggregate, Type};
+use super::literal::{Reached, Words, settle};
+use super::token::{Token, brackets_match, closing, enclosed, lines, tokens};
+use super::{Companion, Gathered, Grammar, Language, others};
+use aggregate::{AXES, Aggregate, FRAME, Type};
 use line::{declared, member, structure, variable};
-use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
-use system::SystemData;
+use std::collections::BTreeSet;
+use system::{SystemData, reach};
+
+pub(super) const GRAMMAR: Grammar = Grammar {
+    endings: &["src", "dat", "sub"],
+    comment: ";",
+    heads: &["DEF", "DEFDAT", "DEFFCT", "GLOBAL"],
+    begins: &[
+        "DEFDAT",
+        "DEF ",
+        "E6AXIS",
+        "E3AXIS",
+        "DECL AXIS",
+        "E6POS",
+        "&ACCESS",
+    ],
+    read,
+    listed,
+};
 
 /// Motions, and how many positions each has.
 const MOTIONS: [(&str, usize); 7] = [
@@ -47,10 +62,12 @@ const LEFT: [&str; 8] = [
 /// What may stand behind a position: how it is blended.
 const BLENDING: [&str; 5] = ["C_PTP", "C_DIS", "C_ORI", "C_VEL", "C_SPL"];
 
+const NO_POSITION: &str = "an aggregate that is no position of this motion";
+
 const RELATIVE: &str = "the geometric operator `:` makes a relative pose of its operand; calib corrects absolute ones alone";
 
 /// Types of the system with fields that targets have as well.
-const KNOWN: [&str; 2] = ["FRAME", "INERTIA"];
+const KNOWN: [&str; 3] = ["FDAT", "FRAME", "INERTIA"];
 
 const WORDS: Words = Words {
     base: "$BASE",
@@ -61,143 +78,97 @@ const WORDS: Words = Words {
 /// Frames of the system that are kept in files.
 const FRAME_TABLES: [&str; 2] = ["BASE_DATA", "TOOL_DATA"];
 
-pub(super) fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
-    let mut found = Gathered::default();
-    let source = ProgramText {
-        bytes,
-        language: Language::Krl,
-    };
-    let all = tokens(source, &mut found);
+/// How many positions a line moves to, where it is a motion.
+fn motion(line: &[Token]) -> Option<usize> {
+    let head = |(name, _): &(&str, usize)| line[0].is_word(&[name]);
+    let (_, positions) = MOTIONS.into_iter().find(head)?;
+    // `PTP = 3` names a variable.
+    (!line.get(1).is_some_and(|next| next.is(b'='))).then_some(positions)
+}
+
+/// A motion without what stands behind its `WITH`.
+fn before_with<'t, 'p>(line: &'t [Token<'p>]) -> &'t [Token<'p>] {
+    let with = line.iter().position(|token| token.is_word(&["WITH"]));
+    &line[..with.unwrap_or(line.len())]
+}
+
+fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
+    let mut reader = Reader::default();
+    let all = tokens(bytes, Language::Krl, &mut reader.found);
     let lines = lines(&all);
-    let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for line in &lines {
-        if let Some((kind, names)) = declared(source, line) {
-            for name in names {
-                let known = types.entry(name).or_default();
-                if !known.contains(&kind) {
-                    known.push(kind.clone());
-                }
-            }
+        if let Some((kind, names)) = declared(line) {
+            let names = names.into_iter();
+            names.for_each(|name| reader.found.declare(name, kind.clone()));
         }
     }
-    let structures = lines
-        .iter()
-        .filter_map(|line| structure(source, line))
-        .collect();
-    let mut reader = Reader {
-        source,
-        types,
-        structures,
-        names: Vec::new(),
-        found,
-    };
-    for line in &lines {
-        reader.line(line);
-    }
-    let Reader {
-        names, mut found, ..
-    } = reader;
-    in_force(source, &lines, companions, &names, &mut found);
-    found
+    reader.structures = lines.iter().filter_map(|line| structure(line)).collect();
+    lines.iter().for_each(|line| reader.line(line));
+    in_force(bytes, &lines, companions, &mut reader.found);
+    reader.found
 }
 
 /// Gives targets their frames, tools and loads, by all files of the program.
-fn in_force(
-    source: ProgramText,
-    statements: &[&[Token]],
-    companions: &[Companion],
-    names: &[(Range<usize>, String)],
-    found: &mut Gathered,
-) {
-    // What is wrong with the writing of another file is no fault of this one.
-    let read =
-        |companion: &Companion| tokens(companion.text(Language::Krl), &mut Gathered::default());
-    let others: Vec<Vec<Token>> = companions.iter().map(read).collect();
+fn in_force(bytes: &[u8], statements: &[&[Token]], companions: &[Companion], found: &mut Gathered) {
+    let others = others(companions, Language::Krl);
+    let others: Vec<Vec<&[Token]>> = others.iter().map(|tokens| lines(tokens)).collect();
     let (mut data, mut reached) = (SystemData::default(), Reached::default());
-    let companions = || companions.iter().zip(&others);
-    let read: Vec<(ProgramText, Vec<&[Token]>)> = companions()
-        .map(|(companion, tokens)| (companion.text(Language::Krl), lines(tokens)))
-        .collect();
-    read.iter()
-        .for_each(|(source, lines)| data.declare(*source, lines));
-    data.declare_routines(&read);
-    data.declare(source, statements);
-    reached::reach(source, statements, &data, None, &mut reached);
-    for (companion, tokens) in companions() {
-        reached::reach(
-            companion.text(Language::Krl),
-            &lines(tokens),
-            &data,
-            Some(companion.place),
-            &mut reached,
-        );
+    others.iter().for_each(|lines| data.declare(lines));
+    data.declare_routines(&others);
+    data.declare(statements);
+    reach(bytes, statements, &data, None, &mut reached);
+    for (file, lines) in companions.iter().zip(&others) {
+        reach(file.text, lines, &data, Some(file.place), &mut reached);
     }
-    let uses = reached.uses(&found.literals, names);
-    settle(found, uses, &WORDS);
-    let mut called = BTreeSet::new();
-    if found
-        .literals
-        .iter()
-        .any(|literal| literal.frame.is_some() || literal.tool_in_force.is_some())
-    {
-        found.warnings.extend(
-            reached
-                .assumed
-                .into_iter()
-                .filter(|(_, message)| called.insert(message.clone())),
-        );
+    settle(found, &reached, &WORDS);
+    let mut literals = found.literals.iter();
+    if literals.any(|literal| literal.frame.is_some() || literal.tool_in_force.is_some()) {
+        let mut called = BTreeSet::new();
+        let assumed = reached.assumed.into_iter();
+        let once = assumed.filter(|(_, message)| called.insert(message.clone()));
+        found.warnings.extend(once);
     }
     found.tools = data.tools().collect();
 }
 
-struct Reader<'p> {
-    source: ProgramText<'p>,
-    /// Variable -> types it is declared with anywhere in the file.
-    types: BTreeMap<String, Vec<String>>,
+#[derive(Default)]
+struct Reader {
     /// Types that the file itself declares by STRUC, in capitals.
     structures: BTreeSet<String>,
-    /// Literals that a variable holds, by their numbers, and its name.
-    names: Vec<(Range<usize>, String)>,
     found: Gathered,
 }
 
-impl Reader<'_> {
+fn braces_match(line: &[Token], found: &mut Gathered) -> bool {
+    brackets_match(line, &[(b'{', b'}')], "on its line", found)
+}
+
+impl Reader {
     fn line(&mut self, line: &[Token]) {
-        if !self.braces_match(line) {
+        if !braces_match(line, &mut self.found) {
             return;
         }
-        let head = self.source.upper(&line[0]);
+        let head = line[0].upper();
         if LEFT.contains(&head.as_str()) {
             if head.ends_with("_REL") {
                 let message = format!(
                     "left as it is: {head} moves by a distance from where the target before, as corrected, has led"
                 );
-                self.found.warn(line[0].span.start, message);
+                self.found.warn(line[0].start, message);
             }
             return;
         }
-        if let Some((_, positions)) = MOTIONS.iter().find(|(name, _)| *name == head) {
-            // `PTP = 3` names a variable.
-            if !line.get(1).is_some_and(|next| next.is(b'=')) {
-                return self.motion(line, *positions);
-            }
+        match motion(line) {
+            Some(positions) => self.motion(line, positions),
+            None => self.other(line, &head),
         }
-        self.other(line, &head);
-    }
-
-    fn braces_match(&mut self, line: &[Token]) -> bool {
-        brackets_match(line, &[(b'{', b'}')], "on its line", &mut self.found)
     }
 
     fn motion(&mut self, line: &[Token], positions: usize) {
-        if let Some(colon) = self.geometric(line) {
+        if let Some(colon) = Self::geometric(line) {
             self.found.fault(colon, RELATIVE);
             return;
         }
-        let end = line
-            .iter()
-            .position(|token| self.source.is_word(token, &["WITH"]))
-            .unwrap_or(line.len());
+        let end = before_with(line).len();
         let (mut depth, mut operand, mut begins) = (0, 0, true);
         let mut k = 1;
         while k < end {
@@ -214,20 +185,11 @@ impl Reader<'_> {
             }
             let close = closing(line, k);
             let behind = line.get(close + 1).filter(|_| close + 1 < end);
-            let whole = begins && operand < positions;
-            if !whole || depth != 0 {
-                self.found.fault(
-                    token.span.start,
-                    "an aggregate that is no position of this motion",
-                );
-            } else if let Some(stray) =
-                behind.filter(|next| !(next.is(b',') || self.source.is_word(next, &BLENDING)))
-            {
-                let text = quoted(self.source.bytes, stray.span.clone());
-                self.found.fault(
-                    stray.span.start,
-                    format!("{text} behind a position is not understood"),
-                );
+            let follows = |next: &&Token| !(next.is(b',') || next.is_word(&BLENDING));
+            if !begins || operand >= positions || depth != 0 {
+                self.found.fault(token.start, NO_POSITION);
+            } else if let Some(stray) = behind.filter(follows) {
+                self.found.stray(stray, "behind a position");
             } else {
                 self.position(&line[k..=close]);
             }
@@ -238,69 +200,50 @@ impl Reader<'_> {
 
     /// An operand of a motion.
     fn position(&mut self, tokens: &[Token]) {
-        let aggregate = Aggregate::new(self.source, tokens);
-        let kind = match aggregate.prefix() {
-            None => aggregate.by_fields(),
-            Some(name) => match Type::of(&name).or((name == "FRAME").then_some(Type::FRAME)) {
-                Some(kind) => kind,
-                None => {
-                    let message = format!("type {name} is not understood as a position");
-                    self.found.fault(tokens[0].span.start, message);
-                    return;
-                }
-            },
+        let aggregate = Aggregate::new(tokens);
+        let frame = |name: &str| (name == "FRAME").then_some(Type::FRAME);
+        let kind = match aggregate.prefix.as_deref() {
+            None => Ok(aggregate.by_fields()),
+            Some(name) => Type::of(name).or_else(|| frame(name)).ok_or(name),
         };
-        aggregate.take(kind, &mut self.found);
+        match kind {
+            Ok(kind) => aggregate.take(kind, &mut self.found),
+            Err(name) => {
+                let message = format!("type {name} is not understood as a position");
+                self.found.fault(tokens[0].start, message);
+            }
+        }
     }
 
     /// What stands behind WITH sets variables of the system: `$BASE = {...}`, `$VEL = {...}`.
     fn settings(&mut self, tokens: &[Token]) {
-        let mut k = 0;
-        while k < tokens.len() {
-            if tokens[k].is(b'{') {
-                let close = closing(tokens, k);
-                let system = k > 1
-                    && tokens[k - 1].is(b'=')
-                    && self.source.upper(&tokens[k - 2]).starts_with('$');
-                if !system && Aggregate::new(self.source, &tokens[k..=close]).may_be_target() {
-                    self.found.fault(
-                        tokens[k].span.start,
-                        "an aggregate that is no position of this motion",
-                    );
-                }
-                k = close;
+        for (k, close) in enclosed(tokens, 0, b'{') {
+            let system = k > 1 && tokens[k - 1].is(b'=') && tokens[k - 2].text().starts_with(b"$");
+            if !system && Aggregate::new(&tokens[k..=close]).may_be_target() {
+                self.found.fault(tokens[k].start, NO_POSITION);
             }
-            k += 1;
         }
     }
 
     /// Where a geometric operator stands.
-    fn geometric(&self, line: &[Token]) -> Option<usize> {
-        let label = line.len() == 2;
-        let heading = line.iter().any(|token| {
-            self.source.is_word(
-                token,
-                &["DEF", "DEFFCT", "EXT", "EXTFCT", "EXTP", "EXTFCTP"],
-            )
-        });
+    fn geometric(line: &[Token]) -> Option<usize> {
+        let heads = ["DEF", "DEFFCT", "EXT", "EXTFCT", "EXTP", "EXTFCTP"];
+        if line.len() == 2 || line.iter().any(|token| token.is_word(&heads)) {
+            return None;
+        }
         let mut depth = 0;
-        line.iter()
-            .filter(|_| !label && !heading)
-            .find_map(|token| {
-                match token.sort {
-                    TokenKind::Sign(b'{') => depth += 1,
-                    TokenKind::Sign(b'}') => depth -= 1,
-                    _ => {}
-                }
-                (depth == 0 && token.is(b':')).then_some(token.span.start)
-            })
+        let operator = |token: &&Token| {
+            depth += i32::from(token.is(b'{')) - i32::from(token.is(b'}'));
+            depth == 0 && token.is(b':')
+        };
+        line.iter().find(operator).map(|token| token.start)
     }
 
     /// A declaration, an assignment, or what is neither.
     fn other(&mut self, line: &[Token], head: &str) {
-        let declares = declared(self.source, line).map(|(kind, _)| kind);
+        let declares = declared(line).map(|(kind, _)| kind);
         let has_aggregate = line.iter().any(|token| token.is(b'{'));
-        if let Some(at) = self.geometric(line) {
+        if let Some(at) = Self::geometric(line) {
             match has_aggregate {
                 _ if declares.as_deref() == Some("FRAME") || self.sets_frame(line) => {}
                 true => self.found.fault(at, RELATIVE),
@@ -314,58 +257,40 @@ impl Reader<'_> {
         if !has_aggregate {
             return self.component(line, head);
         }
-        let mut k = 0;
-        while k < line.len() {
-            if line[k].is(b'{') {
-                let close = closing(line, k);
-                let before = self.found.literals.len();
-                self.value(&line[..k], &line[k..=close], declares.as_deref());
-                let taken = self.found.literals.len() > before;
-                if let Some((name, _)) = variable(self.source, &line[..k]).filter(|_| taken) {
-                    self.names.push((before..self.found.literals.len(), name));
-                }
-                if let Some(stray) = line.get(close + 1).filter(|next| taken && !next.is(b',')) {
-                    let text = quoted(self.source.bytes, stray.span.clone());
-                    self.found.fault(
-                        stray.span.start,
-                        format!("{text} behind a target is not understood"),
-                    );
-                }
-                k = close;
+        for (k, close) in enclosed(line, 0, b'{') {
+            let before = self.found.literals.len();
+            self.value(&line[..k], &line[k..=close], declares.as_deref());
+            if self.found.literals.len() == before {
+                continue;
             }
-            k += 1;
+            if let Some((name, _)) = variable(&line[..k]) {
+                self.found.held_by(name, before);
+            }
+            if let Some(stray) = line.get(close + 1).filter(|next| !next.is(b',')) {
+                self.found.stray(stray, "behind a target");
+            }
         }
     }
 
     /// Whether a line sets a variable that is known to be no target.
     fn sets_frame(&self, line: &[Token]) -> bool {
-        let name = self.source.upper(&line[0]);
+        let name = line[0].upper();
         name.starts_with('$')
             || FRAME_TABLES.contains(&name.as_str())
-            || self.stated(&name) == Some("FRAME")
-    }
-
-    /// The one type that a variable has in this file.
-    fn stated(&self, name: &str) -> Option<&str> {
-        match self.types.get(name).map(Vec::as_slice) {
-            Some([one]) => Some(one),
-            _ => None,
-        }
+            || self.found.stated(&name) == Some("FRAME")
     }
 
     /// An aggregate behind `before`, in a line that declares a type or none.
     fn value(&mut self, before: &[Token], tokens: &[Token], declares: Option<&str>) {
-        let aggregate = Aggregate::new(self.source, tokens);
-        let at = tokens[0].span.start;
-        let (name, member) = variable(self.source, before).unwrap_or_default();
-        let prefix = aggregate.prefix();
+        let aggregate = Aggregate::new(tokens);
+        let at = tokens[0].start;
+        let (name, member) = variable(before).unwrap_or_default();
+        let prefix = aggregate.prefix.clone();
         if name.starts_with('$') {
             if aggregate.by_fields().is_of_axes() || prefix.as_deref().and_then(Type::of).is_some()
             {
-                self.found.warn(
-                    at,
-                    format!("left as it is: `{name}` is a variable of the system"),
-                );
+                let message = format!("left as it is: `{name}` is a variable of the system");
+                self.found.warn(at, message);
             }
             return;
         }
@@ -373,7 +298,7 @@ impl Reader<'_> {
             return;
         }
         let by_name = declares
-            .or_else(|| self.stated(&name))
+            .or_else(|| self.found.stated(&name))
             .filter(|_| member.is_none())
             .map(String::from);
         match prefix.or(by_name) {
@@ -387,13 +312,10 @@ impl Reader<'_> {
                 } else {
                     format!("`{name}`")
                 };
-                self.found.fault(
-                    at,
-                    format!(
-                        "the type of {what} is not stated in this file; write {}",
-                        aggregate.advice()
-                    ),
-                );
+                let advice = aggregate.advice();
+                let message =
+                    format!("the type of {what} is not stated in this file; write {advice}");
+                self.found.fault(at, message);
             }
             None => self.nested(tokens),
         }
@@ -401,144 +323,98 @@ impl Reader<'_> {
 
     /// An aggregate of a type that is none of targets: it is left where the type is known, or declared in this file.
     fn of_other_type(&mut self, kind: &str, tokens: &[Token]) {
-        let at = tokens[0].span.start;
-        if kind != "FDAT"
-            && !KNOWN.contains(&kind)
-            && Aggregate::new(self.source, tokens).may_be_target()
-        {
-            if self.structures.contains(kind) {
-                self.found.warn(
-                    at,
-                    format!(
-                        "left as it is: {kind} is a structure of this file and no type of targets"
-                    ),
-                );
-            } else {
+        let at = tokens[0].start;
+        if !KNOWN.contains(&kind) && Aggregate::new(tokens).may_be_target() {
+            if !self.structures.contains(kind) {
                 let message = format!(
                     "type {kind} is not understood: calib cannot say whether this is a target"
                 );
-                self.found.fault(at, message);
-                return;
+                return self.found.fault(at, message);
             }
+            let message =
+                format!("left as it is: {kind} is a structure of this file and no type of targets");
+            self.found.warn(at, message);
         }
         self.nested(tokens);
     }
 
     /// Aggregates inside one that is no target: a target by its prefix, a frame, or of a kind that is not told.
     fn nested(&mut self, tokens: &[Token]) {
-        let mut k = 1;
-        while k < tokens.len() {
-            if tokens[k].is(b'{') {
-                let close = closing(tokens, k);
-                let inner = &tokens[k..=close];
-                let aggregate = Aggregate::new(self.source, inner);
-                match aggregate.prefix().as_deref().map(Type::of) {
-                    Some(Some(kind)) => aggregate.take(kind, &mut self.found),
-                    Some(None) => {
-                        self.of_other_type(&aggregate.prefix().unwrap_or_default(), inner)
-                    }
-                    // The centre of mass and the inertia of a LOAD.
-                    None if self.source.is_word(&tokens[k - 1], &["CM", "J"]) => {}
-                    None if aggregate.is_frame() => {
-                        self.found.warn(
-                            inner[0].span.start,
-                            "left as it is: read as a FRAME inside a structure",
-                        );
-                    }
-                    None if aggregate.may_be_target() => {
-                        let message = format!(
-                            "the type of this aggregate is not stated; write {}",
-                            aggregate.advice()
-                        );
-                        self.found.fault(inner[0].span.start, message);
-                    }
-                    _ => self.nested(inner),
+        for (k, close) in enclosed(tokens, 1, b'{') {
+            let (inner, at) = (&tokens[k..=close], tokens[k].start);
+            let aggregate = Aggregate::new(inner);
+            match aggregate
+                .prefix
+                .as_deref()
+                .map(|name| (name, Type::of(name)))
+            {
+                Some((_, Some(kind))) => aggregate.take(kind, &mut self.found),
+                Some((name, None)) => self.of_other_type(name, inner),
+                // The centre of mass and the inertia of a LOAD.
+                None if tokens[k - 1].is_word(&["CM", "J"]) => {}
+                None if aggregate.is_frame() => {
+                    let message = "left as it is: read as a FRAME inside a structure";
+                    self.found.warn(at, message);
                 }
-                k = close;
+                None if aggregate.may_be_target() => {
+                    let advice = aggregate.advice();
+                    let message =
+                        format!("the type of this aggregate is not stated; write {advice}");
+                    self.found.fault(at, message);
+                }
+                None => self.nested(inner),
             }
-            k += 1;
         }
     }
 
     /// `XP1.Z = 50`: one number of a target.
     fn component(&mut self, line: &[Token], head: &str) {
-        let Some((Some(member), Some(_))) = member(self.source, &line[1..]) else {
+        let Some((Some(member), Some(_))) = member(&line[1..]) else {
             return;
         };
-        let of_target = [
-            "X", "Y", "Z", "A", "B", "C", "A1", "A2", "A3", "A4", "A5", "A6",
-        ]
-        .contains(&member.as_str());
+        let of_target = [AXES, FRAME].concat().contains(&member.as_str());
         if !of_target || head.starts_with('$') || self.sets_frame(line) {
             return;
         }
-        let at = line[0].span.start;
-        let types = self.types.get(head).map(Vec::as_slice).unwrap_or_default();
+        let at = line[0].start;
+        let types = self.found.types(head);
         if types.iter().any(|name| Type::of(name).is_some()) {
-            self.found
-                .partial(at, format!("sets {member} of the target `{head}` alone; a target is corrected whole or not at all"));
-        } else if types.is_empty() {
-            self.found.warn(
-                at,
-                format!(
-                    "left as it is: sets {member} of `{head}`, whose type this file does not state"
-                ),
+            let message = format!(
+                "sets {member} of the target `{head}` alone; a target is corrected whole or not at all"
             );
+            self.found.partial(at, message);
+        } else if types.is_empty() {
+            let message = format!(
+                "left as it is: sets {member} of `{head}`, whose type this file does not state"
+            );
+            self.found.warn(at, message);
         }
     }
 }
 
-pub(super) fn listed(bytes: &[u8]) -> Declared {
+fn listed(bytes: &[u8]) -> Gathered {
     let mut found = Gathered::default();
-    let source = ProgramText {
-        bytes,
-        language: Language::Krl,
-    };
-    let tokens = tokens(source, &mut found);
-    let mut reader = Reader {
-        source,
-        types: BTreeMap::new(),
-        structures: BTreeSet::new(),
-        names: Vec::new(),
-        found,
-    };
-    let (mut names, mut poses) = (Vec::new(), 0);
+    let tokens = tokens(bytes, Language::Krl, &mut found);
     for line in lines(&tokens) {
-        let declares = declared(source, line).map(|(kind, _)| kind);
-        if !line.iter().any(|token| token.is(b'{')) || !reader.braces_match(line) {
+        let declares = declared(line).map(|(kind, _)| kind);
+        if !line.iter().any(|token| token.is(b'{')) || !braces_match(line, &mut found) {
             continue;
         }
-        let mut k = 0;
-        while let Some(open) = line[k..]
-            .iter()
-            .position(|token| token.is(b'{'))
-            .map(|at| k + at)
-        {
-            let close = closing(line, open);
-            k = close + 1;
-            let aggregate = Aggregate::new(source, &line[open..k]);
-            let kind = aggregate.prefix().or_else(|| declares.clone());
-            let (Some(kind), Some((name, None))) = (
-                kind.as_deref().and_then(Type::of),
-                variable(source, &line[..open]),
-            ) else {
+        for (open, close) in enclosed(line, 0, b'{') {
+            let aggregate = Aggregate::new(&line[open..=close]);
+            let kind = aggregate.prefix.as_ref().or(declares.as_ref());
+            let kind = kind.and_then(|kind| Type::of(kind));
+            let (Some(kind), Some((name, None))) = (kind, variable(&line[..open])) else {
                 continue;
             };
             if !kind.is_of_axes() {
-                poses += 1;
+                found.poses += 1;
                 continue;
             }
-            let before = reader.found.literals.len();
-            aggregate.take(kind, &mut reader.found);
-            names.extend(std::iter::repeat_n(
-                name,
-                reader.found.literals.len() - before,
-            ));
+            let before = found.literals.len();
+            aggregate.take(kind, &mut found);
+            found.held_by(name, before);
         }
     }
-    Declared {
-        found: reader.found,
-        names,
-        poses,
-    }
+    found
 }

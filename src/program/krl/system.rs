@@ -3,15 +3,19 @@
 //! `$BASE`, `$TOOL`, `$LOAD` are set by aggregates, by entries of `BASE_DATA`, `TOOL_DATA`, `LOAD_DATA`, by frames that are declared with their
 //! numbers, by `BAS(#BASE, n)` and `BAS(#TOOL, n)` (which takes the load of the same number), and by the data of a point (`FDAT`) that an inline
 //! form names: `FDAT_ACT=FP1` with `BAS(#PTP_PARAMS, ..)`, or `WITH $BASE=SBASE(FP1.BASE_NO), $TOOL=STOOL2(FP1)` for one motion.
+//!
+//! What is in force where a file of KRL moves to its targets.
 
-use super::super::flow::{FlowStep, JoinedState};
-use super::super::literal::{InForce, Setting, ToolInForce};
-use super::super::token::{ProgramText, Token, TokenKind, arguments, closing};
+use super::super::flow::{Flow, FlowStep, JoinedState};
+use super::super::literal::{InForce, Reached, Setting, ToolInForce};
+use super::super::token::{Token, TokenKind, arguments, closing, number};
 use super::aggregate::Aggregate;
-use super::line::{declared, member, step};
+use super::line::{called, declared, member, routines, step, steps};
+use super::{before_with, motion};
 use crate::compensate::turns;
 use crate::spatial::Pose;
 use nalgebra::Vector3;
+use std::borrow::Borrow;
 use std::collections::BTreeMap;
 
 /// Calls of `BAS` that put the data of a point in force.
@@ -102,40 +106,21 @@ fn note<K: Ord, T: PartialEq + Copy>(known: &mut BTreeMap<K, Option<T>>, key: K,
 
 impl SystemData {
     /// Adds what the lines of a file declare.
-    pub(crate) fn declare(&mut self, source: ProgramText, lines: &[&[Token]]) {
+    pub(crate) fn declare(&mut self, lines: &[&[Token]]) {
         for line in lines {
-            if let Some((name, number, value)) = entry(source, line) {
+            if let Some((name, number, value)) = entry(line) {
                 match name.as_str() {
-                    "BASE_DATA" => note(
-                        &mut self.bases,
-                        number,
-                        value.and_then(|value| frame(source, value)),
-                    ),
-                    "TOOL_DATA" => note(
-                        &mut self.tools,
-                        number,
-                        value.and_then(|value| frame(source, value)),
-                    ),
-                    _ => note(
-                        &mut self.loads,
-                        number,
-                        value.and_then(|value| mass(source, value)),
-                    ),
+                    "BASE_DATA" => note(&mut self.bases, number, value.and_then(frame)),
+                    "TOOL_DATA" => note(&mut self.tools, number, value.and_then(frame)),
+                    _ => note(&mut self.loads, number, value.and_then(mass)),
                 }
-            } else if let Some((kind, names)) = declared(source, line)
+            } else if let Some((kind, names)) = declared(line)
                 && let Some(at) = line.iter().position(|token| token.is(b'='))
             {
+                let (name, value) = (names[0].clone(), &line[at + 1..]);
                 match kind.as_str() {
-                    "FDAT" => note(
-                        &mut self.points,
-                        names[0].clone(),
-                        point(source, &line[at + 1..]),
-                    ),
-                    "FRAME" => note(
-                        &mut self.frames,
-                        names[0].clone(),
-                        frame(source, &line[at + 1..]),
-                    ),
+                    "FDAT" => note(&mut self.points, name, point(value)),
+                    "FRAME" => note(&mut self.frames, name, frame(value)),
                     _ => {}
                 }
             }
@@ -143,23 +128,15 @@ impl SystemData {
         // Set a second time, in whole or in part.
         for line in lines
             .iter()
-            .filter(|line| line.len() > 2 && declared(source, line).is_none())
+            .filter(|line| line.len() > 2 && declared(line).is_none())
         {
-            let name = source.upper(&line[0]);
-            if let Some((subject, Some(value))) = member(source, &line[1..]) {
+            let name = line[0].upper();
+            if let Some((subject, Some(value))) = member(&line[1..]) {
                 let whole = subject.is_none();
                 if self.frames.contains_key(&name) {
-                    note(
-                        &mut self.frames,
-                        name,
-                        frame(source, value).filter(|_| whole),
-                    );
+                    note(&mut self.frames, name, frame(value).filter(|_| whole));
                 } else if self.points.contains_key(&name) {
-                    note(
-                        &mut self.points,
-                        name,
-                        point(source, value).filter(|_| whole),
-                    );
+                    note(&mut self.points, name, point(value).filter(|_| whole));
                 }
             }
         }
@@ -167,38 +144,33 @@ impl SystemData {
 
     /// Adds the routines of other files. What a routine calls may be declared behind it, or in a file behind its own: all are read until no
     /// further one is found to set anything.
-    pub(crate) fn declare_routines(&mut self, files: &[(ProgramText, Vec<&[Token]>)]) {
+    pub(crate) fn declare_routines(&mut self, files: &[Vec<&[Token]>]) {
         loop {
             let before = self.routines.clone();
             files
                 .iter()
-                .for_each(|(source, lines)| self.declare_routines_of(*source, lines));
+                .for_each(|lines| self.declare_routines_of(lines));
             if self.routines == before {
                 return;
             }
         }
     }
 
-    fn declare_routines_of(&mut self, source: ProgramText, lines: &[&[Token]]) {
+    fn declare_routines_of(&mut self, lines: &[&[Token]]) {
         let mut inside: Option<String> = None;
         for line in lines {
-            match step(source, line) {
-                FlowStep::Routine(name) => {
-                    self.routines.entry(name.clone()).or_insert(false);
-                    inside = Some(name);
-                }
-                _ if self.sets(source, line) => {
-                    inside.iter().for_each(|name| {
-                        self.routines.insert(name.clone(), true);
-                    });
-                }
-                _ => {}
+            if let FlowStep::Routine(name) = step(line) {
+                self.routines.entry(name.clone()).or_insert(false);
+                inside = Some(name);
+            } else if self.sets(line) {
+                let inside = inside.iter().cloned();
+                self.routines.extend(inside.map(|name| (name, true)));
             }
         }
     }
 
     /// Whether a line sets what is in force.
-    pub(crate) fn sets(&self, source: ProgramText, line: &[Token]) -> bool {
+    pub(crate) fn sets(&self, line: &[Token]) -> bool {
         const SET: [&str; 7] = [
             "$BASE",
             "$TOOL",
@@ -208,206 +180,176 @@ impl SystemData {
             "FDAT_ACT",
             "BAS",
         ];
-        source.is_word(&line[0], &SET) || self.called(source, line).is_some()
+        line[0].is_word(&SET) || self.called(line).is_some()
     }
 
     /// The routine of another file that a line calls, by itself or within an expression, where that one sets what is in force.
-    fn called(&self, source: ProgramText, line: &[Token]) -> Option<String> {
-        if source.is_word(&line[0], &DECLARING) {
-            return None;
-        }
-        let calls = line
-            .windows(2)
-            .filter(|w| w[0].sort == TokenKind::Word && w[1].is(b'('));
-        calls
-            .map(|w| source.upper(&w[0]))
-            .find(|name| self.routines.get(name) == Some(&true))
+    fn called(&self, line: &[Token]) -> Option<String> {
+        let mut calls = called(line).filter(|_| !line[0].is_word(&DECLARING));
+        calls.find(|name| self.routines.get(name) == Some(&true))
     }
 
     /// The routine that a line calls and that no file that was read has.
-    pub(crate) fn unknown_call(&self, source: ProgramText, line: &[Token]) -> Option<String> {
+    fn unknown_call(&self, line: &[Token]) -> Option<String> {
         let call = line.len() > 2 && line[0].sort == TokenKind::Word && line[1].is(b'(');
-        let known = source.is_word(&line[0], &["BAS"])
-            || self.routines.contains_key(&source.upper(&line[0]));
-        (call && !known).then(|| source.upper(&line[0]))
+        let name = Some(line[0].upper()).filter(|name| call && name != "BAS")?;
+        (!self.routines.contains_key(&name)).then_some(name)
     }
 
     /// Takes a state through a line; `place`: how people find it.
-    pub(crate) fn take(
-        &self,
-        source: ProgramText,
-        line: &[Token],
-        place: &str,
-        state: &mut SystemState,
-    ) {
-        if source.is_word(&line[0], &["BAS"]) {
-            self.call(source, line, place, state);
-        } else if let Some(name) = self.called(source, line) {
-            state.force = InForce::open(&format!(
-                "is set by {name}, a routine of another file ({place})"
-            ));
+    fn take(&self, line: &[Token], place: &str, state: &mut SystemState) {
+        if line[0].is_word(&["BAS"]) {
+            self.call(line, place, state);
+        } else if let Some(name) = self.called(line) {
+            let why = format!("is set by {name}, a routine of another file ({place})");
+            state.force = InForce::open(&why);
         } else {
-            self.set(source, line, place, state);
+            self.set(line, place, state);
         }
     }
 
     /// A motion with what stands behind its `WITH`.
-    pub(crate) fn at_motion(
-        &self,
-        source: ProgramText,
-        line: &[Token],
-        place: &str,
-        state: &SystemState,
-    ) -> InForce {
+    fn at_motion(&self, line: &[Token], place: &str, state: &SystemState) -> InForce {
         let mut state = state.clone();
-        let with = line
-            .iter()
-            .position(|token| source.is_word(token, &["WITH"]))
-            .map_or(line.len(), |at| at + 1);
-        let settings = arguments(&line[with..]);
-        for setting in settings.filter(|setting| !setting.is_empty()) {
-            self.set(source, setting, place, &mut state);
+        let settings = line.get(before_with(line).len() + 1..).unwrap_or_default();
+        for setting in arguments(settings).filter(|setting| !setting.is_empty()) {
+            self.set(setting, place, &mut state);
         }
         state.at_motion()
     }
 
     /// `$BASE = ...` and the like.
-    fn set(&self, source: ProgramText, line: &[Token], place: &str, state: &mut SystemState) {
-        let name = source.upper(&line[0]);
-        let Some((subject, Some(value))) = member(source, &line[1..]) else {
+    fn set(&self, line: &[Token], place: &str, state: &mut SystemState) {
+        let name = line[0].upper();
+        let Some((subject, Some(value))) = member(&line[1..]) else {
             return;
         };
         let by = format!("{name} of {place}");
         let open = |why: &str| format!("{why} ({name} of {place})");
+        let of_part = subject.is_some();
+        let unknown = || open(&unknown(value, of_part));
         match name.as_str() {
             "$BASE" => {
-                state.force.base = match self.base(source, value).filter(|_| subject.is_none()) {
-                    Some(pose) => Setting::Known(pose, by),
-                    None => Setting::Open(open(&self.unknown(source, value, subject.is_some()))),
-                }
+                let base = self.base(value).filter(|_| !of_part);
+                state.force.base = Setting::or_open(base, by, unknown);
             }
             "$TOOL" => {
-                state.force.tool = match self.tool(source, value).filter(|_| subject.is_none()) {
-                    Some(tool) => Setting::Known(tool, by),
-                    None => Setting::Open(open(&self.unknown(source, value, subject.is_some()))),
-                }
+                let tool = self.tool(value).filter(|_| !of_part);
+                state.force.tool = Setting::or_open(tool, by, unknown);
             }
             "$LOAD" => {
-                state.force.load = match self.load(source, value).filter(|_| subject.is_none()) {
-                    Some(mass) => Setting::Known(mass, by),
-                    None => Setting::Open(open("is set when the program runs")),
-                }
+                let mass = self.load(value).filter(|_| !of_part);
+                let unknown = || open("is set when the program runs");
+                state.force.load = Setting::or_open(mass, by, unknown);
             }
             "$IPO_MODE" => {
-                let carried = value
-                    .get(1)
-                    .is_some_and(|word| source.is_word(word, &["BASE"]));
-                let point =
-                    of_function(source, value, &["SIPO_MODE"]).and_then(|name| self.point(&name));
+                let carried = value.get(1).is_some_and(|word| word.is_word(&["BASE"]));
+                let point = self.point_in(value, &["SIPO_MODE"]);
                 let carried = carried || point.is_some_and(|point| !point.fixed_tool);
                 state.astray =
                     Setting::Known(if carried { String::new() } else { open(FIXED) }, by);
             }
             "$ROBROOT" => {
-                let zero = frame(source, value).is_some_and(|pose| pose == Pose::identity());
+                let zero = frame(value).is_some_and(|pose| pose == Pose::identity());
                 let why = open("is not known: the program moves the robot's base");
                 state.astray = Setting::Known(if zero { String::new() } else { why }, by);
             }
-            "FDAT_ACT" => {
-                state.point = value
-                    .first()
-                    .map(|name| source.upper(name))
-                    .filter(|_| subject.is_none())
-            }
+            "FDAT_ACT" => state.point = value.first().map(Token::upper).filter(|_| !of_part),
             _ => {}
         }
     }
 
     /// `BAS(#BASE, 3)`.
-    fn call(&self, source: ProgramText, line: &[Token], place: &str, state: &mut SystemState) {
+    fn call(&self, line: &[Token], place: &str, state: &mut SystemState) {
         let [_, open, sharp, what, tail @ ..] = line else {
             return;
         };
         if !open.is(b'(') || !sharp.is(b'#') {
             return;
         }
-        let what = source.upper(what);
         let number = tail
             .get(1..2)
-            .and_then(|number| source.number(number))
+            .and_then(number)
             .map(|(number, _)| number as i64);
-        if OF_A_POINT.contains(&what.as_str()) {
-            let point = state
-                .point
-                .as_ref()
-                .map(|name| (name.clone(), self.point(name)));
-            match point {
-                Some((name, Some(point))) => {
-                    self.apply(point, &format!("{name} at {place}"), state)
+        match what.upper().as_str() {
+            what if OF_A_POINT.contains(&what) => {
+                let Some(name) = state.point.clone() else {
+                    return;
+                };
+                match self.point(&name) {
+                    Some(point) => self.apply(point, &format!("{name} at {place}"), state),
+                    None => {
+                        let why = format!(
+                            "is that of {name}, which no file that was read declares ({place})"
+                        );
+                        state.force = InForce::open(&why);
+                    }
                 }
-                Some((name, None)) => {
-                    state.force = InForce::open(&format!(
-                        "is that of {name}, which no file that was read declares ({place})"
-                    ))
-                }
-                None => {}
             }
-        } else if what == "BASE" {
-            state.force.base = match number.and_then(|number| self.base_of(number)) {
-                Some(pose) => Setting::Known(pose, format!("BAS(#BASE) of {place}")),
-                None => Setting::Open(format!(
-                    "is an entry of BASE_DATA that no file that was read declares ({place})"
-                )),
-            };
-        } else if what == "TOOL" {
-            match number {
+            "BASE" => {
+                let base = number.and_then(|number| self.base_of(number));
+                let by = format!("BAS(#BASE) of {place}");
+                state.force.base = Setting::or_open(base, by, || {
+                    format!(
+                        "is an entry of BASE_DATA that no file that was read declares ({place})"
+                    )
+                });
+            }
+            "TOOL" => match number {
                 Some(number) => self.use_tool(number, &format!("BAS(#TOOL) of {place}"), state),
                 None => {
-                    state.force.tool =
-                        Setting::Open(format!("is chosen when the program runs ({place})"))
+                    let why = format!("is chosen when the program runs ({place})");
+                    state.force.tool = Setting::Open(why);
                 }
+            },
+            "EX_BASE" => {
+                let why = format!("moves with an external kinematic ({place})");
+                state.force.base = Setting::Open(why);
             }
-        } else if what == "EX_BASE" {
-            state.force.base = Setting::Open(format!("moves with an external kinematic ({place})"));
+            _ => {}
         }
     }
 
     fn apply(&self, point: PointData, by: &str, state: &mut SystemState) {
         self.use_tool(point.tool, by, state);
-        state.force.base = match self.base_of(point.base) {
-            Some(pose) => Setting::Known(pose, format!("BASE_DATA[{}] by {by}", point.base)),
-            None => Setting::Open(format!(
-                "is BASE_DATA[{}], which no file that was read declares ({by})",
-                point.base
-            )),
-        };
-        state.astray = Setting::Known(
-            if point.fixed_tool {
-                format!("{FIXED} ({by})")
-            } else {
-                String::new()
-            },
-            by.into(),
+        let (base, table) = (
+            self.base_of(point.base),
+            format!("BASE_DATA[{}]", point.base),
         );
+        state.force.base = Setting::or_open(base, format!("{table} by {by}"), || {
+            format!("is {table}, which no file that was read declares ({by})")
+        });
+        let why = match point.fixed_tool {
+            true => format!("{FIXED} ({by})"),
+            false => String::new(),
+        };
+        state.astray = Setting::Known(why, by.into());
     }
 
     fn use_tool(&self, number: i64, by: &str, state: &mut SystemState) {
         state.force.tool = Setting::Known(self.tool_of(number), by.into());
-        state.force.load = Setting::Known(
-            self.loads.get(&number).copied().flatten(),
-            format!("LOAD_DATA[{number}], by {by},"),
-        );
+        let by = format!("LOAD_DATA[{number}], by {by},");
+        state.force.load = Setting::Known(sole(&self.loads, &number), by);
     }
 
     fn point(&self, name: &str) -> Option<PointData> {
-        self.points.get(name).copied().flatten()
+        sole(&self.points, name)
+    }
+
+    /// The data of the point in `NAME(FP1)` or `NAME(FP1.MEMBER)`.
+    fn point_in(&self, value: &[Token], names: &[&str]) -> Option<PointData> {
+        let [name, open, point, ..] = value else {
+            return None;
+        };
+        let is = name.is_word(names) && open.is(b'(') && point.sort == TokenKind::Word;
+        self.point(&Some(point.upper()).filter(|_| is)?)
     }
 
     fn base_of(&self, number: i64) -> Option<Pose> {
         if number == 0 {
             Some(Pose::identity())
         } else {
-            self.bases.get(&number).copied().flatten()
+            sole(&self.bases, &number)
         }
     }
 
@@ -415,7 +357,7 @@ impl SystemData {
         let frame = if number == 0 {
             Some(Pose::identity())
         } else {
-            self.tools.get(&number).copied().flatten()
+            sole(&self.tools, &number)
         };
         ToolInForce {
             name: format!("TOOL_DATA[{number}]"),
@@ -428,141 +370,201 @@ impl SystemData {
         self.tools.keys().map(|number| self.tool_of(*number))
     }
 
-    fn base(&self, source: ProgramText, value: &[Token]) -> Option<Pose> {
-        let of_point = || {
-            of_function(source, value, &["SBASE"])
-                .and_then(|name| self.point(&name))
-                .and_then(|point| self.base_of(point.base))
-        };
-        frame(source, value)
-            .or_else(|| self.named(source, value))
-            .or_else(|| indexed(source, value, "BASE_DATA").and_then(|number| self.base_of(number)))
-            .or_else(of_point)
+    fn base(&self, value: &[Token]) -> Option<Pose> {
+        let entry = || self.base_of(indexed(value, "BASE_DATA")?);
+        let of_point = || self.base_of(self.point_in(value, &["SBASE"])?.base);
+        self.plain(value).or_else(entry).or_else(of_point)
     }
 
-    fn tool(&self, source: ProgramText, value: &[Token]) -> Option<ToolInForce> {
-        let plain = frame(source, value).or_else(|| self.named(source, value));
-        let named = |frame| ToolInForce {
-            name: "$TOOL".into(),
-            frame: Some(frame),
-        };
-        let number = indexed(source, value, "TOOL_DATA").or_else(|| {
-            of_function(source, value, &["STOOL", "STOOL2"])
-                .and_then(|name| self.point(&name))
-                .map(|point| point.tool)
-        });
-        plain
-            .map(named)
-            .or_else(|| number.map(|number| self.tool_of(number)))
+    fn tool(&self, value: &[Token]) -> Option<ToolInForce> {
+        if let Some(frame) = self.plain(value) {
+            let (name, frame) = ("$TOOL".into(), Some(frame));
+            return Some(ToolInForce { name, frame });
+        }
+        let of_point = || Some(self.point_in(value, &["STOOL", "STOOL2"])?.tool);
+        let number = indexed(value, "TOOL_DATA").or_else(of_point);
+        number.map(|number| self.tool_of(number))
     }
 
     /// The mass of a load, none where its declaration does not say; none at all where the text does not say which load it is.
-    fn load(&self, source: ProgramText, value: &[Token]) -> Option<Option<f64>> {
+    fn load(&self, value: &[Token]) -> Option<Option<f64>> {
         if value.first().is_some_and(|first| first.is(b'{')) {
-            return Some(mass(source, value));
+            return Some(mass(value));
         }
-        let number = indexed(source, value, "LOAD_DATA").or_else(|| {
-            of_function(source, value, &["SLOAD"])
-                .and_then(|name| self.point(&name))
-                .map(|point| point.tool)
-        });
-        number.map(|number| self.loads.get(&number).copied().flatten())
+        let of_point = || Some(self.point_in(value, &["SLOAD"])?.tool);
+        let number = indexed(value, "LOAD_DATA").or_else(of_point);
+        number.map(|number| sole(&self.loads, &number))
     }
 
-    fn named(&self, source: ProgramText, value: &[Token]) -> Option<Pose> {
-        let [word] = value else { return None };
-        self.frames.get(&source.upper(word)).copied().flatten()
+    /// A frame by its numbers, or one that is declared with them.
+    fn plain(&self, value: &[Token]) -> Option<Pose> {
+        let named = || match value {
+            [word] => sole(&self.frames, word.upper().as_str()),
+            _ => None,
+        };
+        frame(value).or_else(named)
     }
+}
 
-    /// Why a frame is not known.
-    fn unknown(&self, source: ProgramText, value: &[Token], of_part: bool) -> String {
-        let table = ["BASE_DATA", "TOOL_DATA"]
-            .into_iter()
-            .find_map(|table| Some((table, indexed(source, value, table)?)));
-        match table {
-            _ if of_part => "is set in parts".into(),
-            Some((table, number)) => {
-                format!("is {table}[{number}], which no file that was read declares")
-            }
-            None => "is computed when the program runs".into(),
+/// What is declared by a name or number, if one thing is.
+fn sole<K, Q, T>(known: &BTreeMap<K, Option<T>>, key: &Q) -> Option<T>
+where
+    K: Ord + Borrow<Q>,
+    Q: Ord + ?Sized,
+    T: Copy,
+{
+    known.get(key).copied().flatten()
+}
+
+/// Why a frame is not known.
+fn unknown(value: &[Token], of_part: bool) -> String {
+    let number = |table| Some((table, indexed(value, table)?));
+    match ["BASE_DATA", "TOOL_DATA"].into_iter().find_map(number) {
+        _ if of_part => "is set in parts".into(),
+        Some((table, number)) => {
+            format!("is {table}[{number}], which no file that was read declares")
         }
+        None => "is computed when the program runs".into(),
     }
 }
 
 const FIXED: &str = "is carried by the robot: the tool stands still ($IPO_MODE #TCP)";
 
 /// `BASE_DATA[3] = {...}`: name, number, and the value; none where a part of it is set.
-fn entry<'t>(source: ProgramText, line: &'t [Token]) -> Option<(String, i64, Option<&'t [Token]>)> {
-    let [name, open, number, close, tail @ ..] = line else {
+fn entry<'t, 'p>(line: &'t [Token<'p>]) -> Option<(String, i64, Option<&'t [Token<'p>]>)> {
+    let [name, _, _, _, tail @ ..] = line else {
         return None;
     };
-    let is = open.is(b'[')
-        && close.is(b']')
-        && source.is_word(name, &["BASE_DATA", "TOOL_DATA", "LOAD_DATA"]);
-    let (number, _) = source.number(std::slice::from_ref(number))?;
-    let (subject, value) = member(source, tail).filter(|_| is)?;
-    Some((
-        source.upper(name),
-        number as i64,
-        value.filter(|_| subject.is_none()),
-    ))
+    let tables = ["BASE_DATA", "TOOL_DATA", "LOAD_DATA"];
+    let number = tables.iter().find_map(|table| indexed(&line[..4], table))?;
+    let (subject, value) = member(tail)?;
+    Some((name.upper(), number, value.filter(|_| subject.is_none())))
 }
 
 /// The number in `TABLE[3]`.
-fn indexed(source: ProgramText, value: &[Token], table: &str) -> Option<i64> {
-    let [name, open, number, close] = value else {
+fn indexed(value: &[Token], table: &str) -> Option<i64> {
+    let [name, open, index, close] = value else {
         return None;
     };
-    let is = source.is_word(name, &[table]) && open.is(b'[') && close.is(b']');
-    source
-        .number(std::slice::from_ref(number))
-        .filter(|_| is)
-        .map(|(number, _)| number as i64)
-}
-
-/// The point in `NAME(FP1)` or `NAME(FP1.MEMBER)`.
-fn of_function(source: ProgramText, value: &[Token], names: &[&str]) -> Option<String> {
-    let [name, open, point, ..] = value else {
-        return None;
-    };
-    let is = source.is_word(name, names) && open.is(b'(') && point.sort == TokenKind::Word;
-    is.then(|| source.upper(point))
+    let is = name.is_word(&[table]) && open.is(b'[') && close.is(b']');
+    let (number, _) = number(std::slice::from_ref(index)).filter(|_| is)?;
+    Some(number as i64)
 }
 
 /// A frame: `{X 1, ..., C 6}` or `$NULLFRAME`, mm and deg.
-fn frame(source: ProgramText, value: &[Token]) -> Option<Pose> {
-    if value.len() == 1 && source.is_word(&value[0], &["$NULLFRAME"]) {
+fn frame(value: &[Token]) -> Option<Pose> {
+    if value.len() == 1 && value[0].is_word(&["$NULLFRAME"]) {
         return Some(Pose::identity());
     }
-    let value = ["X", "Y", "Z", "A", "B", "C"].map(|name| field(source, value, name));
-    let [x, y, z, a, b, c] = value;
+    let [x, y, z, a, b, c] = ["X", "Y", "Z", "A", "B", "C"].map(|name| field(value, name));
     let turn = turns(a?.to_radians(), b?.to_radians(), c?.to_radians());
     Some(Pose::new(turn, Vector3::new(x?, y?, z?) * 1e-3))
 }
 
 /// The mass of a LOAD, kg: below 0 it is not known.
-fn mass(source: ProgramText, value: &[Token]) -> Option<f64> {
-    field(source, value, "M").filter(|mass| *mass >= 0.0)
+fn mass(value: &[Token]) -> Option<f64> {
+    field(value, "M").filter(|mass| *mass >= 0.0)
 }
 
 /// The data of a point.
-fn point(source: ProgramText, value: &[Token]) -> Option<PointData> {
-    let number = |name: &str| field(source, value, name).map(|number| number as i64);
-    let fixed_tool = value
-        .windows(3)
-        .any(|w| source.is_word(&w[0], &["IPO_FRAME"]) && source.is_word(&w[2], &["TCP"]));
+fn point(value: &[Token]) -> Option<PointData> {
+    let number = |name: &str| field(value, name).map(|number| number as i64);
+    let fixed = |w: &[Token]| w[0].is_word(&["IPO_FRAME"]) && w[2].is_word(&["TCP"]);
     Some(PointData {
         tool: number("TOOL_NO")?,
         base: number("BASE_NO")?,
-        fixed_tool,
+        fixed_tool: value.windows(3).any(fixed),
     })
 }
 
 /// A number of an aggregate by its name, not of those inside.
-fn field(source: ProgramText, value: &[Token], name: &str) -> Option<f64> {
+fn field(value: &[Token], name: &str) -> Option<f64> {
     let [open, .., close] = value else {
         return None;
     };
     let whole = open.is(b'{') && close.is(b'}') && closing(value, 0) + 1 == value.len();
-    whole.then(|| Aggregate::new(source, value).number(name))?
+    whole.then(|| Aggregate::new(value).number(name))?
+}
+
+/// Adds the motions of a file, whose bytes are given; `file`: how people find it, where it is not the one that is corrected.
+pub(super) fn reach(
+    bytes: &[u8],
+    lines: &[&[Token]],
+    data: &SystemData,
+    file: Option<&str>,
+    out: &mut Reached,
+) {
+    let places = places(bytes, lines, file);
+    let names = routines(lines);
+    let flow = Flow::of(&steps(lines, |line| data.sets(line)));
+    let (states, lost) = match flow {
+        Ok(flow) => {
+            let take =
+                |at: usize, state: &mut SystemState| data.take(lines[at], &places[at], state);
+            let lost = "is not known: no way leads to this line".to_string();
+            (flow.states(&SystemState::START, take), lost)
+        }
+        Err(at) => {
+            let place = &places[at];
+            let lost = format!("is not known: the block of {place} does not close where it should");
+            (vec![None; lines.len()], lost)
+        }
+    };
+    for ((line, state), place) in lines.iter().zip(states).zip(&places) {
+        if motion(line).is_none() {
+            mentions(line, place, out);
+            let unknown = data.unknown_call(line);
+            if let Some(name) = unknown.filter(|name| !names.contains(name) && file.is_none()) {
+                let message = format!(
+                    "calls {name} of a file that was not read: calib assumed that it leaves $BASE, $TOOL and $LOAD as they are"
+                );
+                out.assumed.push((line[0].start, message));
+            }
+            continue;
+        }
+        let force = match &state {
+            Some(state) => data.at_motion(line, place, state),
+            None => InForce::open(&lost),
+        };
+        // The positions of a motion, and whatever else stands between its commas.
+        for operand in arguments(&before_with(line)[1..]) {
+            match operand {
+                [first, ..] if first.sort == TokenKind::Word => out.moved_to(first, &force),
+                [first, .., last] if first.is(b'{') && file.is_none() => {
+                    out.placed.push((first.start..last.end, force.clone()));
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Names that a line uses otherwise than as the position of a motion.
+fn mentions(line: &[Token], place: &str, out: &mut Reached) {
+    let head = line[0].upper();
+    // Variables of the system are no targets that a program moves to by their names.
+    if declared(line).is_some() || head.ends_with("_REL") || head.starts_with('$') {
+        return;
+    }
+    // What is assigned to is none that is used.
+    let assigned = line.iter().position(|token| token.is(b'='));
+    out.handed_on(&line[assigned.unwrap_or(0) + 1..], place);
+}
+
+/// How people find each line.
+fn places(bytes: &[u8], lines: &[&[Token]], file: Option<&str>) -> Vec<String> {
+    let (mut number, mut from) = (1, 0);
+    let place = |line: &&[Token]| {
+        let at = line[0].start;
+        number += bytes[from..at]
+            .iter()
+            .filter(|byte| **byte == b'\n')
+            .count();
+        from = at;
+        match file {
+            Some(file) => format!("{file}:{number}"),
+            None => format!("line {number}"),
+        }
+    };
+    lines.iter().map(place).collect()
 }

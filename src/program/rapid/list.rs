@@ -1,7 +1,7 @@
 //! Bracket lists of RAPID: `[[x,y,z],[q1,q2,q3,q4],[cf1,cf4,cf6,cfx],[eax..]]` and `[[rax_1..rax_6],[eax..]]`, and arrays of them.
 
-use super::super::token::{ProgramText, Token};
-use super::super::{DEPTH, Gathered, Literal, PostureStatement, TargetKind, quoted};
+use super::super::token::{Token, number, over, quoted};
+use super::super::{DEPTH, Gathered, Literal, PostureStatement, TargetKind};
 use crate::error::counted;
 use std::ops::Range;
 
@@ -36,49 +36,55 @@ impl Want {
     }
 }
 
-enum Item<'t> {
-    List(List<'t>),
-    Leaf(&'t [Token]),
+enum Item<'t, 'p> {
+    List(List<'t, 'p>),
+    Leaf(&'t [Token<'p>]),
+}
+
+impl<'t, 'p> Item<'t, 'p> {
+    fn list(&self) -> Option<&List<'t, 'p>> {
+        match self {
+            Self::List(list) => Some(list),
+            Self::Leaf(_) => None,
+        }
+    }
 }
 
 /// A list that opens at the first of its tokens.
-pub(super) struct List<'t> {
-    source: ProgramText<'t>,
+pub(super) struct List<'t, 'p> {
     span: Range<usize>,
     /// How many it has, brackets included.
     pub(crate) tokens: usize,
-    items: Vec<Item<'t>>,
+    items: Vec<Item<'t, 'p>>,
 }
 
-impl<'t> List<'t> {
+impl<'t, 'p> List<'t, 'p> {
     /// Reads the list that opens at `tokens[0]`; its brackets match. It has no items where they are nested too deep.
-    pub fn read(source: ProgramText<'t>, tokens: &'t [Token]) -> Self {
+    pub fn read(tokens: &'t [Token<'p>]) -> Self {
         if depths(tokens).any(|(_, depth)| depth >= DEPTH as i32) {
             return Self {
-                source,
-                span: source.over(tokens, 0),
+                span: over(tokens, 0),
                 tokens: tokens.len(),
                 items: Vec::new(),
             };
         }
-        Self::nested(source, tokens)
+        Self::nested(tokens)
     }
 
-    fn nested(source: ProgramText<'t>, tokens: &'t [Token]) -> Self {
+    fn nested(tokens: &'t [Token<'p>]) -> Self {
         let mut items = Vec::new();
         let (mut k, mut from, mut round) = (1, 1, 0);
         let mut inner: Option<List> = None;
         while k < tokens.len() {
             let token = &tokens[k];
-            if token.is(b'[') && k == from {
-                let list = Self::nested(source, &tokens[k..]);
-                k += list.tokens;
-                inner = Some(list);
-                continue;
-            }
-            // A list inside an expression, `Offs([..],..)`: a leaf holds it whole.
             if token.is(b'[') {
-                k += Self::nested(source, &tokens[k..]).tokens;
+                let list = Self::nested(&tokens[k..]);
+                let begins = k == from;
+                k += list.tokens;
+                // A list inside an expression, `Offs([..],..)`: a leaf holds it whole.
+                if begins {
+                    inner = Some(list);
+                }
                 continue;
             }
             round += i32::from(token.is(b'(') || token.is(b'{'))
@@ -97,91 +103,73 @@ impl<'t> List<'t> {
             }
         }
         Self {
-            source,
-            span: source.over(&tokens[..k], 0),
+            span: over(&tokens[..k], 0),
             tokens: k,
             items,
         }
     }
 
-    fn lists(&self) -> impl Iterator<Item = &List<'t>> {
-        self.items.iter().filter_map(|item| {
-            if let Item::List(list) = item {
-                Some(list)
-            } else {
-                None
-            }
-        })
+    fn lists(&self) -> impl Iterator<Item = &List<'t, 'p>> {
+        self.items.iter().filter_map(Item::list)
+    }
+
+    fn is_flat(&self) -> bool {
+        self.lists().next().is_none()
     }
 
     /// The list that is item `k`.
-    pub(crate) fn list(&self, k: usize) -> Option<&List<'t>> {
-        self.items.get(k).and_then(|item| {
-            if let Item::List(list) = item {
-                Some(list)
-            } else {
-                None
-            }
-        })
+    pub(crate) fn list(&self, k: usize) -> Option<&List<'t, 'p>> {
+        self.items.get(k)?.list()
     }
 
     /// The number that is item `k`.
     pub fn number(&self, k: usize) -> Option<f64> {
-        let Item::Leaf(tokens) = self.items.get(k)? else {
-            return None;
-        };
-        self.source.number(tokens).map(|(number, _)| number)
+        match self.items.get(k)? {
+            Item::Leaf(tokens) => number(tokens).map(|(number, _)| number),
+            Item::List(_) => None,
+        }
     }
 
     /// Whether item `k` is a word, in any case.
     pub(crate) fn is_word(&self, k: usize, word: &str) -> bool {
-        matches!(self.items.get(k), Some(Item::Leaf([token])) if self.source.is_word(token, &[word]))
+        matches!(self.items.get(k), Some(Item::Leaf([token])) if token.is_word(&[word]))
     }
 
     /// What it, or a list inside it, has the form of: names may stand for some of its lists.
     pub(crate) fn has_form(&self) -> Option<Want> {
         let form = |want: &Want| {
-            let shape = want.shape();
-            let fits = |(item, size): (&Item, &usize)| match item {
-                Item::List(list) => list.items.len() == *size && list.lists().next().is_none(),
-                Item::Leaf(_) => true,
+            let fits = |(item, size): (&Item, &usize)| {
+                let of_size = |list: &List| list.items.len() == *size && list.is_flat();
+                item.list().is_none_or(of_size)
             };
-            self.items.len() == shape.len()
-                && self.lists().next().is_some()
-                && self.items.iter().zip(shape).all(fits)
+            self.items.len() == want.shape().len()
+                && !self.is_flat()
+                && self.items.iter().zip(want.shape()).all(fits)
         };
         // A slip in what follows makes no other thing of it.
         let begins = |want: &Want| {
-            let shape = want.shape();
-            let used = shape.len() / 2;
-            let fits = |(item, size): (&Item, &usize)| matches!(item, Item::List(list) if list.items.len() == *size);
-            self.items.len() > used && self.items.iter().zip(&shape[..used]).all(fits)
+            let used = &want.shape()[..want.shape().len() / 2];
+            let fits = |(item, size): (&Item, &usize)| {
+                item.list().is_some_and(|list| list.items.len() == *size)
+            };
+            self.items.len() > used.len() && self.items.iter().zip(used).all(fits)
         };
-        let wants = [Want::Joints, Want::Pose];
-        wants
-            .into_iter()
-            .find(|want| form(want) || begins(want))
-            .or_else(|| self.lists().find_map(List::has_form))
+        let mut wants = [Want::Joints, Want::Pose].into_iter();
+        let found = wants.find(|want| form(want) || begins(want));
+        found.or_else(|| self.lists().find_map(List::has_form))
     }
 
     /// Takes the targets in it, those of an array where that is allowed, or says everything that is wrong.
     pub(crate) fn take(&self, want: Want, array: bool, found: &mut Gathered) {
-        let flat = |item: &Item| match item {
-            Item::List(list) => list.lists().next().is_none(),
-            Item::Leaf(_) => true,
-        };
-        if self.items.iter().all(flat) || !array {
+        if !array || self.lists().all(List::is_flat) {
             return self.target(want, found);
         }
         for item in &self.items {
             match item {
                 Item::List(list) => list.take(want, array, found),
                 Item::Leaf(tokens) => {
-                    let span = self.source.over(tokens, self.span.start);
-                    found.fault(
-                        span.start,
-                        format!("{} in an array of targets", quoted(self.source.bytes, span)),
-                    );
+                    let message = format!("{} in an array of targets", quoted(tokens));
+                    found.fault(over(tokens, self.span.start).start, message);
                 }
             }
         }
@@ -189,94 +177,62 @@ impl<'t> List<'t> {
 
     fn target(&self, want: Want, found: &mut Gathered) {
         let before = found.faults.len();
-        let shape = want.shape();
+        let (shape, name) = (want.shape(), want.name());
         let mut numbers: Vec<Vec<(f64, Range<usize>)>> = Vec::new();
         for (item, size) in self.items.iter().zip(shape) {
             match item {
                 Item::List(list) if list.items.len() == *size => numbers.push(list.numbers(found)),
                 Item::List(list) => {
-                    let message = format!(
-                        "{}, expected {size} here in a {}",
-                        counted(list.items.len(), "number"),
-                        want.name()
-                    );
+                    let given = counted(list.items.len(), "number");
+                    let message = format!("{given}, expected {size} here in a {name}");
                     found.fault(list.span.start, message);
                 }
                 Item::Leaf(tokens) => {
-                    let span = self.source.over(tokens, self.span.start);
-                    let text = quoted(self.source.bytes, span.clone());
-                    found.fault(
-                        span.start,
-                        format!(
-                            "{text} in a {}, expected a list of {size} numbers",
-                            want.name()
-                        ),
-                    );
+                    let text = quoted(tokens);
+                    let message = format!("{text} in a {name}, expected a list of {size} numbers");
+                    found.fault(over(tokens, self.span.start).start, message);
                 }
             }
         }
         if self.items.len() != shape.len() {
             let sizes: Vec<String> = shape.iter().map(usize::to_string).collect();
-            let message = format!(
-                "expected a {}: lists of {} numbers",
-                want.name(),
-                sizes.join(", ")
-            );
+            let sizes = sizes.join(", ");
+            let message = format!("expected a {name}: lists of {sizes} numbers");
             found.fault(self.span.start, message);
         }
         if found.faults.len() > before {
             return;
         }
-        for (value, span) in numbers
-            .last()
-            .into_iter()
-            .flatten()
-            .filter(|(value, _)| *value != NOT_CONNECTED)
-        {
+        let axes = numbers.pop().unwrap_or_default();
+        for (value, span) in axes.iter().filter(|(value, _)| *value != NOT_CONNECTED) {
             let message = format!(
                 "external axis at {value}: calib assumed that external axes do not move the robot"
             );
             found.warn(span.start, message);
         }
         let axis = |(value, _): &(f64, _)| (*value != NOT_CONNECTED).then_some(*value);
-        let external = numbers.last().into_iter().flatten().map(axis).collect();
-        let posture = if want == Want::Pose {
-            configuration(&numbers[2], found)
-        } else {
-            PostureStatement::Unstated
+        let external = axes.iter().map(axis).collect();
+        let (posture, kind) = match want {
+            Want::Joints => (PostureStatement::Unstated, TargetKind::Joints),
+            Want::Pose => (configuration(&numbers[2], found), TargetKind::Quaternion),
         };
         let posture_spans = match posture {
             PostureStatement::Unstated => Vec::new(),
             _ => numbers[2].iter().map(|(_, span)| span.clone()).collect(),
         };
-        let used = if want == Want::Joints { 1 } else { 2 };
-        let (values, spans): (Vec<f64>, Vec<Range<usize>>) =
-            numbers.into_iter().take(used).flatten().unzip();
+        let used = numbers.into_iter().take(2).flatten();
+        let (values, spans): (Vec<f64>, Vec<Range<usize>>) = used.unzip();
         if want == Want::Pose {
-            let length = values[3..]
-                .iter()
-                .map(|part| part * part)
-                .sum::<f64>()
-                .sqrt();
+            let square: f64 = values[3..].iter().map(|part| part * part).sum();
+            let length = square.sqrt();
             if (length - 1.0).abs() > UNIT {
-                found.fault(
-                    spans[3].start,
-                    format!("the quaternion has length {length:.4}, expected 1"),
-                );
-                return;
+                let message = format!("the quaternion has length {length:.4}, expected 1");
+                return found.fault(spans[3].start, message);
             }
         }
-        let kind = if want == Want::Joints {
-            TargetKind::Joints
-        } else {
-            TargetKind::Quaternion
-        };
-        found.literals.push(Literal::read(
-            kind,
-            (values, spans),
-            external,
-            (posture, posture_spans),
-        ));
+        let posture = (posture, posture_spans);
+        let literal = Literal::read(kind, (values, spans), external, posture);
+        found.literals.push(literal);
     }
 
     fn numbers(&self, found: &mut Gathered) -> Vec<(f64, Range<usize>)> {
@@ -289,16 +245,10 @@ impl<'t> List<'t> {
                     continue;
                 }
             };
-            match self.source.number(tokens) {
+            match number(tokens) {
                 Some(number) => out.push(number),
                 None if tokens.is_empty() => found.fault(at, "a number is missing in this list"),
-                None => {
-                    let span = self.source.over(tokens, at);
-                    found.fault(
-                        span.start,
-                        format!("{} is no number", quoted(self.source.bytes, span)),
-                    );
-                }
+                None => found.fault(tokens[0].start, format!("{} is no number", quoted(tokens))),
             }
         }
         out
@@ -332,7 +282,9 @@ fn configuration(numbers: &[(f64, Range<usize>)], found: &mut Gathered) -> Postu
 }
 
 /// Tokens with the depth of brackets at each: the brackets themselves are outside.
-pub(super) fn depths(tokens: &[Token]) -> impl Iterator<Item = (&Token, i32)> {
+pub(super) fn depths<'t, 'p>(
+    tokens: &'t [Token<'p>],
+) -> impl Iterator<Item = (&'t Token<'p>, i32)> {
     let mut depth = 0;
     tokens.iter().map(move |token| {
         let opens = token.opens();

@@ -10,12 +10,19 @@
 mod list;
 mod surroundings;
 
-use super::token::{self, BRACKETS, ProgramText, Token, TokenKind, arguments, tokens};
-use super::{Companion, Declared, Gathered, Language, quoted};
+use super::token::{self, BRACKETS, Token, TokenKind, arguments, quoted, tokens};
+use super::{Companion, Gathered, Grammar, Language};
 use list::{List, Want, depths};
-use std::collections::BTreeMap;
-use std::ops::Range;
 use surroundings::in_force;
+
+pub(super) const GRAMMAR: Grammar = Grammar {
+    endings: &["mod", "modx", "sys", "sysx", "prg"],
+    comment: "!",
+    heads: &["MODULE"],
+    begins: &["JOINTTARGET", "ROBTARGET", "MODULE"],
+    read,
+    listed,
+};
 
 /// Motion instructions by how they begin, and which of the positional arguments are positions.
 const MOTIONS: [(&str, &[usize]); 10] = [
@@ -59,37 +66,16 @@ const STORAGE: [&str; 3] = ["VAR", "PERS", "CONST"];
 /// Types whose literals may have the form of a target and are none.
 const NUMBERS: [&str; 5] = ["NUM", "DNUM", "BYTE", "ROBJOINT", "EXTJOINT"];
 
-pub(super) fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
-    let mut found = Gathered::default();
-    let source = ProgramText {
-        bytes,
-        language: Language::Rapid,
-    };
-    let all = tokens(source, &mut found);
-    let statements = statements(source, &all, &mut found);
-    let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for statement in &statements {
-        if let Some(declaration) = declaration(source, statement) {
-            let known = types.entry(declaration.name).or_default();
-            if !known.contains(&declaration.kind) {
-                known.push(declaration.kind);
-            }
-        }
+fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
+    let mut reader = Reader(Gathered::default());
+    let all = tokens(bytes, Language::Rapid, &mut reader.0);
+    let statements = statements(&all, &mut reader.0);
+    for declared in statements.iter().filter_map(|one| declaration(one)) {
+        reader.0.declare(declared.name, declared.kind);
     }
-    let mut reader = Reader {
-        source,
-        types,
-        names: Vec::new(),
-        found,
-    };
-    for statement in &statements {
-        reader.statement(statement);
-    }
-    let Reader {
-        names, mut found, ..
-    } = reader;
-    in_force((source, &statements), companions, &names, &mut found);
-    found
+    statements.iter().for_each(|one| reader.statement(one));
+    in_force(&statements, companions, &mut reader.0);
+    reader.0
 }
 
 /// The motion instruction of this name, in capitals.
@@ -101,11 +87,7 @@ fn motion(name: &str) -> Option<(&'static str, &'static [usize])> {
 
 /// The statements of a program, each without its `;` and without the heads of blocks before it. A value that no `;` ends before the
 /// next block is a fault: what follows would be read as a part of it, or the other way round.
-fn statements<'t>(
-    source: ProgramText,
-    tokens: &'t [Token],
-    found: &mut Gathered,
-) -> Vec<&'t [Token]> {
+fn statements<'t, 'p>(tokens: &'t [Token<'p>], found: &mut Gathered) -> Vec<&'t [Token<'p>]> {
     let mut out: Vec<&[Token]> = Vec::new();
     let mut start = 0;
     let mut k = 0;
@@ -113,20 +95,16 @@ fn statements<'t>(
         let token = &tokens[k];
         let end = if token.is(b';') {
             Some((k, k + 1))
-        } else if token.is(b':') || source.is_word(token, &BLOCKS) {
+        } else if token.is(b':') || token.is_word(&BLOCKS) {
             Some((k + 1, k + 1))
         } else {
-            heading(source, &tokens[k..]).map(|length| (k + length, k + length))
+            heading(&tokens[k..]).map(|length| (k + length, k + length))
         };
-        let ends = token.is(b';') || token.is(b':') || source.is_word(token, &["THEN", "DO"]);
-        if end.is_some()
-            && !ends
-            && tokens[start..k]
-                .iter()
-                .any(|t| t.is(b'[') || t.sort == TokenKind::Pair(b':'))
-        {
-            let text = quoted(source.bytes, token.span.clone());
-            found.fault(token.span.start, format!("`;` is missing before {text}"));
+        let ends = token.is(b';') || token.is(b':') || token.is_word(&["THEN", "DO"]);
+        let mut before = tokens[start..k].iter();
+        if end.is_some() && !ends && before.any(|one| one.is(b'[') || one.assigns()) {
+            let message = format!("`;` is missing before {}", token.quoted());
+            found.fault(token.start, message);
         }
         k += 1;
         if let Some((end, next)) = end {
@@ -140,11 +118,11 @@ fn statements<'t>(
 }
 
 /// How many tokens the head of a module or a routine has; none where there is no such head.
-fn heading(source: ProgramText, tokens: &[Token]) -> Option<usize> {
+fn heading(tokens: &[Token]) -> Option<usize> {
     let kind = &tokens[0];
-    let mut length = if source.is_word(kind, &["MODULE", "PROC", "TRAP"]) {
+    let mut length = if kind.is_word(&["MODULE", "PROC", "TRAP"]) {
         2
-    } else if source.is_word(kind, &["FUNC"]) {
+    } else if kind.is_word(&["FUNC"]) {
         3
     } else {
         return None;
@@ -155,110 +133,74 @@ fn heading(source: ProgramText, tokens: &[Token]) -> Option<usize> {
     Some(length.min(tokens.len()))
 }
 
-struct Declaration<'t> {
+struct Declaration<'t, 'p> {
     /// In capitals, as the name.
     kind: String,
     name: String,
     /// Behind `:=`.
-    value: Option<&'t [Token]>,
+    value: Option<&'t [Token<'p>]>,
     /// Behind the name and its dimensions, where there is no `:=`.
-    stray: Option<&'t Token>,
+    stray: Option<&'t Token<'p>>,
 }
 
-fn declaration<'t>(source: ProgramText, statement: &'t [Token]) -> Option<Declaration<'t>> {
-    let scoped = statement
-        .iter()
-        .take_while(|token| source.is_word(token, &["LOCAL", "TASK"]))
-        .count();
+fn declaration<'t, 'p>(statement: &'t [Token<'p>]) -> Option<Declaration<'t, 'p>> {
+    let is_scope = |token: &&Token| token.is_word(&["LOCAL", "TASK"]);
+    let scoped = statement.iter().take_while(is_scope).count();
     let [storage, kind, name, tail @ ..] = &statement[scoped..] else {
         return None;
     };
-    if !source.is_word(storage, &STORAGE)
-        || kind.sort != TokenKind::Word
-        || name.sort != TokenKind::Word
-    {
+    if !storage.is_word(&STORAGE) || [kind, name].iter().any(|one| one.sort != TokenKind::Word) {
         return None;
     }
-    let assign = tail
-        .iter()
-        .position(|token| token.sort == TokenKind::Pair(b':'));
+    let assign = tail.iter().position(Token::assigns);
     let dimensions = tail.iter().take_while(|token| !token.is(b'}')).count();
-    let named = if tail.first().is_some_and(|token| token.is(b'{')) {
-        tail.get(dimensions + 1..).unwrap_or_default()
-    } else {
-        tail
-    };
-    let stray = if assign.is_none() {
-        named.first()
-    } else {
-        None
+    let named = match tail.first().is_some_and(|token| token.is(b'{')) {
+        true => tail.get(dimensions + 1..).unwrap_or_default(),
+        false => tail,
     };
     Some(Declaration {
-        kind: source.upper(kind),
-        name: source.upper(name),
+        kind: kind.upper(),
+        name: name.upper(),
         value: assign.map(|k| &tail[k + 1..]),
-        stray,
+        stray: named.first().filter(|_| assign.is_none()),
     })
 }
 
-struct Reader<'p> {
-    source: ProgramText<'p>,
-    /// Variable -> types it is declared with anywhere in the file.
-    types: BTreeMap<String, Vec<String>>,
-    /// Literals that a variable holds, by their numbers, and its name.
-    names: Vec<(Range<usize>, String)>,
-    found: Gathered,
+/// Whether what stands before `:=` is a variable: no argument of an instruction.
+fn is_variable(before: &[Token]) -> bool {
+    !before.iter().any(|token| token.is(b'\\') || token.is(b','))
 }
 
-impl Reader<'_> {
+struct Reader(Gathered);
+
+impl Reader {
     fn statement(&mut self, statement: &[Token]) {
-        if !self.brackets_match(statement) {
+        if !brackets_match(statement, &mut self.0) {
             return;
         }
         self.frames(statement);
-        if let Some(Declaration {
-            kind,
-            value,
-            stray,
-            name,
-        }) = declaration(self.source, statement)
-        {
-            if let Some(stray) = stray {
-                let text = quoted(self.source.bytes, stray.span.clone());
-                self.found.fault(
-                    stray.span.start,
-                    format!("{text} in a declaration is not understood; expected `:=` or `;`"),
-                );
+        if let Some(declared) = declaration(statement) {
+            if let Some(stray) = declared.stray {
+                let text = stray.quoted();
+                let message =
+                    format!("{text} in a declaration is not understood; expected `:=` or `;`");
+                self.0.fault(stray.start, message);
             }
-            return self.set(value.unwrap_or_default(), Some(&kind), name);
+            let (name, value) = (declared.name, declared.value.unwrap_or_default());
+            return self.set(value, Some(&declared.kind), name);
         }
+        let outside = |wanted: fn(&Token) -> bool| {
+            depths(statement).position(|(token, depth)| depth == 0 && wanted(token))
+        };
         // In the head of a routine these words stand in brackets.
-        let storage =
-            |(token, depth): &(&Token, _)| *depth == 0 && self.source.is_word(token, &STORAGE);
-        if let Some((storage, _)) = depths(statement).find(storage) {
-            self.found.fault(
-                storage.span.start,
-                "a declaration that is not understood; expected a type and a name",
-            );
-            return;
+        if let Some(storage) = outside(|token| token.is_word(&STORAGE)) {
+            let message = "a declaration that is not understood; expected a type and a name";
+            return self.0.fault(statement[storage].start, message);
         }
-        match depths(statement)
-            .position(|(token, depth)| depth == 0 && token.sort == TokenKind::Pair(b':'))
-        {
-            Some(k)
-                if k > 0
-                    && !statement[..k]
-                        .iter()
-                        .any(|token| token.is(b'\\') || token.is(b',')) =>
-            {
-                self.assignment(statement, k)
-            }
+        match outside(|token| token.assigns()) {
+            Some(k) if k > 0 && is_variable(&statement[..k]) => self.assignment(statement, k),
             _ => self.instruction(statement),
         }
-    }
-
-    fn brackets_match(&mut self, statement: &[Token]) -> bool {
-        token::brackets_match(statement, &BRACKETS, "in its statement", &mut self.found)
     }
 
     /// Displacements.
@@ -266,15 +208,9 @@ impl Reader<'_> {
         const BASE: &str =
             "calib assumed that targets are in the robot's base, as in wobj0 without displacement";
         let head = &statement[0];
-        if self
-            .source
-            .is_word(head, &["PDISPON", "PDISPSET", "EOFFSON", "EOFFSSET"])
-        {
-            let name = quoted(self.source.bytes, head.span.clone());
-            self.found.frame(
-                head.span.start,
-                format!("{name} displaces what follows: {BASE}"),
-            );
+        if head.is_word(&["PDISPON", "PDISPSET", "EOFFSON", "EOFFSSET"]) {
+            let message = format!("{} displaces what follows: {BASE}", head.quoted());
+            self.0.frame(head.start, message);
         }
     }
 
@@ -287,19 +223,13 @@ impl Reader<'_> {
         };
         match (want, value.first()) {
             (Some(want), Some(first)) if first.is(b'[') => {
-                let list = List::read(self.source, value);
-                if list.tokens < value.len() {
-                    let stray = &value[list.tokens];
-                    let text = quoted(self.source.bytes, stray.span.clone());
-                    self.found.fault(
-                        stray.span.start,
-                        format!("{text} behind a target is not understood"),
-                    );
-                } else {
-                    let before = self.found.literals.len();
-                    list.take(want, true, &mut self.found);
-                    self.names.push((before..self.found.literals.len(), name));
+                let list = List::read(value);
+                if let Some(stray) = value.get(list.tokens) {
+                    return self.0.stray(stray, "behind a target");
                 }
+                let before = self.0.literals.len();
+                list.take(want, true, &mut self.0);
+                self.0.held_by(name, before);
             }
             _ if kind.is_some_and(|kind| NUMBERS.contains(&kind)) => {}
             _ => {
@@ -308,130 +238,105 @@ impl Reader<'_> {
                     |kind| format!("of type {kind}"),
                 );
                 self.computed(value, want.is_some());
-                self.others(value, format!("a variable {kind_of}"));
+                self.others(value, &format!("a variable {kind_of}"));
             }
         }
     }
 
     /// Literals that are no targets by where they stand: those of the form of one are refused.
-    fn others(&mut self, tokens: &[Token], place: String) {
+    fn others(&mut self, tokens: &[Token], place: &str) {
         let mut k = 0;
         while k < tokens.len() {
-            if tokens[k].is(b'[') {
-                let list = List::read(self.source, &tokens[k..]);
-                if let Some(want) = list.has_form() {
-                    let message = format!(
-                        "has the form of a {} and stands in {place}; declare it: `CONST {0} p := [...]`",
-                        want.name()
-                    );
-                    self.found.fault(tokens[k].span.start, message);
-                }
-                k += list.tokens;
-            } else {
+            if !tokens[k].is(b'[') {
                 k += 1;
+                continue;
             }
+            let list = List::read(&tokens[k..]);
+            if let Some(want) = list.has_form() {
+                let name = want.name();
+                let message = format!(
+                    "has the form of a {name} and stands in {place}; declare it: `CONST {name} p := [...]`"
+                );
+                self.0.fault(tokens[k].start, message);
+            }
+            k += list.tokens;
         }
     }
 
     /// `p := ...`, `p.trans.z := ...`.
     fn assignment(&mut self, statement: &[Token], assign: usize) {
         let (variable, value) = (&statement[..assign], &statement[assign + 1..]);
-        let name = self.source.upper(&variable[0]);
-        let members: Vec<String> = variable
-            .windows(2)
-            .filter(|w| w[0].is(b'.'))
-            .map(|w| self.source.upper(&w[1]))
-            .collect();
-        let types = self.types.get(&name).map(Vec::as_slice).unwrap_or_default();
-        let Some(member) = members.first() else {
-            let kind = if let [one] = types {
-                Some(one.clone())
-            } else {
-                None
-            };
+        let name = variable[0].upper();
+        let mut members = variable.windows(2).filter(|w| w[0].is(b'.'));
+        let Some(member) = members.next().map(|w| &w[1]) else {
+            let kind = self.0.stated(&name).map(String::from);
             return self.set(value, kind.as_deref(), name);
         };
-        let at = variable[0].span.start;
-        let target = types
-            .iter()
-            .any(|kind| matches!(kind.as_str(), "ROBTARGET" | "JOINTTARGET"));
-        let part = ["TRANS", "ROT", "ROBAX"].contains(&member.as_str());
-        let given = quoted(self.source.bytes, self.source.over(variable, at));
+        let types = self.0.types(&name);
+        let is_target = |kind: &String| ["ROBTARGET", "JOINTTARGET"].contains(&kind.as_str());
+        let (target, unknown) = (types.iter().any(is_target), types.is_empty());
+        let part = ["TRANS", "ROT", "ROBAX"].contains(&member.upper().as_str());
+        let (at, given) = (variable[0].start, quoted(variable));
         if target && part {
-            self.found.partial(at, format!("{given} sets a part of a target alone; a target is corrected whole or not at all"));
-        } else if part && types.is_empty() {
-            self.found.warn(
-                at,
-                format!("left as it is: {given}, of a type that this file does not state"),
+            let message = format!(
+                "{given} sets a part of a target alone; a target is corrected whole or not at all"
             );
+            self.0.partial(at, message);
+        } else if part && unknown {
+            let message =
+                format!("left as it is: {given}, of a type that this file does not state");
+            self.0.warn(at, message);
         } else {
-            self.others(value, "a member of a variable".into());
+            self.others(value, "a member of a variable");
         }
     }
 
     fn instruction(&mut self, statement: &[Token]) {
-        let name = self.source.upper(&statement[0]);
+        let name = statement[0].upper();
         let Some((begin, positions)) = motion(&name) else {
-            return self.others(
-                statement,
-                format!("`{name}`, no motion instruction that calib knows"),
-            );
+            let place = format!("`{name}`, no motion instruction that calib knows");
+            return self.others(statement, &place);
         };
         if begin == "MOVEEXTJ" {
-            self.found.warn(
-                statement[0].span.start,
-                "moves external axes alone: calib assumed that they do not move the robot",
-            );
-            return;
+            let message =
+                "moves external axes alone: calib assumed that they do not move the robot";
+            return self.0.warn(statement[0].start, message);
         }
         let want = if name.contains("ABSJ") {
             Want::Joints
         } else {
             Want::Pose
         };
-        let (mut number, arguments) = (0, arguments(&statement[1..]));
-        for argument in arguments {
-            let Some(first) = argument.first() else {
-                number += 1;
-                continue;
-            };
+        let mut number = 0;
+        for argument in arguments(&statement[1..]) {
             // `MoveL \Conc, p10, ...`
-            if first.is(b'\\') {
-                self.others(argument, format!("an argument of `{name}`"));
+            if argument.first().is_some_and(|first| first.is(b'\\')) {
+                self.others(argument, &format!("an argument of `{name}`"));
                 continue;
             }
-            if positions.contains(&number) {
+            if !argument.is_empty() && positions.contains(&number) {
                 self.position(argument, want);
             } else {
-                self.others(
-                    argument,
-                    format!("an argument of `{name}` that is no position"),
-                );
+                let place = format!("an argument of `{name}` that is no position");
+                self.others(argument, &place);
             }
             number += 1;
         }
     }
 
     fn position(&mut self, argument: &[Token], want: Want) {
-        if argument[0].is(b'[') {
-            let list = List::read(self.source, argument);
-            match argument.get(list.tokens) {
-                Some(stray) if !stray.is(b'\\') => {
-                    let text = quoted(self.source.bytes, stray.span.clone());
-                    self.found.fault(
-                        stray.span.start,
-                        format!("{text} behind a target is not understood"),
-                    );
-                }
-                _ => {
-                    list.take(want, false, &mut self.found);
-                    self.others(&argument[list.tokens..], "an optional argument".into());
-                }
-            }
-            return;
+        if !argument[0].is(b'[') {
+            self.computed(argument, true);
+            return self.others(argument, "an expression");
         }
-        self.computed(argument, true);
-        self.others(argument, "an expression".into());
+        let list = List::read(argument);
+        match argument.get(list.tokens) {
+            Some(stray) if !stray.is(b'\\') => self.0.stray(stray, "behind a target"),
+            _ => {
+                list.take(want, false, &mut self.0);
+                self.others(&argument[list.tokens..], "an optional argument");
+            }
+        }
     }
 
     /// A call in the place of a target; where that is not sure, those that give one.
@@ -439,99 +344,71 @@ impl Reader<'_> {
         let [function, bracket, ..] = tokens else {
             return;
         };
-        let name = quoted(self.source.bytes, function.span.clone());
-        if !bracket.is(b'(') {
+        let does = if !bracket.is(b'(') {
             return;
-        }
-        if self.source.is_word(function, &["OFFS", "RELTOOL"]) {
-            let message = "shifts its target; where that one is corrected, the shifted one gets the same correction";
-            self.found.warn(
-                function.span.start,
-                format!("left as it is: {name} {message}"),
-            );
+        } else if function.is_word(&["OFFS", "RELTOOL"]) {
+            "shifts its target; where that one is corrected, the shifted one gets the same correction"
         } else if target {
-            self.found.warn(
-                function.span.start,
-                format!("left as it is: {name} computes the target"),
-            );
-        }
+            "computes the target"
+        } else {
+            return;
+        };
+        let message = format!("left as it is: {} {does}", function.quoted());
+        self.0.warn(function.start, message);
     }
 }
 
-pub(super) fn listed(bytes: &[u8]) -> Declared {
+fn brackets_match(statement: &[Token], found: &mut Gathered) -> bool {
+    token::brackets_match(statement, &BRACKETS, "in its statement", found)
+}
+
+fn listed(bytes: &[u8]) -> Gathered {
     let mut found = Gathered::default();
-    let source = ProgramText {
-        bytes,
-        language: Language::Rapid,
-    };
-    let tokens = tokens(source, &mut found);
-    let statements = statements(source, &tokens, &mut found);
-    let mut reader = Reader {
-        source,
-        types: BTreeMap::new(),
-        names: Vec::new(),
-        found,
-    };
-    let (mut names, mut poses) = (Vec::new(), 0);
-    for statement in statements {
-        let Some((value, kind)) = declaration(source, statement)
-            .and_then(|declared| Some((declared.value?, declared.kind)))
+    let tokens = tokens(bytes, Language::Rapid, &mut found);
+    for statement in statements(&tokens, &mut found) {
+        let Some(Declaration {
+            kind,
+            value: Some(value),
+            ..
+        }) = declaration(statement)
         else {
             continue;
         };
-        if kind == "ROBTARGET" {
-            poses += 1;
-        }
-        if kind != "JOINTTARGET" || !reader.brackets_match(statement) {
+        found.poses += usize::from(kind == "ROBTARGET");
+        if kind != "JOINTTARGET" || !brackets_match(statement, &mut found) {
             continue;
         }
-        let name = name(source, statement);
+        // As it is written. Scope, storage and type are words, too; the name is the last one before a dimension or `:=`.
+        let words = statement
+            .iter()
+            .take_while(|token| token.sort == TokenKind::Word);
+        let name = words.last().map_or_else(String::new, Token::name);
         if !value.first().is_some_and(|first| first.is(b'[')) {
-            let at = value
-                .first()
-                .map_or(statement[0].span.start, |first| first.span.start);
-            reader.found.fault(
-                at,
-                format!("`{name}` is no list of numbers; expected [[6 joints], [6 external axes]]"),
-            );
+            let at = value.first().unwrap_or(&statement[0]).start;
+            let message =
+                format!("`{name}` is no list of numbers; expected [[6 joints], [6 external axes]]");
+            found.fault(at, message);
             continue;
         }
-        let list = List::read(source, value);
-        if list.tokens < value.len() {
-            reader.found.fault(
-                value[list.tokens].span.start,
-                format!("something behind the list of `{name}`; expected `;`"),
-            );
+        let list = List::read(value);
+        if let Some(stray) = value.get(list.tokens) {
+            let message = format!("something behind the list of `{name}`; expected `;`");
+            found.fault(stray.start, message);
             continue;
         }
         let (before, is_array) = (
-            reader.found.literals.len(),
+            found.literals.len(),
             value.get(2).is_some_and(|token| token.is(b'[')),
         );
-        list.take(Want::Joints, is_array, &mut reader.found);
-        let count = reader.found.literals.len() - before;
-        names.extend((1..=count).map(|k| {
-            if is_array {
-                format!("{name}{{{k}}}")
+        list.take(Want::Joints, is_array, &mut found);
+        for (k, at) in (before..found.literals.len()).enumerate() {
+            let name = if is_array {
+                format!("{name}{{{}}}", k + 1)
             } else {
                 name.clone()
-            }
-        }));
+            };
+            found.names.push((at..at + 1, name));
+        }
     }
-    Declared {
-        found: reader.found,
-        names,
-        poses,
-    }
-}
-
-/// The name that a declaration gives, as it is written.
-fn name(source: ProgramText, statement: &[Token]) -> String {
-    // Scope, storage and type are words, too; the name is the last one before a dimension or `:=`.
-    let words = statement
-        .iter()
-        .take_while(|token| token.sort == TokenKind::Word);
-    words.last().map_or_else(String::new, |word| {
-        String::from_utf8_lossy(&source.bytes[word.span.clone()]).into_owned()
-    })
+    found
 }

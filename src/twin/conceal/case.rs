@@ -1,4 +1,6 @@
 //! One concealed recording: a drawn robot, its errors, its effects sized to be as visible as drawn, and what was measured.
+//!
+//! A case as text: what the user has (robot.json, controller.csv, tracker.csv), and the truth that is sealed apart.
 
 use super::design::{Content, Design};
 use super::family::{Bench, Collection, Column, Draft};
@@ -7,12 +9,15 @@ use super::robots::Kind;
 use super::size::{Concealed, Sight, conceal};
 use super::visible::Site;
 use crate::effect::{HoldingFriction, Physical};
+use crate::folder::{Decimals, File, Log, pretty, robot};
+use crate::matrix;
 use crate::noise::{Noise, Purpose};
 use crate::plan::{Climate, Point, Poses};
 use crate::recorder::{Experiment, Motors, Shot};
 use crate::tracker::{SCATTERS, Scatter, Tracker};
-use crate::truth::{ARCSEC, CouplingError, LinkError, TrueRobot};
+use crate::truth::{ARCSEC, CouplingError, LinkError, TrueRobot, TrueValue};
 use calib_foundation::description::{Coupling, RobotDescription};
+use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
 /// A recording that was tampered with.
@@ -96,10 +101,8 @@ impl Case {
         let fit = points.unwrap_or_else(|| draw.size(50.0, 400.0).round() as usize);
         let validate = (draw.uniform(0.25, 0.5) * fit as f64).round().max(1.0) as usize;
         let climate = weather((fit + validate) as f64 * 19.0, beyond_list, &mut draw);
-        let limits = robot
-            .joints
-            .iter()
-            .map(|joint| joint.limits.unwrap_or_default());
+        let joints = robot.joints.iter();
+        let limits = joints.map(|joint| joint.limits.unwrap_or_default());
         let ranges: Vec<[f64; 2]> = limits.map(|limits| narrowed(limits, &mut draw)).collect();
         let amount = Amount {
             fit,
@@ -206,10 +209,8 @@ impl Case {
         let mut causes: Vec<&Concealed> = self.concealed.iter().filter(|one| which(one)).collect();
         causes.sort_by(|a, b| b.strength.total_cmp(&a.strength));
         let named = |one: &Concealed| (one.cause.effect, one.cause.place.clone());
-        let tampered = self
-            .tampered
-            .iter()
-            .map(|one| (one.effect, "recording".to_string()));
+        let tampered = self.tampered.iter();
+        let tampered = tampered.map(|one| (one.effect, "recording".to_string()));
         causes.into_iter().map(named).chain(tampered).collect()
     }
 }
@@ -218,10 +219,9 @@ impl Case {
 fn arm(design: &Design, draw: &mut Noise) -> (Kind, RobotDescription) {
     let kinds = design.kinds();
     let kind = kinds[draw.index(kinds.len())];
-    let aside = if draw.chance(0.5) {
-        draw.vector(30.0, 80.0).map(f64::round)
-    } else {
-        [0.0; 3]
+    let aside = match draw.chance(0.5) {
+        true => draw.vector(30.0, 80.0).map(f64::round),
+        false => [0.0; 3],
     };
     (kind, kind.description(aside))
 }
@@ -250,14 +250,10 @@ fn weather(lasts_s: f64, swings: bool, draw: &mut Noise) -> Climate {
 /// Friction, in half of the cases, and the motors that show it.
 fn drives(robot: &RobotDescription, bench: &Bench, draw: &mut Noise) -> (Vec<Physical>, Motors) {
     let share = if draw.chance(0.5) { 0.02 } else { 0.0 };
-    let mut friction = Vec::with_capacity(bench.peak.len());
-    for (joint, peak) in bench.peak.iter().enumerate() {
-        let torque_nm = share * draw.uniform(0.2, 1.0) * peak;
-        friction.push(Physical::HoldingFriction(HoldingFriction {
-            joint: joint + 1,
-            torque_nm,
-        }));
-    }
+    let of_joint = |(joint, peak): (usize, &f64)| {
+        HoldingFriction::effect(joint + 1, share * draw.uniform(0.2, 1.0) * peak)
+    };
+    let friction = bench.peak.iter().enumerate().map(of_joint).collect();
     let largest = robot.joints.iter().zip(&bench.peak).map(|(joint, peak)| {
         peak / (joint.reduction_ratio.unwrap_or(1.0) * joint.motor_constant.unwrap_or(1.0))
     });
@@ -272,14 +268,10 @@ fn drives(robot: &RobotDescription, bench: &Bench, draw: &mut Noise) -> (Vec<Phy
 fn errors(robot: &RobotDescription, draw: &mut Noise) -> TrueRobot {
     let joints = robot.joints.len();
     // A gear's error is a misjudged ratio: as large as the tool's turn allows to see, and larger on the big robot.
-    let gear = if joints == 6 && robot.payload_mass > 100.0 {
-        4e-4
-    } else {
-        1e-4
-    };
-    let offset_deg = (0..joints)
-        .map(|_| (5e-4 * draw.normal()).to_degrees())
-        .collect();
+    let is_big = joints == 6 && robot.payload_mass > 100.0;
+    let gear = if is_big { 4e-4 } else { 1e-4 };
+    let mut offset = || (5e-4 * draw.normal()).to_degrees();
+    let offset_deg = (0..joints).map(|_| offset()).collect();
     let ratio = (0..joints).map(|_| 1.0 + gear * draw.normal()).collect();
     let mut links = Vec::new();
     for link in 1..=joints {
@@ -343,10 +335,8 @@ fn narrowed(limits: [f64; 2], draw: &mut Noise) -> [f64; 2] {
 
 /// Columns that the recording lacks: what a form takes away, and now and then one that it can do without.
 fn hidden(drafts: &[Draft], draw: &mut Noise) -> BTreeSet<Column> {
-    let mut out: BTreeSet<Column> = drafts
-        .iter()
-        .flat_map(|draft| draft.hides.clone())
-        .collect();
+    let hides = drafts.iter().flat_map(|draft| &draft.hides);
+    let mut out: BTreeSet<Column> = hides.copied().collect();
     for (column, share) in [
         (Column::Temperature, 0.15),
         (Column::Current, 0.12),
@@ -364,33 +354,151 @@ fn hidden(drafts: &[Draft], draw: &mut Noise) -> BTreeSet<Column> {
 /// Gross errors at one to three points to fit, or two points exchanged.
 fn tamper(design: &Design, shots: &mut [Shot], fit: usize, draw: &mut Noise) -> Vec<Tampering> {
     let (faulty, exchanged) = (draw.chance(design.faulty), draw.chance(0.4));
-    let last = shots
-        .iter()
-        .filter(|shot| shot.block == FIT)
-        .count()
-        .min(fit);
+    let to_fit = shots.iter().filter(|shot| shot.block == FIT);
+    let last = to_fit.count().min(fit);
     if !faulty || last < 10 {
         return Vec::new();
     }
     let first = draw.index(last - 5);
     if exchanged {
         let second = first + 1 + draw.index(4);
-        let (a, b) = (shots[first].position, shots[second].position);
-        (shots[first].position, shots[second].position) = (b, a);
-        return vec![Tampering {
-            effect: "mislabelled_point",
-            rows: vec![first, second],
-        }];
+        let positions = [first, second].map(|row| shots[row].position);
+        [shots[second].position, shots[first].position] = positions;
+        let (effect, rows) = ("mislabelled_point", vec![first, second]);
+        return vec![Tampering { effect, rows }];
     }
     let mut rows: Vec<usize> = (0..1 + draw.index(3)).map(|_| draw.index(last)).collect();
     rows.sort_unstable();
     rows.dedup();
     for row in &rows {
         let jump = draw.vector(0.5e-3, 4e-3);
-        shots[*row].position = std::array::from_fn(|axis| shots[*row].position[axis] + jump[axis]);
+        shots[*row].position = matrix::add(shots[*row].position, jump);
     }
-    vec![Tampering {
-        effect: "outlier",
-        rows,
-    }]
+    let effect = "outlier";
+    vec![Tampering { effect, rows }]
+}
+
+/// A controller's display and a tracker's.
+const DECIMALS: Decimals = Decimals {
+    angle: 4,
+    length: 5,
+    time: 2,
+};
+
+impl Case {
+    /// The files that a user has; fails with what of the robot they cannot state.
+    pub fn recording(&self) -> Result<[File; 3], String> {
+        let log = self.log();
+        Ok([
+            ("robot.json", robot(&self.stated())?),
+            ("controller.csv", log.controller(DECIMALS)),
+            ("tracker.csv", log.tracker(DECIMALS)),
+        ])
+    }
+
+    /// The robot as its file states it.
+    fn stated(&self) -> RobotDescription {
+        let mut stated = self.robot.clone();
+        for joint in stated.joints.iter_mut().filter(|_| self.bare) {
+            (joint.mass, joint.centre) = (None, None);
+        }
+        stated
+    }
+
+    /// The truth.
+    pub fn sealed(&self) -> String {
+        let pair =
+            |(effect, place): &(&'static str, String)| json!({ "effect": effect, "where": place });
+        let hidden: Vec<&str> = self.hidden.iter().map(|column| column.name()).collect();
+        let tampered = self.tampered.iter().map(|one| {
+            let points: Vec<String> = one.rows.iter().map(|row| id(*row)).collect();
+            json!({ "effect": one.effect, "where": "recording", "points": points })
+        });
+        let families = self.collection.families();
+        let (family, content) = match self.content {
+            Content::Null => (String::new(), "null"),
+            Content::Single(row) if families[row].name == "unknown" => ("unknown".into(), "open"),
+            Content::Single(row) => (families[row].name.into(), "single"),
+            Content::Foreign => ("unknown".into(), "foreign"),
+            Content::Pair(a, b) => (format!("{}+{}", families[a].name, families[b].name), "pair"),
+        };
+        pretty(&json!({
+            "case": self.name,
+            "content": content,
+            "family": family,
+            "seed": self.seed,
+            "robot": self.kind.name(),
+            "want": self.want().iter().map(pair).collect::<Vec<_>>(),
+            // Whole answers that are as good as `want`; single names that neither count nor hurt.
+            "accept": [self.want_all().iter().map(pair).collect::<Vec<_>>()],
+            "accepted": self.accepted.iter().map(pair).collect::<Vec<_>>(),
+            "effects": self.concealed.iter().map(effect).collect::<Vec<_>>(),
+            "tampered": tampered.collect::<Vec<_>>(),
+            "hidden_columns": hidden,
+            "points": { "fit": self.fit, "validate": self.shots.len() - self.fit },
+            "geometry_rank": self.geometry_rank,
+            "noise": {
+                "fit_rms_per_axis_mm": self.noise_mm[0],
+                "validate_rms_per_axis_mm": self.noise_mm[1],
+                "unseen_rms_per_axis_mm": self.unseen_mm,
+                "joint_repeatability_rad": self.play_rad,
+                "scatter": self.tracker.scatter,
+            },
+            // The whole robot in the settings of the stage `simulate`, effects apart: it can be measured again.
+            "tracker": self.tracker,
+            "climate": self.climate,
+            "true": self.truth,
+            "motors": self.motors,
+            "friction": self.friction,
+        }))
+    }
+
+    fn log(&self) -> Log {
+        let shown = |column: Column| !self.hidden.contains(&column);
+        let each = |value: fn(&Shot) -> f64| self.shots.iter().map(value).collect::<Vec<f64>>();
+        let joints = |value: fn(&Shot) -> &Vec<f64>| -> Vec<f64> {
+            self.shots.iter().flat_map(value).copied().collect()
+        };
+        let usage = |shot: &Shot| if shot.block == FIT { "fit" } else { "validate" }.to_string();
+        Log {
+            joints: self.robot.joints.len(),
+            id: (0..self.shots.len()).map(id).collect(),
+            time_s: shown(Column::Time).then(|| each(|shot| shot.time_s)),
+            usage: self.shots.iter().map(usage).collect(),
+            payload_kg: self.payload_kg.clone(),
+            q: joints(|shot| &shot.q),
+            current: shown(Column::Current).then(|| joints(|shot| &shot.current)),
+            direction: shown(Column::Direction).then(|| joints(|shot| &shot.direction)),
+            velocity: None,
+            at_once: false,
+            temperature_c: shown(Column::Temperature).then(|| self.thermometer_c.clone()),
+            position: self.shots.iter().map(|shot| shot.position).collect(),
+        }
+    }
+}
+
+fn id(row: usize) -> String {
+    format!("P{:04}", row + 1)
+}
+
+fn effect(one: &Concealed) -> Value {
+    let number = |one: TrueValue| json!({ "name": one.name, "value": one.value, "unit": one.unit });
+    let numbers = one.cause.physical.iter().flat_map(|effect| effect.truth());
+    let numbers = numbers.map(number);
+    let mut out = json!({
+        "effect": one.cause.effect,
+        "where": one.cause.place,
+        "form": one.form,
+        "wanted": one.cause.wanted,
+        "L": one.strength,
+        "L_alone": one.strength_alone,
+        "rms_mm": one.raw_mm,
+        "visible_rms_mm": one.visible_mm,
+        "parameters": numbers.collect::<Vec<_>>(),
+        "physical": one.cause.physical,
+    });
+    if one.strange {
+        out["strange"] = json!(true);
+    }
+    out
 }

@@ -3,7 +3,7 @@
 use super::family::{Collection, DrawEffect};
 use super::points::Layout;
 use super::robots::Kind;
-use crate::families::Family;
+use crate::lists::Family;
 use crate::noise::{Noise, Purpose};
 use crate::tracker::Scatter;
 

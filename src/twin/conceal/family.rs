@@ -11,12 +11,12 @@ pub use table::{BEYOND, FAMILIES};
 use super::robots::{ALL_KINDS, KINDS, Kind};
 use crate::arm::Arm;
 use crate::effect::{JointCompliance, Physical};
-use crate::equilibrium::settle;
-use crate::families::{Family, families};
+use crate::lists::named;
+use crate::lists::{Family, families};
 use crate::matrix::{self, Vector};
-use crate::names::named;
 use crate::noise::Noise;
 use crate::plan::Point;
+use crate::recorder::settle;
 use crate::truth::ARCSEC;
 use calib_foundation::description::RobotDescription;
 

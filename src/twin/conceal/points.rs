@@ -3,7 +3,7 @@
 
 use super::robots::Kind;
 use crate::arm::Arm;
-use crate::names::named;
+use crate::lists::named;
 use crate::noise::{Noise, Purpose};
 use crate::plan::{self, Climate, Point, Poses};
 use crate::truth::TrueRobot;

@@ -1,6 +1,6 @@
 //! The robots of concealed recordings: nominal descriptions typed from data sheets, with plausible masses and motors.
 
-use crate::names::named;
+use crate::lists::named;
 use calib_foundation::description::{
     Coupling, DeclaredInertias, JointDescription, JointKind, RobotDescription,
 };

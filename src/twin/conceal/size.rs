@@ -3,9 +3,8 @@
 use super::design::{Content, Design};
 use super::family::{Bench, Cause, Collection, Draft, foreign::foreign};
 use super::visible::Site;
-use crate::effect::Physical;
+use crate::matrix::{Column, Shadow, length};
 use crate::noise::Noise;
-use crate::shadow::{Column, Shadow, norm};
 
 /// A cause with how visible it is at the points to fit.
 #[derive(Debug, Clone)]
@@ -38,15 +37,13 @@ pub(super) struct Sight<'a> {
 impl Sight<'_> {
     /// Visibility of a displacement that nothing absorbs.
     fn strength(&self, column: &[f64]) -> f64 {
-        (norm(column) / self.noise).powi(2)
+        (length(column) / self.noise).powi(2)
     }
 }
 
 impl Cause {
     fn scale(&mut self, by: f64) {
-        for effect in &mut self.physical {
-            *effect = effect.scaled(by);
-        }
+        self.physical.iter_mut().for_each(|effect| effect.scale(by));
     }
 }
 
@@ -99,7 +96,7 @@ pub(super) fn conceal(
                 // The whole displacement counts. Twice: what hangs on the load is not quite proportional.
                 for _ in 0..2 {
                     let whole = alone(&causes, 0, sight.site);
-                    let found = norm(&whole) / (whole.len().max(1) as f64).sqrt() / sight.noise;
+                    let found = length(&whole) / (whole.len().max(1) as f64).sqrt() / sight.noise;
                     causes[0].0.scale(ratio / found.max(1e-6));
                 }
                 Some((draft, causes))
@@ -151,9 +148,8 @@ pub(super) fn conceal(
         let found = sight.strength(&column).max(1e-9);
         // What is of natural size stays so, but where it would be too plain to test anything.
         let wanted = if natural { found.min(PLAINEST) } else { wanted };
-        causes[index]
-            .0
-            .scale((wanted / found).sqrt().clamp(SMALLEST, LARGEST));
+        let factor = (wanted / found).sqrt().clamp(SMALLEST, LARGEST);
+        causes[index].0.scale(factor);
     }
     (drafts, seen(causes, sight))
 }
@@ -187,14 +183,9 @@ fn seen(causes: Vec<Formed>, sight: &Sight) -> Vec<Concealed> {
     let columns: Vec<Column> = (0..causes.len())
         .map(|index| alone(&causes, index, site))
         .collect();
-    let rms = |column: &[f64]| 1e3 * norm(column) / (column.len().max(1) as f64).sqrt();
+    let rms = |column: &[f64]| 1e3 * length(column) / (column.len().max(1) as f64).sqrt();
     let seen = |(index, (cause, form)): (usize, Formed)| {
-        let mut others = shadow.clone();
-        let columns_of_others = columns
-            .iter()
-            .enumerate()
-            .filter(|(other, _)| *other != index);
-        columns_of_others.for_each(|(_, column)| others.add(column.clone()));
+        let others = shadow.with_others(&columns, index);
         let visible = others.outside(columns[index].clone());
         Concealed {
             cause,
@@ -212,18 +203,13 @@ fn seen(causes: Vec<Formed>, sight: &Sight) -> Vec<Concealed> {
 /// What one cause does in company of all others: the displacement with all of them less that without it, m.
 fn alone(causes: &[Formed], index: usize, site: &Site) -> Column {
     let displacement = |skipped: Option<usize>| {
-        let kept = causes
-            .iter()
-            .enumerate()
-            .filter(|(other, _)| Some(*other) != skipped);
-        let effects: Vec<Physical> = kept
-            .flat_map(|(_, (cause, _))| cause.physical.clone())
-            .collect();
-        site.displacement(&effects)
+        let kept = causes.iter().enumerate();
+        let kept = kept.filter(|(other, _)| Some(*other) != skipped);
+        let effects = kept.flat_map(|(_, (cause, _))| cause.physical.clone());
+        site.displacement(&effects.collect::<Vec<_>>())
     };
-    let (with, without) = (displacement(None), displacement(Some(index)));
-    with.iter()
-        .zip(&without)
-        .map(|(with, without)| with - without)
-        .collect()
+    let pairs = displacement(None)
+        .into_iter()
+        .zip(displacement(Some(index)));
+    pairs.map(|(with, without)| with - without).collect()
 }

@@ -3,9 +3,9 @@
 
 use crate::arm::{Arm, Motion, Row};
 use crate::effect::{self, Physical};
-use crate::equilibrium::{Equilibrium, settle, sighted};
+use crate::matrix::{Column, Shadow, length};
 use crate::plan::Point;
-use crate::shadow::{Column, Shadow, norm};
+use crate::recorder::{Equilibrium, settle, sighted};
 use crate::tracker::Tracker;
 use crate::truth::TrueRobot;
 use crate::{matrix, memory};
@@ -99,7 +99,7 @@ impl Site<'_> {
         let [all, known] = [effects, &known].map(|effects| self.displacement(effects));
         let judged = all.iter().zip(&known).skip(3 * fit);
         let judged: Column = judged.map(|(all, known)| all - known).collect();
-        norm(&judged) / (judged.len().max(1) as f64).sqrt()
+        length(&judged) / (judged.len().max(1) as f64).sqrt()
     }
 
     /// Central differences by every number of geometry, gears, couplings and the tracker's pose.

@@ -1,6 +1,6 @@
 //! An effect that nobody listed: a drawn shape of one variable, or a product of two, in one direction of motion anywhere on the chain.
 
-use super::{Act, Motion, State, Stated, TrueValue, true_value};
+use super::{Act, Motion, State, Stated, TrueValue, true_values};
 use crate::arm::Row;
 use crate::matrix::{self, Matrix, Vector};
 use crate::memory::Moment;
@@ -145,9 +145,8 @@ impl Foreign {
     /// Product of the shapes in what is seen.
     fn share(&self, seen: &Seen) -> f64 {
         let courses = self.courses.iter();
-        courses
-            .map(|course| course.shape.value(course.way(course.over.value(seen))))
-            .product()
+        let values = courses.map(|one| one.shape.value(one.way(one.over.value(seen))));
+        values.product()
     }
 
     /// The motion, m or rad along its direction.
@@ -190,11 +189,8 @@ impl Act for Foreign {
         }
     }
     fn remember(&self, past: &[Moment]) -> Vec<f64> {
-        self.courses
-            .iter()
-            .map(|course| course.over.remember(past))
-            .find(|all| !all.is_empty())
-            .unwrap_or_default()
+        let mut all = self.courses.iter().map(|course| course.over.remember(past));
+        all.find(|all| !all.is_empty()).unwrap_or_default()
     }
     fn sight(&self, row: &Row, memory: f64, point: Vector) -> Vector {
         if !self.motion.is_sighted() {
@@ -231,9 +227,7 @@ impl Stated for Foreign {
             "um"
         };
         let place = self.motion.place(self.seat);
-        vec![true_value(
-            "unknown", "foreign", place, "size", unit, self.size,
-        )]
+        true_values("unknown", "foreign", &place, [("size", unit, self.size)])
     }
 }
 
@@ -308,9 +302,8 @@ impl ForeignVariable {
             Self::Slipping(joint, limit) => {
                 let mut stretch: f64 = 0.0;
                 let live = |moment: &Moment| {
-                    moment
-                        .travels(joint)
-                        .for_each(|way| stretch = (stretch + way).max(-limit).min(limit));
+                    let ways = moment.travels(joint);
+                    ways.for_each(|way| stretch = (stretch + way).max(-limit).min(limit));
                     stretch
                 };
                 past.iter().map(live).collect()
@@ -347,10 +340,10 @@ impl ForeignShape {
     fn value(&self, x: f64) -> f64 {
         match self {
             Self::Straight => 2.0 * x - 1.0,
-            Self::Smooth(waves) => waves
-                .iter()
-                .map(|[amplitude, rate, phase]| amplitude * (rate * x + phase).cos())
-                .sum(),
+            Self::Smooth(waves) => {
+                let wave = |[size, rate, phase]: &[f64; 3]| size * (rate * x + phase).cos();
+                waves.iter().map(wave).sum()
+            }
             Self::Corners(points) => {
                 let after = points.iter().position(|[at, _]| *at > x);
                 let (before, after) = points.split_at(after.unwrap_or(points.len()));

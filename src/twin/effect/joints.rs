@@ -3,8 +3,8 @@
 use super::{Act, Motion, State, Stated, TrueValue, angle_of, effect, sine_and_cosine};
 use crate::matrix;
 use crate::memory::{self, Moment};
-use crate::true_value::true_values;
 use crate::truth::ARCSEC;
+use crate::truth::true_values;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -16,13 +16,14 @@ pub use tracker::*;
 use super::arm::{Arm, Posture};
 use super::matrix::Vector;
 use super::memory::Moment;
-use super::true_value::{TrueValue, true_value};
+use super::truth::{TrueValue, true_values};
 use crate::arm::{Loads, Motion, Row};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::ops::{Deref, DerefMut};
 
 /// What an effect may look at: the row, and the arm as it hangs at present.
-pub(crate) struct State<'a> {
+pub struct State<'a> {
     /// As it really is.
     pub(crate) arm: &'a Arm,
     /// What is recorded at this point.
@@ -70,7 +71,7 @@ fn angle_of(state: &State, joint: usize) -> f64 {
 }
 
 /// An effect of the twin.
-trait Act: Stated {
+pub trait Act: Stated {
     /// Adds what the effect does in `state` to `motion`.
     fn act(&self, _state: &State, _motion: &mut Motion) {}
     /// Changes what the arm is for the whole recording: masses and centres.
@@ -96,7 +97,7 @@ trait Act: Stated {
 }
 
 /// The numbers of an effect.
-trait Stated {
+pub trait Stated {
     /// The joint or link that it sits on, from 1, where it has one.
     fn seat(&self) -> Option<usize> {
         None
@@ -158,8 +159,8 @@ macro_rules! effect {
             fn scale(&mut self, by: f64) {
                 $( $crate::effect::Size::scale(&mut self.$size, by); )+
             }
-            fn truth(&$me) -> Vec<$crate::true_value::TrueValue> {
-                $crate::true_value::true_values($effect, $tag, $place, $numbers)
+            fn truth(&$me) -> Vec<$crate::truth::TrueValue> {
+                $crate::truth::true_values($effect, $tag, $place, $numbers)
             }
         }
         $crate::effect::effect! { @act $name $($law)* }
@@ -229,11 +230,14 @@ macro_rules! physical {
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(rename_all = "snake_case")]
         pub enum Physical { $( #[doc = $doc] $name($name), )+ }
-        impl Physical {
-            fn inner(&self) -> &dyn Act {
+        impl Deref for Physical {
+            type Target = dyn Act;
+            fn deref(&self) -> &Self::Target {
                 match self { $( Physical::$name(effect) => effect, )+ }
             }
-            fn inner_mut(&mut self) -> &mut dyn Act {
+        }
+        impl DerefMut for Physical {
+            fn deref_mut(&mut self) -> &mut Self::Target {
                 match self { $( Physical::$name(effect) => effect, )+ }
             }
         }
@@ -287,43 +291,9 @@ physical! {
 }
 
 impl Physical {
-    /// Adds what the effect does in `state` to `motion`.
-    pub(crate) fn act(&self, state: &State, motion: &mut Motion) {
-        self.inner().act(state, motion);
-    }
-    /// Changes what the arm is for the whole recording.
-    pub(crate) fn shape(&self, arm: &mut Arm) {
-        self.inner().shape(arm);
-    }
-    /// What the tracker reads of a point, m in its frame.
-    pub fn sight(&self, row: &Row, memory: f64, point: Vector) -> Vector {
-        self.inner().sight(row, memory, point)
-    }
-    /// Changes what the controller logs of the joint positions `q` after a move from `before`, rad or m.
-    pub(crate) fn log(&self, q: &mut [f64], before: &[f64]) {
-        self.inner().log(q, before);
-    }
-    /// How much later than the joints beside it a point is measured, s.
-    pub(crate) fn later(&self) -> f64 {
-        self.inner().later()
-    }
-    /// Whether a standing arm knows nothing of it.
-    pub fn moves_only(&self) -> bool {
-        self.inner().moves_only()
-    }
-    /// The same effect, `by` times as large.
-    pub(crate) fn scaled(&self, by: f64) -> Physical {
-        let mut out = self.clone();
-        out.inner_mut().scale(by);
-        out
-    }
-    /// Its true numbers in canonical names.
-    pub fn truth(&self) -> Vec<TrueValue> {
-        self.inner().truth()
-    }
     /// What is wrong with its seat on a robot of so many joints.
     pub fn fault(&self, joints: usize) -> Option<String> {
-        let seat = self.inner().seat()?;
+        let seat = self.seat()?;
         (!(1..=joints).contains(&seat))
             .then(|| format!("sits on joint or link {seat}; allowed: 1 to {joints}"))
     }
@@ -331,19 +301,13 @@ impl Physical {
 
 /// What every effect makes of the rows before, row by row: [`Row::memory`] of each.
 pub fn recall(effects: &[Physical], past: &[Moment]) -> Vec<Vec<f64>> {
-    let torques: Vec<Vec<f64>> = effects
-        .iter()
-        .map(|effect| effect.inner().remember(past))
-        .collect();
-    if torques.iter().all(Vec::is_empty) {
+    let memories: Vec<Vec<f64>> = effects.iter().map(|effect| effect.remember(past)).collect();
+    if memories.iter().all(Vec::is_empty) {
         return vec![Vec::new(); past.len()];
     }
-    (0..past.len())
-        .map(|row| {
-            torques
-                .iter()
-                .map(|all| all.get(row).copied().unwrap_or(0.0))
-                .collect()
-        })
-        .collect()
+    let of_row = |row: usize| {
+        let values = memories.iter().map(|all| all.get(row).copied());
+        values.map(Option::unwrap_or_default).collect()
+    };
+    (0..past.len()).map(of_row).collect()
 }

@@ -99,13 +99,10 @@ impl Board {
     /// Due causes whose formula the library has, or has not: outcomes, and the mean probability that the true name was given.
     fn by_formula(&self, shared: bool) -> Value {
         let is_twins = |cause: &&Marked| cause.strange || TWINS_FORMS.contains(&&*cause.form);
-        let causes: Vec<&Marked> = (self.due().into_iter())
-            .filter(|cause| is_twins(cause) != shared)
-            .collect();
-        let stated: Vec<f64> = causes
-            .iter()
-            .filter_map(|cause| cause.probability)
-            .collect();
+        let mut causes = self.due();
+        causes.retain(|cause| is_twins(cause) != shared);
+        let stated = causes.iter().filter_map(|cause| cause.probability);
+        let stated: Vec<f64> = stated.collect();
         let mean = (!stated.is_empty()).then(|| stated.iter().sum::<f64>() / stated.len() as f64);
         json!({ "shared": shared, "outcomes": outcomes(causes), "mean_probability": mean })
     }
@@ -152,27 +149,22 @@ impl Board {
         let both = format!("two effects of L {DUE} or more, both named and nothing else");
         let faults = self.cases.iter().flat_map(|case| &case.tampered);
         let faults = Share::by_kind(faults.map(|(kind, named)| (kind.as_str(), *named)));
+        let alarms = "false alarms in recordings without an effect";
+        let strays = "recordings with effects in which something was named that is not there";
         let shares = [
-            (
-                "false alarms in recordings without an effect",
-                self.named_besides(true),
-            ),
-            (
-                "recordings with effects in which something was named that is not there",
-                self.named_besides(false),
-            ),
-            (
-                both.as_str(),
-                Share::of(pairs().map(|case| case.right(DUE))),
-            ),
+            (alarms, self.named_besides(true)),
+            (strays, self.named_besides(false)),
+            (&both, Share::of(pairs().map(|case| case.right(DUE)))),
             ("the stronger one named", Share::of(pairs().map(strongest))),
         ];
-        let named = |(what, share): (&str, Share)| json!({ "what": what, "share": share });
-        let faults = faults
-            .into_iter()
-            .map(|(kind, share)| (format!("{kind} named"), share));
-        let faults = faults.map(|(what, share)| named((&what, share)));
-        shares.into_iter().map(named).chain(faults).collect()
+        let named = |what: &str, share: Share| json!({ "what": what, "share": share });
+        let mut out: Vec<Value> = shares.map(|(what, share)| named(what, share)).into();
+        out.extend(
+            faults
+                .into_iter()
+                .map(|(kind, share)| named(&format!("{kind} named"), share)),
+        );
+        out
     }
 
     /// Held-out errors of recordings with a due effect, or of those without any.
@@ -221,13 +213,13 @@ impl Board {
         });
         let due = || self.left_out.iter().filter(|one| one.strength >= DUE);
         let is_both = |case: &&Case| due().any(|one| one.name == case.name);
-        let listed = self.cases.iter().filter(is_both);
-        let listed: Vec<&Statement> = listed.flat_map(|case| &case.statements).collect();
-        let without: Vec<&Statement> = due().flat_map(|one| &one.statements).collect();
-        let hidden: Vec<&Statement> = self
-            .without(false)
-            .flat_map(|one| &one.statements)
-            .collect();
+        let listed = all(self
+            .cases
+            .iter()
+            .filter(is_both)
+            .map(|case| &case.statements));
+        let without = all(due().map(|one| &one.statements));
+        let hidden = all(self.without(false).map(|one| &one.statements));
         let mixed =
             |unlisted| json!({ "unlisted": unlisted, "bins": mixed(&listed, &without, unlisted) });
         json!({
@@ -250,16 +242,12 @@ impl Board {
         let mut by_effect: BTreeMap<&str, Vec<&Marked>> = BTreeMap::new();
         (due.iter()).for_each(|cause| by_effect.entry(&cause.effect).or_default().push(cause));
         let of_effects = |figures: fn(&[&Marked]) -> Value| -> BTreeMap<&str, Value> {
-            by_effect
-                .iter()
+            let effects = by_effect.iter();
+            effects
                 .map(|(name, causes)| (*name, figures(causes)))
                 .collect()
         };
-        let statements: Vec<&Statement> = self
-            .cases
-            .iter()
-            .flat_map(|case| &case.statements)
-            .collect();
+        let statements = all(self.cases.iter().map(|case| &case.statements));
         let by_formula = [true, false].map(|shared| self.by_formula(shared));
         let missing = self.missing.iter();
         let [held_out, null] = [true, false].map(|due| self.held_out(due));
@@ -295,41 +283,31 @@ impl Board {
         let called = |one: &LeftOut| {
             let (name, probability) = one.wrong.as_ref().filter(|(_, p)| *p >= GIVEN)?;
             let (case, effect) = (&one.name, &one.effect);
-            Some(format!(
-                "{case}: {effect} is called {name} with {probability:.2}"
-            ))
+            let line = format!("{case}: {effect} is called {name} with {probability:.2}");
+            Some(line)
         };
-        let called = [true, false].map(|tells| {
-            self.without(tells)
-                .filter_map(called)
-                .collect::<Vec<String>>()
-        });
+        let called = [true, false]
+            .map(|tells| -> Vec<String> { self.without(tells).filter_map(called).collect() });
         let mut verdicts: BTreeMap<(&str, &str), usize> = BTreeMap::new();
         for case in &self.cases {
             *verdicts.entry((&case.content, &case.verdict)).or_default() += 1;
         }
-        let verdicts: Vec<String> = verdicts
-            .into_iter()
-            .map(|((content, verdict), count)| format!("{content}: {verdict} {count}"))
-            .collect();
+        let line = |((content, verdict), count)| format!("{content}: {verdict} {count}");
+        let verdicts: Vec<String> = verdicts.into_iter().map(line).collect();
         json!({ "within": within, "called": called, "verdicts": verdicts })
     }
 }
 
+/// Statements of several.
+fn all<'a>(several: impl Iterator<Item = &'a Vec<Statement>>) -> Vec<&'a Statement> {
+    several.flatten().collect()
+}
+
 fn failure(case: &Case) -> String {
-    let cause = |cause: &Marked| {
-        let Marked {
-            effect,
-            place,
-            form,
-            strength,
-            outcome,
-            ..
-        } = cause;
-        format!(
-            "{effect} at {place} [{form}, L {strength:.0}: {}]",
-            outcome.name()
-        )
+    let cause = |one: &Marked| {
+        let (effect, place, form) = (&one.effect, &one.place, &one.form);
+        let (strength, outcome) = (one.strength, one.outcome.name());
+        format!("{effect} at {place} [{form}, L {strength:.0}: {outcome}]")
     };
     let or = |all: Vec<String>, nothing: &str| match all.is_empty() {
         true => nothing.to_string(),
@@ -337,11 +315,6 @@ fn failure(case: &Case) -> String {
     };
     let wanted = or(case.causes.iter().map(cause).collect(), "nothing");
     let strays = or(case.strays.clone(), "nothing else");
-    let Case {
-        name,
-        robot,
-        points,
-        ..
-    } = case;
+    let (name, robot, points) = (&case.name, &case.robot, case.points);
     format!("  {name} ({robot}, {points} points): {wanted}; also named: {strays}")
 }

@@ -3,10 +3,9 @@
 //! Whether a diagnosis looked in the right place, gave no wrong name, and named `unknown` where it knew no name; and what it named when
 //! the causes of the recording were taken out of the list that it may name.
 
-use super::intervals::{Interval, intervals};
 use super::paper::{Answer, Atoms, Cause, Finding, Name, Truth, all_atoms, atoms};
-use super::stated::{Statement, statements};
-use crate::names::named;
+use super::stated::{Interval, Statement, intervals, statements};
+use crate::lists::named;
 use std::collections::BTreeSet;
 
 /// From this visibility on an effect should be named.
@@ -103,10 +102,8 @@ impl Case {
 
 fn label_of(finding: &Finding) -> String {
     // The names come from a file and go to a terminal.
-    format!("{} at {}", finding.effect, finding.place)
-        .chars()
-        .filter(|c| !c.is_control())
-        .collect()
+    let label = format!("{} at {}", finding.effect, finding.place);
+    label.chars().filter(|c| !c.is_control()).collect()
 }
 
 /// Everything that a finding may mean.
@@ -159,7 +156,7 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
         }
     });
     let faults = truth.tampered.iter().map(|fault| &fault.effect);
-    let numbers = truth.effects.iter();
+    let stated = |cause| intervals(cause, &answer.findings);
     let named = |name: &str| answer.findings.iter().any(|finding| finding.effect == name);
     Case {
         name: truth.case.clone(),
@@ -170,9 +167,7 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
         causes: causes.collect(),
         tampered: faults.map(|fault| (fault.clone(), named(fault))).collect(),
         held_out: held_out(truth, answer),
-        intervals: numbers
-            .flat_map(|cause| intervals(cause, &answer.findings))
-            .collect(),
+        intervals: truth.effects.iter().flat_map(stated).collect(),
         statements: statements(&answer.findings, &true_names, &accepted_names),
         strays,
     }
@@ -231,22 +226,12 @@ fn places(names: &Atoms) -> BTreeSet<&str> {
 fn placed(cause: &Cause, truth: &Truth, findings: &[Finding], known: &Atoms) -> Placed {
     let accepts = cause.atoms();
     let accepted = all_atoms(&truth.accepted);
-    let right: BTreeSet<&str> = places(&accepts)
-        .union(&places(&accepted))
-        .copied()
-        .collect();
+    let right = &places(&accepts) | &places(&accepted);
     let others: Atoms = truth.effects.iter().flat_map(Cause::atoms).collect();
-    let elsewhere: BTreeSet<&str> = places(&others).difference(&right).copied().collect();
-
-    let named: Vec<(&Finding, Atoms)> = findings
-        .iter()
-        .map(|finding| (finding, finding.atoms()))
-        .collect();
-    let physical = || {
-        named
-            .iter()
-            .filter(|(finding, _)| !POINT_FAULTS.contains(&finding.effect.as_str()))
-    };
+    let elsewhere = &places(&others) - &right;
+    let all = findings.iter().map(|finding| (finding, finding.atoms()));
+    let named: Vec<(&Finding, Atoms)> = all.collect();
+    let is_physical = |finding: &Finding| !POINT_FAULTS.contains(&finding.effect.as_str());
     let there = |names: &Atoms| !places(names).is_disjoint(&right);
     let found: Atoms = named.iter().flat_map(|(_, names)| names.clone()).collect();
     let wrong = |finding: &Finding, names: &Atoms| {
@@ -254,17 +239,20 @@ fn placed(cause: &Cause, truth: &Truth, findings: &[Finding], known: &Atoms) -> 
             && names.is_disjoint(known)
             && (there(names) || reach(finding).is_disjoint(known))
     };
+    let any = |is: &dyn Fn(&Finding, &Atoms) -> bool| {
+        let mut named = named.iter();
+        named.any(|(finding, names)| is(finding, names))
+    };
+    let mut strongest = named.iter();
+    let strongest = strongest
+        .find(|(finding, names)| is_physical(finding) && !places(names).is_subset(&elsewhere));
     Placed {
-        place: physical()
-            .find(|(_, names)| !places(names).is_subset(&elsewhere))
-            .is_some_and(|(_, names)| there(names)),
+        place: strongest.is_some_and(|(_, names)| there(names)),
         name_or_unknown: accepts.is_subset(&found)
             || !accepted.is_disjoint(&found)
-            || named
-                .iter()
-                .any(|(finding, names)| finding.effect == NAMELESS && there(names)),
-        wrong_name: named.iter().any(|(finding, names)| wrong(finding, names)),
-        wrong_given: named.iter().any(|(finding, names)| {
+            || any(&|finding, names| finding.effect == NAMELESS && there(names)),
+        wrong_name: any(&wrong),
+        wrong_given: any(&|finding, names| {
             wrong(finding, names) && finding.probability.unwrap_or(1.0) >= GIVEN
         }),
     }
@@ -304,15 +292,11 @@ pub fn left_out(truth: &Truth, whole: &Answer, without: &Answer) -> Option<LeftO
     known.extend(places.flat_map(|place| atoms(NAMELESS, place)));
     known.extend(all_atoms(&truth.tampered));
     // What else is concealed is no wrong name, wanted or not.
-    let others = truth
-        .effects
-        .iter()
-        .filter(|other| other.effect != cause.effect);
+    let is_other = |other: &&Cause| other.effect != cause.effect;
+    let others = truth.effects.iter().filter(is_other);
     known.extend(others.flat_map(Cause::atoms));
-    let right: Vec<Atoms> = known
-        .iter()
-        .map(|name| Atoms::from([name.clone()]))
-        .collect();
+    let right = known.iter().map(|name| Atoms::from([name.clone()]));
+    let right: Vec<Atoms> = right.collect();
     let is_wrong =
         |finding: &&Finding| finding.effect != NAMELESS && finding.atoms().is_disjoint(&known);
     let wrong = without.findings.iter().filter(is_wrong);

@@ -2,13 +2,12 @@
 
 use super::family::{OPEN, Pool, TORQUES};
 use super::law::Law;
-use super::path::{moves, sines};
 use crate::conceal::design::Design;
 use crate::conceal::robots::{ALL_KINDS, Kind};
 use crate::matrix::{self, Vector};
 use crate::noise::{Noise, Purpose};
 use crate::torque::law::{Body, Machine};
-use crate::way::Path;
+use crate::way::{Path, moves, sines};
 use calib_foundation::description::{
     DeclaredInertias, InertiaMoments, JointDescription, MassTolerance, RobotDescription,
 };

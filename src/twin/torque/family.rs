@@ -1,7 +1,7 @@
 //! What one recording of torques may conceal in addition to the friction of all joints: a family of effects with sizes that arms have.
 
 use super::law::{Bristles, Fall, Law, Machine};
-use crate::families::families;
+use crate::lists::families;
 use crate::matrix;
 use crate::noise::Noise;
 

@@ -1,11 +1,16 @@
 //! A case measured: joints by encoders, torques by currents or sensors, with noise that lasts from row to row.
+//!
+//! A case as text: what the user has (robot.json, recording.csv), and the truth.
+//!
+//! A case once more: the same arm with further physics, on other paths or on a motion that is given, and its truth in numbers.
 
-use super::draw::TorqueCase;
-use super::law::{Law, Moment};
+use super::draw::{FITTED, TorqueCase, paths};
+use super::law::{Body, Fall, Law, Machine, Moment};
+use crate::folder::{File, Sheet, pretty, robot_json};
 use crate::matrix;
 use crate::noise::{Noise, Purpose};
-use crate::torque::law::Machine;
-use crate::way::JointState;
+use crate::way::{JointState, Path};
+use serde_json::{Value, json};
 
 /// Hz of the simulation, at least.
 const FINE: f64 = 500.0;
@@ -77,9 +82,8 @@ impl TorqueCase {
                     past = laws.iter().map(|law| law.begin(&rigid)).collect();
                 }
                 let mut friction = vec![0.0; n];
-                laws.iter()
-                    .filter_map(|law| law.plain_friction(&state))
-                    .for_each(|(joint, size)| friction[joint] += size);
+                let plain = laws.iter().filter_map(|law| law.plain_friction(&state));
+                plain.for_each(|(joint, size)| friction[joint] += size);
                 let mut torque = rigid.clone();
                 let now = Moment {
                     time: begin + time,
@@ -88,31 +92,10 @@ impl TorqueCase {
                     rigid: &rigid,
                     friction: &friction,
                 };
-                laws.iter()
-                    .zip(&mut past)
-                    .for_each(|(law, past)| law.add(&now, past, &mut torque));
-                for law in &laws {
-                    match law {
-                        Law::Contact {
-                            start,
-                            end,
-                            force,
-                            held,
-                        } if (*start..*end).contains(&(begin + time)) => {
-                            let part = (begin + time - start) / (end - start);
-                            let wave = (std::f64::consts::PI * part).sin();
-                            let push =
-                                force.map(|f| f * if *held { (3.0 * wave).min(1.0) } else { wave });
-                            let against = machine.against(&state.q, push);
-                            let joints = torque.iter_mut().zip(against);
-                            joints.for_each(|(torque, against)| *torque += against);
-                        }
-                        Law::TorqueConstant { joint, share, half } => {
-                            torque[*joint] *= 1.0 + share / (1.0 + torque[*joint].abs() / half);
-                        }
-                        _ => {}
-                    }
-                }
+                let pairs = laws.iter().zip(&mut past);
+                pairs.for_each(|(law, past)| law.add(&now, past, &mut torque));
+                let after = laws.iter();
+                after.for_each(|law| law.change_sum(&machine, &now, &mut torque));
                 fine.push(torque);
                 if k.is_multiple_of(fine_steps) {
                     rows.time.push(begin + time);
@@ -130,8 +113,8 @@ impl TorqueCase {
                 let at = (k as f64 - late / step).clamp(0.0, (fine.len() - 1) as f64);
                 let (low, part) = (at.floor() as usize, at.fract());
                 let high = (low + 1).min(fine.len() - 1);
-                rows.torque
-                    .extend((0..n).map(|j| fine[low][j] * (1.0 - part) + fine[high][j] * part));
+                let torque = |j: usize| fine[low][j] * (1.0 - part) + fine[high][j] * part;
+                rows.torque.extend((0..n).map(torque));
             }
             begin += duration + PAUSE;
         }
@@ -182,6 +165,29 @@ fn filtered(fine: &mut [Vec<f64>], step: f64) {
 }
 
 impl Law {
+    /// What touches the arm, and what is wrong with the sum of all torques.
+    fn change_sum(&self, machine: &Machine, now: &Moment, torque: &mut [f64]) {
+        match *self {
+            Self::Contact {
+                start,
+                end,
+                force,
+                held,
+            } if (start..end).contains(&now.time) => {
+                let part = (now.time - start) / (end - start);
+                let wave = (std::f64::consts::PI * part).sin();
+                let push = force.map(|f| f * if held { (3.0 * wave).min(1.0) } else { wave });
+                let against = machine.against(&now.state.q, push);
+                let joints = torque.iter_mut().zip(against);
+                joints.for_each(|(torque, against)| *torque += against);
+            }
+            Self::TorqueConstant { joint, share, half } => {
+                torque[joint] *= 1.0 + share / (1.0 + torque[joint].abs() / half);
+            }
+            _ => {}
+        }
+    }
+
     /// Changes the bodies or gravity.
     fn change(&self, machine: &mut Machine) {
         match self {
@@ -215,5 +221,148 @@ impl Law {
             }
             _ => {}
         }
+    }
+}
+
+impl TorqueCase {
+    /// robot.json and recording.csv.
+    pub fn recording(&self) -> [File; 2] {
+        let rows = self.csv(&self.true_rows());
+        [
+            ("robot.json", pretty(&self.robot_json())),
+            ("recording.csv", rows),
+        ]
+    }
+
+    /// The truth: what is concealed, with its numbers and how visible each effect is.
+    pub fn sealed(&self) -> String {
+        let rows = self.true_rows();
+        let pair = |effect: &str, place: &str| json!({ "effect": effect, "where": place });
+        let seen = self.visible(&rows);
+        let mut accepted = Vec::new();
+        let mut effects = Vec::new();
+        for (number, (law, seen)) in self.laws.iter().zip(&seen).enumerate() {
+            let kin = law.kin().iter().map(|effect| pair(effect, &law.place()));
+            let same = seen.same.iter().map(|(effect, place)| pair(effect, place));
+            let same: Vec<Value> = same.chain(kin).collect();
+            let other = law.is_of_another_form();
+            accepted.extend(same.iter().cloned());
+            effects.push(json!({
+                "effect": law.name(), "where": law.place(), "form": if other { "other" } else { "usual" }, "strange": other,
+                "wanted": number >= self.common, "same": same, "law": format!("{law:?}"),
+                "L": seen.l, "L_before_projection": seen.before, "parameters": [],
+            }));
+        }
+        let names: Vec<&str> = self.laws[self.common..].iter().map(Law::name).collect();
+        let to_fit = rows.to_fit();
+        pretty(&json!({
+            "case": self.name, "content": self.content, "family": names.join("+"), "robot": self.robot.name,
+            "seed": self.seed, "accepted": accepted, "effects": effects, "tampered": [],
+            "points": { "fit": to_fit, "validate": rows.validate.len() - to_fit },
+            "noise_nm": { "white": self.white, "lasting": self.lasting },
+        }))
+    }
+
+    fn csv(&self, rows: &TorqueRows) -> String {
+        let n = self.stated.axes.len();
+        let (angles, signal) = self.measured(rows);
+        let mut sheet = Sheet::default();
+        sheet.add("time_s", |row| format!("{:.3}", rows.time[row]));
+        sheet.add("traj", |row| rows.trajectory[row].to_string());
+        let usage = |validate| if validate { "validate" } else { "fit" };
+        sheet.add("use", move |row| usage(rows.validate[row]).into());
+        sheet.of_joints("q{}_deg", n, &angles, |angle| format!("{angle:.5}"));
+        match self.sensors {
+            true => sheet.of_joints("tau{}_nm", n, &signal, |torque| format!("{torque:.2}")),
+            false => sheet.of_joints("i{}_a", n, &signal, |current| format!("{current:.3}")),
+        }
+        sheet.text(rows.time.len())
+    }
+
+    /// What the robot file of points states, and what moving bodies take.
+    fn robot_json(&self) -> Value {
+        let (robot, moments) = (&self.robot, &self.robot.inertias);
+        let mut out = robot_json(robot).expect("an arm of the library has such a file");
+        out["inertia"] = json!(moments.links);
+        out["payload_inertia"] = json!(moments.payload);
+        out["gravity"] = json!(robot.gravity);
+        out["inertia_tolerance"] = json!(moments.tolerance.map(|one| {
+            json!({ "mass_rel": one.mass, "com_mm": one.centre * 1e3, "inertia_rel": one.inertia })
+        }));
+        out
+    }
+
+    /// The same arm with so much more on the tool (kg), the payload's centre off by so much (m).
+    pub fn carrying(self, mass: f64, centre: [f64; 3]) -> Self {
+        self.with(Law::payload(mass, centre))
+    }
+
+    /// The same arm with friction of a joint (from 0) that is greater at low speed (Nm), until so fast (rad/s).
+    pub fn with_stribeck(self, joint: usize, size: f64, speed: f64) -> Self {
+        self.with(Law::stribeck(joint, size, speed, Fall::Exponential(1.0)))
+    }
+
+    /// The same arm with so much more Coulomb friction at a joint (from 0), Nm.
+    pub fn with_drag(self, joint: usize, size: f64) -> Self {
+        self.with(Law::coulomb(joint, size, 0.008))
+    }
+
+    fn with(mut self, law: Law) -> Self {
+        self.laws.push(law);
+        self
+    }
+
+    /// The same arm and physics on other paths, with other noise.
+    pub fn on_other_paths(mut self, seed: u64, seconds: f64) -> Self {
+        let mut noise = Noise::new(seed, Purpose::Poses);
+        self.paths = paths(&self.robot, 1.0, seconds, &mut noise);
+        (self.fitted, self.seed) = (FITTED, seed);
+        self
+    }
+
+    /// The same arm and physics on a motion that is given in even steps (s), to fit, and on its own paths that judge.
+    pub fn on_motion(mut self, step: f64, states: Vec<JointState>) -> Self {
+        let judging = self.paths.split_off(self.fitted);
+        let given = (step * states.len() as f64, Path::Given(step, states));
+        self.paths = std::iter::once(given).chain(judging).collect();
+        self.fitted = 1;
+        self
+    }
+
+    /// All rows without noise.
+    pub fn true_rows(&self) -> TorqueRows {
+        self.rows(&(0..self.laws.len()).collect::<Vec<_>>())
+    }
+
+    /// Torques of rows with the noise of the recording, Nm, row-major.
+    pub fn noisy(&self, rows: &TorqueRows) -> Vec<f64> {
+        let (_, signal) = self.measured(rows);
+        let pairs = signal.iter().zip(self.per_unit.iter().cycle());
+        pairs.map(|(value, unit)| value * unit).collect()
+    }
+
+    /// Nm, white noise by joint.
+    pub fn white_noise(&self) -> &[f64] {
+        &self.white
+    }
+
+    /// Viscous (Nm s/rad) and Coulomb friction (Nm) by joint; none where it is not concealed.
+    pub fn plain_friction(&self) -> Vec<[Option<f64>; 2]> {
+        let mut friction = vec![[None; 2]; self.stated.axes.len()];
+        for law in &self.laws {
+            let (joint, kind, size) = match law {
+                Law::Viscous { joint, size, .. } => (joint, 0, size),
+                Law::Coulomb { joint, size, .. } => (joint, 1, size),
+                _ => continue,
+            };
+            friction[*joint][kind].get_or_insert(*size);
+        }
+        friction
+    }
+
+    /// The last link and what it carries as they are.
+    pub fn last_bodies(&self) -> (Body, Option<Body>) {
+        let machine = self.true_machine(self.laws.iter());
+        (machine.links[machine.links.len() - 1], machine.payload)
     }
 }

@@ -4,7 +4,7 @@
 use super::draw::TorqueCase;
 use super::law::{Fall, Law, Moment};
 use super::record::{AR1_COEFFICIENT, TorqueRows};
-use crate::shadow::{Column, Shadow, norm};
+use crate::matrix::{Column, Shadow, length};
 use crate::torque::law::{Body, Machine};
 use std::f64::consts::FRAC_PI_2;
 
@@ -52,10 +52,8 @@ impl TorqueCase {
             if index < self.common {
                 return priced(columns.of_law(&self.laws[index]), None);
             }
-            let others: Vec<usize> = (0..self.laws.len())
-                .filter(|other| *other != index)
-                .collect();
-            let less = self.rows(&others);
+            let others = (0..self.laws.len()).filter(|other| *other != index);
+            let less = self.rows(&others.collect::<Vec<_>>());
             let pairs = rows.torque.iter().zip(&less.torque);
             priced(columns.of(pairs.map(|(with, less)| with - less)), None)
         };
@@ -64,39 +62,32 @@ impl TorqueCase {
         for (number, column) in inertial.into_iter().enumerate() {
             masses.add(priced(column, Some(number)));
         }
-        let rivals = match self.common < self.laws.len() {
-            true => columns.rivals(),
-            false => Vec::new(),
-        };
+        let is_any = self.common < self.laws.len();
+        let rivals = if is_any { columns.rivals() } else { vec![] };
         let seen = |index: usize| {
-            let mut shadow = masses.clone();
-            let others = effects
-                .iter()
-                .enumerate()
-                .filter(|(other, _)| *other != index);
-            others.for_each(|(_, column)| shadow.add(column.clone()));
+            let shadow = masses.with_others(&effects, index);
             let visible = shadow.outside(effects[index].clone());
-            let l = norm(&visible).powi(2);
+            let l = length(&visible).powi(2);
             let law = &self.laws[index];
             let known = (law.name(), law.place());
-            let says_the_same = |(name, place, columns): &(&'static str, String, Vec<Column>)| {
+            let says_the_same = |columns: &[Column]| {
                 let mut space = Shadow::default();
                 for column in columns.iter().map(|column| priced(column.clone(), None)) {
-                    let size = norm(&column);
+                    let size = length(&column);
                     let outside = shadow.outside(column);
-                    if norm(&outside) > COLLINEAR * size {
+                    if length(&outside) > COLLINEAR * size {
                         space.add(outside);
                     }
                 }
-                (*name, place) != (known.0, &known.1)
-                    && norm(&space.outside(visible.clone())).powi(2) < SAME.max(SAME_SHARE * l)
+                length(&space.outside(visible.clone())).powi(2) < SAME.max(SAME_SHARE * l)
             };
             let rivals = rivals.iter().filter(|_| index >= self.common);
+            let others = rivals.filter(|(name, place, _)| (*name, place) != (known.0, &known.1));
+            let same = others.filter(|(.., columns)| says_the_same(columns));
             Visible {
                 l,
-                before: norm(&effects[index]).powi(2),
-                same: rivals
-                    .filter(|rival| says_the_same(rival))
+                before: length(&effects[index]).powi(2),
+                same: same
                     .map(|(name, place, _)| (*name, place.clone()))
                     .collect(),
             }
@@ -161,10 +152,8 @@ impl<'a> Columns<'a> {
         for (link, body) in self.case.stated.links.iter().enumerate() {
             columns.push(self.of_machine(|arm| arm.links[link].mass *= 1.0 + mass));
             columns.extend(self.centre(link, centre));
-            let most = body
-                .inertia
-                .iter()
-                .fold(0.0, |most: f64, x| most.max(x.abs()));
+            let moments = body.inertia.iter().map(|x| x.abs());
+            let most = moments.fold(0.0, f64::max);
             columns.extend(self.inertia(link, inertia * most));
         }
         columns

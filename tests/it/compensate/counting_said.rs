@@ -78,11 +78,11 @@ fn poses_in_the_controllers_counting_keep_the_joints_within_their_limits() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("poses.csv");
     let drive = Drive {
-        robot: robot.description(),
-        ranges: &ranges,
-        poses: &data,
-        direction: &direction,
-        convention: &convention,
+        robot: robot.description().clone(),
+        ranges,
+        poses: data,
+        direction: direction.clone(),
+        convention,
     };
     write(&file, &drive).unwrap();
     for (k, [numbers, sides, _]) in poses(&file).iter().enumerate() {

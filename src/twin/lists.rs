@@ -1,4 +1,26 @@
-//! Lists of what may be concealed: a row is a canonical name and how physics of that name is drawn.
+//! Lists: kinds of things by the words that people and files have for them, and what may be concealed: a row is a canonical name and how
+//! physics of that name is drawn.
+
+/// Declares an enum with a word for each of its kinds, and a list of all.
+macro_rules! named {
+    ($(#[$meta:meta])* $name:ident, $(#[$list:meta])* $all:ident: $count:literal {
+        $( $(#[$kind:meta])* $variant:ident $word:literal, )+
+    }) => {
+        $(#[$meta])*
+        pub enum $name { $( $(#[$kind])* $variant, )+ }
+
+        $(#[$list])*
+        pub const $all: [$name; $count] = [ $( $name::$variant, )+ ];
+
+        impl $name {
+            /// As it is written.
+            pub fn name(self) -> &'static str {
+                match self { $( Self::$variant => $word, )+ }
+            }
+        }
+    };
+}
+pub(crate) use named;
 
 /// What is concealed under one name; several rows of one name are different causes.
 pub struct Family<F> {
@@ -18,9 +40,9 @@ macro_rules! families {
      $( $pairing:ident $effect:literal $body:expr; )+) => {
         $(#[$meta])*
         #[allow(unused_variables, reason = "a row uses some of what it is drawn from")]
-        pub const $list: &[$crate::families::Family<$draw>] = &[ $( $crate::families::Family {
+        pub const $list: &[$crate::lists::Family<$draw>] = &[ $( $crate::lists::Family {
             name: $effect,
-            paired: $crate::families::families!(@ $pairing),
+            paired: $crate::lists::families!(@ $pairing),
             draw: |$on, $other, $noise| {
                 let $name = $effect;
                 Some($body)

@@ -1,17 +1,24 @@
-//! A set of concealed recordings as a folder: what a user has, and the truth of each apart.
+//! The proof of a diagnosis: sets of concealed recordings written and sealed, and diagnoses held against the truth once it is opened.
+//!
+//! A set is a folder: what a user has, and the truth of each recording apart.
 
 use crate::description::RobotDescription;
 use crate::error::{Error, Fault, Result};
 use crate::estimate::threads::in_order;
 use crate::raw;
-use crate::table::{Recording, Truth};
-use crate::twin::conceal::case::Case;
+use crate::table::{Recording, Scoreboard, ScoreboardRow, Table, Truth};
+use crate::twin::conceal;
 use crate::twin::conceal::design::Design;
 use crate::twin::folder::{self, Decimals, File, Log};
+use crate::twin::reveal::board::Board;
+use crate::twin::reveal::mark::{Case, Marked, NAMELESS, left_out, mark};
+use crate::twin::reveal::paper;
 use crate::twin::torque::TorqueCase;
+use parquet::arrow::ArrowWriter;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Component, Path};
@@ -25,7 +32,7 @@ pub fn conceal(folder: &Path, design: &Design, threads: usize) -> Result<usize> 
             let files = case.recording().into();
             return Ok((case.name.clone(), files, case.sealed()));
         }
-        let case = Case::make(design, number, contents[number])?;
+        let case = conceal::case::Case::make(design, number, contents[number])?;
         Ok((case.name.clone(), case.recording()?.into(), case.sealed()))
     });
     let mut seal = Seal::new(design);
@@ -48,14 +55,11 @@ type Written = (String, Vec<File>, String);
 
 /// Nothing is overwritten: the folder is new or empty.
 pub fn vacant(folder: &Path) -> Result<()> {
-    let taken = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
-    if taken {
-        return Err(Error::spec(
-            folder.display().to_string(),
-            "is not empty; name a new folder",
-        ));
+    let place = folder.display().to_string();
+    match fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
+        true => Err(Error::spec(place, "is not empty; name a new folder")),
+        false => Ok(()),
     }
-    Ok(())
 }
 
 /// The format of this file.
@@ -113,10 +117,8 @@ impl Seal {
         let seal: Seal =
             serde_json::from_str(&text).map_err(|error| Error::data(&place, error.to_string()))?;
         if seal.calib_seal != FORMAT || seal.hash != HASH {
-            return Err(Error::data(
-                place,
-                format!("is no seal of format {FORMAT} with {HASH}"),
-            ));
+            let message = format!("is no seal of format {FORMAT} with {HASH}");
+            return Err(Error::data(place, message));
         }
         Ok(seal)
     }
@@ -128,21 +130,18 @@ impl Seal {
         let mut faults = Vec::new();
         for (name, hash) in &seal.files {
             // A seal comes from a file: it may not lead out of its folder.
-            let inside = Path::new(name)
-                .components()
-                .all(|part| matches!(part, Component::Normal(_)));
+            let mut parts = Path::new(name).components();
+            let inside = parts.all(|part| matches!(part, Component::Normal(_)));
             let bytes = match inside {
                 true => raw::bytes(&folder.join(name)),
                 false => Err(ErrorKind::InvalidFilename.into()),
             };
-            match bytes {
-                Ok(bytes) if digest(&bytes) == *hash => (),
-                Ok(_) => faults.push(Fault::new(name, "was changed since it was sealed")),
-                Err(error) => faults.push(Fault::new(
-                    name,
-                    format!("was sealed, but cannot be read: {error}"),
-                )),
-            }
+            let message = match bytes {
+                Ok(bytes) if digest(&bytes) == *hash => continue,
+                Ok(_) => "was changed since it was sealed".to_string(),
+                Err(error) => format!("was sealed, but cannot be read: {error}"),
+            };
+            faults.push(Fault::new(name, message));
         }
         Error::if_data(faults)?;
         Ok(seal.files.into_keys().collect())
@@ -160,10 +159,8 @@ impl Seal {
 
 /// SHA-256 in hexadecimal digits.
 fn digest(bytes: &[u8]) -> String {
-    Sha256::digest(bytes)
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
+    let hash = Sha256::digest(bytes);
+    hash.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// 1e-9 deg is 0.00005 um at 3 m.
@@ -191,10 +188,8 @@ pub fn recorded(
     let log = log(recording, moves);
     let mut numbers = "name,effect,where,unit,value\n".to_string();
     for row in &truth.0 {
-        numbers.push_str(&format!(
-            "{},{},{},{},{}\n",
-            row.name, row.effect, row.place, row.unit, row.value
-        ));
+        let [name, effect, place, unit] = [&row.name, &row.effect, &row.place, &row.unit];
+        numbers += &format!("{name},{effect},{place},{unit},{}\n", row.value);
     }
     let file = |name: &str, text: String| (name.to_string(), text);
     let mut files = vec![file("robot.json", description), file("truth.csv", numbers)];
@@ -239,4 +234,95 @@ fn log(recording: Recording, at_once: bool) -> Log {
         position: recording.position,
         id: recording.point_id,
     }
+}
+
+/// Folder, within that of the verdicts, of diagnoses without the causes of their recordings.
+pub const LEFT_OUT: &str = "left_out";
+
+/// All sealed cases of the set, marked; `files` are the paths that the seal holds. Of those that were diagnosed without their causes, too,
+/// what was said in their stead.
+pub fn board(folder: &Path, files: &[String], verdicts: &Path) -> Result<Board> {
+    let mut board = Board::default();
+    let is_sealed = |name: &&String| Path::new(name).starts_with(SEALED);
+    for name in files.iter().filter(is_sealed) {
+        let path = folder.join(name);
+        let truth = truth_at(&path)?;
+        let file = path.file_name().unwrap_or_default();
+        match read::<paper::Answer>(&verdicts.join(file)) {
+            Ok(answer) => {
+                let without = read::<paper::Answer>(&verdicts.join(LEFT_OUT).join(file)).ok();
+                let without = without.and_then(|without| left_out(&truth, &answer, &without));
+                board.left_out.extend(without);
+                board.cases.push(mark(&truth, &answer));
+            }
+            Err(why) => board.missing.push((truth.case, why)),
+        }
+    }
+    Ok(board)
+}
+
+/// The cause to leave out of a recording whose truth lies at `path`; none where no single cause of the list is concealed.
+pub fn single_cause(path: &Path) -> Result<Option<String>> {
+    let truth = truth_at(path)?;
+    let is_listed = truth.effects.iter().all(|cause| cause.effect != NAMELESS);
+    let mut effects = truth.effects.into_iter();
+    let wanted = effects.find(|cause| cause.wanted).map(|cause| cause.effect);
+    Ok(wanted.filter(|_| truth.content == "single" && is_listed))
+}
+
+fn truth_at(path: &Path) -> Result<paper::Truth> {
+    read(path).map_err(|why| Error::data(path.display().to_string(), why))
+}
+
+fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, String> {
+    let text = raw::text(path).map_err(|error| error.to_string())?;
+    serde_json::from_str(&text).map_err(|error| error.to_string())
+}
+
+fn rows(case: &Case) -> Vec<ScoreboardRow> {
+    let row = |number: usize, effect: Option<String>| ScoreboardRow {
+        case: case.name.clone(),
+        number: number as i64,
+        content: case.content.clone(),
+        robot: case.robot.clone(),
+        points: case.points as i64,
+        effect,
+        said: case.strays.first().cloned(),
+        strays: case.strays.len() as i64,
+        verdict: case.verdict.clone(),
+        heldout_before_mm: case.held_out.map(|held_out| held_out.before),
+        heldout_after_mm: case.held_out.map(|held_out| held_out.after),
+        heldout_bound_mm: case.held_out.map(|held_out| held_out.bound),
+        ..Default::default()
+    };
+    if case.causes.is_empty() {
+        return vec![row(0, None)];
+    }
+    let of_cause = |(number, cause): (usize, &Marked)| ScoreboardRow {
+        place: Some(cause.place.clone()),
+        form: Some(cause.form.clone()),
+        visibility: Some(cause.strength),
+        outcome: Some(cause.outcome.name().into()),
+        place_right: Some(cause.placed.place),
+        name_or_unknown: Some(cause.placed.name_or_unknown),
+        wrong_name: Some(cause.placed.wrong_name),
+        ..row(number, Some(cause.effect.clone()))
+    };
+    case.causes.iter().enumerate().map(of_cause).collect()
+}
+
+/// One row per concealed effect, as Parquet.
+pub fn write_scoreboard(path: &Path, board: &Board) -> Result<()> {
+    let frame = Scoreboard(board.cases.iter().flat_map(rows).collect()).to_frame()?;
+    let fault = |error: &dyn Display| {
+        let message = format!("cannot be written: {error}");
+        Error::store(path.display().to_string(), message)
+    };
+    let file = std::fs::File::create(path).map_err(|error| fault(&error))?;
+    let written =
+        ArrowWriter::try_new(file, frame.batch().schema(), None).and_then(|mut writer| {
+            writer.write(frame.batch())?;
+            writer.close()
+        });
+    written.map(drop).map_err(|error| fault(&error))
 }
