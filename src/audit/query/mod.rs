@@ -80,129 +80,55 @@ fn names(frame: &mut LazyFrame) -> PolarsResult<Vec<String>> {
 }
 
 /// The same plan, with every step that may lose the order set to keep it.
-pub(crate) fn kept(plan: DslPlan) -> DslPlan {
-    match plan {
+pub(crate) fn kept(mut plan: DslPlan) -> DslPlan {
+    match &mut plan {
         // What polars noted about a plan while it read the SQL; it does so again.
-        DslPlan::IR { dsl, .. } => kept(Arc::unwrap_or_clone(dsl)),
-        DslPlan::GroupBy {
-            input,
-            keys,
-            predicates,
-            aggs,
-            maintain_order: _,
-            options,
-            apply,
-        } => DslPlan::GroupBy {
-            input: below(input),
-            keys,
-            predicates,
-            aggs,
-            maintain_order: true,
-            options,
-            apply,
-        },
-        DslPlan::Join {
-            input_left,
-            input_right,
-            left_on,
-            right_on,
-            predicates,
-            mut options,
-        } => {
+        DslPlan::IR { dsl, .. } => return kept(DslPlan::clone(dsl)),
+        DslPlan::GroupBy { maintain_order, .. } => *maintain_order = true,
+        DslPlan::Join { options, .. } => {
             let order = match options.args.how {
-                JoinType::Inner | JoinType::Left | JoinType::Full => {
-                    Some(MaintainOrderJoin::LeftRight)
-                }
-                JoinType::Right => Some(MaintainOrderJoin::RightLeft),
-                JoinType::Semi | JoinType::Anti => Some(MaintainOrderJoin::Left),
+                JoinType::Inner | JoinType::Left | JoinType::Full => MaintainOrderJoin::LeftRight,
+                JoinType::Right => MaintainOrderJoin::RightLeft,
+                JoinType::Semi | JoinType::Anti => MaintainOrderJoin::Left,
                 // Every row with every row: in order by themselves.
-                _ => None,
+                _ => options.args.maintain_order,
             };
-            if let Some(order) = order {
-                Arc::make_mut(&mut options).args.maintain_order = order;
-            }
-            let (input_left, input_right) = (below(input_left), below(input_right));
-            DslPlan::Join {
-                input_left,
-                input_right,
-                left_on,
-                right_on,
-                predicates,
-                options,
-            }
+            Arc::make_mut(options).args.maintain_order = order;
         }
-        DslPlan::Distinct { input, mut options } => {
+        DslPlan::Distinct { options, .. } => {
             options.maintain_order = true;
             if matches!(options.keep_strategy, UniqueKeepStrategy::Any) {
                 options.keep_strategy = UniqueKeepStrategy::First;
             }
-            DslPlan::Distinct {
-                input: below(input),
-                options,
-            }
         }
-        DslPlan::Sort {
-            input,
-            by_column,
-            slice,
-            mut sort_options,
-        } => {
-            sort_options.maintain_order = true;
-            DslPlan::Sort {
-                input: below(input),
-                by_column,
-                slice,
-                sort_options,
-            }
-        }
-        DslPlan::Union { inputs, mut args } => {
-            args.maintain_order = true;
-            DslPlan::Union {
-                inputs: inputs.into_iter().map(kept).collect(),
-                args,
-            }
-        }
-        DslPlan::Filter { input, predicate } => DslPlan::Filter {
-            input: below(input),
-            predicate,
-        },
-        DslPlan::Select {
-            expr,
-            input,
-            options,
-        } => DslPlan::Select {
-            expr,
-            input: below(input),
-            options,
-        },
-        DslPlan::HStack {
-            input,
-            exprs,
-            options,
-        } => DslPlan::HStack {
-            input: below(input),
-            exprs,
-            options,
-        },
-        DslPlan::Slice { input, offset, len } => DslPlan::Slice {
-            input: below(input),
-            offset,
-            len,
-        },
-        DslPlan::MapFunction { input, function } => DslPlan::MapFunction {
-            input: below(input),
-            function,
-        },
-        DslPlan::Cache { input, id } => DslPlan::Cache {
-            input: below(input),
-            id,
-        },
-        other => other,
+        DslPlan::Sort { sort_options, .. } => sort_options.maintain_order = true,
+        DslPlan::Union { args, .. } => args.maintain_order = true,
+        _ => {}
     }
-}
-
-fn below(input: Arc<DslPlan>) -> Arc<DslPlan> {
-    Arc::new(kept(Arc::unwrap_or_clone(input)))
+    let below = |input: &mut Arc<DslPlan>| *input = Arc::new(kept(DslPlan::clone(input)));
+    match &mut plan {
+        DslPlan::Join {
+            input_left,
+            input_right,
+            ..
+        } => [input_left, input_right].into_iter().for_each(below),
+        DslPlan::Union { inputs, .. } => {
+            inputs
+                .iter_mut()
+                .for_each(|input| *input = kept(input.clone()));
+        }
+        DslPlan::GroupBy { input, .. }
+        | DslPlan::Distinct { input, .. }
+        | DslPlan::Sort { input, .. }
+        | DslPlan::Filter { input, .. }
+        | DslPlan::Select { input, .. }
+        | DslPlan::HStack { input, .. }
+        | DslPlan::Slice { input, .. }
+        | DslPlan::MapFunction { input, .. }
+        | DslPlan::Cache { input, .. } => below(input),
+        _ => {}
+    }
+    plan
 }
 
 /// The rows that a query gave.
