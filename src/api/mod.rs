@@ -9,6 +9,7 @@ mod recording;
 mod robot;
 mod run;
 
+pub(crate) use model::usual_options;
 pub use model::{Compensated, Diagnosis, Identified, Model, Options, diagnose, identify};
 pub use recording::{Poses, Recording, Sigma};
 pub use robot::Robot;

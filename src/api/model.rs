@@ -9,7 +9,7 @@ use crate::error::{Error, Result, instead};
 use crate::identified::IdentifiedModel;
 use crate::pipeline::{Observer, StageCall, StageTables, Unwatched, run_in_memory};
 use crate::robot::{JointConvention, Measurements};
-use crate::summary::DiagnosisSummary;
+use crate::summary::{DiagnosisSummary, Subject};
 use crate::table::{Parameters, Recording as RecordingTable, Table};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -92,9 +92,12 @@ pub fn diagnose(robot: &Robot, recording: &Recording, options: &Options) -> Resu
     let Identified { mut model, given } = options.run("diagnose", robot, recording)?;
     let tables = |kind: &str| Ok(given.kind(kind).cloned());
     // Commands that are proposed speak of a run: the last one of whoever types them.
-    let summary = DiagnosisSummary::of_tables("HEAD", &tables)?;
-    let rows = recording.points_mm.len() as u64;
-    let summary = summary.with_subject(&robot.description.name, rows);
+    let subject = Subject {
+        run: "HEAD".into(),
+        robot: Some(robot.description.name.clone()),
+        rows: recording.points_mm.len() as u64,
+    };
+    let summary = DiagnosisSummary::of_positions(subject, &tables)?;
     if summary.is_wrong_setup() {
         model.identified.refusals.push("the set-up is wrong".into());
     }
@@ -150,15 +153,10 @@ impl Model {
         &self.identified.parameters
     }
 
-    fn convention(&self) -> JointConvention {
-        let convention = self.identified.convention.clone();
-        convention.unwrap_or_else(|| JointConvention::of_the_robot_file(self.robot().joints()))
-    }
-
     /// Measured points of poses, mm in the frame of the instrument, with the learned correction where there is one.
     pub fn predict(&self, poses: &Poses) -> Result<Vec<[f64; 3]>> {
         let mut data = poses.measurements(&self.robot())?;
-        let convention = self.convention();
+        let convention = usual_options(&self.identified).convention;
         let rows = data.q.chunks_mut(data.joints);
         rows.for_each(|q| convention.to_robot(q));
         let mut points = self.identified.model.predict(&data);
@@ -174,7 +172,8 @@ impl Model {
 
     /// Places the arm one pose (rad and m) after the other, each by itself, whatever came before: mm in the frame of the instrument.
     pub(crate) fn placing(&self) -> impl FnMut(&Circumstance, &mut [f64]) -> [f64; 3] + '_ {
-        let (mut reach, convention) = (self.arm.reach(), self.convention());
+        let (mut reach, convention) =
+            (self.arm.reach(), usual_options(&self.identified).convention);
         move |circumstance, q| {
             convention.to_robot(q);
             reach.under(circumstance);
@@ -191,9 +190,8 @@ impl Model {
             identified.accepted(&gate, insist)?;
         }
         let manner = CorrectionOptions {
-            clock: identified.data.as_ref().is_none_or(Measurements::has_clock),
             gate,
-            ..CorrectionOptions::counted_by(self.convention())
+            ..usual_options(identified)
         };
         let (coverage, uncertainty) = (identified.coverage(), identified.uncertainty(&self.arm));
         Ok(Corrector::new(&self.arm, coverage, uncertainty, manner))
@@ -243,6 +241,17 @@ impl Model {
             u95_mm: numbers(|answer| answer.uncertainty.map_or(f64::NAN, |known| known.u95 * 1e3)),
             remarks: answers.iter().map(CorrectedCommand::remark).collect(),
         })
+    }
+}
+
+/// Commands as the controller counts its joints, at times of the recording's clock where it has one.
+pub(crate) fn usual_options(identified: &IdentifiedModel) -> CorrectionOptions {
+    let joints = identified.model.robot.joints();
+    let convention = identified.convention.clone();
+    let of_file = || JointConvention::of_the_robot_file(joints);
+    CorrectionOptions {
+        clock: identified.data.as_ref().is_none_or(Measurements::has_clock),
+        ..CorrectionOptions::counted_by(convention.unwrap_or_else(of_file))
     }
 }
 

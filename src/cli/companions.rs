@@ -1,6 +1,7 @@
 //! The other files of a controller's program: those that lie where its controller keeps them, and those that a person names.
 
-use crate::error::{Error, Result};
+use super::readable;
+use crate::error::Result;
 use crate::program::{Companion, Language};
 use crate::raw;
 use std::path::{Path, PathBuf};
@@ -22,18 +23,11 @@ impl Companions {
         } else {
             Vec::new()
         };
-        paths.extend(
-            named
-                .iter()
-                .filter(|path| !paths.contains(path))
-                .cloned()
-                .collect::<Vec<_>>(),
-        );
+        let others = named.iter().filter(|path| !paths.contains(path)).cloned();
+        paths.extend(others.collect::<Vec<_>>());
         let read = |path: PathBuf| {
-            let place = path.display().to_string();
-            let bytes = raw::bytes(&path)
-                .map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
-            Ok((place, bytes))
+            let bytes = readable(&path, raw::bytes(&path))?;
+            Ok((path.display().to_string(), bytes))
         };
         paths.into_iter().map(read).collect::<Result<_>>().map(Self)
     }

@@ -3,6 +3,8 @@
 use super::companions::Companions;
 use super::feed_forward::{FeedForward, feed_forward};
 use super::pipeline_arguments::{ModelArguments, must_be_positive};
+use super::{note, put, readable, warn};
+use crate::api::usual_options;
 use crate::compensate::{CorrectionOptions, Corrector, Gate, GateLimits, IdentifiedArm, Stated};
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
@@ -12,13 +14,11 @@ use crate::program::{
     with_mark,
 };
 use crate::raw;
-use crate::robot::{JointConvention, Measurements};
-use crate::targets::{Layout, Units, Unreached, parquet, text, unwritten, whole};
+use crate::targets::{Layout, Units, Unreached, parquet, text, whole};
 use crate::units::{Quantity, Unit};
 use clap::{Args, ValueEnum};
 use std::ffi::OsString;
-use std::fs::File;
-use std::io::{BufReader, BufWriter, Write};
+use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Correct targets: joint commands that bring the real arm to where the nominal robot would have put the tool.
@@ -189,65 +189,41 @@ impl CompensateArguments {
         let coverage = identified.coverage();
         let uncertainty = identified.uncertainty(&arm);
         let mut corrector = Corrector::new(&arm, coverage, uncertainty, manner(self, &identified)?);
-        let threads = rayon::ThreadPoolBuilder::new()
-            .num_threads(self.model.jobs())
-            .build()
-            .map_err(|error| Error::store("--jobs", error.to_string()))?;
-        let place = if self.targets.as_os_str() == "-" {
-            "stdin".into()
-        } else {
-            self.targets.display().to_string()
+        let threads = self.model.threads()?;
+        let place = match self.targets.as_os_str() == "-" {
+            true => "stdin".into(),
+            false => self.targets.display().to_string(),
         };
-        let load = if self.payload.is_some() {
-            None
-        } else {
-            identified.needed_load(&arm)
-        };
-        let units = Units {
-            angle: unit(self.angle.as_deref()),
-            length: unit(self.length.as_deref()),
-        };
-        let cartesian = self.target == What::Pose;
+        let unstated = || identified.needed_load(&arm);
+        let load = self.payload.is_none().then(unstated).flatten();
+        let unit = |symbol: &Option<String>| symbol.as_deref().and_then(Unit::parse);
         let layout = Layout {
             place: &place,
             robot: &identified.robot,
-            units,
+            units: Units {
+                angle: unit(&self.angle),
+                length: unit(&self.length),
+            },
             plain: self.plain,
-            cartesian,
+            cartesian: self.target == What::Pose,
             load,
             force: self.model.force,
         };
         let remarks = remarks(self, &identified);
         let unreached = threads.install(|| corrected(self, &layout, &remarks, &mut corrector))?;
-        let mut text = String::new();
         if !self.model.quiet {
-            let counting = identified
-                .counting()
-                .map(|line| format!("{line}\n"))
-                .unwrap_or_default();
-            text = format!(
-                "model: {}\n{counting}{}",
-                identified.origin,
-                corrector.tally.summary()
-            );
+            let counting = identified.counting();
+            let counting = counting.map_or_else(String::new, |line| format!("{line}\n"));
+            let (origin, tally) = (&identified.origin, corrector.tally.summary());
+            note(format!("model: {origin}\n{counting}{tally}"));
         }
-        let column = if language(&self.targets).is_some() || self.plain {
-            ""
-        } else {
-            " (column `remark`)"
+        let column = match language(&self.targets).is_some() || self.plain {
+            true => "",
+            false => " (column `remark`)",
         };
-        text.extend(
-            corrector
-                .tally
-                .warnings()
-                .map(|line| format!("warning: {line}{column}\n")),
-        );
-        let _ = std::io::stderr().write_all(text.as_bytes());
-        if unreached.faults.is_empty() {
-            Ok(())
-        } else {
-            Err(Error::Data(unreached.faults))
-        }
+        let warnings = corrector.tally.warnings();
+        warn(warnings.map(|line| format!("{line}{column}")));
+        Error::if_data(unreached.faults)
     }
 }
 
@@ -291,8 +267,18 @@ fn check(arguments: &CompensateArguments) -> Result<()> {
         .map(|sense| Fault::new("--direction", format!("expected 1 or -1, found {sense}")));
     let tool = arguments.tool.as_deref();
     let tool = tool.and_then(|tool| RobotTool::parse(tool).err());
-    let is_file = arguments.targets.as_os_str() != "-";
-    let unread = is_file.then(|| open(&arguments.targets).err()).flatten();
+    // What is wrong is known before a pipeline is run for them.
+    let targets = &arguments.targets;
+    let unread = match targets.as_os_str() == "-" {
+        true => None,
+        false => raw::open(targets).err(),
+    };
+    let unread = unread.map(|error| {
+        Fault::new(
+            targets.display().to_string(),
+            format!("cannot be read: {error}"),
+        )
+    });
     let out = arguments.out.as_deref();
     Error::if_spec(
         units
@@ -306,16 +292,6 @@ fn check(arguments: &CompensateArguments) -> Result<()> {
             .chain(out.and_then(|out| misplaced(out, &arguments.targets)))
             .collect(),
     )
-}
-
-/// Opens targets; what is wrong is known before a pipeline is run for them.
-fn open(targets: &Path) -> Result<File, Fault> {
-    raw::open(targets).map_err(|error| {
-        Fault::new(
-            targets.display().to_string(),
-            format!("cannot be read: {error}"),
-        )
-    })
 }
 
 /// Why the targets cannot be written to this file.
@@ -339,66 +315,44 @@ fn misplaced(out: &Path, targets: &Path) -> Option<Fault> {
     Some(Fault::new("--out", message))
 }
 
-fn unit(symbol: Option<&str>) -> Option<Unit> {
-    symbol.and_then(Unit::parse)
-}
-
 fn manner(
     arguments: &CompensateArguments,
     identified: &IdentifiedModel,
 ) -> Result<CorrectionOptions> {
     let robot = &identified.model.robot;
-    let start = match &arguments.start {
-        Some(start) if start.len() != robot.joints() => {
-            let message = format!(
-                "has {}, the robot {}",
-                counted(start.len(), "position"),
-                counted(robot.joints(), "joint")
-            );
-            return Err(Error::spec("--start", message));
-        }
-        Some(start) => {
-            let unit = |joint| {
-                if robot.is_revolute(joint) {
-                    Unit::Degree
-                } else {
-                    Unit::Millimetre
-                }
-            };
-            Some(
-                start
-                    .iter()
-                    .enumerate()
-                    .map(|(joint, value)| unit(joint).to_si(*value))
-                    .collect(),
-            )
-        }
-        None => None,
+    let joints = robot.joints();
+    let start = arguments.start.as_ref();
+    if let Some(start) = start.filter(|start| start.len() != joints) {
+        let found = counted(start.len(), "position");
+        let message = format!("has {found}, the robot {}", counted(joints, "joint"));
+        return Err(Error::spec("--start", message));
+    }
+    let si = |(joint, value): (usize, &f64)| {
+        let unit = match robot.is_revolute(joint) {
+            true => Unit::Degree,
+            false => Unit::Millimetre,
+        };
+        unit.to_si(*value)
     };
-    let clock = identified.data.as_ref().is_none_or(Measurements::has_clock);
-    if arguments.time.is_some() && !clock {
+    let usual = usual_options(identified);
+    if arguments.time.is_some() && !usual.clock {
         return Err(Error::spec(
             "--time",
             "the recording of the model has no clock: its steps and drifts are known by row only",
         ));
     }
-    let convention = identified
-        .convention
-        .clone()
-        .unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
     Ok(CorrectionOptions {
-        convention,
         cartesian: arguments.target == What::Pose,
         oriented: arguments.orientation == OrientationUse::Keep,
         one_step: arguments.one_step,
         payload: arguments.payload.unwrap_or(0.0),
         temperature: arguments.temperature,
         time: arguments.time,
-        clock,
         direction: arguments.direction,
-        start,
+        start: start.map(|start| start.iter().enumerate().map(si).collect()),
         uncertainty: !arguments.no_sigma,
         gate: gate(arguments, identified),
+        ..usual
     })
 }
 
@@ -410,14 +364,11 @@ fn gate(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Gate {
         ..GateLimits::default()
     };
     let insisted = arguments.model.force;
+    let refusals = identified.refusals.iter().filter(|_| insisted);
     Gate {
         limits,
         insisted,
-        model: if insisted {
-            identified.refusals.clone()
-        } else {
-            Vec::new()
-        },
+        model: refusals.cloned().collect(),
     }
 }
 
@@ -435,10 +386,8 @@ fn remarks(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Vec
         .model
         .force
         .then_some("limits overridden by --force");
-    let unexplained = identified
-        .unexplained
-        .as_ref()
-        .map(|_| "verdict of the model: unexplained");
+    let unexplained = identified.unexplained.is_some();
+    let unexplained = unexplained.then_some("verdict of the model: unexplained");
     insisted.into_iter().chain(unexplained).collect()
 }
 
@@ -450,13 +399,7 @@ fn rewritten(
     remarks: &[&str],
     corrector: &mut Corrector,
 ) -> Result<()> {
-    let text = raw::bytes(&arguments.targets)
-        .map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
-    let partial = if arguments.leave_partial {
-        Partial::Left
-    } else {
-        Partial::Refused
-    };
+    let text = readable(&arguments.targets, raw::bytes(&arguments.targets))?;
     let companions = Companions::of(&arguments.targets, language, &arguments.with)?;
     let source = ProgramFile {
         place: layout.place,
@@ -468,55 +411,33 @@ fn rewritten(
         let message = "was compensated by calib already: a second correction would move the robot twice as far. Take the program of before, or insist with --force";
         return Err(Error::data(layout.place, message));
     }
-    let frames = if arguments.assume_frames {
-        Frames::Assumed
-    } else {
-        Frames::Refused
-    };
-    let load = match (arguments.payload, layout.load) {
-        (Some(payload), _) => ProgramLoad::Stated(payload),
-        (None, Some(most)) => ProgramLoad::Needed(most),
-        (None, None) => ProgramLoad::Optional,
-    };
-    let tool = arguments
-        .tool
-        .as_deref()
-        .and_then(|tool| RobotTool::parse(tool).ok());
-    let note = companions
-        .summary_line()
-        .filter(|_| !arguments.model.quiet)
-        .unwrap_or_default();
-    let _ = std::io::stderr().write_all(note.as_bytes());
-    let mut rewritten = program::corrected(
-        &source,
-        ProgramRules {
-            partial,
-            frames,
-            load,
-            tool,
+    let rules = ProgramRules {
+        partial: match arguments.leave_partial {
+            true => Partial::Left,
+            false => Partial::Refused,
         },
-        layout.robot,
-        corrector,
-    )?;
-    rewritten.bytes = with_mark(&rewritten.bytes, &text, language, remarks);
-    let warnings = rewritten
-        .warnings
-        .iter()
-        .map(|note| format!("warning: {}: {}\n", source.at(note), note.message));
-    let _ = std::io::stderr().write_all(warnings.collect::<String>().as_bytes());
-    let Some(out) = &arguments.out else {
-        return match std::io::stdout().write_all(&rewritten.bytes) {
-            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::store(
-                "stdout",
-                format!("cannot be written: {error}"),
-            )),
-            _ => Ok(()),
-        };
+        frames: match arguments.assume_frames {
+            true => Frames::Assumed,
+            false => Frames::Refused,
+        },
+        load: match (arguments.payload, layout.load) {
+            (Some(payload), _) => ProgramLoad::Stated(payload),
+            (None, Some(most)) => ProgramLoad::Needed(most),
+            (None, None) => ProgramLoad::Optional,
+        },
+        tool: arguments
+            .tool
+            .as_deref()
+            .and_then(|tool| RobotTool::parse(tool).ok()),
     };
-    whole(out, |mut file| {
-        file.write_all(&rewritten.bytes)
-            .map_err(|error| unwritten(out, &error))
-    })
+    if !arguments.model.quiet {
+        note(companions.summary_line().unwrap_or_default());
+    }
+    let mut rewritten = program::corrected(&source, rules, layout.robot, corrector)?;
+    rewritten.bytes = with_mark(&rewritten.bytes, &text, language, remarks);
+    let warnings = rewritten.warnings.iter();
+    warn(warnings.map(|note| format!("{}: {}", source.at(note), note.message)));
+    put(arguments.out.as_deref(), rewritten.bytes)
 }
 
 /// Reads, corrects and writes.
@@ -526,22 +447,23 @@ fn corrected(
     remarks: &[&str],
     corrector: &mut Corrector,
 ) -> Result<Unreached> {
-    if let Some(language) = language(&arguments.targets) {
-        return rewritten(arguments, language, layout, remarks, corrector)
-            .map(|()| Unreached::default());
+    let targets = &arguments.targets;
+    if let Some(language) = language(targets) {
+        rewritten(arguments, language, layout, remarks, corrector)?;
+        return Ok(Unreached::default());
     }
-    let Some(out) = &arguments.out else {
-        return convert(
-            &arguments.targets,
+    match &arguments.out {
+        Some(out) => whole(out, |file| {
+            convert(targets, file, is_parquet(out), layout, corrector)
+        }),
+        None => convert(
+            targets,
             std::io::stdout(),
-            is_parquet(&arguments.targets),
+            is_parquet(targets),
             layout,
             corrector,
-        );
-    };
-    whole(out, |file| {
-        convert(&arguments.targets, file, is_parquet(out), layout, corrector)
-    })
+        ),
+    }
 }
 
 fn convert(
@@ -551,21 +473,14 @@ fn convert(
     layout: &Layout,
     corrector: &mut Corrector,
 ) -> Result<Unreached> {
-    let opened = || open(targets).map_err(|fault| Error::Spec(vec![fault]));
     let mut output = BufWriter::new(output);
-    match columnar {
-        true => parquet::stream(opened()?, &mut output, layout, corrector),
-        false if targets.as_os_str() == "-" => text::stream(
-            &mut BufReader::new(std::io::stdin()),
-            &mut output,
-            layout,
-            corrector,
-        ),
-        false => text::stream(
-            &mut BufReader::new(opened()?),
-            &mut output,
-            layout,
-            corrector,
-        ),
+    let opened = || readable(targets, raw::open(targets));
+    if columnar {
+        return parquet::stream(opened()?, &mut output, layout, corrector);
     }
+    let mut lines: Box<dyn BufRead> = match targets.as_os_str() == "-" {
+        true => Box::new(BufReader::new(std::io::stdin())),
+        false => Box::new(BufReader::new(opened()?)),
+    };
+    text::stream(&mut lines, &mut output, layout, corrector)
 }

@@ -2,8 +2,8 @@
 //!
 //! `calib check-export`: whether a file in the field belongs to this robot and this model.
 
-use super::emit;
 use super::pipeline_arguments::ModelArguments;
+use super::{emit, note, put};
 use crate::error::{Error, Result};
 use crate::export::{Belonging, CarriedTorques, Export, FORMATS, Format};
 use crate::pipeline::Purpose;
@@ -11,7 +11,6 @@ use crate::raw;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::ffi::OsString;
-use std::io::Write;
 use std::path::PathBuf;
 
 /// Export the identified model: its corrected geometry for other programs, all of it as JSON, or numbers for the controller.
@@ -62,11 +61,9 @@ impl ExportArguments {
         let identified = self.model.load(Purpose::Export, command_line)?;
         identified.spare(self.out.as_deref())?;
         if identified.is_of_torques_alone() && self.format.0.carries == CarriedTorques::Nothing {
-            let allowed: Vec<&str> = FORMATS
-                .iter()
-                .filter(|format| format.carries != CarriedTorques::Nothing)
-                .map(|format| format.name)
-                .collect();
+            let carries = |format: &&Format| format.carries != CarriedTorques::Nothing;
+            let allowed = FORMATS.iter().filter(carries).map(|format| format.name);
+            let allowed: Vec<&str> = allowed.collect();
             let message = format!(
                 "torques were identified, no geometry, and it holds none; allowed: {}",
                 allowed.join(", ")
@@ -75,22 +72,15 @@ impl ExportArguments {
         }
         let export = Export::of(identified, self.model.force);
         let text = (self.format.0.text)(&export)?;
-        match &self.out {
-            Some(path) => std::fs::write(path, text).map_err(|error| {
-                Error::store(
-                    path.display().to_string(),
-                    format!("cannot be written: {error}"),
-                )
-            })?,
-            None => emit(&text)?,
-        }
+        put(self.out.as_deref(), text)?;
         if !self.model.quiet {
-            let remarks: String = export
-                .remarks_in(self.format.0)
-                .iter()
-                .map(|line| format!("{line}\n"))
-                .collect();
-            let _ = std::io::stderr().write_all(remarks.as_bytes());
+            let remarks = export.remarks_in(self.format.0);
+            note(
+                remarks
+                    .iter()
+                    .map(|line| format!("{line}\n"))
+                    .collect::<String>(),
+            );
         }
         Ok(())
     }
@@ -123,40 +113,40 @@ impl CheckExportArguments {
         let origin = identified.origin.clone();
         // Nothing is written here: a format that holds the arm badly may have been insisted on.
         let export = Export::of(identified, true);
-        let serial =
-            |serial: &Option<String>| serial.clone().unwrap_or_else(|| "not stated".into());
+        let serial = |serial: &Option<String>| serial.clone().unwrap_or("not stated".into());
         let (statement, code) = match export.check(&label, &text)? {
-            Belonging::Same(mark) => (
-                format!(
-                    "is the export of {origin}: {}, model {}, robot serial {}",
-                    mark.format,
-                    mark.model,
-                    serial(&mark.serial)
-                ),
-                0,
-            ),
-            Belonging::Edited(mark, line) => (
-                format!(
-                    "line {line} is not as {origin} (model {}) exports it: the file was edited, or another version wrote it",
-                    mark.model
-                ),
-                1,
-            ),
-            Belonging::Other(file, here) if file.serial != here.serial => (
-                format!(
-                    "is of the robot with serial {}; that of {origin} is {}",
-                    serial(&file.serial),
-                    serial(&here.serial)
-                ),
-                1,
-            ),
-            Belonging::Other(file, here) => (
-                format!(
-                    "is of the model {}; that of {origin} is {}",
-                    file.model, here.model
-                ),
-                1,
-            ),
+            Belonging::Same(mark) => {
+                let (format, model, serial) = (&mark.format, &mark.model, serial(&mark.serial));
+                (
+                    format!(
+                        "is the export of {origin}: {format}, model {model}, robot serial {serial}"
+                    ),
+                    0,
+                )
+            }
+            Belonging::Edited(mark, line) => {
+                let model = &mark.model;
+                (
+                    format!(
+                        "line {line} is not as {origin} (model {model}) exports it: the file was edited, or another version wrote it"
+                    ),
+                    1,
+                )
+            }
+            Belonging::Other(file, here) if file.serial != here.serial => {
+                let [file, here] = [&file, &here].map(|mark| serial(&mark.serial));
+                (
+                    format!("is of the robot with serial {file}; that of {origin} is {here}"),
+                    1,
+                )
+            }
+            Belonging::Other(file, here) => {
+                let [file, here] = [file.model, here.model];
+                (
+                    format!("is of the model {file}; that of {origin} is {here}"),
+                    1,
+                )
+            }
         };
         emit(&format!("{label}: {statement}\n"))?;
         Ok(code)

@@ -1,12 +1,12 @@
 //! `calib compensate --torque`: the torques that a planned motion needs by the identified model.
 
-use super::emit;
+use super::{note, put, readable};
 use crate::dynamics::{JudgedRow, TorqueGate};
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::{IdentifiedModel, IdentifiedTorques};
 use crate::raw;
-use crate::targets::{Trajectory, unwritten, whole};
-use std::io::{Read, Write};
+use crate::targets::Trajectory;
+use std::io::Read;
 use std::path::Path;
 
 /// Faults of rows named of one file.
@@ -58,13 +58,7 @@ pub(super) fn feed_forward(asked: &FeedForward, identified: &IdentifiedModel) ->
     };
     let judged = torques.model.judged(&trajectory.motion, &needed, &gate);
     let written = trajectory.written(&needed, torques.per_ampere.as_deref(), &judged);
-    match asked.out {
-        Some(out) => whole(out, |mut file| {
-            file.write_all(written.as_bytes())
-                .map_err(|error| unwritten(out, &error))
-        })?,
-        None => emit(&written)?,
-    }
+    put(asked.out, written)?;
     let mut notes = if asked.quiet {
         String::new()
     } else {
@@ -74,96 +68,78 @@ pub(super) fn feed_forward(asked: &FeedForward, identified: &IdentifiedModel) ->
         notes.push_str("warning: a table of parameters alone does not say how certain torques are: nothing is refused for it\n");
     }
     notes.push_str(&warnings(&judged));
-    let _ = std::io::stderr().write_all(notes.as_bytes());
+    note(notes);
     refused(&judged, &trajectory, &place)
 }
 
 /// What is wrong with some rows, a sentence a line.
 fn warnings(judged: &[JudgedRow]) -> String {
-    let rows = counted(judged.len(), "row");
-    let line = |is: fn(&JudgedRow) -> bool, what: &str| {
-        let count = judged.iter().filter(|row| is(row)).count();
-        if count > 0 {
-            format!("warning: {count} of {rows} {what} (column `remark`)\n")
-        } else {
-            String::new()
-        }
-    };
-    [
-        line(
+    let all: [(fn(&JudgedRow) -> bool, &str); 3] = [
+        (
             JudgedRow::is_beyond,
             "lie beyond the motion that the model was seen in",
         ),
-        line(
+        (
             JudgedRow::is_refused,
             "are less certain than allowed and have no torques; --force writes them all the same",
         ),
-        line(
+        (
             JudgedRow::is_insisted,
             "are refused and written because of --force",
         ),
-    ]
-    .concat()
+    ];
+    let rows = counted(judged.len(), "row");
+    let line = |(is, what): (fn(&JudgedRow) -> bool, &str)| {
+        let count = judged.iter().filter(|row| is(row)).count();
+        (count > 0).then(|| format!("warning: {count} of {rows} {what} (column `remark`)\n"))
+    };
+    all.into_iter().filter_map(line).collect()
 }
 
 /// Fails with the rows that have no torques, the first of them.
 fn refused(judged: &[JudgedRow], trajectory: &Trajectory, place: &str) -> Result<()> {
-    let refused = judged
-        .iter()
-        .enumerate()
-        .filter(|(_, row)| row.is_refused())
-        .take(LIMIT);
+    let rows = judged.iter().enumerate();
+    let refused = rows.filter(|(_, row)| row.is_refused()).take(LIMIT);
     let fault = |(row, judged): (usize, &JudgedRow)| {
-        Fault::new(
-            trajectory.place(row, place),
-            format!("{judged}: no torques are written"),
-        )
+        let message = format!("{judged}: no torques are written");
+        Fault::new(trajectory.place(row, place), message)
     };
-    let faults: Vec<Fault> = refused.map(fault).collect();
-    if faults.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::Data(faults))
-    }
+    Error::if_data(refused.map(fault).collect())
 }
 
 fn read(motion: &Path) -> Result<(String, String)> {
-    let place = if motion.as_os_str() == "-" {
-        "stdin".to_string()
-    } else {
-        motion.display().to_string()
-    };
-    let bytes = if motion.as_os_str() == "-" {
+    let (place, bytes) = if motion.as_os_str() == "-" {
         let mut bytes = Vec::new();
-        std::io::stdin().read_to_end(&mut bytes).map(|_| bytes)
+        let read = std::io::stdin().read_to_end(&mut bytes);
+        (
+            "stdin".to_string(),
+            readable(Path::new("stdin"), read.map(|_| bytes))?,
+        )
     } else {
-        raw::bytes(motion)
+        (
+            motion.display().to_string(),
+            readable(motion, raw::bytes(motion))?,
+        )
     };
-    let bytes = bytes.map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
     let text = String::from_utf8(bytes).map_err(|_| Error::data(&place, "is no text in UTF-8"))?;
     Ok((place, text))
 }
 
 /// What the person must know, a line each.
 fn remarks_on(torques: &IdentifiedTorques, trajectory: &Trajectory, rows: usize) -> String {
-    let derived = match (&trajectory.motion.velocity, &trajectory.motion.acceleration) {
-        (Some(_), Some(_)) => "velocities and accelerations as given",
-        (Some(_), None) => {
-            "accelerations by differences of positions, after the low-pass of the recording"
-        }
-        (None, Some(_)) => {
-            "velocities by differences of positions, after the low-pass of the recording"
-        }
-        (None, None) => {
-            "velocities and accelerations by differences of positions, after the low-pass of the recording"
-        }
+    let motion = &trajectory.motion;
+    let derived = |what: &str| {
+        format!("{what} by differences of positions, after the low-pass of the recording")
     };
-    let warm = torques
-        .model
-        .terms
-        .iter()
-        .any(|term| term.effect == "warmup_friction");
-    let warm = match (warm, trajectory.motion.since_start) {
+    let derived = match (&motion.velocity, &motion.acceleration) {
+        (Some(_), Some(_)) => "velocities and accelerations as given".into(),
+        (Some(_), None) => derived("accelerations"),
+        (None, Some(_)) => derived("velocities"),
+        (None, None) => derived("velocities and accelerations"),
+    };
+    let mut terms = torques.model.terms.iter();
+    let is_warming = terms.any(|term| term.effect == "warmup_friction");
+    let warm = match (is_warming, motion.since_start) {
         (true, None) => {
             "friction is that of a warm arm (--since-start says how long ago it began to move)\n"
         }

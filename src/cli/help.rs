@@ -93,7 +93,7 @@ impl CompletionsArguments {
     pub(crate) fn run(&self) -> Result<()> {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut Arguments::command(), "calib", &mut text);
-        emit(&String::from_utf8_lossy(&text))
+        emit(text)
     }
 }
 
@@ -129,7 +129,7 @@ impl ManArguments {
             .title(title)
             .render(&mut text)
             .map_err(|error| Error::Bug(error.to_string()))?;
-        emit(&String::from_utf8_lossy(&text))
+        emit(text)
     }
 }
 

@@ -1,6 +1,6 @@
 //! `calib init`: a commented robot file and pipeline to start from, made for the columns of one's own files.
 
-use super::emit;
+use super::{emit, note, warn};
 use crate::error::{Error, Result};
 use crate::init::{InitRequest, StarterFiles, TYPICAL, start, typical};
 use crate::raw::ending;
@@ -9,7 +9,6 @@ use crate::text::filled;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use minijinja::context;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Write a robot file and a pipeline to start from: with comments, for the columns found in your recordings.
@@ -78,7 +77,7 @@ impl InitArguments {
             "neither joints nor a measured point were recognised in {}: name the columns where it says REPLACE",
             files.join(" and ")
         );
-        let _ = writeln!(std::io::stderr(), "error: {message}");
+        note(format!("error: {message}\n"));
         Ok(1)
     }
 }
@@ -142,9 +141,7 @@ fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
             written.join(" and ")
         )
     });
-    for note in start.notes.iter().chain(&unread) {
-        let _ = writeln!(std::io::stderr(), "warning: {note}");
-    }
+    warn(start.notes.iter().chain(&unread));
     emit(&closing(arguments, &start, &files))?;
     Ok(start)
 }

@@ -22,6 +22,7 @@ mod verify_robot;
 pub use surroundings::{cores, open_store, surroundings};
 
 use crate::error::{Error, Result, counted, nearest};
+use crate::targets::{unwritten, whole};
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::ffi::OsString;
@@ -159,7 +160,7 @@ fn coded(result: Result<u8>) -> u8 {
 
 /// Says what went wrong, and with which exit code.
 fn complain(error: &Error) -> u8 {
-    let _ = writeln!(std::io::stderr(), "{}", message(error));
+    note(message(error) + "\n");
     error.exit_code()
 }
 
@@ -174,14 +175,51 @@ fn message(error: &Error) -> String {
 }
 
 /// Prints a result on stdout; a reader that has gone away is no fault.
-fn emit(text: &str) -> Result<()> {
+fn emit(text: impl AsRef<[u8]>) -> Result<()> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(text.as_ref()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(Error::store("stdout", error.to_string()))
         }
         _ => Ok(()),
     }
+}
+
+/// Warnings on stderr, a line each.
+fn warn<T: std::fmt::Display>(lines: impl IntoIterator<Item = T>) {
+    note(
+        lines
+            .into_iter()
+            .map(|line| format!("warning: {line}\n"))
+            .collect::<String>(),
+    );
+}
+
+/// Lines on stderr.
+fn note(text: impl AsRef<[u8]>) {
+    let _ = std::io::stderr().write_all(text.as_ref());
+}
+
+/// A result where the command line says, whole, else on stdout.
+fn put(out: Option<&Path>, result: impl AsRef<[u8]>) -> Result<()> {
+    let Some(out) = out else {
+        return emit(result);
+    };
+    whole(out, |mut file| {
+        let written = file.write_all(result.as_ref());
+        written.map_err(|error| unwritten(out, &error))
+    })
+}
+
+/// What a file holds, or what it is when it cannot be read.
+fn readable<T>(path: &Path, read: std::io::Result<T>) -> Result<T> {
+    let fault = |error| {
+        Error::spec(
+            path.display().to_string(),
+            format!("cannot be read: {error}"),
+        )
+    };
+    read.map_err(fault)
 }
 
 /// Writes a page where the command line names it.
@@ -196,10 +234,9 @@ fn emit_lines(text: &str) -> Result<()> {
         return emit(text);
     };
     let text = crate::summary::folded(text, columns);
-    emit(&if surroundings::colours() {
-        surroundings::painted(&text)
-    } else {
-        text
+    emit(match surroundings::colours() {
+        true => surroundings::painted(&text),
+        false => text,
     })
 }
 

@@ -1,11 +1,9 @@
-//! What every verb that runs a pipeline takes, and how it fails under `--json`.
-//!
 //! Options of every verb that runs a pipeline or takes its result: overrides, the store, worker threads.
 //!
 //! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
 
-use super::emit_json;
 use super::surroundings::{cores, open_store, surroundings};
+use super::{emit_json, warn};
 use crate::compensate::GateLimits;
 use crate::error::{Error, Fault, Result};
 use crate::identified::{Files, IdentifiedModel, judges_of, steps_of};
@@ -16,91 +14,13 @@ use crate::pipeline::{
 use crate::progress::{Progress, Verbosity};
 use crate::raw::ending;
 use crate::shell::typed;
-use crate::stage::{DeclaredStage, Report};
 use crate::store::Store;
 use crate::summary::LimitsSummary;
 use clap::Args;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::json;
 use std::ffi::OsString;
-use std::io::Write;
 use std::path::{Path, PathBuf};
-
-#[derive(Args)]
-pub(super) struct PipelineArguments {
-    /// The pipeline's YAML file
-    #[arg(value_name = "PIPELINE")]
-    pub(crate) pipeline: PathBuf,
-    #[command(flatten)]
-    means: ExecutionArguments,
-    /// Prints one JSON document on stdout
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// Prints no progress; warnings and errors remain
-    #[arg(long, short)]
-    quiet: bool,
-}
-
-impl PipelineArguments {
-    /// The pipeline, its reports in another language where one is given.
-    pub(crate) fn plan(&self, language: Option<&str>) -> Result<Plan> {
-        let plan = self.means.plan(&self.pipeline)?;
-        let Some(language) = language else {
-            return Ok(plan);
-        };
-        let reports = plan
-            .stages
-            .iter()
-            .filter(|stage| stage.entry.name == Report::NAME);
-        let sets: Vec<Override> = reports
-            .map(|stage| Override {
-                target: format!("{}.language", stage.id),
-                value: language.into(),
-            })
-            .collect();
-        if sets.is_empty() {
-            return Err(Error::spec(
-                "--language",
-                format!(
-                    "{} has no stage `{}`",
-                    self.pipeline.display(),
-                    Report::NAME
-                ),
-            ));
-        }
-        self.means.plan_with(&self.pipeline, &sets)
-    }
-
-    /// See [`ExecutionArguments::store_again`].
-    pub(crate) fn store_again(&self) -> String {
-        self.means.store_again()
-    }
-
-    pub(crate) fn store(&self) -> Result<Store> {
-        self.means.store()
-    }
-
-    /// Runs the selected stages with progress, and with `details` all that stages note.
-    pub(crate) fn run(
-        &self,
-        plan: &Plan,
-        store: &Store,
-        wanted: (Selection, bool),
-        command_line: &[OsString],
-    ) -> Result<CompletedRun> {
-        let (selection, details) = wanted;
-        let task = CommandTask {
-            purpose: Purpose::Run,
-            selection,
-            shown: shown(self.quiet, details),
-        };
-        self.means.run(plan, store, task, command_line)
-    }
-
-    /// The result, whose failure is also a document where one is asked for.
-    pub(crate) fn reported<T>(&self, result: Result<T>) -> Result<T> {
-        reported_as(self.json, result)
-    }
-}
 
 /// A result, whose failure is also a document under `json`.
 pub(super) fn reported_as<T>(json: bool, result: Result<T>) -> Result<T> {
@@ -183,7 +103,7 @@ impl ExecutionArguments {
         })
     }
 
-    pub(crate) fn jobs(&self) -> usize {
+    fn jobs(&self) -> usize {
         self.jobs.map_or_else(cores, usize::from)
     }
 
@@ -195,24 +115,14 @@ impl ExecutionArguments {
         task: CommandTask,
         command_line: &[OsString],
     ) -> Result<CompletedRun> {
-        let CommandTask {
-            purpose,
-            selection,
-            shown,
-        } = task;
-        let progress = Progress::new(shown, plan.width_of_ids());
+        let progress = Progress::new(task.shown, plan.width_of_ids());
         let options = RunOptions {
-            selection,
+            selection: task.selection,
             jobs: self.jobs(),
-            purpose,
+            purpose: task.purpose,
         };
-        let result = run(
-            plan,
-            store,
-            &options,
-            &surroundings(command_line),
-            &progress,
-        );
+        let around = surroundings(command_line);
+        let result = run(plan, store, &options, &around, &progress);
         progress.finish();
         result
     }
@@ -254,8 +164,12 @@ pub(super) struct ModelArguments {
 }
 
 impl ModelArguments {
-    pub(crate) fn jobs(&self) -> usize {
-        self.means.jobs()
+    /// As many workers as are asked for.
+    pub(crate) fn threads(&self) -> Result<ThreadPool> {
+        let threads = ThreadPoolBuilder::new().num_threads(self.means.jobs());
+        threads
+            .build()
+            .map_err(|error| Error::store("--jobs", error.to_string()))
     }
 
     /// Loads the model and says what is to be known of it; runs the pipeline's stages that are not done.
@@ -270,9 +184,7 @@ impl ModelArguments {
         ];
         Error::if_spec(must_be_positive(limits).collect())?;
         let identified = self.identified(purpose, command_line)?;
-        for warning in &identified.warnings {
-            let _ = writeln!(std::io::stderr(), "warning: {warning}");
-        }
+        warn(&identified.warnings);
         self.judged(identified)
     }
 
@@ -288,12 +200,8 @@ impl ModelArguments {
             identified.accepted(&gate, "--force")?;
         }
         identified.refusals = gate.model;
-        for reason in &identified.refusals {
-            let _ = writeln!(
-                std::io::stderr(),
-                "warning: used because of --force: {reason}"
-            );
-        }
+        let refusals = identified.refusals.iter();
+        warn(refusals.map(|reason| format!("used because of --force: {reason}")));
         Ok(identified)
     }
 
@@ -316,32 +224,29 @@ impl ModelArguments {
                 "is of tables of parameters alone; a run or a pipeline knows its robot: leave it out",
             ));
         }
-        let (store, step) = (self.means.store()?, self.step.as_deref());
-        if !matches!(ending.as_str(), "yaml" | "yml") {
-            let manifest = Manifest::of(&store, &self.run(&store)?)?;
-            let mut identified = IdentifiedModel::of_run(&store, &manifest, step)?;
-            identified
-                .refusals
-                .extend(LimitsSummary::of(&manifest, &store)?.exceeded());
-            // A pipeline's stages say it themselves.
-            identified.warnings.append(&mut identified.stage_warnings);
-            return Ok(identified);
-        }
-        let plan = self.means.plan(&self.model)?;
-        // A report with limits says whether the model is accepted.
-        let wanted = [steps_of(&plan)?, judges_of(&plan)].concat();
-        let task = CommandTask {
-            purpose,
-            selection: Selection::default(),
-            shown: shown(self.quiet, false),
+        let store = self.means.store()?;
+        let is_pipeline = matches!(ending.as_str(), "yaml" | "yml");
+        let manifest = if is_pipeline {
+            let plan = self.means.plan(&self.model)?;
+            // A report with limits says whether the model is accepted.
+            let wanted = [steps_of(&plan)?, judges_of(&plan)].concat();
+            let task = CommandTask {
+                purpose,
+                selection: Selection::default(),
+                shown: shown(self.quiet, false),
+            };
+            let plan = plan.needed_for_all(&wanted);
+            self.means.run(&plan, &store, task, command_line)?.manifest
+        } else {
+            Manifest::of(&store, &self.run(&store)?)?
         };
-        let outcome = self
-            .means
-            .run(&plan.needed_for_all(&wanted), &store, task, command_line)?;
-        let mut identified = IdentifiedModel::of_run(&store, &outcome.manifest, step)?;
-        identified
-            .refusals
-            .extend(LimitsSummary::of(&outcome.manifest, &store)?.exceeded());
+        let mut identified = IdentifiedModel::of_run(&store, &manifest, self.step.as_deref())?;
+        let exceeded = LimitsSummary::of(&manifest, &store)?.exceeded();
+        identified.refusals.extend(exceeded);
+        // A pipeline's stages say it themselves.
+        if !is_pipeline {
+            identified.warnings.append(&mut identified.stage_warnings);
+        }
         Ok(identified)
     }
 

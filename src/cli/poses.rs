@@ -3,16 +3,14 @@
 //! `calib excite`: which motion to record for torques, before anything is recorded.
 
 use crate::cli::surroundings::{cores, open_store};
-use crate::cli::{emit, emit_json};
+use crate::cli::{emit, emit_json, put, warn};
 use crate::error::{Error, Fault, Result};
 use crate::excitation::{MotionRequest, exciting_motion};
 use crate::identified::robot_file;
 use crate::poses::{
     PoseAnswer, PoseRequest, RunStage, apart, fault, places, proposal, sockets, write,
 };
-use crate::targets::{unwritten, whole};
 use clap::Args;
-use std::io::Write;
 use std::path::PathBuf;
 
 /// Propose poses to measure: the best for all parameters together, or for separating two effects.
@@ -148,9 +146,7 @@ fn request(arguments: &PosesArguments) -> PoseRequest {
 }
 
 fn show(arguments: &PosesArguments, answer: &PoseAnswer) -> Result<()> {
-    for warning in &answer.warnings {
-        let _ = writeln!(std::io::stderr(), "warning: {warning}");
-    }
+    warn(&answer.warnings);
     if let (Some(path), Some(poses)) = (&arguments.out, &answer.drive) {
         write(path, poses)?;
     }
@@ -295,7 +291,7 @@ impl ExciteArguments {
     pub(crate) fn run(&self) -> Result<()> {
         if !(0.0..=45.0).contains(&self.margin) {
             let message = format!("expected 0 to 45 percent, found {}", self.margin);
-            return Err(Error::Spec(vec![Fault::new("--margin", message)]));
+            return Err(Error::spec("--margin", message));
         }
         let proposal = exciting_motion(&MotionRequest {
             robot: self.robot.clone(),
@@ -313,10 +309,7 @@ impl ExciteArguments {
             jobs: self.jobs.map_or_else(cores, usize::from),
         })?;
         if let Some(out) = &self.out {
-            whole(out, |mut file| {
-                file.write_all(proposal.csv().as_bytes())
-                    .map_err(|error| unwritten(out, &error))
-            })?;
+            put(Some(out), proposal.csv())?;
         }
         if self.json {
             emit_json(&proposal.document())

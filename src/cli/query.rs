@@ -95,15 +95,11 @@ fn answer(
     match (arguments.csv, arguments.json) {
         (true, _) => emit(&summary::csv(&answer)?),
         (_, true) => emit(&summary::json(&answer)?),
-        _ => emit(&summary::grid(
-            &answer,
-            if arguments.rows == 0 {
-                usize::MAX
-            } else {
-                arguments.rows
-            },
-            super::surroundings::columns(),
-        )),
+        _ => {
+            let rows = Some(arguments.rows).filter(|rows| *rows > 0);
+            let width = super::surroundings::columns();
+            emit(summary::grid(&answer, rows.unwrap_or(usize::MAX), width))
+        }
     }
 }
 
@@ -117,10 +113,10 @@ fn answer(_: &QueryArguments, _: &Store, _: &QueryTables, _: &str) -> Result<()>
 
 /// The tables with their columns.
 fn columns(store: &Store, tables: &[&QueryTable], json: bool) -> Result<()> {
-    if json {
-        emit_json(&summary::columns_json(store, tables)?)
-    } else {
-        emit(&summary::columns(store, tables)?)
+    let tables = summary::columns(store, tables)?;
+    match json {
+        true => emit_json(&tables),
+        false => emit(summary::columns_text(&tables)),
     }
 }
 
@@ -192,62 +188,40 @@ fn check(file: &Path, kind: Option<&str>) -> Result<()> {
 }
 
 fn list() -> String {
-    let width = schema::all()
-        .map(|schema| schema.name.len())
-        .max()
-        .unwrap_or(0);
-    schema::all()
-        .map(|schema| {
-            format!(
-                "{:width$}  {}  {}\n",
-                schema.name, schema.version, schema.description
-            )
-        })
-        .collect()
+    let schemas = || schema::all();
+    let width = schemas().map(|schema| schema.name.len()).max().unwrap_or(0);
+    let line = |schema: &TableSchema| {
+        let (name, version, description) = (&schema.name, &schema.version, &schema.description);
+        format!("{name:width$}  {version}  {description}\n")
+    };
+    schemas().map(line).collect()
 }
 
 fn find(kind: &str) -> Result<&'static TableSchema> {
+    let unknown = || {
+        let kinds: Vec<&str> = schema::all().map(|schema| schema.name.as_str()).collect();
+        let hint = nearest(kind, kinds.iter().copied());
+        let hint = hint.map_or(".".into(), |near| format!("; did you mean `{near}`?"));
+        let message = format!("no table `{kind}`{hint} Allowed: {}", kinds.join(", "));
+        Error::spec("KIND", message)
+    };
     schema::all()
         .find(|schema| schema.name == kind)
-        .ok_or_else(|| {
-            let kinds: Vec<&str> = schema::all().map(|schema| schema.name.as_str()).collect();
-            let hint = nearest(kind, kinds.iter().copied())
-                .map(|near| format!("; did you mean `{near}`?"));
-            Error::spec(
-                "KIND",
-                format!(
-                    "no table `{kind}`{} Allowed: {}",
-                    hint.unwrap_or_else(|| ".".into()),
-                    kinds.join(", ")
-                ),
-            )
-        })
+        .ok_or_else(unknown)
 }
 
 fn show(schema: &TableSchema) -> String {
-    let mut text = format!(
-        "{} {}: {}\n",
-        schema.name, schema.version, schema.description
-    );
-    text.push_str(&format!(
-        "key: {}; sorted by: {}\n\n",
-        schema.primary_key.join(", "),
-        schema.sort.join(", ")
-    ));
-    let width = schema
-        .fields
-        .iter()
-        .map(|field| field.name.len())
-        .max()
-        .unwrap_or(0);
+    let (name, version, description) = (&schema.name, &schema.version, &schema.description);
+    let [key, sort] = [&schema.primary_key, &schema.sort].map(|columns| columns.join(", "));
+    let mut text = format!("{name} {version}: {description}\nkey: {key}; sorted by: {sort}\n\n");
+    let names = schema.fields.iter().map(|field| field.name.len());
+    let width = names.max().unwrap_or(0);
     for field in &schema.fields {
+        let (name, description) = (&field.name, &field.description);
         let kind = format!("{:?}", field.column_type).to_lowercase();
         let null = if field.nullable { "or null" } else { "" };
         let unit = field.unit.as_deref().unwrap_or("");
-        text.push_str(&format!(
-            "{:width$}  {kind:7} {null:7}  {unit:6}  {}\n",
-            field.name, field.description
-        ));
+        text += &format!("{name:width$}  {kind:7} {null:7}  {unit:6}  {description}\n");
     }
     text
 }
@@ -282,13 +256,21 @@ impl EffectsArguments {
 }
 
 fn entry(about: &Cause) -> String {
-    let measure = about.measure.map_or_else(String::new, |measure| {
-        format!("  measure     {}\n", measure.advice)
-    });
-    format!(
-        "{} ({})\n  formula     {}\n  usual size  {}\n  confounded  {}\n  needs       {}\n{measure}",
-        about.name, about.place, about.formula, about.size, about.confounded, about.needs
-    )
+    let measure = about.measure.map(|measure| measure.advice);
+    let lines = [
+        ("formula", Some(about.formula)),
+        ("usual size", Some(about.size)),
+        ("confounded", Some(about.confounded)),
+        ("needs", Some(about.needs)),
+        ("measure", measure),
+    ];
+    let lines = lines
+        .into_iter()
+        .filter_map(|(name, text)| Some((name, text?)));
+    let lines: String = lines
+        .map(|(name, text)| format!("  {name:10}  {text}\n"))
+        .collect();
+    format!("{} ({})\n{lines}", about.name, about.place)
 }
 
 fn unknown(name: &str) -> Error {
@@ -321,34 +303,31 @@ impl RobotsArguments {
 }
 
 fn library() -> Result<String> {
-    let mut out = format!(
-        "{:<16} {:<40} {:>6} {:>9}  {}\n",
-        "name", "arm", "joints", "reach mm", "in the file"
-    );
+    let line = |name: &str, arm: &str, joints: &str, reach: &str, holds: &str| {
+        let line = format!("{name:<16} {arm:<40} {joints:>6} {reach:>9}  {holds}");
+        line.trim_end().to_string() + "\n"
+    };
+    let mut out = line("name", "arm", "joints", "reach mm", "in the file");
     for arm in LIBRARY {
         let read = arm.read()?;
-        let reach = read.about.reach.map_or_else(
-            || "-".into(),
-            |reach| Unit::Millimetre.from_si(reach).round().to_string(),
+        let in_mm = |reach| Unit::Millimetre.from_si(reach).round().to_string();
+        let holds = [
+            (
+                read.robot.joints.iter().any(|joint| joint.mass.is_some()),
+                "masses",
+            ),
+            (read.about.counting().is_some(), "coupled counting"),
+        ];
+        let holds = holds
+            .into_iter()
+            .filter_map(|(there, what)| there.then_some(what));
+        out += &line(
+            arm.name,
+            &read.robot.name,
+            &read.robot.joints.len().to_string(),
+            &read.about.reach.map_or("-".into(), in_mm),
+            &holds.collect::<Vec<_>>().join(", "),
         );
-        let mut holds = Vec::new();
-        if read.robot.joints.iter().any(|joint| joint.mass.is_some()) {
-            holds.push("masses");
-        }
-        if read.about.counting().is_some() {
-            holds.push("coupled counting");
-        }
-        let joints = read.robot.joints.len();
-        out.push_str(
-            format!(
-                "{:<16} {:<40} {joints:>6} {reach:>9}  {}",
-                arm.name,
-                read.robot.name,
-                holds.join(", ")
-            )
-            .trim_end(),
-        );
-        out.push('\n');
     }
     Ok(out)
 }

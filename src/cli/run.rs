@@ -2,22 +2,21 @@
 //!
 //! `calib check`: whether a pipeline can run: what is still to fill in and to look at, every fault at once, and with `--data` what a first fit says.
 
-use super::pipeline_arguments::{CommandTask, ExecutionArguments, PipelineArguments};
+use super::pipeline_arguments::{CommandTask, ExecutionArguments, reported_as, shown};
 use super::surroundings::columns;
 use super::{emit, emit_json, emit_lines};
 use crate::error::{Error, Result, counted};
 use crate::identified::{standing_of, wrong_setup_of};
 use crate::init::{MarkedLines, marked};
 use crate::pipeline::{
-    CompletedRun, Forecast, Plan, Prospect, Purpose, Selection, StageStatus, look, preview,
+    CompletedRun, Forecast, Override, Plan, Prospect, Purpose, Selection, StageStatus, look,
+    preview,
 };
 use crate::progress::Verbosity;
 use crate::raw::ending;
 use crate::report::PageLanguage;
-use crate::stage::{DeclaredStage, Identify};
-use crate::store::Store;
-use crate::summary::{self, LimitsSummary, ResultScreen, first_look, graph, labelled};
-use crate::table::picked;
+use crate::stage::{DeclaredStage, Identify, Report};
+use crate::summary::{self, ResultScreen, RunResult, first_look, graph, labelled};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use serde_json::json;
@@ -33,8 +32,17 @@ use std::time::Instant;
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct RunArguments {
+    /// The pipeline's YAML file
+    #[arg(value_name = "PIPELINE")]
+    pipeline: PathBuf,
     #[command(flatten)]
-    shared: PipelineArguments,
+    means: ExecutionArguments,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+    /// Prints no progress; warnings and errors remain
+    #[arg(long, short)]
+    quiet: bool,
     /// Shows what would run and why, and runs nothing
     #[arg(long, short = 'n')]
     dry_run: bool,
@@ -68,7 +76,31 @@ const EXAMPLES: &str = "Examples:
 
 impl RunArguments {
     pub(crate) fn run(&self, command_line: &[OsString]) -> Result<u8> {
-        self.shared.reported(execute(self, command_line))
+        reported_as(self.json, execute(self, command_line))
+    }
+
+    /// The pipeline, its reports in another language where one is given.
+    fn plan(&self) -> Result<Plan> {
+        let plan = self.means.plan(&self.pipeline)?;
+        let Some(language) = &self.language else {
+            return Ok(plan);
+        };
+        let stages = plan.stages.iter();
+        let reports = stages.filter(|stage| stage.entry.name == Report::NAME);
+        let sets = reports.map(|stage| Override {
+            target: format!("{}.language", stage.id),
+            value: language.into(),
+        });
+        let sets: Vec<Override> = sets.collect();
+        if sets.is_empty() {
+            let message = format!(
+                "{} has no stage `{}`",
+                self.pipeline.display(),
+                Report::NAME
+            );
+            return Err(Error::spec("--language", message));
+        }
+        self.means.plan_with(&self.pipeline, &sets)
     }
 }
 
@@ -78,8 +110,8 @@ pub(super) const WRONG_SETUP: u8 = 10;
 /// Gives the exit code: 1 where the run went through and its result is beyond the limits, 10 where the set-up is wrong.
 fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     let begun = Instant::now();
-    let shared = &arguments.shared;
-    let (plan, store) = (shared.plan(arguments.language.as_deref())?, shared.store()?);
+    let means = &arguments.means;
+    let (plan, store) = (arguments.plan()?, means.store()?);
     // `--force` without a stage stands for all of them.
     let force = arguments
         .force
@@ -93,43 +125,42 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     };
     if arguments.dry_run {
         let forecasts = preview(&plan, &store, &selection)?;
-        match shared.json {
+        match arguments.json {
             true => emit_json(&json!({ "pipeline": plan.name, "stages": forecasts }))?,
             false => emit(&forecast_lines(&forecasts))?,
         }
         return Ok(0);
     }
-    let outcome = shared.run(&plan, &store, (selection, arguments.details), command_line)?;
-    let limits = LimitsSummary::read(&outcome, &store)?;
-    let (standing, wrong) = (
-        standing_of(&outcome.manifest, &store)?,
-        wrong_setup_of(&outcome.manifest, &store)?,
-    );
-    let code = if wrong.is_some() {
-        WRONG_SETUP
-    } else {
-        u8::from(limits.accepted() == Some(false))
+    let task = CommandTask {
+        purpose: Purpose::Run,
+        selection,
+        shown: shown(arguments.quiet, arguments.details),
     };
-    if shared.json {
-        emit_json(&document(&outcome, &limits, &store)?)?;
+    let outcome = means.run(&plan, &store, task, command_line)?;
+    let wrong = wrong_setup_of(&outcome.manifest, &store)?;
+    let standing = standing_of(&outcome.manifest, &store)?;
+    let result = RunResult::read(&outcome, standing, wrong, &store)?;
+    let code = match result.wrong_setup {
+        Some(_) => WRONG_SETUP,
+        None => u8::from(result.accepted == Some(false)),
+    };
+    if arguments.json {
+        emit_json(&result)?;
         return Ok(code);
     }
-    let (again, columns) = (shared.store_again(), columns());
     let on = ResultScreen {
-        store: &again,
-        columns,
+        store: &means.store_again(),
+        columns: columns(),
     };
-    let short = summary::in_short(&outcome, standing.as_ref(), wrong.as_deref(), &store, on)?;
+    let short = result.in_short(&outcome.manifest, &store, on)?;
     let mut text = String::new();
     if arguments.details || short.is_none() {
-        text.push_str(&summary::statistics(&outcome, standing.as_ref(), &store)?);
-        text.push_str(&summary::corrections(&outcome, &store)?);
-        text.push_str(&summary::searches(&outcome, &store)?);
+        text += &result.steps();
     }
     text.push_str(short.as_deref().unwrap_or_default());
     // Of a wrong set-up nothing else is said.
-    if wrong.is_none() {
-        text.push_str(&limits.text());
+    if result.wrong_setup.is_none() {
+        text.push_str(&result.limits.text());
     }
     text.push_str(&summary::rejected(&outcome.manifest));
     let more = if arguments.details || short.is_none() {
@@ -137,12 +168,9 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     } else {
         " (--details: every step and set)"
     };
-    for path in outcome
-        .documents
-        .iter()
-        .filter(|path| arguments.details || ending(path) == "html")
-    {
-        text.push_str(&labelled("report", &format!("{}{more}", path.display())));
+    let is_shown = |path: &&String| arguments.details || ending(path.as_ref()) == "html";
+    for path in result.documents().iter().filter(is_shown) {
+        text.push_str(&labelled("report", &format!("{path}{more}")));
     }
     if arguments.details || short.is_none() || outcome.nothing_done() {
         text.push_str(&closing(&outcome, begun.elapsed().as_secs_f64()));
@@ -153,31 +181,25 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
 
 fn closing(outcome: &CompletedRun, seconds: f64) -> String {
     let stages = &outcome.manifest.stages;
-    let count = |status| stages.iter().filter(|stage| stage.status == status).count();
-    if outcome.nothing_done() {
-        return labelled(
-            "done",
-            &format!(
-                "nothing to do: {} cached ({seconds:.1} s)",
-                counted(stages.len(), "stage")
-            ),
-        );
-    }
-    let (executed, cached, not_run) = (
-        count(StageStatus::Executed),
-        count(StageStatus::Cached),
-        count(StageStatus::NotRun),
-    );
-    let not_run = if not_run > 0 {
-        format!(", {not_run} not selected")
+    let all = [
+        StageStatus::Executed,
+        StageStatus::Cached,
+        StageStatus::NotRun,
+    ];
+    let [executed, cached, not_run] =
+        all.map(|status| stages.iter().filter(|stage| stage.status == status).count());
+    let text = if outcome.nothing_done() {
+        let stages = counted(stages.len(), "stage");
+        format!("nothing to do: {stages} cached ({seconds:.1} s)")
     } else {
-        String::new()
+        let not_run = match not_run {
+            0 => String::new(),
+            _ => format!(", {not_run} not selected"),
+        };
+        let (executed, run) = (counted(executed, "stage"), &outcome.manifest.run_id);
+        format!("{executed} run, {cached} cached{not_run} ({seconds:.1} s), run {run}")
     };
-    let (executed, run) = (counted(executed, "stage"), &outcome.manifest.run_id);
-    labelled(
-        "done",
-        &format!("{executed} run, {cached} cached{not_run} ({seconds:.1} s), run {run}"),
-    )
+    labelled("done", &text)
 }
 
 fn forecast_lines(forecasts: &[Forecast]) -> String {
@@ -196,48 +218,6 @@ fn forecast_lines(forecasts: &[Forecast]) -> String {
         format!("{:width$}  {what}\n", forecast.id)
     };
     forecasts.iter().map(line).collect()
-}
-
-/// The result of a run for other programs.
-fn document(
-    outcome: &CompletedRun,
-    limits: &LimitsSummary,
-    store: &Store,
-) -> Result<serde_json::Value> {
-    let manifest = &outcome.manifest;
-    let documents: Vec<String> = outcome
-        .documents
-        .iter()
-        .map(|path| path.display().to_string())
-        .collect();
-    let stages = manifest.stages.iter().map(|stage| {
-        let mut document = picked(stage, "id uses status reason notes warnings wall_seconds");
-        let outputs = stage.outputs.iter().map(|output| {
-            json!({
-                "port": output.port, "kind": output.kind, "rows": output.table.rows,
-                "table_hash": output.table.table_hash, "path": output.path,
-            })
-        });
-        document["outputs"] = outputs.collect();
-        document
-    });
-    Ok(json!({
-        "status": "done",
-        "run_id": manifest.run_id,
-        "pipeline": manifest.pipeline.name,
-        "seed": manifest.seed,
-        "stages": stages.collect::<Vec<_>>(),
-        "standing": standing_of(manifest, store)?,
-        "wrong_setup": wrong_setup_of(manifest, store)?,
-        "accepted": limits.accepted(),
-        "limits": limits,
-        "statistics": summary::statistics_rows(outcome, store)?,
-        "corrections": summary::corrections_rows(outcome, store)?,
-        "searches": summary::searches_rows(outcome, store)?,
-        "rejected_rows": summary::rejected_rows(&outcome.manifest),
-        "report": documents.first(),
-        "documents": documents,
-    }))
 }
 
 /// Check whether a pipeline can run: what is still to be filled in, what to look at, and every fault with its line.
@@ -295,23 +275,24 @@ impl CheckArguments {
             emit(&graph(&plan))?;
         }
         let stages = counted(plan.stages.len(), "stage");
-        emit_lines(&match to_fill {
+        let (label, text) = match to_fill {
             0 if self.means.overrides() || !self.means.store_again().is_empty() => {
-                labelled("ready", &format!("{stages} can run"))
+                ("ready", format!("{stages} can run"))
             }
-            0 => labelled(
+            0 => (
                 "ready",
-                &format!("{stages} can run: calib run {}", self.pipeline.display()),
+                format!("{stages} can run: calib run {}", self.pipeline.display()),
             ),
-            1 => labelled(
+            1 => (
                 "not yet",
-                &format!("a line is left to fill in; {stages} are wired"),
+                format!("a line is left to fill in; {stages} are wired"),
             ),
-            lines => labelled(
+            lines => (
                 "not yet",
-                &format!("{lines} lines are left to fill in; {stages} are wired"),
+                format!("{lines} lines are left to fill in; {stages} are wired"),
             ),
-        })?;
+        };
+        emit_lines(&labelled(label, &text))?;
         if self.data {
             fitted(self, plan, command_line)
         } else {

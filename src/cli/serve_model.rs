@@ -1,7 +1,7 @@
 //! `calib serve-model`: JSON lines in, JSON lines out, for programs in other languages.
 
-use super::emit;
 use super::pipeline_arguments::ModelArguments;
+use super::{emit, readable};
 use crate::api::{Model, Robot};
 use crate::compensate::{Circumstance, CommandTarget, Corrector, Stated, unstated_payload};
 use crate::error::{Error, Result, counted};
@@ -75,10 +75,7 @@ impl ServeModelArguments {
             true => None,
             false => Some(model.corrector(self.model.force, "--force")?),
         };
-        let threads = rayon::ThreadPoolBuilder::new()
-            .num_threads(self.model.jobs())
-            .build()
-            .map_err(|error| Error::store("--jobs", error.to_string()))?;
+        let threads = self.model.threads()?;
         let mut number = 0;
         loop {
             let batch = waiting(&mut lines)?;
@@ -114,13 +111,7 @@ fn opened(lines: &Path) -> Result<Box<dyn Read>> {
     if lines.as_os_str() == "-" {
         return Ok(Box::new(std::io::stdin()));
     }
-    let file = raw::open(lines).map_err(|error| {
-        Error::spec(
-            lines.display().to_string(),
-            format!("cannot be read: {error}"),
-        )
-    })?;
-    Ok(Box::new(file))
+    Ok(Box::new(readable(lines, raw::open(lines))?))
 }
 
 /// Lines that are there: at least one, unless there are no more, and all others that wait. Blank lines are none.

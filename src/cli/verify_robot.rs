@@ -1,14 +1,15 @@
 //! `calib verify-robot`: what compensation achieved, from points that were measured at corrected targets.
 
 use super::pipeline_arguments::ModelArguments;
-use super::{emit_json, emit_lines, write};
+use super::{emit_json, emit_lines, readable, write};
+use crate::api::usual_options;
 use crate::compensate::{CorrectionOptions, Corrector, IdentifiedArm};
 use crate::error::{Error, Result, counted};
 use crate::identified::{Achieved, achieved};
 use crate::pipeline::Purpose;
 use crate::raw;
 use crate::report::{AchievedTables, achieved_page};
-use crate::robot::{JointConvention, Measurements, RobotModel};
+use crate::robot::RobotModel;
 use crate::summary::labelled;
 use crate::targets::{Layout, Units, measured};
 use clap::Args;
@@ -50,16 +51,12 @@ pub(super) struct VerifyRobotArguments {
 impl VerifyRobotArguments {
     pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
         let place = self.second.display().to_string();
-        let text = raw::text(&self.second)
-            .map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
+        let text = readable(&self.second, raw::text(&self.second))?;
         let identified = self.model.load(Purpose::Compensate, command_line)?;
         let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
         // As `compensate`: what depends on load is not predicted without one.
-        let load = if self.payload.is_some() {
-            None
-        } else {
-            identified.needed_load(&arm)
-        };
+        let unstated = || identified.needed_load(&arm);
+        let load = self.payload.is_none().then(unstated).flatten();
         let layout = Layout {
             place: &place,
             robot: &identified.robot,
@@ -74,16 +71,9 @@ impl VerifyRobotArguments {
             return Err(Error::data(&place, "has no row below its header"));
         }
         let nominal = RobotModel::new(identified.robot.clone());
-        let convention = identified
-            .convention
-            .clone()
-            .unwrap_or_else(|| JointConvention::of_the_robot_file(nominal.joints()));
-        let clock = identified.data.as_ref().is_none_or(Measurements::has_clock);
-        let payload = self.payload.unwrap_or(0.0);
         let options = CorrectionOptions {
-            payload,
-            clock,
-            ..CorrectionOptions::counted_by(convention)
+            payload: self.payload.unwrap_or(0.0),
+            ..usual_options(&identified)
         };
         let mut corrector = Corrector::new(
             &arm,

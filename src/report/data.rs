@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::report::certificate::Judgement;
 use crate::report::language::{Locale, say};
 use crate::report::number::count;
-use crate::report::{Report, Tables};
+use crate::report::{Report, Tables, result};
 use crate::table::{RejectedRow, Robot, RobotRow, VerdictTopic, picked, picked_of};
 use crate::units::Unit;
 use serde_json::{Value, json};
@@ -165,27 +165,13 @@ pub(super) fn document(
     (robot, title): (String, String),
     judgement: Option<&Judgement>,
 ) -> Result<String> {
-    let findings = tables
-        .findings
-        .iter()
-        .flat_map(|table| &table.0)
-        .map(|row| {
-            let columns =
-                "rank effect where=place statement probability place_probability none_probability";
-            let mut finding = picked(row, columns);
-            finding["numbers"] = picked_of(tables.numbers(row.rank), "name value unit sigma");
-            finding["evidence"] = picked(row, "f_statistic p_value delta_bic heldout_gain_mm");
-            finding["forms"] = tables
-                .forms
-                .iter()
-                .flat_map(|table| table.document(row.rank))
-                .collect();
-            finding["rivals"] = picked_of(
-                tables.rivals(row.rank),
-                "effect where=place delta_bic probability",
-            );
-            finding
-        });
+    let findings = tables.findings_with_rivals();
+    let findings = findings.iter().map(|finding| {
+        let evidence = "f_statistic p_value delta_bic heldout_gain_mm";
+        let mut document = result::document(finding, evidence);
+        document["rank"] = finding["rank"].clone();
+        document
+    });
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back().map(|row| {
         let columns = "step verdict statement noise_basis noise_floor_mm before_rms_mm after_rms_mm clock";
         let mut diagnosis = picked(row, columns);

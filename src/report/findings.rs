@@ -7,9 +7,7 @@ use crate::report::Tables;
 use crate::report::language::{Locale, say};
 use crate::report::number::render;
 use crate::report::svg::{Area, Scale, Svg, baseline, label, name_x, name_y};
-use crate::table::{
-    CauseGrid, Cells, CurveRow, FindingRow, Findings, VerdictRow, VerdictTopic, formula_in_words,
-};
+use crate::table::{CauseGrid, CurveRow, FindingRow, VerdictTopic};
 use crate::units::Unit;
 use serde_json::{Value, json};
 
@@ -36,8 +34,7 @@ pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
         .flat_map(|table| &table.0)
         .next_back()?;
     let suspects = tables.suspects.iter().flat_map(|table| &table.0);
-    let findings = tables.findings.iter().flat_map(|table| &table.0);
-    let findings: Vec<Value> = findings.map(|row| finding(locale, row, tables)).collect();
+    let findings = findings(locale, tables);
     let shown = |column: &&str| findings.iter().any(|finding| !finding[*column].is_null());
     let arcsec = |rad: Option<f64>| rad.map(|rad| Unit::Arcsecond.from_si(rad));
     let mut gone = tables
@@ -52,7 +49,7 @@ pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
         "noise_arcsec": arcsec(verdict.noise_floor_rad),
         "leftover_arcsec": arcsec(verdict.leftover_rms_rad),
         "repeatability_arcsec": arcsec(Some(verdict.repeatability_rad)),
-        "causes": tables.cells.last().zip(tables.findings.last()).and_then(|(cells, findings)| picture(cells, findings)),
+        "causes": tables.cells.last().zip(tables.findings.last()).map(|(cells, findings)| CauseGrid::of(cells, findings)),
         // Of which evidence the meaning is stated.
         "meanings": EVIDENCE.iter().filter(|column| shown(column)).collect::<Vec<_>>(),
         "findings": findings,
@@ -67,32 +64,19 @@ pub(super) fn wrong_setup(tables: &Tables) -> Option<String> {
     tables.verdict.last()?.wrong_setup(findings)
 }
 
-/// A row with its numbers, rivals, formulas, range and curves.
-fn finding(locale: &Locale, row: &FindingRow, tables: &Tables) -> Value {
-    let rivals = tables
-        .rivals(row.rank)
-        .filter(|rival| rival.is_inseparable());
-    let forms = tables
-        .forms
-        .iter()
-        .flat_map(|table| table.of_finding(row.rank));
-    let curve = tables
-        .curves
-        .0
-        .iter()
-        .filter(|point| point.rank == row.rank);
-    let mut shown = json!(row);
-    let is_missing = |column: &&&str| shown[**column].is_null();
-    shown["without"] = EVIDENCE.iter().filter(is_missing).copied().collect();
-    shown["numbers"] = json!(tables.numbers(row.rank).collect::<Vec<_>>());
-    shown["rivals"] = json!(rivals.collect::<Vec<_>>());
-    // Formulas that do what it does, with what they cost and bring.
-    shown["formulas"] = forms
-        .map(|rows| json!([formula_in_words(rows), rows[0]]))
-        .collect();
-    shown["valid"] = json!(row.valid_range());
-    shown["pictures"] = json!(pictures(locale, row, &curve.collect::<Vec<_>>()));
-    shown
+/// Findings with numbers, rivals that the data do not exclude, formulas, range and curves.
+fn findings(locale: &Locale, tables: &Tables) -> Vec<Value> {
+    let rows = || tables.findings.iter().flat_map(|table| &table.0);
+    let mut findings = tables.findings_with_rivals();
+    for (shown, row) in findings.iter_mut().zip(rows()) {
+        let points = tables.curves.0.iter();
+        let curve: Vec<_> = points.filter(|point| point.rank == row.rank).collect();
+        let is_missing = |column: &&&str| shown[**column].is_null();
+        shown["without"] = EVIDENCE.iter().filter(is_missing).copied().collect();
+        shown["valid"] = json!(row.valid_range());
+        shown["pictures"] = json!(pictures(locale, row, &curve));
+    }
+    findings
 }
 
 /// Before with the fitted curve and its band, and after on the same scales.
@@ -222,32 +206,8 @@ fn pictures(locale: &Locale, finding: &FindingRow, curve: &[&CurveRow]) -> Vec<(
     ]
 }
 
-/// What the macro `causes` of the page draws; none where nothing was asked.
-pub(super) fn picture(cells: &Cells, findings: &Findings) -> Option<CauseGrid> {
-    Some(CauseGrid::of(cells, findings)).filter(|grid| !grid.rows.is_empty())
-}
-
-/// A diagnosis as one file that needs no other; `origin` is the run, `next` what to measure next, a sentence each.
-pub fn diagnosed_page(
-    title: &str,
-    origin: &str,
-    verdict: &VerdictRow,
-    (cells, findings): (&Cells, &Findings),
-    next: &[String],
-) -> Result<String> {
-    let locale = Locale::default();
-    let page = json!({
-        "title": title,
-        "run": origin,
-        "verdict": verdict,
-        "causes_found": picture(cells, findings),
-        "findings": &findings.0,
-        "next": next,
-    });
-    render(
-        &locale,
-        "diagnosed.html",
-        include_str!("diagnosed.html"),
-        page,
-    )
+/// A diagnosis as one file that needs no other.
+pub(crate) fn diagnosed_page(page: Value) -> Result<String> {
+    let template = include_str!("diagnosed.html");
+    render(&Locale::default(), "diagnosed.html", template, page)
 }

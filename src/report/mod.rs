@@ -12,26 +12,27 @@ pub mod fleet_causes;
 mod language;
 mod number;
 mod parameters;
+pub(crate) mod result;
 mod svg;
 mod torques;
 mod workspace;
 
 pub use certificate::{AchievedTables, achieved_page};
-pub use findings::diagnosed_page;
+pub(crate) use findings::diagnosed_page;
 pub use language::PageLanguage;
 use language::{Locale, say};
 pub use torques::{ReportTorquesReads, torque_page};
 
 use crate::error::Result;
 use crate::table::{
-    Acceptance, Cells, Corrections, Curves, FindingNumberRow, FindingNumbers, Findings, Fit, Forms,
-    Intake, JointConventions, Labelled, Observability, Parameters, Prediction, Recording, Rejected,
-    RivalRow, Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, VerdictSentences,
-    VerdictTopic, Withdrawn,
+    Acceptance, Cells, Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake,
+    JointConventions, Labelled, Observability, Parameters, Prediction, Recording, Rejected, Rivals,
+    Robot, Split, Statistics, Suspects, Training, Verdict, VerdictSentences, VerdictTopic,
+    Withdrawn,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::ops::Deref;
 
@@ -116,14 +117,19 @@ impl Deref for Tables {
 }
 
 impl Tables {
-    fn numbers(&self, rank: i64) -> impl Iterator<Item = &FindingNumberRow> {
-        let all = self.finding_numbers.iter().flat_map(|table| &table.0);
-        all.filter(move |number| number.rank == rank)
-    }
-
-    fn rivals(&self, rank: i64) -> impl Iterator<Item = &RivalRow> {
-        let all = self.rivals.iter().flat_map(|table| &table.0);
-        all.filter(move |rival| rival.rank == rank)
+    /// Findings of all diagnoses, each with its numbers, rivals and formulas.
+    fn findings_with_rivals(&self) -> Vec<Value> {
+        let mut findings = result::findings(
+            self.findings.iter().flat_map(|table| &table.0),
+            self.finding_numbers.iter().flat_map(|table| &table.0),
+            self.rivals.iter().flat_map(|table| &table.0),
+        );
+        for finding in &mut findings {
+            let rank = finding["rank"].as_i64().unwrap_or_default();
+            let forms = self.forms.iter().map(|forms| &forms.table);
+            finding["formulas"] = result::formulas(forms, rank);
+        }
+        findings
     }
 
     /// What the diagnosis of a step says of a topic.

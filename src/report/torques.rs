@@ -3,12 +3,13 @@
 use super::data;
 use super::language::Locale;
 use super::number::render;
+use super::result;
 use super::svg::{Area, Scale, Svg, baseline, name_x, name_y};
 use crate::error::{Error, Result};
 use crate::table::{
     BodyConsistencies, Contacts, FrictionCurveRow, FrictionCurves, Inertials, JointTorques,
-    Labelled, Robot, TorqueCourse, TorqueFindingRow, TorqueFindings, TorqueNumbers, TorqueRivals,
-    TorqueVerdict, VerdictSentences, VerdictTopic,
+    Labelled, Robot, TorqueCourse, TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict,
+    VerdictSentences, VerdictTopic,
 };
 use serde_json::{Value, json};
 
@@ -51,7 +52,7 @@ pub fn torque_page(
         "robot": robot,
         "joints": tables.course.joints,
         "verdict": verdict,
-        "findings": tables.findings.0.iter().map(|row| finding(row, tables)).collect::<Vec<_>>(),
+        "findings": result::findings(&tables.findings.0, &tables.numbers.0, &tables.rivals.0),
         "errors": &tables.joints.0,
         "pictures": (0..tables.course.joints).map(|joint| pictures(&locale, tables, joint)).collect::<Vec<_>>(),
         "contacts": &tables.contacts.0,
@@ -62,24 +63,6 @@ pub fn torque_page(
         "hashes": hashes,
     });
     render(&locale, "torques.html", include_str!("torques.html"), page)
-}
-
-/// A finding with its numbers and its rivals.
-fn finding(row: &TorqueFindingRow, tables: &ReportTorquesReads) -> Value {
-    let numbers = tables
-        .numbers
-        .0
-        .iter()
-        .filter(|number| number.rank == row.rank);
-    let rivals = tables
-        .rivals
-        .0
-        .iter()
-        .filter(|rival| rival.rank == row.rank);
-    let mut finding = json!(row);
-    finding["numbers"] = numbers.map(|number| json!(number)).collect();
-    finding["rivals"] = rivals.map(|rival| json!(rival)).collect();
-    finding
 }
 
 fn pictures(locale: &Locale, tables: &ReportTorquesReads, joint: usize) -> Value {

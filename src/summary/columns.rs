@@ -4,87 +4,70 @@
 
 use crate::audit::{QueryColumn, QueryTable};
 use crate::effect::Cause;
-use crate::error::{Result, counted};
+use crate::error::Result;
 use crate::store::Store;
+use crate::text::filled;
+use minijinja::context;
+use minijinja::value::Serde;
+use serde::Serialize;
 use serde_json::{Value, json};
 
-/// Tables with their columns, as JSON.
-pub fn columns_json(store: &Store, tables: &[&QueryTable]) -> Result<Value> {
-    tables
-        .iter()
-        .map(|table| object(store, table))
-        .collect::<Result<Vec<Value>>>()
-        .map(Value::from)
+/// A table with its columns, as JSON has it.
+#[derive(Serialize)]
+pub struct TableColumns<'a> {
+    table: &'a str,
+    short: Option<&'a str>,
+    stage: &'a str,
+    port: &'a str,
+    kind: &'a str,
+    rows: u64,
+    columns: Vec<QueryColumn>,
+    #[serde(skip)]
+    description: &'a str,
 }
 
-/// Tables with their columns, as text.
-pub fn columns(store: &Store, tables: &[&QueryTable]) -> Result<String> {
-    let mut groups: Vec<(&str, Vec<&QueryTable>)> = Vec::new();
+/// Tables with their columns. Fails where one has left the store.
+pub fn columns<'a>(store: &Store, tables: &[&'a QueryTable]) -> Result<Vec<TableColumns<'a>>> {
+    let of_table = |table: &&'a QueryTable| {
+        Ok(TableColumns {
+            table: &table.name,
+            short: table.short.as_deref(),
+            stage: &table.stage,
+            port: &table.port,
+            kind: &table.kind,
+            rows: table.table.rows,
+            columns: table.columns(store)?,
+            description: table.schema().map_or("", |schema| &schema.description),
+        })
+    };
+    tables.iter().map(of_table).collect()
+}
+
+/// The same as text.
+pub fn columns_text(tables: &[TableColumns]) -> String {
+    let mut kinds: Vec<&str> = Vec::new();
     for table in tables {
-        match groups.iter_mut().find(|(kind, _)| *kind == table.kind) {
-            Some((_, group)) => group.push(table),
-            None => groups.push((&table.kind, vec![table])),
+        if !kinds.contains(&table.kind) {
+            kinds.push(table.kind);
         }
     }
-    let texts = groups
-        .iter()
-        .map(|(kind, group)| text(store, kind, group))
-        .collect::<Result<Vec<String>>>()?;
-    Ok(if texts.is_empty() {
-        "the run has no tables\n".into()
-    } else {
-        texts.join("\n")
-    })
-}
-
-fn object(store: &Store, table: &QueryTable) -> Result<Value> {
-    Ok(json!({
-        "table": table.name, "short": table.short, "stage": table.stage, "port": table.port, "kind": table.kind,
-        "rows": table.table.rows, "columns": table.columns(store)?,
-    }))
-}
-
-fn text(store: &Store, kind: &str, tables: &[&QueryTable]) -> Result<String> {
-    let description = tables
-        .iter()
-        .find_map(|table| table.schema())
-        .map_or("", |schema| &schema.description);
-    let mut text = format!("{kind}: {description}\n");
-    let width = tables
-        .iter()
-        .map(|table| table.name.len())
-        .max()
-        .unwrap_or(0);
-    let mut columns: Vec<QueryColumn> = Vec::new();
-    for table in tables {
-        let short = table
-            .short
-            .as_ref()
-            .map_or_else(String::new, |short| format!(", also `{short}`"));
-        text.push_str(&format!(
-            "  {:width$}  {}{short}\n",
-            table.name,
-            counted(table.table.rows, "row")
-        ));
-        for column in table.columns(store)? {
+    let groups = kinds.into_iter().map(|kind| {
+        let of_kind = tables.iter().filter(|table| table.kind == kind);
+        let of_kind: Vec<&TableColumns> = of_kind.collect();
+        let mut columns: Vec<&QueryColumn> = Vec::new();
+        for column in of_kind.iter().flat_map(|table| &table.columns) {
             if columns.iter().all(|known| known.name != column.name) {
                 columns.push(column);
             }
         }
-    }
-    let width = columns
-        .iter()
-        .map(|column| column.name.len())
-        .max()
-        .unwrap_or(0);
-    for column in columns {
-        let unit = column.unit.as_deref().unwrap_or("");
-        text.push_str(&format!(
-            "    {:width$}  {:7}  {unit:5}  {}\n",
-            column.name, column.column_type, column.description
-        ));
-    }
-    Ok(text)
+        let names = of_kind.iter().map(|table| table.table.len());
+        json!({
+            "kind": kind, "description": of_kind[0].description, "table_width": names.max(), "tables": of_kind,
+            "width": columns.iter().map(|column| column.name.len()).max().unwrap_or(0), "columns": columns,
+        })
+    });
+    let groups = Serde(groups.collect::<Vec<_>>());
+    filled(include_str!("text/columns.txt"), context! { groups })
 }
 
 /// Name, formula, usual size, what each is confounded with, and what a recording needs to show it.

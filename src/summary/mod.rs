@@ -3,28 +3,26 @@
 mod columns;
 mod diagnosis;
 mod estimate;
+mod found;
 #[cfg(feature = "query")]
 mod grid;
-mod in_short;
 mod run;
 mod run_diff;
+mod run_result;
 mod screen;
-mod short_finding;
 
-pub use columns::{columns, columns_json, effects_json};
+pub use columns::{columns, columns_text, effects_json};
 pub use diagnosis::DiagnosisSummary;
+pub(crate) use diagnosis::Subject;
 #[cfg(feature = "query")]
 pub use grid::grid;
 #[cfg(feature = "query")]
 pub use grid::{csv, json};
-pub use in_short::{
-    ResultScreen, corrections, corrections_rows, in_short, rejected, rejected_rows, searches,
-    searches_rows, statistics, statistics_rows,
-};
 pub use run::LimitsSummary;
 pub use run::{explanation, first_look, graph, run, scoreboard, stage, status};
 pub use run_diff::run_diff;
 pub use run_diff::{RivalChange, rival_changes};
+pub use run_result::{ResultScreen, RunResult, rejected};
 pub use screen::{LABEL, folded, labelled};
 
 use crate::error::Result;

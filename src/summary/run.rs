@@ -11,7 +11,7 @@
 
 use crate::audit::Explanation;
 use crate::error::{Error, Result};
-use crate::pipeline::{CompletedRun, Manifest, Plan, RunStatus, StageReport};
+use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
 use crate::stage::{DeclaredStage, Report};
 use crate::store::Store;
 use crate::summary::{labelled, tables};
@@ -184,12 +184,7 @@ fn figures<S: Serializer>(rows: &[AcceptanceRow], serializer: S) -> Result<S::Ok
 }
 
 impl LimitsSummary {
-    /// The judgements of all reports of a run. Fails where a table has left the store, or a report is older than the table.
-    pub fn read(outcome: &CompletedRun, store: &Store) -> crate::error::Result<Self> {
-        Self::of(&outcome.manifest, store)
-    }
-
-    /// The judgements of all reports of the record of a run.
+    /// The judgements of all reports of the record of a run. Fails where a table has left the store, or a report is older than the table.
     pub fn of(manifest: &Manifest, store: &Store) -> crate::error::Result<Self> {
         let mut all = Vec::new();
         for stage in manifest

@@ -28,17 +28,12 @@ pub fn run_diff(diff: &RunDiff, rivals: &[RivalChange], stat: bool) -> String {
     };
     let causes = diff.causes.iter().take(most(CAUSES)).map(|cause| {
         let change = &cause.change;
-        let place = if change.name.is_empty() {
-            &cause.stage
-        } else {
-            &change.name
+        let place = match change.name.is_empty() {
+            true => &cause.stage,
+            false => &change.name,
         };
-        (
-            &change.what,
-            place,
-            value(&change.before),
-            value(&change.now),
-        )
+        let [before, now] = [&change.before, &change.now].map(|text| value(text));
+        (&change.what, place, before, now)
     });
     let causes: Vec<_> = causes.collect();
     let is_same = |table: &&TableChange| table.status == "same";
@@ -86,68 +81,44 @@ fn summary(table: &TableChange) -> String {
     };
     let rows = &diff.rows;
     let all = rows.same + rows.within_tolerance + rows.changed;
-    let mut parts = vec![if rows.changed == 0 {
-        table.status.to_string()
-    } else {
-        format!("{} of {} changed", rows.changed, counted(all, "row"))
-    }];
-    for (count, what) in [
+    let changed = match rows.changed {
+        0 => table.status.to_string(),
+        changed => format!("{changed} of {} changed", counted(all, "row")),
+    };
+    let counts = [
         (rows.only_a, "only in A"),
         (rows.only_b, "only in B"),
         (diff.duplicates(), "with duplicate keys"),
-    ] {
-        if count > 0 {
-            parts.push(format!("{count} {what}"));
-        }
-    }
-    parts.extend(
-        diff.findings
-            .iter()
-            .map(|finding| format!("{} {}: {}", finding.what, finding.column, finding.says)),
-    );
-    let mut text = parts.join(", ");
-    text.push_str(&measure(diff));
-    text
+    ];
+    let counts = counts.into_iter().filter(|(count, _)| *count > 0);
+    let counts = counts.map(|(count, what)| format!("{count} {what}"));
+    let found = diff.findings.iter();
+    let found = found.map(|one| format!("{} {}: {}", one.what, one.column, one.says));
+    let parts = std::iter::once(changed).chain(counts).chain(found);
+    parts.collect::<Vec<_>>().join(", ") + &measure(diff)
 }
 
 /// The column that says most: its greatest change, in its unit and in sigmas.
 fn measure(diff: &TableDiff) -> String {
-    let worst = diff.worst.first().map(|row| (&row.key, headline(row)));
-    let telling = |column: &&ColumnDiff| {
+    let is_telling = |column: &&ColumnDiff| {
         column.changed > 0 && column.statistics.is_some() && !column.unit.is_empty()
     };
-    let column = diff
-        .columns
-        .iter()
-        .filter(telling)
-        .find(|column| column.name == "error_mm");
-    let column = column.or_else(|| {
-        diff.columns.iter().filter(telling).max_by(|l, r| {
-            l.max_sigmas
-                .unwrap_or(0.0)
-                .total_cmp(&r.max_sigmas.unwrap_or(0.0))
-        })
-    });
-    match (
-        column.and_then(|column| Some((column, column.statistics?))),
-        worst,
-    ) {
+    let telling = || diff.columns.iter().filter(is_telling);
+    let sigmas = |column: &ColumnDiff| column.max_sigmas.unwrap_or(0.0);
+    let column = telling().find(|column| column.name == "error_mm");
+    let column = column.or_else(|| telling().max_by(|a, b| sigmas(a).total_cmp(&sigmas(b))));
+    match column.and_then(|column| Some((column, column.statistics?))) {
         // Where every row is a quantity of its own, the worst row says more than a mean over rows.
-        (Some((column, found)), _) if diff.rows.changed > 20 => {
-            let sigmas = column
-                .max_sigmas
-                .map_or_else(String::new, |sigmas| format!(" ({} sigma)", short(sigmas)));
-            format!(
-                "; {} by {} {} rms, at most {} {}{sigmas}",
-                column.name,
-                short(found.rms),
-                column.unit,
-                short(found.max),
-                column.unit
-            )
+        Some((column, found)) if diff.rows.changed > 20 => {
+            let sigmas = column.max_sigmas;
+            let sigmas = sigmas.map_or_else(String::new, |by| format!(" ({} sigma)", short(by)));
+            let (name, unit) = (&column.name, &column.unit);
+            let [rms, max] = [found.rms, found.max].map(short);
+            format!("; {name} by {rms} {unit} rms, at most {max} {unit}{sigmas}")
         }
-        (_, Some((key, cell))) => format!("; {key}: {cell}"),
-        _ => String::new(),
+        _ => diff.worst.first().map_or_else(String::new, |row| {
+            format!("; {}: {}", row.key, headline(row))
+        }),
     }
 }
 
@@ -232,12 +203,9 @@ impl DiagnosedCauses {
 
     /// A rival of a finding, if it is listed.
     fn rival(&self, finding: &CauseAtPlace, rival: &CauseAtPlace) -> Option<&Listed> {
-        let rivals = self
-            .0
-            .iter()
-            .filter(|(cause, _)| cause == finding)
-            .flat_map(|(_, rivals)| rivals);
-        rivals.into_iter().find(|(cause, _)| cause == rival)
+        let of_finding = self.0.iter().filter(|(cause, _)| cause == finding);
+        let mut rivals = of_finding.flat_map(|(_, rivals)| rivals);
+        rivals.find(|(cause, _)| cause == rival)
     }
 }
 
@@ -265,24 +233,21 @@ fn table<T: Table>(stage: &StageReport, store: &Store) -> Result<Option<T>> {
 }
 
 fn compare(stage: &str, a: &DiagnosedCauses, b: &DiagnosedCauses) -> Vec<RivalChange> {
-    let change = |finding: &CauseAtPlace, rival: &CauseAtPlace, outcome, before, now| {
-        let (stage, finding, rival) = (stage.to_string(), finding.clone(), rival.clone());
-        RivalChange {
-            stage,
-            finding,
-            rival,
-            outcome,
-            before,
-            now,
-        }
+    let change = |finding: &CauseAtPlace, rival: &CauseAtPlace, outcome| RivalChange {
+        stage: stage.into(),
+        finding: finding.clone(),
+        rival: rival.clone(),
+        outcome,
+        before: None,
+        now: None,
     };
+    let probability = |listed: Option<&Listed>| listed.and_then(|(_, value)| *value);
     let mut out: Vec<RivalChange> = Vec::new();
     for (finding, rival, before) in a.open() {
         let (stays, comes) = (b.finds(finding), b.finds(rival));
-        let listed = if stays {
-            b.rival(finding, rival)
-        } else {
-            b.rival(rival, finding)
+        let listed = match stays {
+            true => b.rival(finding, rival),
+            false => b.rival(rival, finding),
         };
         let outcome = match (stays, comes) {
             (true, true) => RivalOutcome::Both,
@@ -291,26 +256,22 @@ fn compare(stage: &str, a: &DiagnosedCauses, b: &DiagnosedCauses) -> Vec<RivalCh
             (true, false) => RivalOutcome::Confirmed,
             (false, true) => RivalOutcome::Reversed,
         };
-        out.push(change(
-            finding,
-            rival,
-            outcome,
+        out.push(RivalChange {
             before,
-            listed.and_then(|(_, value)| *value),
-        ));
+            now: probability(listed),
+            ..change(finding, rival, outcome)
+        });
     }
     for (finding, rival, now) in b.open() {
-        let known = |one: &RivalChange| {
+        let is_known = |one: &RivalChange| {
             [(&one.finding, &one.rival), (&one.rival, &one.finding)].contains(&(finding, rival))
         };
-        if !out.iter().any(known) {
-            out.push(change(
-                finding,
-                rival,
-                RivalOutcome::New,
-                a.rival(finding, rival).and_then(|(_, value)| *value),
+        if !out.iter().any(is_known) {
+            out.push(RivalChange {
+                before: probability(a.rival(finding, rival)),
                 now,
-            ));
+                ..change(finding, rival, RivalOutcome::New)
+            });
         }
     }
     out
@@ -322,31 +283,26 @@ pub fn rival_changes(
     diff: &RunDiff,
     runs: [&RunAddress; 2],
 ) -> Result<Vec<RivalChange>> {
-    let (a, b) = (
-        Manifest::of(store, &diff.a.run)?,
-        Manifest::of(store, &diff.b.run)?,
-    );
-    let asked = |id: &String| {
-        runs.iter().all(|place| {
-            place.port.is_none() && place.stage.as_ref().is_none_or(|stage| stage == id)
-        })
+    let [a, b] = [&diff.a, &diff.b].map(|run| Manifest::of(store, &run.run));
+    let (a, b) = (a?, b?);
+    let is_asked = |id: &String| {
+        let named = |run: &&RunAddress| {
+            run.port.is_none() && run.stage.as_ref().is_none_or(|stage| stage == id)
+        };
+        runs.iter().all(named)
     };
     let mut out = Vec::new();
-    for now in b
-        .stages
-        .iter()
-        .filter(|stage| stage.uses == Diagnose::NAME && asked(&stage.id))
-    {
-        let Some(before) = a
-            .stage(&now.id)
-            .filter(|stage| stage.uses == Diagnose::NAME)
-        else {
-            continue;
-        };
-        if let (Some(before), Some(after)) = (
-            DiagnosedCauses::read(before, store)?,
-            DiagnosedCauses::read(now, store)?,
-        ) {
+    for now in b.stages.iter().filter(|stage| is_asked(&stage.id)) {
+        let before = a.stage(&now.id);
+        let both = before.filter(|before| {
+            [&before.uses, &now.uses]
+                .iter()
+                .all(|uses| **uses == Diagnose::NAME)
+        });
+        let Some(before) = both else { continue };
+        let causes = [before, now].map(|stage| DiagnosedCauses::read(stage, store));
+        let [before, after] = causes;
+        if let (Some(before), Some(after)) = (before?, after?) {
             out.extend(compare(&now.id, &before, &after));
         }
     }

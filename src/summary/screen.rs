@@ -4,7 +4,7 @@
 //!
 //! Lines of a result: a label, then text; on a terminal long ones are broken at spaces and indented.
 
-use super::short_finding::ShortFinding;
+use super::found::ShortFinding;
 use crate::effect::{EffectDeclaration, ShapeRange};
 use crate::error::{Error, Result};
 use serde::Serialize;
@@ -53,29 +53,6 @@ pub(super) fn noise(size: &str, basis: Option<&str>) -> String {
     }
 }
 
-/// What the errors after a diagnosis are of.
-pub(super) fn with_findings(count: usize) -> &'static str {
-    if count == 0 {
-        "nothing found"
-    } else {
-        "with the findings"
-    }
-}
-
-/// What the data cannot show, by the names alone that begin its sentences.
-pub(super) fn not_seen(sentences: &[&str], width: usize) -> String {
-    let name = |line: &&str| {
-        line.split_once(": ")
-            .map_or(*line, |(what, _)| what)
-            .replace('_', " ")
-    };
-    names(
-        "not seen",
-        &sentences.iter().map(name).collect::<Vec<_>>(),
-        width,
-    )
-}
-
 /// One thing to do next.
 pub(crate) struct NextStep {
     pub(crate) what: String,
@@ -110,9 +87,9 @@ pub(super) fn sentence(label: &str, text: &str, width: usize) -> String {
 }
 
 /// The largest findings, two a line where there is room, and how many are smaller.
-pub(super) fn found(mut findings: Vec<ShortFinding>, width: usize) -> String {
-    let size = |finding: &ShortFinding| finding.size.as_ref().map_or(0.0, |(size, _)| *size);
-    findings.sort_by(|a, b| size(b).total_cmp(&size(a)));
+pub(super) fn found(findings: &[ShortFinding], width: usize) -> String {
+    let mut findings: Vec<&ShortFinding> = findings.iter().collect();
+    findings.sort_by(|a, b| b.magnitude().total_cmp(&a.magnitude()));
     let shown = if findings.len() > FOUND + 1 {
         FOUND
     } else {
@@ -220,17 +197,12 @@ pub(super) fn declared_in_yaml(declaration: &str, heading: &str) -> Result<Strin
         format!("# {heading}."),
         "# `with: {effects: [this file]}` below `uses: diagnose` tries it; rename it once its cause is known.".into(),
         "calib_effect: 1".into(),
-        format!("name: {}", json(&declared.name)),
-        format!("place: {}", json(&declared.place)),
+        line("name", &declared.name),
+        line("place", &declared.place),
     ];
-    lines.extend(
-        declared
-            .motion
-            .iter()
-            .map(|motion| format!("motion: {}", json(motion))),
-    );
+    lines.extend(declared.motion.iter().map(|motion| line("motion", motion)));
     match &declared.law.0[..] {
-        [one] => lines.push(format!("law: {}", json(one))),
+        [one] => lines.push(line("law", one)),
         several => {
             lines.push("law:".into());
             lines.extend(several.iter().map(|law| format!("  - {}", json(law))));
@@ -238,26 +210,16 @@ pub(super) fn declared_in_yaml(declaration: &str, heading: &str) -> Result<Strin
     }
     if !declared.shape.is_empty() {
         lines.push("shape:".into());
-        lines.extend(
-            declared
-                .shape
-                .iter()
-                .map(|(name, range)| format!("  {name}: {}", bounds(range))),
-        );
     }
-    lines.extend(
-        declared
-            .unit
-            .iter()
-            .map(|unit| format!("unit: {}", json(unit))),
-    );
-    lines.extend(
-        declared
-            .sentence
-            .iter()
-            .map(|sentence| format!("sentence: {}", json(sentence))),
-    );
+    let shape = declared.shape.iter();
+    lines.extend(shape.map(|(name, range)| format!("  {name}: {}", bounds(range))));
+    lines.extend(declared.unit.iter().map(|unit| line("unit", unit)));
+    lines.extend(declared.sentence.iter().map(|text| line("sentence", text)));
     Ok(lines.join("\n") + "\n")
+}
+
+fn line(key: &str, value: &impl Serialize) -> String {
+    format!("{key}: {}", json(value))
 }
 
 fn bounds(range: &ShapeRange) -> String {
@@ -340,18 +302,18 @@ mod tests {
     #[test]
     fn the_five_largest_findings_stand_two_a_line_and_the_others_are_counted() {
         assert_eq!(
-            found(several(17), 100),
+            found(&several(17), 100),
             "found     17.00 mm  joint 17 yields under load          16.00 mm  joint 16 yields under load\n          \
              15.00 mm  joint 15 yields under load          14.00 mm  joint 14 yields under load\n          \
              13.00 mm  joint 13 yields under load                    and 12 smaller\n"
         );
-        assert_eq!(found(several(6), 100).lines().count(), 3);
-        let narrow = found(several(17), 80);
+        assert_eq!(found(&several(6), 100).lines().count(), 3);
+        let narrow = found(&several(17), 80);
         assert!(
             narrow.lines().count() == 6 && narrow.lines().all(|line| line.width() <= 80),
             "{narrow}"
         );
-        assert_eq!(found(Vec::new(), 100), "");
+        assert_eq!(found(&[], 100), "");
     }
 
     #[test]
@@ -362,7 +324,7 @@ mod tests {
         };
         for width in [60, 80, 100] {
             let text = ranked(3, &long, " at the tool", width)
-                + &found(vec![finding(0.1, &"x".repeat(120))], width);
+                + &found(&[finding(0.1, &"x".repeat(120))], width);
             let text = text + &names("not seen", &vec!["temperature".to_string(); 20], width);
             assert!(text.lines().all(|line| line.width() <= width), "{text}");
             assert!(

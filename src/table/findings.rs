@@ -16,9 +16,8 @@ use crate::robot::NoiseBasis;
 use crate::table::{
     CellRow, Cells, FindingNumberRow, FindingNumbers, FindingRow, Findings, FormRow, Forms,
     RivalRow, Rivals, ShareRow, Shares, Spectrum, SpectrumRow, Verdict, VerdictRow,
-    VerdictSentenceRow, VerdictSentences, picked, picked_of,
+    VerdictSentenceRow, VerdictSentences,
 };
-use serde_json::Value;
 
 impl FindingRow {
     /// The joint (from 1) whose range bounds it, that range as people read it, and the range's unit.
@@ -34,31 +33,6 @@ impl FindingRow {
         }
     }
 }
-
-impl RivalRow {
-    /// Whether it is more than the nearest name of a finding that has none: one that the data exclude.
-    pub(crate) fn is_inseparable(&self) -> bool {
-        self.probability
-            .is_none_or(|probability| probability >= EXCLUDED)
-    }
-}
-
-impl FindingNumbers {
-    pub(crate) fn of_finding(&self, rank: i64) -> Vec<FindingNumberRow> {
-        let of_rank = self.0.iter().filter(|row| row.rank == rank);
-        of_rank.cloned().collect()
-    }
-}
-
-impl Rivals {
-    pub(crate) fn of_finding(&self, rank: i64) -> Vec<RivalRow> {
-        let of_rank = self.0.iter().filter(|row| row.rank == rank);
-        of_rank.cloned().collect()
-    }
-}
-
-/// Less probable than this, a name is excluded.
-const EXCLUDED: f64 = 0.005;
 
 /// Whether more poses may separate an effect of these tables from others.
 pub fn is_separable_by_poses(effect: &str) -> bool {
@@ -284,19 +258,6 @@ impl Forms {
         self.0
             .chunk_by(|a, b| (a.rank, a.form) == (b.rank, b.form))
             .filter(is_of_rank)
-    }
-}
-
-impl Forms {
-    /// The formulas of a finding as JSON.
-    pub(crate) fn document(&self, rank: i64) -> Vec<Value> {
-        let one = |rows: &[FormRow]| {
-            let columns = "formula price proposed folds_rms_mm curve_rms_mm without_rms_mm";
-            let mut form = picked(&rows[0], columns);
-            form["numbers"] = picked_of(rows, "name=number value unit sigma");
-            form
-        };
-        self.of_finding(rank).map(one).collect()
     }
 }
 

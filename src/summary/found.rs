@@ -1,10 +1,9 @@
 //! A finding in a few words: what it is, its number, its size, and what it might be instead.
 
-use super::estimate::estimate;
+use super::estimate::{angle, estimate, length};
 use crate::effect::{figure, names};
-use crate::table::{FindingNumberRow, FindingNumbers, RivalRow, Rivals, picked, picked_of};
-use serde::Serialize;
-use serde_json::{Value, json};
+use serde::Deserialize;
+use serde_json::Value;
 
 /// From this probability on a name stands without its rivals.
 const CERTAIN: f64 = 0.9;
@@ -14,91 +13,54 @@ const UNLISTED: f64 = 0.2;
 /// Rivals that are named; of more the name is not determined.
 const NAMED: usize = 2;
 
-/// A finding of positions or torques with its numbers and rivals.
+/// A finding of positions or torques, as [`crate::report`] makes it of the tables.
+#[derive(Clone, Default, Deserialize)]
+#[serde(default)]
 pub(super) struct Found {
     pub(crate) rank: i64,
     pub(crate) effect: String,
     pub(crate) place: String,
     pub(crate) statement: String,
-    /// Its forms, objects of one cause each; null where it has none.
-    pub(crate) forms: Value,
-    pub(crate) numbers: Vec<FindingNumberRow>,
-    /// Of its name, of its place, and of none of the names.
-    pub(crate) probabilities: [Option<f64>; 3],
-    /// Whether it was compared with others.
-    pub(crate) is_compared: bool,
-    pub(crate) rivals: Vec<RivalRow>,
-    /// Its size in a unit that all findings of a diagnosis share, and as it is printed.
-    pub(crate) size: Option<(f64, String)>,
-    /// What `--json` has of it but numbers and rivals.
-    pub(crate) document: Value,
+    /// Its forms, objects of one cause each, as a text; empty where it has none.
+    forms: String,
+    numbers: Vec<FoundNumber>,
+    pub(crate) rivals: Vec<FoundRival>,
+    /// Of its name, and of none of the names.
+    probability: Option<f64>,
+    none_probability: Option<f64>,
+    /// None where it was not compared with others.
+    delta_bic: Option<f64>,
+    /// Its size, in the unit that all findings of a diagnosis share.
+    effect_rms_mm: Option<f64>,
+    effect_rms_rad: Option<f64>,
+    effect_rms_nm: Option<f64>,
+}
+
+#[derive(Clone, Deserialize)]
+struct FoundNumber {
+    name: String,
+    value: f64,
+    unit: String,
+    sigma: Option<f64>,
+}
+
+#[derive(Clone, Deserialize)]
+pub(super) struct FoundRival {
+    pub(crate) effect: String,
+    pub(crate) place: String,
+    pub(crate) delta_bic: f64,
+    probability: Option<f64>,
 }
 
 impl Found {
-    /// A row of findings on positions or torques with what both have; `evidence` are the columns that speak for it.
-    pub(crate) fn of(
-        row: &impl Serialize,
-        evidence: &str,
-        numbers: &FindingNumbers,
-        rivals: &Rivals,
-    ) -> Self {
-        let columns = "effect where=place statement probability place_probability none_probability";
-        let mut document = picked(row, columns);
-        document["evidence"] = picked(row, evidence);
-        document["valid_range"] = json!({});
-        let row = json!(row);
-        let text = |column: &str| row[column].as_str().unwrap_or_default().to_string();
-        let rank = row["rank"].as_i64().unwrap_or_default();
-        let probabilities = ["probability", "place_probability", "none_probability"];
-        Self {
-            rank,
-            effect: text("effect"),
-            place: text("place"),
-            statement: text("statement"),
-            forms: Value::Null,
-            numbers: numbers.of_finding(rank),
-            probabilities: probabilities.map(|column| row[column].as_f64()),
-            is_compared: !row["delta_bic"].is_null(),
-            rivals: rivals.of_finding(rank),
-            size: None,
-            document,
-        }
-    }
-
-    /// All of it for other programs.
-    pub(crate) fn document(&self) -> Value {
-        let mut document = self.document.clone();
-        document["parameters"] = picked_of(&self.numbers, "name value unit sigma");
-        document["rivals"] = picked_of(&self.rivals, "effect where=place delta_bic probability");
-        document
-    }
-
-    /// All of it for a person; `more` stands before the rivals that are shown.
-    pub(crate) fn details(&self, more: &str, is_shown: fn(&RivalRow) -> bool) -> String {
-        let (effect, at) = (&self.effect, &self.place);
-        let mut text = format!("{}. {}\n", self.rank, self.statement);
-        if let [Some(name), Some(place), Some(none)] = self.probabilities {
-            text.push_str(&format!("   probability: {effect} {name:.2}, at {at} {place:.2}, none of the names {none:.2}\n"));
-        }
-        text.push_str(more);
-        let rival = |rival: &RivalRow| {
-            let probability = rival.probability.map(|value| format!(" {value:.2}"));
-            format!(
-                "{} at {}{}",
-                rival.effect,
-                rival.place,
-                probability.unwrap_or_default()
-            )
-        };
-        let shown = self.rivals.iter().filter(|rival| is_shown(rival));
-        let shown: Vec<String> = shown.map(rival).collect();
-        if !shown.is_empty() {
-            let rivals = shown.join(", ");
-            text.push_str(&format!(
-                "   these data cannot separate it from: {rivals}\n"
-            ));
-        }
-        text
+    /// Its size, and as it is printed.
+    fn size(&self) -> Option<(f64, String)> {
+        let by_length = self.effect_rms_mm.map(|mm| (mm, length(mm)));
+        let by_angle = self.effect_rms_rad.map(|rad| (rad, angle(rad)));
+        let torque = self.effect_rms_nm.filter(|nm| *nm > 0.0);
+        by_length
+            .or(by_angle)
+            .or_else(|| torque.map(|nm| (nm, format!("{} Nm", figure(nm, 1)))))
     }
 }
 
@@ -113,39 +75,14 @@ pub(super) struct ShortFinding {
     pub(crate) instead: Option<String>,
 }
 
-/// Which number of a finding is shown.
-#[derive(Clone, Copy)]
-enum NumberShown {
-    No,
-    Largest,
-    /// The same without its sign.
-    Size,
-    /// Twice that: of half a gap the whole.
-    Twice,
-    /// The amplitude of the largest sine and cosine, with its order.
-    Amplitude,
-    /// The one of this name, e.g. `mass`.
-    Called(&'static str),
-}
-
-use NumberShown::{Amplitude, Called, Largest, No, Size, Twice};
-
-/// An effect, what it does at a place `{}`, and the number that is shown of it: a kind of [`NumberShown`], or a name.
+/// An effect, what it does at a place `{}`, and the number that is shown of it: `No`, the `Largest`, its `Size` without a sign, `Twice` that (of
+/// half a gap the whole), the `Amplitude` of the largest sine and cosine with its order, or the one of a name.
 const PHRASES: &str = include_str!("text/phrases.txt");
 
-fn phrase(effect: &str) -> Option<(&'static str, NumberShown)> {
+fn phrase(effect: &str) -> Option<(&'static str, &'static str)> {
     let mut lines = PHRASES.lines().filter_map(|line| line.split_once(": "));
     let (_, phrase) = lines.find(|(name, _)| *name == effect)?;
-    let (words, number) = phrase.split_once(": ")?;
-    let shown = match number {
-        "No" => No,
-        "Largest" => Largest,
-        "Size" => Size,
-        "Twice" => Twice,
-        "Amplitude" => Amplitude,
-        name => Called(name),
-    };
-    Some((words, shown))
+    phrase.split_once(": ")
 }
 
 /// What a cause does at a place, whatever its size; one that a user declares by its name.
@@ -158,29 +95,36 @@ pub(super) fn words(effect: &str, place: &str) -> String {
 }
 
 impl ShortFinding {
+    /// Its size for the order of findings; 0 where it has none.
+    pub(super) fn magnitude(&self) -> f64 {
+        self.size.as_ref().map_or(0.0, |(size, _)| *size)
+    }
+
     /// The same of a finding as its tables have it; `rows` says that time counts rows.
     pub fn of(found: &Found, rows: bool) -> Self {
         // A cause of the list which fits best, but not well enough to bear its name.
+        let forms: Value = serde_json::from_str(&found.forms).unwrap_or_default();
         let nearest = (found.effect == names::UNKNOWN)
-            .then(|| nearest(found))
+            .then(|| nearest(found, &forms))
             .flatten();
         let effect = nearest.unwrap_or(&found.effect);
-        let shown = phrase(effect).map_or(
-            if effect == names::UNKNOWN {
-                No
-            } else {
-                Largest
-            },
-            |(_, shown)| shown,
+        let usual = if effect == names::UNKNOWN {
+            "No"
+        } else {
+            "Largest"
+        };
+        let number = number(
+            phrase(effect).map_or(usual, |(_, shown)| shown),
+            &found.numbers,
         );
-        let number = shown.number(&found.numbers);
-        let of_rows = number.is_none() && found.size.is_none();
+        let size = found.size();
+        let of_rows = number.is_none() && size.is_none();
         let mut what = if of_rows {
             found.statement.trim_end_matches('.').to_string()
         } else {
             words(effect, &found.place)
         };
-        if let Some(at) = changed_at(&found.forms).filter(|_| !of_rows) {
+        if let Some(at) = changed_at(&forms).filter(|_| !of_rows) {
             what += &if rows {
                 format!(" at row {:.0}", at.floor() + 2.0)
             } else {
@@ -192,7 +136,7 @@ impl ShortFinding {
         }
         let instead = instead(found, nearest);
         Self {
-            size: found.size.clone(),
+            size,
             what,
             number,
             instead,
@@ -201,13 +145,12 @@ impl ShortFinding {
 }
 
 /// The cause by whose form something unknown is modelled, where that is its closest rival.
-fn nearest(found: &Found) -> Option<&str> {
-    let is_here = |rival: &&RivalRow| rival.place == found.place && rival.effect != names::UNKNOWN;
+fn nearest<'a>(found: &'a Found, forms: &Value) -> Option<&'a str> {
+    let is_here =
+        |rival: &&FoundRival| rival.place == found.place && rival.effect != names::UNKNOWN;
     let modelled = |effect: &str| {
-        found
-            .forms
-            .as_array()
-            .is_some_and(|all| all.iter().any(|form| form.get(effect).is_some()))
+        let all = forms.as_array();
+        all.is_some_and(|all| all.iter().any(|form| form.get(effect).is_some()))
     };
     found
         .rivals
@@ -234,10 +177,10 @@ fn changed_at(forms: &Value) -> Option<f64> {
 
 /// What else it might be, where its name is not certain.
 fn instead(found: &Found, nearest: Option<&str>) -> Option<String> {
-    let [name, _, none] = found.probabilities;
-    let name = name.filter(|_| found.is_compared);
+    let (name, none) = (found.probability, found.none_probability);
+    let name = name.filter(|_| found.delta_bic.is_some());
     let certain = nearest.is_some() || name.is_none_or(|probability| probability > CERTAIN);
-    let notable = |rival: &RivalRow| {
+    let notable = |rival: &FoundRival| {
         let probability = rival.probability.filter(|value| *value >= NOTABLE)?;
         Some((probability, words(&rival.effect, &rival.place)))
     };
@@ -262,47 +205,47 @@ fn instead(found: &Found, nearest: Option<&str>) -> Option<String> {
     Some(format!("or: {}", others.join(", ")))
 }
 
-impl NumberShown {
-    fn number(self, all: &[FindingNumberRow]) -> Option<String> {
-        let written = |one: &FindingNumberRow| {
-            let per = if one.name.ends_with("per_kelvin") {
-                "/K"
-            } else {
-                ""
+/// The number that is shown of all, by what [`PHRASES`] says.
+fn number(shown: &str, all: &[FoundNumber]) -> Option<String> {
+    let written = |one: &FoundNumber| {
+        let per = if one.name.ends_with("per_kelvin") {
+            "/K"
+        } else {
+            ""
+        };
+        estimate(one.value, one.sigma, &one.unit) + per
+    };
+    let largest = all
+        .iter()
+        .max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()));
+    let times = |factor: f64| {
+        let one = largest?;
+        let sigma = one.sigma.map(|sigma| factor * sigma);
+        Some(estimate(factor * one.value.abs(), sigma, &one.unit))
+    };
+    match shown {
+        "No" => None,
+        "Largest" => largest.map(written),
+        "Size" => times(1.0),
+        "Twice" => times(2.0),
+        "Amplitude" => amplitude(all),
+        name => {
+            let is_called = |one: &&FoundNumber| {
+                one.name.rsplit(['.', '_']).next() == Some(name) || one.name == name
             };
-            estimate(one.value, one.sigma, &one.unit) + per
-        };
-        let largest = || {
-            all.iter()
-                .max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))
-        };
-        match self {
-            No => None,
-            Largest => largest().map(written),
-            Size => largest().map(|one| estimate(one.value.abs(), one.sigma, &one.unit)),
-            Twice => largest().map(|one| {
-                estimate(
-                    2.0 * one.value.abs(),
-                    one.sigma.map(|sigma| 2.0 * sigma),
-                    &one.unit,
-                )
-            }),
-            Called(name) => {
-                let called = all.iter().find(|one| {
-                    one.name.rsplit(['.', '_']).next() == Some(name) || one.name == name
-                });
-                let more = |one: &&FindingNumberRow| {
-                    ["mass", "relative", "offset"].contains(&name) && one.value > 0.0
-                };
-                called.map(|one| format!("{}{}", if more(&one) { "+" } else { "" }, written(one)))
-            }
-            Amplitude => amplitude(all),
+            let one = all.iter().find(is_called)?;
+            let is_more = ["mass", "relative", "offset"].contains(&name) && one.value > 0.0;
+            Some(format!(
+                "{}{}",
+                if is_more { "+" } else { "" },
+                written(one)
+            ))
         }
     }
 }
 
 /// The amplitude of the largest sine and cosine, and how many periods a turn has.
-fn amplitude(all: &[FindingNumberRow]) -> Option<String> {
+fn amplitude(all: &[FoundNumber]) -> Option<String> {
     let pairs = all.iter().filter_map(|sine| {
         let start = sine.name.strip_suffix("sin")?;
         let cosine = all
@@ -334,10 +277,10 @@ fn amplitude(all: &[FindingNumberRow]) -> Option<String> {
 mod tests {
     use super::*;
     use crate::effect::CAUSES;
+    use serde_json::json;
 
-    fn rival(effect: &str, probability: f64) -> RivalRow {
-        RivalRow {
-            rank: 1,
+    fn rival(effect: &str, probability: f64) -> FoundRival {
+        FoundRival {
             effect: effect.into(),
             place: "joint 3".into(),
             delta_bic: 0.0,
@@ -345,9 +288,8 @@ mod tests {
         }
     }
 
-    fn number(name: &str, value: f64, unit: &str, sigma: f64) -> FindingNumberRow {
-        FindingNumberRow {
-            rank: 1,
+    fn number(name: &str, value: f64, unit: &str, sigma: f64) -> FoundNumber {
+        FoundNumber {
             name: name.into(),
             value,
             unit: unit.into(),
@@ -355,19 +297,16 @@ mod tests {
         }
     }
 
-    fn found(effect: &str, numbers: Vec<FindingNumberRow>) -> Found {
+    fn found(effect: &str, numbers: Vec<FoundNumber>) -> Found {
         Found {
-            rank: 1,
             effect: effect.into(),
             place: "joint 3".into(),
-            statement: String::new(),
-            forms: Value::Null,
             numbers,
-            probabilities: [Some(0.95), None, Some(0.0)],
-            is_compared: true,
-            rivals: Vec::new(),
-            document: Value::Null,
-            size: Some((3.546, "3.55 mm".into())),
+            probability: Some(0.95),
+            none_probability: Some(0.0),
+            delta_bic: Some(30.0),
+            effect_rms_mm: Some(3.546),
+            ..Found::default()
         }
     }
 
@@ -409,7 +348,7 @@ mod tests {
         );
         let law = json!({ "of": "time", "basis": { "after": { "at": 447.2 } } });
         let step = Found {
-            forms: json!([{ "zero_shift": { "law": law } }]),
+            forms: json!([{ "zero_shift": { "law": law } }]).to_string(),
             ..found("zero_shift", vec![number("j3.step", -14.8, "arcsec", 0.4)])
         };
         assert_eq!(
@@ -433,7 +372,8 @@ mod tests {
         let backlash = || rival("backlash", 0.3);
         let doubtful = |probability, rivals, none| {
             lines_of(Found {
-                probabilities: [Some(probability), None, Some(none)],
+                probability: Some(probability),
+                none_probability: Some(none),
                 rivals,
                 ..found("gear_cyclic", Vec::new())
             })[2]
@@ -457,7 +397,7 @@ mod tests {
         let rivals = || vec![rival("joint_compliance", 0.02)];
         let numbers = || vec![number("j3", 4.17e-7, "rad/Nm", 2e-9)];
         let near = Found {
-            forms: json!([{ "joint_compliance": {} }]),
+            forms: json!([{ "joint_compliance": {} }]).to_string(),
             rivals: rivals(),
             ..found("unknown", numbers())
         };
@@ -470,7 +410,7 @@ mod tests {
             ]
         );
         let far = Found {
-            forms: json!([{ "unknown": {} }]),
+            forms: json!([{ "unknown": {} }]).to_string(),
             rivals: rivals(),
             ..found("unknown", numbers())
         };
