@@ -78,7 +78,6 @@ pub(super) use criteria;
 
 #[cfg(feature = "ablate")]
 pub(super) mod ablate {
-    use super::CriterionValue;
     use std::ops::Deref;
     use std::sync::OnceLock;
     use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
@@ -114,7 +113,7 @@ pub(super) mod ablate {
         }
     }
 
-    impl<T: Scaled> Deref for CriterionValue<T> {
+    impl<T: Scaled> Deref for super::CriterionValue<T> {
         type Target = T;
 
         /// The value as it is scaled now.
@@ -137,7 +136,7 @@ pub(super) mod ablate {
         fn was_reached(&self) -> bool;
     }
 
-    impl<T: Scaled> Scalable for CriterionValue<T> {
+    impl<T: Scaled> Scalable for super::CriterionValue<T> {
         fn scale(&self, factor: CriterionFactor) {
             self.scaling.factor.store(factor as u8, Ordering::Relaxed);
         }
