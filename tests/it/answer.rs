@@ -103,9 +103,6 @@ impl Answer {
     pub fn both(&self) -> String {
         self.out.clone() + &self.err
     }
-    pub fn parts(self) -> (Option<i32>, String, String) {
-        (self.code, self.out, self.err)
-    }
 }
 
 /// Runs calib in a folder.

@@ -24,7 +24,7 @@ use calib::twin::conceal::robots::Kind;
 use nalgebra::Vector3;
 use std::path::Path;
 use std::process::Output;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 #[test]
 fn a_cartesian_pose_is_found_and_reached_within_the_limits() {
@@ -263,44 +263,49 @@ fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
 
 #[test]
 fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
-    let run = |input: &str| {
-        let output = fed(cell(), "compensate latest --quiet", input);
-        (output.code, output.err, output.out)
-    };
     let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n";
-    let (code, printed, _) = run(&format!("{header}1,2,3,4,5,6\n1,2,x,4,5,6\n1,2\n"));
-    assert_eq!(code, Some(10));
-    has(&printed, "stdin:3: column 5: field 3 is `x`, no number");
-    has(&printed, "stdin:4: has 2 fields, the header 6");
-    // A quote inside a field is a letter of it; one that begins a field ends it.
     let open = header.replace("q6_deg", "q6_deg,note");
-    let (code, printed, _) = run(&format!(
-        "{open}1,2,3,4,5,6,3\" bolt\n1,2,3,4,5,6,\"3, and 4\n"
-    ));
-    assert_eq!(code, Some(10));
-    assert_eq!(printed.matches("stdin:").count(), 1, "{printed}");
-    has(
-        &printed,
-        "stdin:3: column 13: `\"` is not closed on its line",
-    );
-    let (code, printed, _) = run(&format!("{header}1,2,3,4,5,\"0.25\"0\n"));
-    assert_eq!(code, Some(10));
-    has(
-        &printed,
-        "stdin:2: column 17: text behind the closing `\"` of a field; allowed:",
-    );
-    let (code, printed, _) = run(&header.replace("q6_deg", "\"q6_deg"));
-    assert_eq!(code, Some(10));
-    has(
-        &printed,
-        "stdin:1: column 36: `\"` is not closed on its line",
-    );
-    let (code, printed, _) = run("A1,A2,A3,A4,A5,A6\n1,2,3,4,5,6\n");
-    assert_eq!(code, Some(2));
-    has(&printed, ["`A1` has no unit", "--angle deg"]);
-    let (code, printed, _) = run("foo,bar\n1,2\n");
-    assert_eq!(code, Some(2));
-    has(&printed, "no targets found");
+    let two_faults = [
+        "stdin:3: column 5: field 3 is `x`, no number",
+        "stdin:4: has 2 fields, the header 6",
+    ];
+    for (input, code, parts) in [
+        (
+            format!("{header}1,2,3,4,5,6\n1,2,x,4,5,6\n1,2\n"),
+            10,
+            &two_faults[..],
+        ),
+        // A quote inside a field is a letter of it; one that begins a field ends it.
+        (
+            format!("{open}1,2,3,4,5,6,3\" bolt\n1,2,3,4,5,6,\"3, and 4\n"),
+            10,
+            &["stdin:3: column 13: `\"` is not closed on its line"],
+        ),
+        (
+            format!("{header}1,2,3,4,5,\"0.25\"0\n"),
+            10,
+            &["stdin:2: column 17: text behind the closing `\"` of a field; allowed:"],
+        ),
+        (
+            header.replace("q6_deg", "\"q6_deg"),
+            10,
+            &["stdin:1: column 36: `\"` is not closed on its line"],
+        ),
+        (
+            "A1,A2,A3,A4,A5,A6\n1,2,3,4,5,6\n".into(),
+            2,
+            &["`A1` has no unit", "--angle deg"],
+        ),
+        ("foo,bar\n1,2\n".into(), 2, &["no targets found"]),
+    ] {
+        let err = fed(cell(), "compensate latest --quiet", &input)
+            .code(code)
+            .err;
+        parts.iter().for_each(|part| has(&err, *part));
+        if code == 10 {
+            assert_eq!(err.matches("stdin:").count(), parts.len(), "{err}");
+        }
+    }
 }
 
 #[test]
@@ -353,37 +358,34 @@ fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
 fn a_pose_that_only_another_orientation_reaches_gets_no_joints() {
     // The wrist's limits do not bind the search: what is out of reach is the point 1.4 m away, with the tool turned back.
     let input = "x_mm,y_mm,z_mm,qw,qx,qy,qz\n1230,0,900,1,0,0,0\n1230,0,900,0,0,0,1\n";
-    let output = fed(cell(), "compensate latest --quiet", input);
-    let (message, printed) = (output.out, output.err);
-    assert_eq!(output.code, Some(10), "{message}{printed}");
-    assert!(
-        message
-            .lines()
-            .nth(2)
-            .is_some_and(|row| row.contains(",,,,,,") && row.contains("not reached")),
-        "{message}"
-    );
+    let out = fed(cell(), "compensate latest --quiet", input).code(10).out;
+    has(out.lines().nth(2).unwrap(), [",,,,,,", "not reached"]);
+}
+
+/// A table of Parquet in the cell.
+fn put_columns(name: &str, columns: &[(&str, &[f64])]) {
+    use arrow::array::{ArrayRef, Float64Array, RecordBatch};
+    let column = |values: &[f64]| Arc::new(Float64Array::from(values.to_vec())) as ArrayRef;
+    let columns = columns.iter().map(|(name, values)| (*name, column(values)));
+    let batch = RecordBatch::try_from_iter(columns).unwrap();
+    let file = std::fs::File::create(cell().join(name)).unwrap();
+    let mut writer = parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
 }
 
 #[test]
 fn a_target_that_is_not_reached_is_null_in_parquet() {
-    use arrow::array::{Array, AsArray, Float64Array, RecordBatch};
+    use arrow::array::{Array, AsArray};
     use arrow::datatypes::Float64Type;
-    let column = |values: [f64; 2]| -> arrow::array::ArrayRef {
-        std::sync::Arc::new(Float64Array::from(values.to_vec()))
-    };
-    let axes = [
-        ("x_mm", column([800.0, 7800.0])),
-        ("y_mm", column([40.0; 2])),
-        ("z_mm", column([900.0; 2])),
-    ];
-    let batch = RecordBatch::try_from_iter(axes).unwrap();
-    let file = std::fs::File::create(cell().join("points.parquet")).unwrap();
-    let mut writer = parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).unwrap();
-    writer
-        .write(&batch)
-        .and_then(|()| writer.close().map(|_| ()))
-        .unwrap();
+    put_columns(
+        "points.parquet",
+        &[
+            ("x_mm", &[800.0, 7800.0]),
+            ("y_mm", &[40.0; 2]),
+            ("z_mm", &[900.0; 2]),
+        ],
+    );
     let output = answer::calib(
         cell(),
         "compensate latest points.parquet --out points_c.parquet --quiet",
@@ -411,15 +413,11 @@ fn quiet_keeps_warnings_and_takes_the_summary() {
     let message_of = |more: &str| fed(cell(), &format!("compensate latest {more}"), input).err;
     let (loud, quiet) = (message_of(""), message_of("-q"));
     has(&loud, ["model: ", "1 target; "]);
-    let warnings: String = loud
-        .lines()
+    let warnings = loud.split_inclusive('\n');
+    let warnings: String = warnings
         .filter(|line| line.starts_with("warning: "))
-        .map(|line| format!("{line}\n"))
         .collect();
-    assert!(
-        warnings.contains("1 of them leaves the joint limits"),
-        "{loud}"
-    );
+    has(&warnings, "1 of them leaves the joint limits");
     assert_eq!(quiet, warnings);
 }
 
@@ -428,35 +426,26 @@ fn partial_targets_of_a_program_stay_where_that_is_wished_and_nothing_is_written
     let program = "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n";
     put(cell(), "partial.src", program);
     let run = |more: &str| {
-        let output = answer::calib(
-            cell(),
-            &format!("compensate latest partial.src --out partial_c.src -q {more}"),
-        );
-        (output.code, output.err)
+        let words = format!("compensate latest partial.src --out partial_c.src -q {more}");
+        answer::calib(cell(), &words)
     };
     let whole = "a target is corrected whole or not at all";
-    let (code, printed) = run("");
-    assert_eq!(code, Some(10));
+    let missing = format!("partial.src:3:5: the target has no A2, A3, A4, A5, A6; {whole}");
+    let err = run("").refused();
     has(
-        &printed,
+        &err,
         &format!("partial.src:2:5: the target has no Z, A, B, C; {whole}"),
     );
+    has(&err, &missing);
     has(
-        &printed,
-        &format!("partial.src:3:5: the target has no A2, A3, A4, A5, A6; {whole}"),
-    );
-    has(
-        &printed,
+        &err,
         "partial.src: partial targets stay as they are with --leave-partial",
     );
     assert!(!cell().join("partial_c.src").exists());
-    let (code, printed) = run("--leave-partial");
-    assert_eq!(code, Some(0), "{printed}");
+    let left = missing.replace("3:5: ", "3:5: left as it is: ");
     has(
-        &printed,
-        &format!(
-            "warning: partial.src:3:5: left as it is: the target has no A2, A3, A4, A5, A6; {whole}"
-        ),
+        &run("--leave-partial").code(0).err,
+        &format!("warning: {left}"),
     );
     let written = read(cell().join("partial_c.src"));
     let (mark, tail) = written.split_once('\n').unwrap();

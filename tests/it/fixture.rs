@@ -189,6 +189,12 @@ pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, f64::max)
 }
 
+/// The largest difference of two lists.
+pub fn apart(one: &[f64], other: &[f64]) -> f64 {
+    assert_eq!(one.len(), other.len());
+    largest(one.iter().zip(other).map(|(a, b)| (a - b).abs()))
+}
+
 /// How far each predicted point is from those of the rows, m.
 pub fn misses(model: &Model, data: &Measurements) -> Vec<f64> {
     let pairs = model.predict(data).into_iter().zip(&data.points.position);

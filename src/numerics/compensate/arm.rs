@@ -1,7 +1,7 @@
 //! The arm as identified: where it really puts the tool, in its own base frame, under stated circumstances.
 
 use super::solve::{Chain, parts};
-use crate::effect::{Form, PlacementBuffers, Variable};
+use crate::effect::{Effect, Form, PlacementBuffers, Variable};
 use crate::estimate::Model;
 use crate::estimate::choose::spread;
 use crate::estimate::network::Correction;
@@ -93,36 +93,28 @@ impl IdentifiedArm {
 
     /// The effect and place that depends on motor currents, where one does: without them it is nothing.
     pub(super) fn by_current(&self) -> Option<String> {
+        self.moved_by(|effect| effect.needs_current()).next()
+    }
+
+    /// Effects of a kind that have a size, with their places.
+    fn moved_by(&self, is: impl Fn(&dyn Effect) -> bool) -> impl Iterator<Item = String> {
         let (specs, x) = (self.model.stack.specs(), &self.model.x);
-        let mut effects = self
-            .model
-            .stack
-            .effects()
-            .filter(|(effect, _)| effect.needs_current());
-        effects.find_map(|(effect, mut range)| {
-            let k = range.find(|k| x[*k] != 0.0)?;
-            Some(format!("{} at {}", effect.name(), specs[k].place))
-        })
+        let effects = self.model.stack.effects();
+        effects
+            .filter(move |(effect, _)| is(*effect))
+            .filter_map(|(effect, mut range)| {
+                let k = range.find(|k| x[*k] != 0.0)?;
+                Some(format!("{} at {}", effect.name(), specs[k].place))
+            })
     }
 
     /// Effects and places that depend on what no target states: on moves before it, as of an arm that rested, or on another circumstance, which
     /// counts for nothing.
     pub fn by_what_is_not_stated(&self) -> Vec<String> {
-        let (specs, x) = (self.model.stack.specs(), &self.model.x);
         let follows = |form: &Form| form.variables().into_iter().any(Variable::is_no_targets);
-        let effects = self
-            .model
-            .stack
-            .effects()
-            .filter(|(effect, _)| effect.form().is_some_and(follows));
-        let moved = effects.filter_map(|(effect, mut range)| {
-            range.find(|k| x[*k] != 0.0).map(|k| (effect.name(), k))
-        });
-        moved
-            .map(|(name, k)| format!("{name} at {}", specs[k].place))
-            .collect::<BTreeSet<String>>()
-            .into_iter()
-            .collect()
+        let moved = self.moved_by(|effect| effect.form().is_some_and(follows));
+        let places: BTreeSet<String> = moved.collect();
+        places.into_iter().collect()
     }
 
     /// The base in the tracker's frame.

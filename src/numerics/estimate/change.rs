@@ -7,7 +7,7 @@
 //! Parameters as people know them: where base, targets and anchors stand, and of all others the change from nominal.
 
 use crate::effect::names;
-use crate::estimate::factor::TriangularFactor;
+use crate::estimate::factor::{TriangularFactor, axpy};
 use crate::estimate::fit::Session;
 use crate::estimate::model::Model;
 use crate::robot::{Anchor, Shape, Target};
@@ -74,11 +74,7 @@ pub fn changes(
     }
     let found = (0..shared.len()).filter_map(|j| {
         // Those taken in are judged beside each other.
-        let others = ranks
-            .iter()
-            .enumerate()
-            .filter(|(i, rank)| *i != j && rank.is_some())
-            .map(|(i, _)| i);
+        let others = (0..ranks.len()).filter(|i| *i != j && ranks[*i].is_some());
         let alone = if ranks[j].is_some() {
             reduced.fresh_without(others)
         } else {
@@ -199,10 +195,7 @@ impl Reduced {
         let taken = self.columns[j].clone();
         let project = |column: &mut Vec<f64>| {
             let share = column.iter().zip(&taken).map(|(a, b)| a * b).sum::<f64>() / square;
-            column
-                .iter_mut()
-                .zip(&taken)
-                .for_each(|(a, b)| *a -= share * b);
+            axpy(-share, &taken, column);
         };
         project(&mut self.right);
         self.columns
@@ -216,11 +209,8 @@ impl Reduced {
     /// From the beginning, with others taken in.
     fn fresh_without(&self, others: impl Iterator<Item = usize>) -> Self {
         let (columns, right) = self.original.clone();
-        let mut fresh = Self {
-            columns,
-            right,
-            ..self.clone()
-        };
+        let mut fresh = self.clone();
+        (fresh.columns, fresh.right) = (columns, right);
         others.for_each(|other| fresh.take(other));
         fresh
     }

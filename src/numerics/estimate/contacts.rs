@@ -149,6 +149,12 @@ fn placed_by(
     (Model { x, ..model.clone() }, inflation)
 }
 
+/// The rows without those of a part, which is sorted.
+pub(super) fn less(rows: &[usize], part: &[usize]) -> Vec<usize> {
+    let is_kept = |row: &usize| part.binary_search(row).is_err();
+    rows.iter().copied().filter(is_kept).collect()
+}
+
 /// Errors of the rows `part` under a fit to the others, from the whole one on, where `part` holds all rows of some anchor; `None` where it
 /// does not. The noise is that of the whole fit.
 pub(super) fn without_places(
@@ -163,11 +169,7 @@ pub(super) fn without_places(
         rows,
         fitted,
     } = *whole;
-    let kept: Vec<usize> = rows
-        .iter()
-        .copied()
-        .filter(|row| part.binary_search(row).is_err())
-        .collect();
+    let kept = less(rows, part);
     let unseen = unseen(model, data, &kept, part);
     if unseen.is_empty() {
         return None;

@@ -336,8 +336,8 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_tail), (b, b_tail)) = (a[..length].as_chunks::<4>(), b[..length].as_chunks::<4>());
     let mut sums = [0.0; 4];
     for (a, b) in a.iter().zip(b) {
-        for k in 0..4 {
-            sums[k] += a[k] * b[k];
+        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+            *sum += a * b;
         }
     }
     let whole = sums[0] + sums[1] + sums[2] + sums[3];

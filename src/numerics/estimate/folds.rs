@@ -10,7 +10,7 @@
 //! Without the rows of a part it is, of G = J R^-1 of these rows (R'R = J'J of all) and their errors e, the step R^-1 (1 - G'G)^-1
 //! (Q'r - G'e). Of a part only its own triangular factor is kept, which has the same G'G and G'e.
 
-use crate::estimate::contacts::without_places;
+use crate::estimate::contacts::{less, without_places};
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::fit::{Session, fit};
 use crate::estimate::model::Model;
@@ -205,11 +205,7 @@ fn without(whole: &Session, candidates: &[usize], part: &[usize], scale: ErrorSc
     let Session {
         model, data, rows, ..
     } = *whole;
-    let kept: Vec<usize> = rows
-        .iter()
-        .copied()
-        .filter(|row| part.binary_search(row).is_err())
-        .collect();
+    let kept = less(rows, part);
     let (other, _) = fit(model, data, &kept, candidates);
     let mut scratch = other.stack.scratch(&other.robot);
     part.iter()
@@ -325,13 +321,7 @@ impl<'a> NearbyFits<'a> {
         for (parameter, step) in self.columns.iter().zip(steps) {
             model.x[*parameter] += step.unwrap_or_default();
         }
-        let open: Vec<usize> = self
-            .columns
-            .iter()
-            .zip(steps)
-            .filter(|(_, step)| step.is_none())
-            .map(|(parameter, _)| *parameter)
-            .collect();
+        let open = self.open(steps);
         let whole_fit = FitOfAll {
             whole,
             inverse,
@@ -346,15 +336,19 @@ impl<'a> NearbyFits<'a> {
         )
     }
 
+    /// Parameters of the columns without a step.
+    fn open(&self, steps: &[Option<f64>]) -> Vec<usize> {
+        let columns = self.columns.iter().zip(steps);
+        let open = columns.filter(|(_, step)| step.is_none());
+        open.map(|(parameter, _)| *parameter).collect()
+    }
+
     /// Values of some of the columns under a fit to all rows, the columns that have a step moved by it and kept, with their standard
     /// deviations by the stated noise. `None` where the others are not separable.
     pub fn estimated(&self, steps: &[Option<f64>], groups: &[usize]) -> Option<Vec<(f64, f64)>> {
         let whole = self.whole.given(steps);
         let (inverse, found) = (whole.inverse()?, whole.solve(0.0)?);
-        let open: Vec<usize> = (0..steps.len())
-            .filter(|j| steps[*j].is_none())
-            .map(|j| self.columns[j])
-            .collect();
+        let open = self.open(steps);
         let one = |parameter: &usize| {
             let i = open.iter().position(|other| other == parameter)?;
             Some((self.model.x[*parameter] + found[i], inverse.row_norm(i)))
@@ -404,13 +398,8 @@ impl<'a> NearbyFits<'a> {
             Par::Seq,
         );
         let left = left.llt(Side::Lower).ok()?;
-        if left
-            .L()
-            .diagonal()
-            .column_vector()
-            .iter()
-            .any(|pivot| pivot * pivot < LEFT)
-        {
+        let mut pivots = left.L().diagonal().column_vector().iter();
+        if pivots.any(|pivot| pivot * pivot < LEFT) {
             return None;
         }
         let errors: Vec<f64> = (0..=p).map(|i| factor.entry(i, p)).collect();

@@ -38,10 +38,11 @@ pub fn gauge(
             oriented: false,
         }
     };
-    let mut robot = robot.measured_by(MeasurementSetup {
-        targets: names.iter().map(target).collect(),
-        anchors: Vec::new(),
-    });
+    let aimed = |robot: RobotModel, targets| {
+        let anchors = Vec::new();
+        robot.measured_by(MeasurementSetup { targets, anchors })
+    };
+    let mut robot = aimed(robot, names.iter().map(target).collect());
     let open = |target: &Target| !target.name.is_empty() && !stated.contains_key(&target.name);
     let mut base = align(&robot, data, rows);
     for _ in 0..ROUNDS {
@@ -58,10 +59,7 @@ pub fn gauge(
             None => target.clone(),
         };
         let targets = robot.setup().targets.iter().map(place).collect();
-        robot = robot.measured_by(MeasurementSetup {
-            targets,
-            anchors: Vec::new(),
-        });
+        robot = aimed(robot, targets);
         base = align(&robot, data, rows);
     }
     let turned = |target: &Target| match rotation_of(&robot, data, rows, &base, target) {
@@ -131,9 +129,14 @@ fn rotation_of(
             .filter_map(move |kind| kind.attitude(data, *row, &body))
     });
     let sum = attitudes.reduce(|sum, next| sum + next)?;
-    let svd = sum.svd(true, true);
+    nearest_rotation(sum)
+}
+
+fn nearest_rotation(matrix: Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let svd = matrix.svd(true, true);
     let (u, v_t) = svd.u.zip(svd.v_t)?;
     let mut sign = Matrix3::identity();
+    // Without this a mirrored solution could win.
     sign[(2, 2)] = (u * v_t).determinant().signum();
     Some(u * sign * v_t)
 }
@@ -227,13 +230,7 @@ pub(super) fn kabsch(from: &[Vector3<f64>], to: &[Vector3<f64>], used: &[usize])
         .iter()
         .map(|i| (to[*i] - b) * (from[*i] - a).transpose())
         .sum();
-    let svd = covariance.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-        return Pose::identity();
-    };
-    let mut sign = Matrix3::identity();
-    // Without this a mirrored solution could win.
-    sign[(2, 2)] = (u * v_t).determinant().signum();
-    let rotation = u * sign * v_t;
-    Pose::new(rotation, b - rotation * a)
+    nearest_rotation(covariance).map_or_else(Pose::identity, |rotation| {
+        Pose::new(rotation, b - rotation * a)
+    })
 }

@@ -166,18 +166,8 @@ pub struct RowError {
     pub angle: Option<f64>,
 }
 
-/// How far off a row is under a model.
-pub(crate) fn row_error(
-    model: &Model,
-    data: &Measurements,
-    row: usize,
-    scratch: &mut PlacementBuffers,
-) -> RowError {
-    placed_row_error(data, row, &model.place(data, row, scratch))
-}
-
-/// The same of a row whose arm was placed.
-pub(crate) fn placed_row_error(data: &Measurements, row: usize, placed: &PlacedRow) -> RowError {
+/// How far off a row is whose arm was placed.
+pub(crate) fn row_error(data: &Measurements, row: usize, placed: &PlacedRow) -> RowError {
     let (mut length, mut angle) = (None, None);
     for residual in KINDS
         .iter()
@@ -202,9 +192,9 @@ impl Model {
         let plain = data.readings.is_empty() && (0..data.rows()).all(|row| data.has_point(row));
         let rows = if plain { 0 } else { data.rows() };
         let scratch = || self.stack.scratch(&self.robot);
-        (0..rows)
-            .into_par_iter()
-            .map_init(scratch, |scratch, row| row_error(self, data, row, scratch))
-            .collect()
+        let error = |scratch: &mut PlacementBuffers, row| {
+            row_error(data, row, &self.place(data, row, scratch))
+        };
+        (0..rows).into_par_iter().map_init(scratch, error).collect()
     }
 }

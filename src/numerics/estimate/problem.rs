@@ -124,10 +124,10 @@ impl<'a> Problem<'a> {
                 term.sensitivity
                     .derivatives(placed, |parameter, derivative| {
                         if let Some(j) = column[parameter] {
-                            add(&mut lines[j][first..], &derivative, share);
+                            axpy(share, derivative.as_slice(), &mut lines[j][first..]);
                         }
                     });
-                add(&mut lines[p][first..], &term.error, share);
+                axpy(share, term.error.as_slice(), &mut lines[p][first..]);
             };
             for (i, &row) in chunk.iter().enumerate() {
                 let mut placed = model.place(self.data, row, &mut scratch);
@@ -184,12 +184,6 @@ fn rms(residuals: &[Residual]) -> f64 {
         .find(|squares| !squares.is_empty())
         .unwrap_or_default();
     (first.iter().sum::<f64>() / first.len().max(1) as f64).sqrt()
-}
-
-fn add(to: &mut [f64], values: &Vector3<f64>, share: f64) {
-    to.iter_mut()
-        .zip(values)
-        .for_each(|(to, value)| *to += value * share);
 }
 
 /// Beyond this whitened error length (99.3 % of good terms of one, two, three numbers are below) a term pulls with constant force.

@@ -3,6 +3,7 @@
 //! To the factor of the recording come poses all over the joints' ranges, the same with another payload, or with a second target
 //! off the last axis whose place on the tool is unknown too. What is estimated stays first in precedence.
 
+use super::choose::even;
 use super::factor::TriangularFactor;
 use super::fit::{ParameterStatus, Session};
 use super::model::Model;
@@ -130,15 +131,10 @@ fn shown(
         .collect()
 }
 
-/// Poses all over the joints' ranges (an additive recurrence: even and reproducible), under the payloads in turn.
+/// Poses all over the joints' ranges under the payloads in turn.
 fn poses(model: &Model, data: &Measurements, rows: &[usize], payloads: &[f64]) -> Measurements {
     let joints = data.joints;
     let count = rows.len().clamp(FEWEST, LIMIT);
-    // The root of x^(d+1) = x + 1.
-    let mut root: f64 = 2.0;
-    for _ in 0..60 {
-        root = (1.0 + root).powf(1.0 / (joints as f64 + 1.0));
-    }
     let ranges: Vec<[f64; 2]> = (0..joints)
         .map(|joint| range(model, data, rows, joint))
         .collect();
@@ -147,16 +143,9 @@ fn poses(model: &Model, data: &Measurements, rows: &[usize], payloads: &[f64]) -
         .map(|row| data.points.sigma[*row])
         .sum::<Vector3<f64>>()
         / rows.len() as f64;
-    let mut q = Vec::with_capacity(count * joints);
-    for i in 0..count {
-        for (joint, [low, high]) in ranges.iter().enumerate() {
-            let share = (0.5 + (i + 1) as f64 * root.powi(-(joint as i32 + 1))).fract();
-            q.push(low + (high - low) * share);
-        }
-    }
     Measurements {
         joints,
-        q,
+        q: even(&ranges, count),
         points: PointReadings {
             position: vec![Vector3::zeros(); count],
             sigma: vec![sigma; count],

@@ -5,7 +5,7 @@
 
 use crate::effect::{PlacedRow, PlacementBuffers, names};
 use crate::estimate::covariance::Covariance;
-use crate::estimate::model::{Model, placed_row_error};
+use crate::estimate::model::{Model, row_error};
 use crate::observation::{Dimension, KINDS, Residual, dimension, kinds, only_contacts};
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
@@ -254,7 +254,7 @@ impl ErrorScale {
     /// The error of a row that was placed, m or rad.
     pub(crate) fn of_placed(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> f64 {
         let Self::Noise { size, .. } = self else {
-            return placed_row_error(data, row, placed).length;
+            return row_error(data, row, placed).length;
         };
         let of_row = kinds(data)
             .into_iter()

@@ -1,6 +1,7 @@
 //! Independent pieces of work on several threads, with results that do not depend on how many there are.
 
-use std::sync::Mutex;
+use std::iter::from_fn;
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Computes `work(0), work(1), ...` on at most `jobs` threads and returns the results in order.
@@ -12,23 +13,20 @@ pub fn in_order<T: Send>(jobs: usize, count: usize, work: impl Fn(usize) -> T + 
         return (0..count).map(work).collect();
     }
     let next = AtomicUsize::new(0);
-    let slots: Vec<Mutex<Option<T>>> = (0..count).map(|_| Mutex::new(None)).collect();
-    std::thread::scope(|scope| {
-        for _ in 0..jobs {
-            scope.spawn(|| {
-                loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(slot) = slots.get(index) else { break };
-                    let result = work(index);
-                    *slot.lock().expect("a slot is locked once") = Some(result);
-                }
-            });
-        }
+    let some = || {
+        let open = || Some(next.fetch_add(1, Ordering::Relaxed)).filter(|piece| *piece < count);
+        from_fn(open)
+            .map(|piece| (piece, work(piece)))
+            .collect::<Vec<_>>()
+    };
+    let mut done: Vec<(usize, T)> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..jobs).map(|_| scope.spawn(some)).collect();
+        let ended = threads.into_iter().map(|thread| thread.join());
+        let parts: Vec<Vec<(usize, T)>> = ended
+            .map(|part| part.unwrap_or_else(|panic| resume_unwind(panic)))
+            .collect();
+        parts.into_iter().flatten().collect()
     });
-    let filled = slots
-        .into_iter()
-        .map(|slot| slot.into_inner().expect("the threads have ended"));
-    filled
-        .map(|value| value.expect("every piece was computed"))
-        .collect()
+    done.sort_unstable_by_key(|(piece, _)| *piece);
+    done.into_iter().map(|(_, result)| result).collect()
 }

@@ -3,7 +3,7 @@
 //! `CALIB_RECORDINGS=100 cargo test --release --test it -- compensate::concealed --nocapture` prints the whole table.
 
 use super::true_error::exact;
-use crate::fixture::all_rows;
+use crate::fixture::{self, all_rows};
 use crate::recorded::{Recorded, recording_of};
 use calib::compensate::{
     CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, IdentifiedArm, Scatter,
@@ -25,6 +25,7 @@ use calib::twin::effect::{GearCyclic, JointCompliance, Physical};
 use calib::twin::noise::{Noise, Purpose};
 use calib::twin::plan::{Point, Poses, allowed};
 use calib::twin::recorder::{Experiment, Shot};
+use calib::twin::tracker::Tracker;
 use nalgebra::Vector3;
 use serde_json::json;
 
@@ -208,22 +209,12 @@ pub fn targets(case: &Case) -> (Vec<Point>, Vec<bool>) {
         layout: Layout::default(),
     };
     let far = TARGETS / 3;
-    let mut inside = plan(
-        case.kind,
-        &recorded,
-        amount(TARGETS - far),
-        &case.climate,
-        case.seed ^ 0xA5,
-    )
-    .unwrap();
-    let mut outside = plan(
-        case.kind,
-        &whole,
-        amount(far),
-        &case.climate,
-        case.seed ^ 0x5A,
-    )
-    .unwrap();
+    let planned = |ranges: &[[f64; 2]], count, salt: u64| {
+        let (amount, seed) = (amount(count), case.seed ^ salt);
+        plan(case.kind, ranges, amount, &case.climate, seed).unwrap()
+    };
+    let mut inside = planned(&recorded, TARGETS - far, 0xA5);
+    let mut outside = planned(&whole, far, 0x5A);
     for (k, target) in inside.iter_mut().enumerate() {
         let shot = fitted[k * 7 % fitted.len()];
         (target.time_s, target.temperature_c) = (shot.time_s, shot.temperature_c);
@@ -262,29 +253,14 @@ fn misses(
     targets: &[Point],
     commands: &[CorrectedCommand],
 ) -> Vec<Option<f64>> {
-    let effects: Vec<Physical> = case
-        .concealed
-        .iter()
-        .flat_map(|one| one.cause.physical.clone())
-        .chain(case.friction.iter().cloned())
-        .collect();
-    let experiment = Experiment {
-        robot: &case.robot,
-        truth: &case.truth,
-        effects: &effects,
-        tracker: &exact(&case.tracker),
-        motors: &case.motors,
-        repeatability_arcsec: &[],
-        poses: &Poses::default(),
-        blocks: &[],
-        climate: &case.climate,
-        seed: 1,
-    };
+    let concealed = case.concealed.iter();
+    let concealed = concealed.flat_map(|one| one.cause.physical.clone());
+    let effects: Vec<Physical> = concealed.chain(case.friction.iter().cloned()).collect();
     let driven = targets.iter().zip(commands).map(|(target, command)| Point {
         q: command.q.clone().unwrap_or_else(|| target.q.clone()),
         ..target.clone()
     });
-    let shots = experiment.measure(driven.collect(), || ());
+    let shots = measured(case, &effects, &exact(&case.tracker), driven.collect(), 1);
     let robot = RobotModel::new(case.robot.clone());
     let each = shots.iter().zip(targets).zip(commands);
     each.map(|((shot, target), command)| {
@@ -293,6 +269,29 @@ fn misses(
         Some((Vector3::from(shot.position) - wanted).norm() * 1e3)
     })
     .collect()
+}
+
+/// What a tracker says of the arm of a case at these points, with the effects that are given.
+fn measured(
+    case: &Case,
+    effects: &[Physical],
+    tracker: &Tracker,
+    points: Vec<Point>,
+    seed: u64,
+) -> Vec<Shot> {
+    let experiment = Experiment {
+        robot: &case.robot,
+        truth: &case.truth,
+        effects,
+        tracker,
+        motors: &case.motors,
+        repeatability_arcsec: &[],
+        poses: &Poses::default(),
+        blocks: &[],
+        climate: &case.climate,
+        seed,
+    };
+    experiment.measure(points, || ())
 }
 
 pub fn from_environment(name: &str, usual: u64) -> u64 {
@@ -314,17 +313,14 @@ fn print(case: &Case, floor: f64, outcomes: &[Outcome], named: &str) {
         .iter()
         .map(|(effect, place)| format!("{effect} at {place}"))
         .collect();
-    let harm = outcomes.iter().filter(|one| is_harmed(one, floor)).count();
     let rms = |outside: bool, value_of: fn(&Outcome) -> f64| {
-        let values: Vec<f64> = outcomes
-            .iter()
-            .filter(|one| one.outside == outside && !one.refused)
-            .map(value_of)
-            .collect();
-        (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
+        let some = outcomes.iter();
+        let some = some.filter(|one| one.outside == outside && !one.refused);
+        fixture::rms(some.map(value_of))
     };
+    let count = |is: &dyn Fn(&Outcome) -> bool| outcomes.iter().filter(|one| is(one)).count();
     println!(
-        "{} {:8} wanted [{}], named [{named}]: inside {:.3} (geometry {:.3}), outside {:.3} ({:.3}) mm rms, floor {floor:.3}; harmed {harm}, remarked {} + {}, refused {}",
+        "{} {:8} wanted [{}], named [{named}]: inside {:.3} (geometry {:.3}), outside {:.3} ({:.3}) mm rms, floor {floor:.3}; harmed {}, remarked {} + {}, refused {}",
         case.name,
         case.kind.name(),
         want.join(", "),
@@ -332,15 +328,10 @@ fn print(case: &Case, floor: f64, outcomes: &[Outcome], named: &str) {
         rms(false, |one| one.plain),
         rms(true, |one| one.miss),
         rms(true, |one| one.plain),
-        outcomes
-            .iter()
-            .filter(|one| one.remarked && !one.outside)
-            .count(),
-        outcomes
-            .iter()
-            .filter(|one| one.remarked && one.outside)
-            .count(),
-        outcomes.iter().filter(|one| one.refused).count()
+        count(&|one| is_harmed(one, floor)),
+        count(&|one| one.remarked && !one.outside),
+        count(&|one| one.remarked && one.outside),
+        count(&|one| one.refused)
     );
 }
 
@@ -385,15 +376,8 @@ fn a_correction_never_harms_unless_it_says_so() {
             share(&|_, one| one.miss > 1.5 * one.plain && !one.remarked),
             share(&|floor, one| is_harmed(one, floor)),
         );
-        let harmed = these
-            .iter()
-            .filter(|(floor, one)| is_harmed(one, *floor))
-            .count();
-        assert!(
-            harmed * 500 <= these.len(),
-            "{harmed} of {} targets",
-            these.len()
-        );
+        let harmed = share(&|floor, one| is_harmed(one, floor));
+        assert!(harmed <= 0.2, "{harmed} % of {} targets", these.len());
     }
 }
 
@@ -503,23 +487,13 @@ pub fn again(
         });
         before = q;
     }
-    case.friction = effects;
-    let experiment = Experiment {
-        robot: &case.robot,
-        truth: &case.truth,
-        effects: &case.friction,
-        tracker: &case.tracker,
-        motors: &case.motors,
-        repeatability_arcsec: &[],
-        poses: &Poses::default(),
-        blocks: &[],
-        climate: &case.climate,
-        seed,
-    };
-    let shots = experiment.measure(planned, || ());
-    case.payload_kg = vec![0.0; shots.len()];
-    case.shots = shots;
-    case
+    let shots = measured(&case, &effects, &case.tracker, planned, seed);
+    Case {
+        friction: effects,
+        payload_kg: vec![0.0; shots.len()],
+        shots,
+        ..case
+    }
 }
 
 #[test]

@@ -2,9 +2,9 @@
 //! controller counts, and each number's sigma is what the parameters' covariance makes of it.
 
 use super::ROBOT;
-use super::maker::{Maker, PLAIN, makers, ran, recorded};
+use super::maker::{Maker, PLAIN, makers_of, ran, recorded};
 use super::true_error::Cell;
-use crate::fixture::robot_of;
+use crate::fixture::{apart, largest, robot_of};
 use calib::table::{CovarianceTable, Parameters, from_file};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -89,12 +89,9 @@ fn counted(maker: &Maker, ours: &ControllerList) -> ControllerList {
 
 /// Each number by a unit of each parameter, and the parameters' covariance (deg): what sigma has to be.
 fn sigmas(maker: &Maker, tables: &Path) -> BTreeMap<(String, String), f64> {
-    let parameters = from_file::<Parameters>(&tables.join("identify.parameters.parquet"))
-        .unwrap()
-        .table;
-    let covariance = from_file::<CovarianceTable>(&tables.join("identify.covariance.parquet"))
-        .unwrap()
-        .table;
+    let table = |name: &str| tables.join(format!("identify.{name}.parquet"));
+    let parameters: Parameters = from_file(&table("parameters")).unwrap().table;
+    let covariance: CovarianceTable = from_file(&table("covariance")).unwrap().table;
     let none = counted(maker, &ControllerList::new());
     let mut by: BTreeMap<String, ControllerList> = BTreeMap::new();
     for row in &parameters.0 {
@@ -136,16 +133,13 @@ fn numbers_for_the_controller_move_its_joints_as_the_model_does() {
     let points = cell.points(60, &[0.0], 5);
     let stages = "  - uses: identify\n    with: {on: [fit], effects: [base_frame, tool_offset, joint_offset, link_geometry, reduction_ratio, coupling_ratio]}\n";
     let mixed = [
+        PLAIN.name,
         "signs 1, 4, 6",
         "zeros",
         "ABB, parallelogram",
         "all at once",
     ];
-    for maker in makers()
-        .into_iter()
-        .filter(|maker| mixed.contains(&maker.name))
-        .chain([PLAIN])
-    {
+    for maker in makers_of(&mixed) {
         let folder = recorded(&maker, &cell, &points, &text, stages);
         let export = |model: &str| {
             listed(&ran(
@@ -157,24 +151,19 @@ fn numbers_for_the_controller_move_its_joints_as_the_model_does() {
         let list = export("latest");
         // A table of parameters alone does not know the controller: its numbers are in the robot file's counting.
         let ours = export(".calib/tables/counted/identify.parameters.parquet --robot robot.yaml");
-        let mut apart = 0f64;
-        for k in 0..200 {
+        let off = (0..200).map(|k| {
             let q: Vec<f64> = (0..6)
                 .map(|j| 2.0 * (1.3 * f64::from(k) + 0.7 * f64::from(j)).sin())
                 .collect();
             let degrees: Vec<f64> = q.iter().map(|q| q.to_degrees()).collect();
-            let real: Vec<f64> = true_joints(&ours, &degrees)
-                .iter()
-                .map(|q| q.to_radians())
-                .collect();
-            let shown = maker.driven(&true_joints(&list, &maker.counted(&q)));
-            apart = shown
-                .iter()
-                .zip(&real)
-                .map(|(a, b)| (a - b).abs())
-                .fold(apart, f64::max);
-        }
-        println!("{}: {apart:.1e} rad apart at most", maker.name);
+            let real = true_joints(&ours, &degrees);
+            let real: Vec<f64> = real.iter().map(|q| q.to_radians()).collect();
+            apart(
+                &maker.driven(&true_joints(&list, &maker.counted(&q))),
+                &real,
+            )
+        });
+        let apart = largest(off);
         assert!(apart < 1e-9, "{}: {apart} rad", maker.name);
         let expected = sigmas(&maker, &folder.path().join(".calib/tables/counted"));
         assert!(

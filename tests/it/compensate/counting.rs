@@ -7,7 +7,7 @@ use super::round_trip::{driven, pose, read};
 use super::sides::{confdata, krl, rapid, turn};
 use super::true_error::Cell;
 use crate::answer::{fed, put};
-use crate::fixture::robot_of;
+use crate::fixture::{apart, largest, robot_of};
 use calib::program::{Language, Literal};
 use calib::robot::RobotModel;
 use calib::spatial::Pose;
@@ -93,11 +93,7 @@ fn compensated(
             "KRL",
             "t.src",
             Language::Krl,
-            each(&|target| {
-                let named = counted(target).into_iter().zip(1..);
-                let named = named.map(|(c, j)| format!("A{j} {c}")).collect::<Vec<_>>();
-                format!("PTP {{{}}}\n", named.join(","))
-            }),
+            each(&|target| maker.ptp(&target.q)),
         ),
         (
             "RAPID",
@@ -185,35 +181,24 @@ fn commands_are_counted_as_the_controller_counts() {
     let cell = Cell::of(robot, 1.2, [100.0, 200.0], Vec::new());
     let points = cell.points(60, &[0.0], 5);
     let targets = cell.targets_by(20, &[0.0], 99);
-    let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
     let plain = compensated(&PLAIN, &cell, &points, &targets);
-    for (output, misses) in &plain {
-        println!(
-            "{}: {output}: {:.4} mm at most",
-            PLAIN.name,
-            largest(misses)
-        );
-        assert!(
-            *output == "uncorrected" || largest(misses) < 0.1 * largest(&plain[0].1),
-            "{output}: {}",
-            largest(misses)
-        );
+    let most: Vec<f64> = plain
+        .iter()
+        .map(|(_, miss)| largest(miss.clone()))
+        .collect();
+    let corrected = plain.iter().zip(&most).skip(1);
+    for ((output, _), mm) in corrected {
+        assert!(*mm < 0.1 * most[0], "{output}: {mm} of {} mm", most[0]);
     }
     for maker in makers() {
         for ((output, misses), (_, ours)) in compensated(&maker, &cell, &points, &targets)
             .iter()
             .zip(&plain)
         {
-            let apart = misses
-                .iter()
-                .zip(ours)
-                .map(|(a, b)| (a - b).abs())
-                .fold(0.0, f64::max);
+            let apart = apart(misses, ours);
             println!(
-                "{}: {output}: {:.4} mm at most, {:.6} mm from the robot file's counting",
-                maker.name,
-                largest(misses),
-                apart
+                "{}: {output}: {apart:.6} mm from the robot file's counting",
+                maker.name
             );
             assert!(apart < 1e-3, "{}: {output}: {apart} mm", maker.name);
         }

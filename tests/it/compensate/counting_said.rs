@@ -3,8 +3,8 @@
 use super::ROBOT;
 use super::maker::{Maker, PLAIN, makers, ran, recorded};
 use super::true_error::Cell;
-use crate::answer::{calib, read};
-use crate::fixture::robot_of;
+use crate::answer::{calib, read, starts_with};
+use crate::fixture::{apart, robot_of};
 use calib::poses::{Drive, write};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::twin::effect::{JointCompliance, Physical};
@@ -104,12 +104,8 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         joint: 2,
         rad_per_nm: 4e-6,
     });
-    let cell = Cell::of(
-        robot.description().clone(),
-        1.2,
-        [100.0, 200.0],
-        vec![compliance],
-    );
+    let description = robot.description().clone();
+    let cell = Cell::of(description, 1.2, [100.0, 200.0], vec![compliance]);
     let points = cell.points(80, &[0.0, 30.0], 5);
     let stages = "  - uses: diagnose\n  - uses: validate\n  - uses: report\n";
     for maker in [PLAIN, all_at_once()] {
@@ -121,17 +117,15 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         let separate = "poses --run HEAD --separate 1 'link_compliance@link 2'";
         let few = "--count 12 --candidates 100 --out poses.csv";
         let text = ran(here, &format!("{separate} {few}"), "");
-        let sentence = format!(
-            "joints and directions of the poses are counted as at the controller: {difference}\n"
-        );
-        assert_eq!(text.contains(&sentence), otherwise, "{text}");
-        assert_eq!(text.contains("counted as"), otherwise, "{text}");
-        let document: serde_json::Value =
-            serde_json::from_str(&ran(here, &format!("{separate} {few} --json"), "")).unwrap();
-        let counting = if otherwise {
-            format!("controller: {difference}")
-        } else {
-            "robot file".into()
+        let sentence = "joints and directions of the poses are counted as at the controller: ";
+        let sentence = format!("{sentence}{difference}\n");
+        for part in [&*sentence, "counted as"] {
+            assert_eq!(text.contains(part), otherwise, "{text}");
+        }
+        let document = calib(here, &format!("{separate} {few} --json")).json();
+        let counting = match otherwise {
+            true => format!("controller: {difference}"),
+            false => "robot file".into(),
         };
         assert_eq!(document["counting"], counting.as_str());
         let rows = poses(&here.join("poses.csv"));
@@ -142,12 +136,10 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
             let driven = maker.driven(numbers);
             within_limits(&robot, &driven);
             let reached = robot.forward(&driven).translation * 1e3;
-            let apart = (0..3)
-                .map(|axis| (reached[axis] - point[axis]).abs())
-                .fold(0.0, f64::max);
+            let apart = apart(reached.as_slice(), point);
             assert!(
                 apart < 0.02,
-                "{}: {numbers:?} reaches {reached:?}, not {point:?}",
+                "{}: {numbers:?} reaches {reached:?}",
                 maker.name
             );
         }
@@ -155,36 +147,18 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         let printed = format!(
             "joints stand in the robot file's counting; both controllers count otherwise ({difference})"
         );
-        let tables = ["latest/ingest/recording", "latest/ingest/recording"]
-            .map(|name| name.replace("latest", "HEAD"));
-        for pair in [["HEAD", "HEAD"], [tables[0].as_str(), tables[1].as_str()]] {
-            let text = ran(here, &format!("diff {} {}", pair[0], pair[1]), "");
-            assert_eq!(
-                text.lines().filter(|line| **line == printed).count(),
-                usize::from(otherwise),
-                "{text}"
-            );
+        for one in ["HEAD", "HEAD/ingest/recording"] {
+            let text = ran(here, &format!("diff {one} {one}"), "");
+            let lines = text.lines().filter(|line| **line == printed);
+            assert_eq!(lines.count(), usize::from(otherwise), "{text}");
             assert_eq!(text.contains("counting"), otherwise, "{text}");
-            let document: serde_json::Value = serde_json::from_str(&ran(
-                here,
-                &format!("diff {} {} --json", pair[0], pair[1]),
-                "",
-            ))
-            .unwrap();
-            assert_eq!(
-                document["counting"].as_str(),
-                otherwise.then_some(printed.as_str())
-            );
+            let document = calib(here, &format!("diff {one} {one} --json")).json();
+            let counting = document["counting"].as_str();
+            assert_eq!(counting, otherwise.then_some(printed.as_str()));
         }
-        let parameters = calib(
-            here,
-            "diff HEAD/diagnose/parameters HEAD/diagnose/parameters",
-        )
-        .out;
-        assert!(
-            !parameters.contains("counting"),
-            "joints are said of where they stand"
-        );
+        // Joints are said of where they stand.
+        let parameters = "diff HEAD/diagnose/parameters HEAD/diagnose/parameters";
+        assert!(!calib(here, parameters).out.contains("counting"));
 
         let page = read(here.join(".calib/documents/counted/report.html"));
         let sentence = "Zeros, ratios and couplings of joints stand in the robot file&#x27;s counting; the controller counts otherwise";
@@ -192,13 +166,7 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         let report = read(here.join(".calib/documents/counted/report.json"));
         let report: serde_json::Value = serde_json::from_str(&report).unwrap();
         let counting = report["parameters_counting"].as_str().unwrap();
-        assert_eq!(
-            (
-                counting.starts_with("robot file"),
-                counting.contains(difference)
-            ),
-            (true, otherwise),
-            "{counting}"
-        );
+        starts_with(counting, "robot file");
+        assert_eq!(counting.contains(difference), otherwise, "{counting}");
     }
 }

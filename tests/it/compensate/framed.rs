@@ -2,12 +2,13 @@
 //! to. The true robot goes to the same points as with the targets stated as joints.
 
 use super::cell;
-use super::maker::{Maker, PLAIN, makers};
+use super::maker::{Maker, PLAIN, makers_of};
 use super::round_trip::{Trip, pose, read};
 use super::sides::{confdata, krl, poses, rapid, status, turn};
 use crate::answer::{calib, has};
+use crate::fixture::apart;
 use calib::compensate::turns;
-use calib::program::{Companion, Language, RobotTool};
+use calib::program::{Companion, Language, Rewritten, RobotTool};
 use calib::spatial::Pose;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -225,39 +226,10 @@ fn programs(trip: &Trip, maker: &Maker, targets: &[Target]) -> Vec<Written> {
 #[test]
 fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
     let trip = Trip::new();
-    let of_name = |name: &str| {
-        makers()
-            .into_iter()
-            .find(|maker| maker.name == name)
-            .unwrap()
-    };
-    for maker in [
-        PLAIN,
-        of_name("KUKA"),
-        of_name("signs 1, 4, 6"),
-        of_name("zeros"),
-    ] {
+    for maker in makers_of(&[PLAIN.name, "KUKA", "signs 1, 4, 6", "zeros"]) {
         let targets = targets(&trip, &maker);
         let wanted: Vec<Vec<f64>> = targets.iter().map(|target| target.q.clone()).collect();
-        let joints = |q: &[f64]| {
-            maker
-                .counted(q)
-                .iter()
-                .zip(1..)
-                .map(|(c, j)| format!("A{j} {c:.9}"))
-                .collect::<Vec<_>>()
-                .join(",")
-        };
-        let joints: String = wanted
-            .iter()
-            .map(|q| format!("PTP {{{}}}\n", joints(q)))
-            .collect();
-        let ours = trip.compensated(&maker, Language::Krl, &joints).unwrap();
-        let ours: Vec<Vec<f64>> = read(Language::Krl, &ours.bytes)
-            .iter()
-            .map(|one| maker.driven(&one.values))
-            .collect();
-        let ours = trip.misses(&wanted, &ours);
+        let ours = trip.misses_by_joints(&maker, &wanted);
         for (name, language, text, others) in programs(&trip, &maker, &targets) {
             let companions: Vec<Companion> = others
                 .iter()
@@ -266,13 +238,13 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
                     text: text.as_bytes(),
                 })
                 .collect();
-            let tool = RobotTool::parse(if language == Language::Krl {
+            let tool = if language == Language::Krl {
                 "1"
             } else {
                 "own"
-            })
-            .unwrap();
-            let written = trip.compensated_by(&maker, language, &text, &companions, Some(tool));
+            };
+            let tool = Some(RobotTool::parse(tool).unwrap());
+            let written = trip.compensated_by(&maker, language, &text, &companions, tool);
             let written =
                 written.unwrap_or_else(|refused| panic!("{} {name}: {refused}", maker.name));
             let literals = read(language, &written.bytes);
@@ -282,11 +254,7 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
                 .zip(&targets)
                 .map(|(one, target)| trip.driven(target.meant(&trip, pose(one)), &target.q));
             let misses = trip.misses(&wanted, &driven.collect::<Vec<_>>());
-            let apart = misses
-                .iter()
-                .zip(&ours)
-                .map(|(a, b)| (a - b).abs())
-                .fold(0.0, f64::max);
+            let apart = apart(&misses, &ours);
             println!(
                 "{}: {name}: {apart:.6} mm from the same targets as joints",
                 maker.name
@@ -305,10 +273,9 @@ fn files_beside_a_program_are_read_with_it_in_capitals_too() {
         .unwrap();
     let at = |name: &str| here.join("R1").join(name);
     let write = |name: &str, text: &str| std::fs::write(at(name), text).unwrap();
-    write(
-        "System/$CONFIG.DAT",
-        "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n",
-    );
+    let frames =
+        "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n";
+    write("System/$CONFIG.DAT", frames);
     write(
         "Program/WELD.SRC",
         "DEF WELD()\nFDAT_ACT=FP1\nBAS(#PTP_PARAMS,100)\nPTP XP1\nEND\n",
@@ -318,9 +285,8 @@ fn files_beside_a_program_are_read_with_it_in_capitals_too() {
         "DEFDAT WELD\nDECL E6POS XP1={X 600,Y 0,Z 430,A 0,B 0,C 0}\nDECL FDAT FP1={TOOL_NO 2,BASE_NO 3,IPO_FRAME #BASE}\nENDDAT\n",
     );
     let program = at("Program/Weld.dat").display().to_string();
-    let run = |more: &str| calib(cell(), &format!("compensate latest {program} {more}")).parts();
-    let (code, _, err) = run("");
-    assert_eq!(code, Some(0), "{err}");
+    let run = |more: &str| calib(cell(), &format!("compensate latest {program} {more}"));
+    let err = run("").code(0).err;
     has(&err, ["read with the program: ", "WELD.SRC", "$CONFIG.DAT"]);
     has(
         &err,
@@ -328,24 +294,12 @@ fn files_beside_a_program_are_read_with_it_in_capitals_too() {
     );
     has(&err, "the tool TOOL_DATA[2] is taken as the robot file's");
     std::fs::remove_file(at("System/$CONFIG.DAT")).unwrap();
-    let (code, out, err) = run("");
-    assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-    has(
-        &err,
-        [
-            "Weld.dat:2:",
-            "BASE_DATA[3], which no file that was read declares",
-        ],
-    );
-    write(
-        "frames.dat",
-        "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n",
-    );
-    let (code, _, err) = run(&format!("--with {}", at("frames.dat").display()));
-    assert_eq!(code, Some(0), "{err}");
-    let (code, _, err) = run("--tool 1,2");
-    assert_eq!(code, Some(2), "{err}");
-    has(&err, "--tool: expected the name of a tool");
+    let undeclared = "BASE_DATA[3], which no file that was read declares";
+    has(&run("").refused(), ["Weld.dat:2:", undeclared]);
+    write("frames.dat", frames);
+    run(&format!("--with {}", at("frames.dat").display())).code(0);
+    let refused = run("--tool 1,2").code(2);
+    has(&refused.err, "--tool: expected the name of a tool");
 }
 
 #[test]
@@ -368,71 +322,44 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
         let tool = tool.map(|tool| RobotTool::parse(tool).unwrap());
         trip.compensated_by(&PLAIN, Language::Krl, text, &config, tool)
     };
-    let one = run(&text(&["BAS(#TOOL,1)"]), None).unwrap();
-    assert!(
-        one.warnings.iter().any(|note| note
-            .message
-            .contains("TOOL_DATA[1] is taken as the robot file's")),
-        "{:?}",
-        one.warnings
-    );
-    let refused = run(&text(&["BAS(#TOOL,2)"]), None).expect_err("another tool");
-    has(
-        &refused,
-        "the tool stands 65.6 mm from axis 6, the robot file's 50.0 mm",
-    );
-    let two = text(&["BAS(#TOOL,1)", "BAS(#TOOL,2)"]);
-    let refused = run(&two, None).expect_err("two tools");
-    has(
-        &refused,
-        [
-            "program:6:",
-            "--tool says which of them is the robot file's",
-        ],
-    );
-    let by_number = run(&two, Some("1")).unwrap();
-    let far = |note: &calib::program::Note| {
-        note.line == 6 && note.message.contains("its tool stands 172.9 mm")
+    let warns = |written: &Rewritten, part: &str| {
+        let notes = &written.warnings;
+        let found = notes.iter().find(|note| note.message.contains(part));
+        found.unwrap_or_else(|| panic!("{part}: {notes:?}")).line
     };
-    assert!(
-        by_number.warnings.iter().any(far),
-        "{:?}",
-        by_number.warnings
-    );
-    let by_number = by_number.bytes;
+    let refused = |text: &str, tool: Option<&str>| run(text, tool).expect_err("refused");
+    let one = run(&text(&["BAS(#TOOL,1)"]), None).unwrap();
+    warns(&one, "TOOL_DATA[1] is taken as the robot file's");
+    let off = "the tool stands 65.6 mm from axis 6, the robot file's 50.0 mm";
+    has(&refused(&text(&["BAS(#TOOL,2)"]), None), off);
+    let two = text(&["BAS(#TOOL,1)", "BAS(#TOOL,2)"]);
+    let which = "--tool says which of them is the robot file's";
+    has(&refused(&two, None), ["program:6:", which]);
+    let by_number = run(&two, Some("1")).unwrap();
+    assert_eq!(warns(&by_number, "its tool stands 172.9 mm"), 6);
     let joints = two.replace(
         "END\n",
         "BAS(#TOOL,2)\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nEND\n",
     );
-    let joints = run(&joints, Some("1")).unwrap().warnings;
-    assert!(
-        joints.iter().any(|note| note
-            .message
-            .contains("joints with the tool TOOL_DATA[2]: they are corrected")),
-        "{joints:?}"
+    let joints = run(&joints, Some("1")).unwrap();
+    warns(
+        &joints,
+        "joints with the tool TOOL_DATA[2]: they are corrected",
     );
     let by_frame = numbers(&own_tool(&trip))
         .map(|number| format!("{number:.9}"))
         .join(",");
-    assert_eq!(run(&two, Some(&by_frame)).unwrap().bytes, by_number);
-    let refused = run(&two, Some("7")).expect_err("no such tool");
+    assert_eq!(run(&two, Some(&by_frame)).unwrap().bytes, by_number.bytes);
+    let declared = "declared: TOOL_DATA[1], TOOL_DATA[2]";
+    has(&refused(&two, Some("7")), ["TOOL_DATA[7]", declared]);
+    let frameless = "TOOL_DATA[9], whose frame no file that was read declares";
     has(
-        &refused,
-        ["TOOL_DATA[7]", "declared: TOOL_DATA[1], TOOL_DATA[2]"],
+        &refused(&text(&["BAS(#TOOL,1)", "BAS(#TOOL,9)"]), Some("1")),
+        frameless,
     );
-    let refused = run(&text(&["BAS(#TOOL,1)", "BAS(#TOOL,9)"]), Some("1"))
-        .expect_err("a tool without a frame");
-    has(
-        &refused,
-        "TOOL_DATA[9], whose frame no file that was read declares",
-    );
-    let none = run(&text(&[""]), None).unwrap();
-    assert!(
-        none.warnings
-            .iter()
-            .any(|note| note.message.contains("no tool is set before this target")),
-        "{:?}",
-        none.warnings
+    warns(
+        &run(&text(&[""]), None).unwrap(),
+        "no tool is set before this target",
     );
     for faulty in ["", "1,2,3", "a b", "1,2,3,4,5,x"] {
         assert!(

@@ -1,7 +1,8 @@
 //! Programs of FANUC and Universal Robots, compensated: where the true robot goes, in two postures and three countings.
 
-use super::maker::{Maker, PLAIN, makers};
+use super::maker::{Maker, PLAIN, makers_of};
 use super::round_trip::{Trip, pose, read};
+use crate::fixture::apart;
 use calib::compensate::ArmSides;
 use calib::program::{Language, TargetKind};
 use calib::spatial::Pose;
@@ -18,10 +19,7 @@ const POSES: [[f64; 6]; 6] = [
 ];
 
 fn three() -> Vec<Maker> {
-    let others = makers()
-        .into_iter()
-        .filter(|maker| ["FANUC", "all at once"].contains(&maker.name));
-    std::iter::once(PLAIN).chain(others).collect()
+    makers_of(&[PLAIN.name, "FANUC", "all at once"])
 }
 
 fn wanted() -> Vec<Vec<f64>> {
@@ -33,13 +31,8 @@ fn wanted() -> Vec<Vec<f64>> {
 
 /// Poses and joints lead to one place, as far as the model is right.
 fn near(poses: &[f64], joints: &[f64], what: &str) {
-    assert_eq!(poses.len(), joints.len());
-    let alike = poses
-        .iter()
-        .zip(joints)
-        .all(|(pose, joint)| (pose - joint).abs() < 1e-3);
     assert!(
-        alike && joints.iter().all(|mm| *mm < 0.01),
+        apart(poses, joints) < 1e-3 && joints.iter().all(|mm| *mm < 0.01),
         "{what}: {poses:?} and {joints:?} mm"
     );
 }

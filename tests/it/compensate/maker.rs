@@ -80,14 +80,30 @@ pub fn makers() -> Vec<Maker> {
     all
 }
 
+/// Those of these names, the robot file's counting among them.
+pub fn makers_of(names: &[&str]) -> Vec<Maker> {
+    let all = std::iter::once(PLAIN).chain(makers());
+    all.filter(|maker| names.contains(&maker.name)).collect()
+}
+
 impl Maker {
+    /// A motion of KRL to these joints.
+    pub fn ptp(&self, q: &[f64]) -> String {
+        let counted = self.counted(q).into_iter().zip(1..);
+        let named: Vec<String> = counted.map(|(c, j)| format!("A{j} {c:.9}")).collect();
+        format!("PTP {{{}}}\n", named.join(","))
+    }
+
+    /// Whether no joint is within 5 deg of the border of a quadrant.
+    pub fn is_clear(&self, q: &[f64]) -> bool {
+        let numbers = self.counted(q);
+        let off = |c: &f64| (5.0..85.0).contains(&c.rem_euclid(90.0));
+        numbers.iter().all(off)
+    }
+
     pub fn counted(&self, q: &[f64]) -> Vec<f64> {
         let ours: Vec<f64> = q.iter().map(|q| q.to_degrees()).collect();
-        let held = |joint: usize| {
-            self.parts(joint)
-                .map(|(by, ratio)| ratio * ours[by])
-                .sum::<f64>()
-        };
+        let held = |joint| self.held(joint, &ours);
         (0..6)
             .map(|joint| self.sign[joint] * (ours[joint] + held(joint)) + self.zero[joint])
             .collect()
@@ -98,13 +114,8 @@ impl Maker {
         let plain: Vec<f64> = (0..6)
             .map(|joint| self.sign[joint] * (numbers[joint] - self.zero[joint]))
             .collect();
-        let held = |joint: usize| {
-            self.parts(joint)
-                .map(|(by, ratio)| ratio * plain[by])
-                .sum::<f64>()
-        };
         (0..6)
-            .map(|joint| (plain[joint] - held(joint)).to_radians())
+            .map(|joint| (plain[joint] - self.held(joint, &plain)).to_radians())
             .collect()
     }
 
@@ -124,11 +135,13 @@ impl Maker {
         )
     }
 
-    fn parts(&self, joint: usize) -> impl Iterator<Item = (usize, f64)> {
-        self.coupled
+    /// What of the other joints is in the number of one.
+    fn held(&self, joint: usize, values: &[f64]) -> f64 {
+        let parts = self
+            .coupled
             .iter()
-            .filter(move |(moved, ..)| *moved == joint + 1)
-            .map(|(_, by, ratio)| (by - 1, *ratio))
+            .filter(|(moved, ..)| *moved == joint + 1);
+        parts.map(|(_, by, ratio)| ratio * values[by - 1]).sum()
     }
 
     fn settings(&self) -> String {

@@ -1,8 +1,8 @@
 //! A Cartesian target is reached in the posture that it states, as the controller counts, or not at all.
 
-use super::maker::{Maker, makers};
+use super::maker::{Maker, makers_of};
 use super::{ROBOT, cell};
-use crate::answer::{calib, has, put};
+use crate::answer::{Answer, calib, has, put};
 use crate::fixture::robot_of;
 use calib::compensate::{
     CommandTarget, CorrectionOptions, Corrector, IdentifiedArm, StatedPosture,
@@ -27,13 +27,8 @@ fn poses(robot: &RobotModel, maker: &Maker) -> Vec<Vec<f64>> {
             .map(at)
             .collect()
     };
-    let clear = |q: &Vec<f64>| {
-        maker
-            .counted(q)
-            .iter()
-            .all(|c| (5.0..85.0).contains(&c.rem_euclid(90.0)))
-    };
-    (0..4000).map(pose).filter(clear).take(40).collect()
+    let all = (0..4000).map(pose).filter(|q| maker.is_clear(q));
+    all.take(40).collect()
 }
 
 #[test]
@@ -41,32 +36,21 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
     let robot = RobotModel::new(robot_of(ROBOT));
     let stack = EffectStack::new(&robot, Pose::identity(), Vec::new());
     let arm = IdentifiedArm::new(Model::nominal(robot.clone(), stack), None);
-    for maker in makers()
-        .into_iter()
-        .filter(|maker| ["sign 1", "zeros", "KUKA", "all at once"].contains(&maker.name))
-    {
+    for maker in makers_of(&["sign 1", "zeros", "KUKA", "all at once"]) {
         let poses = poses(&robot, &maker);
         assert!(poses.len() > 20, "{}: {} poses", maker.name, poses.len());
         let quadrant = |c: f64| (c / 90.0).floor() as i32;
         let by_quadrants = |q: &[f64]| {
             let c = maker.counted(q);
-            StatedPosture::of_quadrants(
-                6,
-                &[
-                    (0, quadrant(c[0])),
-                    (3, quadrant(c[3])),
-                    (5, quadrant(c[5])),
-                ],
-            )
+            StatedPosture::of_quadrants(6, &[0, 3, 5].map(|joint| (joint, quadrant(c[joint]))))
         };
         let by_signs = |q: &[f64]| {
-            StatedPosture::of_signs(
-                &maker
-                    .counted(q)
-                    .iter()
-                    .map(|c| *c < 0.0)
-                    .collect::<Vec<_>>(),
-            )
+            let below: Vec<bool> = maker.counted(q).iter().map(|c| *c < 0.0).collect();
+            StatedPosture::of_signs(&below)
+        };
+        let same = |c: &[f64], found: &[f64]| {
+            let mut joints = [0, 3, 5].into_iter();
+            joints.all(|j: usize| quadrant(c[j]) == quadrant(found[j]))
         };
         let solved = |posture: &dyn Fn(&[f64]) -> Option<StatedPosture>| -> Vec<Option<Vec<f64>>> {
             let target = |q: &Vec<f64>| {
@@ -89,38 +73,20 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
                 .map(|answer| answer.q.map(|q| q.iter().map(|q| q.to_degrees()).collect()))
                 .collect()
         };
-        let [mut other, mut reached] = [0, 0];
-        for (q, found) in poses.iter().zip(solved(&|_| None)) {
-            let (c, found) = (maker.counted(q), found.unwrap());
-            other += usize::from(
-                [0, 3, 5]
-                    .iter()
-                    .any(|j| quadrant(c[*j]) != quadrant(found[*j])),
-            );
-        }
+        let nearest = poses.iter().zip(solved(&|_| None));
+        let other = nearest.filter(|(q, found)| !same(&maker.counted(q), found.as_ref().unwrap()));
+        let other = other.count();
         assert!(
             other > 5,
             "{}: the nearest posture is the one that is stated anyway",
             maker.name
         );
         for (q, found) in poses.iter().zip(solved(&|q| Some(by_quadrants(q)))) {
-            let Some(found) = found else { continue };
-            let c = maker.counted(q);
-            assert!(
-                [0, 3, 5]
-                    .iter()
-                    .all(|j| quadrant(c[*j]) == quadrant(found[*j])),
-                "{}: {c:?}, found {found:?}",
-                maker.name
-            );
-            assert!(
-                (robot.forward(&maker.driven(&found)).translation - robot.forward(q).translation)
-                    .norm()
-                    < 1e-6
-            );
-            reached += 1;
+            let (c, found) = (maker.counted(q), found.unwrap());
+            assert!(same(&c, &found), "{}: {c:?}, found {found:?}", maker.name);
+            let [there, here] = [&maker.driven(&found), q].map(|q| robot.forward(q).translation);
+            assert!((there - here).norm() < 1e-6);
         }
-        assert_eq!(reached, poses.len(), "{}", maker.name);
         for (q, found) in poses.iter().zip(solved(&|q| Some(by_signs(q)))) {
             let (c, found) = (maker.counted(q), found.unwrap());
             assert!(
@@ -129,21 +95,13 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
                 maker.name
             );
         }
-        println!(
-            "{}: {other} of {} in another posture where none is stated, none where it is",
-            maker.name,
-            poses.len()
-        );
     }
 }
 
-fn run(name: &str, text: &str) -> (Option<i32>, String, String) {
+fn run(name: &str, text: &str) -> Answer {
     put(cell(), name, text);
-    calib(
-        cell(),
-        &format!("compensate latest {name} --start 2,3,4,5,40,0"),
-    )
-    .parts()
+    let words = format!("compensate latest {name} --start 2,3,4,5,40,0");
+    calib(cell(), &words)
 }
 
 #[test]
@@ -164,19 +122,17 @@ fn programs_state_postures_and_are_told_once_where_they_do_not() {
             at.join(",")
         )
     };
-    let (code, ours, err) = run("own.mod", &rapid("0,0,0,0"));
-    assert_eq!(code, Some(0), "{err}");
-    assert!(!err.contains("posture"), "{err}");
+    let silent = |name: &str, text: &str| {
+        let answer = run(name, text).code(0);
+        assert!(!answer.err.contains("posture"), "{}", answer.err);
+        answer.out
+    };
+    let unreached = "not reached in the posture that is stated";
+    let ours = silent("own.mod", &rapid("0,0,0,0"));
     // The wrist turned over: another posture, another error, another correction.
-    let (code, over, err) = run("over.mod", &rapid("0,-2,-2,1"));
-    assert_eq!(code, Some(0), "{err}");
-    assert_ne!(ours, over);
-    let (code, out, err) = run("none.mod", &rapid("1,0,0,0"));
-    assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-    has(
-        &err,
-        ["none.mod:2:", "not reached in the posture that is stated"],
-    );
+    assert_ne!(ours, run("over.mod", &rapid("0,-2,-2,1")).ok());
+    let err = run("none.mod", &rapid("1,0,0,0")).refused();
+    has(&err, ["none.mod:2:", unreached]);
 
     let (c, b, a) = turn.euler_angles();
     let krl = |posture: &str| {
@@ -187,31 +143,21 @@ fn programs_state_postures_and_are_told_once_where_they_do_not() {
         )
     };
     // Joint 3 below 0, by number and by bits.
-    let (code, by_number, err) = run("t.src", &krl(",S 2,T 4"));
-    assert_eq!(code, Some(0), "{err}");
-    assert!(!err.contains("posture"), "{err}");
-    let (_, by_bits, err) = run("b.src", &krl(",T 'B000100'"));
-    assert!(!err.contains("posture"), "{err}");
-    let (code, _, err) = run("s.src", &krl(",S 3,T 4"));
-    assert_eq!(code, Some(10), "{err}");
-    has(&err, "not reached in the posture that is stated (S 3, T 4)");
+    let by_number = silent("t.src", &krl(",S 2,T 4"));
+    let by_bits = silent("b.src", &krl(",T 'B000100'"));
     let targets = |text: &str| {
-        text.lines()
-            .filter(|line| line.starts_with("LIN"))
-            .map(|line| line[..60].to_string())
-            .collect::<Vec<_>>()
+        let lines = text.lines().filter(|line| line.starts_with("LIN"));
+        lines.map(|line| line[..60].to_string()).collect::<Vec<_>>()
     };
     assert_eq!(targets(&by_number), targets(&by_bits));
-    let (code, _, err) = run("below.src", &krl(",T 'B000101'"));
-    assert_eq!(code, Some(10), "{err}");
-    has(&err, "not reached in the posture that is stated");
-    let (code, _, err) = run("open.src", &(krl("") + &krl("")));
-    assert_eq!(code, Some(0), "{err}");
-    assert_eq!(
-        err.matches("posture not stated: taken nearest to the target before")
-            .count(),
-        1,
-        "{err}"
+    let err = run("s.src", &krl(",S 3,T 4")).code(10).err;
+    has(&err, &format!("{unreached} (S 3, T 4)"));
+    has(
+        &run("below.src", &krl(",T 'B000101'")).code(10).err,
+        unreached,
     );
+    let err = run("open.src", &(krl("") + &krl(""))).code(0).err;
+    let open = "posture not stated: taken nearest to the target before";
+    assert_eq!(err.matches(open).count(), 1, "{err}");
     has(&err, "open.src:1:");
 }

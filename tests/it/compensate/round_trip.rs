@@ -120,6 +120,15 @@ impl Trip {
             .collect()
     }
 
+    /// The misses of the same targets stated as joints in a program of KRL.
+    pub fn misses_by_joints(&self, maker: &Maker, wanted: &[Vec<f64>]) -> Vec<f64> {
+        let joints: String = wanted.iter().map(|q| maker.ptp(q)).collect();
+        let written = self.compensated(maker, Language::Krl, &joints).unwrap();
+        let targets = read(Language::Krl, &written.bytes).into_iter();
+        let driven: Vec<_> = targets.map(|one| maker.driven(&one.values)).collect();
+        self.misses(wanted, &driven)
+    }
+
     fn still(&self) -> Point {
         self.cell.targets_by(1, &[0.0], 3).remove(0)
     }

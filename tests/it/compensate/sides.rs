@@ -4,6 +4,7 @@
 use super::maker::{Maker, PLAIN, makers};
 use super::round_trip::{Trip, pose, read};
 use crate::answer::has;
+use crate::fixture::{apart, largest};
 use calib::program::{Language, PostureStatement};
 use calib::spatial::Pose;
 use nalgebra::UnitQuaternion;
@@ -23,11 +24,7 @@ fn sides(maker: &Maker, q: &[f64]) -> [bool; 3] {
 
 fn is_clear(maker: &Maker, q: &[f64]) -> bool {
     let x = 500.0 * q[1].sin() + 700.0 * (q[1] + q[2]).cos();
-    let off = maker
-        .counted(q)
-        .iter()
-        .all(|c| (5.0..85.0).contains(&c.rem_euclid(90.0)));
-    off && x.abs() > 60.0 && q[2].cos().abs() > 0.1 && q[4].sin().abs() > 0.1
+    maker.is_clear(q) && x.abs() > 60.0 && q[2].cos().abs() > 0.1 && q[4].sin().abs() > 0.1
 }
 
 /// Poses within the limits, as many in each of the eight postures.
@@ -115,10 +112,6 @@ pub fn rapid(pose: &Pose, [one, four, six, x]: [i32; 4]) -> String {
     )
 }
 
-fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
-    values.into_iter().fold(0.0, f64::max)
-}
-
 /// Whether a maker's RAPID says on which side the arm is: not with a parallelogram.
 fn uses_cfx(maker: &Maker) -> bool {
     let parallelogram = maker
@@ -136,31 +129,13 @@ fn every_posture_that_a_program_states_is_reached_as_its_joints_are() {
         let poses = poses(&trip, &maker, 48);
         let postures: BTreeSet<[bool; 3]> = poses.iter().map(|q| sides(&maker, q)).collect();
         assert_eq!((poses.len(), postures.len()), (48, 8), "{}", maker.name);
-        let joints: String = poses
-            .iter()
-            .map(|q| {
-                let named = maker
-                    .counted(q)
-                    .iter()
-                    .zip(1..)
-                    .map(|(c, j)| format!("A{j} {c:.9}"))
-                    .collect::<Vec<_>>()
-                    .join(",");
-                format!("PTP {{{named}}}\n")
-            })
-            .collect();
         let placed = |text: fn(&Maker, &[f64], &Pose) -> String| -> String {
             poses
                 .iter()
                 .map(|q| text(&maker, q, &trip.robot.forward(q)))
                 .collect()
         };
-        let by_joints = trip.compensated(&maker, Language::Krl, &joints).unwrap();
-        let ours: Vec<Vec<f64>> = read(Language::Krl, &by_joints.bytes)
-            .iter()
-            .map(|one| maker.driven(&one.values))
-            .collect();
-        let ours = trip.misses(&poses, &ours);
+        let ours = trip.misses_by_joints(&maker, &poses);
         let status_turn = placed(|maker, q, at| {
             krl(at, &format!(",S {},T {}", status(maker, q), turn(maker, q)))
         });
@@ -198,18 +173,12 @@ fn every_posture_that_a_program_states_is_reached_as_its_joints_are() {
                 };
                 assert_eq!(target.posture, stated, "{} {name}: {q:?}", maker.name);
             }
-            let apart = trip
-                .misses(&poses, &driven)
-                .iter()
-                .zip(&ours)
-                .map(|(a, b)| (a - b).abs())
-                .collect::<Vec<_>>();
+            let apart = apart(&trip.misses(&poses, &driven), &ours);
             println!(
-                "{}: {name}: {:.6} mm from the same targets as joints, of 48 in 8 postures",
-                maker.name,
-                largest(apart.clone())
+                "{}: {name}: {apart:.6} mm from the same targets as joints",
+                maker.name
             );
-            assert!(largest(apart) < 1e-3, "{} {name}", maker.name);
+            assert!(apart < 1e-3, "{} {name}", maker.name);
         }
         assert!(largest(ours) < 0.1, "{}", maker.name);
     }

@@ -1,6 +1,7 @@
 //! The true robot, a twin that shares no kinematics with the model, goes where it was wanted: every kind of effect that acts.
 
 use super::concealed::model;
+use crate::fixture::rms;
 use crate::recorded::{Recorded, made, recording_of, settings};
 use calib::compensate::{
     Circumstance, IdentifiedArm as Identified, Nominal, Reach, SETTLED, ToolGoal, least_change,
@@ -192,12 +193,7 @@ impl Cell {
         targets: &[Point],
         solve: impl Fn(&mut Reach, &ToolGoal, &[f64]) -> Vec<f64>,
     ) -> f64 {
-        let square = self
-            .misses(arm, targets, solve)
-            .into_iter()
-            .map(|miss| miss * miss)
-            .sum::<f64>();
-        (square / targets.len() as f64).sqrt() * 1e3
+        rms(self.misses(arm, targets, solve)) * 1e3
     }
 
     /// By how much (m) the true robot misses each target, with the commands that `solve` makes of it.
@@ -266,9 +262,8 @@ fn proof_of(cell: &Cell) {
     let step = cell.true_error(&arm, &targets, |reach, wanted, q| {
         one_step(reach, &mut Nominal::new(&arm.model().robot), wanted, q).q
     });
-    let named: Vec<String> = findings
-        .0
-        .iter()
+    let named = findings.0.iter();
+    let named: Vec<String> = named
         .map(|row| format!("{} at {}", row.effect, row.place))
         .collect();
     println!(

@@ -43,21 +43,15 @@ fn a_holder_that_turns_about_the_flange_is_one_step_with_two_names() {
         starts_with(statements[0], &size);
         has(statements[0], "from row 71");
         let found = &diagnosis.findings[0];
-        let mut names: Vec<(&str, Place)> = found
-            .rivals
-            .iter()
-            .map(|rival| (rival.effect, rival.place))
-            .collect();
+        let rivals = found.rivals.iter().map(|rival| (rival.effect, rival.place));
+        let mut names: Vec<(&str, Place)> = rivals.collect();
         names.push((found.effect, found.place));
         for name in [
             ("zero_shift", Place::Joint(joints - 1)),
             ("tool_shift", Place::Tool),
         ] {
-            assert_eq!(
-                names.iter().filter(|other| **other == name).count(),
-                1,
-                "{names:?}"
-            );
+            let times = names.iter().filter(|other| **other == name).count();
+            assert_eq!(times, 1, "{names:?}");
         }
     }
 }
@@ -72,11 +66,6 @@ fn a_target_that_moves_along_the_last_axis_has_not_turned() {
     }
     let diagnosis = diagnosis_of(&cell, data);
     assert_eq!(diagnosis.findings.len(), 1, "{}", diagnosis.statement);
-    assert!(
-        diagnosis.findings[0]
-            .statement
-            .starts_with("the target on the tool has moved"),
-        "{}",
-        diagnosis.findings[0].statement
-    );
+    let statement = &diagnosis.findings[0].statement;
+    starts_with(statement, "the target on the tool has moved");
 }

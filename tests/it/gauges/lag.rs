@@ -40,26 +40,11 @@ fn lagging(poses: usize, others: impl Fn(f64, f64) -> f64) -> (Cell, Measurement
 }
 
 fn lag_alone(diagnosis: &Diagnosis, what: &str) -> (String, f64) {
-    let named: Vec<&str> = diagnosis
-        .findings
-        .iter()
-        .map(|finding| finding.effect)
-        .collect();
-    assert_eq!(
-        named,
-        ["joint_log_lag"],
-        "{what}: {}",
-        diagnosis
-            .findings
-            .iter()
-            .map(|f| f.statement.as_str())
-            .collect::<Vec<_>>()
-            .join(" ")
-    );
-    (
-        diagnosis.findings[0].statement.clone(),
-        diagnosis.findings[0].parameters[0].value,
-    )
+    let findings = &diagnosis.findings;
+    let named: Vec<&str> = findings.iter().map(|finding| finding.effect).collect();
+    assert_eq!(named, ["joint_log_lag"], "{what}: {}", diagnosis.statement);
+    let found = &findings[0];
+    (found.statement.clone(), found.parameters[0].value)
 }
 
 #[test]
@@ -98,18 +83,13 @@ fn rows_in_another_order_than_their_times_lag_by_their_times() {
             .map(|time| order.iter().map(|row| time[*row]).collect());
         let times = sorted.time.clone().unwrap();
         sorted.sequence = Sequence::by_time(&times, |a, b| sorted.near_pose(a, b));
+        let way = |data: &Measurements, row, joint| {
+            (data.last_move(row, joint), data.direction(row, joint))
+        };
         for (row, ours) in order.iter().enumerate() {
             for joint in 0..data.joints {
-                assert_eq!(
-                    sorted.last_move(row, joint),
-                    data.last_move(*ours, joint),
-                    "{what}, row {row}, joint {joint}"
-                );
-                assert_eq!(
-                    sorted.direction(row, joint),
-                    data.direction(*ours, joint),
-                    "{what}, row {row}, joint {joint}"
-                );
+                let (there, here) = (way(&sorted, row, joint), way(&data, *ours, joint));
+                assert_eq!(there, here, "{what}, row {row}, joint {joint}");
             }
         }
         let (statement, remaining) = lag_alone(&diagnosed(&cell.description, &sorted), what);

@@ -14,63 +14,54 @@ fn cell(points: usize) -> Vec<Fixture> {
         ("a/0", [480.0, 120.0, 300.0]),
         ("a/1", [480.0, 170.0, 300.0]),
         ("b/0", [-250.0, 450.0, 380.0]),
-    ];
-    let more = [
         ("b/1", [-250.0, 450.0, 430.0]),
         ("c/0", [100.0, -480.0, 320.0]),
         ("c/1", [100.0, -480.0, 370.0]),
     ];
-    places
-        .into_iter()
-        .chain(more)
-        .map(|(name, place)| socket(name, place, points, 60.0))
-        .collect()
+    let sockets = places.map(|(name, place)| socket(name, place, points, 60.0));
+    sockets.into()
 }
 
-/// Causes by place, the verdict, and all that was warned of.
-fn diagnosed(robot: &RobotDescription, recording: Recording) -> (Vec<String>, VerdictRow, String) {
-    let (named, verdict, _, warnings) = diagnosed_with_sentences(robot, recording);
-    (named, verdict, warnings)
+/// What is said of a recording: causes by place, the verdict, what the data cannot show, all that was warned of.
+struct Told {
+    named: Vec<String>,
+    verdict: VerdictRow,
+    unseen: String,
+    warnings: String,
 }
 
-/// The same, with what the data cannot show.
-fn diagnosed_with_sentences(
-    robot: &RobotDescription,
-    recording: Recording,
-) -> (Vec<String>, VerdictRow, String, String) {
+fn diagnosed(robot: &RobotDescription, recording: Recording) -> Told {
     let made = Recorded::fitted(robot, recording).diagnose(json!({}));
-    let verdict = made.verdict();
-    let named = made.named();
+    let (verdict, named) = (made.verdict(), made.named());
     let named = named
         .iter()
         .map(|(effect, place)| format!("{effect} at {place}"));
     let sentences: VerdictSentences = made.get();
-    let unseen = sentences
-        .about(&verdict.step, VerdictTopic::NotObservable)
-        .join("\n");
-    (named.collect(), verdict, unseen, made.warnings)
+    let unseen = sentences.about(&verdict.step, VerdictTopic::NotObservable);
+    Told {
+        named: named.collect(),
+        unseen: unseen.join("\n"),
+        verdict,
+        warnings: made.warnings,
+    }
 }
 
 #[test]
 fn nothing_is_found_in_a_clean_recording_and_what_cannot_be_known_is_said() {
     let robot = fixture::seven();
-    let (named, verdict, unseen, warnings) =
-        diagnosed_with_sentences(&robot, touched(&robot, &truth(&robot, 31), &cell(30), 31));
-    assert!(named.is_empty(), "{named:?}");
-    assert_eq!(
-        verdict.verdict, "nothing_missing",
-        "{:?}",
-        verdict.statement
-    );
-    for expected in [
-        "anything below the repeatability of closing",
-        "scale of the arm",
-        "place of the base",
-    ] {
-        has(&unseen, expected);
-    }
+    let clean = touched(&robot, &truth(&robot, 31), &cell(30), 31);
+    let Told {
+        named,
+        verdict,
+        unseen,
+        warnings,
+    } = diagnosed(&robot, clean);
+    assert_eq!((named, &*verdict.verdict), (Vec::new(), "nothing_missing"));
+    let closing = "anything below the repeatability of closing";
+    has(&unseen, [closing, "scale of the arm", "place of the base"]);
+    let silent = ["do not close", "sits elsewhere"];
     assert!(
-        !warnings.contains("do not close") && !warnings.contains("sits elsewhere"),
+        !silent.iter().any(|part| warnings.contains(part)),
         "{warnings}"
     );
 }
@@ -96,7 +87,7 @@ fn wind_up_cyclic_errors_and_lost_motion_are_named_at_their_joints() {
             ..truth(&robot, seed)
         };
         let recording = touched_with(&robot, &truth, effects, &cell(30), seed);
-        let (named, verdict, _) = diagnosed(&robot, recording);
+        let Told { named, verdict, .. } = diagnosed(&robot, recording);
         for expected in expected {
             let found = named.iter().any(|name| name == expected);
             assert!(found, "{named:?}, {:?}", verdict.statement);
@@ -116,39 +107,31 @@ fn a_ball_that_was_put_back_elsewhere_is_found() {
     );
     let half = 90 * recording.joints;
     recording.q[half..].copy_from_slice(&second.q[half..]);
-    let (named, verdict, warnings) = diagnosed(&robot, recording);
-    let is_stated = warnings.contains("sits elsewhere on the tool")
-        || named.iter().any(|name| name.starts_with("tool_shift"));
-    assert!(is_stated, "{named:?}, {:?}, {warnings}", verdict.statement);
+    let told = diagnosed(&robot, recording);
+    let mut named = told.named.iter();
+    let is_stated = told.warnings.contains("sits elsewhere on the tool")
+        || named.any(|name| name.starts_with("tool_shift"));
+    assert!(is_stated, "{:?}, {}", told.named, told.warnings);
 }
 
 #[test]
 fn rows_of_a_plate_that_slipped_are_named_in_the_verdict() {
     let robot = fixture::seven();
     let mut recording = touched(&robot, &truth(&robot, 34), &cell(30), 34);
-    let moved: Vec<Fixture> = cell(30)
-        .into_iter()
-        .map(|ours| Fixture {
-            centre_mm: [
-                ours.centre_mm[0] + 1.5,
-                ours.centre_mm[1],
-                ours.centre_mm[2] + 1.0,
-            ],
-            ..ours
-        })
-        .collect();
+    let mut moved = cell(30);
+    for one in &mut moved {
+        one.centre_mm[0] += 1.5;
+        one.centre_mm[2] += 1.0;
+    }
     let slipped = touched(&robot, &truth(&robot, 34), &moved, 35);
     // Rows 20 to 25 of b/0, which is the third socket.
     let joints = recording.joints;
     recording.q[79 * joints..85 * joints].copy_from_slice(&slipped.q[79 * joints..85 * joints]);
-    let (named, verdict, warnings) = diagnosed(&robot, recording);
-    let is_stated = warnings.contains("6 rows do not close")
-        && warnings.contains("b/0-0020 to b/0-0025 (6 rows)");
-    assert!(is_stated, "{named:?}, {warnings}");
-    assert!(
-        verdict
-            .statement
-            .unwrap_or_default()
-            .contains("ball or fixture moved there")
+    let told = diagnosed(&robot, recording);
+    has(
+        &told.warnings,
+        ["6 rows do not close", "b/0-0020 to b/0-0025 (6 rows)"],
     );
+    let statement = told.verdict.statement.unwrap_or_default();
+    has(&statement, "ball or fixture moved there");
 }

@@ -29,27 +29,17 @@ fn planes_and_spheres_stand_where_they_were_identified() {
         .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
         .unwrap();
     for (error, row) in model.row_errors(&data).iter().zip(&prediction.0) {
+        let (read, stored) = (1e3 * error.length, row.error_mm);
         assert!(
-            (1e3 * error.length - row.error_mm).abs() < 1e-6,
-            "{}: {} and {}",
-            row.point_id,
-            1e3 * error.length,
-            row.error_mm
+            (read - stored).abs() < 1e-6,
+            "{}: {read} and {stored}",
+            row.point_id
         );
     }
-    let value = |name: &str| {
-        parameters
-            .0
-            .iter()
-            .find(|row| row.name == name)
-            .unwrap()
-            .value
-    };
-    assert!(
-        (value("anchor.ball.radius") - 40.0).abs() < 0.3,
-        "{}",
-        value("anchor.ball.radius")
-    );
+    let rows = &parameters.0;
+    let value = |name: &str| rows.iter().find(|row| row.name == name).unwrap().value;
+    let radius = value("anchor.ball.radius");
+    assert!((radius - 40.0).abs() < 0.3, "{radius}");
     // The base stands at nominal, up to what the tolerances of the first link leave.
     let normal = Anchor::normal([value("anchor.wall.rx"), value("anchor.wall.ry")]);
     assert!(

@@ -32,7 +32,7 @@ fn seen_knowing(
     let (model, fitted) = calibrated_knowing(robot, &data, lengths, effects, known);
     let (setup, free) = (model.robot.setup(), fitted.free().len());
     // Theory knows places of sockets, three numbers each, and no diameters.
-    if effects.is_empty() && known.len() % 3 == 0 {
+    if effects.is_empty() && known.len().is_multiple_of(3) {
         let (rows, scaled) = (all_rows(&data), !lengths.is_empty());
         let expected = rank(&model.robot, &data, &rows, scaled, known.len() / 3);
         assert_eq!(expected, Some(free), "{}", robot.name);

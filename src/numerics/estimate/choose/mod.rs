@@ -15,6 +15,7 @@ pub use contact::{
     BallOffset, ContactProposal, ContactRequest, LeftOutPlace, PriorSigma, propose_contacts,
 };
 pub use point_jacobian::{PointJacobian, Score};
+pub(crate) use site::even;
 pub use site::{Circumstances, Site, spread};
 pub use t_optimal::{
     Alternative, Discrimination, DiscriminationProblem, MIN_SEPARATION_L, Proposed, tell,

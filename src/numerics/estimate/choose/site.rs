@@ -166,23 +166,34 @@ impl Site {
     }
 }
 
+/// Rows of positions within the ranges, row-major: even and reproducible (an additive recurrence).
+pub(crate) fn even(ranges: &[[f64; 2]], rows: usize) -> Vec<f64> {
+    // The root of x^(d+1) = x + 1.
+    let power = 1.0 / (ranges.len() as f64 + 1.0);
+    let root = (0..60).fold(2.0f64, |x, _| (1.0 + x).powf(power));
+    let position = |row: usize, joint: usize| {
+        let share = (0.5 + (row + 1) as f64 * root.powi(-(joint as i32 + 1))).fract();
+        let [lower, upper] = ranges[joint];
+        lower + (upper - lower) * share
+    };
+    (0..rows)
+        .flat_map(|row| (0..ranges.len()).map(move |joint| (row, joint)))
+        .map(|(row, joint)| position(row, joint))
+        .collect()
+}
+
 /// `rows` poses within the limits, rad or m, with the declared payload; a joint without limits keeps within 1 of its zero.
 pub fn spread(robot: &RobotModel, rows: usize) -> Measurements {
-    let n = robot.joints();
-    let golden = (0..60).fold(1.5f64, |x, _| (1.0 + x).powf(1.0 / (n as f64 + 1.0)));
-    let limits = |j: usize| robot.description().joints[j].limits.unwrap_or([-1.0, 1.0]);
-    let q = (0..rows)
-        .flat_map(|row| (0..n).map(move |j| (row, j)))
-        .map(|(row, j)| {
-            let share = (0.5 + (row as f64 + 1.0) * golden.powi(-(j as i32) - 1)).fract();
-            let [lower, upper] = limits(j);
-            lower + share * (upper - lower)
-        });
+    let description = robot.description();
+    let limits = description
+        .joints
+        .iter()
+        .map(|joint| joint.limits.unwrap_or([-1.0, 1.0]));
     Measurements {
-        joints: n,
-        q: q.collect(),
+        joints: robot.joints(),
+        q: even(&limits.collect::<Vec<_>>(), rows),
         points: PointReadings::new(vec![Vector3::zeros(); rows], 0.0),
-        payload: vec![robot.description().payload_mass; rows],
+        payload: vec![description.payload_mass; rows],
         ..Measurements::default()
     }
 }

@@ -5,7 +5,7 @@
 
 use super::arm::ScrewArm;
 use super::linear::Linear;
-use super::perceptron::{LayerSizes, OUTPUTS};
+use super::perceptron::{LayerSizes, OUTPUTS, scatter};
 use super::process::Process;
 use super::region::Region;
 
@@ -151,13 +151,6 @@ pub struct Networks {
     pub members: Vec<Vec<f64>>,
 }
 
-impl Networks {
-    /// Outputs of each network at scaled inputs.
-    fn outputs<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = Vec<f64>> + 'a {
-        self.members.iter().map(|member| self.shape.at(member, x))
-    }
-}
-
 /// What was learnt.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Body {
@@ -223,35 +216,23 @@ impl Correction {
             }
             Body::Networks(dress, networks) => {
                 let x = dress.scaled(sources);
-                let each: Vec<[f64; OUTPUTS]> = match &networks.joints {
-                    None => networks
-                        .outputs(&x)
-                        .map(|y| std::array::from_fn(|k| y[k]))
-                        .collect(),
-                    Some(motion) => {
-                        let ways = motion.ways(sources);
-                        let along = |y: &[f64], k: usize| {
-                            y.iter().zip(&ways).map(|(y, way)| y * way[k]).sum::<f64>()
-                        };
-                        networks
-                            .outputs(&x)
-                            .map(|y| std::array::from_fn(|k| along(&y, k) / dress.outputs[k].scale))
-                            .collect()
+                let ways = networks.joints.as_ref().map(|motion| motion.ways(sources));
+                let along = |y: &[f64], k: usize| match &ways {
+                    None => y[k],
+                    Some(ways) => {
+                        let moved = y.iter().zip(ways).map(|(y, way)| y * way[k]);
+                        moved.sum::<f64>() / dress.outputs[k].scale
                     }
                 };
+                let members = networks.members.iter();
+                let each: Vec<[f64; OUTPUTS]> = members
+                    .map(|member| networks.shape.at(member, &x))
+                    .map(|y| std::array::from_fn(|k| along(&y, k)))
+                    .collect();
                 let count = each.len().max(1) as f64;
                 let mean: [f64; OUTPUTS] =
                     std::array::from_fn(|k| each.iter().map(|y| y[k]).sum::<f64>() / count);
-                let squares: f64 = each
-                    .iter()
-                    .flatten()
-                    .zip(mean.iter().cycle())
-                    .map(|(y, mean)| (y - mean).powi(2))
-                    .sum();
-                (
-                    dress.worn(mean),
-                    (squares / (count * OUTPUTS as f64)).sqrt() * dress.size(),
-                )
+                (dress.worn(mean), scatter(&each, &mean) * dress.size())
             }
         }
     }

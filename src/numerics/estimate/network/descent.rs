@@ -1,6 +1,7 @@
 //! Gradient training: limited-memory BFGS (Liu and Nocedal 1989) with backtracking, stopped early by rows kept back.
 
 use super::OUTPUTS;
+use crate::estimate::factor::axpy;
 use std::collections::VecDeque;
 
 /// Steps remembered; ten is the usual choice and more gains nothing here.
@@ -73,10 +74,7 @@ pub fn descend(
         } else {
             since += 1;
         }
-        if since >= PATIENCE {
-            break;
-        }
-        if index >= iterations {
+        if since >= PATIENCE || index >= iterations {
             break;
         }
         let mut direction = quasi_newton(&gradient, &memory);
@@ -111,12 +109,8 @@ pub fn descend(
         let Some((value, at_next)) = found else {
             break;
         };
-        let s: Vec<f64> = next.iter().zip(&x).map(|(n, x)| n - x).collect();
-        let y: Vec<f64> = next_gradient
-            .iter()
-            .zip(&gradient)
-            .map(|(n, g)| n - g)
-            .collect();
+        let [s, y] = [(&next, &x), (&next_gradient, &gradient)]
+            .map(|(n, x)| n.iter().zip(x).map(|(n, x)| n - x).collect::<Vec<f64>>());
         let curvature = dot(&s, &y);
         // Only positive curvature keeps the approximation positive definite.
         if curvature > 1e-10 * norm(&s) * norm(&y) {
@@ -153,7 +147,7 @@ fn quasi_newton(gradient: &[f64], memory: &VecDeque<Pair>) -> Vec<f64> {
     let mut alphas = Vec::with_capacity(memory.len());
     for pair in memory.iter().rev() {
         let alpha = dot(&pair.s, &q) / pair.curvature;
-        add(&mut q, -alpha, &pair.y);
+        axpy(-alpha, &pair.y, &mut q);
         alphas.push(alpha);
     }
     if let Some(last) = memory.back() {
@@ -162,7 +156,7 @@ fn quasi_newton(gradient: &[f64], memory: &VecDeque<Pair>) -> Vec<f64> {
     }
     for (pair, alpha) in memory.iter().zip(alphas.into_iter().rev()) {
         let beta = dot(&pair.y, &q) / pair.curvature;
-        add(&mut q, alpha - beta, &pair.s);
+        axpy(alpha - beta, &pair.s, &mut q);
     }
     q
 }
@@ -173,10 +167,4 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 fn norm(a: &[f64]) -> f64 {
     dot(a, a).sqrt()
-}
-
-fn add(a: &mut [f64], factor: f64, b: &[f64]) {
-    for (a, b) in a.iter_mut().zip(b) {
-        *a += factor * b;
-    }
 }

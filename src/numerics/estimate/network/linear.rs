@@ -6,6 +6,7 @@
 
 use super::arm::ScrewArm;
 use super::basis::{BasisFunctions, BasisTerm};
+use super::perceptron::scatter;
 use super::region::TrainingSamples;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::solvers::{Llt, Solve};
@@ -50,12 +51,11 @@ impl Linear {
     ) -> Option<Self> {
         let every = samples.rows().div_ceil(ROWS).max(1);
         let rows: Vec<usize> = (0..samples.rows()).step_by(every).collect();
-        let (terms, group) = Self::lively(samples, &rows, arm, groups);
-        let mut sums = Sums::new(samples, &rows, arm, &terms.0, &terms.1)?;
+        let mut sums = Sums::new(samples, &rows, arm, groups)?;
+        let group = sums.group.clone();
         let p = group.len();
-        let counts: Vec<f64> = (0..groups.len())
-            .map(|g| group.iter().filter(|group_of| **group_of == g).count() as f64)
-            .collect();
+        let count = |g| group.iter().filter(|group_of| **group_of == g).count() as f64;
+        let counts: Vec<f64> = (0..groups.len()).map(count).collect();
         // In units of the residual: each column starts as a tenth of it, and half of it as noise.
         let (mut alpha, mut beta) = (vec![100.0; groups.len()], 4.0);
         let mut weights = vec![1.0; rows.len()];
@@ -97,43 +97,10 @@ impl Linear {
             .extend((0..DRAWS).map(|d| (0..p).map(|i| scaled(i, x[i] + draws[(i, d)])).collect()));
         Some(Self {
             arm: arm.cloned(),
-            terms: terms.0,
+            terms: sums.terms,
             members,
             noise: unit / beta.sqrt(),
         })
-    }
-
-    /// The terms that move the point anywhere with the root mean square of each, and the group of each.
-    fn lively(
-        samples: &TrainingSamples,
-        rows: &[usize],
-        arm: Option<&ScrewArm>,
-        groups: &[Vec<BasisTerm>],
-    ) -> ((Vec<BasisTerm>, Vec<f64>), Vec<usize>) {
-        let all: Vec<BasisTerm> = groups.iter().flatten().cloned().collect();
-        let group_of: Vec<usize> = groups
-            .iter()
-            .enumerate()
-            .flat_map(|(g, terms)| terms.iter().map(move |_| g))
-            .collect();
-        let mut squares = vec![0.0; all.len()];
-        let mut basis = BasisFunctions::new(arm, &all);
-        for row in rows {
-            basis.at(&samples.sources[*row], |t, way| {
-                squares[t] += way.iter().map(|v| v * v).sum::<f64>()
-            });
-        }
-        let scale: Vec<f64> = squares
-            .iter()
-            .map(|sum| (sum / (3 * rows.len().max(1)) as f64).sqrt())
-            .collect();
-        // A metre of lever arm times a hundredth of a microradian is nothing.
-        let kept: Vec<usize> = (0..all.len()).filter(|t| scale[*t] > 1e-8).collect();
-        let terms = kept.iter().map(|t| all[*t].clone()).collect();
-        (
-            (terms, kept.iter().map(|t| scale[*t]).collect()),
-            kept.iter().map(|t| group_of[*t]).collect(),
-        )
     }
 
     /// The correction and its standard deviation per axis beside the noise, m.
@@ -149,13 +116,7 @@ impl Linear {
         let Some((mean, draws)) = sums.split_first() else {
             return ([0.0; 3], 0.0);
         };
-        let squares: f64 = draws
-            .iter()
-            .flatten()
-            .zip(mean.iter().cycle())
-            .map(|(draw, mean)| (draw - mean).powi(2))
-            .sum();
-        (*mean, (squares / (3 * draws.len().max(1)) as f64).sqrt())
+        (*mean, scatter(draws, mean))
     }
 }
 
@@ -164,8 +125,11 @@ struct Sums<'a> {
     samples: &'a TrainingSamples,
     rows: &'a [usize],
     arm: Option<&'a ScrewArm>,
-    terms: &'a [BasisTerm],
-    scale: &'a [f64],
+    /// Those that move the point anywhere, the root mean square of each, and its group.
+    terms: Vec<BasisTerm>,
+    scale: Vec<f64>,
+    group: Vec<usize>,
+    /// Root mean square of the residual, m.
     unit: f64,
     h: Mat<f64>,
     g: Vec<f64>,
@@ -175,40 +139,57 @@ struct Sums<'a> {
 }
 
 impl<'a> Sums<'a> {
+    /// `None` where nothing moves.
     fn new(
         samples: &'a TrainingSamples,
         rows: &'a [usize],
         arm: Option<&'a ScrewArm>,
-        terms: &'a [BasisTerm],
-        scale: &'a [f64],
+        groups: &[Vec<BasisTerm>],
     ) -> Option<Self> {
-        let squares: f64 = rows
-            .iter()
-            .flat_map(|row| samples.residual[*row])
-            .map(|v| v * v)
-            .sum();
-        let unit = (squares / (3 * rows.len().max(1)) as f64).sqrt();
+        let all: Vec<BasisTerm> = groups.iter().flatten().cloned().collect();
+        let mut squares = vec![0.0; all.len()];
+        let mut basis = BasisFunctions::new(arm, &all);
+        for row in rows {
+            basis.at(&samples.sources[*row], |t, way| {
+                squares[t] += way.iter().map(|v| v * v).sum::<f64>()
+            });
+        }
+        let root_mean = |sum: f64| (sum / (3 * rows.len().max(1)) as f64).sqrt();
+        let (mut terms, mut scale, mut group) = (Vec::new(), Vec::new(), Vec::new());
+        let groups = groups.iter().enumerate();
+        let group_of = groups.flat_map(|(g, terms)| terms.iter().map(move |_| g));
+        for ((term, g), sum) in all.into_iter().zip(group_of).zip(squares) {
+            let size = root_mean(sum);
+            // A metre of lever arm times a hundredth of a microradian is nothing.
+            if size > 1e-8 {
+                terms.push(term);
+                scale.push(size);
+                group.push(g);
+            }
+        }
+        let residual = rows.iter().flat_map(|row| samples.residual[*row]);
+        let unit = root_mean(residual.map(|v| v * v).sum());
         let p = terms.len();
-        let empty = Self {
+        (unit > 0.0 && p > 0).then(|| Self {
             samples,
             rows,
             arm,
             terms,
             scale,
+            group,
             unit,
             h: Mat::zeros(p, p),
             g: vec![0.0; p],
             squares: 0.0,
             count: 0.0,
-        };
-        (unit > 0.0 && p > 0).then_some(empty)
+        })
     }
 
     fn add_up(&mut self, weights: &[f64]) {
         self.h.fill(0.0);
         self.g.fill(0.0);
         (self.squares, self.count) = (0.0, 0.0);
-        let mut basis = BasisFunctions::new(self.arm, self.terms);
+        let mut basis = BasisFunctions::new(self.arm, &self.terms);
         let mut columns = Mat::<f64>::zeros(3 * CHUNK, self.terms.len());
         for (rows, weights) in self.rows.chunks(CHUNK).zip(weights.chunks(CHUNK)) {
             columns.fill(0.0);
@@ -263,7 +244,7 @@ impl<'a> Sums<'a> {
 
     /// Huber's weights of the rows under coefficients `x`; `limit` is a length in units of the residual.
     fn weights(&self, x: &[f64], limit: f64) -> Vec<f64> {
-        let mut basis = BasisFunctions::new(self.arm, self.terms);
+        let mut basis = BasisFunctions::new(self.arm, &self.terms);
         let weight = |row: &usize| {
             let mut left = self.samples.residual[*row].map(|value| value / self.unit);
             basis.at(&self.samples.sources[*row], |t, way| {

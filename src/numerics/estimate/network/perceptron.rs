@@ -10,6 +10,13 @@ use std::ops::Range;
 /// Axes of the position residual, and outputs of a network that does not go through the Jacobian.
 pub const OUTPUTS: usize = 3;
 
+/// Root mean square of what values are off a mean, all axes together.
+pub(super) fn scatter(values: &[[f64; OUTPUTS]], mean: &[f64; OUTPUTS]) -> f64 {
+    let pairs = values.iter().flatten().zip(mean.iter().cycle());
+    let squares: f64 = pairs.map(|(value, mean)| (value - mean).powi(2)).sum();
+    (squares / (OUTPUTS * values.len().max(1)) as f64).sqrt()
+}
+
 /// Numbers of neurons; the parameters are kept apart from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LayerSizes {

@@ -56,14 +56,8 @@ impl Process {
         let lengths = theta[..width].iter().map(|l| l.exp()).collect();
         let rows: Vec<Vec<f64>> = thin(ROWS).map(|r| x[r].clone()).collect();
         let targets: Vec<[f64; OUTPUTS]> = thin(ROWS).map(|r| y[r]).collect();
-        let mut process = Self::remember(
-            lengths,
-            theta[width].exp(),
-            theta[width + 1].exp(),
-            rows,
-            Vec::new(),
-        )?;
-        let llt = Llt::new(process.matrix().as_ref(), Side::Lower).ok()?;
+        let (signal, noise) = (theta[width].exp(), theta[width + 1].exp());
+        let (mut process, llt) = Self::factored(lengths, signal, noise, rows)?;
         let solved = llt.solve(Mat::from_fn(targets.len(), OUTPUTS, |r, k| targets[r][k]));
         process.alpha = (0..targets.len())
             .map(|r| std::array::from_fn(|k| solved[(r, k)]))
@@ -79,19 +73,27 @@ impl Process {
         rows: Vec<Vec<f64>>,
         alpha: Vec<[f64; OUTPUTS]>,
     ) -> Option<Self> {
+        let (process, _) = Self::factored(lengths, signal, noise, rows)?;
+        Some(Self { alpha, ..process })
+    }
+
+    fn factored(
+        lengths: Vec<f64>,
+        signal: f64,
+        noise: f64,
+        rows: Vec<Vec<f64>>,
+    ) -> Option<(Self, Llt<f64>)> {
         let mut process = Self {
             lengths,
             signal,
             noise,
             rows,
-            alpha,
+            alpha: Vec::new(),
             factor: Mat::new(),
         };
-        process.factor = Llt::new(process.matrix().as_ref(), Side::Lower)
-            .ok()?
-            .L()
-            .to_owned();
-        Some(process)
+        let llt = Llt::new(process.matrix().as_ref(), Side::Lower).ok()?;
+        process.factor = llt.L().to_owned();
+        Some((process, llt))
     }
 
     fn matrix(&self) -> Mat<f64> {

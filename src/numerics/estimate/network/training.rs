@@ -121,7 +121,17 @@ pub fn train(
         members.push(parameters);
         course.extend(history);
     }
-    (prepared.correction(members), course)
+    let networks = Networks {
+        shape: prepared.shape,
+        joints: prepared.joints,
+        members,
+    };
+    let correction = Correction {
+        body: Body::Networks(prepared.dress, networks),
+        region: prepared.region,
+        left: 0.0,
+    };
+    (correction, course)
 }
 
 /// Rows scaled and ready to be learnt.
@@ -334,17 +344,13 @@ impl<'a> Prepared<'a> {
         let (kept_back, trained) = draw(&mut rng, self.y.len(), back.min(self.y.len() - 1));
         let batch = self.batch(&trained);
         let check = self.batch(&kept_back);
-        let decay = self.recipe.decay;
-        let train = Loss {
+        let loss = |batch| Loss {
             shape: self.shape,
-            batch: &batch,
-            decay,
+            batch,
+            decay: self.recipe.decay,
         };
-        let check = (check.rows() > 0).then_some(Loss {
-            shape: self.shape,
-            batch: &check,
-            decay,
-        });
+        let train = loss(&batch);
+        let check = (check.rows() > 0).then(|| loss(&check));
         let (mut scratch, mut check_scratch) =
             (LossBuffers::new(self.shape), LossBuffers::new(self.shape));
         let descent = descend(
@@ -368,20 +374,6 @@ impl<'a> Prepared<'a> {
         )
     }
 
-    fn correction(self, members: Vec<Vec<f64>>) -> Correction {
-        let left = 0.0;
-        let networks = Networks {
-            shape: self.shape,
-            joints: self.joints,
-            members,
-        };
-        Correction {
-            body: Body::Networks(self.dress, networks),
-            region: self.region,
-            left,
-        }
-    }
-
     /// A stream of its own for each purpose, so that none depends on how much another drew.
     fn rng(&self, stream: u64) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(self.recipe.seed);
@@ -393,15 +385,11 @@ impl<'a> Prepared<'a> {
         let x: Vec<Vec<f64>> = rows.iter().map(|r| self.x[*r].clone()).collect();
         let y: Vec<[f64; OUTPUTS]> = rows.iter().map(|r| self.y[*r]).collect();
         let batch = Batch::new(&x, &y);
-        match self.ways.is_empty() {
-            true => batch,
-            false => batch.through(
-                &rows
-                    .iter()
-                    .map(|r| self.ways[*r].clone())
-                    .collect::<Vec<_>>(),
-            ),
+        if self.ways.is_empty() {
+            return batch;
         }
+        let ways: Vec<_> = rows.iter().map(|r| self.ways[*r].clone()).collect();
+        batch.through(&ways)
     }
 
     /// Root of the mean squared length, m, from mean squares of the scaled outputs.

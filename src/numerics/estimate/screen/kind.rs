@@ -70,7 +70,7 @@ pub(super) fn name(
             kinds.insert(row, (kind, None));
         }
     }
-    let index = Index::new(standings);
+    let by_x = by_x(standings);
     let moved: Vec<usize> = flagged
         .iter()
         .copied()
@@ -78,7 +78,7 @@ pub(super) fn name(
         .collect();
     let fits: BTreeMap<usize, Vec<(usize, f64)>> = moved
         .iter()
-        .map(|row| (*row, index.fits(data, standings, *row, limit)))
+        .map(|row| (*row, fits(&by_x, data, standings, *row, limit)))
         .collect();
     exchange(&fits, &mut kinds);
     shift(data, &fits, &mut kinds);
@@ -122,48 +122,39 @@ pub(super) fn misread(
     }
 }
 
-/// Predicted points in order of x, so that near ones are found without looking at all.
-struct Index {
-    by_x: Vec<(f64, usize)>,
+/// Predicted points in order of x with their rows, so that near ones are found without looking at all.
+fn by_x(standings: &[LeaveOneOut]) -> Vec<(f64, usize)> {
+    let places = standings.iter().map(|standing| standing.predicted.x);
+    let mut by_x: Vec<(f64, usize)> = places.zip(0..).collect();
+    by_x.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    by_x
 }
 
-impl Index {
-    fn new(standings: &[LeaveOneOut]) -> Self {
-        let mut by_x: Vec<(f64, usize)> = standings
-            .iter()
-            .enumerate()
-            .map(|(row, standing)| (standing.predicted.x, row))
-            .collect();
-        by_x.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        Self { by_x }
-    }
-
-    /// Rows of other poses whose joints fit the point of `row` far better than its own, with their distance (m).
-    fn fits(
-        &self,
-        data: &Measurements,
-        standings: &[LeaveOneOut],
-        row: usize,
-        limit: f64,
-    ) -> Vec<(usize, f64)> {
-        let Some(point) = data.point(row) else {
-            return Vec::new();
-        };
-        let standing = &standings[row];
-        let typical = median_sigma(standings, row);
-        let reach = (limit * typical * 3f64.sqrt()).min(standing.residual.norm() / *BETTER);
-        let start = self.by_x.partition_point(|(x, _)| *x < point.x - reach);
-        let slab = self.by_x[start..]
-            .iter()
-            .take_while(|(x, _)| *x <= point.x + reach);
-        let mut found: Vec<(usize, f64)> = slab
-            .map(|(_, other)| (*other, (point - standings[*other].predicted).norm()))
-            .filter(|(other, distance)| *distance <= reach && !data.near_pose(row, *other))
-            .collect();
-        found.sort_by_key(|(other, _)| (other.abs_diff(row), *other));
-        found.truncate(*CANDIDATES);
-        found
-    }
+/// Rows of other poses whose joints fit the point of `row` far better than its own, with their distance (m).
+fn fits(
+    by_x: &[(f64, usize)],
+    data: &Measurements,
+    standings: &[LeaveOneOut],
+    row: usize,
+    limit: f64,
+) -> Vec<(usize, f64)> {
+    let Some(point) = data.point(row) else {
+        return Vec::new();
+    };
+    let standing = &standings[row];
+    let typical = median_sigma(standings, row);
+    let reach = (limit * typical * 3f64.sqrt()).min(standing.residual.norm() / *BETTER);
+    let start = by_x.partition_point(|(x, _)| *x < point.x - reach);
+    let slab = by_x[start..]
+        .iter()
+        .take_while(|(x, _)| *x <= point.x + reach);
+    let mut found: Vec<(usize, f64)> = slab
+        .map(|(_, other)| (*other, (point - standings[*other].predicted).norm()))
+        .filter(|(other, distance)| *distance <= reach && !data.near_pose(row, *other))
+        .collect();
+    found.sort_by_key(|(other, _)| (other.abs_diff(row), *other));
+    found.truncate(*CANDIDATES);
+    found
 }
 
 /// The row's own standard deviation (m); its neighbour's where a wrong point makes it absurd.

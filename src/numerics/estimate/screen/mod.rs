@@ -382,22 +382,15 @@ fn crowded(data: &Measurements, named: &[ClassedRow], set: &[usize]) -> BTreeSet
     let sets: BTreeSet<usize> = set.iter().copied().collect();
     sets.into_iter()
         .filter(|number| {
-            let stops = |rows: &[usize]| kind::stops(data, rows) as f64;
-            let all = stops(
-                &(0..set.len())
-                    .filter(|row| set[*row] == *number)
-                    .collect::<Vec<_>>(),
-            );
-            let outlier = |(row, kind, _): &&ClassedRow| {
-                set[*row] == *number && *kind == SuspectKind::Outlier
+            let stops = |rows: &mut dyn Iterator<Item = usize>| {
+                let rows: Vec<usize> = rows.filter(|row| set[*row] == *number).collect();
+                kind::stops(data, &rows) as f64
             };
-            let unexplained = stops(
-                &named
-                    .iter()
-                    .filter(outlier)
-                    .map(|(row, ..)| *row)
-                    .collect::<Vec<_>>(),
-            );
+            let all = stops(&mut (0..set.len()));
+            let outliers = named
+                .iter()
+                .filter(|(_, kind, _)| *kind == SuspectKind::Outlier);
+            let unexplained = stops(&mut outliers.map(|(row, ..)| *row));
             unexplained > *CROWD * all + 2.0 * (*CROWD * (1.0 - *CROWD) * all).sqrt()
         })
         .collect()

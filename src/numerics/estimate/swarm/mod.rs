@@ -39,41 +39,43 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Objective for F {
 }
 
 /// A box: every coordinate stays within `lower..=upper`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchBox {
-    lower: Vec<f64>,
-    upper: Vec<f64>,
+    dimensions: usize,
+    lower: f64,
+    upper: f64,
 }
 
 impl SearchBox {
-    /// The box between two corners. Panics where they differ in length, are not finite or are in the wrong order.
-    pub(crate) fn new(lower: Vec<f64>, upper: Vec<f64>) -> Self {
-        assert_eq!(lower.len(), upper.len(), "corners of one box");
+    /// The cube `lower..=upper` in `dimensions` dimensions. Panics where the ends are not finite or in the wrong order.
+    pub fn cube(dimensions: usize, lower: f64, upper: f64) -> Self {
+        let ends = [lower, upper];
         assert!(
-            lower
-                .iter()
-                .zip(&upper)
-                .all(|(l, u)| l.is_finite() && u.is_finite() && l <= u),
+            ends.iter().all(|end| end.is_finite()) && lower <= upper,
             "lower <= upper"
         );
-        Self { lower, upper }
+        Self {
+            dimensions,
+            lower,
+            upper,
+        }
     }
-    /// The cube `lower..=upper` in `dimensions` dimensions.
-    pub fn cube(dimensions: usize, lower: f64, upper: f64) -> Self {
-        Self::new(vec![lower; dimensions], vec![upper; dimensions])
-    }
-    /// How many numbers are searched.
-    pub(crate) fn dimensions(&self) -> usize {
-        self.lower.len()
-    }
-    fn width(&self, s: usize) -> f64 {
-        self.upper[s] - self.lower[s]
+    fn width(&self) -> f64 {
+        self.upper - self.lower
     }
     fn clamp(&self, x: &mut [f64]) {
-        for ((value, lower), upper) in x.iter_mut().zip(&self.lower).zip(&self.upper) {
+        for value in x {
             // Not `clamp`: that the bounds are in order is known, and it checks for every number.
-            let above = if *value < *lower { *lower } else { *value };
-            *value = if above > *upper { *upper } else { above };
+            let above = if *value < self.lower {
+                self.lower
+            } else {
+                *value
+            };
+            *value = if above > self.upper {
+                self.upper
+            } else {
+                above
+            };
         }
     }
     /// A point moved along a direction, within the box.
@@ -84,8 +86,8 @@ impl SearchBox {
     }
     /// A point anywhere in the box.
     pub(super) fn random(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
-        (0..self.dimensions())
-            .map(|s| self.lower[s] + self.width(s) * rng.random::<f64>())
+        (0..self.dimensions)
+            .map(|_| self.lower + self.width() * rng.random::<f64>())
             .collect()
     }
 }

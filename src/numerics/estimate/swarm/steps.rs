@@ -68,9 +68,9 @@ impl Swarm {
     pub(super) fn start<O: Objective>(size: usize, flies: bool, search: &mut Search<O>) -> Self {
         let bounds = search.bounds;
         let positions: Vec<Vec<f64>> = (0..size).map(|_| bounds.random(&mut search.rng)).collect();
-        let mut speed = |s: usize| FASTEST * bounds.width(s) * search.rng.random_range(-1.0..1.0);
+        let mut speed = |_| FASTEST * bounds.width() * search.rng.random_range(-1.0..1.0);
         let velocities = (0..if flies { size } else { 0 })
-            .map(|_| (0..bounds.dimensions()).map(&mut speed).collect())
+            .map(|_| (0..bounds.dimensions).map(&mut speed).collect())
             .collect();
         let values = search.visit(&positions);
         Self {
@@ -125,7 +125,7 @@ impl Swarm {
                 let pulls = [best[s], search.best.1[s]];
                 let [individual, group] =
                     [0, 1].map(|k| PULL[k] * search.rng.random::<f64>() * (pulls[k] - position[s]));
-                let limit = FASTEST * search.bounds.width(s);
+                let limit = FASTEST * search.bounds.width();
                 *v = (inertia * *v + individual + group).clamp(-limit, limit);
             }
         }
@@ -199,7 +199,7 @@ impl Swarm {
             })
             .collect();
         self.fly(&onlookers, search);
-        let limit = LIMIT * (count * search.bounds.dimensions()) as f64;
+        let limit = LIMIT * (count * search.bounds.dimensions) as f64;
         let tired = (0..count)
             .max_by_key(|i| (self.trials[*i], count - i))
             .unwrap_or(0);
@@ -242,7 +242,7 @@ impl Swarm {
 /// Eq. 31: components in -1..1, scaled to length one.
 fn unit_vector<O: Objective>(search: &mut Search<O>) -> Vec<f64> {
     loop {
-        let b: Vec<f64> = (0..search.bounds.dimensions())
+        let b: Vec<f64> = (0..search.bounds.dimensions)
             .map(|_| search.rng.random_range(-1.0..1.0))
             .collect();
         let length = b.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -288,7 +288,7 @@ fn cross([a, b]: &mut [Vec<f64>; 2], rng: &mut ChaCha8Rng) {
 
 fn mutate<O: Objective>(child: &mut [f64], search: &mut Search<O>) {
     let rate = MUTATIONS / child.len() as f64;
-    for (s, x) in child.iter_mut().enumerate() {
+    for x in child.iter_mut() {
         if search.rng.random::<f64>() >= rate {
             continue;
         }
@@ -299,7 +299,7 @@ fn mutate<O: Objective>(child: &mut [f64], search: &mut Search<O>) {
         } else {
             1.0 - (2.0 * (1.0 - u)).powf(power)
         };
-        *x += shift * search.bounds.width(s);
+        *x += shift * search.bounds.width();
     }
 }
 
