@@ -1,6 +1,6 @@
 //! The model between rounds, and how it is fitted anew with other causes.
 
-use super::noise::{JointSpread, RepeatPairs, by_residual};
+use super::noise::{JointSpread, PredictedRows, RepeatPairs};
 use super::stretches::{CorrelationChange, PathCorrelation, follow_a_path, lasts};
 use crate::criteria::noise::{ESTIMATES, REPEATS, SETTLED};
 use crate::diagnose::types::{JointRepeatability, Question};
@@ -125,17 +125,15 @@ impl<'a> Fitter<'a> {
         let kept = &now.screening.kept;
         let lasts = lasts(&now.model, &fitter.data, kept);
         let pairs = RepeatPairs::of(&fitter.data, kept);
-        let shown = pairs.noise(&now.model, &fitter.data, &fitter.spread, lasts);
+        let shown = pairs.noise(fitter.rows_by(&now.model), lasts);
         fitter.repeatability = shown.joints;
         fitter.scaled = shown.scale != 1.0;
         if fitter.scaled {
             let sigmas = fitter.data.points.sigma.iter_mut();
             sigmas.for_each(|sigma| *sigma *= shown.scale);
             let returns = RepeatPairs::returns(&fitter.data, kept);
-            let by_returns = returns.map_or(0.0, |pairs| {
-                let spread = &fitter.spread;
-                pairs.repeatability(&now.model, &fitter.data, spread).sigma
-            });
+            let rows = fitter.rows_by(&now.model);
+            let by_returns = returns.map_or(0.0, |pairs| pairs.repeatability(rows).sigma);
             fitter.repeatability.sigma = fitter.repeatability.sigma.max(by_returns);
         }
         fitter.repeated = fitter.repeatability.sigma;
@@ -146,6 +144,15 @@ impl<'a> Fitter<'a> {
             now = fitter.fit(&base, Vec::new());
         }
         (fitter, now)
+    }
+
+    /// The rows as a model has them.
+    fn rows_by<'b>(&'b self, model: &'b Model) -> PredictedRows<'b> {
+        PredictedRows {
+            model,
+            data: &self.data,
+            spread: &self.spread,
+        }
     }
 
     /// Repeats that say how well the joints repeat; none where they are too few, or the arm stood between them.
@@ -201,19 +208,15 @@ impl<'a> Fitter<'a> {
     /// How well the joints repeat (rad) by what is left of a residual without structure, if that is news: it is asked once, and where
     /// repeats are too few to tell. Where the arm was elsewhere between repeats, by what the model leaves between those.
     pub(crate) fn noise_left_by(&self, settled: &FitState) -> Option<f64> {
-        let FitState {
-            model,
-            fitted,
-            screening,
-            ..
-        } = settled;
-        let pairs = self.repeats(&screening.kept);
+        let kept = &settled.screening.kept;
+        let pairs = self.repeats(kept);
         if self.asked || pairs.as_ref().is_some_and(|pairs| !pairs.are_returns) {
             return None;
         }
+        let rows = self.rows_by(&settled.model);
         let other = match pairs {
-            Some(pairs) => pairs.repeatability(model, &self.data, &self.spread).sigma,
-            None => by_residual(model, fitted, &screening.kept, &self.data, &self.spread),
+            Some(pairs) => pairs.repeatability(rows).sigma,
+            None => rows.repeatability(&settled.fitted, kept),
         };
         let now = self.repeatability.sigma;
         ((other - now).abs() > *SETTLED * other.max(now)).then_some(other)

@@ -73,21 +73,30 @@ impl JointSpread {
         };
         data.reading_spread = turns.map(spread).collect();
     }
+}
 
+/// Rows as a model has them, with what deviations of the joints make of each.
+#[derive(Clone, Copy)]
+pub(super) struct PredictedRows<'a> {
+    pub(super) model: &'a Model,
+    pub(super) data: &'a Measurements,
+    pub(super) spread: &'a JointSpread,
+}
+
+impl PredictedRows<'_> {
     /// What is left of rows beside points, of which kind each.
-    fn beside_points(
-        &self,
-        model: &Model,
-        data: &Measurements,
-        rows: &[usize],
-    ) -> Vec<(&'static str, Sample)> {
-        let mut scratch = model.stack.scratch(&model.robot);
+    fn beside_points(self, rows: &[usize]) -> Vec<(&'static str, Sample)> {
+        let Self {
+            model,
+            data,
+            spread,
+        } = self;
+        let (stack, robot) = (&model.stack, &model.robot);
+        let mut scratch = stack.scratch(robot);
         let mut left = Vec::new();
         for row in rows {
-            let placed = model
-                .stack
-                .place(&model.robot, data, *row, &model.x, &mut scratch);
-            for (kind, spread) in &self.others {
+            let placed = stack.place(robot, data, *row, &model.x, &mut scratch);
+            for (kind, spread) in &spread.others {
                 let seen = Residual::of(*kind, data, *row, &placed).zip(kind.reading(data, *row));
                 left.extend(seen.map(|(residual, reading)| {
                     // 1 on lines that hold nothing.
@@ -106,6 +115,34 @@ impl JointSpread {
             }
         }
         left
+    }
+
+    /// Covariance of the instrument in a row's point.
+    fn fixed(self, row: usize) -> Matrix3<f64> {
+        Matrix3::from_diagonal(&self.data.points.sigma[row].map(|s| s * s))
+    }
+
+    /// The joints' repeatability (rad) by what a fit leaves of `rows` that holds no structure any more.
+    pub(super) fn repeatability(self, fitted: &Fitted, rows: &[usize]) -> f64 {
+        let data = self.data;
+        let predicted = self.model.predict(data);
+        let numbers: usize = rows.iter().map(|row| values(data, *row)).sum();
+        let freedom = numbers.saturating_sub(fitted.singular.len()).max(1);
+        let freedom = (numbers as f64 / freedom as f64).sqrt();
+        let point = |row: &usize| {
+            Some(Sample {
+                error: (data.point(*row)? - predicted[*row]) * freedom,
+                fixed: self.fixed(*row),
+                varying: self.spread.points[*row],
+            })
+        };
+        let mut samples: Vec<_> = rows.iter().filter_map(point).collect();
+        let others = self.beside_points(rows).into_iter();
+        samples.extend(others.map(|(_, left)| Sample {
+            error: left.error * freedom,
+            ..left
+        }));
+        likeliest(&samples, 6.0)
     }
 }
 
@@ -177,16 +214,10 @@ impl RepeatPairs {
     /// What the pairs show of the instrument's noise, with the joints' repeatability at that: where they follow each other at once, are enough,
     /// and are clear evidence of another noise than the stated one. Where noise `lasts` from pose to pose, shots of a standing arm agree better than
     /// it is small.
-    pub(crate) fn noise(
-        &self,
-        model: &Model,
-        data: &Measurements,
-        spread: &JointSpread,
-        lasts: bool,
-    ) -> RepeatedNoise {
-        let joints = self.repeatability(model, data, spread);
+    pub(crate) fn noise(&self, rows: PredictedRows, lasts: bool) -> RepeatedNoise {
+        let joints = self.repeatability(rows);
         let stated = RepeatedNoise { scale: 1.0, joints };
-        let samples = self.point_samples(model, data, spread);
+        let samples = self.point_samples(rows);
         let Some(shown) =
             scale_of(&samples).filter(|_| !self.are_returns && samples.len() >= *REPEATS)
         else {
@@ -227,52 +258,41 @@ impl RepeatPairs {
         }
     }
 
-    /// What points differ by beyond the motion that `model` knows between them.
-    fn point_samples(
-        &self,
-        model: &Model,
-        data: &Measurements,
-        spread: &JointSpread,
-    ) -> Vec<Sample> {
-        let predicted = model.predict(data);
+    /// What points differ by beyond the motion that the model knows between them.
+    fn point_samples(&self, rows: PredictedRows) -> Vec<Sample> {
+        let data = rows.data;
+        let predicted = rows.model.predict(data);
         let one = |[a, b]: &[usize; 2]| {
-            let variance =
-                |row: usize| Matrix3::from_diagonal(&data.points.sigma[row].map(|s| s * s));
-            let known = if self.are_returns || !data.same_pose(*a, *b) {
-                predicted[*b] - predicted[*a]
-            } else {
-                Vector3::zeros()
+            let known = match self.are_returns || !data.same_pose(*a, *b) {
+                true => predicted[*b] - predicted[*a],
+                false => Vector3::zeros(),
             };
             Some(Sample {
                 error: data.point(*b)? - data.point(*a)? - known,
-                fixed: variance(*a) + variance(*b),
-                varying: spread.points[*b] * 2.0,
+                fixed: rows.fixed(*a) + rows.fixed(*b),
+                varying: rows.spread.points[*b] * 2.0,
             })
         };
         self.pairs.iter().filter_map(one).collect()
     }
 
-    /// The joints' repeatability by what the pairs differ beyond the motion that `model` knows between them.
-    pub(crate) fn repeatability(
-        &self,
-        model: &Model,
-        data: &Measurements,
-        spread: &JointSpread,
-    ) -> JointRepeatability {
+    /// The joints' repeatability by what the pairs differ beyond the motion that the model knows between them.
+    pub(crate) fn repeatability(&self, rows: PredictedRows) -> JointRepeatability {
         let repeats = self.pairs.len();
         let sigma = match repeats < *FEW {
             true => 0.0,
-            false => likeliest(&self.samples(model, data, spread), 2.0),
+            false => likeliest(&self.samples(rows), 2.0),
         };
         JointRepeatability { sigma, repeats }
     }
 
     /// What everything that the pairs measured differs by.
-    fn samples(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> Vec<Sample> {
-        let mut samples = self.point_samples(model, data, spread);
+    fn samples(&self, rows: PredictedRows) -> Vec<Sample> {
+        let data = rows.data;
+        let mut samples = self.point_samples(rows);
         let same_anchor = |[a, b]: &&[usize; 2]| data.anchor(*a) == data.anchor(*b);
         for [a, b] in self.pairs.iter().filter(same_anchor) {
-            let [from, to] = [a, b].map(|row| spread.beside_points(model, data, &[*row]));
+            let [from, to] = [a, b].map(|row| rows.beside_points(&[*row]));
             let both = to.iter().filter_map(|(kind, to)| {
                 let (_, from) = from.iter().find(|from| from.0 == *kind)?;
                 Some((from, to))
@@ -306,36 +326,6 @@ fn without_points(data: &Measurements, poses: &Poses) -> Vec<Vec<usize>> {
     }
     out.retain(|rows| rows.len() > 1);
     out
-}
-
-/// The joints' repeatability (rad) by what a fit leaves of `rows` that holds no structure any more.
-pub(super) fn by_residual(
-    model: &Model,
-    fitted: &Fitted,
-    rows: &[usize],
-    data: &Measurements,
-    spread: &JointSpread,
-) -> f64 {
-    let predicted = model.predict(data);
-    let numbers: usize = rows.iter().map(|row| values(data, *row)).sum();
-    let freedom =
-        (numbers as f64 / numbers.saturating_sub(fitted.singular.len()).max(1) as f64).sqrt();
-    let one = |row: &usize| {
-        let residual = data.point(*row)? - predicted[*row];
-        let fixed = Matrix3::from_diagonal(&data.points.sigma[*row].map(|s| s * s));
-        Some(Sample {
-            error: residual * freedom,
-            fixed,
-            varying: spread.points[*row],
-        })
-    };
-    let mut samples: Vec<_> = rows.iter().filter_map(one).collect();
-    let others = spread.beside_points(model, data, rows).into_iter();
-    samples.extend(others.map(|(_, left)| Sample {
-        error: left.error * freedom,
-        ..left
-    }));
-    likeliest(&samples, 6.0)
 }
 
 /// Returns after the shortest times, half of them.

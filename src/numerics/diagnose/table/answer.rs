@@ -160,8 +160,8 @@ impl CauseTable<'_, '_> {
         let (effect, place) = (self.name_of(component), self.cells[cell].place);
         let (probabilities, rivals) = self.weigh((effect, place), component, &scan);
         let bounds = members.iter().flat_map(|i| {
-            let Component { forms, group, .. } = &components[*i];
-            std::iter::repeat_n((group.positive, group.largest), forms.len())
+            let one = &components[*i];
+            std::iter::repeat_n((one.positive, one.largest), one.forms.len())
         });
         let gain = (state.rows.square - with.rows.square).max(0.0);
         let found = FoundCell {
@@ -254,14 +254,6 @@ impl CauseTable<'_, '_> {
                 let shares = &seen.group.shapes[shape].shares;
                 let parameters = shares.iter().filter(|share| **share > 0.0).count();
                 let delta_bic = 2.0 * (found.log + cell.log_prior);
-                let entry = |by, name: String| ExplainedShare {
-                    by,
-                    name,
-                    share,
-                    parameters,
-                    delta_bic,
-                    effect: cell.name,
-                };
                 let form = &seen.group.forms[0];
                 let follows = form.follows(cell.place);
                 let explains = self.frame.size(found.fit) * state.kappa;
@@ -272,9 +264,7 @@ impl CauseTable<'_, '_> {
                     delta_bic,
                     effect: cell.name,
                 };
-                let at = cells
-                    .entry((cell.place, follows))
-                    .or_insert_with(|| new.clone());
+                let at = cells.entry((cell.place, follows)).or_insert(new.clone());
                 if new.delta_bic > at.delta_bic {
                     *at = new;
                 }
@@ -285,8 +275,15 @@ impl CauseTable<'_, '_> {
                     names.push(("variable", variables.join(" and ")));
                 }
                 for (by, name) in names {
-                    let new = entry(by, name.clone());
-                    let at = best.entry((by, name)).or_insert_with(|| new.clone());
+                    let new = ExplainedShare {
+                        by,
+                        name: name.clone(),
+                        share,
+                        parameters,
+                        delta_bic,
+                        effect: cell.name,
+                    };
+                    let at = best.entry((by, name)).or_insert(new.clone());
                     if new.delta_bic > at.delta_bic {
                         *at = new;
                     }

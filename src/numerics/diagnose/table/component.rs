@@ -113,7 +113,12 @@ impl CellColumns {
     pub(crate) fn of_component(component: &Component, frame: &SearchRows) -> Self {
         let (gram, gradient) = frame.products(view(&component.values));
         let group = SeenGroup {
-            group: (*component.group).clone(),
+            group: ShapeGroup {
+                forms: component.forms.clone(),
+                shapes: vec![component.shape.clone()],
+                positive: component.positive,
+                largest: component.largest,
+            },
             range: 0..component.values.ncols(),
             counts: component.counts.clone(),
             gram,
@@ -186,8 +191,9 @@ pub(super) struct Component {
     pub(crate) forms: Vec<Form>,
     pub(crate) counts: Vec<usize>,
     pub(crate) shape: CellShape,
-    /// Whether, and up to which size, its coefficients are positive.
-    pub(crate) group: Arc<ShapeGroup>,
+    /// Whether its coefficients are positive, and the largest that makes sense, SI.
+    pub(crate) positive: bool,
+    pub(crate) largest: f64,
     pub(crate) values: Arc<DMatrix<f64>>,
     pub(crate) square: Arc<Vec<f64>>,
     /// Rms motion at the tool, m.

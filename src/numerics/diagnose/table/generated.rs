@@ -43,9 +43,6 @@ const fn curve((count, first, lengths): (usize, usize, usize)) -> Over {
     }
 }
 
-/// Variables of one kind, which share its prior odds.
-type Kind = Vec<(Variable, Over)>;
-
 /// All cells of one variable.
 pub(super) fn cells(
     survey: &Survey,
@@ -62,17 +59,18 @@ pub(super) fn cells(
         let mut groups: Vec<Vec<FreeShape>> = Vec::new();
         for motions in families(place, survey) {
             let kinds = kinds(motions[0], survey);
-            let variables: Vec<Variable> = kinds.iter().flatten().map(|(one, _)| *one).collect();
+            let variables: Vec<Variable> = kinds.iter().flatten().map(|one| one.variable).collect();
             frame.prepare(&[], &variables);
             for mut kind in kinds {
-                kind.retain(|(variable, _)| varies(*variable, frame));
-                let all = kind.into_iter().flat_map(|(variable, over)| {
-                    motions.iter().map(move |motion| FreeShape {
+                kind.retain(|free| varies(free.variable, frame));
+                let moved = |free: FreeShape| {
+                    let motions = motions.iter();
+                    motions.map(move |motion| FreeShape {
                         motion: *motion,
-                        variable,
-                        over,
+                        ..free
                     })
-                });
+                };
+                let all = kind.into_iter().flat_map(moved);
                 groups.push(all.filter(|free| !is_listed(free, survey)).collect());
             }
         }
@@ -108,10 +106,8 @@ pub(super) fn products(
     let mut out: Vec<CauseCell> = Vec::new();
     for free in shown {
         let kinds = kinds(free.motion, survey).into_iter().flatten();
-        let others: Vec<Variable> = kinds
-            .map(|(other, _)| other)
-            .filter(|other| *other != free.variable)
-            .collect();
+        let others = kinds.map(|other| other.variable);
+        let others: Vec<Variable> = others.filter(|other| *other != free.variable).collect();
         frame.prepare(&[], &others);
         for other in others {
             let product = FreeShape {
@@ -138,7 +134,7 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
             let mut variables: Vec<Variable> = Vec::new();
             let mut kinds = kinds(motion, survey);
             kinds.retain(|kind| kind.len() <= survey.joints());
-            for (variable, _) in kinds.into_iter().flatten() {
+            for FreeShape { variable, .. } in kinds.into_iter().flatten() {
                 if varies(variable, frame)
                     && !variables.iter().any(|known| is_square(*known, variable))
                 {
@@ -295,8 +291,8 @@ pub(super) fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
     }
 }
 
-/// What a motion may follow, by kind.
-fn kinds(motion: Motion, survey: &Survey) -> Vec<Kind> {
+/// A motion over what it may follow, by kind of variable: those of a kind share its prior odds.
+fn kinds(motion: Motion, survey: &Survey) -> Vec<Vec<FreeShape>> {
     let place = motion.place();
     let reading = match motion {
         Motion::Instrument { reading } => Some(reading),
@@ -312,23 +308,26 @@ fn kinds(motion: Motion, survey: &Survey) -> Vec<Kind> {
     let others: Vec<usize> = (0..survey.joints())
         .filter(|joint| Some(*joint) != seat)
         .collect();
-    let each = |joints: &[usize], over: Over, variable: &dyn Fn(usize) -> Variable| -> Kind {
-        joints
-            .iter()
-            .map(|joint| (variable(*joint), over))
-            .collect()
+    let free = |variable: Variable, over: Over| FreeShape {
+        motion,
+        variable,
+        over,
+    };
+    let each = |joints: &[usize], over: Over, variable: &dyn Fn(usize) -> Variable| {
+        let joints = joints.iter();
+        joints.map(|joint| free(variable(*joint), over)).collect()
     };
     let arrows = ARROWS.map(|arrow| Vector3::from(arrow).map(f64::from).normalize().into());
-    let mut out: Vec<Kind> = Vec::new();
+    let mut out: Vec<Vec<FreeShape>> = Vec::new();
     // What counts fractions of a wave errs by them.
     let over_range = match reading {
         Some(Polar::Range) => WAVY,
         _ => CURVE,
     };
     if reading.is_some() {
-        out.push(vec![(Variable::Azimuth, CURVE)]);
-        out.push(vec![(Variable::Elevation, CURVE)]);
-        out.push(vec![(Variable::Range, over_range)]);
+        out.push(vec![free(Variable::Azimuth, CURVE)]);
+        out.push(vec![free(Variable::Elevation, CURVE)]);
+        out.push(vec![free(Variable::Range, over_range)]);
     }
     let turns = matches!(motion, Motion::Joint { .. });
     let angle = |joint| Variable::Angle { joint };
@@ -341,7 +340,7 @@ fn kinds(motion: Motion, survey: &Survey) -> Vec<Kind> {
     out.push(each(&here, CURVE, &last_move));
     out.push(each(&others, SLOW, &last_move));
     if reading.is_some() {
-        let sighted = |along| (Variable::Sighted { along }, SLOW);
+        let sighted = |along| free(Variable::Sighted { along }, SLOW);
         out.push(arrows.map(sighted).to_vec());
     } else {
         for (joints, over) in [(&here, CURVE), (&others, SLOW)] {
@@ -349,20 +348,20 @@ fn kinds(motion: Motion, survey: &Survey) -> Vec<Kind> {
             loaded.retain(|joint| survey.is_loaded(*joint));
             out.push(each(&loaded, over, &|joint| Variable::Load { joint }));
         }
-        let position = |along| (Variable::Position { along }, SLOW);
+        let position = |along| free(Variable::Position { along }, SLOW);
         out.push(arrows.map(position).to_vec());
     }
     let stretch = |joint: usize, share: f64| Variable::Stretch {
         joint,
         limit: share * survey.travel(joint),
     };
-    let at_limits = |joint: &usize| LIMITS.map(|share| (stretch(*joint, share), SLOW));
+    let at_limits = |joint: &usize| LIMITS.map(|share| free(stretch(*joint, share), SLOW));
     out.push(here.iter().flat_map(at_limits).collect());
     out.push(each(&others, SLOW, &|joint| stretch(joint, LIMITS[1])));
     if survey.data.has_clock() {
         let fading = |joint: &usize| {
             let joint = *joint;
-            FADING.map(|time| (Variable::Recent { joint, time }, SLOW))
+            FADING.map(|time| free(Variable::Recent { joint, time }, SLOW))
         };
         out.push(here.iter().flat_map(fading).collect());
         let time = FADING[1];
@@ -372,13 +371,13 @@ fn kinds(motion: Motion, survey: &Survey) -> Vec<Kind> {
         }));
     }
     if place == Place::Tool {
-        let gravity = |axis| (Variable::Gravity { axis: Some(axis) }, SLOW);
+        let gravity = |axis| free(Variable::Gravity { axis: Some(axis) }, SLOW);
         out.push((0..3).map(gravity).collect());
     }
-    out.push(vec![(Variable::Time, CURVE)]);
-    out.push(vec![(Variable::Time, Over::Step)]);
-    out.push(vec![(Variable::Temperature, CURVE)]);
-    out.push(vec![(Variable::Payload, Over::Line)]);
+    out.push(vec![free(Variable::Time, CURVE)]);
+    out.push(vec![free(Variable::Time, Over::Step)]);
+    out.push(vec![free(Variable::Temperature, CURVE)]);
+    out.push(vec![free(Variable::Payload, Over::Line)]);
     out.retain(|kind| !kind.is_empty());
     out
 }
@@ -387,14 +386,7 @@ fn kinds(motion: Motion, survey: &Survey) -> Vec<Kind> {
 pub(super) fn cells_at(place: Place, survey: &Survey) -> Vec<CauseCell> {
     let motions = families(place, survey).into_iter().flatten();
     let motions = motions.filter(|motion| motion.place() == place);
-    let all = motions.flat_map(|motion| {
-        let kinds = kinds(motion, survey).into_iter().flatten();
-        kinds.map(move |(variable, over)| FreeShape {
-            motion,
-            variable,
-            over,
-        })
-    });
+    let all = motions.flat_map(|motion| kinds(motion, survey).into_iter().flatten());
     all.filter(|free| !is_listed(free, survey))
         .map(|free| cell(free, 0.0, survey))
         .collect()

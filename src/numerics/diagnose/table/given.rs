@@ -142,8 +142,7 @@ impl CauseTable<'_, '_> {
                     amplitude: one.size,
                     ..self.as_found(cell, &found)
                 };
-                self.next += 1;
-                let component = component.with_part(self.next);
+                let component = self.with_part(component);
                 match out.iter_mut().find(|(other, _)| *other == i) {
                     Some((_, before)) => *before = component,
                     None => out.push((i, component)),

@@ -1,12 +1,12 @@
 //! What each cell says given the components of a model.
 
 use super::cause_table::CauseTable;
-use super::cell::{CellShape, FreeShape, ShapeGroup};
+use super::cell::{CellShape, FreeShape};
 use super::component::{CellColumns, Component, shape_keys};
 use super::evidence::{GroupEvidence, log_sum};
 use super::state::KnownState;
 use crate::criteria::cells::{BENDS, FAR_BELOW, JOINS, PAIR, PAIRS, SEPARATED, UNLIKELY};
-use crate::effect::{Form, Variable};
+use crate::effect::Form;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -301,29 +301,23 @@ impl CauseTable<'_, '_> {
 
     /// The component that a cell is in a scan.
     pub(crate) fn component(&mut self, cell: usize, found: &CellEvidence) -> Component {
-        let found_component = self.as_found(cell, found);
+        let mut component = self.as_found(cell, found);
         let Some(refined) = found.refined.clone() else {
-            self.next += 1;
-            return found_component.with_part(self.next);
+            return self.with_part(component);
         };
-        let (forms, amplitude) = (refined.forms, refined.amplitude);
-        let new = |variable: &Variable| !self.numbers.contains(variable);
-        let variables = forms.iter().flat_map(|form| form.variables()).filter(new);
-        self.numbers.extend(variables.collect::<Vec<_>>());
-        let mut found_component = Component {
-            forms,
-            amplitude,
-            ..found_component
-        };
-        if let Some(shape) = refined.shape {
-            found_component.group = Arc::new(ShapeGroup {
-                forms: found_component.forms.clone(),
-                shapes: vec![shape.clone()],
-                ..(*found_component.group).clone()
-            });
-            found_component.shape = shape;
-        }
-        self.component_of(&found_component, cell)
+        let variables = refined.forms.iter().flat_map(|form| form.variables());
+        let new = variables.filter(|variable| !self.numbers.contains(variable));
+        self.numbers.extend(new.collect::<Vec<_>>());
+        component.amplitude = refined.amplitude;
+        component.forms = refined.forms;
+        component.shape = refined.shape.unwrap_or(component.shape);
+        self.component_of(&component, cell)
+    }
+
+    /// A component with its part in the covariance.
+    pub(crate) fn with_part(&mut self, component: Component) -> Component {
+        self.next += 1;
+        component.with_part(self.next)
     }
 
     /// The same with the numbers of its listed shape; it has no part in the covariance yet.
@@ -352,18 +346,14 @@ impl CauseTable<'_, '_> {
             shares: kept.iter().map(|k| shape.shares[*k]).collect(),
             ..shape
         };
-        let group = ShapeGroup {
-            forms: forms.clone(),
-            shapes: vec![shape.clone()],
-            ..seen.group.clone()
-        };
         Component {
             id: 0,
             cell,
             forms,
             counts,
             shape,
-            group: Arc::new(group),
+            positive: seen.group.positive,
+            largest: seen.group.largest,
             values: Arc::new(values),
             square: Arc::new(columns.iter().map(|k| block.square[*k]).collect()),
             amplitude: found.amplitude,
@@ -386,12 +376,11 @@ impl CauseTable<'_, '_> {
 
     /// A component of given forms, e.g. of the model before.
     pub(crate) fn component_of(&mut self, before: &Component, cell: usize) -> Component {
-        self.next += 1;
-        Component {
+        let forms = before.forms.clone();
+        self.with_part(Component {
             cell,
-            ..self.with_forms(before, before.forms.clone())
-        }
-        .with_part(self.next)
+            ..self.with_forms(before, forms)
+        })
     }
 
     /// ln of the evidence of one shape with its weight given a state, and its amplitude.

@@ -148,12 +148,12 @@ impl CauseTable<'_, '_> {
                     && found.shape.shares.len() == components[i].shape.shares.len();
                 if same {
                     components[i].shape = found.shape.clone();
-                    components[i].group = found.group.clone();
+                    components[i].positive = found.positive;
+                    components[i].largest = found.largest;
                     components[i].amplitude = found.amplitude;
                 }
                 if before != (components[i].amplitude, components[i].shape.shares.clone()) {
-                    self.next += 1;
-                    components[i] = components[i].clone().with_part(self.next);
+                    components[i] = self.with_part(components[i].clone());
                     changed = true;
                 }
                 if same {
