@@ -27,7 +27,7 @@ use std::collections::BTreeMap;
 #[serde(deny_unknown_fields)]
 pub struct Diagnose {
     /// Sets of the split to fit; all others are predicted in the end and choose nothing.
-    #[serde(default = "fit_set")]
+    #[serde(default = "crate::stage::fit_set")]
     pub(crate) on: Vec<String>,
     /// By what ln of the odds of rare causes against common ones is multiplied: 0.5 or 2 shows how much a diagnosis rests on them.
     #[serde(default = "as_believed")]
@@ -85,10 +85,6 @@ fn as_believed() -> f64 {
 
 fn open_world() -> f64 {
     0.3
-}
-
-fn fit_set() -> Vec<String> {
-    vec!["fit".into()]
 }
 
 /// No prior is worth more times its own weight.

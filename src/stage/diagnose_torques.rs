@@ -23,7 +23,7 @@ use std::collections::BTreeSet;
 #[serde(deny_unknown_fields)]
 pub struct DiagnoseTorques {
     /// Labels of the recording's `usage` to fit; all other rows judge.
-    #[serde(default = "fit")]
+    #[serde(default = "crate::stage::fit_set")]
     pub(crate) on: Vec<String>,
     /// Rows that are held out instead of those that `usage` labels otherwise; by default the last 30 %.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -76,10 +76,6 @@ pub enum ConsistencySetting {
     Report,
     /// The nearest numbers that bodies have are taken.
     Enforce,
-}
-
-fn fit() -> Vec<String> {
-    vec!["fit".into()]
 }
 
 /// Share of the rows that is held out where nothing is said.

@@ -62,7 +62,7 @@ macro_rules! identification {
             #[serde(default)]
             pub load: crate::stage::identified::LoadSetting,
             /// Whether rows that no smooth model can follow (exchanged, slipped, lost, shifted, gross) are set aside and listed.
-            #[serde(default = "crate::stage::identified::yes")]
+            #[serde(default = "crate::stage::yes")]
             pub screen: bool,
             /// How well joints come back to a pose: `measured` from poses that the recording returns to, `ignored`, or
             /// `{arcsec: 3}`.
@@ -109,10 +109,6 @@ macro_rules! identification {
     };
 }
 pub(crate) use identification;
-
-pub(crate) fn yes() -> bool {
-    true
-}
 
 crate::table::writes! {
     /// Output ports of `identify`, `stiffness` and `transfer`.

@@ -26,7 +26,7 @@ crate::stage::identified::identification! {
     /// Settings of `identify`.
     pub struct Identify {
         /// Sets of the split to fit.
-        #[serde(default = "fit_set")]
+        #[serde(default = "crate::stage::fit_set")]
         pub on: Vec<String>,
         /// Effects to estimate, by canonical name; those that the recording cannot support are left out with a note.
         #[serde(default = "all_effects")]
@@ -48,9 +48,6 @@ crate::stage::identified::identification! {
     }
 }
 
-fn fit_set() -> Vec<String> {
-    vec!["fit".into()]
-}
 fn all_effects() -> Vec<String> {
     identified().map(|cause| cause.name().to_string()).collect()
 }

@@ -201,6 +201,15 @@ pub trait Stage:
     fn run(&self, reads: Self::Reads, context: &Context) -> Result<Self::Writes>;
 }
 
+/// The sets that are fitted where nothing else is said.
+fn fit_set() -> Vec<String> {
+    vec!["fit".into()]
+}
+
+fn yes() -> bool {
+    true
+}
+
 /// A setting `on` names a set; `example` is one.
 fn must_name_sets(sets: &[String], example: &str, at: &mut Place) {
     let message = format!("expected at least one set, e.g. [{example}]");

@@ -20,13 +20,9 @@ crate::stage::identified::identification! {
     /// Settings of `transfer`.
     pub struct Transfer {
         /// Sets of the split by which the base is found.
-        #[serde(default = "fit_set")]
+        #[serde(default = "crate::stage::fit_set")]
         pub(crate) on: Vec<String>,
     }
-}
-
-fn fit_set() -> Vec<String> {
-    vec!["fit".into()]
 }
 
 crate::stage::stage! {

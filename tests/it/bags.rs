@@ -56,6 +56,27 @@ fn rows(bag: &[u8], topic: Option<&str>) -> Rows {
     rows_of(Box::new(Cursor::new(bag.to_vec())), topic).unwrap()
 }
 
+fn refused(bag: &[u8], topic: Option<&str>) -> String {
+    let bag = Box::new(Cursor::new(bag.to_vec()));
+    rows_of(bag, topic).unwrap_err().to_string()
+}
+
+fn column(names: &[String], name: &str) -> usize {
+    names.iter().position(|other| other == name).unwrap()
+}
+
+/// The state of an arm's joints of which all stand at `q`, by a clock in s.
+fn states_of(q: f64, seconds: i64) -> Vec<u8> {
+    let ns = START + seconds * SECOND;
+    joint_state(false, ns, &ARM, [&[q; 6], &[], &[]])
+}
+
+/// A point that was seen at a time, ns.
+fn seen(is_big: bool, received: i64, ns: i64, k: i64) -> Message {
+    let place = [1.0, 0.01 * k as f64, 0.5];
+    ("/reflector", POINT, received, point(is_big, ns, place))
+}
+
 fn wave(k: usize, joint: usize) -> f64 {
     0.3 * joint as f64 + (0.1 * k as f64 + joint as f64).sin()
 }
@@ -96,7 +117,7 @@ fn joints_come_by_their_names_from_every_kind_of_bag_and_both_orders_of_bytes() 
     {
         let (names, rows, loss) = rows(&bag, None);
         assert_eq!((rows.len(), loss), (300, None));
-        let column = |name: &str| names.iter().position(|other| other == name).unwrap();
+        let column = |name: &str| column(&names, name);
         for (k, row) in rows.iter().enumerate() {
             for (j, joint) in ARM.iter().enumerate() {
                 for (what, factor) in [("position", 1.0), ("velocity", 2.0), ("effort", 3.0)] {
@@ -134,19 +155,11 @@ fn transforms_are_read_by_their_frames() {
         .collect();
     for bag in every(&messages) {
         let (names, found, _) = rows(&bag, Some("/tf base->tool0"));
-        let x = names
-            .iter()
-            .position(|name| name == "translation.x")
-            .unwrap();
+        let x = column(&names, "translation.x");
         let read: Vec<&str> = found.iter().map(|row| row[x].as_str()).collect();
         assert_eq!(read, ["1.0", "2.0", "4.0", "5.0", "7.0", "8.0"]);
-        let answer = rows_of(Box::new(Cursor::new(bag)), None)
-            .unwrap_err()
-            .to_string();
-        has(
-            &answer,
-            "`topic: NAME`; allowed: `/tf base->tool0`, `/tf map->base`",
-        );
+        let allowed = "`topic: NAME`; allowed: `/tf base->tool0`, `/tf map->base`";
+        has(&refused(&bag, None), allowed);
     }
 }
 
@@ -160,29 +173,14 @@ fn a_topic_that_is_not_there_or_not_read_is_named_with_those_that_are() {
         vec![0, 1, 0, 0],
     ));
     for bag in every(&messages) {
-        let refused = |topic: &str| {
-            rows_of(Box::new(Cursor::new(bag.clone())), Some(topic))
-                .unwrap_err()
-                .to_string()
-        };
-        let answer = refused("/joint_state");
-        has(
-            &answer,
-            "no messages of a topic `/joint_state`; allowed: `/joint_states`; of other types: `/plan`",
-        );
-        let answer = refused("/plan");
-        has(
-            &answer,
-            "holds trajectory_msgs/msg/JointTrajectory, which is not read; allowed: sensor_msgs",
-        );
+        let absent = "no messages of a topic `/joint_state`; allowed: `/joint_states`; of other types: `/plan`";
+        has(&refused(&bag, Some("/joint_state")), absent);
+        let foreign =
+            "holds trajectory_msgs/msg/JointTrajectory, which is not read; allowed: sensor_msgs";
+        has(&refused(&bag, Some("/plan")), foreign);
     }
-    let answer = rows_of(Box::new(Cursor::new(db3(&messages[3..]))), None)
-        .unwrap_err()
-        .to_string();
-    has(
-        &answer,
-        "has no topic that is read; none of its topics is read",
-    );
+    let none = "has no topic that is read; none of its topics is read";
+    has(&refused(&db3(&messages[3..]), None), none);
 }
 
 #[test]
@@ -279,10 +277,7 @@ fn a_folder_of_parts_is_one_recording_in_the_order_of_their_numbers() {
             "rosbag2_bagfile_information: {}\n",
         );
         let (names, found, loss) = rows_of(source(folder.path()).unwrap(), None).unwrap();
-        let x = names
-            .iter()
-            .position(|name| name == "elbow_joint.position")
-            .unwrap();
+        let x = column(&names, "elbow_joint.position");
         let read: Vec<f64> = found.iter().map(|row| row[x].parse().unwrap()).collect();
         let expected: Vec<f64> = (0..120).map(|k| wave(k, 2)).collect();
         assert!(
@@ -340,9 +335,15 @@ const POSES: &str = "      files:
 
 #[test]
 fn each_message_that_is_not_used_has_its_reason() {
-    let joints = |k: i64, q: f64| joint_state(false, START + k * SECOND, &ARM, [&[q; 6], &[], &[]]);
     let mut messages: Vec<Message> = (0..20)
-        .map(|k| ("/joint_states", JOINTS, START, joints(k, 0.01 * k as f64)))
+        .map(|k| {
+            (
+                "/joint_states",
+                JOINTS,
+                START,
+                states_of(0.01 * k as f64, k),
+            )
+        })
         .collect();
     let more = [
         // Another publisher, a gripper.
@@ -352,8 +353,8 @@ fn each_message_that_is_not_used_has_its_reason() {
             &["finger_1", "finger_2"],
             [&[0.0, 0.0], &[], &[]],
         ),
-        joints(19, 0.2),
-        joints(30, f64::NAN),
+        states_of(0.2, 19),
+        states_of(f64::NAN, 30),
         joint_state(false, START + 31 * SECOND, &ARM, [&[], &[0.0; 6], &[]]),
         joint_state(false, START + 32 * SECOND, &ARM, [&[0.0; 5], &[], &[]]),
         joint_state(
@@ -362,20 +363,13 @@ fn each_message_that_is_not_used_has_its_reason() {
             &["elbow_joint", "elbow_joint"],
             [&[0.0; 2], &[], &[]],
         ),
-        joints(34, 0.0)[..60].to_vec(),
+        states_of(0.0, 34)[..60].to_vec(),
         vec![],
         // A publisher that does not know the time.
         joint_state(false, 0, &ARM, [&[0.3; 6], &[], &[]]),
     ];
     messages.extend(more.map(|data| ("/joint_states", JOINTS, START, data)));
-    messages.extend((0..20).map(|k| {
-        (
-            "/reflector",
-            POINT,
-            START,
-            point(true, START + k * SECOND, [1.0, 0.01 * k as f64, 0.5]),
-        )
-    }));
+    messages.extend((0..20).map(|k| seen(true, START, START + k * SECOND, k)));
     let folder = tempfile::tempdir().unwrap();
     put(
         folder.path(),
@@ -426,15 +420,7 @@ fn a_folder_of_parts_is_run_as_one_file_and_a_part_that_changed_is_read_again() 
                 std::array::from_fn::<f64, 6, _>(|j| wave(k as usize, j)),
             );
             let state = joint_state(false, ns, &ARM, [&q, &[], &[]]);
-            [
-                ("/joint_states", JOINTS, ns, state),
-                (
-                    "/reflector",
-                    POINT,
-                    ns,
-                    point(false, ns, [1.0, 0.01 * k as f64, 0.5]),
-                ),
-            ]
+            [("/joint_states", JOINTS, ns, state), seen(false, ns, ns, k)]
         })
         .collect();
     let folder = tempfile::tempdir().unwrap();
@@ -474,29 +460,14 @@ fn two_robots_in_one_topic_are_told_by_their_joints() {
     let of_arm = |arm: &str, k: i64, q: f64| {
         let names: Vec<String> = ARM.iter().map(|joint| format!("{arm}{joint}")).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        (
-            "/joint_states",
-            JOINTS,
-            START + k,
-            joint_state(
-                k % 2 == 0,
-                START + k * SECOND / 10,
-                &names,
-                [&[q; 6], &[], &[]],
-            ),
-        )
+        let ns = START + k * SECOND / 10;
+        let state = joint_state(k % 2 == 0, ns, &names, [&[q; 6], &[], &[]]);
+        ("/joint_states", JOINTS, START + k, state)
     };
     let mut messages: Vec<Message> = (0..30)
         .flat_map(|k| [of_arm("left_", k, 0.3), of_arm("", k, 0.01 * k as f64)])
         .collect();
-    messages.extend((0..30).map(|k| {
-        (
-            "/reflector",
-            POINT,
-            START,
-            point(false, START + k * SECOND / 10, [1.0, 0.01 * k as f64, 0.5]),
-        )
-    }));
+    messages.extend((0..30).map(|k| seen(false, START, START + k * SECOND / 10, k)));
     let folder = tempfile::tempdir().unwrap();
     put(folder.path(), "run.mcap", mcap(None, &messages));
     let (recording, rejected, intake, _) = run(folder.path(), POSES);
@@ -518,12 +489,8 @@ fn init_reads_a_bag_and_its_pipeline_runs() {
             START + k * SECOND / 2,
             std::array::from_fn::<f64, 6, _>(|j| wave(k as usize, j)),
         );
-        messages.push((
-            "/joint_states",
-            JOINTS,
-            ns,
-            joint_state(false, ns, &ARM, [&q, &[], &[]]),
-        ));
+        let state = joint_state(false, ns, &ARM, [&q, &[], &[]]);
+        messages.push(("/joint_states", JOINTS, ns, state));
         let seen = [0.8 + 0.01 * k as f64, 0.2 * (k as f64).sin(), 0.5];
         messages.push(("/reflector", POINT, ns, point(false, ns + 1_000_000, seen)));
     }
@@ -539,23 +506,17 @@ fn init_reads_a_bag_and_its_pipeline_runs() {
         let output = calib(&here, &format!("init --robot ur10 --data {name}"));
         let answer = output.out;
         assert!(output.code == Some(0), "{answer}");
-        has(
-            &answer,
-            "topic `/image`: sensor_msgs/msg/Image, 1 message; this type is not read",
-        );
-        has(
-            &answer,
-            "topic `/reflector`: geometry_msgs/msg/PointStamped, 60 messages, 2.0000 Hz, longest gap 0.5000 s",
-        );
+        let image = "topic `/image`: sensor_msgs/msg/Image, 1 message; this type is not read";
+        let reflector = "topic `/reflector`: geometry_msgs/msg/PointStamped, 60 messages, 2.0000 Hz, longest gap 0.5000 s";
+        has(&answer, [image, reflector]);
         let pipeline = std::fs::read_to_string(here.join("pipeline.yaml")).unwrap();
-        for line in [
+        let lines = [
             "topic: \"/joint_states\"",
             "topic: \"/reflector\"",
             "x: {column: \"point.x\", unit: m}",
             "join: {by: time, tolerance_s: 0.005}",
-        ] {
-            assert!(pipeline.contains(line), "{line} in\n{pipeline}");
-        }
+        ];
+        has(&pipeline, lines);
         calib(&here, "run pipeline.yaml --until ingest --store s").code(0);
         let recordings = glob::glob(
             here.join("s/tables/*/ingest.recording.parquet")
@@ -575,19 +536,14 @@ fn init_reads_a_bag_and_its_pipeline_runs() {
 fn a_doubled_stamp_is_one_of_the_same_joints() {
     // Two publishers with one clock: the hand's states are no doubles of the arm's.
     let hand = |k: i64| joint_state(false, START + k * SECOND, &["finger_1"], [&[0.0], &[], &[]]);
-    let arm = |k: i64| joint_state(false, START + k * SECOND, &ARM, [&[0.1; 6], &[], &[]]);
     let messages: Vec<Message> = (0..4)
-        .flat_map(|k| [hand(k), arm(k)])
+        .flat_map(|k| [hand(k), states_of(0.1, k)])
         .map(|data| ("/joint_states", JOINTS, START, data))
         .collect();
     let mut reader = BagRows::open(Box::new(Cursor::new(db3(&messages))), "run.bag", None).unwrap();
     let mut record = Record::default();
     reader.next(&mut record).unwrap();
-    let elbow = record
-        .cells()
-        .iter()
-        .position(|name| name == "elbow_joint.position")
-        .unwrap();
+    let elbow = column(&record.cells(), "elbow_joint.position");
     reader.only(&[(elbow, true)]);
     let mut faults = Vec::new();
     while reader.next(&mut record).unwrap() {

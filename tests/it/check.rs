@@ -1,6 +1,7 @@
 //! `check` reads what it reports on: the robot file, the headers of the data files, and the marks that `init` left.
 
 use crate::answer::{calib, has, put};
+use tempfile::TempDir;
 
 const ROBOT: &str = "calib_robot: 1
 name: arm
@@ -33,22 +34,22 @@ stages:
       join: {by: id}
 ";
 
+/// A folder with these files.
+fn folder(robot: &str, pipeline: &str, arm: &str, points: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    put(folder.path(), "robot.yaml", robot);
+    put(folder.path(), "pipeline.yaml", pipeline);
+    put(folder.path(), "arm.csv", arm);
+    put(folder.path(), "points.csv", points);
+    folder
+}
+
 /// Exit code, stdout and stderr of `check` with these files.
 fn checked(robot: &str, pipeline: &str, arm: &str, points: &str) -> (i32, String, String) {
-    let folder = tempfile::tempdir().unwrap();
-    for (name, text) in [
-        ("robot.yaml", robot),
-        ("pipeline.yaml", pipeline),
-        ("arm.csv", arm),
-        ("points.csv", points),
-    ] {
-        put(folder.path(), name, text);
-    }
+    let folder = folder(robot, pipeline, arm, points);
     let output = calib(folder.path(), "check pipeline.yaml");
-    assert!(
-        !folder.path().join(".calib").exists(),
-        "check writes nothing"
-    );
+    let is_clean = !folder.path().join(".calib").exists();
+    assert!(is_clean, "check writes nothing");
     (output.code.unwrap(), output.out, output.err)
 }
 
@@ -58,23 +59,9 @@ const POINTS: &str = "id,x,y,z\nA,1,2,3\n";
 #[test]
 fn a_sound_pipeline_is_ready_and_shows_its_graph_on_demand() {
     let (code, out, err) = checked(ROBOT, PIPELINE, ARM, POINTS);
-    assert_eq!(
-        (code, err.as_str(), out.as_str()),
-        (
-            0,
-            "",
-            "ready     2 stages can run: calib run pipeline.yaml\n"
-        )
-    );
-    let folder = tempfile::tempdir().unwrap();
-    for (name, text) in [
-        ("robot.yaml", ROBOT),
-        ("pipeline.yaml", PIPELINE),
-        ("arm.csv", ARM),
-        ("points.csv", POINTS),
-    ] {
-        put(folder.path(), name, text);
-    }
+    let ready = "ready     2 stages can run: calib run pipeline.yaml\n";
+    assert_eq!((code, err.as_str(), out.as_str()), (0, "", ready));
+    let folder = folder(ROBOT, PIPELINE, ARM, POINTS);
     let out = calib(folder.path(), "check pipeline.yaml --details").out;
     has(&out, "reads   robot  <- robot.robot");
 }
@@ -102,30 +89,20 @@ fn faults_of_the_yaml_and_of_the_robot_file_are_told_in_one_pass() {
 fn columns_that_are_not_there_are_named_with_the_nearest_all_at_once() {
     let (code, _, err) = checked(ROBOT, PIPELINE, "id,q1,q_2\n", "ids,x,y,z_mm\n");
     assert_eq!(code, 10, "{err}");
-    for part in [
+    let named = [
         "arm.csv:1: no column `q2`",
         "did you mean `q1`",
         "points.csv:1: no column `id`, mapped to `point_id`; did you mean `ids`?",
         "points.csv:1: no column `z`",
-    ] {
-        assert!(err.contains(part), "{part} in {err}");
-    }
-    let (code, _, err) = checked(
-        &ROBOT.replace("[0, 0, 400]}\ntool", "[0, 0]}\ntool"),
-        PIPELINE,
-        ARM,
-        "id,x,y,Z\n",
-    );
+    ];
+    has(&err, named);
+    let robot = ROBOT.replace("[0, 0, 400]}\ntool", "[0, 0]}\ntool");
+    let (code, _, err) = checked(&robot, PIPELINE, ARM, "id,x,y,Z\n");
     assert_eq!(code, 2, "the robot's fault decides: {err}");
     has(&err, ["robot.yaml:7", "points.csv:1: no column `z`"]);
     let (code, _, err) = checked(ROBOT, PIPELINE, "", POINTS);
-    assert_eq!(
-        (code, err.as_str()),
-        (
-            10,
-            "error: arm.csv: is empty; allowed: a header and at least one data row\n"
-        )
-    );
+    let empty = "error: arm.csv: is empty; allowed: a header and at least one data row\n";
+    assert_eq!((code, err.as_str()), (10, empty));
 }
 
 #[test]
@@ -151,82 +128,75 @@ fn lines_that_init_marked_are_listed_and_are_no_faults() {
 
 /// Exit code and stderr of a command on the pipeline, with a good robot and data of two days.
 fn message_of(command: &str, pipeline: &str, tuesday: &str) -> (i32, String) {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder(ROBOT, pipeline, ARM, POINTS);
     std::fs::create_dir(folder.path().join("tue")).unwrap();
-    let files = [
-        ("robot.yaml", ROBOT),
-        ("pipeline.yaml", pipeline),
-        ("arm.csv", ARM),
-        ("points.csv", POINTS),
-    ];
-    for (name, text) in files
-        .into_iter()
-        .chain([("tue/arm.csv", ARM), ("tue/points.csv", tuesday)])
-    {
-        put(folder.path(), name, text);
-    }
+    put(folder.path(), "tue/arm.csv", ARM);
+    put(folder.path(), "tue/points.csv", tuesday);
     let output = calib(folder.path(), &[command, "pipeline.yaml"]);
     (output.code.unwrap(), output.err)
 }
 
+/// A command on the pipeline ends so, and says this.
+fn refuses(command: &str, pipeline: &str, expected: (i32, &str)) {
+    let (code, err) = message_of(command, pipeline, POINTS);
+    assert_eq!(code, expected.0, "{err}");
+    has(&err, expected.1);
+}
+
 #[test]
 fn a_set_that_the_split_does_not_deal_to_is_a_fault_with_its_place() {
-    let with = |split: &str, more: &str| {
-        message_of(
-            "check",
-            &format!("{PIPELINE}  - uses: split\n    with: {split}\n{more}"),
-            POINTS,
-        )
-    };
+    let with =
+        |split: &str, more: &str| format!("{PIPELINE}  - uses: split\n    with: {split}\n{more}");
     let on = |set: &str| {
         format!("  - uses: identify\n    with: {{effects: [base_frame], on: [{set}]}}\n")
     };
-    let (code, err) = with("{by: every, n: 4}", &on("Fit"));
-    let expected = "pipeline.yaml:23:40: stages[3].with.on[0]: no set `Fit` in the split; did you mean `fit`? Allowed: fit, validate";
-    assert!(code == 2 && err.contains(expected), "{err}");
-    let (code, err) = with(
-        "{by: blocks, count: 4, sets: [training, test]}",
-        "  - uses: identify\n    with: {effects: [base_frame]}\n",
-    );
-    let expected = "stages[3].with.on[0]: not given, which means `fit`: no set of the split. Allowed: test, training";
-    assert!(code == 2 && err.contains(expected), "{err}");
+    let silent = "  - uses: identify\n    with: {effects: [base_frame]}\n";
     let reference = "  - uses: validate\n    with: {reference: [{label: L, step: identify, set: fitt, mean_mm: 1}]}\n";
-    let (code, err) = with("{by: every, n: 4}", &(on("fit") + reference));
-    assert!(
-        code == 2
-            && err.contains(
-                "stages[4].with.reference[0].set: no set `fitt` in the split; did you mean `fit`?"
-            ),
-        "{err}"
-    );
+    for (split, more, expected) in [
+        (
+            "{by: every, n: 4}",
+            on("Fit"),
+            "pipeline.yaml:23:40: stages[3].with.on[0]: no set `Fit` in the split; did you mean `fit`? Allowed: fit, validate",
+        ),
+        (
+            "{by: blocks, count: 4, sets: [training, test]}",
+            silent.into(),
+            "stages[3].with.on[0]: not given, which means `fit`: no set of the split. Allowed: test, training",
+        ),
+        (
+            "{by: every, n: 4}",
+            on("fit") + reference,
+            "stages[4].with.reference[0].set: no set `fitt` in the split; did you mean `fit`?",
+        ),
+        (
+            "{by: usage, sets: {a: fit, b: check}, blank: rest}",
+            on("validate"),
+            "no set `validate` in the split. Allowed: check, fit, rest",
+        ),
+    ] {
+        refuses("check", &with(split, &more), (2, expected));
+    }
     // Labels of the data may be any.
-    assert_eq!(with("{by: usage}", &on("Fit")), (0, String::new()));
-    let (code, err) = with(
-        "{by: usage, sets: {a: fit, b: check}, blank: rest}",
-        &on("validate"),
-    );
-    assert!(
-        code == 2 && err.contains("no set `validate` in the split. Allowed: check, fit, rest"),
-        "{err}"
-    );
+    let any = message_of("check", &with("{by: usage}", &on("Fit")), POINTS);
+    assert_eq!(any, (0, String::new()));
 }
 
 #[test]
 fn a_setting_that_only_the_data_refute_is_named_with_its_line_and_stage() {
-    let with = |split: &str| {
-        let identify = "  - uses: identify\n    with: {effects: [base_frame], on: [Fit]}\n";
-        message_of(
-            "run",
-            &format!("{PIPELINE}  - uses: split\n    with: {split}\n{identify}"),
-            POINTS,
-        )
-    };
-    let (code, err) = with("{by: every, n: 4, rest: Fit}");
-    let expected = "pipeline.yaml:21:26: stages[2].with.n: stage `split`: set `validate` gets none of the 1 row; say a smaller `n`";
-    assert!(code == 10 && err.contains(expected), "{err}");
-    let (code, err) = with("{by: usage, blank: fit}");
-    let expected = "pipeline.yaml:23:40: stages[3].with.on[0]: stage `identify`: no row is in set `Fit`; did you mean `fit`? Allowed: fit";
-    assert!(code == 10 && err.contains(expected), "{err}");
+    let identify = "  - uses: identify\n    with: {effects: [base_frame], on: [Fit]}\n";
+    for (split, expected) in [
+        (
+            "{by: every, n: 4, rest: Fit}",
+            "pipeline.yaml:21:26: stages[2].with.n: stage `split`: set `validate` gets none of the 1 row; say a smaller `n`",
+        ),
+        (
+            "{by: usage, blank: fit}",
+            "pipeline.yaml:23:40: stages[3].with.on[0]: stage `identify`: no row is in set `Fit`; did you mean `fit`? Allowed: fit",
+        ),
+    ] {
+        let pipeline = format!("{PIPELINE}  - uses: split\n    with: {split}\n{identify}");
+        refuses("run", &pipeline, (10, expected));
+    }
 }
 
 #[test]
@@ -248,15 +218,10 @@ fn a_name_that_is_too_long_says_how_long_it_may_be() {
     let pipeline = PIPELINE
         .replace("name: two", &format!("name: {name}"))
         .replace("  - uses: robot", &format!("  - id: {id}\n    uses: robot"));
-    let (code, err) = message_of("check", &pipeline, POINTS);
-    assert!(
-        code == 2 && err.contains(&format!("name: `{name}`: 65 letters; allowed: up to 64")),
-        "{err}"
-    );
-    has(
-        &err,
-        &format!("stages[0].id: `{id}`: 70 letters; allowed: up to 64"),
-    );
+    let named = format!("name: `{name}`: 65 letters; allowed: up to 64");
+    refuses("check", &pipeline, (2, &named));
+    let named = format!("stages[0].id: `{id}`: 70 letters; allowed: up to 64");
+    refuses("check", &pipeline, (2, &named));
 }
 
 #[test]
@@ -270,45 +235,25 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
         let (along, up) = (800.0 * d, 400.0 - 800.0 * t);
         writeln!(arm, "P{k},{},{}", q[0], q[1]).unwrap();
         // The last five were measured under other names.
-        let name = if k < 35 {
-            format!("P{k}")
-        } else {
-            format!("Q{k}")
-        };
-        writeln!(
-            points,
-            "{name},{:.4},{:.4},{:.4}",
-            along * c - 50.0 * s,
-            along * s + 50.0 * c,
-            up
-        )
-        .unwrap();
+        let name = if k < 35 { "P" } else { "Q" };
+        let (x, y) = (along * c - 50.0 * s, along * s + 50.0 * c);
+        writeln!(points, "{name}{k},{x:.4},{y:.4},{up:.4}").unwrap();
     }
-    let folder = tempfile::tempdir().unwrap();
     let fits = "  - uses: split\n    with: {by: every, n: 4}\n  - id: nominal\n    uses: identify\n    with: {effects: [base_frame]}\n\
                 \x20 - id: geometry\n    uses: identify\n    with: {effects: [base_frame, tool_offset, joint_offset, link_geometry]}\n";
-    let pipeline = format!("{PIPELINE}{fits}");
-    for (name, text) in [
-        ("robot.yaml", ROBOT),
-        ("pipeline.yaml", &pipeline),
-        ("arm.csv", &arm),
-        ("points.csv", &points),
-    ] {
-        put(folder.path(), name, text);
-    }
+    let folder = folder(ROBOT, &format!("{PIPELINE}{fits}"), &arm, &points);
     let output = calib(folder.path(), "check pipeline.yaml --data --store kept");
     let out = output.out.clone();
     assert_eq!(output.code, Some(0), "{out}{}", output.err);
-    for part in [
+    let parts = [
         "rows      35 used, of 35 points\n",
         "ranges    J1 -60.0 deg to 53.0 deg\n",
         "rejected  10 rows, unmatched: P35 (arm.csv: ",
         "after `nominal`, 35 points\n",
         "after `geometry`, 35 points\n",
         "parameters can be estimated\n",
-    ] {
-        assert!(out.contains(part), "{part} in\n{out}");
-    }
+    ];
+    has(&out, parts);
     assert!(folder.path().join("kept").exists() && !folder.path().join(".calib").exists());
     let run = calib(folder.path(), "run pipeline.yaml --store kept");
     let printed = run.err.clone();

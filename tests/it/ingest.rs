@@ -76,25 +76,16 @@ fn taken(tables: BTreeMap<&'static str, Vec<Frame>>) -> Result<Taken> {
     let mut chunks = table::<Recording>(&tables).into_iter();
     let first = chunks.next().unwrap();
     assert!(chunks.next().is_none(), "more than one chunk");
-    let rejected = Rejected(
-        table::<Rejected>(&tables)
-            .into_iter()
-            .flat_map(|chunk| chunk.0)
-            .collect(),
-    );
+    let rejected = table::<Rejected>(&tables).into_iter();
     let taken = Taken {
         recording: first,
-        rejected,
+        rejected: Rejected(rejected.flat_map(|chunk| chunk.0).collect()),
         intake: table::<Intake>(&tables).remove(0),
     };
     for file in &taken.intake.0 {
         assert_eq!(file.accepted + file.rejected, file.read, "{}", file.file);
-        let listed = taken
-            .rejected
-            .0
-            .iter()
-            .filter(|row| row.file == file.file)
-            .count() as i64;
+        let rejected = taken.rejected.0.iter();
+        let listed = rejected.filter(|row| row.file == file.file).count() as i64;
         assert_eq!(listed, file.rejected, "{}", file.file);
     }
     Ok(taken)
@@ -102,11 +93,10 @@ fn taken(tables: BTreeMap<&'static str, Vec<Frame>>) -> Result<Taken> {
 
 fn refusal(desk: &Desk, yaml: &str, robot: Robot) -> String {
     match take(desk, yaml, robot) {
-        Err(Error::Data(faults)) => faults
-            .iter()
-            .map(ToString::to_string)
-            .collect::<Vec<_>>()
-            .join("\n"),
+        Err(Error::Data(faults)) => {
+            let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
+            faults.join("\n")
+        }
         Err(other) => panic!("another error: {other}"),
         Ok(_) => panic!("was accepted"),
     }
@@ -158,76 +148,27 @@ fn quantities_arrive_in_si_under_the_names_of_the_file() {
 
 #[test]
 fn every_refused_row_has_its_line_reason_and_text() {
-    let bad = [
-        ("B1,1,2,,2,3", "blank", "x is blank"),
-        (
-            "B2,1,abc,1,2,3",
-            "not_a_number",
-            "q2: `abc` is not a number",
-        ),
-        (
-            "B3,1,2,1,NaN,3",
-            "not_a_number",
-            "y: `NaN` is not a finite number",
-        ),
-        (
-            "B4,1,2,1,2,inf",
-            "not_a_number",
-            "z: `inf` is not a finite number",
-        ),
-        ("B5,1,2,1", "short_row", "4 fields; allowed: 6"),
-        ("B6,1,2,1,2,3,4", "long_row", "7 fields; allowed: 6"),
-        (
-            "B7,1,2,0,0.0,0",
-            "lost_beam",
-            "the position is 0, 0, 0: the tracker saw nothing",
-        ),
-        (",1,2,1,2,3", "blank", "point_id is blank"),
-        (",,,,,", "blank", "the whole row is blank"),
-        (
-            "B8,1,2,1e6,2,3",
-            "out_of_range",
-            "x: `1e6`; allowed: -200000 to 200000 mm",
-        ),
-        (
-            "B9,1,2000,1,2,3",
-            "out_of_range",
-            "q2: `2000`; allowed: -1145.91559 to 1145.91559 deg",
-        ),
-        (
-            "g1,1,2,1,2,3",
-            "duplicate_id",
-            "point id `g1` also stands on line 13",
-        ),
-    ];
-    let text: String = bad.iter().map(|(row, _, _)| format!("{row}\n")).collect();
+    let bad = "B1,1,2,,2,3|blank|x is blank
+B2,1,abc,1,2,3|not_a_number|q2: `abc` is not a number
+B3,1,2,1,NaN,3|not_a_number|y: `NaN` is not a finite number
+B4,1,2,1,2,inf|not_a_number|z: `inf` is not a finite number
+B5,1,2,1|short_row|4 fields; allowed: 6
+B6,1,2,1,2,3,4|long_row|7 fields; allowed: 6
+B7,1,2,0,0.0,0|lost_beam|the position is 0, 0, 0: the tracker saw nothing
+,1,2,1,2,3|blank|point_id is blank
+,,,,,|blank|the whole row is blank
+B8,1,2,1e6,2,3|out_of_range|x: `1e6`; allowed: -200000 to 200000 mm
+B9,1,2000,1,2,3|out_of_range|q2: `2000`; allowed: -1145.91559 to 1145.91559 deg
+g1,1,2,1,2,3|duplicate_id|point id `g1` also stands on line 14";
+    let row = |line: &str| line.split('|').next().unwrap().to_string() + "\n";
+    let text: String = bad.lines().map(row).collect();
     // g1 again, so both are refused; trailing delimiters make no long row.
-    let taken = take(
-        &rows(&format!("{text}{}T1,1,2,3,4,5,,\n", good(20))),
-        TWO,
-        rr(),
-    );
-    let taken = match taken {
-        Ok(taken) => taken,
-        Err(error) => panic!("{error}"),
-    };
-    for (index, (row, reason, detail)) in bad.iter().enumerate() {
-        let rejected = &taken.rejected.0[index];
-        let detail = if *reason == "duplicate_id" {
-            "point id `g1` also stands on line 14"
-        } else {
-            detail
-        };
-        assert_eq!(
-            (
-                rejected.line,
-                rejected.reason.as_str(),
-                rejected.detail.as_str()
-            ),
-            (index as i64 + 2, *reason, detail)
-        );
-        assert_eq!(&rejected.text, row);
-        assert_eq!(rejected.file, "a.csv");
+    let file = rows(&format!("{text}{}T1,1,2,3,4,5,,\n", good(20)));
+    let taken = take(&file, TWO, rr()).unwrap_or_else(|error| panic!("{error}"));
+    for ((line, expected), row) in (2..).zip(bad.lines()).zip(&taken.rejected.0) {
+        let found = format!("{}|{}|{}", row.text, row.reason, row.detail);
+        assert_eq!((found.as_str(), row.line), (expected, line));
+        assert_eq!(row.file, "a.csv");
     }
     let last = taken.rejected.0.last().unwrap();
     assert_eq!((last.line, last.reason.as_str()), (14, "duplicate_id"));

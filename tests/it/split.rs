@@ -49,53 +49,36 @@ fn sets(yaml: &str, recording: Recording) -> Result<Vec<String>> {
     Ok(split.0.into_iter().map(|row| row.set).collect())
 }
 
-fn refusal(yaml: &str, recording: Recording) -> String {
+fn refuses(yaml: &str, recording: Recording, expected: &str) {
     match sets(yaml, recording) {
-        Err(error @ Error::Data(_)) => error.to_string(),
+        Err(error @ Error::Data(_)) => assert_eq!(error.to_string(), expected),
         other => panic!("{other:?}"),
     }
 }
 
+fn deals(yaml: &str, recording: Recording, expected: &str) {
+    assert_eq!(sets(yaml, recording).unwrap().join(" "), expected, "{yaml}");
+}
+
 #[test]
 fn every_fourth_row_validates() {
-    assert_eq!(
-        sets("{by: every, n: 4}", distinct(9)).unwrap(),
-        [
-            "fit", "fit", "fit", "validate", "fit", "fit", "fit", "validate", "fit"
-        ]
-    );
-    let named = sets(
-        "{by: every, n: 3, offset: 0, set: check, rest: learn}",
-        distinct(4),
-    )
-    .unwrap();
-    assert_eq!(named, ["check", "learn", "learn", "check"]);
-    assert_eq!(
-        refusal("{by: every, n: 4}", distinct(3)),
-        "with.n: set `validate` gets none of the 3 rows; say a smaller `n`"
-    );
-    let few = refusal("{by: random, fraction: 0.0001}", distinct(9));
-    assert_eq!(
-        few,
-        "with.fraction: set `validate` gets none of the 9 rows; say a larger `fraction`"
-    );
+    let expected = "fit fit fit validate fit fit fit validate fit";
+    deals("{by: every, n: 4}", distinct(9), expected);
+    let named = "{by: every, n: 3, offset: 0, set: check, rest: learn}";
+    deals(named, distinct(4), "check learn learn check");
+    let expected = "with.n: set `validate` gets none of the 3 rows; say a smaller `n`";
+    refuses("{by: every, n: 4}", distinct(3), expected);
+    let expected = "with.fraction: set `validate` gets none of the 9 rows; say a larger `fraction`";
+    refuses("{by: random, fraction: 0.0001}", distinct(9), expected);
 }
 
 #[test]
 fn blocks_are_dealt_in_turn_and_break_at_poses() {
-    assert_eq!(
-        sets("{by: blocks, length: 2, sets: [a, b]}", distinct(5)).unwrap(),
-        ["a", "a", "b", "b", "a"]
-    );
-    assert_eq!(
-        sets("{by: blocks, count: 3, sets: [a, a, b]}", distinct(6)).unwrap(),
-        ["a", "a", "a", "a", "b", "b"]
-    );
-    let repeats = recording(&[0, 1, 1, 2, 3, 4]);
-    assert_eq!(
-        sets("{by: blocks, length: 2, sets: [a, b]}", repeats).unwrap(),
-        ["a", "a", "a", "b", "a", "a"]
-    );
+    let of_two = "{by: blocks, length: 2, sets: [a, b]}";
+    deals(of_two, distinct(5), "a a b b a");
+    let three = "{by: blocks, count: 3, sets: [a, a, b]}";
+    deals(three, distinct(6), "a a a a b b");
+    deals(of_two, recording(&[0, 1, 1, 2, 3, 4]), "a a a b a a");
 }
 
 #[test]
@@ -125,63 +108,54 @@ fn usage_labels_become_sets() {
             .collect();
         recording
     };
-    assert_eq!(
-        sets("{by: usage}", labelled(&["fit", "validate"])).unwrap(),
-        ["fit", "validate"]
+    deals(
+        "{by: usage}",
+        labelled(&["fit", "validate"]),
+        "fit validate",
     );
     let mapped = "{by: usage, sets: {train: fit, test: validate}, blank: rest}";
-    assert_eq!(
-        sets(mapped, labelled(&["test", "train", ""])).unwrap(),
-        ["validate", "fit", "rest"]
+    deals(
+        mapped,
+        labelled(&["test", "train", ""]),
+        "validate fit rest",
     );
-    let unknown = refusal(mapped, labelled(&["test", "trian"]));
-    assert_eq!(
-        unknown,
-        "with.sets: label `trian` (point `P1`) has no set; mapped: test, train; found: test, trian"
-    );
-    let none = refusal("{by: usage}", labelled(&["", ""]));
-    assert_eq!(
-        none,
-        "with.blank: point `P0` has no usage label; found: none; allowed: map `usage` in ingest, or say `blank`"
-    );
+    let unknown =
+        "with.sets: label `trian` (point `P1`) has no set; mapped: test, train; found: test, trian";
+    refuses(mapped, labelled(&["test", "trian"]), unknown);
+    let none = "with.blank: point `P0` has no usage label; found: none; allowed: map `usage` in ingest, or say `blank`";
+    refuses("{by: usage}", labelled(&["", ""]), none);
 }
 
 #[test]
 fn counts_in_the_order_of_recording_must_fit_the_rows() {
     let yaml = "{by: order, sets: [{set: a, rows: 2}, {set: b, rows: 1}, {set: a}]}";
-    assert_eq!(sets(yaml, distinct(5)).unwrap(), ["a", "a", "b", "a", "a"]);
+    deals(yaml, distinct(5), "a a b a a");
     let short = "{by: order, sets: [{set: a, rows: 2}, {set: b, rows: 4}]}";
-    assert_eq!(
-        refusal(short, distinct(5)),
-        "with.sets[1].rows: set `b` takes 4 rows, but only 3 of 5 remain"
-    );
+    let message = "with.sets[1].rows: set `b` takes 4 rows, but only 3 of 5 remain";
+    refuses(short, distinct(5), message);
     let message =
         "with.sets: the sets take 6 of 7 rows; let the last one leave `rows` out, or name one more";
-    assert_eq!(refusal(short, distinct(7)), message);
+    refuses(short, distinct(7), message);
 }
 
 #[test]
 fn faulty_settings_are_named_by_their_place() {
-    let places = |yaml: &str| {
-        settings(yaml)
-            .check()
-            .iter()
-            .map(|fault| fault.place.clone())
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(
-        places("{by: every, n: 1, offset: 5, set: a, rest: a}"),
-        ["n", "offset", "rest"]
-    );
-    assert_eq!(
-        places("{by: blocks, length: 0, sets: []}"),
-        ["length", "sets"]
-    );
-    assert_eq!(places("{by: random, fraction: 1.5}"), ["fraction"]);
-    assert_eq!(
-        places("{by: order, sets: [{set: a}, {set: b, rows: 0}]}"),
-        ["sets[0].rows", "sets[1].rows"]
-    );
+    for (yaml, expected) in [
+        (
+            "{by: every, n: 1, offset: 5, set: a, rest: a}",
+            "n offset rest",
+        ),
+        ("{by: blocks, length: 0, sets: []}", "length sets"),
+        ("{by: random, fraction: 1.5}", "fraction"),
+        (
+            "{by: order, sets: [{set: a}, {set: b, rows: 0}]}",
+            "sets[0].rows sets[1].rows",
+        ),
+    ] {
+        let faults = settings(yaml).check();
+        let places: Vec<&str> = faults.iter().map(|fault| fault.place.as_str()).collect();
+        assert_eq!(places.join(" "), expected, "{yaml}");
+    }
 }
 
 /// Three targets a pose, whose logs differ in the last digits.

@@ -356,7 +356,7 @@ pub struct FileLayout {
     #[serde(default)]
     pub(crate) decimal: DecimalMark,
     /// Whether a row of column names stands above the data.
-    #[serde(default = "yes")]
+    #[serde(default = "crate::stage::yes")]
     pub(crate) header: bool,
     /// Lines to skip above the header (above the data where there is no header).
     #[serde(default)]
@@ -407,10 +407,6 @@ impl FileLayout {
 
 fn comma() -> String {
     ",".into()
-}
-
-fn yes() -> bool {
-    true
 }
 
 fn is_false(value: &bool) -> bool {

@@ -1,6 +1,7 @@
 //! The noise of a recording is its own: recorded, by uncertainty, by instrument, or said to be inferred.
 
 use super::{faults_of, rr, take};
+use crate::answer::starts_with;
 use crate::desk::Desk;
 use crate::workbook::workbook;
 use calib::robot::{INSTRUMENTS, NoiseBasis, SigmaSource};
@@ -136,41 +137,36 @@ fn without_a_statement_the_noise_is_inferred_and_said_to_be() {
     let (recording, notes) = taken("", "");
     is_near(&sigmas_um(&recording), &[[11.25; 3]; 3]);
     assert_eq!(recording.measurements().noise_basis, NoiseBasis::Inferred);
+    let weighted = "3 rows without a stated noise: weighted as 10 um + 2.5 um/m";
     assert!(
-        notes
-            .iter()
-            .any(|note| note
-                .starts_with("3 rows without a stated noise: weighted as 10 um + 2.5 um/m")),
+        notes.iter().any(|note| note.starts_with(weighted)),
         "{notes:?}"
     );
 }
 
 #[test]
 fn a_noise_is_stated_once_and_in_a_way_that_is_known() {
-    let both = faults(
-        "u95: {column: u, unit: mm}\n      u: {column: v, unit: mm}",
-        "",
-    );
-    let wanted = "files[0].columns.u: states the standard deviation that `u95` states already; map one of them";
-    assert_eq!(both, [wanted]);
-    let alone = faults("u95_x: {column: u, unit: mm}", "");
-    assert_eq!(
-        alone,
-        ["files[0].columns: map all of u95_x, u95_y, u95_z, or none"]
-    );
-    let zero = faults("u95: {column: u, unit: mm, coverage_factor: 0}", "");
-    assert_eq!(
-        zero,
-        ["files[0].columns.u95.coverage_factor: allowed: above 0, e.g. 2 for 95 %"]
-    );
+    for (columns, expected) in [
+        (
+            "u95: {column: u, unit: mm}\n      u: {column: v, unit: mm}",
+            ".u: states the standard deviation that `u95` states already; map one of them",
+        ),
+        (
+            "u95_x: {column: u, unit: mm}",
+            ": map all of u95_x, u95_y, u95_z, or none",
+        ),
+        (
+            "u95: {column: u, unit: mm, coverage_factor: 0}",
+            ".u95.coverage_factor: allowed: above 0, e.g. 2 for 95 %",
+        ),
+    ] {
+        assert_eq!(faults(columns, ""), [format!("files[0].columns{expected}")]);
+    }
     let none = faults(
         "",
         "instrument: {constant_um: 0, per_metre_um: 0, coverage: 2}",
     );
-    assert!(
-        none[0].starts_with("instrument: expected a noise above zero"),
-        "{none:?}"
-    );
+    starts_with(&none[0], "instrument: expected a noise above zero");
 }
 
 #[test]

@@ -47,9 +47,13 @@ fn desk(program: &str, text: &str, points: &str) -> Desk {
 }
 
 fn degrees(row: &[f64]) -> Vec<f64> {
-    row.iter()
-        .map(|angle| (angle.to_degrees() * 1e9).round() / 1e9)
-        .collect()
+    let rounded = |angle: &f64| (angle.to_degrees() * 1e9).round() / 1e9;
+    row.iter().map(rounded).collect()
+}
+
+fn leaves_out_a_pose(desk: &Desk, program: &str) {
+    let note = format!("{program}: 1 pose without joints left out");
+    assert!(desk.notes.lock().unwrap().contains(&note));
 }
 
 #[test]
@@ -68,13 +72,7 @@ fn jointtargets_of_rapid_are_rows_in_the_order_of_the_file_and_robtargets_are_co
         [0.0, -12.5, 20.0, 0.0, 30.0, -90.0]
     );
     assert_eq!(taken.recording.position[0], [0.007, 0.008, 0.016]);
-    assert!(
-        desk.notes
-            .lock()
-            .unwrap()
-            .iter()
-            .any(|note| note == "cell.MOD: 1 pose without joints left out")
-    );
+    leaves_out_a_pose(&desk, "cell.MOD");
 }
 
 #[test]
@@ -85,31 +83,15 @@ fn positions_of_one_line_that_no_point_was_measured_at_are_rejected_together() {
         "p10,7,8,16\n",
     );
     let yaml = joined("cell.MOD", "rax_#") + "max_rejected_fraction: 0.9\n";
-    let tables = desk
-        .run(
-            &settings(&yaml),
-            IngestReads {
-                robot: robot("rrrrrr", 1.0),
-            },
-        )
-        .unwrap();
-    let rejected: Vec<RejectedRow> = table::<Rejected>(&tables)
-        .into_iter()
-        .flat_map(|chunk| chunk.0)
-        .collect();
-    let answer: Vec<(i64, usize)> = rejected
-        .iter()
-        .map(|row| (row.line, row.detail.matches("no usable row").count()))
-        .collect();
+    let robot = robot("rrrrrr", 1.0);
+    let tables = desk.run(&settings(&yaml), IngestReads { robot }).unwrap();
+    let rejected = table::<Rejected>(&tables).into_iter();
+    let rejected: Vec<RejectedRow> = rejected.flat_map(|chunk| chunk.0).collect();
+    let of_row = |row: &RejectedRow| (row.line, row.detail.matches("no usable row").count());
+    let answer: Vec<(i64, usize)> = rejected.iter().map(of_row).collect();
     assert_eq!(answer, [(6, 2)], "{rejected:?}");
-    assert_eq!(
-        table::<Intake>(&tables)[0]
-            .0
-            .iter()
-            .map(|file| file.rejected)
-            .collect::<Vec<_>>(),
-        [2, 0]
-    );
+    let files = table::<Intake>(&tables).remove(0).0;
+    assert_eq!([files[0].rejected, files[1].rejected], [2, 0]);
 }
 
 #[test]
@@ -123,32 +105,18 @@ fn an_external_axis_at_9e9_is_none_and_a_connected_one_is_a_joint() {
         RAPID,
         "more{1},4,5,6\np10,7,8,9\nmore{2},1,2,3\n",
     );
-    let taken = take(
-        &desk,
-        &track.replace("PROGRAM", "cell.prg"),
-        robot("prrrrrr", 1.0),
-    )
-    .unwrap();
+    let track = track.replace("PROGRAM", "cell.prg");
+    let taken = take(&desk, &track, robot("prrrrrr", 1.0)).unwrap();
     assert_eq!(
         [taken.recording.q(0)[0], taken.recording.q(1)[0]],
         [1.5, 0.0005]
     );
-    let rejected = taken
-        .rejected
-        .0
-        .iter()
-        .find(|row| row.file == "cell.prg")
-        .unwrap();
-    assert_eq!(
-        (rejected.line, rejected.detail.as_str()),
-        (6, "eax_a is blank")
-    );
+    let mut rejected = taken.rejected.0.iter();
+    let rejected = rejected.find(|row| row.file == "cell.prg").unwrap();
+    let found = (rejected.line, rejected.detail.as_str());
+    assert_eq!(found, (6, "eax_a is blank"));
     let none = RAPID.replace("1500", "9E9").replace("[0.5,", "[9E9,");
-    let message = refusal(
-        &desk.with("cell.prg", none),
-        &track.replace("PROGRAM", "cell.prg"),
-        robot("prrrrrr", 1.0),
-    );
+    let message = refusal(&desk.with("cell.prg", none), &track, robot("prrrrrr", 1.0));
     has(&message, "cell.prg:1: no column `eax_a`, mapped to `q`");
 }
 
@@ -164,26 +132,15 @@ fn axes_that_krl_declares_are_rows_and_its_poses_are_counted() {
         degrees(taken.recording.q(0)),
         [0.0, -90.0, 90.5, 0.0, 10.0, 0.0]
     );
-    assert!(
-        desk.notes
-            .lock()
-            .unwrap()
-            .iter()
-            .any(|note| note == "measure.dat: 1 pose without joints left out")
-    );
+    leaves_out_a_pose(&desk, "measure.dat");
 }
 
 #[test]
 fn a_table_of_text_that_ends_as_a_program_does_is_a_table() {
     let text = "name,A1,A2,A3,A4,A5,A6\nP1,1,2,3,4,5,6\n";
     let desk = desk("joints.dat", text, "P1,1,2,3\n");
-    assert_eq!(
-        take(&desk, &joined("joints.dat", "A#"), robot("rrrrrr", 1.0))
-            .unwrap()
-            .recording
-            .rows(),
-        1
-    );
+    let taken = take(&desk, &joined("joints.dat", "A#"), robot("rrrrrr", 1.0)).unwrap();
+    assert_eq!(taken.recording.rows(), 1);
 }
 
 #[test]

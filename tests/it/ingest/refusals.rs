@@ -46,28 +46,29 @@ fn text_behind_a_closing_quote_refuses_its_row() {
 
 #[test]
 fn a_file_that_is_none_says_what_it_is() {
-    assert_eq!(
-        with("", TWO),
-        "a.csv: is empty; allowed: a header and at least one data row"
-    );
-    assert_eq!(
-        with(HEAD, TWO),
-        "a.csv: has a header but no data row; allowed: at least one"
-    );
-    assert_eq!(
-        with("\n\n", TWO),
-        "a.csv: has no header: 2 lines, all empty, comments or skipped"
-    );
-    let open = with(
-        &format!("{HEAD}P1,1,2,3,4,5\n\"P2,1,2,3,4,5\nP3,1,2,3,4,5\n"),
-        TWO,
-    );
-    assert_eq!(open, "a.csv:3: a quoted field is not closed");
-    let endless = with(&format!("{HEAD}P1,1,2,3,4,{}", "5".repeat(1 << 21)), TWO);
-    assert_eq!(
-        endless,
-        "a.csv:2: a row of more than 1 MiB; allowed: rows ending in LF or CRLF, every quote closed"
-    );
+    let open = format!("{HEAD}P1,1,2,3,4,5\n\"P2,1,2,3,4,5\nP3,1,2,3,4,5\n");
+    let endless = format!("{HEAD}P1,1,2,3,4,{}", "5".repeat(1 << 21));
+    for (file, expected) in [
+        (
+            "",
+            "a.csv: is empty; allowed: a header and at least one data row",
+        ),
+        (
+            HEAD,
+            "a.csv: has a header but no data row; allowed: at least one",
+        ),
+        (
+            "\n\n",
+            "a.csv: has no header: 2 lines, all empty, comments or skipped",
+        ),
+        (&open, "a.csv:3: a quoted field is not closed"),
+        (
+            &endless,
+            "a.csv:2: a row of more than 1 MiB; allowed: rows ending in LF or CRLF, every quote closed",
+        ),
+    ] {
+        assert_eq!(with(file, TWO), expected);
+    }
 }
 
 #[test]
@@ -90,34 +91,34 @@ fn a_file_whose_lines_end_in_cr_alone_says_how_to_convert_it() {
 
 #[test]
 fn a_column_of_two_measured_quantities_or_joints_is_a_fault() {
-    let faults = |yaml: &str| faults_of(yaml);
-    let ours = "allowed: a column for each";
-    assert_eq!(
-        faults(&TWO.replace("column: y", "column: \" x\"")),
-        [format!(
-            "files[0].columns.y.column: column ` x` is mapped to `x` and `y`; {ours}"
-        )]
-    );
-    assert_eq!(
-        faults(&TWO.replace("column: \"q{j}\"", "columns: [q1, q1]")),
-        [format!(
-            "files[0].columns.q.columns[1]: column `q1` is mapped to joint 1 of `q` and joint 2 of `q`; {ours}"
-        )]
-    );
     let target = TWO
         .replace("column: x", "column: xt, minus: xd")
         .replace("column: y", "column: yt, minus: xd");
-    assert_eq!(
-        faults(&target),
-        [format!(
-            "files[0].columns.y.minus: column `xd` is mapped to `x` and `y`; {ours}"
-        )]
-    );
+    for (yaml, place, found) in [
+        (
+            TWO.replace("column: y", "column: \" x\""),
+            "y.column",
+            "column ` x` is mapped to `x` and `y`",
+        ),
+        (
+            TWO.replace("column: \"q{j}\"", "columns: [q1, q1]"),
+            "q.columns[1]",
+            "column `q1` is mapped to joint 1 of `q` and joint 2 of `q`",
+        ),
+        (
+            target.clone(),
+            "y.minus",
+            "column `xd` is mapped to `x` and `y`",
+        ),
+    ] {
+        let expected = format!("files[0].columns.{place}: {found}; allowed: a column for each");
+        assert_eq!(faults_of(&yaml), [expected]);
+    }
     // A target is also the simulated point; one uncertainty is that of all axes.
     let more = "      sim_x: {column: xt, unit: mm}\n      sim_y: {column: yt, unit: mm}\n      sim_z: {column: zt, unit: mm}\n      \
                 sigma_x: {column: s, unit: mm}\n      sigma_y: {column: s, unit: mm}\n      sigma_z: {column: s, unit: mm}\n";
     let target = target.replace("column: yt, minus: xd", "column: yt, minus: yd");
-    assert_eq!(faults(&format!("{target}{more}")), Vec::<String>::new());
+    assert_eq!(faults_of(&format!("{target}{more}")), Vec::<String>::new());
 }
 
 #[test]
@@ -138,30 +139,28 @@ fn a_header_of_another_shape_gets_a_hint() {
 #[test]
 fn another_number_of_joints_is_an_error_of_the_file() {
     let desk = || rows(&good(3));
-    let more = refusal(&desk(), TWO, robot("rrr", 1.0));
-    starts_with(
-        &more,
-        "a.csv:1: `q` has 2 of its columns; the robot has 3 joints\na.csv:1: no column `q3`",
-    );
-    let fewer = refusal(&desk(), TWO, robot("r", 1.0));
-    starts_with(
-        &fewer,
-        "a.csv:1: column `q2`, by the pattern of `q`: the robot has 1 joint only",
-    );
-    let listed = refusal(
-        &desk(),
-        &TWO.replace("column: \"q{j}\"", "columns: [q1, q2]"),
-        robot("rrr", 1.0),
-    );
-    starts_with(
-        &listed,
-        "a.csv:1: `q` lists 2 columns; the robot has 3 joints",
-    );
-    let linear = refusal(&desk(), TWO, robot("pr", 1.0));
-    starts_with(
-        &linear,
-        "a.csv:1: joint 1 is prismatic; say `linear_unit` for `q`",
-    );
+    let listed = TWO.replace("column: \"q{j}\"", "columns: [q1, q2]");
+    for (kinds, yaml, expected) in [
+        (
+            "rrr",
+            TWO,
+            "`q` has 2 of its columns; the robot has 3 joints\na.csv:1: no column `q3`",
+        ),
+        (
+            "r",
+            TWO,
+            "column `q2`, by the pattern of `q`: the robot has 1 joint only",
+        ),
+        (
+            "rrr",
+            &listed,
+            "`q` lists 2 columns; the robot has 3 joints",
+        ),
+        ("pr", TWO, "joint 1 is prismatic; say `linear_unit` for `q`"),
+    ] {
+        let message = refusal(&desk(), yaml, robot(kinds, 1.0));
+        starts_with(&message, &format!("a.csv:1: {expected}"));
+    }
 }
 
 #[test]
@@ -279,38 +278,41 @@ fn files_that_do_not_fit_together_are_faults_of_the_settings() {
         faults_of(&yaml)
     };
     let without = "join: several files; say how they belong together: {by: id}, {by: time, tolerance_s: 0.5}, {by: order} or {by: append}";
-    assert_eq!(faults(q, xyz, ""), [without]);
-    assert_eq!(faults(q, "", ""), ["files[0].columns: not mapped: x, y, z"]);
-    assert_eq!(
-        faults(q, xyz, "join: {by: append}"),
-        [
-            "files[0].columns: not mapped: x, y, z",
-            "files[1].columns: not mapped: q"
-        ]
+    let lacks = "files[0].columns: not mapped: x, y, z";
+    let no_joints = "files[1].columns: not mapped: q";
+    let unnamed = "files[1].columns.point_id: not mapped; the files are joined by point_id";
+    let twice = "files[1].columns.time: mapped in two files; map it in one";
+    let keep =
+        "duplicates: `keep` cannot be combined with a join by id; allowed: reject, first, last";
+    let (of_id, of_both) = (
+        format!("{id}{q}"),
+        [q, xyz].map(|more| format!("{id}{time}{more}")),
     );
-    assert_eq!(
-        faults(q, "", "join: {by: order}"),
-        ["join: joins two files or more, not 1"]
-    );
-    assert_eq!(
-        faults(&format!("{id}{q}"), xyz, "join: {by: id}"),
-        ["files[1].columns.point_id: not mapped; the files are joined by point_id"]
-    );
-    assert_eq!(
-        faults(
-            &format!("{id}{time}{q}"),
-            &format!("{id}{time}{xyz}"),
-            "join: {by: id}\nduplicates: keep"
+    let of_time = [q, xyz].map(|more| format!("{time}{more}"));
+    for (first, second, tail, expected) in [
+        (q, xyz, "", &[without][..]),
+        (q, "", "", &[lacks]),
+        (q, xyz, "join: {by: append}", &[lacks, no_joints]),
+        (
+            q,
+            "",
+            "join: {by: order}",
+            &["join: joins two files or more, not 1"],
         ),
-        [
-            "files[1].columns.time: mapped in two files; map it in one",
-            "duplicates: `keep` cannot be combined with a join by id; allowed: reject, first, last"
-        ]
-    );
-    let clock = faults(
-        &format!("{time}{q}"),
-        &format!("{time}{xyz}"),
-        "join: {by: time, tolerance_s: -1}",
-    );
-    assert_eq!(clock, ["join.tolerance_s: allowed: 0 and above"]);
+        (&of_id, xyz, "join: {by: id}", &[unnamed]),
+        (
+            &of_both[0],
+            &of_both[1],
+            "join: {by: id}\nduplicates: keep",
+            &[twice, keep],
+        ),
+        (
+            &of_time[0],
+            &of_time[1],
+            "join: {by: time, tolerance_s: -1}",
+            &["join.tolerance_s: allowed: 0 and above"],
+        ),
+    ] {
+        assert_eq!(faults(first, second, tail), expected);
+    }
 }

@@ -57,17 +57,10 @@ fn a_prismatic_joint_beyond_its_limits_is_told_in_millimetres() {
 
 #[test]
 fn ids_without_a_partner_are_shown_with_an_example_of_each_file() {
-    let yaml = PAIR
-        .replace("KEY", "point_id")
-        .replace("LEFT", "")
-        .replace("RIGHT", "")
-        + "join: {by: id}\n";
+    let yaml = by_id();
     let message_of = |ids: [&str; 2]| {
         let points = format!("k,x,y,z\n{},1,1,1\n{},2,2,2\n", ids[0], ids[1]);
-        let desk = Desk::default()
-            .with("run/z_arm.csv", "k,q1\nP1,1\nP2,2\n")
-            .with("run/b_tracker.csv", points);
-        refusal(&desk, &yaml, robot("r", 2.0))
+        refusal(&pair("k,q1\nP1,1\nP2,2\n", &points), &yaml, robot("r", 2.0))
     };
     let other = message_of(["XP1", "XP2"]);
     let expected = "2 unmatched (no partner in run/b_tracker.csv, e.g. `P1` here and `XP1` there: ids must be the same in both files)";
@@ -81,31 +74,30 @@ fn ids_without_a_partner_are_shown_with_an_example_of_each_file() {
 #[test]
 fn of_duplicated_ids_none_the_first_the_last_or_all_are_used() {
     let text = "A,1,2,3,4,1\nB,1,2,3,4,2\nA,1,2,,4,3\nA,1,2,3,4,4\nC,1,2,3,4,5\nD,1,2,3,4,6\n";
-    let used = |word: &str| {
-        let taken = take(&rows(text), &format!("{TWO}duplicates: {word}\n"), rr()).unwrap();
-        let lines = taken
-            .rejected
-            .0
-            .iter()
-            .map(|row| (row.line, row.detail.clone()))
-            .collect::<Vec<_>>();
-        (taken.recording.sequence, lines)
-    };
-    let blank = (4, "x is blank".to_string());
-    let twin = |line, other: i64| (line, format!("point id `A` also stands on line {other}"));
-    assert_eq!(
-        used("reject"),
-        (vec![2, 5, 6], vec![twin(2, 5), blank.clone(), twin(5, 2)])
-    );
-    assert_eq!(
-        used("first"),
-        (vec![1, 2, 5, 6], vec![blank.clone(), twin(5, 2)])
-    );
-    assert_eq!(
-        used("last"),
-        (vec![2, 4, 5, 6], vec![twin(2, 5), blank.clone()])
-    );
-    assert_eq!(used("keep"), (vec![1, 2, 4, 5, 6], vec![blank]));
+    let blank = "a.csv:4 blank: x is blank".to_string();
+    let twin = |line, other| twin(line, 'A', other);
+    for (word, sequence, lines) in [
+        (
+            "reject",
+            &[2, 5, 6][..],
+            vec![twin(2, 5), blank.clone(), twin(5, 2)],
+        ),
+        ("first", &[1, 2, 5, 6], vec![blank.clone(), twin(5, 2)]),
+        ("last", &[2, 4, 5, 6], vec![twin(2, 5), blank.clone()]),
+        ("keep", &[1, 2, 4, 5, 6], vec![blank]),
+    ] {
+        of_duplicates(text, word, sequence, &lines);
+    }
+}
+
+fn of_duplicates(text: &str, word: &str, sequence: &[i64], lines: &[String]) {
+    let taken = take(&rows(text), &format!("{TWO}duplicates: {word}\n"), rr()).unwrap();
+    assert_eq!(taken.recording.sequence, sequence, "{word}");
+    assert_eq!(refused(&taken.rejected), lines, "{word}");
+}
+
+fn twin(line: i64, id: char, other: i64) -> String {
+    format!("a.csv:{line} duplicate_id: point id `{id}` also stands on line {other}")
 }
 
 const PAIR: &str = r#"
@@ -124,19 +116,30 @@ files:
       z: {column: z, unit: m}
 "#;
 
+fn by_id() -> String {
+    let pair = PAIR.replace("KEY", "point_id");
+    pair.replace("LEFT", "").replace("RIGHT", "") + "join: {by: id}\n"
+}
+
+/// The points of the second file named, joined by order.
+fn by_order() -> String {
+    let pair = PAIR.replace("      KEY: {column: kLEFT}\n", "");
+    pair.replace("KEY", "point_id").replace("RIGHT", "") + "join: {by: order}\n"
+}
+
+fn pair(arm: &str, tracker: &str) -> Desk {
+    Desk::default()
+        .with("run/z_arm.csv", arm)
+        .with("run/b_tracker.csv", tracker)
+}
+
 #[test]
 fn rows_join_by_id_in_the_order_of_the_first_file() {
-    let desk = Desk::default()
-        .with("run/z_arm.csv", "k,q1\nC,3\nA,1\nlost,4\nA2,\nB,2\n")
-        .with(
-            "run/b_tracker.csv",
-            "k,use,x,y,z\nA,fit,1,1,1\nB,,2,2,2\nC,validate,3,3,3\nA2,fit,4,4,4\nmore,fit,5,5,5\n",
-        );
-    let yaml = PAIR
-        .replace("KEY", "point_id")
-        .replace("LEFT", "")
-        .replace("RIGHT", "")
-        + "join: {by: id}\n";
+    let desk = pair(
+        "k,q1\nC,3\nA,1\nlost,4\nA2,\nB,2\n",
+        "k,use,x,y,z\nA,fit,1,1,1\nB,,2,2,2\nC,validate,3,3,3\nA2,fit,4,4,4\nmore,fit,5,5,5\n",
+    );
+    let yaml = by_id();
     let taken = take(&desk, &yaml, robot("r", 2.0)).unwrap();
     let recording = &taken.recording;
     assert_eq!(
@@ -170,19 +173,11 @@ fn a_simulation_joins_as_a_third_file_by_id_by_time_and_by_order() {
       sim_y: {column: y, unit: m}
       sim_z: {column: z, unit: m}
 "#;
-    let desk = |arm: &str, tracker: &str, model: &str| {
-        let desk = Desk::default()
-            .with("run/z_arm.csv", arm)
-            .with("run/b_tracker.csv", tracker);
-        desk.with("sim/model.csv", model)
-    };
+    let desk =
+        |arm: &str, tracker: &str, model: &str| pair(arm, tracker).with("sim/model.csv", model);
     let by = |key: &str, join: &str| {
-        third
-            .replace("KEY", key)
-            .replace("LEFT", "")
-            .replace("RIGHT", "")
-            .replace("THIRD", "")
-            + join
+        let named = third.replace("KEY", key).replace("THIRD", "");
+        named.replace("LEFT", "").replace("RIGHT", "") + join
     };
     let arm = "k,q1\nC,3\nA,1\nB,2\nD,1\n";
     let tracker = "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\n";
@@ -247,12 +242,10 @@ fn a_simulation_joins_as_a_third_file_by_id_by_time_and_by_order() {
 
 #[test]
 fn rows_join_by_time_within_the_tolerance_and_across_clocks() {
-    let desk = Desk::default()
-        .with("run/z_arm.csv", "k,q1\n10,1\n20,2\n30,3\n40,1\n")
-        .with(
-            "run/b_tracker.csv",
-            "k,x,y,z\n31500,3,3,3\n11400,1,1,1\n21600,2,2,2\n46000,4,4,4\n",
-        );
+    let desk = pair(
+        "k,q1\n10,1\n20,2\n30,3\n40,1\n",
+        "k,x,y,z\n31500,3,3,3\n11400,1,1,1\n21600,2,2,2\n46000,4,4,4\n",
+    );
     let yaml = PAIR
         .replace("KEY", "time")
         .replace("kLEFT", "k, unit: s")
@@ -275,17 +268,9 @@ fn rows_join_by_time_within_the_tolerance_and_across_clocks() {
 
 #[test]
 fn rows_join_by_order_and_a_bad_row_takes_its_partner_along() {
-    let desk = Desk::default()
-        .with("run/z_arm.csv", "q1\n1\nbad\n3\n4\n")
-        .with(
-            "run/b_tracker.csv",
-            "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\nD,4,4,4\n,,,\n",
-        );
-    let yaml = PAIR
-        .replace("      KEY: {column: kLEFT}\n", "")
-        .replace("KEY", "point_id")
-        .replace("RIGHT", "");
-    let taken = take(&desk, &(yaml + "join: {by: order}\n"), robot("r", 2.0)).unwrap();
+    let points = "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\nD,4,4,4\n,,,\n";
+    let desk = pair("q1\n1\nbad\n3\n4\n", points);
+    let taken = take(&desk, &by_order(), robot("r", 2.0)).unwrap();
     assert_eq!(taken.recording.point_id, ["A", "C", "D"]);
     assert_eq!(taken.recording.position, [[1.0; 3], [3.0; 3], [4.0; 3]]);
     assert_eq!(
@@ -300,14 +285,8 @@ fn rows_join_by_order_and_a_bad_row_takes_its_partner_along() {
 
 #[test]
 fn files_of_unequal_length_are_not_joined_by_order() {
-    let desk = Desk::default()
-        .with("run/z_arm.csv", "q1\n1\n2\n3\n4\n")
-        .with("run/b_tracker.csv", "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\n");
-    let yaml = PAIR
-        .replace("      KEY: {column: kLEFT}\n", "")
-        .replace("KEY", "point_id")
-        .replace("RIGHT", "");
-    let message = refusal(&desk, &(yaml + "join: {by: order}\n"), robot("r", 2.0));
+    let desk = pair("q1\n1\n2\n3\n4\n", "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\n");
+    let message = refusal(&desk, &by_order(), robot("r", 2.0));
     let expected = "run/b_tracker.csv: 3 data rows, run/z_arm.csv has 4: rows cannot be joined by order; allowed: as many rows in each \
                     file, or `join: {by: id}` or `{by: time, tolerance_s: ...}`";
     assert_eq!(message, expected);
@@ -316,67 +295,30 @@ fn files_of_unequal_length_are_not_joined_by_order() {
 #[test]
 fn of_rows_that_are_copies_of_each_other_one_is_used() {
     let text = "A,1,2,3,4,1\nB,1,2,3,4,2\nA,1.0, 2,3,4,1\nC,1,2,3,4,5\nC,1,2,3,4,6\nC,1,2,3,4,5\nD,1,2,3,4,5\nE,1,2,3,4,5\nF,1,2,3,4,5\n";
-    let used = |word: &str| {
-        let taken = take(&rows(text), &format!("{TWO}duplicates: {word}\n"), rr()).unwrap();
-        let lines = taken
-            .rejected
-            .0
-            .iter()
-            .map(|row| (row.line, row.reason.clone(), row.detail.clone()))
-            .collect::<Vec<_>>();
-        (taken.recording.sequence, lines)
-    };
     let copy = |line: i64, other: i64| {
-        (
-            line,
-            "duplicate_row".to_string(),
-            format!("a copy of line {other}: the same id, the same values"),
-        )
+        format!("a.csv:{line} duplicate_row: a copy of line {other}: the same id, the same values")
     };
-    let twin = |line: i64, other: i64| {
+    let twin = |line, other| twin(line, 'C', other);
+    let all = vec![copy(4, 2), twin(5, 7), twin(6, 5), twin(7, 5)];
+    for (word, sequence, lines) in [
+        ("reject", &[1, 2, 7, 8, 9][..], all),
         (
-            line,
-            "duplicate_id".to_string(),
-            format!("point id `C` also stands on line {other}"),
-        )
-    };
-    assert_eq!(
-        used("reject"),
-        (
-            vec![1, 2, 7, 8, 9],
-            vec![copy(4, 2), twin(5, 7), twin(6, 5), twin(7, 5)]
-        )
-    );
-    assert_eq!(
-        used("first"),
-        (
-            vec![1, 2, 4, 7, 8, 9],
-            vec![copy(4, 2), twin(6, 5), copy(7, 5)]
-        )
-    );
-    assert_eq!(used("keep"), (vec![1, 2, 3, 4, 5, 6, 7, 8, 9], vec![]));
+            "first",
+            &[1, 2, 4, 7, 8, 9],
+            vec![copy(4, 2), twin(6, 5), copy(7, 5)],
+        ),
+        ("keep", &[1, 2, 3, 4, 5, 6, 7, 8, 9], vec![]),
+    ] {
+        of_duplicates(text, word, sequence, &lines);
+    }
 }
 
 #[test]
 fn a_cut_file_is_blamed_for_the_partners_that_it_lacks() {
-    let arm = |rows: usize| {
-        "k,q1\n".to_string()
-            + &(0..rows)
-                .map(|k| format!("P{k},{}\n", k % 3))
-                .collect::<String>()
-    };
-    let points = "k,x,y,z\n".to_string()
-        + &(0..20)
-            .map(|k| format!("P{k},1,{k},1\n"))
-            .collect::<String>();
-    let yaml = PAIR
-        .replace("KEY", "point_id")
-        .replace("LEFT", "")
-        .replace("RIGHT", "")
-        + "join: {by: id}\n";
-    let desk = Desk::default()
-        .with("run/z_arm.csv", arm(5))
-        .with("run/b_tracker.csv", points);
+    let arm: String = (0..5).map(|k| format!("P{k},{}\n", k % 3)).collect();
+    let points: String = (0..20).map(|k| format!("P{k},1,{k},1\n")).collect();
+    let yaml = by_id();
+    let desk = pair(&format!("k,q1\n{arm}"), &format!("k,x,y,z\n{points}"));
     let message = refusal(&desk, &yaml, robot("r", 2.0));
     let expected = "run/z_arm.csv: has partners for 5 of the 20 rows of run/b_tracker.csv, 15 of which are rejected; allowed: up to 50 % \
                     (`max_rejected_fraction`); reasons: 15 unmatched (no partner in run/z_arm.csv)";

@@ -73,26 +73,18 @@ fn of_several_sheets_with_numbers_one_is_named() {
         ("_spare", DATA),
     ];
     let message = refusal(&book(&sheets), &titled(), rr());
-    assert_eq!(
-        message,
-        "a.csv: has numbers in several sheets; say which, `sheet: NAME`; allowed: `One`, `Two`"
-    );
+    let several =
+        "a.csv: has numbers in several sheets; say which, `sheet: NAME`; allowed: `One`, `Two`";
+    assert_eq!(message, several);
     let two = titled().replace("  - file: a.csv\n", "  - file: a.csv\n    sheet: Two\n");
-    assert_eq!(
-        take(&book(&sheets), &two, rr()).unwrap().recording.rows(),
-        3
-    );
-    let three = two.replace("Two", "Three");
-    let message = refusal(&book(&sheets), &three, rr());
-    assert_eq!(
-        message,
-        "a.csv: has no sheet `Three`; allowed: `One`, `Two`, `_spare`"
-    );
+    let taken = take(&book(&sheets), &two, rr()).unwrap();
+    assert_eq!(taken.recording.rows(), 3);
+    let message = refusal(&book(&sheets), &two.replace("Two", "Three"), rr());
+    let absent = "a.csv: has no sheet `Three`; allowed: `One`, `Two`, `_spare`";
+    assert_eq!(message, absent);
     let none = refusal(&book(&[("Notes", "a|b|c\n1|2")]), TWO, rr());
-    assert_eq!(
-        none,
-        "a.csv: has no sheet with rows of numbers; its sheets: `Notes`"
-    );
+    let unread = "a.csv: has no sheet with rows of numbers; its sheets: `Notes`";
+    assert_eq!(none, unread);
     let text = Desk::default().with("a.csv", "id,q1,q2,x,y,z\nP1,1,2,3,4,5\n");
     let message = refusal(&text, &two, rr());
     starts_with(&message, "a.csv: is no workbook, and has no sheet `Two`");
@@ -119,22 +111,21 @@ fn texts_in_cells_keep_quotes_and_lose_line_ends_and_numbers_have_the_stated_mar
 #[test]
 fn what_is_no_workbook_is_refused_in_words() {
     let refused = |content: Vec<u8>| refusal(&Desk::default().with("a.csv", content), TWO, rr());
-    let older = refused(
-        [
-            &[0xd0, 0xcf, 0x11, 0xe0, 0xa1, 0xb1, 0x1a, 0xe1][..],
-            &[0; 600],
-        ]
-        .concat(),
-    );
-    assert_eq!(
-        older,
-        "a.csv: is a workbook of the older kind (.xls), or has a password; allowed: .xlsx, .xlsm, or the sheet saved as CSV"
-    );
-    let other = refused(archive(&[("content.xml", b"<office/>")]));
-    assert_eq!(
-        other,
-        "a.csv: is an archive or a workbook of another kind; allowed: .xlsx, .xlsm, or the sheet saved as CSV"
-    );
+    let older = [0xd0, 0xcf, 0x11, 0xe0, 0xa1, 0xb1, 0x1a, 0xe1].to_vec();
+    for (content, what) in [
+        (
+            [older, vec![0; 600]].concat(),
+            "a workbook of the older kind (.xls), or has a password",
+        ),
+        (
+            archive(&[("content.xml", b"<office/>")]),
+            "an archive or a workbook of another kind",
+        ),
+    ] {
+        let expected =
+            format!("a.csv: is {what}; allowed: .xlsx, .xlsm, or the sheet saved as CSV");
+        assert_eq!(refused(content), expected);
+    }
     let whole = workbook(&[("Data", DATA)]);
     for cut in (8..whole.len()).step_by(97) {
         assert!(
@@ -155,24 +146,21 @@ fn a_workbook_that_unpacks_to_too_much_is_refused_before_it_is_decoded() {
     let refused = |content: Vec<u8>| refusal(&Desk::default().with("a.csv", content), TWO, rr());
     let body = "<worksheet><sheetData/></worksheet>".to_string();
     let long = format!("<sst>{}</sst>", " ".repeat(70 << 20));
-    let message = refused(with_texts(
-        &[("Data", "")],
-        std::slice::from_ref(&body),
-        &long,
-    ));
-    starts_with(
-        &message,
-        "a.csv: is too large at `xl/sharedStrings.xml`; allowed: up to 512 MB unpacked",
-    );
-    let message = refused(with_texts(
-        &[("Data", "")],
-        &[body],
-        r#"<sst uniqueCount="900000000000"></sst>"#,
-    ));
-    starts_with(
-        &message,
-        "a.csv: is damaged: `xl/sharedStrings.xml` says that it has more texts",
-    );
+    let many = r#"<sst uniqueCount="900000000000"></sst>"#;
+    for (texts, expected) in [
+        (
+            long.as_str(),
+            "is too large at `xl/sharedStrings.xml`; allowed: up to 512 MB unpacked",
+        ),
+        (
+            many,
+            "is damaged: `xl/sharedStrings.xml` says that it has more texts",
+        ),
+    ] {
+        let body = std::slice::from_ref(&body);
+        let message = refused(with_texts(&[("Data", "")], body, texts));
+        starts_with(&message, &format!("a.csv: {expected}"));
+    }
     let far = r#"<worksheet><sheetData><row r="1048577"><c r="A1048577"><v>1</v></c><c r="B1048577"><v>1</v></c><c r="C1048577"><v>1</v></c></row></sheetData></worksheet>"#;
     assert!(
         refused(with_texts(&[("Data", "")], &[far.into()], "<sst></sst>")).starts_with("a.csv: ")

@@ -88,27 +88,25 @@ impl Made {
     pub fn path(&self) -> &Path {
         self.folder.path()
     }
-    /// The pipeline holds these, and each in a line that counts.
-    pub fn has(&self, parts: &[&str]) -> &Self {
+    /// Whether each of these stands in a line that counts, or none.
+    fn counts(&self, parts: &[&str], wanted: bool) -> &Self {
+        let lines = self.pipeline.lines();
+        let lines: Vec<&str> = lines
+            .filter(|line| !line.trim_start().starts_with('#'))
+            .collect();
         for part in parts {
-            let there = self
-                .pipeline
-                .lines()
-                .any(|line| line.contains(part) && !line.trim_start().starts_with('#'));
-            assert!(there, "{part} in\n{}", self.pipeline);
+            let there = lines.iter().any(|line| line.contains(part));
+            assert!(there == wanted, "{part} in\n{}", self.pipeline);
         }
         self
     }
+    /// The pipeline holds these, and each in a line that counts.
+    pub fn has(&self, parts: &[&str]) -> &Self {
+        self.counts(parts, true)
+    }
     /// No line that counts holds one of these.
     pub fn lacks(&self, parts: &[&str]) -> &Self {
-        for part in parts {
-            let there = self
-                .pipeline
-                .lines()
-                .any(|line| line.contains(part) && !line.trim_start().starts_with('#'));
-            assert!(!there, "{part} in\n{}", self.pipeline);
-        }
-        self
+        self.counts(parts, false)
     }
     pub fn says(&self, parts: &[&str]) -> &Self {
         for part in parts {
@@ -121,19 +119,14 @@ impl Made {
         let check = calib(self.path(), "check pipeline.yaml");
         let printed = check.err.clone();
         assert!(check.code == Some(0), "{printed}\n{}", self.pipeline);
-        let run = calib(
-            self.path(),
-            "run pipeline.yaml --until split --json --quiet",
-        )
-        .code(0);
-        let run: serde_json::Value = run.json();
-        let stages = run["stages"].as_array().unwrap();
-        let ingest = stages.iter().find(|stage| stage["id"] == "ingest").unwrap();
-        let outputs = ingest["outputs"].as_array().unwrap();
-        let recording = outputs
-            .iter()
-            .find(|output| output["port"] == "recording")
-            .unwrap();
+        let words = "run pipeline.yaml --until split --json --quiet";
+        let run: serde_json::Value = calib(self.path(), words).code(0).json();
+        let named = |list: &serde_json::Value, key: &str, name: &str| {
+            let mut all = list.as_array().unwrap().iter();
+            all.find(|one| one[key] == name).unwrap().clone()
+        };
+        let ingest = named(&run["stages"], "id", "ingest");
+        let recording = named(&ingest["outputs"], "port", "recording");
         assert_eq!(recording["rows"], rows, "{}", self.pipeline);
         self
     }
@@ -190,11 +183,8 @@ fn a_spatial_analyzer_export_with_commas_is_understood_too() {
         "join: {by: id}",
     ]);
     made.lacks(&["// Collection"]).runs(30);
-    let again = calib(
-        made.path(),
-        "run pipeline.yaml --until split --json --quiet",
-    );
-    let again: serde_json::Value = again.json();
+    let words = "run pipeline.yaml --until split --json --quiet";
+    let again: serde_json::Value = calib(made.path(), words).json();
     assert_eq!(again["rejected_rows"], 0, "a line of remarks is no row");
 }
 
