@@ -124,8 +124,7 @@ impl Pairs<'_> {
         let (a, b) = (self.a, self.b);
         let column = &a.columns[at_a];
         let Some(at_b) = counterpart(a, b, at_a, &self.used_b) else {
-            self.findings
-                .push(Discrepancy::new("column", &column.name, "only in A"));
+            self.say("column", column, "only in A");
             return None;
         };
         self.used_b.insert(at_b);
@@ -165,23 +164,19 @@ impl Pairs<'_> {
     /// Says where two columns are stored, or meant, differently.
     fn kinds_apart(&mut self, ours: &TableColumn, theirs: &TableColumn) {
         if ours.stored != theirs.stored {
-            let text = format!(
-                "{} in A, {} in B",
-                shown(&ours.stored),
-                shown(&theirs.stored)
-            );
-            self.findings
-                .push(Discrepancy::new("type", &ours.name, text));
+            let [a, b] = [ours, theirs].map(|column| shown(&column.stored));
+            self.say("type", ours, format!("{a} in A, {b} in B"));
         }
-        if let (Some(our_semantic), Some(semantic)) = (&ours.semantic, &theirs.semantic)
-            && our_semantic != semantic
+        if let (Some(a), Some(b)) = (&ours.semantic, &theirs.semantic)
+            && a != b
         {
-            self.findings.push(Discrepancy::new(
-                "semantic",
-                &ours.name,
-                format!("{our_semantic} in A, {semantic} in B"),
-            ));
+            self.say("semantic", ours, format!("{a} in A, {b} in B"));
         }
+    }
+
+    fn say(&mut self, what: &str, column: &TableColumn, says: impl Into<String>) {
+        let finding = Discrepancy::new(what, &column.name, says);
+        self.findings.push(finding);
     }
 
     /// What makes B's values A's: factor and summand. None where they are of different quantities.
@@ -190,29 +185,23 @@ impl Pairs<'_> {
         (column, ours): (&TableColumn, Option<Unit>),
         (other, theirs): (&TableColumn, Option<Unit>),
     ) -> Option<(f64, f64)> {
-        let mut say = |what: &str, text: String| {
-            self.findings
-                .push(Discrepancy::new(what, &column.name, text))
-        };
         match (ours, theirs) {
             (Some(ours), Some(theirs)) if ours != theirs => {
-                if ours.quantity() != theirs.quantity() {
-                    say(
-                        "unit",
-                        format!("{ours} in A, {theirs} in B: not the same quantity"),
-                    );
+                let same = ours.quantity() == theirs.quantity();
+                let how = match same {
+                    true => format!("; values compared in {ours}"),
+                    false => ": not the same quantity".into(),
+                };
+                self.say("unit", column, format!("{ours} in A, {theirs} in B{how}"));
+                if !same {
                     return None;
                 }
-                say(
-                    "unit",
-                    format!("{ours} in A, {theirs} in B; values compared in {ours}"),
-                );
                 let zero = ours.from_si(theirs.to_si(0.0));
                 Some((ours.from_si(theirs.to_si(1.0)) - zero, zero))
             }
             _ => {
                 if column.name != other.name {
-                    say("column", format!("called {} in B", other.name));
+                    self.say("column", column, format!("called {} in B", other.name));
                 }
                 Some((1.0, 0.0))
             }
@@ -236,12 +225,7 @@ fn known_names(a: &TableFile, b: &TableFile, options: &DiffOptions) -> Result<()
     if options.where_present {
         return Ok(());
     }
-    let columns: Vec<&str> = a
-        .columns
-        .iter()
-        .chain(&b.columns)
-        .map(|column| column.name.as_str())
-        .collect();
+    let columns = [a.names(), b.names()].concat();
     let named = |flag: &'static str, names: &mut dyn Iterator<Item = &String>| -> Result<()> {
         for name in names {
             if !columns.contains(&name.as_str()) {

@@ -185,14 +185,9 @@ fn key_columns(
     }
     let key = if a.key.is_empty() { &b.key } else { &a.key };
     if key.is_empty() {
-        let columns: Vec<&str> = a
-            .columns
-            .iter()
-            .map(|column| column.name.as_str())
-            .collect();
         let message = format!(
             "does not say which columns identify its rows; name them with --key, of: {}",
-            columns.join(", ")
+            a.names().join(", ")
         );
         return Err(Error::spec(a.path.display().to_string(), message));
     }

@@ -128,14 +128,16 @@ impl TableFile {
     /// The place of a column that a key needs.
     pub(crate) fn key_column(&self, name: &str) -> Result<usize> {
         self.position(name).ok_or_else(|| {
-            let known: Vec<&str> = self
-                .columns
-                .iter()
-                .map(|column| column.name.as_str())
-                .collect();
-            let message = format!("no key column `{name}`; its columns: {}", known.join(", "));
+            let known = self.names().join(", ");
+            let message = format!("no key column `{name}`; its columns: {known}");
             Error::spec(self.path.display().to_string(), message)
         })
+    }
+
+    /// Of all columns.
+    pub(crate) fn names(&self) -> Vec<&str> {
+        let names = self.columns.iter();
+        names.map(|column| column.name.as_str()).collect()
     }
 
     /// Batches of the given columns, in the given order, each cast to the type of its kind.

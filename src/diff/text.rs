@@ -61,31 +61,20 @@ fn cell(cell: &WorstCell) -> String {
         }
         other => other.to_string(),
     };
-    let unit = if cell.unit.is_empty() {
-        String::new()
-    } else {
-        format!(" {}", cell.unit)
-    };
-    let mut notes = Vec::new();
-    notes.extend(cell.difference.map(|difference| {
-        format!(
-            "{}{}",
-            if difference > 0.0 { "+" } else { "" },
-            short(difference)
-        )
-    }));
-    notes.extend(cell.sigmas.map(|sigmas| format!("{} sigma", short(sigmas))));
-    let notes = if notes.is_empty() {
-        String::new()
-    } else {
-        format!(" ({})", notes.join(", "))
-    };
-    format!(
-        "{} {} -> {}{unit}{notes}",
-        cell.column,
-        show(&cell.a),
-        show(&cell.b)
-    )
+    let sign = |difference: f64| if difference > 0.0 { "+" } else { "" };
+    let difference = cell.difference;
+    let difference = difference.map(|difference| sign(difference).to_string() + &short(difference));
+    let sigmas = cell.sigmas.map(|sigmas| short(sigmas) + " sigma");
+    let notes: Vec<String> = difference.into_iter().chain(sigmas).collect();
+    let (a, b) = (show(&cell.a), show(&cell.b));
+    let mut text = format!("{} {a} -> {b}", cell.column);
+    if !cell.unit.is_empty() {
+        text += &format!(" {}", cell.unit);
+    }
+    if !notes.is_empty() {
+        text += &format!(" ({})", notes.join(", "));
+    }
+    text
 }
 
 /// Three significant digits.

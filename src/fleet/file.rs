@@ -3,9 +3,9 @@
 //! One robot of a fleet: its name, its groups and what it sets in the pipeline.
 
 use crate::error::{Error, Fault, Result};
-use crate::pipeline::{Override, misnamed, trouble_at};
+use crate::pipeline::{Override, misnamed, sort_by_place, trouble_at, unreadable_text};
 use crate::raw;
-use crate::yaml::{self, Mark, Node, Trouble, typed};
+use crate::yaml::{self, Node, Trouble, typed};
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::{Deserialize, Serialize};
@@ -171,7 +171,7 @@ impl FleetFile {
     /// Reads the file; fails with every fault at once.
     pub fn load(path: &Path) -> Result<(Self, Node)> {
         let label = path.display().to_string();
-        let text = raw::text(path).map_err(|error| Error::spec(&label, unreadable(&error)))?;
+        let text = raw::text(path).map_err(|error| Error::spec(&label, unreadable_text(&error)))?;
         let (tree, mut troubles) = yaml::parse(&text);
         if let Some(tree) = tree {
             match typed::<Self>(&tree) {
@@ -258,27 +258,16 @@ pub(super) fn pipeline_text(path: &Path, tree: &Node, pipeline: &Path) -> Result
         let message = format!(
             "`{}`: {} (relative to this file)",
             pipeline.display(),
-            unreadable(&error)
+            unreadable_text(&error)
         );
         let trouble = trouble_at(tree, "pipeline", message);
         Error::Spec(vec![trouble.fault(&path.display().to_string())])
     })
 }
 
-fn unreadable(error: &std::io::Error) -> String {
-    match error.kind() {
-        std::io::ErrorKind::NotFound => "no such file".into(),
-        std::io::ErrorKind::InvalidData => "not a text file: expected YAML in UTF-8".into(),
-        _ => error.to_string(),
-    }
-}
-
 /// All faults of the file, in its order.
 pub(super) fn faulty(label: &str, mut troubles: Vec<Trouble>) -> Error {
-    troubles.sort_by_key(|trouble| match trouble.mark {
-        Some(Mark::Line { line, column }) => (line, column),
-        _ => (u64::MAX, 0),
-    });
+    sort_by_place(&mut troubles);
     let faults: Vec<Fault> = troubles
         .into_iter()
         .map(|trouble| trouble.fault(label))

@@ -1,8 +1,8 @@
 //! Records -> the fleet's tables and page, published as any other: equal records give equal tables.
 
 use super::Fleet;
+use super::earlier::{Earlier, with_limits};
 use super::ledger::{Ending, Ledger, RobotRecord};
-use super::recalibration;
 use crate::error::Result;
 use crate::report::fleet as page;
 use crate::table::{
@@ -33,7 +33,7 @@ pub(crate) fn publish(
     ledger: &Ledger,
     records: &[Option<RobotRecord>],
 ) -> Result<FleetSummary> {
-    let earlier = recalibration::Earlier::find(fleet, ledger)?;
+    let earlier = Earlier::find(fleet, ledger)?;
     let read: Vec<Read> = records
         .par_iter()
         .map(|record| Read::of(ledger, record.as_ref()))
@@ -46,7 +46,7 @@ pub(crate) fn publish(
         .previous
         .as_ref()
         .map_or(1.0, |previous| previous.alpha);
-    let changes = recalibration::with_limits(&changes, alpha);
+    let changes = with_limits(&changes, alpha);
     let mut flagged: BTreeMap<&str, Vec<&FleetChangeRow>> = BTreeMap::new();
     for change in changes.0.iter().filter(|change| change.flagged) {
         flagged.entry(&change.robot).or_default().push(change);

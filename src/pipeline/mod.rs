@@ -4,7 +4,6 @@ mod look;
 mod manifest;
 mod overrides;
 pub(crate) mod plan;
-mod reason;
 mod run;
 mod run_state;
 mod schema;
@@ -14,16 +13,15 @@ mod spec;
 #[cfg(test)]
 mod tests;
 
-pub use look::{Forecast, Prospect, checked_plan, look, preview};
+pub use look::{Forecast, KeyChange, Prospect, changes_of, checked_plan, look, preview};
 pub use manifest::{
     Host, Manifest, OutputRecord, Purpose, RunOptions, RunStatus, StageReport, StageStatus,
     Surroundings, Tool, find_run,
 };
 pub use overrides::Override;
 pub use plan::{Plan, Selection};
-pub use reason::{KeyChange, changes_of};
 pub use run::{CompletedRun, run};
 pub use schema::json_schema;
 pub use services::{Interrupted, Observer, Unwatched};
 pub use services::{StageCall, StageTables, run_in_memory};
-pub(crate) use spec::{misnamed, trouble_at};
+pub(crate) use spec::{misnamed, sort_by_place, trouble_at, unreadable_text};

@@ -62,18 +62,8 @@ impl Plan {
         stages: &'static [StageEntry],
     ) -> Result<Self> {
         let label = file.display().to_string();
-        let text = raw::bytes(file).map_err(|error| {
-            Error::spec(
-                &label,
-                if error.kind() == std::io::ErrorKind::NotFound {
-                    "no such file".into()
-                } else {
-                    error.to_string()
-                },
-            )
-        })?;
-        let text = String::from_utf8(text)
-            .map_err(|_| Error::spec(&label, "not a text file: expected YAML in UTF-8"))?;
+        let text = raw::text(file);
+        let text = text.map_err(|error| Error::spec(label, spec::unreadable_text(&error)))?;
         Self::parse(file, text, overrides, stages)
     }
 

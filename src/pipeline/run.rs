@@ -13,7 +13,7 @@ use super::manifest::{
 use super::plan::{Plan, Selected};
 use super::run_state::{self, KeyState, RunState};
 use super::services::{Interrupted, Observer, StageServices, label};
-use super::{overrides, reason, spec::trouble_at};
+use super::{look, overrides, spec::trouble_at};
 use crate::error::{Error, Fault, Result};
 use crate::stage::{Context, InputTable, Output, Port, Streamed};
 use crate::store::key::canonical;
@@ -153,7 +153,7 @@ impl Running<'_> {
         }
         let reason = match self.among_many() {
             true => "a robot of a fleet".into(),
-            false => reason::why(self.store, plan, &key, &found, forced)?,
+            false => look::why(self.store, plan, &key, &found, forced)?,
         };
         let id = &plan.stages[index].id;
         let mut waiting = || {

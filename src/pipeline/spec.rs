@@ -159,10 +159,7 @@ pub(super) fn read(
 impl Draft {
     /// All faults, those of the file in its order; nothing where it is sound.
     pub(crate) fn all_faults(&mut self, file: &str) -> Vec<Fault> {
-        self.troubles.sort_by_key(|trouble| match trouble.mark {
-            Some(Mark::Line { line, column }) => (line, column),
-            _ => (u64::MAX, 0),
-        });
+        sort_by_place(&mut self.troubles);
         let mut seen = BTreeSet::new();
         let mut faults = std::mem::take(&mut self.faults);
         let troubles = self
@@ -171,6 +168,23 @@ impl Draft {
             .filter(|trouble| seen.insert((trouble.path.clone(), trouble.message.clone())));
         faults.extend(troubles.map(|trouble| trouble.fault(file)));
         faults
+    }
+}
+
+/// Troubles in the order of the file.
+pub(crate) fn sort_by_place(troubles: &mut [Trouble]) {
+    troubles.sort_by_key(|trouble| match trouble.mark {
+        Some(Mark::Line { line, column }) => (line, column),
+        _ => (u64::MAX, 0),
+    });
+}
+
+/// Why there is no text of YAML in a file.
+pub(crate) fn unreadable_text(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => "no such file".into(),
+        std::io::ErrorKind::InvalidData => "not a text file: expected YAML in UTF-8".into(),
+        _ => error.to_string(),
     }
 }
 

@@ -2,7 +2,6 @@
 
 mod browser;
 mod causes;
-mod engines;
 mod killed;
 mod names;
 mod recalibrated;

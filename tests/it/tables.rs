@@ -1,11 +1,17 @@
 //! Every table kind: one schema, and a round trip through the store for no row, one row and extreme values.
+//!
+//! The JSON Schema of the YAML files: what editors complete from.
 
-use crate::answer::{has, root};
+use crate::answer::{has, read, root};
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, Int64Array, StringArray};
+use calib::pipeline::json_schema;
+use calib::stage::STAGES;
 use calib::store::frame::{Frame, FrameBuilder};
 use calib::store::schema::{self, ColumnType, FieldSchema};
 use calib::store::{Account, PendingTable, Store};
 use calib::table::{self, Table};
+use std::collections::BTreeSet;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::store::key;
@@ -289,4 +295,66 @@ fn duckdb_pandas_pyarrow_and_polars_read_every_table_with_its_units_and_key() {
         + &String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{printed}");
     has(&printed, &format!("{} tables read alike", 2 * KINDS.len()));
+}
+
+#[test]
+fn the_schema_in_the_repository_is_that_of_the_code() {
+    let path = root("schemas/pipeline.v1.schema.json");
+    let kept = read(&path);
+    assert!(
+        kept == json_schema(STAGES),
+        "out of date; make it anew with: cargo run -- schema pipeline > schemas/pipeline.v1.schema.json"
+    );
+}
+
+#[test]
+fn every_stage_is_registered_once_and_documented() {
+    let names: BTreeSet<&str> = STAGES.iter().map(|entry| entry.name).collect();
+    assert_eq!(names.len(), STAGES.len());
+    for entry in STAGES {
+        assert!(
+            !entry.summary.is_empty() && entry.implementation > 0,
+            "{}",
+            entry.name
+        );
+        for port in (entry.reads)().iter().chain(&(entry.writes)()) {
+            assert!(
+                calib::table::TABLES.contains(&port.kind),
+                "{}: no table `{}`",
+                entry.name,
+                port.kind
+            );
+        }
+    }
+}
+
+#[test]
+fn every_stage_is_in_the_list() {
+    let folders = ["src/stage", "src/stage/ingest"].map(root);
+    let entries = folders
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(folder).unwrap());
+    let files = entries
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.is_file());
+    let declared = |path: PathBuf| {
+        let text = read(path);
+        text.matches("\nimpl Stage for ").count()
+    };
+    let stages: usize = files.map(declared).sum();
+    assert_eq!(
+        stages,
+        STAGES.len(),
+        "a stage is missing in STAGES (src/stage/mod.rs)"
+    );
+}
+
+#[test]
+fn the_schema_of_fleet_files_is_that_of_their_type() {
+    let file = root("schemas/fleet.v1.schema.json");
+    let fresh = calib::fleet::file::json_schema();
+    assert!(
+        read(file) == fresh,
+        "run: calib schema fleet > schemas/fleet.v1.schema.json"
+    );
 }
