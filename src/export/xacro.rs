@@ -36,15 +36,15 @@ fn text(export: &Export) -> Result<String> {
         let is = move |source: &&PathBuf| wanted.contains(&ending(source).as_str());
         sources.iter().filter(is)
     };
-    let own = with_ending(["urdf", "xml"]).next().ok_or_else(|| {
+    let description = with_ending(["urdf", "xml"]).next().ok_or_else(|| {
         let message = "no URDF stands behind this model; allowed: a robot file with `kinematics: {urdf: ...}`, or --format urdf, which writes a whole arm";
         Error::data(&export.identified.origin, message)
     })?;
-    let label = own.display().to_string();
+    let label = description.display().to_string();
     let read = |path: &PathBuf| {
         raw::text(path).map_err(|error| Error::unreadable(path.display().to_string(), &error))
     };
-    let urdf = read(own)?;
+    let urdf = read(description)?;
     let mut base = None;
     for file in with_ending(["yaml", "yml"]) {
         let tree = yaml::parse(&read(file)?).0;
@@ -61,7 +61,7 @@ fn text(export: &Export) -> Result<String> {
     let mut remarks = export.remarks_in(&XACRO);
     remarks.push(format!(
         "in {}: include this file, and in each joint below have",
-        own.file_name().unwrap_or_default().to_string_lossy()
+        description.file_name().unwrap_or_default().to_string_lossy()
     ));
     remarks.push("<xacro:calib_origin joint=\"NAME\"/> in the place of its <origin .../>".into());
     remarks.push(origins.tool.clone());

@@ -1,7 +1,8 @@
 //! The twin beyond the library: instruments, memory and interactions against numbers worked out by hand, the set that is drawn from them,
 //! and the library's set, which stays as it was.
 
-use calib::twin::arm::{Arm, Row};
+use crate::twin::{ARCSEC, assert_near, row};
+use calib::twin::arm::Arm;
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
 use calib::twin::conceal::family::{BEYOND, Collection};
@@ -13,26 +14,8 @@ use calib::twin::effect::{
 use calib::twin::matrix::IDENTITY;
 use calib::twin::memory::{Moment, past};
 use calib::twin::plan::Point;
-use calib::twin::recorder::Shot;
-use calib::twin::recorder::{Equilibrium, settle, sighted};
+use calib::twin::recorder::{Equilibrium, Shot, settle, sighted};
 use calib::twin::truth::TrueRobot;
-use std::f64::consts::PI;
-
-const ARCSEC: f64 = PI / 648_000.0;
-
-fn row(q: &[f64], memory: Vec<f64>) -> Row {
-    let (command, drive, direction) = (q.to_vec(), q.to_vec(), vec![1.0; q.len()]);
-    Row {
-        command,
-        drive,
-        direction,
-        time_s: 0.0,
-        temperature_c: 20.0,
-        payload_kg: 0.0,
-        velocity: Vec::new(),
-        memory,
-    }
-}
 
 /// Moves of one joint, deg, 100 s apart, at a temperature that rises by 1 K from one to the next.
 fn moves(travels_deg: &[f64]) -> Vec<Moment> {
@@ -49,16 +32,6 @@ fn remembered(effect: Physical, past: &[Moment]) -> Vec<f64> {
         .into_iter()
         .map(|memory| memory[0])
         .collect()
-}
-
-fn assert_near(found: &[f64], expected: &[f64], within: f64) {
-    assert_eq!(found.len(), expected.len());
-    let apart = found
-        .iter()
-        .zip(expected)
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f64::max);
-    assert!(apart <= within, "{found:?} is {apart} from {expected:?}");
 }
 
 /// Two travels up leave 1 - exp(-2); half a travel back brings -1 + (1 + that) exp(-1/2); a joint that stays keeps what it had.
@@ -83,7 +56,7 @@ fn maxwells_elements_slip_one_after_another() {
 /// The arm of five joints at its zero pose under effects of this memory.
 fn settled(memory: Vec<f64>, effects: &[Physical]) -> Equilibrium {
     let arm = Arm::new(&Kind::Five5r.description([0.0; 3]), &TrueRobot::default());
-    settle(&arm, &row(&[0.0; 5], memory), effects)
+    settle(&arm, &row(&[0.0; 5], 0.0, memory), effects)
 }
 
 /// An arcsec of zero per unit of warmth, which saturates at `full`.
@@ -173,7 +146,7 @@ fn an_instrument_errs_in_range_azimuth_and_elevation_about_its_own_origin() {
         (ranges(75.0, 0.0, 1.0), along, farther, 1e-12),
         (ranges(0.0, 100.0, 0.0), along, farther, 1e-12),
     ] {
-        let found = effect.sight(&row(&[0.0], vec![0.0]), 0.0, point);
+        let found = effect.sight(&row(&[0.0], 0.0, vec![0.0]), 0.0, point);
         assert_near(&found, &expected, within);
     }
 }
@@ -185,7 +158,7 @@ fn warm_air_stretches_ranges_after_the_arm_has_settled() {
     let effects = [Presliding::effect(1, 0.0, 1.0, vec![]), air];
     let memory = recall(&effects, &moves(&[0.0; 5])).pop().unwrap();
     let found = settled(memory.clone(), &effects);
-    let seen = sighted(&found, &IDENTITY, &row(&[0.0; 5], memory), &effects);
+    let seen = sighted(&found, &IDENTITY, &row(&[0.0; 5], 0.0, memory), &effects);
     let expected = [1.010, 0.0, 1.130].map(|metres| metres * (1.0 + 5e-6));
     assert_near(&seen, &expected, 1e-12);
 }

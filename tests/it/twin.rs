@@ -16,7 +16,7 @@ use calib::twin::tracker::{Beam, Scatter, Tracker};
 use calib::twin::truth::{CouplingError, LinkError, TrueRobot};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-const ARCSEC: f64 = PI / 648_000.0;
+pub const ARCSEC: f64 = PI / 648_000.0;
 
 pub fn sr210d() -> RobotDescription {
     let path = root("pipelines/sr210d/robot.yaml");
@@ -50,17 +50,16 @@ fn lever() -> RobotDescription {
     }
 }
 
-fn row(q: &[f64], payload_kg: f64) -> Row {
-    let direction = vec![1.0; q.len()];
-    let (velocity, memory) = (Vec::new(), Vec::new());
+/// A row of an arm that stands, with what effects make of the rows before.
+pub fn row(q: &[f64], payload_kg: f64, memory: Vec<f64>) -> Row {
     Row {
         command: q.to_vec(),
         drive: q.to_vec(),
-        direction,
+        direction: vec![1.0; q.len()],
         time_s: 0.0,
         temperature_c: 20.0,
         payload_kg,
-        velocity,
+        velocity: Vec::new(),
         memory,
     }
 }
@@ -71,11 +70,8 @@ fn settled(
     q: &[f64],
     payload_kg: f64,
 ) -> Equilibrium {
-    settle(
-        &Arm::new(robot, &TrueRobot::default()),
-        &row(q, payload_kg),
-        effects,
-    )
+    let arm = Arm::new(robot, &TrueRobot::default());
+    settle(&arm, &row(q, payload_kg, vec![]), effects)
 }
 
 fn tool_mm(robot: &RobotDescription, truth: &TrueRobot, q: &[f64]) -> [f64; 3] {
@@ -85,10 +81,11 @@ fn tool_mm(robot: &RobotDescription, truth: &TrueRobot, q: &[f64]) -> [f64; 3] {
         .map(|x| 1e3 * x)
 }
 
-fn assert_near(found: [f64; 3], expected: [f64; 3], within: f64) {
-    let apart = (0..3)
-        .map(|i| (found[i] - expected[i]).abs())
-        .fold(0.0, f64::max);
+pub fn assert_near(found: impl AsRef<[f64]>, expected: impl AsRef<[f64]>, within: f64) {
+    let (found, expected) = (found.as_ref(), expected.as_ref());
+    assert_eq!(found.len(), expected.len());
+    let pairs = found.iter().zip(expected);
+    let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(apart <= within, "{found:?} is {apart} from {expected:?}");
 }
 
@@ -432,7 +429,7 @@ fn currents_carry_the_load_in_the_controllers_sign() {
     for index in 0..recording.rows() {
         let q = recording.q(index);
         let payload = recording.payload.as_ref().unwrap()[index];
-        let mut row = row(q, payload);
+        let mut row = row(q, payload, vec![]);
         row.drive = settings.truth.drive(&robot, q);
         let found = settle(&arm, &row, &[spring(2, 1.89e-5), spring(3, 2.49e-5)]);
         for (joint, factor) in [(1, 1.89e-5), (2, -2.49e-5)] {

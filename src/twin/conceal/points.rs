@@ -62,6 +62,7 @@ pub fn plan(
 ) -> Result<Vec<Point>, String> {
     let robot = kind.description([0.0; 3]);
     let [floor_mm, clearance_mm] = kind.room_mm();
+    let ranges = ranges_deg.iter().map(|range| range.map(f64::to_radians));
     let cell = Cell {
         arm: Arm::new(&robot, &TrueRobot::default()),
         poses: Poses {
@@ -70,9 +71,7 @@ pub fn plan(
             clearance_mm,
             candidates: 1,
         },
-        ranges: (ranges_deg.iter())
-            .map(|range| range.map(f64::to_radians))
-            .collect(),
+        ranges: ranges.collect(),
     };
     let mut draw = Noise::new(seed, Purpose::Poses);
     let mut clock = Noise::new(seed, Purpose::Clock);
@@ -107,12 +106,10 @@ pub fn plan(
                     None => cell.pose(near.as_ref().unwrap_or(&cell.ranges), &mut draw)?,
                 };
                 let shown = |angle: f64| (angle.to_degrees() / STEP_DEG).round() * STEP_DEG;
-                q.iter_mut()
-                    .for_each(|angle| *angle = shown(*angle).to_radians());
-                (
-                    q,
-                    last.map_or_else(|| vec![0.0; cell.ranges.len()], Vec::clone),
-                )
+                let angles = q.iter_mut();
+                angles.for_each(|angle| *angle = shown(*angle).to_radians());
+                let zero = || vec![0.0; cell.ranges.len()];
+                (q, last.cloned().unwrap_or_else(zero))
             }
         };
         out.push(Point {
@@ -145,10 +142,9 @@ impl Cell {
     /// The part of the ranges that a short move reaches, rad.
     fn around(&self, q: &[f64], draw: &mut Noise) -> Vec<[f64; 2]> {
         let away = draw.size(SHORT_DEG[0], SHORT_DEG[1]).to_radians();
-        let joints = q.iter().zip(&self.ranges);
-        joints
-            .map(|(q, [low, high])| [(q - away).max(*low), (q + away).min(*high)])
-            .collect()
+        let near =
+            |(q, [low, high]): (&f64, &[f64; 2])| [(q - away).max(*low), (q + away).min(*high)];
+        q.iter().zip(&self.ranges).map(near).collect()
     }
 
     /// Poses (rad) in order of measurement, each of `blocks` shuffled by itself; none where every pose is drawn anew. Ends and bends of the
@@ -177,10 +173,8 @@ impl Cell {
             from = to;
         }
         out.truncate(count);
-        if layout == Layout::Shuffled {
-            blocks
-                .iter()
-                .for_each(|block| draw.shuffle(&mut out[block.clone()]));
+        for block in blocks.iter().filter(|_| layout == Layout::Shuffled) {
+            draw.shuffle(&mut out[block.clone()]);
         }
         Ok(out)
     }
@@ -188,8 +182,7 @@ impl Cell {
 
 /// A parabola from one pose to another, straight where `bend` is midway (Bezier).
 fn curve(from: &[f64], bend: &[f64], to: &[f64], u: f64) -> Vec<f64> {
+    let at = |a: f64, b: f64, c: f64| (1.0 - u).powi(2) * a + 2.0 * u * (1.0 - u) * b + u * u * c;
     let joints = from.iter().zip(bend).zip(to);
-    joints
-        .map(|((a, b), c)| (1.0 - u).powi(2) * a + 2.0 * u * (1.0 - u) * b + u * u * c)
-        .collect()
+    joints.map(|((a, b), c)| at(*a, *b, *c)).collect()
 }

@@ -31,13 +31,10 @@ impl Site<'_> {
         let (still, base) = (Motion::none(arm.links.len()), tracker.base());
         let rows = self.points.iter().flat_map(|point| {
             let mut q = point.q.clone();
-            effects
-                .iter()
-                .for_each(|effect| effect.log(&mut q, &point.before));
-            matrix::place(
-                &base,
-                arm.posture(&truth.drive(self.robot, &q), &still).tool,
-            )
+            let logs = effects.iter();
+            logs.for_each(|effect| effect.log(&mut q, &point.before));
+            let posture = arm.posture(&truth.drive(self.robot, &q), &still);
+            matrix::place(&base, posture.tool)
         });
         rows.collect()
     }
@@ -50,14 +47,12 @@ impl Site<'_> {
         let mut arm = Arm::new(self.robot, self.truth);
         effects.iter().for_each(|effect| effect.shape(&mut arm));
         let memories = effect::recall(effects, &memory::past(self.points));
-        self.points
-            .iter()
-            .zip(memories)
-            .map(move |(point, memory)| {
-                let row = point.row(self.truth.drive(self.robot, &point.q), memory);
-                let settled = settle(&arm, &row, effects);
-                (row, settled)
-            })
+        let points = self.points.iter().zip(memories);
+        points.map(move |(point, memory)| {
+            let row = point.row(self.truth.drive(self.robot, &point.q), memory);
+            let settled = settle(&arm, &row, effects);
+            (row, settled)
+        })
     }
 
     /// What the tracker sees with effects, less what it would see without them of the joints as logged.
@@ -105,7 +100,7 @@ impl Site<'_> {
     /// Central differences by every number of geometry, gears, couplings and the tracker's pose.
     fn geometry(&self) -> Vec<Column> {
         let mut out = Vec::new();
-        let mut push = |change: &dyn Fn(&mut TrueRobot, &mut Tracker, f64), step: f64| {
+        let mut push = |step: f64, change: &dyn Fn(&mut TrueRobot, &mut Tracker, f64)| {
             let at = |side: f64| {
                 let (mut truth, mut tracker) = (self.truth.clone(), self.tracker.clone());
                 change(&mut truth, &mut tracker, side * step);
@@ -117,31 +112,27 @@ impl Site<'_> {
         };
         // Steps of about 1e-5 rad or m: truncation and rounding are both about 1e-10 of the difference.
         for joint in 0..self.robot.joints.len() {
-            push(
-                &|truth, _, by| truth.offset_deg[joint] += by.to_degrees(),
-                1e-5,
-            );
-            push(&|truth, _, by| truth.ratio[joint] += by, 1e-5);
+            push(1e-5, &|truth, _, by| {
+                truth.offset_deg[joint] += by.to_degrees()
+            });
+            push(1e-5, &|truth, _, by| truth.ratio[joint] += by);
             for axis in 0..3 {
-                push(
-                    &|truth, _, by| truth.links[joint].shift_mm[axis] += by,
-                    0.01,
-                );
-                push(
-                    &|truth, _, by| truth.links[joint].tilt_arcsec[axis] += by,
-                    2.0,
-                );
+                push(0.01, &|truth, _, by| {
+                    truth.links[joint].shift_mm[axis] += by
+                });
+                push(2.0, &|truth, _, by| {
+                    truth.links[joint].tilt_arcsec[axis] += by
+                });
             }
         }
         for coupling in 0..self.truth.couplings.len() {
-            push(&|truth, _, by| truth.couplings[coupling].error += by, 1e-5);
+            push(1e-5, &|truth, _, by| truth.couplings[coupling].error += by);
         }
         for axis in 0..3 {
-            push(&|_, tracker, by| tracker.position_mm[axis] += by, 0.01);
-            push(
-                &|_, tracker, by| tracker.roll_pitch_yaw_deg[axis] += by,
-                0.0005,
-            );
+            push(0.01, &|_, tracker, by| tracker.position_mm[axis] += by);
+            push(0.0005, &|_, tracker, by| {
+                tracker.roll_pitch_yaw_deg[axis] += by
+            });
         }
         out
     }

@@ -196,13 +196,8 @@ fn declared(kind: Kind, noise: &mut Noise) -> RobotDescription {
     let mut robot = kind.description([0.0; 3]);
     robot.payload_mass =
         (robot.payload_mass * noise.uniform(CARRIED[0], CARRIED[1]) * 10.0).round() / 10.0;
-    let ends = robot
-        .joints
-        .iter()
-        .skip(1)
-        .map(|joint| joint.point)
-        .chain([robot.tool])
-        .collect::<Vec<_>>();
+    let ends = robot.joints.iter().skip(1).map(|joint| joint.point);
+    let ends = ends.chain([robot.tool]);
     let links = robot.joints.iter().zip(ends).map(|(joint, end)| {
         let span = matrix::minus(end, joint.point);
         Some(rod(joint.mass.unwrap_or(0.0), span))

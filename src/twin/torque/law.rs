@@ -250,10 +250,8 @@ fn sign(v: f64, width: f64) -> f64 {
 
 /// A sum of waves (rate, phase, share).
 fn curve(waves: &[[f64; 3]], x: f64) -> f64 {
-    waves
-        .iter()
-        .map(|[rate, phase, share]| share * (rate * x + phase).sin())
-        .sum()
+    let wave = |[rate, phase, share]: &[f64; 3]| share * (rate * x + phase).sin();
+    waves.iter().map(wave).sum()
 }
 
 impl Bristles {

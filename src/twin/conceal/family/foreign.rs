@@ -9,6 +9,7 @@ use crate::effect::{
 use crate::matrix::{self, Vector};
 use crate::noise::Noise;
 use ForeignMotion::*;
+use ForeignVariable::*;
 use std::f64::consts::TAU;
 
 /// Motions, evenly drawn: a joint's shift is along its axis or across it.
@@ -33,8 +34,8 @@ pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
     let mut courses = vec![course(bench, motion, seat, &[], draw)];
     let alone = match &courses[0].over {
         // Those alone are a gap and a payload: names of the list.
-        ForeignVariable::Approach(number) => motion != JointTurn || *number != seat,
-        ForeignVariable::Payload => false,
+        Approach(number) => motion != JointTurn || *number != seat,
+        Payload => false,
         _ => true,
     };
     if !alone || draw.chance(PRODUCTS) {
@@ -48,13 +49,9 @@ pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
         .collect();
     let form = form(&courses);
     // Time only goes on, and so does the temperature of these recordings: what jumps with them does so once and for good.
+    let jumps = |one: &ForeignCourse| matches!(one.shape, ForeignShape::Jumps(_));
     let is_step = match &courses[..] {
-        [one] => {
-            matches!(
-                one.over,
-                ForeignVariable::Time | ForeignVariable::Temperature
-            ) && matches!(one.shape, ForeignShape::Jumps(_))
-        }
+        [one] => matches!(one.over, Time | Temperature) && jumps(one),
         _ => false,
     };
     let effect = Physical::Foreign(Foreign {
@@ -133,10 +130,7 @@ fn course(
         if others.iter().any(taken) {
             continue;
         }
-        let two_values = matches!(
-            over,
-            ForeignVariable::Approach(_) | ForeignVariable::Payload
-        );
+        let two_values = matches!(over, Approach(_) | Payload);
         let shape = if two_values {
             ForeignShape::Straight
         } else {
@@ -171,35 +165,32 @@ fn variable(
     let spans = (0..bench.joints()).map(|index| matrix::norm(bench.line(index)));
     let reach: f64 = spans.sum();
     match draw.index(11) {
-        0..=2 => (ForeignVariable::Angle(number), range),
-        3 => (ForeignVariable::Approach(number), [-1.0, 1.0]),
-        4 => (
-            ForeignVariable::LastMove(number),
-            [-0.7 * width, 0.7 * width],
-        ),
+        0..=2 => (Angle(number), range),
+        3 => (Approach(number), [-1.0, 1.0]),
+        4 => (LastMove(number), [-0.7 * width, 0.7 * width]),
         5 if !instrument => {
             let loaded = bench.loaded();
             let number = loaded.get(draw.index(loaded.len())).copied().unwrap_or(1);
             (
-                ForeignVariable::Load(number),
+                Load(number),
                 [-bench.peak[number - 1], bench.peak[number - 1]],
             )
         }
-        6 => (ForeignVariable::Payload, [0.0, bench.robot.payload_mass]),
-        7 => (ForeignVariable::Temperature, WARMTH_C),
+        6 => (Payload, [0.0, bench.robot.payload_mass]),
+        7 => (Temperature, WARMTH_C),
         8 => {
             let far = if instrument { 2.0 * reach } else { reach };
-            (ForeignVariable::Space(draw.vector(1.0, 1.0)), [-far, far])
+            (Space(draw.vector(1.0, 1.0)), [-far, far])
         }
         9 => (
-            ForeignVariable::Relaxing(number, draw.size(10.0, 120.0)),
+            Relaxing(number, draw.size(10.0, 120.0)),
             [-0.7 * width, 0.7 * width],
         ),
         10 => {
             let limit = draw.uniform(0.05, 0.4) * width;
-            (ForeignVariable::Slipping(number, limit), [-limit, limit])
+            (Slipping(number, limit), [-limit, limit])
         }
-        _ => (ForeignVariable::Time, [0.0, bench.end_s]),
+        _ => (Time, [0.0, bench.end_s]),
     }
 }
 
@@ -210,17 +201,11 @@ fn shape(draw: &mut Noise) -> ForeignShape {
             // Random Fourier features of a Gaussian process with a squared exponential kernel.
             let length = draw.size(LENGTHS[0], LENGTHS[1]);
             let amplitude = (2.0 / WAVES as f64).sqrt();
-            ForeignShape::Smooth(
-                (0..WAVES)
-                    .map(|_| {
-                        [
-                            amplitude * draw.normal(),
-                            draw.normal() / length,
-                            draw.uniform(0.0, TAU),
-                        ]
-                    })
-                    .collect(),
-            )
+            let mut wave = || {
+                let (size, rate) = (amplitude * draw.normal(), draw.normal() / length);
+                [size, rate, draw.uniform(0.0, TAU)]
+            };
+            ForeignShape::Smooth((0..WAVES).map(|_| wave()).collect())
         }
         2 => {
             let inner = 1 + draw.index(3);
@@ -245,9 +230,9 @@ fn points(fixed: &[f64], inner: usize, draw: &mut Noise) -> Vec<[f64; 2]> {
 /// What nobody can see without.
 fn column(over: &ForeignVariable) -> Option<Column> {
     match over {
-        ForeignVariable::Approach(_) => Some(Column::Direction),
-        ForeignVariable::Time | ForeignVariable::Relaxing(..) => Some(Column::Time),
-        ForeignVariable::Temperature => Some(Column::Temperature),
+        Approach(_) => Some(Column::Direction),
+        Time | Relaxing(..) => Some(Column::Time),
+        Temperature => Some(Column::Temperature),
         _ => None,
     }
 }
