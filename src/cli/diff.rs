@@ -141,33 +141,17 @@ fn execute(arguments: &DiffArguments) -> Result<u8> {
     } else {
         emit(&(run_diff(&diff, &rivals, arguments.stat) + &line(counting.as_deref())))?;
     }
+    let tables = diff.tables.iter();
+    let tables = tables.filter_map(|table| Some((table.name.clone(), table.diff.clone()?)));
+    let tables: Vec<(String, TableDiff)> = tables.collect();
     if let Some(path) = &arguments.html {
         let text = run_diff(&diff, &rivals, true);
-        let notes: Vec<String> = text
-            .lines()
-            .filter(|line| !line.is_empty())
-            .map(String::from)
-            .collect();
-        let tables: Vec<(String, TableDiff)> = diff
-            .tables
-            .iter()
-            .filter_map(|table| Some((table.name.clone(), table.diff.clone()?)))
-            .collect();
-        write(
-            path,
-            &diff::html(
-                &format!("runs {} and {}", diff.a.run, diff.b.run),
-                &notes,
-                &tables,
-            )?,
-        )?;
+        let notes = text.lines().filter(|line| !line.is_empty());
+        let notes: Vec<String> = notes.map(String::from).collect();
+        let title = format!("runs {} and {}", diff.a.run, diff.b.run);
+        write(path, &diff::html(&title, &notes, &tables)?)?;
     }
-    let duplicates: u64 = diff
-        .tables
-        .iter()
-        .filter_map(|table| table.diff.as_ref())
-        .map(TableDiff::duplicates)
-        .sum();
+    let duplicates = tables.iter().map(|(_, diff)| diff.duplicates()).sum();
     Ok(code(diff.is_same(), duplicates, arguments))
 }
 
@@ -251,31 +235,17 @@ fn place(store: &Store, text: &str) -> Result<RunAddress> {
     }
     let manifest = Manifest::of(store, &place.run)?;
     if let Some(id) = &place.stage {
-        let stages: Vec<&str> = manifest
-            .stages
-            .iter()
-            .map(|stage| stage.id.as_str())
-            .collect();
+        let stages = manifest.stages.iter().map(|stage| stage.id.as_str());
+        let stages: Vec<&str> = stages.collect();
+        let unknown = || format!("no stage `{id}`; its stages: {}", stages.join(", "));
         let stage = manifest.stage(id);
-        let stage = stage.ok_or_else(|| {
-            Error::spec(
-                text,
-                format!("no stage `{id}`; its stages: {}", stages.join(", ")),
-            )
-        })?;
-        let ports: Vec<&str> = stage
-            .outputs
-            .iter()
-            .map(|output| output.port.as_str())
-            .collect();
+        let stage = stage.ok_or_else(|| Error::spec(text, unknown()))?;
+        let ports = stage.outputs.iter().map(|output| output.port.as_str());
+        let ports: Vec<&str> = ports.collect();
         if let Some(port) = place.port.as_deref().filter(|port| !ports.contains(port)) {
-            return Err(Error::spec(
-                text,
-                format!(
-                    "stage {id} has no table `{port}`; its tables: {}",
-                    ports.join(", ")
-                ),
-            ));
+            let ports = ports.join(", ");
+            let message = format!("stage {id} has no table `{port}`; its tables: {ports}");
+            return Err(Error::spec(text, message));
         }
     }
     Ok(place)
@@ -303,24 +273,18 @@ fn options(arguments: &DiffArguments) -> Result<DiffOptions> {
         out: arguments.out.clone(),
         ..DiffOptions::default()
     };
-    arguments
-        .atol
-        .iter()
-        .try_for_each(|text| options.atol.add("--atol", text))?;
-    arguments
-        .rtol
-        .iter()
-        .try_for_each(|text| options.rtol.add("--rtol", text))?;
+    for text in &arguments.atol {
+        options.atol.add("--atol", text)?;
+    }
+    for text in &arguments.rtol {
+        options.rtol.add("--rtol", text)?;
+    }
     for text in &arguments.quaternion {
-        let names: Vec<String> = text
-            .split(',')
-            .map(|name| name.trim().to_string())
-            .collect();
+        let names = text.split(',').map(|name| name.trim().to_string());
+        let names: Vec<String> = names.collect();
         if names.len() != 4 {
-            return Err(Error::spec(
-                "--quaternion",
-                format!("`{text}`: expected four columns w,x,y,z"),
-            ));
+            let message = format!("`{text}`: expected four columns w,x,y,z");
+            return Err(Error::spec("--quaternion", message));
         }
         options.quaternions.push(names);
     }

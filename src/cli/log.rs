@@ -57,39 +57,30 @@ impl LogArguments {
         // Where there is none, or a manifest is damaged, the list says so in its lines.
         let head = find_run(&store, "HEAD").ok();
         let (mut text, mut rows, mut shown) = (String::new(), Vec::new(), 0);
+        let is_other = |manifest: &Manifest| {
+            let name = self.pipeline.as_ref();
+            name.is_some_and(|name| name != &manifest.pipeline.name)
+        };
         for run in store.runs()?.into_iter().rev() {
             if self.limit > 0 && shown == self.limit {
                 text.push_str("older ones: --limit 0\n");
                 break;
             }
-            let on_run: Vec<&str> = tags
-                .iter()
-                .filter(|(_, tagged)| **tagged == run)
-                .map(|(tag, _)| tag.as_str())
-                .collect();
+            let on_run = tags.iter().filter(|(_, tagged)| **tagged == run);
+            let on_run: Vec<&str> = on_run.map(|(tag, _)| tag.as_str()).collect();
             let is_head = head.as_ref() == Some(&run);
             match Manifest::of(&store, &run) {
-                Ok(manifest)
-                    if self
-                        .pipeline
-                        .as_ref()
-                        .is_some_and(|name| name != &manifest.pipeline.name) =>
-                {
-                    continue;
-                }
+                Ok(manifest) if is_other(&manifest) => continue,
                 Ok(manifest) => {
-                    let names: Vec<&str> = is_head
-                        .then_some("HEAD")
-                        .into_iter()
-                        .chain(on_run.iter().copied())
-                        .collect();
+                    let names = is_head.then_some("HEAD").into_iter();
+                    let names: Vec<&str> = names.chain(on_run.iter().copied()).collect();
                     let [executed, cached] = counts(&store, &manifest);
                     text.push_str(&line(&manifest, [executed, cached], &names));
                     rows.push(json!({
-                    "run": run, "started": manifest.started, "what": manifest.what(), "pipeline": manifest.pipeline.name, "status": manifest.status,
-                    "wall_seconds": manifest.wall_seconds, "executed": executed,
-                    "cached": cached, "tags": on_run, "head": is_head, "error": manifest.error,
-                }));
+                        "run": run, "started": manifest.started, "what": manifest.what(), "pipeline": manifest.pipeline.name,
+                        "status": manifest.status, "wall_seconds": manifest.wall_seconds, "executed": executed, "cached": cached,
+                        "tags": on_run, "head": is_head, "error": manifest.error,
+                    }));
                 }
                 Err(error) => {
                     text.push_str(&format!("{run}  {error}\n"));
@@ -109,18 +100,13 @@ fn line(manifest: &Manifest, [executed, cached]: [usize; 2], tags: &[&str]) -> S
     let status = status(manifest);
     let seconds = manifest
         .wall_seconds
-        .map_or_else(String::new, |seconds| format!("  {seconds:.1} s"));
-    let tags = if tags.is_empty() {
-        String::new()
-    } else {
-        format!("  [{}]", tags.join(", "))
-    };
+        .map(|seconds| format!("  {seconds:.1} s"));
+    let tags = (!tags.is_empty()).then(|| format!("  [{}]", tags.join(", ")));
+    let [seconds, tags] = [seconds, tags].map(Option::unwrap_or_default);
+    let (run, started, what) = (&manifest.run_id, &manifest.started, manifest.what());
+    let name = &manifest.pipeline.name;
     format!(
-        "{}  {:.16}  {:10}  {}  {status}, {executed} run, {cached} cached{seconds}{tags}\n",
-        manifest.run_id,
-        manifest.started,
-        manifest.what(),
-        manifest.pipeline.name
+        "{run}  {started:.16}  {what:10}  {name}  {status}, {executed} run, {cached} cached{seconds}{tags}\n"
     )
 }
 
@@ -132,16 +118,12 @@ fn counts(store: &Store, manifest: &Manifest) -> [usize; 2] {
         Vec::new()
     };
     [StageStatus::Executed, StageStatus::Cached].map(|status| {
-        let ended = events
-            .iter()
-            .filter(|event| event["event"] == "ends" && event["detail"]["status"] == json!(status))
-            .count();
-        manifest
-            .stages
-            .iter()
-            .filter(|stage| stage.status == status)
-            .count()
-            .max(ended)
+        let has_ended = |event: &&serde_json::Value| {
+            event["event"] == "ends" && event["detail"]["status"] == json!(status)
+        };
+        let stages = manifest.stages.iter();
+        let noted = stages.filter(|stage| stage.status == status).count();
+        noted.max(events.iter().filter(has_ended).count())
     })
 }
 
@@ -184,18 +166,10 @@ impl ShowArguments {
             };
         };
         let Some(stage) = manifest.stage(id) else {
-            let ids: Vec<&str> = manifest
-                .stages
-                .iter()
-                .map(|stage| stage.id.as_str())
-                .collect();
-            return Err(Error::spec(
-                format!("stage {id}"),
-                format!(
-                    "run {run} has no such stage; its stages: {}",
-                    ids.join(", ")
-                ),
-            ));
+            let ids = manifest.stages.iter().map(|stage| stage.id.as_str());
+            let ids = ids.collect::<Vec<_>>().join(", ");
+            let message = format!("run {run} has no such stage; its stages: {ids}");
+            return Err(Error::spec(format!("stage {id}"), message));
         };
         if self.json {
             return emit_json(stage);
@@ -250,16 +224,13 @@ fn hash(store: &Store, table: &str) -> Result<String> {
     let output = manifest
         .stage(stage)
         .and_then(|stage| stage.outputs.iter().find(|output| output.port == port));
-    match output {
-        Some(output) => Ok(output.table.table_hash.to_string()),
-        None => Err(Error::spec(
-            table,
-            format!(
-                "run {} has no such table; calib show {run}/{stage} lists a stage's",
-                manifest.run_id
-            ),
-        )),
-    }
+    let unknown = || {
+        let id = &manifest.run_id;
+        let message =
+            format!("run {id} has no such table; calib show {run}/{stage} lists a stage's");
+        Error::spec(table, message)
+    };
+    Ok(output.ok_or_else(unknown)?.table.table_hash.to_string())
 }
 
 /// Explain why a stage ran, or did not: which part of what it depends on changed since the run before.

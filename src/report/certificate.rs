@@ -106,50 +106,48 @@ pub(super) fn judged<'a>(tables: &'a Tables, set: Option<&str>) -> Option<&'a St
 impl<'a> Judgement<'a> {
     /// None where there are no limits and the set-up is right.
     pub(crate) fn new(tables: &'a Tables, limits: &Accepted, set: Option<&str>) -> Option<Self> {
-        let figures = [
-            ("mean", limits.mean_mm),
-            ("95 % of the points", limits.p95_mm),
-            ("largest", limits.max_mm),
-        ];
         let wrong = wrong_setup(tables);
-        if wrong.is_none() && figures.iter().all(|(_, limit)| limit.is_none()) {
-            return None;
-        }
         let row = judged(tables, set).filter(|_| wrong.is_none());
-        let found = row.map_or([None; 3], |row| {
-            [row.mean_mm, row.p95_mm, row.max_mm].map(Some)
-        });
+        let figures = [
+            ("mean", limits.mean_mm, row.map(|row| row.mean_mm)),
+            (
+                "95 % of the points",
+                limits.p95_mm,
+                row.map(|row| row.p95_mm),
+            ),
+            ("largest", limits.max_mm, row.map(|row| row.max_mm)),
+        ];
         let asked = figures
             .into_iter()
-            .zip(found)
-            .filter_map(|((name, limit), found)| Some((name, found, limit?)));
-        let asked: Vec<(&str, Option<f64>, f64)> = asked.collect();
-        let is_within = |found: Option<f64>, limit: f64| found.is_some_and(|found| found <= limit);
-        let kept = row.is_some()
-            && asked
-                .iter()
-                .all(|(_, found, limit)| is_within(*found, *limit));
-        let judgement = Self {
+            .filter_map(|(figure, limit_mm, found_mm)| {
+                let limit_mm = limit_mm?;
+                Some(AcceptanceRow {
+                    figure: figure.into(),
+                    found_mm,
+                    limit_mm,
+                    kept: found_mm.is_some_and(|found| found <= limit_mm),
+                    ..AcceptanceRow::default()
+                })
+            });
+        let mut limits: Vec<AcceptanceRow> = asked.collect();
+        if wrong.is_none() && limits.is_empty() {
+            return None;
+        }
+        let kept = row.is_some() && limits.iter().all(|limit| limit.kept);
+        let mut judgement = Self {
             wrong,
             row,
             limits: Vec::new(),
             kept,
         };
-        let limit =
-            |(order, (name, found_mm, limit_mm)): (i64, (&str, Option<f64>, f64))| AcceptanceRow {
-                order,
-                figure: name.into(),
-                found_mm,
-                limit_mm,
-                kept: is_within(found_mm, limit_mm),
-                accepted: kept,
-                sentence: judgement.sentence(&Locale::default()),
-            };
-        let limits = (1..).zip(asked).map(limit).collect();
-        Some(Self {
-            limits,
-            ..judgement
-        })
+        let sentence = judgement.sentence(&Locale::default());
+        for (order, limit) in (1..).zip(&mut limits) {
+            limit.order = order;
+            limit.accepted = kept;
+            limit.sentence.clone_from(&sentence);
+        }
+        judgement.limits = limits;
+        Some(judgement)
     }
 
     /// The judgement in a sentence.

@@ -115,47 +115,45 @@ fn tool(locale: &Locale, robot: &Robot) -> Option<String> {
 }
 
 fn kinds(locale: &Locale, tables: &Tables) -> Vec<(&'static str, String)> {
-    fn of<'a, T: 'a>(
-        tables: impl IntoIterator<Item = &'a T>,
-        rows: fn(&T) -> usize,
-    ) -> Vec<String> {
-        let tables = tables.into_iter();
-        tables.map(|table| count(rows(table) as i64)).collect()
+    // Of a list of tables the rows of each.
+    macro_rules! rows {
+        ($table:ident) => {
+            (stringify!($table), vec![tables.$table.0.len()])
+        };
+        ([$table:ident]) => {
+            (
+                stringify!($table),
+                tables.$table.iter().map(|table| table.0.len()).collect(),
+            )
+        };
     }
-    let kinds = [
-        ("robot", of([&tables.robot], |table| table.0.len())),
-        ("recording", of([&tables.recording], |table| table.rows())),
-        ("intake", of(&tables.intake, |table| table.0.len())),
-        ("rejected", of(&tables.rejected, |table| table.0.len())),
-        ("split", of([&tables.split], |table| table.0.len())),
-        (
-            "parameters",
-            of([&tables.parameters], |table| table.0.len()),
-        ),
-        ("fit", of(&tables.fit, |table| table.0.len())),
-        (
-            "observability",
-            of(&tables.observability, |table| table.0.len()),
-        ),
-        ("training", of(&tables.training, |table| table.0.len())),
-        (
-            "corrections",
-            of(&tables.corrections, |table| table.0.len()),
-        ),
-        ("prediction", of(&tables.prediction, |table| table.0.len())),
-        (
-            "statistics",
-            of([&tables.statistics], |table| table.0.len()),
-        ),
-        ("suspects", of(&tables.suspects, |table| table.0.len())),
-        ("findings", of(&tables.findings, |table| table.0.len())),
-        ("curves", of([&tables.curves], |table| table.0.len())),
+    let kinds: [(&str, Vec<usize>); 15] = [
+        rows!(robot),
+        ("recording", vec![tables.recording.rows()]),
+        rows!([intake]),
+        rows!([rejected]),
+        rows!(split),
+        rows!(parameters),
+        rows!([fit]),
+        rows!([observability]),
+        rows!([training]),
+        rows!([corrections]),
+        rows!([prediction]),
+        rows!(statistics),
+        rows!([suspects]),
+        rows!([findings]),
+        rows!(curves),
     ];
-    let words = |lengths: Vec<String>| match lengths.is_empty() {
-        true => say!(locale, "not written"),
-        false => say!(locale, "{rows} rows", rows = lengths.join(" + ")),
-    };
-    kinds.map(|(kind, lengths)| (kind, words(lengths))).into()
+    kinds
+        .map(|(kind, lengths)| {
+            let rows: Vec<String> = lengths.iter().map(|rows| count(*rows as i64)).collect();
+            let words = match rows.is_empty() {
+                true => say!(locale, "not written"),
+                false => say!(locale, "{rows} rows", rows = rows.join(" + ")),
+            };
+            (kind, words)
+        })
+        .into()
 }
 
 /// The document; `judgement` is that of the page.

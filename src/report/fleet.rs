@@ -58,38 +58,26 @@ const NAMED: usize = 30;
 
 /// What a robot needs a technician for, in a sentence, and how urgently, 0 first; nothing where it needs none.
 fn needs(row: &FleetRow) -> Option<(u8, String)> {
-    let reason = |what: &str, why: Option<&str>| match why.filter(|why| !why.is_empty()) {
-        Some(why) => format!("{what}: {why}"),
-        None => what.to_string(),
+    let verdict = row.verdict.as_deref();
+    let errors = row.before_rms_mm.zip(row.after_rms_mm);
+    let (urgency, what, why) = match () {
+        () if matches!(row.status.as_str(), "failed" | "rejected") => {
+            (0, "was not calibrated", &row.reason)
+        }
+        () if verdict == Some("wrong_setup") => (1, "its set-up is wrong", &row.causes),
+        () if errors.is_some_and(|(before, after)| after >= before) => {
+            (2, "the calibration did not make it more accurate", &None)
+        }
+        () if row.flags.is_some() => {
+            let what = "changed beyond its limits since the last calibration";
+            (3, what, &row.flags)
+        }
+        () if verdict == Some("unexplained") => (4, "its error is not explained", &row.causes),
+        () => return None,
     };
-    if matches!(row.status.as_str(), "failed" | "rejected") {
-        return Some((0, reason("was not calibrated", row.reason.as_deref())));
-    }
-    if row.verdict.as_deref() == Some("wrong_setup") {
-        return Some((1, reason("its set-up is wrong", row.causes.as_deref())));
-    }
-    if row
-        .before_rms_mm
-        .zip(row.after_rms_mm)
-        .is_some_and(|(before, after)| after >= before)
-    {
-        return Some((2, "the calibration did not make it more accurate".into()));
-    }
-    if let Some(flags) = &row.flags {
-        return Some((
-            3,
-            reason(
-                "changed beyond its limits since the last calibration",
-                Some(flags),
-            ),
-        ));
-    }
-    (row.verdict.as_deref() == Some("unexplained")).then(|| {
-        (
-            4,
-            reason("its error is not explained", row.causes.as_deref()),
-        )
-    })
+    let why = why.as_ref().filter(|why| !why.is_empty());
+    let sentence = why.map_or_else(|| what.into(), |why| format!("{what}: {why}"));
+    Some((urgency, sentence))
 }
 
 fn row(row: &FleetRow, links: &BTreeMap<String, String>) -> Value {

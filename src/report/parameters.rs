@@ -15,20 +15,11 @@ pub(super) fn section(locale: &Locale, parameters: &Parameters, counting: Option
     };
     let mut sorted: Vec<&ParameterRow> = parameters.0.iter().collect();
     sorted.sort_by_cached_key(|row| (place(row), row.effect.clone(), along_the_chain(&row.name)));
-    let mut effects: Vec<(&str, Vec<&ParameterRow>)> = Vec::new();
-    for &parameter in &sorted {
-        match effects
-            .iter_mut()
-            .find(|(effect, _)| *effect == parameter.effect)
-        {
-            Some((_, rows)) => rows.push(parameter),
-            None => effects.push((&parameter.effect, vec![parameter])),
-        }
-    }
-    let groups = effects.into_iter().map(|(effect, rows)| {
+    let groups = sorted.chunk_by(|a, b| a.effect == b.effect);
+    let groups = groups.map(|rows| {
         json!({
-            "effect": effect,
-            "rows": rows.iter().map(|parameter| row(locale, parameter, &rows)).collect::<Vec<_>>(),
+            "effect": rows[0].effect,
+            "rows": rows.iter().map(|parameter| row(locale, parameter, rows)).collect::<Vec<_>>(),
         })
     });
     let remarked = sorted
@@ -75,62 +66,46 @@ fn along_the_chain(name: &str) -> Vec<(bool, String, u64)> {
     parts
 }
 
-/// A parameter among those of its effect, with which it shares its decimals.
+/// A parameter among those of its effect, with which it shares its decimals; one of a unit that calib does not know as it is stored.
 fn row(locale: &Locale, p: &ParameterRow, group: &[&ParameterRow]) -> Value {
-    let (nominal, value, unit, change, sigma, fine_unit) = match readings(&p.unit) {
-        Some((coarse, fine)) => read(locale, p, group, coarse, fine),
-        // A unit that calib does not know is shown as it is stored.
-        None => (
-            locale.significant(p.nominal, 6),
-            locale.significant(p.value, 6),
-            p.unit.clone(),
-            locale.significant(p.change, 4),
-            p.sigma
-                .map_or_else(String::new, |s| locale.significant(s, 2)),
-            p.unit.clone(),
-        ),
+    let alike = || group.iter().filter(|other| other.unit == p.unit);
+    let decimals = |unit: &UnitFormat| {
+        let needed = alike().map(|other| unit.decimals_for(other.sigma));
+        needed.max().unwrap_or_default()
     };
+    let units = readings(&p.unit);
+    let coarse = |value: f64| match &units {
+        Some((unit, _)) => locale.decimal(unit.show(value, decimals(unit))),
+        None => locale.significant(value, 6),
+    };
+    let change = match &units {
+        Some((_, unit)) => locale.decimal(unit.show_signed(p.change, decimals(unit))),
+        None => locale.significant(p.change, 4),
+    };
+    let sigma = |sigma: f64| match &units {
+        Some((_, unit)) => locale.decimal(unit.show(sigma, decimals(unit))),
+        None => locale.significant(sigma, 2),
+    };
+    let [unit, fine_unit] = match &units {
+        Some((coarse, fine)) => [coarse, fine].map(|unit| locale.stored(unit.symbol)),
+        None => [p.unit.clone(), p.unit.clone()],
+    };
+    let stored = exact(p.value, 7);
     json!({
         "name": p.name,
         "place": p.place,
-        "nominal": nominal,
-        "value": value,
+        "nominal": coarse(p.nominal),
+        "value": coarse(p.value),
         // Unit of nominal and value.
         "unit": unit,
         "change": change,
-        "sigma": sigma,
+        "sigma": p.sigma.map(sigma).unwrap_or_default(),
         // Unit of change and sigma.
         "fine_unit": fine_unit,
         "status": p.status,
         "step": p.step,
-        "stored": if p.unit == "1" { exact(p.value, 7) } else { format!("{} {}", exact(p.value, 7), p.unit) },
+        "stored": if p.unit == "1" { stored } else { format!("{stored} {}", p.unit) },
     })
-}
-
-fn read(
-    locale: &Locale,
-    p: &ParameterRow,
-    group: &[&ParameterRow],
-    coarse: UnitFormat,
-    fine: UnitFormat,
-) -> (String, String, String, String, String, String) {
-    let decimals = |reading: UnitFormat| {
-        let alike = group.iter().filter(|other| other.unit == p.unit);
-        alike
-            .map(|other| reading.decimals_for(other.sigma))
-            .max()
-            .unwrap_or_default()
-    };
-    (
-        locale.decimal(coarse.show(p.nominal, decimals(coarse))),
-        locale.decimal(coarse.show(p.value, decimals(coarse))),
-        locale.stored(coarse.symbol),
-        locale.decimal(fine.show_signed(p.change, decimals(fine))),
-        p.sigma.map_or_else(String::new, |s| {
-            locale.decimal(fine.show(s, decimals(fine)))
-        }),
-        locale.stored(fine.symbol),
-    )
 }
 
 #[cfg(test)]
