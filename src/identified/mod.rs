@@ -11,7 +11,7 @@ use standing::{last, output, unexplained_of, written};
 pub use torques::IdentifiedTorques;
 
 use crate::compensate::{Gate, GateLimits, IdentifiedArm, Scatter, Uncertainty, load_matters};
-use crate::description::RobotDescription;
+use crate::description::{JointDescription, JointKind, RobotDescription};
 use crate::effect::Load;
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::network::Correction;

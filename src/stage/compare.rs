@@ -1,7 +1,7 @@
 //! `compare`: what changed on the robot since an earlier recording of it; the earlier model is the prior and the comparison.
 
 use crate::effect::{Load, names};
-use crate::error::{Place, Result};
+use crate::error::{Error, Place, Result};
 use crate::estimate::{Prior, align, changes};
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::doubtful::{FittedRows, fit_rows};

@@ -347,7 +347,7 @@ fn truth(
     effects: &[Physical],
 ) -> Truth {
     let values = truth.values(robot).into_iter().chain(tracker.values());
-    let values = values.chain(effects.iter().flat_map(Physical::truth));
+    let values = values.chain(effects.iter().flat_map(|effect| effect.truth()));
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     let row = |one: TrueValue| {
         let count = seen.entry(one.name.clone()).or_default();
