@@ -188,7 +188,12 @@ fn beyond_the_library_every_family_is_plain_in_both_forms() {
             };
             let case = Case::make(&design, row, Content::Single(row)).unwrap();
             let first = case.concealed.first().unwrap();
-            let name = format!("{} ({}, {})", family.name, first.form, case.kind.name());
+            let name = format!(
+                "{} ({}, {})",
+                family.name,
+                first.cause.form,
+                case.kind.name()
+            );
             assert!(
                 first.cause.effect == family.name && case.want().len() == 1,
                 "{name}: {:?}",
@@ -257,7 +262,10 @@ fn the_librarys_recordings_are_those_of_before() {
         let line = |case: Case| {
             let causes = case.concealed.iter().map(|one| {
                 let (effect, place) = (one.cause.effect, &one.cause.place);
-                format!("{effect} at {place}, {}, L {:.3}", one.form, one.strength)
+                format!(
+                    "{effect} at {place}, {}, L {:.3}",
+                    one.cause.form, one.strength
+                )
             });
             let causes: Vec<String> = causes.collect();
             let (kind, held_out) = (case.kind.name(), case.shots.len() - case.fit);
