@@ -61,7 +61,10 @@ fn text(export: &Export) -> Result<String> {
     let mut remarks = export.remarks_in(&XACRO);
     remarks.push(format!(
         "in {}: include this file, and in each joint below have",
-        description.file_name().unwrap_or_default().to_string_lossy()
+        description
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
     ));
     remarks.push("<xacro:calib_origin joint=\"NAME\"/> in the place of its <origin .../>".into());
     remarks.push(origins.tool.clone());

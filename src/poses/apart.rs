@@ -223,7 +223,7 @@ fn name<'t>(text: &'t str, found: &[&str]) -> Result<(&'t str, Option<Place>)> {
     if known.contains(&effect) {
         return Ok((effect, place.map(named).transpose()?));
     }
-    let near = nearest(effect, known.into_iter());
+    let near = nearest(effect, known);
     let near = near
         .map(|near| format!("did you mean `{near}`? "))
         .unwrap_or_default();

@@ -40,9 +40,9 @@ fn lost_motion_of_dahl_fades_in_over_its_travel() {
     let friction = Presliding::effect(1, 30.0, 1.0, vec![]);
     let z = remembered(friction.clone(), &moves(&[2.0, -0.5, 0.0]));
     let expected = [0.864_664_716_763, 0.130_976_320_801, 0.130_976_320_801];
-    assert_near(&z, &expected, 1e-12);
+    assert_near(&z, expected, 1e-12);
     let found = settled(vec![0.5], &[friction]).motion.joint;
-    assert_near(&found, &[-15.0 * ARCSEC, 0.0, 0.0, 0.0, 0.0], 1e-15);
+    assert_near(&found, [-15.0 * ARCSEC, 0.0, 0.0, 0.0, 0.0], 1e-15);
 }
 
 /// Elements that slip at 1 and 3 deg: after 2 deg up one slides and one is stretched by 2/3; 1.5 deg back leave -1/2 and 1/6.
@@ -50,7 +50,7 @@ fn lost_motion_of_dahl_fades_in_over_its_travel() {
 fn maxwells_elements_slip_one_after_another() {
     let friction = Presliding::effect(1, 30.0, 0.0, vec![1.0, 3.0]);
     let z = remembered(friction, &moves(&[2.0, -1.5]));
-    assert_near(&z, &[5.0 / 6.0, -1.0 / 6.0], 1e-12);
+    assert_near(&z, [5.0 / 6.0, -1.0 / 6.0], 1e-12);
 }
 
 /// The arm of five joints at its zero pose under effects of this memory.
@@ -69,7 +69,7 @@ fn warming(heat: Heat, time_s: f64, full: f64) -> Physical {
 fn a_joint_warms_by_its_own_work_and_cools_off() {
     let worked = moves(&[0.5f64.to_degrees(), -0.2f64.to_degrees()]);
     let warm = remembered(warming(Heat::Work, 100.0, 0.0), &worked);
-    assert_near(&warm, &[0.5, 0.383_939_720_586], 1e-12);
+    assert_near(&warm, [0.5, 0.383_939_720_586], 1e-12);
 }
 
 /// Behind a ramp of 0.01 K/s a body with 100 s ends up 1 K behind: after 1000 s it is 10 - 1 + exp(-10) K warmer.
@@ -81,10 +81,10 @@ fn metal_trails_a_ramp_by_slope_times_its_time() {
             &moves(&vec![0.0; rows]),
         )
     };
-    assert_near(&warm(100.0, 0.0, 10)[9..], &[9.000_045_399_930], 1e-11);
-    assert_near(&warm(0.0, 0.0, 3), &[1.0, 2.0, 3.0], 1e-12);
+    assert_near(&warm(100.0, 0.0, 10)[9..], [9.000_045_399_930], 1e-11);
+    assert_near(warm(0.0, 0.0, 3), [1.0, 2.0, 3.0], 1e-12);
     // Saturating at 2 K, the first kelvin is 2 tanh(1/2).
-    assert_near(&warm(0.0, 2.0, 1), &[2.0 * 0.5f64.tanh()], 1e-12);
+    assert_near(warm(0.0, 2.0, 1), [2.0 * 0.5f64.tanh()], 1e-12);
 }
 
 /// A repeat is reached as before: back to where the arm came from, and again.
@@ -147,7 +147,7 @@ fn an_instrument_errs_in_range_azimuth_and_elevation_about_its_own_origin() {
         (ranges(0.0, 100.0, 0.0), along, farther, 1e-12),
     ] {
         let found = effect.sight(&row(&[0.0], 0.0, vec![0.0]), 0.0, point);
-        assert_near(&found, &expected, within);
+        assert_near(found, expected, within);
     }
 }
 
@@ -160,7 +160,7 @@ fn warm_air_stretches_ranges_after_the_arm_has_settled() {
     let found = settled(memory.clone(), &effects);
     let seen = sighted(&found, &IDENTITY, &row(&[0.0; 5], 0.0, memory), &effects);
     let expected = [1.010, 0.0, 1.130].map(|metres| metres * (1.0 + 5e-6));
-    assert_near(&seen, &expected, 1e-12);
+    assert_near(seen, expected, 1e-12);
 }
 
 /// 100 arcsec/Nm times sin(90 deg) times the torque of the wrist's weight: the hand's centre lies 115 mm before joint 4 in x.
@@ -188,7 +188,12 @@ fn beyond_the_library_every_family_is_plain_in_both_forms() {
             };
             let case = Case::make(&design, row, Content::Single(row)).unwrap();
             let first = case.concealed.first().unwrap();
-            let name = format!("{} ({}, {})", family.name, first.form, case.kind.name());
+            let name = format!(
+                "{} ({}, {})",
+                family.name,
+                first.cause.form,
+                case.kind.name()
+            );
             assert!(
                 first.cause.effect == family.name && case.want().len() == 1,
                 "{name}: {:?}",
@@ -257,7 +262,10 @@ fn the_librarys_recordings_are_those_of_before() {
         let line = |case: Case| {
             let causes = case.concealed.iter().map(|one| {
                 let (effect, place) = (one.cause.effect, &one.cause.place);
-                format!("{effect} at {place}, {}, L {:.3}", one.form, one.strength)
+                format!(
+                    "{effect} at {place}, {}, L {:.3}",
+                    one.cause.form, one.strength
+                )
             });
             let causes: Vec<String> = causes.collect();
             let (kind, held_out) = (case.kind.name(), case.shots.len() - case.fit);

@@ -50,7 +50,7 @@ fn every_family_moves_the_tool_and_is_wanted_by_a_canonical_name() {
                 ..sound(5, 40)
             };
             let case = Case::make(&design, row, Content::Single(row)).unwrap();
-            let form = case.concealed.first().map_or("", |one| one.form);
+            let form = case.concealed.first().map_or("", |one| one.cause.form);
             let name = format!("{} ({form})", family.name);
             let mut effects = case.concealed.iter().map(|one| one.cause.effect);
             assert!(

@@ -488,7 +488,7 @@ fn effect(one: &Concealed) -> Value {
     let mut out = json!({
         "effect": one.cause.effect,
         "where": one.cause.place,
-        "form": one.form,
+        "form": one.cause.form,
         "wanted": one.cause.wanted,
         "L": one.strength,
         "L_alone": one.strength_alone,

@@ -40,6 +40,8 @@ named! {
 /// One concealed cause: what a diagnosis should name, and what the twin does for it.
 #[derive(Debug, Clone)]
 pub struct Cause {
+    /// The form of it, in a few words.
+    pub form: &'static str,
     pub effect: &'static str,
     pub place: String,
     /// What makes it.
@@ -53,8 +55,6 @@ pub struct Cause {
 /// What a family has drawn.
 #[derive(Debug, Clone, Default)]
 pub struct Draft {
-    /// The form, in a few words.
-    pub(crate) form: &'static str,
     /// More than one where they act together.
     pub(crate) causes: Vec<Cause>,
     /// Names that are true as well, or that no position data can separate: they neither count nor hurt.
@@ -66,9 +66,9 @@ pub struct Draft {
 }
 
 impl Draft {
-    fn new(form: &'static str, causes: Vec<Cause>) -> Draft {
+    fn new(form: &'static str, mut causes: Vec<Cause>) -> Draft {
+        causes.iter_mut().for_each(|cause| cause.form = form);
         Draft {
-            form,
             causes,
             ..Draft::default()
         }
@@ -103,6 +103,7 @@ impl Draft {
     fn over_spring(mut self, on: &Bench, number: usize, sizes: [f64; 2], draw: &mut Noise) -> Self {
         let linear = [spring(on, number, draw.size(sizes[0], sizes[1]))];
         self.causes.push(Cause {
+            form: self.causes[0].form,
             wanted: false,
             ..fixed("joint_compliance", joint(number), linear)
         });
@@ -121,6 +122,7 @@ impl Draft {
 /// A cause of the size that it was drawn with.
 fn fixed(effect: &'static str, place: String, physical: impl Into<Vec<Physical>>) -> Cause {
     Cause {
+        form: "",
         effect,
         place,
         physical: physical.into(),
@@ -137,11 +139,8 @@ fn spring(on: &Bench, number: usize, arcsec: f64) -> Physical {
 /// The springs of all loaded joints, of their natural size.
 fn springs(on: &Bench, draw: &mut Noise) -> Vec<Cause> {
     let spring = |number| {
-        fixed(
-            "joint_compliance",
-            joint(number),
-            [spring(on, number, draw.size(60.0, 250.0))],
-        )
+        let spring = [spring(on, number, draw.size(60.0, 250.0))];
+        fixed("joint_compliance", joint(number), spring)
     };
     on.loaded().into_iter().map(spring).collect()
 }
@@ -178,16 +177,14 @@ impl<'a> Bench<'a> {
         points: &[Point],
     ) -> Bench<'a> {
         let arm = Arm::new(robot, &Default::default());
+        let loaded = points.iter().find(|point| point.payload_kg > 0.0);
         let mut bench = Bench {
             robot,
             ranges_deg,
             peak: vec![0.0; robot.joints.len()],
             overturning: 0.0,
             end_s: points.last().map_or(0.0, |point| point.time_s),
-            change_s: points
-                .iter()
-                .find(|point| point.payload_kg > 0.0)
-                .map_or(0.0, |point| point.time_s),
+            change_s: loaded.map_or(0.0, |point| point.time_s),
         };
         for point in points {
             let row = point.row(point.q.clone(), Vec::new());
@@ -240,9 +237,8 @@ impl<'a> Bench<'a> {
 
     /// Links (from 1) with a length worth the name.
     fn long_links(&self) -> Vec<usize> {
-        (1..self.joints())
-            .filter(|number| matrix::norm(self.line(number - 1)) > 0.15)
-            .collect()
+        let is_long = |number: &usize| matrix::norm(self.line(number - 1)) > 0.15;
+        (1..self.joints()).filter(is_long).collect()
     }
 
     /// One of them; none where there is none.

@@ -11,7 +11,6 @@ use crate::noise::Noise;
 pub struct Concealed {
     /// What acts.
     pub cause: Cause,
-    pub form: &'static str,
     /// Made by a formula that a library is not expected to hold; stated of what lies beyond the library.
     pub strange: bool,
     /// Root mean square of its displacement per axis, mm: all of it, and what geometry and the other causes leave.
@@ -45,14 +44,6 @@ impl Cause {
     fn scale(&mut self, by: f64) {
         self.physical.iter_mut().for_each(|effect| effect.scale(by));
     }
-}
-
-/// A cause in the form of its draft.
-type Formed = (Cause, &'static str);
-
-fn causes(draft: &Draft) -> Vec<Formed> {
-    let causes = draft.causes.iter();
-    causes.map(|cause| (cause.clone(), draft.form)).collect()
 }
 
 /// A visibility to aim at: mostly 50 to 1000, some hardly there, some plain.
@@ -92,12 +83,12 @@ pub(super) fn conceal(
             return until_plain(sight, true, |_| {
                 let draft = foreign(on, draw);
                 let ratio = draw.size(FOREIGN[0], FOREIGN[1]);
-                let mut causes = causes(&draft);
+                let mut causes = draft.causes.clone();
                 // The whole displacement counts. Twice: what hangs on the load is not quite proportional.
                 for _ in 0..2 {
                     let whole = alone(&causes, 0, sight.site);
                     let found = length(&whole) / (whole.len().max(1) as f64).sqrt() / sight.noise;
-                    causes[0].0.scale(ratio / found.max(1e-6));
+                    causes[0].scale(ratio / found.max(1e-6));
                 }
                 Some((draft, causes))
             });
@@ -108,12 +99,12 @@ pub(super) fn conceal(
                 let draft = (families[row].draw)(on, other, draw)?;
                 let wanted = draw.size(PLAIN[0], PLAIN[1]);
                 let largest = if is_last { f64::INFINITY } else { LARGEST };
-                let mut causes = causes(&draft);
+                let mut causes = draft.causes.clone();
                 for index in (0..causes.len()).filter(|index| draft.causes[*index].sized) {
                     // The others absorb what they can, as geometry does.
                     let found = seen(causes.clone(), sight)[index].strength.max(1e-9);
                     let factor = (wanted / found).sqrt().clamp(SMALLEST, largest);
-                    causes[index].0.scale(factor);
+                    causes[index].scale(factor);
                 }
                 Some((draft, causes))
             });
@@ -137,11 +128,11 @@ pub(super) fn conceal(
         let draft = (0..50).find_map(attempt);
         drafts.extend(draft);
     }
-    let mut causes: Vec<Formed> = drafts.iter().flat_map(causes).collect();
+    let mut causes: Vec<Cause> = drafts.iter().flat_map(|one| one.causes.clone()).collect();
     for index in 0..causes.len() {
         let natural = draw.chance(design.natural);
         let wanted = aim(draw);
-        if !causes[index].0.sized {
+        if !causes[index].sized {
             continue;
         }
         let column = sight.shadow.outside(alone(&causes, index, sight.site));
@@ -149,7 +140,7 @@ pub(super) fn conceal(
         // What is of natural size stays so, but where it would be too plain to test anything.
         let wanted = if natural { found.min(PLAINEST) } else { wanted };
         let factor = (wanted / found).sqrt().clamp(SMALLEST, LARGEST);
-        causes[index].0.scale(factor);
+        causes[index].scale(factor);
     }
     (drafts, seen(causes, sight))
 }
@@ -158,7 +149,7 @@ pub(super) fn conceal(
 fn until_plain(
     sight: &Sight,
     strange: bool,
-    mut attempt: impl FnMut(bool) -> Option<(Draft, Vec<Formed>)>,
+    mut attempt: impl FnMut(bool) -> Option<(Draft, Vec<Cause>)>,
 ) -> (Vec<Draft>, Vec<Concealed>) {
     let mut out = (Vec::new(), Vec::new());
     for number in 1..=DRAWS {
@@ -178,18 +169,17 @@ fn until_plain(
 }
 
 /// How visible causes of this size are.
-fn seen(causes: Vec<Formed>, sight: &Sight) -> Vec<Concealed> {
+fn seen(causes: Vec<Cause>, sight: &Sight) -> Vec<Concealed> {
     let Sight { site, shadow, .. } = *sight;
     let columns: Vec<Column> = (0..causes.len())
         .map(|index| alone(&causes, index, site))
         .collect();
     let rms = |column: &[f64]| 1e3 * length(column) / (column.len().max(1) as f64).sqrt();
-    let seen = |(index, (cause, form)): (usize, Formed)| {
+    let seen = |(index, cause): (usize, Cause)| {
         let others = shadow.with_others(&columns, index);
         let visible = others.outside(columns[index].clone());
         Concealed {
             cause,
-            form,
             strange: false,
             raw_mm: rms(&columns[index]),
             visible_mm: rms(&visible),
@@ -201,11 +191,11 @@ fn seen(causes: Vec<Formed>, sight: &Sight) -> Vec<Concealed> {
 }
 
 /// What one cause does in company of all others: the displacement with all of them less that without it, m.
-fn alone(causes: &[Formed], index: usize, site: &Site) -> Column {
+fn alone(causes: &[Cause], index: usize, site: &Site) -> Column {
     let displacement = |skipped: Option<usize>| {
         let kept = causes.iter().enumerate();
         let kept = kept.filter(|(other, _)| Some(*other) != skipped);
-        let effects = kept.flat_map(|(_, (cause, _))| cause.physical.clone());
+        let effects = kept.flat_map(|(_, cause)| cause.physical.clone());
         site.displacement(&effects.collect::<Vec<_>>())
     };
     let pairs = displacement(None)

@@ -89,7 +89,7 @@ fn what_is_in_no_list_is_diagnosed_and_counted() {
         println!(
             "{} {} at {} ({places:?}), L {:.0}, {} rows, raw {:.3} mm, held out {:.4} -> {:.4} (noise {floor:.4}), {}{}{}{}{}: {:?}\n    {}",
             case.name,
-            one.form,
+            one.cause.form,
             one.cause.place,
             one.strength,
             case.fit,
