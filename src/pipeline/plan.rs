@@ -415,9 +415,10 @@ fn writes(entry: &StageEntry, kind: &str) -> bool {
     (entry.writes)().iter().any(|port| port.kind == kind)
 }
 fn list<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
-    match listed(names).as_str() {
-        "none" => "(none)".into(),
-        names => names.into(),
+    let mut names = names.into_iter().peekable();
+    match names.peek() {
+        Some(_) => listed(names),
+        None => "(none)".into(),
     }
 }
 

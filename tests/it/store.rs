@@ -1,16 +1,15 @@
 //! The store: identity, the commit protocol, and what is done about damage, rivals and refusals.
 
 use crate::answer::{has, put, read};
-use arrow::array::{ArrayRef, Float64Array, Int64Array, StringArray};
+use arrow::array::ArrayRef;
 use calib::error::{Error, Result};
-use calib::store::frame::{Frame, FrameBuilder};
+use calib::store::frame::{Cell, Frame, FrameBuilder};
 use calib::store::{
     Account, KEY_FORMAT, Lookup, PendingTable, Published, StageKey, Store, TableHash, TableRef,
 };
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
 
 pub(super) fn key(stage: &str, seed: u64) -> StageKey {
     StageKey {
@@ -26,25 +25,22 @@ pub(super) fn key(stage: &str, seed: u64) -> StageKey {
     }
 }
 
+/// A letter and a number each.
+fn names(letter: char, keys: &[i64]) -> ArrayRef {
+    let name = |key: &i64| format!("{letter}{key}");
+    Cell::to_array(keys.iter().map(name).collect())
+}
+
+fn texts<const N: usize>(texts: [&str; N]) -> ArrayRef {
+    Cell::to_array(texts.map(String::from).to_vec())
+}
+
 fn columns(keys: &[i64]) -> FrameBuilder {
     let mut frame = FrameBuilder::new("split");
-    frame.push(
-        "sequence",
-        Arc::new(Int64Array::from(keys.to_vec())) as ArrayRef,
-    );
-    frame.push(
-        "point_id",
-        Arc::new(StringArray::from_iter_values(
-            keys.iter().map(|key| format!("P{key}")),
-        )),
-    );
-    frame.push(
-        "set",
-        Arc::new(StringArray::from_iter_values(
-            keys.iter()
-                .map(|key| if key % 4 == 3 { "validate" } else { "fit" }),
-        )),
-    );
+    let set = |key: &i64| if key % 4 == 3 { "validate" } else { "fit" }.to_string();
+    frame.push("sequence", Cell::to_array(keys.to_vec()));
+    frame.push("point_id", names('P', keys));
+    frame.push("set", Cell::to_array(keys.iter().map(set).collect()));
     frame
 }
 
@@ -112,29 +108,19 @@ fn the_order_of_pushing_and_computing_does_not_show_in_the_content() {
 
 #[test]
 fn the_content_hash_sees_a_moved_border_between_texts_and_a_null() {
-    let hash = |texts: [&str; 2], sigma: Option<f64>| {
+    let hash = |pair: [&str; 2], sigma: Option<f64>| {
         let mut frame = FrameBuilder::new("parameters");
-        for name in ["name", "effect", "place", "unit", "step"] {
-            let (first, second) = if name == "name" {
-                ("a", "b")
-            } else {
-                (texts[0], texts[1])
-            };
-            frame.push(
-                name,
-                Arc::new(StringArray::from(vec![first, second])) as ArrayRef,
-            );
+        frame.push("name", texts(["a", "b"]));
+        for name in ["effect", "place", "unit", "step"] {
+            frame.push(name, texts(pair));
         }
-        frame.push("status", Arc::new(StringArray::from(vec!["free", "held"])));
-        frame.push("remark", Arc::new(StringArray::from(vec![None, Some("")])));
-        frame.push(
-            "form",
-            Arc::new(StringArray::from(vec![None::<&str>, None])),
-        );
-        frame.push("nominal", Arc::new(Float64Array::from(vec![0.0, 0.0])));
-        frame.push("value", Arc::new(Float64Array::from(vec![0.0, 1.0])));
-        frame.push("change", Arc::new(Float64Array::from(vec![0.0, 1.0])));
-        frame.push("sigma", Arc::new(Float64Array::from(vec![sigma, None])));
+        frame.push("status", texts(["free", "held"]));
+        frame.push("remark", Cell::to_array(vec![None, Some(String::new())]));
+        frame.push("form", Cell::to_array(vec![None::<String>, None]));
+        frame.push("nominal", Cell::to_array(vec![0.0, 0.0]));
+        frame.push("value", Cell::to_array(vec![0.0, 1.0]));
+        frame.push("change", Cell::to_array(vec![0.0, 1.0]));
+        frame.push("sigma", Cell::to_array(vec![sigma, None]));
         frame.finish().unwrap().table_hash()
     };
     let hashes: Vec<TableHash> = vec![
@@ -157,7 +143,7 @@ fn a_frame_that_breaks_its_schema_is_refused_with_column_and_key() {
     assert!(refused(|_| (), &[1, 2, 2]).contains("table split: key sequence 2 twice"));
     assert!(
         refused(
-            |frame| frame.push("extra", Arc::new(Int64Array::from(vec![1]))),
+            |frame| frame.push("extra", Cell::to_array(vec![1i64])),
             &[1]
         )
         .contains("column extra is not in the schema")
@@ -169,15 +155,11 @@ fn a_frame_that_breaks_its_schema_is_refused_with_column_and_key() {
     assert!(refused(|frame| *frame = FrameBuilder::new("splitt"), &[1]).contains("splitt"));
     let float = |values: Vec<Option<f64>>| {
         let mut frame = FrameBuilder::new("truth");
+        let rows: Vec<i64> = (0..values.len() as i64).collect();
         for name in ["name", "effect", "place", "unit"] {
-            frame.push(
-                name,
-                Arc::new(StringArray::from_iter_values(
-                    (0..values.len()).map(|row| format!("n{row}")),
-                )) as ArrayRef,
-            );
+            frame.push(name, names('n', &rows));
         }
-        frame.push("value", Arc::new(Float64Array::from(values)));
+        frame.push("value", Cell::to_array(values));
         frame.finish().unwrap_err().to_string()
     };
     assert!(float(vec![Some(1.0), Some(f64::NAN)]).contains("column value, name n1: NaN"));
@@ -567,37 +549,20 @@ fn a_million_rows_stream_in_bounded_memory() {
     let (mut settled, mut most) = (0, 0);
     for start in (0..ROWS).step_by(CHUNK as usize) {
         let keys: Vec<i64> = (start..start + CHUNK).collect();
-        let text = |text: &str| Arc::new(StringArray::from(vec![text; keys.len()])) as ArrayRef;
         let mut frame = FrameBuilder::new("prediction");
-        frame.push(
-            "point_id",
-            Arc::new(StringArray::from_iter_values(
-                keys.iter().map(|key| format!("P{key}")),
-            )) as ArrayRef,
-        );
-        frame.push("set", text("fit"));
-        frame.push("step", text("geometry"));
+        frame.push("point_id", names('P', &keys));
+        for (name, text) in [("set", "fit"), ("step", "geometry")] {
+            frame.push(name, Cell::to_array(vec![text.to_string(); keys.len()]));
+        }
         for name in ["held_out", "suspect"] {
-            frame.push(
-                name,
-                Arc::new(arrow::array::BooleanArray::from(vec![false; keys.len()])),
-            );
+            frame.push(name, Cell::to_array(vec![false; keys.len()]));
         }
-        let numbers = [
-            "x_mm", "y_mm", "z_mm", "dx_mm", "dy_mm", "dz_mm", "error_mm", "noise_mm", "sigma_mm",
-        ];
-        for name in numbers
-            .into_iter()
-            .chain(["fold_error_mm", "block_error_mm"])
-        {
-            frame.push(
-                name,
-                Arc::new(Float64Array::from_iter_values(
-                    keys.iter().map(|key| (*key as f64 * 0.7371).fract()),
-                )),
-            );
+        let numbers = "x_mm y_mm z_mm dx_mm dy_mm dz_mm error_mm noise_mm sigma_mm fold_error_mm block_error_mm";
+        for name in numbers.split(' ') {
+            let number = |key: &i64| (*key as f64 * 0.7371).fract();
+            frame.push(name, Cell::to_array(keys.iter().map(number).collect()));
         }
-        frame.push("sequence", Arc::new(Int64Array::from(keys)));
+        frame.push("sequence", Cell::to_array(keys));
         writer.push(&frame.finish().unwrap()).unwrap();
         if start == ROWS / 5 {
             settled = resident();

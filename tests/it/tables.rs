@@ -3,16 +3,15 @@
 //! The JSON Schema of the YAML files: what editors complete from.
 
 use crate::answer::{has, read, root};
-use arrow::array::{ArrayRef, BooleanArray, Float64Array, Int64Array, StringArray};
+use arrow::array::Array;
 use calib::pipeline::json_schema;
 use calib::stage::STAGES;
-use calib::store::frame::{Frame, FrameBuilder};
+use calib::store::frame::{Cell, Frame, FrameBuilder};
 use calib::store::schema::{self, ColumnType, FieldSchema};
 use calib::store::{Account, PendingTable, Store};
 use calib::table::{self, Table};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use super::store::key;
 
@@ -85,22 +84,12 @@ fn frame(kind: &str, rows: &[Extreme]) -> Frame {
                 .enumerate()
                 .map(|(row, extreme)| cell(field, *extreme, row, key))
                 .collect();
-            let array: ArrayRef = match field.column_type {
-                ColumnType::Float64 => {
-                    Arc::new(cells.iter().map(|cell| cell.0).collect::<Float64Array>())
-                }
-                ColumnType::Int64 => {
-                    Arc::new(cells.iter().map(|cell| cell.1).collect::<Int64Array>())
-                }
-                ColumnType::Utf8 => Arc::new(
-                    cells
-                        .iter()
-                        .map(|cell| cell.2.clone())
-                        .collect::<StringArray>(),
-                ),
-                ColumnType::Boolean => {
-                    Arc::new(cells.iter().map(|cell| cell.3).collect::<BooleanArray>())
-                }
+            let cells = cells.into_iter();
+            let array = match field.column_type {
+                ColumnType::Float64 => Cell::to_array(cells.map(|cell| cell.0).collect()),
+                ColumnType::Int64 => Cell::to_array(cells.map(|cell| cell.1).collect()),
+                ColumnType::Utf8 => Cell::to_array(cells.map(|cell| cell.2).collect()),
+                ColumnType::Boolean => Cell::to_array(cells.map(|cell| cell.3).collect()),
             };
             // Lists of rows leave an optional column out that has no value.
             if !field.optional || kind == "recording" || array.null_count() < array.len() {
