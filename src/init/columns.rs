@@ -456,7 +456,7 @@ pub(super) fn points(names: &[Name]) -> Points {
         found.question = Some("several points fit; which one was measured?".into());
     } else if measured.is_empty() && !plain.is_empty() {
         if let (Some(difference), true) = (differences.first(), wanted.is_empty()) {
-            found.ways.push(by(&plain[0], difference));
+            found.ways.push(by(plain[0], difference));
             found.question = Some(format!(
                 "is this the measured point, or the target of the differences next to it ({sides})?"
             ));

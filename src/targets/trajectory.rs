@@ -235,7 +235,7 @@ fn put(motion: &mut PlannedMotion, row: usize, role: ColumnRole, value: f64) {
 /// Endings of a column's name, with what a unit is in SI.
 const DEG: f64 = std::f64::consts::PI / 180.0;
 const TIMES: [(&str, f64); 2] = [("time_s", 1.0), ("time_ms", 1e-3)];
-const PER_JOINT: [(&str, RoleOfJoint, [(&str, f64); 2]); 3] = [
+const PER_JOINT: [(&str, RoleOfJoint, [UnitEnding; 2]); 3] = [
     ("q", ColumnRole::Joint, [("_deg", DEG), ("_rad", 1.0)]),
     (
         "dq",
@@ -250,6 +250,7 @@ const PER_JOINT: [(&str, RoleOfJoint, [(&str, f64); 2]); 3] = [
 ];
 
 type RoleOfJoint = fn(usize) -> ColumnRole;
+type UnitEnding = (&'static str, f64);
 
 fn columns(place: &str, names: &[String], robot: &RobotDescription) -> Result<Vec<MotionColumn>> {
     let n = robot.joints.len();

@@ -89,10 +89,10 @@ impl JsonSchema for InstrumentSetting {
 /// What is wrong with how noise is stated: a standard deviation is stated once, as such or by an uncertainty; in files that are
 /// joined by one of them.
 pub(super) fn faults(settings: &Ingest, at: &mut Place) {
-    if let Some(InstrumentSetting::Figures(figures)) = &settings.instrument {
-        if let Some(fault) = figures.fault() {
-            at.at("instrument").fault(fault);
-        }
+    if let Some(InstrumentSetting::Figures(figures)) = &settings.instrument
+        && let Some(fault) = figures.fault()
+    {
+        at.at("instrument").fault(fault);
     }
     let appended = settings.join == Some(Join::Append {});
     let mut stated: BTreeMap<&str, &str> = BTreeMap::new();
