@@ -85,7 +85,7 @@ impl StatusArguments {
         let all = format!(
             "fleet {name}: {done} of {robots} done, {rejected} rejected, {failed} failed, {missing} not computed yet\n"
         );
-        emit(lines.collect::<String>() + &all)
+        emit(&(lines.collect::<String>() + &all))
     }
 }
 
