@@ -72,9 +72,12 @@ pub(super) fn feed_forward(asked: &FeedForward, identified: &IdentifiedModel) ->
     refused(&judged, &trajectory, &place)
 }
 
+/// Whether something is so of a row.
+type OfRow = fn(&JudgedRow) -> bool;
+
 /// What is wrong with some rows, a sentence a line.
 fn warnings(judged: &[JudgedRow]) -> String {
-    let all: [(fn(&JudgedRow) -> bool, &str); 3] = [
+    let all: [(OfRow, &str); 3] = [
         (
             JudgedRow::is_beyond,
             "lie beyond the motion that the model was seen in",
@@ -89,7 +92,7 @@ fn warnings(judged: &[JudgedRow]) -> String {
         ),
     ];
     let rows = counted(judged.len(), "row");
-    let line = |(is, what): (fn(&JudgedRow) -> bool, &str)| {
+    let line = |(is, what): (OfRow, &str)| {
         let count = judged.iter().filter(|row| is(row)).count();
         (count > 0).then(|| format!("warning: {count} of {rows} {what} (column `remark`)\n"))
     };

@@ -2,7 +2,7 @@
 //!
 //! `calib completions` and `calib man`: what a shell and a reader of manuals need, from the same declarations as `--help`.
 
-use super::{Arguments, emit};
+use super::{Arguments, emit_bytes};
 use crate::error::{Error, Result};
 use clap::{Args, Command, CommandFactory};
 use clap_complete::Shell;
@@ -93,7 +93,7 @@ impl CompletionsArguments {
     pub(crate) fn run(&self) -> Result<()> {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut Arguments::command(), "calib", &mut text);
-        emit(text)
+        emit_bytes(&text)
     }
 }
 
@@ -129,7 +129,7 @@ impl ManArguments {
             .title(title)
             .render(&mut text)
             .map_err(|error| Error::Bug(error.to_string()))?;
-        emit(text)
+        emit_bytes(&text)
     }
 }
 

@@ -119,26 +119,22 @@ fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
     {
         std::fs::write(path, text).map_err(refused(path))?;
     }
-    let unread = if data.is_empty() {
-        tables_in(folder)
-    } else {
-        Vec::new()
+    let unread = match data.is_empty() {
+        true => tables_in(folder),
+        false => Vec::new(),
     };
     let unread = (!unread.is_empty()).then(|| {
-        let written: Vec<String> = files
-            .iter()
-            .zip(texts)
-            .filter_map(|(path, text)| text.map(|_| path.display().to_string()))
-            .collect();
+        let written = files.iter().zip(texts).filter(|(_, text)| text.is_some());
+        let written = written.map(|(path, _)| path.display().to_string());
+        let written = written.collect::<Vec<_>>().join(" and ");
         let more = match unread.len().saturating_sub(NAMED) {
             0 => String::new(),
             more => format!(" and {more} more"),
         };
+        let named = unread[..unread.len().min(NAMED)].join(", ");
         format!(
-            "not looked at in {}: {}{more}; delete {} and name the recording after --data",
-            folder.display(),
-            unread[..unread.len().min(NAMED)].join(", "),
-            written.join(" and ")
+            "not looked at in {}: {named}{more}; delete {written} and name the recording after --data",
+            folder.display()
         )
     });
     warn(start.notes.iter().chain(&unread));

@@ -175,9 +175,13 @@ fn message(error: &Error) -> String {
 }
 
 /// Prints a result on stdout; a reader that has gone away is no fault.
-fn emit(text: impl AsRef<[u8]>) -> Result<()> {
+fn emit(text: &str) -> Result<()> {
+    emit_bytes(text.as_bytes())
+}
+
+fn emit_bytes(bytes: &[u8]) -> Result<()> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_ref()).and_then(|()| out.flush()) {
+    match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(Error::store("stdout", error.to_string()))
         }
@@ -203,7 +207,7 @@ fn note(text: impl AsRef<[u8]>) {
 /// A result where the command line says, whole, else on stdout.
 fn put(out: Option<&Path>, result: impl AsRef<[u8]>) -> Result<()> {
     let Some(out) = out else {
-        return emit(result);
+        return emit_bytes(result.as_ref());
     };
     whole(out, |mut file| {
         let written = file.write_all(result.as_ref());
@@ -234,10 +238,10 @@ fn emit_lines(text: &str) -> Result<()> {
         return emit(text);
     };
     let text = crate::summary::folded(text, columns);
-    emit(match surroundings::colours() {
-        true => surroundings::painted(&text),
-        false => text,
-    })
+    match surroundings::colours() {
+        true => emit(&surroundings::painted(&text)),
+        false => emit(&text),
+    }
 }
 
 /// Prints one JSON document, keys in their order.

@@ -98,7 +98,7 @@ fn answer(
         _ => {
             let rows = Some(arguments.rows).filter(|rows| *rows > 0);
             let width = super::surroundings::columns();
-            emit(summary::grid(&answer, rows.unwrap_or(usize::MAX), width))
+            emit(&summary::grid(&answer, rows.unwrap_or(usize::MAX), width))
         }
     }
 }
@@ -116,7 +116,7 @@ fn columns(store: &Store, tables: &[&QueryTable], json: bool) -> Result<()> {
     let tables = summary::columns(store, tables)?;
     match json {
         true => emit_json(&tables),
-        false => emit(summary::columns_text(&tables)),
+        false => emit(&summary::columns_text(&tables)),
     }
 }
 

@@ -113,17 +113,11 @@ fn rows(found: &Achieved, new_base: bool) -> Vec<(&'static str, [f64; 3], String
         ""
     };
     let achieved = format!("measured, {}{base}", counted(found.achieved.len(), "point"));
+    let before = "of the uncorrected targets, by the model".to_string();
+    let predicted = "within which 95 % of corrected targets were to be".to_string();
     let all = [
-        (
-            "before",
-            &found.before,
-            "of the uncorrected targets, by the model".to_string(),
-        ),
-        (
-            "predicted",
-            &found.predicted,
-            "within which 95 % of corrected targets were to be".to_string(),
-        ),
+        ("before", &found.before, before),
+        ("predicted", &found.predicted, predicted),
         ("achieved", &found.achieved, achieved),
     ];
     let filled = all
@@ -136,70 +130,52 @@ fn rows(found: &Achieved, new_base: bool) -> Vec<(&'static str, [f64; 3], String
 
 /// How many points are farther off than predicted; none where nothing was predicted.
 fn beyond(found: &Achieved) -> Option<String> {
-    let beyond = found
-        .achieved
-        .iter()
-        .zip(&found.predicted)
+    let pairs = found.achieved.iter().zip(&found.predicted);
+    let beyond = pairs
         .filter(|(achieved, predicted)| achieved > predicted)
         .count();
-    let line = format!(
-        "{beyond} of {} points are farther off than predicted",
-        found.achieved.len()
-    );
-    (!found.predicted.is_empty()).then_some(line)
+    let all = found.achieved.len();
+    let line = || format!("{beyond} of {all} points are farther off than predicted");
+    (!found.predicted.is_empty()).then(line)
 }
 
 /// Targets without a correction; none where all have one.
 fn unreached(found: &Achieved) -> Option<String> {
-    let line = format!(
-        "{} cannot be reached by the model and had no correction",
-        counted(found.unreached, "target")
-    );
-    (found.unreached > 0).then_some(line)
+    let targets = counted(found.unreached, "target");
+    let line = || format!("{targets} cannot be reached by the model and had no correction");
+    (found.unreached > 0).then(line)
 }
 
 fn page(origin: &str, found: &Achieved, new_base: bool) -> Result<String> {
-    let mm = |lengths: &[f64]| {
-        lengths
-            .iter()
-            .map(|length| 1e3 * length)
-            .collect::<Vec<f64>>()
-    };
-    let poses = found
-        .poses
-        .iter()
-        .map(|pose| (pose.cycles, 1e3 * pose.accuracy, 1e3 * pose.repeatability));
+    let mm = |lengths: &[f64]| lengths.iter().map(|length| 1e3 * length).collect();
+    let poses = found.poses.iter();
+    let poses = poses.map(|pose| (pose.cycles, 1e3 * pose.accuracy, 1e3 * pose.repeatability));
+    let remarks = beyond(found).into_iter().chain(unreached(found));
     achieved_page(&AchievedTables {
         title: "Before, predicted and achieved",
         model: origin,
         rows: rows(found, new_base),
         errors: [mm(&found.before), mm(&found.achieved)],
         poses: poses.collect(),
-        remarks: beyond(found)
-            .into_iter()
-            .chain(unreached(found))
-            .map(|line| format!("{line}."))
-            .collect(),
+        remarks: remarks.map(|line| format!("{line}.")).collect(),
     })
 }
 
 fn report_text(origin: &str, found: &Achieved, new_base: bool) -> String {
     let mut text = labelled("model", origin);
     for (label, [mean, p95, max], what) in rows(found, new_base) {
-        text.push_str(&labelled(
-            label,
-            &format!("mean {mean:.4} mm, 95 % within {p95:.4} mm, max {max:.4} mm {what}"),
-        ));
+        let figures = format!("mean {mean:.4} mm, 95 % within {p95:.4} mm, max {max:.4} mm {what}");
+        text += &labelled(label, &figures);
     }
-    text.push_str(&beyond(found).map_or_else(String::new, |line| labelled("", &line)));
-    text.push_str(&unreached(found).map_or_else(String::new, |line| labelled("warning", &line)));
+    text.extend(beyond(found).map(|line| labelled("", &line)));
+    text.extend(unreached(found).map(|line| labelled("warning", &line)));
     for (k, pose) in (1..).zip(&found.poses) {
         let (accuracy, repeatability) = (1e3 * pose.accuracy, 1e3 * pose.repeatability);
-        let text_of = format!(
-            "pose {k}, {} cycles: accuracy AP {accuracy:.4} mm, repeatability RP {repeatability:.4} mm",
-            pose.cycles
+        let cycles = pose.cycles;
+        let line = format!(
+            "pose {k}, {cycles} cycles: accuracy AP {accuracy:.4} mm, repeatability RP {repeatability:.4} mm"
         );
-        text.push_str(&labelled("ISO 9283", &text_of));
+        text += &labelled("ISO 9283", &line);
     }
     text
 }

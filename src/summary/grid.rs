@@ -65,10 +65,9 @@ fn line<'a>(cells: impl Iterator<Item = (&'a Drawn, &'a str)>) -> String {
     let cells = cells.map(|(column, cell)| {
         let cell = cut(cell, column.width);
         let blank = " ".repeat(column.width.saturating_sub(cell.width()));
-        if column.right {
-            blank + &cell
-        } else {
-            cell + &blank
+        match column.right {
+            true => blank + &cell,
+            false => cell + &blank,
         }
     });
     let line = cells.collect::<Vec<_>>().join("  ");
@@ -100,12 +99,11 @@ fn fit(columns: &mut Vec<Drawn>, width: usize) -> Vec<String> {
 }
 
 fn drawn(name: &str, values: &[QueryValue]) -> Drawn {
-    let right = values.iter().all(|value| {
-        matches!(
-            value,
-            QueryValue::Null | QueryValue::Integer(_) | QueryValue::Number(_)
-        )
-    });
+    let is_right = |value: &QueryValue| {
+        use QueryValue::{Integer, Null, Number};
+        matches!(value, Null | Integer(_) | Number(_))
+    };
+    let right = values.iter().all(is_right);
     let decimals = decimals(values, if name.ends_with("_mm") { LENGTH } else { 0 });
     let mut cells: Vec<String> = values
         .iter()
@@ -136,20 +134,16 @@ fn drawn(name: &str, values: &[QueryValue]) -> Drawn {
 
 /// Decimals that suit all numbers of a column, at least so many; nothing where they are of too different sizes.
 fn decimals(values: &[QueryValue], least: i32) -> Option<usize> {
-    let sizes = values.iter().filter_map(|value| {
-        if let QueryValue::Number(number) = value {
-            Some(number.abs())
-        } else {
-            None
-        }
+    let sizes = values.iter().filter_map(|value| match value {
+        QueryValue::Number(number) => Some(number.abs()),
+        _ => None,
     });
-    let sizes: Vec<f64> = sizes
-        .filter(|size| size.is_finite() && *size > 0.0)
-        .collect();
-    let (Some(largest), Some(smallest)) = (
-        sizes.iter().copied().reduce(f64::max),
-        sizes.iter().copied().reduce(f64::min),
-    ) else {
+    let sizes = sizes.filter(|size| size.is_finite() && *size > 0.0);
+    let ends = sizes.fold(None, |ends, size| {
+        let (smallest, largest) = ends.unwrap_or((size, size));
+        Some((size.min(smallest), size.max(largest)))
+    });
+    let Some((smallest, largest)) = ends else {
         return Some(0);
     };
     let decimals = (DIGITS - 1 - power(largest)).max(least);

@@ -187,23 +187,20 @@ impl LimitsSummary {
     /// The judgements of all reports of the record of a run. Fails where a table has left the store, or a report is older than the table.
     pub fn of(manifest: &Manifest, store: &Store) -> crate::error::Result<Self> {
         let mut all = Vec::new();
-        for stage in manifest
-            .stages
-            .iter()
-            .filter(|stage| stage.uses == Report::NAME && !stage.outputs.is_empty())
-        {
-            let Some(acceptance) = stage
-                .outputs
-                .iter()
-                .find(|output| output.kind == Acceptance::KIND)
-            else {
-                let message = "its report was made by an earlier calib, which kept limits elsewhere; run the pipeline again";
-                return Err(Error::data(&manifest.run_id, message));
-            };
-            all.extend(judged(
-                &stage.id,
-                Acceptance::from_frame(&store.load(&acceptance.table)?)?,
-            ));
+        let is_report = |stage: &&StageReport| stage.uses == Report::NAME;
+        for stage in manifest.stages.iter().filter(is_report) {
+            let mut outputs = stage.outputs.iter();
+            match outputs.find(|output| output.kind == Acceptance::KIND) {
+                Some(output) => {
+                    let acceptance = Acceptance::from_frame(&store.load(&output.table)?)?;
+                    all.extend(judged(&stage.id, acceptance));
+                }
+                None if stage.outputs.is_empty() => {}
+                None => {
+                    let message = "its report was made by an earlier calib, which kept limits elsewhere; run the pipeline again";
+                    return Err(Error::data(&manifest.run_id, message));
+                }
+            }
         }
         Ok(Self(all))
     }
@@ -215,19 +212,14 @@ impl LimitsSummary {
 
     /// What is not accepted, a sentence a report.
     pub(crate) fn exceeded(&self) -> Vec<String> {
-        self.0
-            .iter()
-            .filter(|judged| !judged.kept)
-            .map(Judged::words)
-            .collect()
+        let beyond = self.0.iter().filter(|judged| !judged.kept);
+        beyond.map(Judged::words).collect()
     }
 
     /// A line for each report with limits.
     pub fn text(&self) -> String {
-        self.0
-            .iter()
-            .map(|judged| labelled("limits", &judged.words()))
-            .collect()
+        let line = |judged: &Judged| labelled("limits", &judged.words());
+        self.0.iter().map(line).collect()
     }
 }
 
@@ -248,27 +240,18 @@ fn judged(stage: &str, Acceptance(rows): Acceptance) -> Option<Judged> {
 impl Judged {
     /// The judgement, then the figures that are beyond, or all where none is.
     fn words(&self) -> String {
-        let limits = self
-            .figures
-            .iter()
-            .filter(|figure| figure.kept == self.kept);
-        let limits = limits.filter_map(|one| {
+        let limits = self.figures.iter().filter_map(|one| {
             let (figure, found, limit) = (&one.figure, one.found_mm?, one.limit_mm);
-            Some(format!(
-                "{figure} {found:.4} mm, at most {limit} mm allowed"
-            ))
+            let words = format!("{figure} {found:.4} mm, at most {limit} mm allowed");
+            (one.kept == self.kept).then_some(words)
         });
         let limits: Vec<String> = limits.collect();
-        let mut letters = self.sentence.trim_end_matches('.').chars();
-        let first = letters
-            .next()
-            .map(|letter| letter.to_lowercase().to_string())
-            .unwrap_or_default();
-        let sentence = format!("{first}{}", letters.as_str());
-        if limits.is_empty() {
-            sentence
-        } else {
-            format!("{sentence}: {}", limits.join("; "))
+        let sentence = self.sentence.trim_end_matches('.');
+        let (first, others) = sentence.split_at(sentence.chars().next().map_or(0, char::len_utf8));
+        let sentence = first.to_lowercase() + others;
+        match limits.is_empty() {
+            true => sentence,
+            false => format!("{sentence}: {}", limits.join("; ")),
         }
     }
 }

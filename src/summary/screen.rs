@@ -24,15 +24,9 @@ pub(super) fn width(terminal: Option<usize>) -> usize {
 
 /// What was measured: the robot, its rows, the noise.
 pub(super) fn measured(robot: Option<&str>, rows: &str, noise: Option<&str>) -> String {
-    let all: Vec<&str> = [Some(rows), noise].into_iter().flatten().collect();
-    let rows = all.join("; ");
-    labelled(
-        "robot",
-        &robot.map_or_else(
-            || rows.clone(),
-            |robot| format!("{}: {rows}", cut(robot, WIDTH / 3)),
-        ),
-    )
+    let noise = noise.map_or_else(String::new, |noise| format!("; {noise}"));
+    let robot = robot.map_or_else(String::new, |robot| cut(robot, WIDTH / 3) + ": ");
+    labelled("robot", &format!("{robot}{rows}{noise}"))
 }
 
 /// Mean and largest error of a step (mm), with the decimals that suit the smaller of all means.
@@ -128,21 +122,18 @@ pub(super) fn ranked(rank: i64, finding: &ShortFinding, at: &str, width: usize) 
     let room = width.saturating_sub(LABEL);
     let printed = |at: &str| {
         let size = finding.size.as_ref().map(|(_, size)| format!("{size}{at}"));
-        let figures: Vec<&str> = finding
-            .number
-            .iter()
-            .chain(&size)
-            .map(String::as_str)
-            .collect();
-        if figures.is_empty() {
-            finding.what.clone()
-        } else {
-            format!("{}: {}", finding.what, figures.join(", "))
+        let figures: Vec<String> = finding.number.iter().cloned().chain(size).collect();
+        let what = &finding.what;
+        match figures.is_empty() {
+            true => what.clone(),
+            false => format!("{what}: {}", figures.join(", ")),
         }
     };
-    let printed_here = Some(printed(at))
-        .filter(|text| text.width() <= room)
-        .unwrap_or_else(|| cut(&printed(""), room));
+    let printed_here = printed(at);
+    let printed_here = match printed_here.width() <= room {
+        true => printed_here,
+        false => cut(&printed(""), room),
+    };
     let label = format!("{rank:>3}.");
     match &finding.instead {
         Some(instead) if printed_here.width() + instead.width() + 2 <= room => {

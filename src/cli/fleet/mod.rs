@@ -107,61 +107,49 @@ const NAMED: usize = 20;
 
 /// Nothing where all robots are done; else the worst of how they ended, with reasons.
 fn verdict(fleet: &Fleet, records: &[Option<RobotRecord>]) -> Result<()> {
-    let bad = |ending: Ending| {
-        records
-            .iter()
-            .flatten()
-            .filter(move |record| record.ending == ending)
-    };
+    let all = || records.iter().flatten();
+    let bad = |ending: Ending| all().filter(move |record| record.ending == ending);
     let line = |record: &RobotRecord| {
-        let reason = record
-            .reason
-            .as_deref()
-            .and_then(|reason| reason.lines().next())
-            .unwrap_or_default();
-        Fault::new(
-            visible(&record.robot),
-            format!("{}: {}", record.ending.name(), visible(reason)),
-        )
+        let message = format!("{}: {}", record.ending.name(), first_line(record));
+        Fault::new(visible(&record.robot), message)
     };
-    let mut faults: Vec<Fault> = bad(Ending::Failed)
-        .chain(bad(Ending::Rejected))
+    let all_bad: Vec<&RobotRecord> = bad(Ending::Failed).chain(bad(Ending::Rejected)).collect();
+    let mut faults: Vec<Fault> = all_bad
+        .iter()
         .take(NAMED)
-        .map(line)
+        .map(|record| line(record))
         .collect();
-    let count = bad(Ending::Failed).count() + bad(Ending::Rejected).count();
-    if count > NAMED {
-        faults.push(Fault::new(
-            "",
-            format!("and {} more: see `calib fleet status`", count - NAMED),
-        ));
+    if all_bad.len() > NAMED {
+        let message = format!(
+            "and {} more: see `calib fleet status`",
+            all_bad.len() - NAMED
+        );
+        faults.push(Fault::new("", message));
     }
     let list = |faults: &[Fault]| {
-        faults
-            .iter()
-            .map(Fault::to_string)
-            .collect::<Vec<_>>()
-            .join("\n")
+        let lines = faults.iter().map(Fault::to_string);
+        lines.collect::<Vec<_>>().join("\n")
     };
     if bad(Ending::Failed).any(|record| record.exit_code == 70) {
         return Err(Error::Bug(list(&faults)));
     }
     let missing = records.iter().filter(|record| record.is_none()).count();
     if missing > 0 {
-        faults.push(Fault::new(
-            "",
-            format!(
-                "not computed yet: {missing} of {}; run again",
-                counted(records.len(), "robot")
-            ),
-        ));
+        let robots = counted(records.len(), "robot");
+        let message = format!("not computed yet: {missing} of {robots}; run again");
+        faults.push(Fault::new("", message));
     }
     if missing > 0 || bad(Ending::Failed).next().is_some() {
         return Err(Error::store(fleet.name(), list(&faults)));
     }
-    if faults.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::Data(faults))
-    }
+    Error::if_data(faults)
+}
+
+/// Why a robot is not done.
+fn first_line(record: &RobotRecord) -> String {
+    let reason = record
+        .reason
+        .as_deref()
+        .and_then(|reason| reason.lines().next());
+    visible(reason.unwrap_or_default())
 }

@@ -84,22 +84,14 @@ pub(super) fn retry(arguments: &RetryArguments, command_line: &[OsString]) -> Re
     let fleet = Fleet::load(&arguments.place.fleet, &store)?;
     let fresh = || surroundings(command_line);
     let workshop = workshop(&fleet, &store, &fresh);
-    for record in records(&workshop)?
-        .into_iter()
-        .flatten()
-        .filter(|record| record.ending != Ending::Done)
-    {
-        if arguments.how.robot.is_empty() || arguments.how.robot.contains(&record.robot) {
+    let (place, how) = (&arguments.place, &arguments.how);
+    let bad = records(&workshop)?.into_iter().flatten();
+    for record in bad.filter(|record| record.ending != Ending::Done) {
+        if how.robot.is_empty() || how.robot.contains(&record.robot) {
             workshop.ledger.forget(&record.key)?;
         }
     }
-    run(
-        &fleet,
-        &store,
-        &arguments.place,
-        &arguments.how,
-        command_line,
-    )
+    run(&fleet, &store, place, how, command_line)
 }
 
 fn run(
@@ -161,18 +153,13 @@ fn chosen(fleet: &Fleet, names: &[String]) -> Result<Vec<usize>> {
         return Ok((0..fleet.roster.0.len()).collect());
     }
     let find = |name: &String| {
-        let known = fleet.roster.0.iter().map(|robot| robot.name.as_str());
-        let hint = || {
-            crate::error::nearest(name, known)
-                .map(|near| format!("; did you mean {near:?}?"))
-                .unwrap_or_default()
+        let unknown = || {
+            let known = fleet.roster.0.iter().map(|robot| robot.name.as_str());
+            let hint = crate::error::nearest(name, known);
+            let hint = hint.map_or_else(String::new, |near| format!("; did you mean {near:?}?"));
+            Error::spec("--robot", format!("no robot {name:?} in the fleet{hint}"))
         };
-        fleet.roster.position(name).ok_or_else(|| {
-            Error::spec(
-                "--robot",
-                format!("no robot {name:?} in the fleet{}", hint()),
-            )
-        })
+        fleet.roster.position(name).ok_or_else(unknown)
     };
     names.iter().map(find).collect()
 }
@@ -217,30 +204,24 @@ fn text(
     seconds: f64,
     shown: &tables::FleetSummary,
 ) -> String {
-    let mut text = String::new();
-    for row in shown.fleet.0.iter().filter(|row| row.flags.is_some()) {
-        text.push_str(&format!(
-            "{}: {}\n",
-            visible(&row.robot),
-            visible(row.flags.as_deref().unwrap_or_default())
-        ));
-    }
-    for path in &shown.tables {
-        text.push_str(&format!("table: {}\n", path.display()));
-    }
-    text.push_str(&format!("page: {}\n", shown.page.display()));
-    let rate = if computed > 0 {
-        format!(", {:.0} a minute", computed as f64 / seconds * 60.0)
-    } else {
-        String::new()
+    let flagged = shown.fleet.0.iter().filter_map(|row| {
+        let flags = row.flags.as_deref()?;
+        Some(format!("{}: {}\n", visible(&row.robot), visible(flags)))
+    });
+    let tables = shown.tables.iter();
+    let tables = tables.map(|path| format!("table: {}\n", path.display()));
+    let page = format!("page: {}\n", shown.page.display());
+    let rate = match computed {
+        0 => String::new(),
+        _ => format!(", {:.0} a minute", computed as f64 / seconds * 60.0),
     };
-    text + &format!(
-        "{} of {} done, {} rejected, {} failed; {computed} computed now ({seconds:.1} s{rate})\n",
-        count(records, Ending::Done),
-        counted(records.len(), "robot"),
-        count(records, Ending::Rejected),
-        count(records, Ending::Failed)
-    )
+    let robots = counted(records.len(), "robot");
+    let [done, rejected, failed] =
+        [Ending::Done, Ending::Rejected, Ending::Failed].map(|ending| count(records, ending));
+    let all = format!(
+        "{done} of {robots} done, {rejected} rejected, {failed} failed; {computed} computed now ({seconds:.1} s{rate})\n"
+    );
+    flagged.chain(tables).chain([page, all]).collect()
 }
 
 fn document(

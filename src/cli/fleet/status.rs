@@ -4,7 +4,7 @@
 
 use crate::cli::fleet::cluster::ClusterArguments;
 use crate::cli::fleet::run::{self, count, ledger};
-use crate::cli::fleet::{FleetLocation, records, workshop};
+use crate::cli::fleet::{FleetLocation, first_line, records, workshop};
 use crate::cli::surroundings::surroundings;
 use crate::cli::{emit, emit_json};
 use crate::error::{Error, Result, counted, visible};
@@ -75,36 +75,18 @@ impl StatusArguments {
                 "fleet": fleet.name(), "done": done, "rejected": rejected, "failed": failed, "missing": missing, "robots": robots,
             }));
         }
-        let mut text = String::new();
-        for record in records
-            .iter()
-            .flatten()
-            .filter(|record| record.ending != Ending::Done)
-        {
-            text.push_str(&format!(
-                "{}: {}: {}\n",
-                visible(&record.robot),
-                record.ending.name(),
-                first_line(record)
-            ));
-        }
-        text.push_str(&format!(
-        "fleet {}: {done} of {} done, {rejected} rejected, {failed} failed, {missing} not computed yet\n",
-        fleet.name(),
-        counted(records.len(), "robot")
-    ));
-        emit(&text)
+        let bad = records.iter().flatten();
+        let bad = bad.filter(|record| record.ending != Ending::Done);
+        let lines = bad.map(|record| {
+            let (robot, ending) = (visible(&record.robot), record.ending.name());
+            format!("{robot}: {ending}: {}\n", first_line(record))
+        });
+        let (name, robots) = (fleet.name(), counted(records.len(), "robot"));
+        let all = format!(
+            "fleet {name}: {done} of {robots} done, {rejected} rejected, {failed} failed, {missing} not computed yet\n"
+        );
+        emit(&(lines.collect::<String>() + &all))
     }
-}
-
-fn first_line(record: &RobotRecord) -> String {
-    visible(
-        record
-            .reason
-            .as_deref()
-            .and_then(|reason| reason.lines().next())
-            .unwrap_or_default(),
-    )
 }
 
 fn detail(record: &RobotRecord, store: &crate::store::Store, fleet: &str) -> String {
