@@ -336,7 +336,7 @@ impl Law {
             times.variable
         };
         let inner = times.count();
-        if !(a + b > 0.0) {
+        if a + b == 0.0 {
             return None;
         }
         let of_first = self.first.all(robot, state, of_first);

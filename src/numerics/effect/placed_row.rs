@@ -163,7 +163,7 @@ impl PlacedRow<'_> {
         self.scratch.velocities(self.robot, &self.point);
         let rates = self.scratch.rates();
         for (parameter, direction) in &self.scratch.deflection.partials {
-            emit(*parameter, rates.from_anchor(direction, reach));
+            emit(*parameter, rates.anchor_reach(direction, reach));
         }
     }
 }
@@ -285,7 +285,7 @@ impl Rates<'_> {
     }
 
     /// Derivative of the vector from the row's anchor to the point, which is `reach`, m per unit.
-    pub(super) fn from_anchor(&self, direction: &Direction, reach: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn anchor_reach(&self, direction: &Direction, reach: &Vector3<f64>) -> Vector3<f64> {
         match direction {
             Direction::Anchor(rate) => -rate,
             Direction::AnchorTilt(normal, turn) => normal * turn.dot(reach),

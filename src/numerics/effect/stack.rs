@@ -437,7 +437,7 @@ impl PointMotion {
         direction: &Direction,
         reach: &Vector3<f64>,
     ) -> Vector3<f64> {
-        self.rates().from_anchor(direction, reach)
+        self.rates().anchor_reach(direction, reach)
     }
 
     /// Rotation of the target about the tracker's axes, rad per unit; zero where turns were not asked for.

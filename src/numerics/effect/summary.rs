@@ -32,7 +32,7 @@ pub fn people(unit: Unit) -> (Unit, &'static str) {
 }
 
 /// The unit behind a number; none of ratios.
-fn unit(number: &ParameterEstimate) -> String {
+pub(super) fn unit(number: &ParameterEstimate) -> String {
     if number.unit == "1" {
         String::new()
     } else {

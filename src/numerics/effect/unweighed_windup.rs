@@ -109,11 +109,10 @@ impl UnweighedWindup {
             };
             bodies.iter().flat_map(pair).collect()
         };
-        let first = |count: usize| &heavy[..count.min(heavy.len())];
         let mut all: Vec<(Vec<Moment>, bool)> = Vec::new();
         for count in 1..=heavy.len() {
-            all.push((outwards(first(count)), true));
-            all.push((both(first(count)), false));
+            let first = &heavy[..count];
+            all.extend([(outwards(first), true), (both(first), false)]);
         }
         all.push((both(&bodies), false));
         let mut out: Vec<Hypothesis> = Vec::new();

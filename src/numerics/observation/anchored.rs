@@ -72,6 +72,19 @@ macro_rules! along_a_line {
     };
 }
 
+/// The place a and the number b that solve `factor` p . a + b = right of each of some points p in the mean: four numbers.
+fn linear(
+    points: &[Vector3<f64>],
+    factor: f64,
+    right: impl Fn(usize) -> f64,
+    least: f64,
+) -> Option<DVector<f64>> {
+    let of_point = |i: usize, j: usize| points[i].get(j).map_or(1.0, |value| factor * value);
+    let lines = DMatrix::from_fn(points.len(), 4, of_point);
+    let right = DVector::from_fn(points.len(), |i, _| right(i));
+    lines.svd(true, true).solve(&right, least).ok()
+}
+
 /// The middle of some points, m.
 fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
     points.iter().sum::<Vector3<f64>>() / points.len() as f64
@@ -213,22 +226,13 @@ impl MeasurementKind for Distance {
                     "{called}: {count} distances to fit cannot place it, at least {FEWEST_DISTANCES} are needed"
                 ));
             }
+            let points: Vec<Vector3<f64>> = seen.iter().map(|(point, _)| *point).collect();
             // About the points' middle, so that nothing cancels.
-            let middle = seen.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / count as f64;
-            let lines = DMatrix::from_fn(count, 4, |i, j| {
-                if j < 3 {
-                    -2.0 * (seen[i].0 - middle)[j]
-                } else {
-                    1.0
-                }
-            });
-            let right = DVector::from_fn(count, |i, _| {
-                seen[i].1.powi(2) - (seen[i].0 - middle).norm_squared()
-            });
-            let solution = lines
-                .svd(true, true)
-                .solve(&right, 1e-9)
-                .map_err(|_| format!("{called} cannot be placed"))?;
+            let middle = middle(&points);
+            let from_middle: Vec<Vector3<f64>> = points.iter().map(|p| p - middle).collect();
+            let right = |k: usize| seen[k].1.powi(2) - from_middle[k].norm_squared();
+            let solution = linear(&from_middle, -2.0, right, 1e-9)
+                .ok_or_else(|| format!("{called} cannot be placed"))?;
             Ok(Anchor::point(
                 name,
                 middle + Vector3::new(solution[0], solution[1], solution[2]),
@@ -472,18 +476,10 @@ impl MeasurementKind for SphereKind {
                 ));
             }
             let middle = middle(&points);
-            let lines = DMatrix::from_fn(count, 4, |i, j| {
-                if j < 3 {
-                    2.0 * (points[i] - middle)[j]
-                } else {
-                    1.0
-                }
-            });
-            let right = DVector::from_fn(count, |i, _| (points[i] - middle).norm_squared());
-            let solution = lines
-                .svd(true, true)
-                .solve(&right, 1e-12)
-                .map_err(|_| format!("sphere `{name}` cannot be placed"))?;
+            let from_middle: Vec<Vector3<f64>> = points.iter().map(|p| p - middle).collect();
+            let right = |k: usize| from_middle[k].norm_squared();
+            let solution = linear(&from_middle, 2.0, right, 1e-12)
+                .ok_or_else(|| format!("sphere `{name}` cannot be placed"))?;
             let centre = Vector3::new(solution[0], solution[1], solution[2]);
             let radius = (solution[3] + centre.norm_squared()).max(0.0).sqrt();
             Ok(Anchor {

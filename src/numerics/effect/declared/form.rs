@@ -6,6 +6,7 @@ use super::formula::Formula;
 use super::pattern::{DeclarationFault, DeclaredPattern, Seat, combinations};
 use super::quantity::RowQuantity;
 use crate::effect::sentence::filled;
+use crate::effect::summary::unit;
 use crate::effect::{
     ArmState, Cause, Deflection, Form, Hypothesis, Measure, Motion, NumberSpec, OwnMotion, Place,
     Placed, Summary, Survey, Variable, figure,
@@ -131,14 +132,7 @@ fn sentence(summary: &Summary) -> String {
         .map(|per| format!(" per {per}"))
         .unwrap_or_default();
     let numbers: Vec<String> = (summary.parameters.iter())
-        .map(|number| {
-            let unit = if number.unit == "1" {
-                String::new()
-            } else {
-                format!(" {}", number.unit)
-            };
-            format!("{}{unit}{per}", figure(number.value, 1))
-        })
+        .map(|number| format!("{}{}{per}", figure(number.value, 1), unit(number)))
         .collect();
     let shape: Vec<(String, f64)> = summary
         .forms

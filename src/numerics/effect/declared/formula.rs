@@ -149,6 +149,14 @@ pub(crate) struct FormulaFault {
     pub(crate) message: String,
 }
 
+impl FormulaFault {
+    /// At the character after so many.
+    fn new(before: usize, message: impl Into<String>) -> Self {
+        let (at, message) = (before + 1, message.into());
+        Self { at, message }
+    }
+}
+
 /// Deeper brackets are nobody's formula.
 const DEEPEST: usize = 60;
 
@@ -181,10 +189,7 @@ struct FormulaReader<'a> {
 
 impl FormulaReader<'_> {
     fn fault(&self, message: impl Into<String>) -> FormulaFault {
-        FormulaFault {
-            at: self.at + 1,
-            message: message.into(),
-        }
+        FormulaFault::new(self.at, message)
     }
 
     /// The next letter that is no blank.
@@ -298,10 +303,7 @@ impl FormulaReader<'_> {
         text.parse::<f64>()
             .ok()
             .filter(|number| number.is_finite())
-            .ok_or_else(|| FormulaFault {
-                at: start + 1,
-                message: format!("`{text}` is no number"),
-            })
+            .ok_or_else(|| FormulaFault::new(start, format!("`{text}` is no number")))
     }
 
     fn name(&mut self) -> Result<Formula, FormulaFault> {
@@ -320,10 +322,7 @@ impl FormulaReader<'_> {
         if name == "pi" {
             return Ok(Formula::Number(std::f64::consts::PI));
         }
-        let there = |message| FormulaFault {
-            at: start + 1,
-            message,
-        };
+        let there = |message: String| FormulaFault::new(start, message);
         if let Some((_, function)) = Function::NAMED.iter().find(|(name_of, _)| *name_of == name) {
             if !self.take('(') {
                 return Err(there(format!("`{name}` is a function: write {name}(...)")));
@@ -369,16 +368,11 @@ impl FormulaReader<'_> {
             return Err(self.fault(wanted));
         }
         self.peek();
-        let at = self.at + 1;
+        let start = self.at;
         let constant = match self.sum()? {
             Formula::Number(number) if number > 0.0 => Constant::Number(number),
             Formula::Shape(k) => Constant::Shape(k),
-            _ => {
-                return Err(FormulaFault {
-                    at,
-                    message: wanted,
-                });
-            }
+            _ => return Err(FormulaFault::new(start, wanted)),
         };
         self.close()?;
         Ok(constant)

@@ -56,15 +56,7 @@ fn joint(screw: DocumentNode, length: Unit) -> ChainJoint {
             (kind, direction(&screw.get("axis")), Point3::from(point))
         }
     };
-    ChainJoint {
-        name: None,
-        kind,
-        axis,
-        point,
-        limits: None,
-        frame: None,
-        body: None,
-    }
+    ChainJoint::new(kind, axis, point)
 }
 
 /// A direction of any length but zero, as a unit vector.
@@ -176,13 +168,8 @@ pub(super) fn dh(
         };
         let Some(kind) = kind else { continue };
         joints.push(ChainJoint {
-            name: None,
-            kind,
-            axis: at_joint * Vector3::z(),
-            point: at_joint * Point3::origin(),
-            limits: None,
             frame: Some(frame),
-            body: None,
+            ..ChainJoint::new(kind, at_joint * Vector3::z(), at_joint * Point3::origin())
         });
     }
     FrameChain {

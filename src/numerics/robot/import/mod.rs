@@ -71,6 +71,21 @@ struct ChainJoint {
     body: Option<ChainBody>,
 }
 
+impl ChainJoint {
+    /// A joint of which the format knows no more.
+    fn new(kind: JointKind, axis: Vector3<f64>, point: Point3<f64>) -> Self {
+        Self {
+            name: None,
+            kind,
+            axis,
+            point,
+            limits: None,
+            frame: None,
+            body: None,
+        }
+    }
+}
+
 /// Mass, kg, centre, and moments about it in base axes where all parts of the body state them.
 struct ChainBody {
     mass: f64,
