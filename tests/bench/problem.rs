@@ -3,7 +3,7 @@
 use crate::fixture;
 use calib::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use calib::effect::{EffectContext, EffectStack, Load, identified};
-use calib::estimate::{FitOptions, Fitted, Model, align, fit};
+use calib::estimate::{Fitted, Model, align, fit};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
@@ -149,14 +149,7 @@ impl Case {
             &self.effects,
         );
         let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
-        fit(
-            &model,
-            &self.data,
-            &FitOptions {
-                rows: &self.rows,
-                candidates: &candidates,
-            },
-        )
+        fit(&model, &self.data, &self.rows, &candidates)
     }
 }
 

@@ -9,7 +9,6 @@ mod framed;
 mod gate;
 mod listings;
 mod maker;
-mod posture;
 mod round_trip;
 mod sides;
 mod standing;

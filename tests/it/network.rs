@@ -364,9 +364,6 @@ fn a_joint_curve_does_not_swing_where_no_row_was_and_says_its_doubt() {
     }
     let mean = |sums: [f64; 2]| [sums[0] / rows[0], sums[1] / rows[1]];
     let (spread, covered) = (mean(spread), mean(covered));
-    println!(
-        "beside and in the gap: largest {largest:?} m, spread {spread:?} m, within 95 % {covered:.3?} of {rows:?} rows"
-    );
     assert!(rows[0] > 200.0 && rows[1] > 50.0, "{rows:?}");
     assert!(largest[1] < 1.2 * largest[0], "{largest:?}");
     assert!(spread[1] > spread[0], "{spread:?}");
@@ -400,7 +397,6 @@ fn a_network_of_joint_motions_learns_what_joints_do_better_than_one_of_displacem
         mean_error(&unseen, Some(&correction)) / mean_error(&unseen, None)
     };
     let (point, joints) = (left(None), left(Some(tool.clone())));
-    println!("left on unseen rows: outputs along the axes {point:.3}, joint motions {joints:.3}");
     assert!(joints < 0.8 * point && joints > 0.02, "{joints} {point}");
 }
 

@@ -247,11 +247,11 @@ fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
     assert_eq!(made.quantity("clusters"), Some(25.0));
     assert!(made.quantity("repeat_noise_mm").unwrap() < 0.01);
     assert!(made.quantity("lack_of_fit_p").unwrap() < 1e-6);
-    let said = [
+    let expected = [
         "measured more than once: 25 poses",
         "this model lacks something",
     ];
-    has(&made.notes, said);
+    has(&made.notes, expected);
     let wrong: Identify =
         serde_json::from_value(json!({"repeatability": {"arcsec": 0.0}})).unwrap();
     assert!(wrong.check().iter().any(|fault| {

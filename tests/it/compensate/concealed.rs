@@ -531,10 +531,6 @@ fn what_no_row_shows_moves_no_robot() {
         };
         let (away, _) = outcomes_at(&case, (away.map(point).to_vec(), vec![true; 2]));
         for one in &away {
-            println!(
-                "    home and candle: {:.3} mm, with geometry alone {:.3}, remark {}",
-                one.miss, one.plain, one.remarked
-            );
             assert!(one.refused || !is_harmed(one, floor), "seed {}", 500 + seed);
         }
     }

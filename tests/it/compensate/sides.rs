@@ -3,9 +3,11 @@
 
 use super::maker::{Maker, PLAIN, makers};
 use super::round_trip::{Trip, pose, read};
-use crate::answer::has;
-use crate::fixture::{apart, largest};
+use super::{ROBOT, cell};
+use crate::answer::{calib, has, put};
+use crate::fixture::{apart, largest, robot_of};
 use calib::program::{Language, PostureStatement};
+use calib::robot::RobotModel;
 use calib::spatial::Pose;
 use nalgebra::UnitQuaternion;
 use std::collections::{BTreeMap, BTreeSet};
@@ -266,4 +268,44 @@ fn a_joint_that_the_correction_takes_over_its_zero_is_stated_anew() {
         let bits = String::from_utf8_lossy(&written.bytes).contains(",T 'B");
         assert_eq!(bits, text.contains("'B"));
     }
+}
+
+#[test]
+fn programs_state_postures_and_are_told_once_where_they_do_not() {
+    let q = [10.0f64, 15.0, -20.0, 25.0, 40.0, 30.0].map(f64::to_radians);
+    let pose = RobotModel::new(robot_of(ROBOT)).forward(&q);
+    let module = |configuration| format!("MODULE m\n{}ENDMODULE\n", rapid(&pose, configuration));
+    let ptp = |posture: &str| krl(&pose, posture);
+    let run = |name: &str, text: String| {
+        put(cell(), name, text);
+        let words = format!("compensate latest {name} --start 2,3,4,5,40,0");
+        calib(cell(), &words)
+    };
+    let silent = |name: &str, text: String| {
+        let answer = run(name, text).code(0);
+        assert!(!answer.err.contains("posture"), "{}", answer.err);
+        answer.out
+    };
+    let unreached = "not reached in the posture that is stated";
+    let ours = silent("own.mod", module([0, 0, 0, 0]));
+    // The wrist turned over: another posture, another error, another correction.
+    assert_ne!(ours, run("over.mod", module([0, -2, -2, 1])).ok());
+    let err = run("none.mod", module([1, 0, 0, 0])).refused();
+    has(&err, ["none.mod:2:", unreached]);
+    // Joint 3 below 0, by number and by bits.
+    let by_number = silent("t.src", ptp(",S 2,T 4"));
+    let by_bits = silent("b.src", ptp(",T 'B000100'"));
+    let targets = |text: &str| {
+        let lines = text.lines().filter(|line| line.starts_with("PTP"));
+        lines.map(|line| line[..60].to_string()).collect::<Vec<_>>()
+    };
+    assert_eq!(targets(&by_number), targets(&by_bits));
+    let err = run("s.src", ptp(",S 3,T 4")).code(10).err;
+    has(&err, &format!("{unreached} (S 3, T 4)"));
+    let err = run("below.src", ptp(",T 'B000101'")).code(10).err;
+    has(&err, unreached);
+    let err = run("open.src", ptp("") + &ptp("")).code(0).err;
+    let open = "posture not stated: taken nearest to the target before";
+    assert_eq!(err.matches(open).count(), 1, "{err}");
+    has(&err, "open.src:1:");
 }

@@ -251,12 +251,7 @@ fn proof_of(cell: &Cell) {
     let before = cell.true_error(&arm, &targets, |_, _, q| q.to_vec());
     let after = cell.true_error(&arm, &targets, |reach, wanted, q| {
         let found = least_change(reach, wanted, q, q);
-        assert!(
-            found.residual <= SETTLED,
-            "round trip {} m after {} steps",
-            found.residual,
-            found.iterations
-        );
+        assert!(found.residual <= SETTLED, "{found:?}");
         found.q
     });
     let step = cell.true_error(&arm, &targets, |reach, wanted, q| {
@@ -266,15 +261,9 @@ fn proof_of(cell: &Cell) {
     let named: Vec<String> = named
         .map(|row| format!("{} at {}", row.effect, row.place))
         .collect();
-    println!(
-        "{}: {before:.4} mm -> {after:.4} mm (one step {step:.4}), floor {floor:.4} mm, {:.2} floors; {named:?}",
-        name,
-        after / floor
-    );
     assert!(
         after < 1.5 * floor,
-        "{}: {after:.4} mm above {floor:.4} mm; found {named:?}",
-        name
+        "{name}: {after:.4} mm above {floor:.4} mm; found {named:?}"
     );
     assert!(after > 0.05 * floor, "too good: the truth leaked");
     assert!(step < 0.2 * before && step >= 0.99 * after);
@@ -352,11 +341,6 @@ fn a_learned_correction_is_made_up_for() {
             .measure(cell.points(1, &[0.0], 3), &cell.tracker, 77)
             .remove(0);
         let floor = 3f64.sqrt() * shot.sigma * 1e3;
-        println!(
-            "{}: geometry alone {before:.4} mm, learned {after:.4} mm, {:.2} floors",
-            cell.robot.name,
-            after / floor
-        );
         assert!(
             after < 1.5 * floor && after < 0.5 * before,
             "{before:.4} -> {after:.4} mm, floor {floor:.4} mm"

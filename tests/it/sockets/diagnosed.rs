@@ -23,14 +23,14 @@ fn cell(points: usize) -> Vec<Fixture> {
 }
 
 /// What is said of a recording: causes by place, the verdict, what the data cannot show, all that was warned of.
-struct Told {
+struct Diagnosed {
     named: Vec<String>,
     verdict: VerdictRow,
     unseen: String,
     warnings: String,
 }
 
-fn diagnosed(robot: &RobotDescription, recording: Recording) -> Told {
+fn diagnosed(robot: &RobotDescription, recording: Recording) -> Diagnosed {
     let made = Recorded::fitted(robot, recording).diagnose(json!({}));
     let (verdict, named) = (made.verdict(), made.named());
     let named = named
@@ -38,7 +38,7 @@ fn diagnosed(robot: &RobotDescription, recording: Recording) -> Told {
         .map(|(effect, place)| format!("{effect} at {place}"));
     let sentences: VerdictSentences = made.get();
     let unseen = sentences.about(&verdict.step, VerdictTopic::NotObservable);
-    Told {
+    Diagnosed {
         named: named.collect(),
         unseen: unseen.join("\n"),
         verdict,
@@ -50,7 +50,7 @@ fn diagnosed(robot: &RobotDescription, recording: Recording) -> Told {
 fn nothing_is_found_in_a_clean_recording_and_what_cannot_be_known_is_said() {
     let robot = fixture::seven();
     let clean = touched(&robot, &truth(&robot, 31), &cell(30), 31);
-    let Told {
+    let Diagnosed {
         named,
         verdict,
         unseen,
@@ -87,7 +87,7 @@ fn wind_up_cyclic_errors_and_lost_motion_are_named_at_their_joints() {
             ..truth(&robot, seed)
         };
         let recording = touched_with(&robot, &truth, effects, &cell(30), seed);
-        let Told { named, verdict, .. } = diagnosed(&robot, recording);
+        let Diagnosed { named, verdict, .. } = diagnosed(&robot, recording);
         for expected in expected {
             let found = named.iter().any(|name| name == expected);
             assert!(found, "{named:?}, {:?}", verdict.statement);
@@ -107,11 +107,11 @@ fn a_ball_that_was_put_back_elsewhere_is_found() {
     );
     let half = 90 * recording.joints;
     recording.q[half..].copy_from_slice(&second.q[half..]);
-    let told = diagnosed(&robot, recording);
-    let mut named = told.named.iter();
-    let is_stated = told.warnings.contains("sits elsewhere on the tool")
+    let found = diagnosed(&robot, recording);
+    let mut named = found.named.iter();
+    let is_stated = found.warnings.contains("sits elsewhere on the tool")
         || named.any(|name| name.starts_with("tool_shift"));
-    assert!(is_stated, "{:?}, {}", told.named, told.warnings);
+    assert!(is_stated, "{:?}, {}", found.named, found.warnings);
 }
 
 #[test]
@@ -127,11 +127,11 @@ fn rows_of_a_plate_that_slipped_are_named_in_the_verdict() {
     // Rows 20 to 25 of b/0, which is the third socket.
     let joints = recording.joints;
     recording.q[79 * joints..85 * joints].copy_from_slice(&slipped.q[79 * joints..85 * joints]);
-    let told = diagnosed(&robot, recording);
+    let found = diagnosed(&robot, recording);
     has(
-        &told.warnings,
+        &found.warnings,
         ["6 rows do not close", "b/0-0020 to b/0-0025 (6 rows)"],
     );
-    let statement = told.verdict.statement.unwrap_or_default();
+    let statement = found.verdict.statement.unwrap_or_default();
     has(&statement, "ball or fixture moved there");
 }

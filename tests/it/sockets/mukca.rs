@@ -11,7 +11,6 @@ use calib::estimate::{Model, scale};
 use calib::robot::{Measurements, PointReadings, Readings};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
-use std::time::Instant;
 
 pub fn panda() -> RobotDescription {
     robot_of(&read(root("pipelines/sockets/robot.yaml")))
@@ -77,37 +76,23 @@ fn calibrate(
     fitted_with(&panda(), data, rows, effects, &pairs(data), priors)
 }
 
-/// Mean and largest distance, mm.
-fn figures(distances: impl Iterator<Item = f64>) -> [f64; 2] {
-    let all: Vec<f64> = distances.map(|distance| 1e3 * distance).collect();
-    [
-        all.iter().sum::<f64>() / all.len() as f64,
-        all.iter().copied().fold(0.0, f64::max),
-    ]
+/// Mean distance, mm.
+fn mean(distances: &[f64]) -> f64 {
+    1e3 * distances.iter().sum::<f64>() / distances.len() as f64
 }
 
 /// Every fourth row of every file held out.
-fn every_fourth(folder: &str, without: &[&str], effects: &[&str]) -> Option<[f64; 2]> {
+fn every_fourth(folder: &str, without: &[&str], effects: &[&str]) -> Option<f64> {
     let (data, numbers) = recording(folder, without)?;
     let (held, fit): (Vec<usize>, Vec<usize>) =
         (0..data.rows()).partition(|row| numbers[*row] % 4 == 3);
-    let begin = Instant::now();
-    let (model, fitted) = calibrate(&data, &fit, effects);
-    let seconds = begin.elapsed().as_secs_f64();
-    let scale = scale(&model, &data, &fit, fitted.covariance.as_ref());
-    let errors = model.row_errors(&data);
-    let found = figures(held.iter().map(|row| errors[*row].length));
-    println!(
-        "{folder} {without:?} {effects:?}: {found:.3?} mm, {} rows in {seconds:.2} s, {:?}, {:?}",
-        fit.len(),
-        scale.and_then(|scale| scale.sigma),
-        fitted.stop
-    );
-    Some(found)
+    let errors = calibrate(&data, &fit, effects).0.row_errors(&data);
+    let held: Vec<f64> = held.iter().map(|row| errors[*row].length).collect();
+    Some(mean(&held))
 }
 
 /// Every position in turn left out: each row against the place of the ball by the other rows of its socket.
-fn by_position(folder: &str, without: &[&str], effects: &[&str]) -> Option<[f64; 2]> {
+fn by_position(folder: &str, without: &[&str], effects: &[&str]) -> Option<f64> {
     let (data, _) = recording(folder, without)?;
     let names: Vec<&str> = (0..data.rows())
         .map(|row| data.reading("socket", row).unwrap().anchor)
@@ -116,36 +101,24 @@ fn by_position(folder: &str, without: &[&str], effects: &[&str]) -> Option<[f64;
     for [first, second] in pairs(&data) {
         let (held, fit): (Vec<usize>, Vec<usize>) =
             (0..data.rows()).partition(|row| names[*row] == first || names[*row] == second);
-        let (model, _) = calibrate(&data, &fit, effects);
-        let points = model.predict(&data);
+        let points = calibrate(&data, &fit, effects).0.predict(&data);
         for row in &held {
-            let others: Vec<Vector3<f64>> = held
-                .iter()
-                .filter(|other| *other != row && names[**other] == names[*row])
-                .map(|other| points[*other])
-                .collect();
-            all.push((points[*row] - middle(&others)).norm());
+            let is_other = |other: &&usize| *other != row && names[**other] == names[*row];
+            let others = held.iter().filter(is_other).map(|other| points[*other]);
+            all.push((points[*row] - middle(&others.collect::<Vec<_>>())).norm());
         }
     }
-    let found = figures(all.into_iter());
-    println!("{folder} {without:?} {effects:?}, positions left out: {found:.3?} mm");
-    Some(found)
+    Some(mean(&all))
 }
 
 /// The geometric median, so that a slipped row moves it little (Weiszfeld).
 fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
     let mut at = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     for _ in 0..50 {
-        let weights: Vec<f64> = points
-            .iter()
-            .map(|point| 1.0 / (point - at).norm().max(2e-4))
-            .collect();
-        at = points
-            .iter()
-            .zip(&weights)
-            .map(|(point, weight)| point * *weight)
-            .sum::<Vector3<f64>>()
-            / weights.iter().sum::<f64>();
+        let weight = |point: &Vector3<f64>| 1.0 / (point - at).norm().max(2e-4);
+        let weights: f64 = points.iter().map(weight).sum();
+        let sum: Vector3<f64> = points.iter().map(|point| point * weight(point)).sum();
+        at = sum / weights;
     }
     at
 }
@@ -169,7 +142,7 @@ fn held_out_rows_and_positions_close_as_an_independent_solver_closes_them() {
         let effects = [GEOMETRY, COMPLIANCE, GEOMETRY, COMPLIANCE];
         for (k, (effects, expected)) in effects.into_iter().zip(figures).enumerate() {
             let judge = if k < 2 { every_fourth } else { by_position };
-            let Some([mean, _]) = judge(folder, without, effects) else {
+            let Some(mean) = judge(folder, without, effects) else {
                 return;
             };
             if mean > SHARE * expected {
@@ -230,18 +203,17 @@ fn without_a_length_the_volume_term_keeps_the_arm_from_shrinking() {
         return;
     };
     let rows: Vec<usize> = (0..data.rows()).collect();
+    // 1 mm and 3 mrad of links.
     let wide = |name: &str| {
-        super::priors(name).map(|sigma| {
-            if name.starts_with("link_geometry") {
-                sigma * 10.0 / 3.0
-            } else {
-                sigma
-            }
-        })
+        let larger = if name.starts_with("link_geometry") {
+            10.0 / 3.0
+        } else {
+            1.0
+        };
+        Some(super::priors(name)? * larger)
     };
     let (model, _) = fitted_with(&panda(), &data, &rows, GEOMETRY, &[], wide);
     let found = against_holes(&model, hole);
-    println!("no length, priors 1 mm and 3 mrad: scale {found:+.2e} of the holes");
     assert!(found.abs() < 3e-3, "{found:+.2e}");
 }
 

@@ -107,11 +107,6 @@ fn stated_sigmas_of_distances_hold_and_the_rank_is_that_of_theory() {
     let scatter = rms(scores.iter().copied());
     let covered =
         scores.iter().filter(|score| score.abs() < 1.96).count() as f64 / scores.len() as f64;
-    println!(
-        "{count} twins: scatter over sigma {scatter:.3}, coverage {:.1} %, rank wrong in {}",
-        100.0 * covered,
-        wrong.len()
-    );
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     // Twelve twins leave room for chance.
     let (scatters, coverage) = if count >= 100 {
@@ -159,10 +154,6 @@ fn the_scale_that_priors_tell_scatters_as_stated_where_links_err_on_their_own() 
         scores.push((ours / real - 1.0) * stated.beyond / apart);
     }
     let scatter = rms(scores.iter().copied());
-    let mean = scores.iter().sum::<f64>() / scores.len() as f64;
-    println!(
-        "{count} twins without a length: scale over its sigma, mean {mean:+.2}, scatter {scatter:.2}"
-    );
     let scatters = if count >= 100 { 0.85..1.18 } else { 0.6..1.5 };
     assert!(scatters.contains(&scatter), "{scatter:.3}");
 }

@@ -21,22 +21,24 @@ pub(super) fn apart(data: &Measurements, predicted: &[Vector3<f64>]) -> Vec<i64>
     for first in (0..predicted.len()).step_by(*STEP) {
         let last = (first + *STRETCH).min(predicted.len());
         let rows = last.saturating_sub(*STRETCH)..last;
-        let Some(unshifted) = AlignedStretch::fit(data, predicted, rows.clone(), 0)
-            .filter(|unshifted| unshifted.left > *NOMINAL)
-        else {
+        let with = |offset: i64| Some((aligned(data, predicted, rows.clone(), offset)?, offset));
+        let Some(((_, unshifted), _)) = with(0).filter(|((_, left), _)| *left > *NOMINAL) else {
             continue;
         };
-        let tried = (1..=FARTHEST).flat_map(|k| [k, -k]);
-        let tried = tried.filter_map(|k| {
-            AlignedStretch::fit(data, predicted, rows.clone(), k).map(|stretch| (stretch, k))
-        });
-        if let Some((stretch, offset)) = tried.min_by(|a, b| a.0.left.total_cmp(&b.0.left))
-            && stretch.left < *NOMINAL
-            && *SLIPPED_BETTER * stretch.left < unshifted.left
+        let tried = (1..=FARTHEST).flat_map(|k| [k, -k]).filter_map(with);
+        if let Some(((motion, left), offset)) = tried.min_by(|a, b| a.0.1.total_cmp(&b.0.1))
+            && left < *NOMINAL
+            && *SLIPPED_BETTER * left < unshifted
         {
             // Rows beside the slip may fit either way, since their joints stand in both places: those are right.
-            let nearer = |row: &usize| stretch.nearer(data, predicted, *row, offset);
-            rows.filter(nearer).for_each(|row| out[row] = offset);
+            let is_nearer = |row: &usize| {
+                let pair = data.point(*row).zip(other(predicted, *row, offset));
+                pair.is_some_and(|(measured, there)| {
+                    let off = |point: &Vector3<f64>| (motion.point(point) - measured).norm();
+                    *SLIPPED_BETTER * off(there) < off(&predicted[*row])
+                })
+            };
+            rows.filter(is_nearer).for_each(|row| out[row] = offset);
         }
     }
     under_one_base(data, predicted, &mut out);
@@ -102,60 +104,29 @@ fn beyond_the_log(apart: &mut [i64]) {
     }
 }
 
-/// Points of some rows moved onto the measured ones.
-struct AlignedStretch {
-    motion: Pose,
-    /// Rms distance that remains, as a share of the stretch's size.
-    left: f64,
-}
-
-impl AlignedStretch {
-    /// With the joints `offset` rows further on; `None` where too few rows have both.
-    fn fit(
-        data: &Measurements,
-        predicted: &[Vector3<f64>],
-        rows: Range<usize>,
-        offset: i64,
-    ) -> Option<Self> {
-        let (from, to): (Vec<_>, Vec<_>) = rows
-            .filter_map(|row| Some((*other(predicted, row, offset)?, data.point(row)?)))
-            .unzip();
-        if 2 * from.len() < *STRETCH {
-            return None;
-        }
-        let all: Vec<usize> = (0..from.len()).collect();
-        let motion = kabsch(&from, &to, &all);
-        let centre = to.iter().sum::<Vector3<f64>>() / to.len() as f64;
-        let size = to
-            .iter()
-            .map(|point| (point - centre).norm_squared())
-            .sum::<f64>();
-        let remaining = from
-            .iter()
-            .zip(&to)
-            .map(|(a, b)| (motion.point(a) - b).norm_squared())
-            .sum::<f64>();
-        (size > 0.0).then(|| Self {
-            motion,
-            left: (remaining / size).sqrt(),
-        })
+/// The motion that brings the points of some rows, with the joints `offset` rows further on, onto the measured ones, and the rms distance
+/// that remains, as a share of the stretch's size; `None` where too few rows have both.
+fn aligned(
+    data: &Measurements,
+    predicted: &[Vector3<f64>],
+    rows: Range<usize>,
+    offset: i64,
+) -> Option<(Pose, f64)> {
+    let (from, to): (Vec<_>, Vec<_>) = rows
+        .filter_map(|row| Some((*other(predicted, row, offset)?, data.point(row)?)))
+        .unzip();
+    if 2 * from.len() < *STRETCH {
+        return None;
     }
-
-    /// Whether the measured point of a row is far nearer with the joints `offset` rows further on than with its own.
-    fn nearer(
-        &self,
-        data: &Measurements,
-        predicted: &[Vector3<f64>],
-        row: usize,
-        offset: i64,
-    ) -> bool {
-        data.point(row)
-            .zip(other(predicted, row, offset))
-            .is_some_and(|(measured, there)| {
-                let off = |point: &Vector3<f64>| (self.motion.point(point) - measured).norm();
-                *SLIPPED_BETTER * off(there) < off(&predicted[row])
-            })
-    }
+    let all: Vec<usize> = (0..from.len()).collect();
+    let motion = kabsch(&from, &to, &all);
+    let centre = to.iter().sum::<Vector3<f64>>() / to.len() as f64;
+    let size: f64 = to.iter().map(|point| (point - centre).norm_squared()).sum();
+    let pairs = from.iter().zip(&to);
+    let remaining: f64 = pairs
+        .map(|(a, b)| (motion.point(a) - b).norm_squared())
+        .sum();
+    (size > 0.0).then(|| (motion, (remaining / size).sqrt()))
 }
 
 fn other(predicted: &[Vector3<f64>], row: usize, offset: i64) -> Option<&Vector3<f64>> {
