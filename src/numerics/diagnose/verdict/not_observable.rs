@@ -224,7 +224,8 @@ pub(super) fn faults(
         let noun = if rows.len() == 1 { "row" } else { "rows" };
         format!("{noun} {}{more}", named.join(", "))
     };
-    let kinds: [(&str, &str, fn(SuspectKind) -> bool); 3] = [
+    type IsKind = fn(SuspectKind) -> bool;
+    let kinds: [(&str, &str, IsKind); 3] = [
         (
             names::MISLABELLED_POINT,
             "points carry another point's name",
