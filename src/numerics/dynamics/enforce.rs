@@ -298,7 +298,8 @@ mod tests {
         let mut dice = ChaCha8Rng::seed_from_u64(8);
         let mut tried = 0;
         while tried < 2000 {
-            let values = found.iter().zip(covariance.diagonal().iter());
+            let variances = covariance.diagonal();
+            let values = found.iter().zip(variances.iter());
             let other = values.map(|(value, variance)| {
                 value + variance.sqrt() * 3.0 * (dice.random::<f64>() - 0.5)
             });
