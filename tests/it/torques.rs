@@ -13,12 +13,11 @@ mod rigid;
 use crate::answer::{Answer, calib, put, read, root};
 use crate::bags::ARM;
 use crate::desk::shared;
-use calib::dynamics::{
-    DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow,
-};
+use calib::dynamics::{DynamicArm, INERTIAL_NUMBERS, InverseDynamics, MotionRow};
 use calib::twin::conceal::design::Design;
 use calib::twin::folder::File;
-use calib::twin::torque::TorqueCase;
+use calib::twin::torque::{Body, TorqueCase};
+use rigid::{bare, ten};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -41,6 +40,10 @@ fn nothing(seed: u64) -> Design {
 fn named(entry: &Value) -> Named {
     let text = |key: &str| entry[key].as_str().unwrap().to_string();
     (text("effect"), text("where"))
+}
+
+fn all_named(entries: &Value) -> Vec<Named> {
+    entries.as_array().unwrap().iter().map(named).collect()
 }
 
 /// `calib diagnose` of a folder, with a store beside it.
@@ -96,29 +99,16 @@ struct Marks {
 }
 
 fn mark(want: &Value, answer: &Value) -> Marks {
-    let all: Vec<Named> = answer["findings"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(named)
-        .collect();
+    let all = all_named(&answer["findings"]);
     let mut marks = Marks {
         missed: Vec::new(),
         also: all.clone(),
     };
     for entry in want["effects"].as_array().unwrap() {
-        let pair = |pair: &Value| {
-            (
-                pair[0].as_str().unwrap().to_string(),
-                pair[1].as_str().unwrap().to_string(),
-            )
-        };
-        let accepted: Vec<Named> = entry["accept"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(pair)
-            .collect();
+        let text = |value: &Value| value.as_str().unwrap().to_string();
+        let accepted = entry["accept"].as_array().unwrap().iter();
+        let accepted = accepted.map(|pair| (text(&pair[0]), text(&pair[1])));
+        let accepted: Vec<Named> = accepted.collect();
         // One name may stand for two effects that the data cannot separate.
         let hit = all.iter().any(|one| accepted.contains(one));
         marks.also.retain(|one| !accepted.contains(one));
@@ -170,26 +160,20 @@ fn the_practice_recordings_of_torques_are_solved() {
             ));
         }
         // A push begins within 0.3 s of when it did.
-        for entry in want["effects"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .filter(|entry| entry["window"].is_array())
-        {
-            let began = entry["window"][0].as_f64().unwrap();
-            let findings = answer["findings"].as_array().unwrap();
-            let contact = findings
-                .iter()
-                .filter(|finding| finding["effect"] == "contact");
-            let starts = contact.flat_map(|finding| finding["parameters"].as_array().unwrap());
-            let near = starts
-                .filter(|number| number["name"] == "start")
-                .any(|number| {
-                    number["value"]
-                        .as_f64()
-                        .is_some_and(|start| (start - began).abs() < 0.3)
-                });
-            assert!(near, "{}: no contact starts near {began} s", case.display());
+        let effects = want["effects"].as_array().unwrap().iter();
+        for began in effects.filter_map(|entry| entry["window"][0].as_f64()) {
+            let findings = answer["findings"].as_array().unwrap().iter();
+            let contacts = findings.filter(|finding| finding["effect"] == "contact");
+            let numbers = contacts.flat_map(|finding| finding["parameters"].as_array().unwrap());
+            let starts = numbers.filter(|number| number["name"] == "start");
+            let near = |start: f64| (start - began).abs() < 0.3;
+            assert!(
+                starts
+                    .filter_map(|number| number["value"].as_f64())
+                    .any(near),
+                "{}: no contact starts near {began} s",
+                case.display()
+            );
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -201,19 +185,8 @@ fn the_example_of_torques_is_solved_and_reported() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let example = root.join("pipelines/dynamics/example");
     let answer = document(&example, store.path());
-    let found: Vec<Named> = answer["findings"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(named)
-        .collect();
-    let hidden = json(example.join("truth.json"));
-    let mut wanted: Vec<Named> = hidden["effects"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(named)
-        .collect();
+    let found = all_named(&answer["findings"]);
+    let mut wanted = all_named(&json(example.join("truth.json"))["effects"]);
     wanted.retain(|one| !found.contains(one));
     assert_eq!(wanted, Vec::<Named>::new(), "hidden and not found");
     let (store, pipeline) = (
@@ -266,57 +239,27 @@ fn declared(case: &TorqueCase) -> (DynamicArm, Vec<f64>) {
     let robot = &case.robot;
     let last = robot.joints.len() - 1;
     let mut theta = vec![0.0; INERTIAL_NUMBERS * robot.joints.len()];
-    let mut add = |link: usize, mass: f64, centre: [f64; 3], moments: [f64; 6]| {
-        let point = robot.joints[link].point;
-        let r = [0, 1, 2].map(|k| centre[k] - point[k]);
-        let square = r.iter().map(|x| x * x).sum::<f64>();
-        let mut ten = vec![mass, mass * r[0], mass * r[1], mass * r[2]];
-        for ((row, column), moment) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
-            .into_iter()
-            .zip(moments)
-        {
-            ten.push(
-                moment + mass * (if row == column { square } else { 0.0 } - r[row] * r[column]),
-            );
-        }
-        theta[INERTIAL_NUMBERS * link..]
-            .iter_mut()
-            .zip(ten)
-            .for_each(|(sum, value)| *sum += value);
+    let mut add = |link: usize, mass: f64, centre: [f64; 3], inertia: [f64; 6]| {
+        let body = Body {
+            mass,
+            centre,
+            inertia,
+        };
+        let ten = ten(&body, robot.joints[link].point);
+        let sums = theta[INERTIAL_NUMBERS * link..].iter_mut().zip(ten);
+        sums.for_each(|(sum, value)| *sum += value);
     };
     for (link, (joint, moments)) in robot.joints.iter().zip(&robot.inertias.links).enumerate() {
-        add(
-            link,
-            joint.mass.unwrap(),
-            joint.centre.unwrap(),
-            moments.unwrap(),
-        );
+        let (mass, centre) = (joint.mass.unwrap(), joint.centre.unwrap());
+        add(link, mass, centre, moments.unwrap());
     }
-    add(
-        last,
-        robot.payload_mass,
-        robot.payload_centre,
-        robot.inertias.payload.unwrap(),
-    );
+    let inertia = robot.inertias.payload.unwrap();
+    add(last, robot.payload_mass, robot.payload_centre, inertia);
+    let axes: Vec<[f64; 3]> = robot.joints.iter().map(|joint| joint.axis).collect();
+    let points: Vec<[f64; 3]> = robot.joints.iter().map(|joint| joint.point).collect();
     let arm = DynamicArm {
-        axes: robot.joints.iter().map(|joint| joint.axis.into()).collect(),
-        points: robot
-            .joints
-            .iter()
-            .map(|joint| joint.point.into())
-            .collect(),
-        prismatic: vec![false; robot.joints.len()],
         tool: robot.tool.into(),
-        links: None,
-        payload: None,
-        gravity: robot.gravity.into(),
-        ratio: vec![1.0; robot.joints.len()],
-        coupled: Vec::new(),
-        tolerance: InertialTolerance {
-            mass_relative: 0.01,
-            centre: 0.004,
-            inertia_relative: 0.05,
-        },
+        ..bare(&axes, &points, robot.gravity)
     };
     (arm, theta)
 }

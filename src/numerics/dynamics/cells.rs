@@ -119,7 +119,10 @@ impl<'a> CauseChoice<'a> {
     pub(crate) fn other_friction(&self, set: &[usize]) -> Vec<usize> {
         let missing = |number: &usize| {
             let TorqueForm { cause, place, .. } = self.form(*number);
-            let other = [COULOMB, VISCOUS][usize::from(cause.name != VISCOUS)];
+            let other = match cause.name {
+                VISCOUS => COULOMB,
+                _ => VISCOUS,
+            };
             !self.has(set, |form| form.is_called(cause.name, *place))
                 && self.has(set, |form| form.is_called(other, *place))
         };
@@ -144,14 +147,6 @@ pub(super) struct TorqueCell {
 pub(super) struct TorqueComponent {
     pub(crate) form: usize,
     pub(crate) amplitude: f64,
-}
-
-/// The posterior of a cell given others.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct CellPosterior {
-    /// ln of its posterior odds.
-    pub(super) log_odds: f64,
-    pub(super) best: TorqueComponent,
 }
 
 /// A form's columns at unit amplitude, the base swept out: with each other, and with the measured torque.
@@ -199,8 +194,8 @@ impl ComponentSearch for TorqueTable<'_, '_> {
 
     fn best(&mut self, components: &[TorqueComponent]) -> Option<TorqueComponent> {
         let state = (components.len() < *COMPONENTS).then(|| self.state(components, None))?;
-        let best = self.strongest(0..self.cells.len(), &state)?;
-        (best.log_odds >= self.least()).then_some(best.best)
+        let (log_odds, best) = self.strongest(0..self.cells.len(), &state)?;
+        (log_odds >= self.least()).then_some(best)
     }
 
     fn with_newest(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
@@ -374,16 +369,13 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             .collect()
     }
 
-    /// The posterior of a cell given a state.
-    pub(super) fn cell(&self, cell: usize, state: &TorqueState) -> Option<CellPosterior> {
+    /// ln of the posterior odds of a cell given a state, and its best shape.
+    pub(super) fn cell(&self, cell: usize, state: &TorqueState) -> Option<(f64, TorqueComponent)> {
         let all = self.shapes(cell, state);
         let (_, best) = *all.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
         let logs: Vec<f64> = all.iter().map(|(log, _)| *log).collect();
         let log = log_sum(&logs) - self.log_count(cell);
-        Some(CellPosterior {
-            log_odds: self.cells[cell].log_prior + log,
-            best,
-        })
+        Some((self.cells[cell].log_prior + log, best))
     }
 
     /// The most probable of some cells given a state.
@@ -391,9 +383,9 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         &self,
         cells: impl IntoIterator<Item = usize>,
         state: &TorqueState,
-    ) -> Option<CellPosterior> {
+    ) -> Option<(f64, TorqueComponent)> {
         let all = cells.into_iter().filter_map(|cell| self.cell(cell, state));
-        all.max_by(|a, b| a.log_odds.total_cmp(&b.log_odds))
+        all.max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// ln of the odds of a component given the others.
@@ -407,7 +399,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         };
         let log = self.cells[cell].log_prior + log - self.log_count(cell);
         let grid = self.cell(cell, &state);
-        grid.map_or(log, |grid| grid.log_odds.max(log))
+        grid.map_or(log, |(grid, _)| grid.max(log))
     }
 
     /// Amplitudes anew, each given all others.
@@ -449,21 +441,21 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
                 let others = without(&components, place);
                 let state = self.state(&others, Some(kappa));
                 let stays = self.odds_of(&components, place, kappa);
-                let Some(best) = self.strongest(self.competing(here), &state) else {
+                let Some((log_odds, best)) = self.strongest(self.competing(here), &state) else {
                     continue;
                 };
-                let is_same = self.cell_of[&best.best.form] == self.cell_of[&here];
+                let is_same = self.cell_of[&best.form] == self.cell_of[&here];
                 let gain = match is_same {
                     // Another shape of the same cell: by itself, against the present one.
                     true => {
                         let log = |form: usize| self.form(form, &state).map(|found| found.0);
                         let log = |form: usize| log(form).unwrap_or(f64::NEG_INFINITY);
-                        log(best.best.form) - log(here)
+                        log(best.form) - log(here)
                     }
-                    false => best.log_odds - stays,
+                    false => log_odds - stays,
                 };
                 let mut next = others.clone();
-                next.insert(place, best.best);
+                next.insert(place, best);
                 if gain <= *SWAPS || !self.choice.is_whole(&forms(&next)) {
                     continue;
                 }
@@ -524,7 +516,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             .filter(|cell| *cell != self.cell_of[&form]);
         let rival = |cell: usize| {
             let TorqueCell { name, place, .. } = self.cells[cell];
-            Some(((name, place), self.cell(cell, &state)?.log_odds))
+            Some(((name, place), self.cell(cell, &state)?.0))
         };
         (log_odds, rivals.filter_map(rival).collect())
     }
@@ -564,7 +556,10 @@ pub(super) fn from_common(choice: &CauseChoice) -> Vec<usize> {
     }
     let scaled = table.searched(&start);
     let worse = table.total(&masses) - table.total(&scaled);
-    let most = [0.5 * *APART, 0.0][usize::from(has_masses(&scaled))];
+    let most = match has_masses(&scaled) {
+        true => 0.0,
+        false => 0.5 * *APART,
+    };
     forms(if worse <= most { &scaled } else { &masses })
 }
 

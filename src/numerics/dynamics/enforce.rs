@@ -23,19 +23,9 @@ const LOOK: usize = 50;
 /// m: a link's extent where its numbers say none.
 const EXTENT: f64 = 0.1;
 
-/// Numbers that bodies have.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct NearestBodies {
-    /// 10 a link.
-    pub(crate) theta: Vec<f64>,
-    /// Squared distance in the metric: what the whitened squared residual, tolerances included, rises by.
-    pub(crate) cost: f64,
-    /// Links that were no bodies, from 0.
-    pub(crate) links: Vec<usize>,
-}
-
-/// The nearest numbers (10 n) that are bodies', by the covariance of all (row-major, 10 n x 10 n). `None` where they are bodies' already.
-pub(super) fn nearest_bodies(theta: &[f64], covariance: &DMatrix<f64>) -> Option<NearestBodies> {
+/// The nearest numbers (10 n) that are bodies', by the covariance of all (row-major, 10 n x 10 n), and what was moved: the squared distance in
+/// that metric is what the whitened squared residual, tolerances included, rises by. `None` where they are bodies' already.
+fn nearest_bodies(theta: &[f64], covariance: &DMatrix<f64>) -> Option<(Vec<f64>, EnforcedBodies)> {
     let bodies = || theta.chunks_exact(INERTIAL_NUMBERS);
     let maps: Vec<ConeMap> = bodies().map(ConeMap::of).collect();
     let is_none = |link: &usize| !maps[*link].is_body(&theta[INERTIAL_NUMBERS * link..]);
@@ -60,7 +50,7 @@ pub(super) fn nearest_bodies(theta: &[f64], covariance: &DMatrix<f64>) -> Option
     let seen = along.iter().zip(eigen.eigenvalues.iter());
     let seen = seen.filter(|(_, size)| **size > least);
     let cost = seen.map(|(value, size)| value * value / size).sum();
-    Some(NearestBodies { theta, cost, links })
+    Some((theta, EnforcedBodies { links, cost }))
 }
 
 /// The point of the cones nearest to `start` by the inverse of `metric`.
@@ -215,14 +205,10 @@ pub(super) fn with_bodies(fit: &FittedSet) -> Option<(Vec<(usize, f64)>, Enforce
     let theta = problem.inertials(set, solution);
     let with = &covariance * shares.transpose();
     let variance = &shares * &with;
-    let found = nearest_bodies(&theta, &variance)?;
-    let moved = DVector::from(found.theta) - DVector::from(theta);
+    let (bodies, enforced) = nearest_bodies(&theta, &variance)?;
+    let moved = DVector::from(bodies) - DVector::from(theta);
     let change = with * solved(&variance, &moved);
     let moved = DVector::from(values) + change;
-    let enforced = EnforcedBodies {
-        links: found.links,
-        cost: found.cost,
-    };
     Some((
         pivots.into_iter().zip(moved.iter().copied()).collect(),
         enforced,
@@ -249,7 +235,7 @@ fn solved(matrix: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
 #[cfg(test)]
 mod tests {
     use super::super::cases::{arm, record};
-    use super::super::{BodyConsistency, TorqueQuestion, diagnose};
+    use super::super::{TorqueDiagnosis, TorqueQuestion, diagnose};
     use super::*;
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
@@ -298,62 +284,44 @@ mod tests {
     #[test]
     fn numbers_of_no_body_become_those_of_bodies_and_no_other_bodies_are_nearer() {
         let (theta, covariance) = (theta(), covariance());
-        let found = nearest_bodies(&theta, &covariance).expect("one is none");
-        assert_eq!(found.links, [0]);
+        let (found, enforced) = nearest_bodies(&theta, &covariance).expect("one is none");
+        assert_eq!(enforced.links, [0]);
         let is_body = |all: &[f64]| {
-            all.chunks_exact(10)
-                .all(|ten| ConeMap::of(ten).is_body(ten))
+            let mut links = all.chunks_exact(10);
+            links.all(|ten| ConeMap::of(ten).is_body(ten))
         };
-        assert!(!is_body(&theta) && is_body(&found.theta));
-        let cost = distance(&theta, &found.theta, &covariance);
-        assert!(
-            (found.cost - cost).abs() < 1e-6 * cost,
-            "{} {cost}",
-            found.cost
-        );
+        assert!(!is_body(&theta) && is_body(&found));
+        let cost = distance(&theta, &found, &covariance);
+        let stated = enforced.cost;
+        assert!((stated - cost).abs() < 1e-6 * cost, "{stated} {cost}");
         // On the way from it to any body the distance rises.
         let mut dice = ChaCha8Rng::seed_from_u64(8);
         let mut tried = 0;
         while tried < 2000 {
-            let other: Vec<f64> = found
-                .theta
-                .iter()
-                .zip(covariance.diagonal().iter())
-                .map(|(value, variance)| {
-                    value + variance.sqrt() * 3.0 * (dice.random::<f64>() - 0.5)
-                })
-                .collect();
+            let variances = covariance.diagonal();
+            let values = found.iter().zip(variances.iter());
+            let other = values.map(|(value, variance)| {
+                value + variance.sqrt() * 3.0 * (dice.random::<f64>() - 0.5)
+            });
+            let other: Vec<f64> = other.collect();
             if !is_body(&other) {
                 continue;
             }
             tried += 1;
-            let step: Vec<f64> = found
-                .theta
-                .iter()
-                .zip(&other)
-                .map(|(a, b)| a + 1e-3 * (b - a))
-                .collect();
+            let step = found.iter().zip(&other);
+            let step: Vec<f64> = step.map(|(a, b)| a + 1e-3 * (b - a)).collect();
             // Up to what is kept off the limit.
             assert!(distance(&theta, &step, &covariance) > cost * (1.0 - 1e-5));
         }
         // Numbers that are correlated with those of the rod move, too.
-        assert!(
-            found.theta[10..]
-                .iter()
-                .zip(&theta[10..])
-                .any(|(a, b)| (a - b).abs() > 1e-6)
-        );
+        let mut ball = found[10..].iter().zip(&theta[10..]);
+        assert!(ball.any(|(a, b)| (a - b).abs() > 1e-6));
     }
 
     #[test]
     fn bodies_stay_as_they_are() {
-        assert!(
-            nearest_bodies(
-                &theta()[10..],
-                &covariance().view((10, 10), (10, 10)).into_owned()
-            )
-            .is_none()
-        );
+        let covariance = covariance().view((10, 10), (10, 10)).into_owned();
+        assert_eq!(nearest_bodies(&theta()[10..], &covariance), None);
     }
 
     #[test]
@@ -374,42 +342,31 @@ mod tests {
             diagnose(&loose, &recording, &question, &mut |_| ()).expect("a diagnosis")
         };
         let (free, held) = (asked(false), asked(true));
-        let wrong: Vec<usize> = free
-            .model
-            .consistency()
-            .iter()
-            .filter(|body| !body.is_consistent())
-            .map(|body| body.link)
-            .collect();
+        let none = |diagnosis: &TorqueDiagnosis| -> Vec<usize> {
+            let mut links = diagnosis.model.consistency();
+            links.retain(|body| !body.is_consistent());
+            links.iter().map(|body| body.link).collect()
+        };
+        let wrong = none(&free);
         assert!(wrong.contains(&2) && free.enforced.is_none(), "{wrong:?}");
-        assert!(
-            held.model
-                .consistency()
-                .iter()
-                .all(BodyConsistency::is_consistent),
-            "{:?}",
-            held.model.consistency()
-        );
+        assert_eq!(none(&held), Vec::<usize>::new());
         let enforced = held.enforced.expect("something was moved");
         assert_eq!(enforced.links, wrong);
         assert!(enforced.cost > 1.0, "{}", enforced.cost);
         assert!(held.after.nrmse_mean > free.after.nrmse_mean);
+        let remarks = held.remarks.join("\n");
         assert!(
-            held.remarks
-                .iter()
-                .any(|line| line.starts_with("no body has the numbers of link ")
-                    && line.contains("at the price of"))
+            remarks.contains("no body has the numbers of link "),
+            "{remarks}"
         );
+        assert!(remarks.contains("at the price of"), "{remarks}");
         // An arm of bodies is left as it is.
-        let plain = diagnose(
-            &arm(),
-            &record(&arm(), 0.0, &|_| 0.0),
-            &TorqueQuestion {
-                enforce_bodies: true,
-                ..TorqueQuestion::default()
-            },
-            &mut |_| (),
-        );
+        let question = TorqueQuestion {
+            enforce_bodies: true,
+            ..TorqueQuestion::default()
+        };
+        let recording = record(&arm(), 0.0, &|_| 0.0);
+        let plain = diagnose(&arm(), &recording, &question, &mut |_| ());
         assert!(plain.expect("a diagnosis").enforced.is_none());
     }
 }

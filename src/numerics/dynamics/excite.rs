@@ -27,7 +27,7 @@ const INFLATED: f64 = 1e4;
 const SMALL_RANGE: f64 = 0.2;
 
 /// What a motion may be and is for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExciteRequest {
     /// s.
     pub seconds: f64,
@@ -96,12 +96,6 @@ pub struct ExcitingMotion {
 pub fn excite(arm: &DynamicArm, request: &ExciteRequest) -> Result<ExcitingMotion> {
     check(arm, request)?;
     let n = arm.joints();
-    let limits = |joint: usize| JointLimits {
-        range: request.range[joint],
-        speed: request.speed[joint],
-        acceleration: request.acceleration[joint],
-    };
-    let limits: Vec<JointLimits> = (0..n).map(limits).collect();
     let coarse = SeriesBasis::new(request.seconds, GRID, request.harmonics);
     let width = 1 + 2 * request.harmonics;
     let mut dice = ChaCha8Rng::seed_from_u64(request.seed);
@@ -111,7 +105,7 @@ pub fn excite(arm: &DynamicArm, request: &ExciteRequest) -> Result<ExcitingMotio
             .collect()
     };
     let draws: Vec<Vec<f64>> = (0..RANDOM).map(&mut random).collect();
-    let base = base_of(arm, &coarse, &scaled(&coarse, &draws[0], &limits));
+    let base = base_of(arm, &coarse, &scaled(&coarse, &draws[0], request));
     let information = Information {
         arm,
         base: &base,
@@ -119,7 +113,7 @@ pub fn excite(arm: &DynamicArm, request: &ExciteRequest) -> Result<ExcitingMotio
     };
     let rows = coarse.spread(COUNTED);
     let share = request.rate * request.seconds / rows.len() as f64;
-    let of_x = |x: &[f64]| information.of(&coarse, &scaled(&coarse, x, &limits), &rows, share);
+    let of_x = |x: &[f64]| information.of(&coarse, &scaled(&coarse, x, request), &rows, share);
     let bounds = SearchBox::cube(n * width, -1.0, 1.0);
     let budget = Budget {
         generations: request.generations,
@@ -133,7 +127,7 @@ pub fn excite(arm: &DynamicArm, request: &ExciteRequest) -> Result<ExcitingMotio
     let best = of_x(&found.position);
     let others: Vec<_> = draws.iter().map(|x| of_x(x)).collect();
     let fine = SeriesBasis::new(request.seconds, request.rate, request.harmonics);
-    let motion = fine.motion(&scaled(&fine, &found.position, &limits));
+    let motion = fine.motion(&scaled(&fine, &found.position, request));
     let (sigmas, inflations) = (best.sigmas(), best.inflations());
     let all: Vec<Vec<f64>> = others.iter().map(|other| other.sigmas()).collect();
     let median = |values: &mut dyn Iterator<Item = f64>| {
@@ -376,17 +370,6 @@ const PERIOD: f64 = 10.0;
 /// Share of a limit that is used.
 const USED: f64 = 0.98;
 
-/// What a joint may do.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct JointLimits {
-    /// rad.
-    range: [f64; 2],
-    /// rad/s.
-    speed: f64,
-    /// rad/s^2.
-    acceleration: f64,
-}
-
 /// Sines and cosines of a clock, times the start and stop, with their derivatives: `[row][2 harmonic + (sine or cosine)]`.
 struct SeriesBasis {
     time: Vec<f64>,
@@ -480,9 +463,9 @@ impl SeriesBasis {
 
 /// The series of numbers from -1 to 1 (of each joint a place in its range, then coefficients), each joint brought to the limit that it
 /// meets first on the rows of a clock.
-fn scaled(basis: &SeriesBasis, x: &[f64], limits: &[JointLimits]) -> JointSeries {
+fn scaled(basis: &SeriesBasis, x: &[f64], request: &ExciteRequest) -> JointSeries {
     let width = 1 + basis.terms;
-    let of_course = |(course, limit): (&[f64], &JointLimits)| {
+    let of_course = |(joint, course): (usize, &[f64])| {
         // Equal speeds of all harmonics are likelier than equal amplitudes.
         let raw = course[1..].iter().enumerate();
         let raw: Vec<f64> = raw
@@ -496,16 +479,16 @@ fn scaled(basis: &SeriesBasis, x: &[f64], limits: &[JointLimits]) -> JointSeries
             fastest = fastest.max(basis.sum(&basis.velocity, row, &raw).abs());
             hardest = hardest.max(basis.sum(&basis.acceleration, row, &raw).abs());
         }
-        let [from, to] = limit.range;
+        let [from, to] = request.range[joint];
         let room = (to - from) / (greatest - least).max(1e-12);
-        let by_speed = room.min(limit.speed / fastest);
-        let scale = USED * by_speed.min(limit.acceleration / hardest);
+        let by_speed = room.min(request.speed[joint] / fastest);
+        let scale = USED * by_speed.min(request.acceleration[joint] / hardest);
         let (lowest, highest) = (from - scale * least, to - scale * greatest);
         let margin = 0.5 * (1.0 - USED) * (highest - lowest);
         let middle = lowest + margin + 0.5 * (course[0] + 1.0) * (highest - lowest - 2.0 * margin);
         (middle, raw.iter().map(|value| scale * value).collect())
     };
-    JointSeries(x.chunks_exact(width).zip(limits).map(of_course).collect())
+    JointSeries(x.chunks_exact(width).enumerate().map(of_course).collect())
 }
 
 /// 0 at both ends, 1 between, with its derivatives.
@@ -528,14 +511,15 @@ mod tests {
 
     #[test]
     fn a_series_holds_its_limits_meets_one_and_starts_and_stops_at_rest() {
-        let limits = JointLimits {
-            range: [-0.5, 1.5],
-            speed: 0.8,
-            acceleration: 2.0,
+        let request = ExciteRequest {
+            range: vec![[-0.5, 1.5]],
+            speed: vec![0.8],
+            acceleration: vec![2.0],
+            ..ExciteRequest::default()
         };
         let x: Vec<f64> = (0..11).map(|k| (1.7 * f64::from(k)).sin()).collect();
         let basis = SeriesBasis::new(20.0, 100.0, 5);
-        let motion = basis.motion(&scaled(&basis, &x, &[limits]));
+        let motion = basis.motion(&scaled(&basis, &x, &request));
         let [speed, acceleration] = [&motion.velocity, &motion.acceleration].map(largest);
         assert!(motion.position.iter().all(|q| (-0.5..=1.5).contains(q)));
         assert!(speed <= 0.8 && acceleration <= 2.0);

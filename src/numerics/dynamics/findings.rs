@@ -2,13 +2,13 @@
 
 use super::arm::INERTIAL_NUMBERS;
 use super::cause::{
-    COULOMB, FittedNumber, TorqueForm, TorqueParameter, VISCOUS, line_of_power, plain, shape,
+    COULOMB, FittedNumber, TorqueForm, TorqueParameter, VISCOUS, line_of_power, plain, shape, slope,
 };
 use super::cells::{CauseChoice, CellOdds, TorqueTable, all_but};
 use super::model::{COVERAGE, JointRange, TorqueModel, TorqueTerm};
 use super::problem::TorqueProblem;
 use super::recording::{ends, largest};
-use super::refine::{ShapeNumber, ShapeSlopes, slope};
+use super::refine::{ShapeNumber, ShapeSlopes};
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueFinding};
 use crate::criteria::cells::{MISLED, RIVAL};
@@ -192,7 +192,9 @@ fn weighed(mut finding: TorqueFinding, (log_odds, rivals): CellOdds) -> TorqueFi
     let mut here = share(log_odds);
     for ((effect, place), log) in rivals {
         let probability = share(log);
-        here += [0.0, probability][usize::from(place == finding.place)];
+        if place == finding.place {
+            here += probability;
+        }
         if (effect, place) != (finding.effect, finding.place) && probability > *RIVAL {
             finding.rivals.push(RivalCause {
                 effect,

@@ -136,12 +136,11 @@ impl TorqueTable<'_, '_> {
 
     /// What a cell says given a state, and each of its shapes that robots may share.
     fn answer(&self, cell: usize, state: &TorqueState, left_out: Option<&str>) -> Vec<CellAnswer> {
-        let Some(posterior) = self.cell(cell, state) else {
+        let Some((log_odds, best)) = self.cell(cell, state) else {
             return Vec::new();
         };
-        let best = posterior.best;
         let size = best.amplitude * self.newton_metres(best.form);
-        let whole = self.whole_answer(best.form, posterior.log_odds, size, left_out);
+        let whole = self.whole_answer(best.form, log_odds, size, left_out);
         // Forms of each shape, and ln of the evidence of those that may be.
         let mut shapes: BTreeMap<String, (usize, Vec<f64>)> = BTreeMap::new();
         for form in self.open(cell) {
@@ -206,7 +205,7 @@ fn follows(form: &TorqueForm) -> &'static str {
     let cause = form.cause;
     match () {
         () if cause.inertial || cause.of_rigid => "load",
-        () if cause.brakes || cause.of_sign || cause.friction.is_some() => "speed",
+        () if cause.brakes || cause.of_sign => "speed",
         () if cause.alike_at_joints => "other angle",
         () if cause.of_angle => "own angle",
         () => "constant",

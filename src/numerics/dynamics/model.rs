@@ -3,8 +3,9 @@
 //! Friction of a joint over its velocity, with its band, is the sum of all laws of speed, which single ones may stand for in part alone.
 
 use super::arm::{INERTIAL_NUMBERS, inertial_name, inertial_unit};
-use super::cause::{COULOMB, FittedNumber, TORQUE_CAUSES, TorqueForm, VISCOUS, line_of_power};
-use super::refine::slope;
+use super::cause::{
+    COULOMB, FittedNumber, TORQUE_CAUSES, TorqueForm, VISCOUS, line_of_power, slope,
+};
 use crate::effect::Place;
 use crate::error::{Error, Result};
 

@@ -6,7 +6,7 @@
 //!
 //! The width is at first that under which base, viscous, Coulomb friction and offset leave least.
 
-use super::cause::{ShapeSpan, TorqueForm};
+use super::cause::{SHARE, ShapeSpan, TorqueForm};
 use super::columns::TorqueColumn;
 use super::problem::TorqueProblem;
 use super::recording::{add, square};
@@ -29,28 +29,18 @@ pub(super) fn refine(
 ) -> bool {
     let before = set.to_vec();
     for place in 0..set.len() {
-        refine_one(problem, weighted, set, place);
-    }
-    before != set
-}
-
-/// Replaces one form of a set.
-fn refine_one(
-    problem: &mut TorqueProblem,
-    weighted: &mut WeightedColumns,
-    set: &mut [usize],
-    place: usize,
-) {
-    let form = &problem.all.forms[set[place]];
-    for span in (form.cause.spans)(form) {
-        for half in HALVES {
-            try_grid(problem, weighted, set, place, span, half);
-            // What the coarsest grid leaves as it usually is stays so.
-            if span.usual == Some(problem.all.forms[set[place]].shape[span.index]) {
-                break;
+        let form = &problem.all.forms[set[place]];
+        for span in (form.cause.spans)(form) {
+            for half in HALVES {
+                try_grid(problem, weighted, set, place, span, half);
+                // What the coarsest grid leaves as it usually is stays so.
+                if span.usual == Some(problem.all.forms[set[place]].shape[span.index]) {
+                    break;
+                }
             }
         }
     }
+    before != set
 }
 
 /// One grid about the present number.
@@ -202,8 +192,6 @@ pub(super) fn take_out_ends(
     before != *set
 }
 
-/// By what share a shape number is moved for a difference.
-const SHARE: f64 = 0.03;
 /// Standard deviation of the logarithm of a shape number beforehand: of what the data hardly show, its size is known to a factor of three.
 const BEFOREHAND: f64 = 1.0;
 
@@ -334,11 +322,6 @@ pub(super) fn planned_slopes<C: AsRef<[f64]>>(
     }
     scene.sign_width = width;
     slopes
-}
-
-/// The slope of a function of a shape number.
-pub(super) fn slope(size: f64, function: impl Fn(f64) -> f64) -> f64 {
-    (function(size * (1.0 + SHARE)) - function(size * (1.0 - SHARE))) / (2.0 * SHARE * size)
 }
 
 /// Nm, of a form with its coefficients at a joint.

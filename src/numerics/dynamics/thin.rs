@@ -59,53 +59,8 @@ impl ThinningPlan {
     }
 }
 
-/// A recording that was thinned.
-pub(super) struct ThinnedRecording {
-    pub(crate) recording: TorqueRecording,
-    pub(crate) clock: RecordingClock,
-    /// The recorded row of each.
-    pub(crate) origin: Vec<usize>,
-    /// Rows that were made up where some were lost.
-    pub(crate) made_up: usize,
-    /// Recorded rows before which clock or joints jump, and s since the row before.
-    pub(crate) tears: Vec<(usize, f64)>,
-}
-
-impl ThinnedRecording {
-    /// Reads all rows once more.
-    pub(crate) fn of(
-        source: &dyn TorqueSource,
-        survey: &RecordingSurvey,
-        plan: &ThinningPlan,
-    ) -> Result<Self> {
-        let mut thinner: Option<Thinner> = None;
-        source.blocks(&mut |block| {
-            thinner
-                .get_or_insert_with(|| Thinner::new(block, survey.pace.clone(), plan.clone()))
-                .push(block);
-            Ok(())
-        })?;
-        let mut thinner = thinner.unwrap_or_else(|| {
-            let nothing = TorqueRecording::of_motion(source.joints(), Vec::new(), Vec::new());
-            Thinner::new(&nothing, survey.pace.clone(), plan.clone())
-        });
-        thinner.pass_on(0);
-        thinner.end_stretch();
-        let rate = 1.0 / (survey.pace.usual * plan.every as f64);
-        Ok(Self {
-            clock: RecordingClock {
-                rate,
-                stretches: thinner.stretches,
-            },
-            recording: thinner.kept,
-            origin: thinner.origin,
-            made_up: thinner.made_up,
-            tears: thinner.tears,
-        })
-    }
-}
-
-struct Thinner {
+/// Keeps some rows of a recording as its blocks come.
+pub(super) struct Thinner {
     plan: ThinningPlan,
     pace: ClockPace,
     filter: ZeroPhase,
@@ -122,14 +77,37 @@ struct Thinner {
     begun: usize,
     /// The next row of the stretch to keep.
     next: usize,
-    kept: TorqueRecording,
-    origin: Vec<usize>,
-    stretches: Vec<Range<usize>>,
-    made_up: usize,
-    tears: Vec<(usize, f64)>,
+    pub(crate) kept: TorqueRecording,
+    /// The recorded row of each.
+    pub(crate) origin: Vec<usize>,
+    /// Kept rows without a gap.
+    pub(crate) stretches: Vec<Range<usize>>,
+    /// Rows that were made up where some were lost.
+    pub(crate) made_up: usize,
+    /// Recorded rows before which clock or joints jump, and s since the row before.
+    pub(crate) tears: Vec<(usize, f64)>,
 }
 
 impl Thinner {
+    /// Reads all rows once more.
+    pub(crate) fn read(
+        source: &dyn TorqueSource,
+        survey: &RecordingSurvey,
+        plan: &ThinningPlan,
+    ) -> Result<Self> {
+        let mut thinner: Option<Self> = None;
+        let new = |like: &TorqueRecording| Self::new(like, survey.pace.clone(), plan.clone());
+        source.blocks(&mut |block| {
+            thinner.get_or_insert_with(|| new(block)).push(block);
+            Ok(())
+        })?;
+        let nothing = || TorqueRecording::of_motion(source.joints(), Vec::new(), Vec::new());
+        let mut thinner = thinner.unwrap_or_else(|| new(&nothing()));
+        thinner.pass_on(0);
+        thinner.end_stretch();
+        Ok(thinner)
+    }
+
     fn new(like: &TorqueRecording, pace: ClockPace, plan: ThinningPlan) -> Self {
         // Rates are shares of that of kept rows, whatever the clock: what the filter does depends on nothing that blocks measure.
         let rate = plan.every as f64;

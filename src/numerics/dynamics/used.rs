@@ -4,7 +4,7 @@ use super::arm::DynamicArm;
 use super::check;
 use super::even::EvenSource;
 use super::recording::{Bridged, RecordingClock, TorqueRecording, TorqueSource, bridged_remark};
-use super::thin::{RecordingSurvey, ThinnedRecording, ThinningPlan};
+use super::thin::{RecordingSurvey, Thinner, ThinningPlan};
 use crate::error::Result;
 
 /// Rows that are used as they were recorded; of longer recordings about so many are kept, however long they are.
@@ -65,11 +65,8 @@ impl UsedRecording {
         let Bridged { recording, origin } = Bridged::of(whole);
         let origin = source.recorded(&origin)?;
         let clock = RecordingClock::of(&recording);
-        let odd = check::remarks(&recording, &origin, &clock);
-        let remarks = odd
-            .into_iter()
-            .chain(bridged_remark(recording.rows() - recorded))
-            .collect();
+        let mut remarks = check::remarks(&recording, &origin, &clock);
+        remarks.extend(bridged_remark(recording.rows() - recorded));
         Ok(Self {
             recording,
             clock,
@@ -87,32 +84,26 @@ impl UsedRecording {
         let survey = RecordingSurvey::of(source)?;
         let rate = 1.0 / survey.pace.usual;
         let plan = ThinningPlan::new(source.rows(), rate, cutoff.unwrap_or(survey.cutoff), most);
-        let ThinnedRecording {
-            recording,
-            clock,
-            origin,
-            made_up,
-            tears,
-        } = ThinnedRecording::of(source, &survey, &plan)?;
+        let thinner = Thinner::read(source, &survey, &plan)?;
+        let recording = thinner.kept;
+        let clock = RecordingClock {
+            rate: 1.0 / (survey.pace.usual * plan.every as f64),
+            stretches: thinner.stretches,
+        };
         check::check(arm, &recording)?;
-        let mut remarks = vec![thinning_remark(
-            source.rows(),
-            &recording,
-            &plan,
-            clock.rate,
-        )];
-        let (rows, lasted): (Vec<usize>, Vec<f64>) = tears.into_iter().unzip();
+        let rows = source.rows();
+        let mut remarks = vec![thinning_remark(rows, &recording, &plan, clock.rate)];
+        let (rows, lasted): (Vec<usize>, Vec<f64>) = thinner.tears.into_iter().unzip();
         let tears = source.recorded(&rows)?.into_iter().zip(lasted);
         remarks.extend(check::few(
             tears.map(|(row, lasted)| check::torn_at(row, lasted, survey.pace.usual)),
         ));
         remarks.extend(check::of_sets(&recording));
-        let origin = source.recorded(&origin)?;
-        remarks.extend(bridged_remark(made_up));
+        remarks.extend(bridged_remark(thinner.made_up));
         Ok(Self {
             recording,
             clock,
-            origin,
+            origin: source.recorded(&thinner.origin)?,
             remarks,
         })
     }
@@ -136,6 +127,8 @@ fn thinning_remark(rows: usize, kept: &TorqueRecording, plan: &ThinningPlan, rat
 #[cfg(test)]
 mod tests {
     use super::super::cases::{Blocks, arm, found, record_at};
+    use super::super::diagnose_used;
+    use super::super::recording::{add, column, largest};
     use super::super::types::TorqueQuestion;
     use super::*;
 
@@ -158,11 +151,10 @@ mod tests {
         let recording = Blocks(long(), 7001);
         let diagnosed = |most: usize| {
             let used = UsedRecording::within(&arm(), &recording, None, most).unwrap();
-            let rows = used.recording.rows();
+            let (rows, question) = (used.recording.rows(), TorqueQuestion::default());
             (
                 rows,
-                super::super::diagnose_used(&arm(), used, &TorqueQuestion::default(), &mut |_| ())
-                    .unwrap(),
+                diagnose_used(&arm(), used, &question, &mut |_| ()).unwrap(),
             )
         };
         let ((all, whole), (few, thinned)) = (diagnosed(usize::MAX), diagnosed(10_000));
@@ -170,15 +162,8 @@ mod tests {
         assert_eq!(found(&whole), found(&thinned));
         for (one, other) in whole.findings.iter().zip(&thinned.findings) {
             for (a, b) in one.parameters.iter().zip(&other.parameters) {
-                let sigma = a.sigma.unwrap_or(0.0);
-                assert!(
-                    (a.value - b.value).abs() < 0.5 * sigma,
-                    "{} {}: {} {} {sigma}",
-                    one.effect,
-                    a.name,
-                    a.value,
-                    b.value
-                );
+                let near = (a.value - b.value).abs() < 0.5 * a.sigma.unwrap_or(0.0);
+                assert!(near, "{}: {a:?} {b:?}", one.effect);
             }
         }
         assert!((whole.after.nrmse_mean / thinned.after.nrmse_mean - 1.0).abs() < 0.05);
@@ -196,18 +181,12 @@ mod tests {
             UsedRecording::within(&arm(), &Blocks(recording.clone(), block), None, 10_000).unwrap()
         };
         let (one, other) = (thinned(80_000), thinned(1500));
-        assert_eq!(
-            (one.origin, one.recording.time),
-            (other.origin, other.recording.time)
-        );
-        let apart = |a: &[f64], b: &[f64]| {
-            a.iter()
-                .zip(b)
-                .map(|(a, b)| (a - b).abs())
-                .fold(0.0, f64::max)
-        };
-        let far = apart(&one.recording.position, &other.recording.position);
-        let torque = apart(&one.recording.torque, &other.recording.torque);
+        assert_eq!(one.origin, other.origin);
+        assert_eq!(one.recording.time, other.recording.time);
+        let [mut one, other] = [one.recording, other.recording];
+        add(&mut one.position, -1.0, &other.position);
+        add(&mut one.torque, -1.0, &other.torque);
+        let [far, torque] = [&one.position, &one.torque].map(largest);
         assert!(far < 1e-9 && torque < 1e-6, "{far} {torque}");
     }
 
@@ -216,9 +195,8 @@ mod tests {
         let plan = ThinningPlan::new(10_000_000, 500.0, 10.0, LIMIT);
         assert_eq!((plan.every, plan.spans), (5, [306, 20]));
         let mut recording = long();
-        recording.time[30_001..]
-            .iter_mut()
-            .for_each(|time| *time += 0.5);
+        let later = recording.time[30_001..].iter_mut();
+        later.for_each(|time| *time += 0.5);
         // Three rows are lost.
         let mut lost = TorqueRecording::like(&recording);
         lost.extend(&recording, 0..50_000);
@@ -241,29 +219,13 @@ mod tests {
             let mut recording = long();
             spoilt(&mut recording);
             let used = UsedRecording::within(&arm(), &Blocks(recording, 9000), None, 10_000);
-            used.err()
-                .map(|error| error.to_string())
-                .unwrap_or_default()
+            used.err().expect("a fault").to_string()
         };
         let saturated = refused(&|recording| {
-            let of_joint = |recording: &TorqueRecording| -> Vec<f64> {
-                recording
-                    .torque
-                    .iter()
-                    .skip(1)
-                    .step_by(4)
-                    .copied()
-                    .collect()
-            };
-            let mut sorted = of_joint(recording);
+            let mut sorted = column(&recording.torque, 4, 1);
             sorted.sort_by(f64::total_cmp);
-            let most = sorted[70_000];
-            recording
-                .torque
-                .iter_mut()
-                .skip(1)
-                .step_by(4)
-                .for_each(|torque| *torque = torque.min(most));
+            let torques = recording.torque.iter_mut().skip(1).step_by(4);
+            torques.for_each(|torque| *torque = torque.min(sorted[70_000]));
         });
         assert!(
             saturated.contains("joint 2") && saturated.contains("cut off"),

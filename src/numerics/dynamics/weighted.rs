@@ -83,9 +83,9 @@ impl WeightedColumns {
             gram: vec![Vec::new(); count],
             right: vec![0.0; count],
         };
-        chosen
-            .iter()
-            .for_each(|number| all.gram[*number] = vec![0.0; count]);
+        for number in chosen {
+            all.gram[*number] = vec![0.0; count];
+        }
         (0..all.measured.len()).for_each(|joint| all.take_joint(joint, chosen));
         all
     }
@@ -284,13 +284,18 @@ mod tests {
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
 
+    /// Numbers that are nearly normal.
+    fn normal(seed: u64) -> impl FnMut() -> f64 {
+        let mut dice = ChaCha8Rng::seed_from_u64(seed);
+        move || (0..12).map(|_| dice.random::<f64>() - 0.5).sum()
+    }
+
     #[test]
     fn a_course_that_remembers_is_found_with_its_memory_and_whitened() {
-        let mut dice = ChaCha8Rng::seed_from_u64(1);
-        let mut now = 0.0;
+        let (mut normal, mut now) = (normal(1), 0.0);
         let course: Vec<f64> = (0..20_000)
             .map(|_| {
-                now = 0.8 * now + (0..12).map(|_| dice.random::<f64>() - 0.5).sum::<f64>();
+                now = 0.8 * now + normal();
                 now
             })
             .collect();
@@ -302,11 +307,8 @@ mod tests {
             "{noise:?}"
         );
         // (1 + 0.8) / (1 - 0.8).
-        assert!(
-            (noise.autocorrelation() / 9.0 - 1.0).abs() < 0.15,
-            "{}",
-            noise.autocorrelation()
-        );
+        let lasting = noise.autocorrelation();
+        assert!((lasting / 9.0 - 1.0).abs() < 0.15, "{lasting}");
         let mut white = Vec::new();
         noise.whiten(&course, runs, &mut white);
         let lag = white.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / white.len() as f64;
@@ -315,8 +317,7 @@ mod tests {
 
     #[test]
     fn slow_noise_in_quick_noise_is_seen_at_its_full_density_by_the_long_memory() {
-        let mut dice = ChaCha8Rng::seed_from_u64(2);
-        let mut normal = || (0..12).map(|_| dice.random::<f64>() - 0.5).sum::<f64>();
+        let mut normal = normal(2);
         // 25 rows a second: white, and with a quarter of its variance what lasts a fifth of a second.
         let keeps = libm::exp(-0.2_f64);
         let mut now = 0.0;

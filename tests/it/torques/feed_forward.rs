@@ -1,6 +1,6 @@
 //! Torques that are fed forward say how certain they are, and what is not certain is refused: a wrong number moves a robot.
 
-use super::results::{Solved, arm, calib, column, motion, solve, solved};
+use super::results::{Solved, arm, calib, column, motion, rms, rows_of, solve, solved};
 use crate::answer::{Answer, has, read};
 use crate::compensate::concealed::from_environment;
 use calib::twin::torque::TorqueCase;
@@ -12,14 +12,6 @@ fn fed(solved: &Solved, file: &Path, more: &str) -> Answer {
         &format!("compensate HEAD {file} --torque {more}"),
         &solved.path("store"),
     )
-}
-
-fn message_of(answer: &Answer) -> String {
-    answer.err.clone()
-}
-
-fn answer(answer: &Answer) -> String {
-    answer.clone().ok()
 }
 
 /// A fresh motion of the solved case as a file.
@@ -52,27 +44,24 @@ fn covered(solved: &Solved, seed: u64) -> Vec<f64> {
     for stretch in [1, 2] {
         let file = solved.path(&format!("fresh_{seed}_{stretch}.csv"));
         std::fs::write(&file, motion(&rows, stretch, true)).unwrap();
-        let text = answer(&fed(solved, &file, "--quiet --force"));
-        let ours: Vec<usize> = (0..rows.time.len())
-            .filter(|row| rows.trajectory[*row] == stretch)
-            .collect();
+        let text = fed(solved, &file, "--quiet --force").ok();
+        let ours = rows_of(&rows, stretch);
         for (joint, (inside, all)) in within.iter_mut().enumerate() {
             let found = column(&text, &format!("tau{}_nm", joint + 1));
             let u95 = column(&text, &format!("u95_{}_nm", joint + 1));
-            let off = super::results::rms(
-                ours.iter()
-                    .zip(&found)
-                    .map(|(row, found)| rows.torque[n * row + joint] - found),
-            );
+            let off = ours.iter().zip(&found);
+            let off = off.map(|(row, found)| rows.torque[n * row + joint] - found);
             println!(
-                "stretch {stretch}, joint {}: rms error {off:.4} Nm, rms u95 {:.4} Nm",
+                "stretch {stretch}, joint {}: rms error {:.4} Nm, rms u95 {:.4} Nm",
                 joint + 1,
-                super::results::rms(u95.iter().copied())
+                rms(off.clone()),
+                rms(u95.iter().copied())
             );
-            for (row, (found, u95)) in ours.iter().zip(found.iter().zip(&u95)) {
-                *inside += usize::from((rows.torque[n * row + joint] - found).abs() <= *u95);
-                *all += 1;
-            }
+            *all += ours.len();
+            *inside += off
+                .zip(&u95)
+                .filter(|(off, u95)| off.abs() <= **u95)
+                .count();
         }
     }
     within
@@ -122,12 +111,9 @@ fn torques_less_certain_than_allowed_are_refused_and_written_only_with_force() {
     let file = fresh("doubtful.csv");
     let rows = read(&file).lines().count() - 1;
     let refused = fed(solved(), &file, "--max-uncertainty 1e-6").code(10);
-    let printed = message_of(&refused);
-    has(&printed, ["doubtful.csv:2: ", "no torques are written"]);
-    has(
-        &printed,
-        &format!("{rows} of {rows} rows are less certain than allowed"),
-    );
+    has(&refused.err, ["doubtful.csv:2: ", "no torques are written"]);
+    let message = format!("{rows} of {rows} rows are less certain than allowed");
+    has(&refused.err, &message);
     let text = refused.out;
     assert!(
         cells(&text, "tau2_nm").iter().all(|cell| cell.is_empty())
@@ -135,7 +121,7 @@ fn torques_less_certain_than_allowed_are_refused_and_written_only_with_force() {
     );
     assert!(column(&text, "u95_2_nm").iter().all(|u95| *u95 > 0.0));
     has(&text, ["refused: joint ", "Nm allowed (--max-uncertainty)"]);
-    let text = answer(&fed(solved(), &file, "--max-uncertainty 1e-6 --force"));
+    let text = fed(solved(), &file, "--max-uncertainty 1e-6 --force").ok();
     assert!(
         column(&text, "tau2_nm")
             .iter()
@@ -147,23 +133,19 @@ fn torques_less_certain_than_allowed_are_refused_and_written_only_with_force() {
     );
     // By default a motion like the recorded one is written whole.
     fed(solved(), &file, "").code(0);
-    let without = answer(&fed(solved(), &file, "--no-sigma --quiet"));
+    let without = fed(solved(), &file, "--no-sigma --quiet").ok();
     assert!(!without.contains("u95_1_nm"));
 }
 
 #[test]
 fn torques_that_were_fed_forward_already_are_no_motion() {
     let file = fresh("once.csv");
-    let once = answer(&fed(solved(), &file, "--quiet"));
+    let once = fed(solved(), &file, "--quiet").ok();
     let twice = solved().path("twice.csv");
     std::fs::write(&twice, &once).unwrap();
     let refused = fed(solved(), &twice, "").code(10);
-    assert!(
-        message_of(&refused).contains("carries the torques that calib wrote already"),
-        "{}",
-        message_of(&refused)
-    );
-    let again = answer(&fed(solved(), &twice, "--quiet --force"));
+    has(&refused.err, "carries the torques that calib wrote already");
+    let again = fed(solved(), &twice, "--quiet --force").ok();
     assert_eq!(again, once);
 }
 
@@ -190,21 +172,16 @@ fn a_motion_beyond_the_recording_is_remarked_row_by_row_with_what_it_exceeds() {
     let file = solved().path("fast.csv");
     std::fs::write(&file, fast).unwrap();
     let output = fed(solved(), &file, "--force");
-    assert!(
-        message_of(&output).contains("beyond the motion that the model was seen in"),
-        "{}",
-        message_of(&output)
-    );
-    let fast = answer(&output);
-    for what in [
+    has(&output.err, "beyond the motion that the model was seen in");
+    let fast = output.ok();
+    let remarks = [
         "faster than recorded",
         "accelerates more than recorded",
         "under more load than recorded",
-    ] {
-        assert!(fast.contains(what), "no `{what}`");
-    }
+    ];
+    has(&fast, remarks);
     // Friction is less certain where nobody saw it.
-    let slow = answer(&fed(solved(), &solved().path("slow.csv"), "--quiet"));
+    let slow = fed(solved(), &solved().path("slow.csv"), "--quiet").ok();
     let most = |text: &str| column(text, "u95_2_nm").into_iter().fold(0.0, f64::max);
     assert!(
         most(&fast) > 2.0 * most(&slow),
@@ -230,12 +207,12 @@ fn an_arm_whose_recording_says_its_temperature_is_remarked_where_it_is_colder() 
         motion(&case.on_other_paths(977, 40.0).true_rows(), 1, false),
     )
     .unwrap();
-    let cold = answer(&fed(&solved, &file, "--temperature 5"));
+    let cold = fed(&solved, &file, "--temperature 5").ok();
     assert!(
         cold.contains("colder than recorded: 5.0 C, the recording begins at 25.0 C"),
         "{}",
         &cold[..2000]
     );
-    let usual = answer(&fed(&solved, &file, "--temperature 26"));
+    let usual = fed(&solved, &file, "--temperature 26").ok();
     assert!(!usual.contains("than recorded: "), "{}", &usual[..2000]);
 }

@@ -66,28 +66,17 @@ fn design() -> Design {
     }
 }
 
-/// Friction at all joints and nothing else concealed, motor currents.
-pub(super) fn arm() -> TorqueCase {
+/// The first arm of six joints of whose viscous and Coulomb friction something holds at all of them.
+fn first(holds: fn(&[Option<f64>; 2]) -> bool) -> TorqueCase {
     let fits = |case: &TorqueCase| {
-        case.robot.name == "compact6"
-            && case
-                .plain_friction()
-                .iter()
-                .all(|[v, c]| v.and(*c).is_some())
+        case.robot.name == "compact6" && case.plain_friction().iter().all(holds)
     };
     cases(60).into_iter().find(fits).unwrap()
 }
 
-/// The first arm of six joints without any friction.
-fn frictionless() -> TorqueCase {
-    let bare = |case: &TorqueCase| {
-        case.robot.name == "compact6"
-            && case
-                .plain_friction()
-                .iter()
-                .all(|[v, c]| v.or(*c).is_none())
-    };
-    cases(60).into_iter().find(bare).unwrap()
+/// Friction at all joints and nothing else concealed, motor currents.
+pub(super) fn arm() -> TorqueCase {
+    first(|[v, c]| v.and(*c).is_some())
 }
 
 /// Arms of all kinds.
@@ -101,15 +90,9 @@ pub(super) fn calib(words: &str, store: &Path) -> Answer {
     answer::calib(".", &format!("{words} --store {}", store.display()))
 }
 
-fn text(answer: Answer) -> String {
-    answer.ok()
-}
-
-fn exported(format: &str) -> String {
-    text(calib(
-        &format!("export HEAD --quiet --format {format}"),
-        &solved().path("store"),
-    ))
+fn exported(solved: &Solved, format: &str) -> String {
+    let words = format!("export HEAD --quiet --format {format}");
+    calib(&words, &solved.path("store")).ok()
 }
 
 fn number(element: &roxmltree::Node, name: &str) -> f64 {
@@ -133,57 +116,51 @@ fn near(found: f64, truth: f64, share: f64, what: &str) {
     );
 }
 
-/// Mass and its moment about the last joint's point of the last link and what it carries.
-fn true_last(case: &TorqueCase) -> (f64, [f64; 3]) {
+/// Mass of the last link and what it carries.
+fn true_last_mass(case: &TorqueCase) -> f64 {
     let (link, payload) = case.last_bodies();
-    let point = case.robot.joints[case.robot.joints.len() - 1].point;
-    let bodies = std::iter::once(link).chain(payload);
-    bodies.fold((0.0, [0.0; 3]), |(mass, moment), body| {
-        (
-            mass + body.mass,
-            std::array::from_fn(|axis| {
-                moment[axis] + body.mass * (body.centre[axis] - point[axis])
-            }),
-        )
-    })
+    link.mass + payload.map_or(0.0, |payload| payload.mass)
+}
+
+/// Ratio and torque constant of each joint.
+fn drives(case: &TorqueCase) -> Vec<(f64, f64)> {
+    let joints = case.robot.joints.iter();
+    joints
+        .map(|joint| joint.reduction_ratio.zip(joint.motor_constant).unwrap())
+        .collect()
+}
+
+/// Elements of a name hold the friction of the twin in two attributes, joint after joint.
+fn friction_is_that_of_the_twin(file: &roxmltree::Document, name: &str, attributes: [&str; 2]) {
+    let truth = solved().case.plain_friction();
+    let elements = file.descendants().filter(|node| node.has_tag_name(name));
+    let elements: Vec<_> = elements.collect();
+    assert_eq!(elements.len(), truth.len());
+    for (joint, (element, sizes)) in elements.iter().zip(truth).enumerate() {
+        for (attribute, size) in attributes.iter().zip(sizes) {
+            let what = format!("{attribute} of joint {}", joint + 1);
+            near(
+                number(element, attribute),
+                size.unwrap(),
+                share(joint),
+                &what,
+            );
+        }
+    }
 }
 
 #[test]
 fn a_urdf_of_torques_holds_the_friction_and_the_masses_of_the_twin() {
-    let text = exported("urdf");
+    let text = exported(solved(), "urdf");
     let file = roxmltree::Document::parse(&text).unwrap();
-    let all: Vec<_> = file
-        .descendants()
-        .filter(|node| node.has_tag_name("dynamics"))
-        .collect();
-    let truth = solved().case.plain_friction();
-    assert_eq!(all.len(), truth.len());
-    for (joint, (dynamics, [viscous, coulomb])) in all.iter().zip(truth).enumerate() {
-        near(
-            number(dynamics, "damping"),
-            viscous.unwrap(),
-            share(joint),
-            &format!("viscous friction of joint {}", joint + 1),
-        );
-        near(
-            number(dynamics, "friction"),
-            coulomb.unwrap(),
-            share(joint),
-            &format!("Coulomb friction of joint {}", joint + 1),
-        );
-    }
-    let last = file
-        .descendants()
-        .find(|node| node.attribute("name") == Some("link_6"))
-        .unwrap();
-    let mass = last
-        .descendants()
-        .find(|node| node.has_tag_name("mass"))
-        .unwrap();
-    let (truth, _) = true_last(&solved().case);
+    friction_is_that_of_the_twin(&file, "dynamics", ["damping", "friction"]);
+    let mut nodes = file.descendants();
+    let last = nodes.find(|node| node.attribute("name") == Some("link_6"));
+    let mut nodes = last.unwrap().descendants();
+    let mass = nodes.find(|node| node.has_tag_name("mass")).unwrap();
     near(
         number(&mass, "value"),
-        truth,
+        true_last_mass(&solved().case),
         0.03,
         "mass of the last link with its payload",
     );
@@ -191,43 +168,16 @@ fn a_urdf_of_torques_holds_the_friction_and_the_masses_of_the_twin() {
 
 #[test]
 fn an_mjcf_of_torques_holds_friction_and_drives() {
-    let text = exported("mjcf");
+    let text = exported(solved(), "mjcf");
     let file = roxmltree::Document::parse(&text).unwrap();
-    let truth = solved().case.plain_friction();
-    let joints: Vec<_> = file
-        .descendants()
-        .filter(|node| node.has_tag_name("joint"))
-        .collect();
-    assert_eq!(joints.len(), truth.len());
-    for (joint, (element, [viscous, coulomb])) in joints.iter().zip(truth).enumerate() {
-        near(
-            number(element, "damping"),
-            viscous.unwrap(),
-            share(joint),
-            &format!("viscous friction of joint {}", joint + 1),
-        );
-        near(
-            number(element, "frictionloss"),
-            coulomb.unwrap(),
-            share(joint),
-            &format!("Coulomb friction of joint {}", joint + 1),
-        );
-    }
-    let gears: Vec<f64> = file
-        .descendants()
-        .filter(|node| node.has_tag_name("motor"))
-        .map(|motor| number(&motor, "gear"))
-        .collect();
-    let declared = solved()
-        .case
-        .robot
-        .joints
-        .iter()
-        .map(|joint| joint.reduction_ratio.zip(joint.motor_constant).unwrap());
+    friction_is_that_of_the_twin(&file, "joint", ["damping", "frictionloss"]);
+    let motors = file.descendants().filter(|node| node.has_tag_name("motor"));
+    let gears: Vec<f64> = motors.map(|motor| number(&motor, "gear")).collect();
+    let declared = drives(&solved().case);
+    assert_eq!(gears.len(), declared.len());
     for (gear, (ratio, constant)) in gears.iter().zip(declared) {
         near(*gear, ratio * constant, 1e-12, "Nm per ampere");
     }
-    assert_eq!(gears.len(), joints.len());
 }
 
 #[test]
@@ -235,82 +185,63 @@ fn files_say_nothing_of_friction_that_was_not_found() {
     // Friction at two joints alone: none at the others is found, and 0 would be a statement that nobody made.
     let plain = arm().plain_friction();
     let [viscous, coulomb] = [1, 2].map(|joint| plain[joint].map(|size| size.unwrap()));
-    let case = frictionless()
-        .with_drag(1, viscous[1])
-        .with_drag(2, coulomb[1]);
-    let solved = solve(case);
-    let found: Value = serde_json::from_str(&text(calib(
-        "export HEAD --quiet --format dynamics",
-        &solved.path("store"),
-    )))
-    .unwrap();
+    let frictionless = first(|[v, c]| v.or(*c).is_none());
+    let solved = solve(
+        frictionless
+            .with_drag(1, viscous[1])
+            .with_drag(2, coulomb[1]),
+    );
+    let found: Value = serde_json::from_str(&exported(&solved, "dynamics")).unwrap();
     for (format, element, names) in [
         ("urdf", "dynamics", ["damping", "friction"]),
         ("mjcf", "joint", ["damping", "frictionloss"]),
     ] {
-        let text = text(calib(
-            &format!("export HEAD --quiet --format {format}"),
-            &solved.path("store"),
-        ));
+        let text = exported(&solved, format);
         let file = roxmltree::Document::parse(&text).unwrap();
         for (index, joint) in found["joints"].as_array().unwrap().iter().enumerate() {
             let name = joint["name"].as_str().unwrap();
             let ours = file
                 .descendants()
                 .find(|node| node.has_tag_name("joint") && node.attribute("name") == Some(name));
-            let ours = ours.unwrap();
-            let ours = if element == "joint" {
-                Some(ours)
-            } else {
-                ours.children().find(|node| node.has_tag_name(element))
-            };
+            let mut ours = ours.unwrap().descendants();
+            let ours = ours.find(|node| node.has_tag_name(element));
             for (attribute, number) in names.iter().zip([&joint["viscous"], &joint["coulomb"]]) {
                 let written = ours.and_then(|node| node.attribute(*attribute));
-                assert_eq!(
-                    written.is_some(),
-                    !number.is_null(),
-                    "{format}: {attribute} of joint {}",
-                    index + 1
-                );
-                assert_ne!(
-                    written,
-                    Some("0"),
-                    "{format}: {attribute} of joint {}",
-                    index + 1
-                );
+                let what = format!("{format}: {attribute} of joint {}", index + 1);
+                assert_eq!(written.is_some(), !number.is_null(), "{what}");
+                assert_ne!(written, Some("0"), "{what}");
             }
         }
-        let sliding = found["joints"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .filter(|joint| !joint["coulomb"].is_null())
-            .count();
-        assert!(
-            (2..6).contains(&sliding),
-            "Coulomb friction at {sliding} joints"
-        );
     }
+    let joints = found["joints"].as_array().unwrap().iter();
+    let sliding = joints.filter(|joint| !joint["coulomb"].is_null()).count();
+    assert!(
+        (2..6).contains(&sliding),
+        "Coulomb friction at {sliding} joints"
+    );
 }
 
 #[test]
 fn what_a_format_does_not_hold_of_torques_is_said_with_its_size() {
-    let all: Value = serde_json::from_str(&exported("dynamics")).unwrap();
-    let causes = all["causes"].as_array().unwrap();
+    let all: Value = serde_json::from_str(&exported(solved(), "dynamics")).unwrap();
+    let mut causes = all["causes"].as_array().unwrap().iter();
     let stribeck = causes
-        .iter()
         .find(|cause| cause["effect"] == "stribeck_friction")
         .unwrap();
     assert_eq!(stribeck["where"], "joint 2");
     assert!(stribeck["numbers"]["stribeck"]["sigma"].as_f64().unwrap() > 0.0);
     for format in ["urdf", "mjcf"] {
-        let text = exported(format);
+        let text = exported(solved(), format);
         has(&text, "not carried: stribeck_friction at joint 2, ");
     }
-    let refused = calib("export HEAD --format dh", &solved().path("store"));
-    let printed = refused.err.clone();
-    assert_eq!(refused.code, Some(2), "{printed}");
-    has(&printed, "allowed: urdf, json, mjcf, sdf, dynamics");
+    let refused = calib("export HEAD --format dh", &solved().path("store")).code(2);
+    has(&refused.err, "allowed: urdf, json, mjcf, sdf, dynamics");
+}
+
+/// Rows of a stretch.
+pub(super) fn rows_of(rows: &TorqueRows, stretch: usize) -> Vec<usize> {
+    let is_of = |row: &usize| rows.trajectory[*row] == stretch;
+    (0..rows.time.len()).filter(is_of).collect()
 }
 
 /// A motion as its user has it, of one stretch of rows.
@@ -325,17 +256,11 @@ pub(super) fn motion(rows: &TorqueRows, stretch: usize, derivatives: bool) -> St
     if derivatives {
         text += &(names("dq{j}_deg_s") + &names("ddq{j}_deg_s2"));
     }
-    for (row, state) in rows
-        .state
-        .iter()
-        .enumerate()
-        .filter(|(row, _)| rows.trajectory[*row] == stretch)
-    {
-        let degrees = |values: &[f64]| {
-            values
-                .iter()
-                .map(|value| format!(",{:.7}", value.to_degrees()))
-                .collect::<String>()
+    for row in rows_of(rows, stretch) {
+        let state = &rows.state[row];
+        let degrees = |values: &[f64]| -> String {
+            let values = values.iter().map(|value| value.to_degrees());
+            values.map(|value| format!(",{value:.7}")).collect()
         };
         text += &format!("\n{:.4}{}", rows.time[row], degrees(&state.q));
         if derivatives {
@@ -378,28 +303,16 @@ fn torques_fed_forward_are_those_of_the_twin_on_fresh_motions() {
     for (stretch, derivatives) in [(1, false), (1, true), (2, true)] {
         let file = solved.path(&format!("motion_{stretch}_{derivatives}.csv"));
         std::fs::write(&file, motion(&rows, stretch, derivatives)).unwrap();
-        let printed = text(calib(
-            &format!("compensate HEAD {} --torque --quiet", file.display()),
-            &solved.path("store"),
-        ));
-        let ours: Vec<usize> = (0..rows.time.len())
-            .filter(|row| rows.trajectory[*row] == stretch)
-            .collect();
-        let drives = fresh
-            .robot
-            .joints
-            .iter()
-            .map(|joint| joint.reduction_ratio.zip(joint.motor_constant).unwrap());
-        for (joint, (ratio, constant)) in drives.enumerate() {
+        let words = format!("compensate HEAD {} --torque --quiet", file.display());
+        let printed = calib(&words, &solved.path("store")).ok();
+        let ours = rows_of(&rows, stretch);
+        for (joint, (ratio, constant)) in drives(&fresh).into_iter().enumerate() {
             let found = column(&printed, &format!("tau{}_nm", joint + 1));
             assert_eq!(found.len(), ours.len());
-            let error = rms(ours
-                .iter()
-                .zip(&found)
-                .map(|(row, found)| rows.torque[n * row + joint] - found));
-            let nominal = rms(ours
-                .iter()
-                .map(|row| rows.torque[n * row + joint] - rigid[*row][joint]));
+            let truth = |row: &usize| rows.torque[n * row + joint];
+            let pairs = ours.iter().zip(&found);
+            let error = rms(pairs.map(|(row, found)| truth(row) - found));
+            let nominal = rms(ours.iter().map(|row| truth(row) - rigid[*row][joint]));
             let noise = fresh.white_noise()[joint];
             println!(
                 "stretch {stretch}, joint {}: {error:.4} Nm, rigid {nominal:.4} Nm, noise {noise:.4} Nm",
@@ -440,15 +353,10 @@ fn a_motion_that_cannot_be_fed_forward_is_refused_at_its_line() {
         let mut lines: Vec<String> = whole.lines().map(String::from).collect();
         change(&mut lines);
         std::fs::write(&file, lines.join("\n")).unwrap();
-        let output = calib(
-            &format!("compensate HEAD {} --torque", file.display()),
-            &solved.path("store"),
-        );
-        let printed = output.err.clone();
-        assert!([Some(2), Some(10)].contains(&output.code), "{printed}");
-        words
-            .iter()
-            .for_each(|word| assert!(printed.contains(word), "no `{word}` in: {printed}"));
+        let asked = format!("compensate HEAD {} --torque", file.display());
+        let output = calib(&asked, &solved.path("store"));
+        assert!([Some(2), Some(10)].contains(&output.code), "{output:?}");
+        words.iter().for_each(|word| has(&output.err, word));
     };
     changed(
         &|lines| lines[0] = lines[0].replace("q3_deg", "angle3"),
@@ -468,9 +376,6 @@ fn a_motion_that_cannot_be_fed_forward_is_refused_at_its_line() {
     );
     changed(&|lines| lines.truncate(5), &["at least 10"]);
     // Without --torque there is nothing to correct.
-    let output = calib(
-        &format!("compensate HEAD {}", file.display()),
-        &solved.path("store"),
-    );
-    assert!(output.err.contains("--torque"), "{output:?}");
+    let asked = format!("compensate HEAD {}", file.display());
+    has(&calib(&asked, &solved.path("store")).err, "--torque");
 }

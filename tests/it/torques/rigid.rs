@@ -20,7 +20,7 @@ fn list(value: &Value) -> Vec<f64> {
 }
 
 /// The ten numbers of a body about its joint's point, by the parallel-axis rule.
-fn ten(body: &Body, point: [f64; 3]) -> [f64; INERTIAL_NUMBERS] {
+pub(super) fn ten(body: &Body, point: [f64; 3]) -> [f64; INERTIAL_NUMBERS] {
     let r = [0, 1, 2].map(|k| body.centre[k] - point[k]);
     let square: f64 = r.iter().map(|x| x * x).sum();
     let entry = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
@@ -36,7 +36,7 @@ fn ten(body: &Body, point: [f64; 3]) -> [f64; INERTIAL_NUMBERS] {
 }
 
 /// An arm without declared masses.
-fn bare(axes: &[[f64; 3]], points: &[[f64; 3]], gravity: [f64; 3]) -> DynamicArm {
+pub(super) fn bare(axes: &[[f64; 3]], points: &[[f64; 3]], gravity: [f64; 3]) -> DynamicArm {
     DynamicArm {
         axes: axes.iter().map(|axis| (*axis).into()).collect(),
         points: points.iter().map(|point| (*point).into()).collect(),

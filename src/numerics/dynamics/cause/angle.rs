@@ -248,7 +248,10 @@ pub(super) static RIPPLE: TorqueCause = TorqueCause {
     has_ends: |form| form.with[0] >= [ORDERS, MOTOR_ORDERS][form.with[1].min(1)],
     torque: ColumnTorque::Row(|column, row| {
         let [order, motor] = column.form.with;
-        let turns = [1.0, column.form.shape[0]][usize::from(motor == 1)];
+        let turns = match motor {
+            1 => column.form.shape[0],
+            _ => 1.0,
+        };
         let periods = order as f64 * turns * (1 + column.column / 2) as f64;
         wave(column.column, periods * column.angle(row))
     }),

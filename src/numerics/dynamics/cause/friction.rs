@@ -33,8 +33,7 @@ pub(crate) static VISCOUS_FRICTION: TorqueCause = TorqueCause {
         };
         form.shape.first().map(|_| span).into_iter().collect()
     },
-    torque: ColumnTorque::Row(|column, row| power(column.form, column.velocity(row))),
-    friction: Some(|form, _, velocity, _| power(form, velocity)),
+    torque: ColumnTorque::Friction(|form, _, velocity, _| power(form, velocity)),
     statement: |form, fitted| {
         let grows = exponent(form).map_or_else(String::new, |exponent| {
             format!(", which grows with the power {exponent:.2} of speed")
@@ -83,8 +82,7 @@ pub(crate) static COULOMB_FRICTION: TorqueCause = TorqueCause {
     of_sign: true,
     rich: |_| true,
     brakes: true,
-    torque: ColumnTorque::Row(|column, row| column.direction(row)),
-    friction: Some(|_, _, _, sign| sign),
+    torque: ColumnTorque::Friction(|_, _, _, sign| sign),
     statement: |form, fitted| {
         format!(
             "{} has Coulomb friction of {:.3} Nm",
@@ -101,8 +99,7 @@ pub(super) static ASYMMETRIC: TorqueCause = TorqueCause {
     of_sign: true,
     rich: |_| true,
     modifies: &[COULOMB],
-    torque: ColumnTorque::Row(|column, row| column.direction(row).max(0.0)),
-    friction: Some(|_, _, _, sign| sign.max(0.0)),
+    torque: ColumnTorque::Friction(|_, _, _, sign| sign.max(0.0)),
     statement: |form, fitted| {
         let is_negative = fitted[0].value < 0.0;
         format!(
@@ -157,10 +154,7 @@ pub(super) static STRIBECK: TorqueCause = TorqueCause {
         };
         vec![speed, exponent, speed]
     },
-    torque: ColumnTorque::Row(|column, row| {
-        column.direction(row) * falls(column.form, column.velocity(row))
-    }),
-    friction: Some(|form, _, velocity, sign| sign * falls(form, velocity)),
+    torque: ColumnTorque::Friction(|form, _, velocity, sign| sign * falls(form, velocity)),
     statement: |form, fitted| {
         format!(
             "friction of {} is {:.3} Nm greater when it begins to move, which falls over {:.3} rad/s",
@@ -301,7 +295,10 @@ pub(super) static WRIST_COUPLING: TorqueCause = TorqueCause {
         let (form, velocity) = (column.form, &column.scene.velocity);
         let ratio = form.shape[0];
         let together = velocity[form.joint()][row] + ratio * velocity[form.with[0]][row];
-        let share = [ratio, 1.0][usize::from(column.joint == form.joint())];
+        let share = match column.joint == form.joint() {
+            true => 1.0,
+            false => ratio,
+        };
         let value = match column.column {
             0 => together,
             _ => column.scene.sign(together),
@@ -361,10 +358,9 @@ pub(super) static BY_SPEED: TorqueCause = TorqueCause {
             std::iter::once(fastest).chain(lines).collect::<Vec<f64>>()
         })
     },
-    torque: ColumnTorque::Row(|column, row| {
-        column.direction(row) * bent(column.form, column.column, column.velocity(row))
+    torque: ColumnTorque::Friction(|form, column, velocity, sign| {
+        sign * bent(form, column, velocity)
     }),
-    friction: Some(|form, column, velocity, sign| sign * bent(form, column, velocity)),
     statement: |form, _| {
         format!(
             "friction without a name acts at {}: a curve of how fast the joint moves, of which viscous and Coulomb friction are the straight line",

@@ -86,6 +86,14 @@ impl ShapeSpan {
     }
 }
 
+/// By what share a shape number is moved for a difference.
+pub(super) const SHARE: f64 = 0.03;
+
+/// The slope of a function of a shape number.
+pub(super) fn slope(size: f64, function: impl Fn(f64) -> f64) -> f64 {
+    (function(size * (1.0 + SHARE)) - function(size * (1.0 - SHARE))) / (2.0 * SHARE * size)
+}
+
 /// A physical reason why measured torques differ from those of the rigid arm.
 pub(super) struct TorqueCause {
     /// Canonical.
@@ -134,8 +142,6 @@ pub(super) struct TorqueCause {
     pub(crate) is_itself: fn(&TorqueForm, &DynamicScene) -> bool,
     /// Shape numbers that are refined once it is found.
     pub(crate) spans: fn(&TorqueForm) -> Vec<ShapeSpan>,
-    /// Torque per coefficient of a column at a velocity and its smoothed sign, for causes that are friction over velocity.
-    pub(crate) friction: Option<FrictionLaw>,
     /// Whether a number of it that is counted, as an order, is the last that is tried.
     pub(crate) has_ends: fn(&TorqueForm) -> bool,
     /// Its numbers as people read them: its coefficients and shape numbers unless it has others.
@@ -154,6 +160,8 @@ pub(super) type InertialChanges = Vec<(usize, [f64; INERTIAL_NUMBERS])>;
 pub(super) enum ColumnTorque {
     /// By each row.
     Row(fn(&ColumnOf, usize) -> f64),
+    /// Of what is friction over velocity.
+    Friction(FrictionLaw),
     /// All rows as recorded, from zeros.
     Course(fn(&ColumnOf, &mut [f64])),
     /// A change of masses alone.
@@ -210,7 +218,6 @@ const PLAIN: TorqueCause = TorqueCause {
     is_possible: |_, _| true,
     is_itself: |_, _| true,
     spans: |_| Vec::new(),
-    friction: None,
     has_ends: |_| false,
     parameters: plain_parameters,
     statement: |form, _| form.place.to_string(),
@@ -307,8 +314,10 @@ impl TorqueForm {
 
     /// Torque per coefficient of a column at a velocity and its smoothed sign, of what is friction over velocity.
     pub(crate) fn friction(&self, column: usize, velocity: f64, sign: f64) -> Option<f64> {
-        let friction = self.cause.friction?;
-        Some(friction(self, column, velocity, sign))
+        match self.cause.torque {
+            ColumnTorque::Friction(law) => Some(law(self, column, velocity, sign)),
+            _ => None,
+        }
     }
 
     /// Writes a column of the torque at a joint (Nm per unit of its coefficient), rows as recorded; zero of what is a change of masses alone.
@@ -323,6 +332,12 @@ impl TorqueForm {
             ColumnTorque::Row(function) => {
                 let rows = out.iter_mut().enumerate();
                 rows.for_each(|(row, value)| *value = function(&column, row));
+            }
+            ColumnTorque::Friction(law) => {
+                for (row, value) in out.iter_mut().enumerate() {
+                    let (velocity, sign) = (column.velocity(row), column.direction(row));
+                    *value = law(self, column.column, velocity, sign);
+                }
             }
             ColumnTorque::Course(function) => {
                 out.fill(0.0);
