@@ -197,11 +197,11 @@ impl ClockSteps {
 /// Whether lists have their lengths and numbers are numbers that ascend.
 fn is_sound(block: &TorqueRecording, joints: usize) -> bool {
     let rows = block.rows();
-    let columns = block.columns().into_iter();
+    let mut columns = block.columns().into_iter();
     let is_long =
         |(all, wide): (Option<&Vec<f64>>, usize)| all.is_none_or(|all| all.len() == wide * rows);
     block.joints == joints
-        && columns.map(is_long).all(|long| long)
+        && columns.all(is_long)
         && [block.trajectory.len(), block.held_out.len()] == [rows; 2]
         && row_faults(block, 0, None).is_empty()
 }

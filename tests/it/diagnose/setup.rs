@@ -417,7 +417,7 @@ fn two_set_up_errors_are_named_together_and_two_reflectors_hide_none() {
         ],
     );
     let mut named = recorded(&shouldered(), 45, json!([]));
-    let target = |row: usize| Some(if row % 2 == 0 { "A" } else { "B" }.to_string());
+    let target = |row: usize| Some(if row.is_multiple_of(2) { "A" } else { "B" }.to_string());
     named.recording.target = Some((0..72).map(target).collect());
     joints(&mut named, |q| q[2] = -q[2]);
     starts_with(
