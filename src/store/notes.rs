@@ -109,7 +109,7 @@ pub(super) fn unseal(text: &[u8]) -> std::result::Result<String, &'static str> {
     let (body, end) = text.split_at(split);
     let carried = end
         .strip_prefix(OPEN.as_bytes())
-        .and_then(|rest| rest.strip_suffix(CLOSE.as_bytes()))
+        .and_then(|after| after.strip_suffix(CLOSE.as_bytes()))
         .and_then(|digits| std::str::from_utf8(digits).ok());
     match carried {
         None => Err("it has no seal at its end: it is torn, or was edited"),

@@ -58,11 +58,11 @@ impl S3 {
     /// Nothing is asked yet.
     fn open(url: &str, settings: &BTreeMap<String, String>) -> Result<Self> {
         let shape = || Error::spec(url, "expected s3://BUCKET/PREFIX");
-        let rest = url
+        let path = url
             .strip_prefix("s3://")
             .ok_or_else(shape)?
             .trim_end_matches('/');
-        let (bucket, prefix) = rest.split_once('/').unwrap_or((rest, ""));
+        let (bucket, prefix) = path.split_once('/').unwrap_or((path, ""));
         let prefix = Key::parse(prefix).map_err(|_| shape())?;
         if bucket.is_empty() {
             return Err(shape());
@@ -158,11 +158,11 @@ impl S3 {
             .split_whitespace()
             .collect::<Vec<_>>()
             .join(" ");
-        let mut said: String = text.chars().take(SHOWN).collect();
+        let mut answer: String = text.chars().take(SHOWN).collect();
         // The first cause (no route, a certificate) is the last of a chain, and a text need not name it.
         let causes =
             std::iter::successors(std::error::Error::source(&error), |error| error.source());
-        said.extend(
+        answer.extend(
             causes
                 .last()
                 .map(ToString::to_string)
@@ -179,7 +179,7 @@ impl S3 {
         }
         if self.keyless && !matches!(error, object_store::Error::NotFound { .. }) {
             let message = format!(
-                "no credentials: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY (AWS_REGION, and AWS_ENDPOINT_URL where the bucket is not Amazon's); {said}"
+                "no credentials: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY (AWS_REGION, and AWS_ENDPOINT_URL where the bucket is not Amazon's); {answer}"
             );
             return Error::spec(&self.name, message);
         }
@@ -192,7 +192,7 @@ impl S3 {
                 "check the network, AWS_ENDPOINT_URL and AWS_REGION, and run again: finished stages are kept"
             }
         };
-        Error::store(place, format!("cannot {doing}: {said}; {remedy}"))
+        Error::store(place, format!("cannot {doing}: {answer}; {remedy}"))
     }
 }
 

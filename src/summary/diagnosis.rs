@@ -155,10 +155,10 @@ impl DiagnosisSummary {
             ..Self::default()
         };
         let evidence = "f_statistic p_value delta_bic heldout_gain_mm effect_rms_mm";
-        let said = (v.step.clone(), table(tables)?);
+        let step = (v.step.clone(), table(tables)?);
         summary.with(
             subject,
-            said,
+            step,
             (document, shown),
             findings,
             evidence,
@@ -207,9 +207,9 @@ impl DiagnosisSummary {
             ..Self::default()
         };
         let evidence = "gain f_statistic p_value delta_bic heldout_gain_nm effect_rms_nm";
-        let said = (v.step.clone(), table(tables)?);
+        let step = (v.step.clone(), table(tables)?);
         let ranges = vec![json!({}); rows.len()];
-        summary.with(subject, said, (document, shown), findings, evidence, ranges)
+        summary.with(subject, step, (document, shown), findings, evidence, ranges)
     }
 
     /// The same with what both have: sentences and findings.

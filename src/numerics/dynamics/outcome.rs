@@ -244,8 +244,8 @@ fn errors(problem: &TorqueProblem, residual: &[Vec<f64>], rows: &[usize]) -> Tor
     let all: Vec<f64> = all.collect();
     let nrmse = joints().map(|joint| all[joint] / spread(problem, joint, rows));
     let nrmse: Vec<f64> = nrmse.collect();
-    let of_rows = |rest: bool| {
-        let of_joint = |joint| rms(joint, &|row| rests(problem, joint, row) == rest);
+    let of_rows = |at_rest: bool| {
+        let of_joint = |joint| rms(joint, &|row| rests(problem, joint, row) == at_rest);
         joints().map(of_joint).collect()
     };
     TorqueErrors {
