@@ -126,7 +126,7 @@ impl S3 {
         let runtime =
             runtime.map_err(|e| Error::store(url, format!("no thread for the network: {e}")))?;
         Ok(Self {
-            name: format!("s3://{rest}"),
+            name: format!("s3://{path}"),
             bucket: bucket.into(),
             prefix,
             endpoint,

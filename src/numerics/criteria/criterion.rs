@@ -1,7 +1,5 @@
 //! A number by which something is decided, `*NAME` is its value; how a table of them is written; and, for `ablate`, half and double of each.
 
-use std::ops::Deref;
-
 /// A number by which something is decided.
 pub struct CriterionValue<T: 'static> {
     value: T,
@@ -20,7 +18,7 @@ impl<T> CriterionValue<T> {
 }
 
 #[cfg(not(feature = "ablate"))]
-impl<T> Deref for CriterionValue<T> {
+impl<T> std::ops::Deref for CriterionValue<T> {
     type Target = T;
 
     #[inline(always)]
