@@ -240,7 +240,7 @@ fn log(recording: Recording, at_once: bool) -> Log {
 pub const LEFT_OUT: &str = "left_out";
 
 /// All sealed cases of the set, marked; `files` are the paths that the seal holds. Of those that were diagnosed without their causes, too,
-/// what was said in their stead.
+/// which name was given instead.
 pub fn board(folder: &Path, files: &[String], verdicts: &Path) -> Result<Board> {
     let mut board = Board::default();
     let is_sealed = |name: &&String| Path::new(name).starts_with(SEALED);

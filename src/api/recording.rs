@@ -51,7 +51,7 @@ pub struct Recording {
 }
 
 /// Faults that are reported for one array.
-const TOLD: usize = 5;
+const LISTED: usize = 5;
 
 /// Columns that have fields of their own.
 const OWN: [&str; 5] = ["q_rad", "q_mm", "sequence", "usage", SIGMA_SOURCE];
@@ -76,7 +76,7 @@ impl Poses {
             return Err(Error::data("joints", message));
         }
         let values = self.joints_rad.iter().enumerate();
-        let missing = values.filter(|(_, value)| !value.is_finite()).take(TOLD);
+        let missing = values.filter(|(_, value)| !value.is_finite()).take(LISTED);
         let fault = |(at, value): (usize, &f64)| {
             let place = format!("joints, row {}, joint {}", at / joints, at % joints + 1);
             Fault::new(place, format!("{value} is not a number"))
@@ -143,7 +143,7 @@ impl Recording {
             };
             Some(Fault::new(format!("points, row {row}"), message))
         });
-        let mut faults: Vec<Fault> = wrong.take(TOLD).collect();
+        let mut faults: Vec<Fault> = wrong.take(LISTED).collect();
         if let Sigma::Mm(given) = &self.sigma
             && let Some(value) = given.iter().find(|mm| !(mm.is_finite() && **mm > 0.0))
         {

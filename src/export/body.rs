@@ -13,7 +13,7 @@ use minijinja::{UndefinedBehavior, Value};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use quick_xml::escape::escape;
 
-/// What is to be said of [`placeholder_inertia`].
+/// The remark on [`placeholder_inertia`].
 const PLACEHOLDER: &str = "the inertia is a placeholder: recordings at rest do not show it";
 
 /// The inertia of a ball of 0.1 m, kg m2.

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-/// Columns that a list may have beside `set.TARGET` and `path.TARGET`.
+/// Columns that a list may have in addition to `set.TARGET` and `path.TARGET`.
 const COLUMNS: [&str; 5] = ["robot", "folder", "model", "plant", "campaign"];
 
 /// Reads a list; `variable` takes the folder. Fails with every fault of its columns and rows.

@@ -118,7 +118,7 @@ pub fn sockets(
     })
 }
 
-/// What is said of the ball's distance from the axis of the last joint, of so many.
+/// The remark on the ball's distance from the axis of the last joint, of so many.
 fn advice(proposal: &ContactProposal, joints: usize) -> Option<String> {
     let offsets = &proposal.offsets;
     let now = offsets.first().filter(|now| now.known < now.directions)?;

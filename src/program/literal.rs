@@ -317,7 +317,7 @@ pub(super) struct Words {
     pub(crate) no_base: &'static str,
 }
 
-/// Gives literals their frames, tools and payloads, by what is in force wherever they are reached, and says which they are.
+/// Gives literals their frames, tools and payloads, as they are in force where the literals are reached, and reports them.
 pub(super) fn settle(found: &mut Gathered, reached: &Reached, words: &Words) {
     let uses = reached.uses(&found.literals, &found.names);
     let mut reported = BTreeSet::new();

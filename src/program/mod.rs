@@ -58,7 +58,7 @@ struct Grammar {
     heads: &'static [&'static str],
     /// What stands at the begin of a file that declares positions, in capitals.
     begins: &'static [&'static str],
-    /// Reads a file by what the others declare.
+    /// Reads a file with the declarations of the others.
     read: fn(&[u8], &[Companion]) -> Gathered,
     /// Reads the joint positions that a file declares, and counts its poses.
     listed: fn(&[u8]) -> Gathered,

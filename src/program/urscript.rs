@@ -185,7 +185,7 @@ impl Reader {
         reader
     }
 
-    /// As those of the other languages, but that the first fault of a line is told alone.
+    /// As those of the other languages, but that only the first fault of a line is reported.
     fn brackets_match(&mut self, line: &[Token]) -> bool {
         let mut open: Vec<(u8, u8, usize)> = Vec::new();
         let fault = line.iter().find_map(|token| {

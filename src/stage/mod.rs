@@ -201,7 +201,7 @@ pub trait Stage:
     fn run(&self, reads: Self::Reads, context: &Context) -> Result<Self::Writes>;
 }
 
-/// The sets that are fitted where nothing else is said.
+/// The sets that are fitted by default.
 fn fit_set() -> Vec<String> {
     vec!["fit".into()]
 }

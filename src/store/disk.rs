@@ -364,7 +364,7 @@ pub(super) fn ends_in(path: &Path, extension: &str) -> bool {
     path.extension().is_some_and(|end| end == extension)
 }
 
-/// A file that one living process has locked, and that goes with it; the kernel frees the lock when the process dies. Two that do the same
+/// A file that one living process has locked, and that is removed with it; the kernel frees the lock when the process dies. Two that do the same
 /// share the work by it, and no result depends on it.
 #[derive(Debug)]
 pub(crate) struct Claim {

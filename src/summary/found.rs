@@ -205,7 +205,7 @@ fn instead(found: &Found, nearest: Option<&str>) -> Option<String> {
     Some(format!("or: {}", others.join(", ")))
 }
 
-/// The number that is shown of all, by what [`PHRASES`] says.
+/// The number that is shown of all, as [`PHRASES`] states.
 fn number(shown: &str, all: &[FoundNumber]) -> Option<String> {
     let written = |one: &FoundNumber| {
         let per = if one.name.ends_with("per_kelvin") {

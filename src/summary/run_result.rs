@@ -304,7 +304,7 @@ fn error(label: &str, row: &StatisticsRow, least: f64) -> String {
     text + &without.unwrap_or_default()
 }
 
-/// What is left where no stage asked why.
+/// The residual where no stage diagnosed it.
 fn verdict(row: &StatisticsRow) -> String {
     let left = length(row.rms_mm);
     match row.is_inferred() {

@@ -43,7 +43,7 @@ const ACROSS: f64 = 2.5;
 /// The state of a tracker from point to point: its randomness, and where it has wandered to in standard deviations.
 pub struct Beam {
     noise: Noise,
-    astray: Option<Vector>,
+    wander: Option<Vector>,
 }
 
 impl Beam {
@@ -51,7 +51,7 @@ impl Beam {
     pub fn new(seed: u64) -> Self {
         Self {
             noise: Noise::new(seed, Purpose::Tracker),
-            astray: None,
+            wander: None,
         }
     }
 }
@@ -118,7 +118,7 @@ impl Tracker {
     /// What the tracker says where `point` (m, tracker frame) is.
     pub fn measure(&self, point: Vector, beam: &mut Beam) -> Vector {
         let sigma = self.sigma(point);
-        let Beam { noise, astray } = beam;
+        let Beam { noise, wander } = beam;
         match self.scatter {
             Scatter::Gaussian => point.map(|coordinate| coordinate + sigma * noise.normal()),
             Scatter::Student => point.map(|coordinate| {
@@ -137,10 +137,10 @@ impl Tracker {
             Scatter::Wandering => {
                 let fresh = [(); 3].map(|()| noise.normal());
                 let part = (1.0 - WANDERING * WANDERING).sqrt();
-                let now = astray.map_or(fresh, |last| {
+                let now = wander.map_or(fresh, |last| {
                     std::array::from_fn(|k| WANDERING * last[k] + part * fresh[k])
                 });
-                *astray = Some(now);
+                *wander = Some(now);
                 std::array::from_fn(|k| point[k] + sigma * now[k])
             }
             Scatter::Directional => {

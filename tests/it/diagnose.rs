@@ -109,7 +109,7 @@ fn calib(words: &str, folder: &Path) -> String {
     answer::calib(folder, words).ok()
 }
 
-/// What is printed on stderr by what is refused as a misuse.
+/// The error output of a command that is refused as a misuse.
 #[track_caller]
 fn refused(words: &str, folder: &Path) -> String {
     answer::calib(folder, words).code(2).err

@@ -107,7 +107,7 @@ fn identify(
     fit_all(&model(&robot, base, effects), data, rows)
 }
 
-/// Everything that is estimated beside the geometry.
+/// Everything that is estimated in addition to the geometry.
 const BEYOND: [&str; 3] = ["reduction_ratio", "coupling_ratio", "joint_compliance"];
 
 fn rms_of(model: &Model, data: &Measurements, is: impl Fn(usize) -> bool) -> f64 {

@@ -38,7 +38,7 @@ criteria! {
     SHOWN: f64 = 9.0, "squared standard errors", "literature: three sigma", "";
     /// A coefficient is hardly ever smaller than this share of the largest that is not of the family: the arm's own lines bend
     /// a little.
-    BESIDE: f64 = 0.2, "share", "judgement: lines of an arm", "";
+    LEAST_SHARE: f64 = 0.2, "share", "judgement: lines of an arm", "";
     /// The autocorrelation is estimated at most so often: what it makes of slow causes changes what it is estimated from.
     ESTIMATES: usize = 3, "estimates", "judgement: bounds time", "";
     /// A repeatability that changes by less than this share is settled.

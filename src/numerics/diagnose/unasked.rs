@@ -22,7 +22,7 @@ pub(crate) fn not_asked(question: &Question) -> Diagnosis {
     }
 }
 
-/// What is said of the nominal robot, fitted by its base: no findings, and nothing after. Rows are screened by `set`, if given.
+/// The diagnosis of the nominal robot, fitted by its base: no findings, and nothing after. Rows are screened by `set`, if given.
 pub(super) fn unasked(
     question: &Question,
     verdict: VerdictKind,

@@ -23,7 +23,7 @@ const COUNTED: usize = 80;
 const GRID: f64 = 25.0;
 /// A parameter whose variance others raise by more than this is hardly separable from them.
 const INFLATED: f64 = 1e4;
-/// rad: a joint that moves less shows neither its gravity nor an offset beside it.
+/// rad: a joint that moves less shows neither its gravity nor an offset.
 const SMALL_RANGE: f64 = 0.2;
 
 /// What a motion may be and is for.
@@ -361,7 +361,7 @@ impl MotionInformation {
     }
 }
 
-// Fourier series of joints that begin and end at rest, brought to the limits of each joint.
+// Fourier series of joints that begin and end at rest, scaled to the limits of each joint.
 
 /// s in which the arm starts and stops.
 const RAMP: f64 = 1.0;
@@ -461,7 +461,7 @@ impl SeriesBasis {
     }
 }
 
-/// The series of numbers from -1 to 1 (of each joint a place in its range, then coefficients), each joint brought to the limit that it
+/// The series of numbers from -1 to 1 (of each joint a place in its range, then coefficients), each joint scaled to the limit that it
 /// meets first on the rows of a clock.
 fn scaled(basis: &SeriesBasis, x: &[f64], request: &ExciteRequest) -> JointSeries {
     let width = 1 + basis.terms;

@@ -72,7 +72,7 @@ impl TorqueRecording {
         ]
     }
 
-    /// Does something with each column of numbers and the same of another, told how many of them a row has.
+    /// Does something with each column of numbers and the same of another; the number of values per row is passed on.
     pub(super) fn each(
         &mut self,
         other: &Self,

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 /// A function of one variable, or a few.
-#[expect(missing_docs, reason = "a field is said with its function")]
+#[expect(missing_docs, reason = "a field is documented with its function")]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Basis {

@@ -396,7 +396,7 @@ pub struct Term {
     law: Law,
 }
 
-/// What a table of parameters keeps of a term beside its cause's name.
+/// What a table of parameters keeps of a term in addition to its cause's name.
 #[derive(Serialize, Deserialize)]
 struct Stored {
     motion: Motion,

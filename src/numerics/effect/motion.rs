@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// Joints and links count from 0.
-#[expect(missing_docs, reason = "a field is said with its motion")]
+#[expect(missing_docs, reason = "a field is documented with its motion")]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Motion {

@@ -150,7 +150,7 @@ pub struct FittedForms<'a> {
 /// What a finding is in the fitted model, where that says more than its own numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelledFinding {
-    /// What a mechanic is told, without its size at the tool.
+    /// The sentence for a mechanic, without the size at the tool.
     pub sentence: String,
     /// The cause, at its place, that does the same in these data.
     pub same: (&'static str, Place),

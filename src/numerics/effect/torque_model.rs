@@ -305,7 +305,7 @@ fn load(joint: usize, mass: f64, moment: Option<Vector3<f64>>, out: &mut Deflect
 pub(crate) struct WrongPayload {
     /// Whether the centre is wrong too.
     centre: bool,
-    /// Whether it is a mass at the tool that every row carries, beside the declared payload.
+    /// Whether it is a mass at the tool that every row carries, in addition to the declared payload.
     #[serde(default)]
     tool: bool,
 }

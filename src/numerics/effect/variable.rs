@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A scalar of a row; joints count from 0 here and from 1 in words.
-#[expect(missing_docs, reason = "a field is said with its variable")]
+#[expect(missing_docs, reason = "a field is documented with its variable")]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Variable {

@@ -7,7 +7,7 @@ use std::fmt;
 use std::sync::Arc;
 
 /// A state that follows the rows.
-#[expect(missing_docs, reason = "a field is said with its state")]
+#[expect(missing_docs, reason = "a field is documented with its state")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Memory {
     /// Side to which pre-sliding friction has brought a joint: it fades in over a travel (rad or m) after each reversal, -1 to 1 (Dahl).

@@ -53,7 +53,7 @@ pub(super) struct SystemState {
     pub(crate) force: InForce,
     point: Option<String>,
     /// Why the robot does not carry the tool in `$BASE`.
-    astray: Setting<String>,
+    not_in_base: Setting<String>,
 }
 
 impl JoinedState for SystemState {
@@ -65,7 +65,7 @@ impl JoinedState for SystemState {
         Self {
             force: self.force.joined(&other.force),
             point,
-            astray: self.astray.joined(&other.astray),
+            not_in_base: self.not_in_base.joined(&other.not_in_base),
         }
     }
 }
@@ -75,12 +75,12 @@ impl SystemState {
     pub(crate) const START: Self = Self {
         force: InForce::NOTHING,
         point: None,
-        astray: Setting::Unset,
+        not_in_base: Setting::Unset,
     };
 
     /// What is in force at a motion.
     pub(crate) fn at_motion(&self) -> InForce {
-        let base = match &self.astray {
+        let base = match &self.not_in_base {
             Setting::Unset => return self.force.clone(),
             Setting::Known(why, _) if why.is_empty() => return self.force.clone(),
             Setting::Known(why, _) => why.clone(),
@@ -246,13 +246,13 @@ impl SystemData {
                 let carried = value.get(1).is_some_and(|word| word.is_word(&["BASE"]));
                 let point = self.point_in(value, &["SIPO_MODE"]);
                 let carried = carried || point.is_some_and(|point| !point.fixed_tool);
-                state.astray =
+                state.not_in_base =
                     Setting::Known(if carried { String::new() } else { open(FIXED) }, by);
             }
             "$ROBROOT" => {
                 let zero = frame(value).is_some_and(|pose| pose == Pose::identity());
                 let why = open("is not known: the program moves the robot's base");
-                state.astray = Setting::Known(if zero { String::new() } else { why }, by);
+                state.not_in_base = Setting::Known(if zero { String::new() } else { why }, by);
             }
             "FDAT_ACT" => state.point = value.first().map(Token::upper).filter(|_| !of_part),
             _ => {}
@@ -323,7 +323,7 @@ impl SystemData {
             true => format!("{FIXED} ({by})"),
             false => String::new(),
         };
-        state.astray = Setting::Known(why, by.into());
+        state.not_in_base = Setting::Known(why, by.into());
     }
 
     fn use_tool(&self, number: i64, by: &str, state: &mut SystemState) {

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What is said of a file without rows.
+/// The fault of a file without rows.
 pub(super) const NO_ROW: &str = "has a header but no data row; allowed: at least one";
 
 /// Texts one behind the other.

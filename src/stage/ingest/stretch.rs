@@ -30,7 +30,7 @@ pub(super) struct Stretches {
 }
 
 /// Gaps that are told one by one.
-const TOLD: u64 = 5;
+const LISTED: u64 = 5;
 
 impl Stretches {
     /// Rows of another file follow: another stretch.
@@ -116,8 +116,8 @@ impl Stretches {
         let (line, gap) = self.gap.take()?;
         self.warned += 1;
         let more = match self.warned {
-            1..TOLD => "another stretch begins",
-            TOLD => "further gaps are not listed",
+            1..LISTED => "another stretch begins",
+            LISTED => "further gaps are not listed",
             _ => return None,
         };
         Some(format!("{label}:{line}: no rows for {gap:.3} s; {more}"))

@@ -232,7 +232,7 @@ impl<'a> MotionRows<'a> {
         Ok(reading::intake(name, open.lines(), counts, context))
     }
 
-    /// Every file has the same quantities: one of currents and torques, and the same beside.
+    /// Every file has the same quantities: one of currents and torques, and the same other ones.
     fn agree(&mut self, open: &OpenedFile, label: &str) -> Result<()> {
         let given = open.binding().slots();
         let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);

@@ -156,7 +156,7 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
             let counting = document["counting"].as_str();
             assert_eq!(counting, otherwise.then_some(printed.as_str()));
         }
-        // Joints are said of where they stand.
+        // Joints are stated where they are.
         let parameters = "diff HEAD/diagnose/parameters HEAD/diagnose/parameters";
         assert!(!calib(here, parameters).out.contains("counting"));
 

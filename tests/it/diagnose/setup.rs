@@ -89,7 +89,7 @@ struct Diagnosed {
 }
 
 impl Diagnosed {
-    /// The first thing that is wrong with the set-up, and nothing physical beside it.
+    /// The first thing that is wrong with the set-up, and no physical cause with it.
     #[track_caller]
     fn wrong(&self) -> &str {
         assert_eq!(self.verdict, "wrong_setup", "{}", self.statement);
@@ -98,7 +98,7 @@ impl Diagnosed {
         &self.findings[0].statement
     }
 
-    /// What is left (mm) without it, as it is said.
+    /// Residual (mm) without it, as stated.
     #[track_caller]
     fn left_mm(&self) -> f64 {
         let after = self.wrong().split("without it ").nth(1);

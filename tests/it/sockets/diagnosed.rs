@@ -22,7 +22,7 @@ fn cell(points: usize) -> Vec<Fixture> {
     sockets.into()
 }
 
-/// What is said of a recording: causes by place, the verdict, what the data cannot show, all that was warned of.
+/// The answer on a recording: causes by place, the verdict, what the data cannot show, all that was warned of.
 struct Diagnosed {
     named: Vec<String>,
     verdict: VerdictRow,

@@ -5,7 +5,7 @@
 //! logarithm of the evidence is half the sum over eigenvalues p of P of b^2 / (p + 1/s^2) - ln(1 + s^2 p).
 
 use super::fit_state::{EstimatedCause, FitState, Fitter};
-use crate::criteria::noise::{AGAINST, BESIDE, FITS, SHOWN};
+use crate::criteria::noise::{AGAINST, FITS, LEAST_SHARE, SHOWN};
 use crate::estimate::{Covariance, Model, ParameterStatus, Prior};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -51,7 +51,7 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
             .map(|k| state.model.x[k].abs());
         let most = others.fold(0.0, f64::max);
         let size = match most > 0.0 {
-            true => size.clamp(*BESIDE * most, most),
+            true => size.clamp(*LEAST_SHARE * most, most),
             false => size,
         };
         any = true;

@@ -15,12 +15,12 @@ use crate::effect::Survey;
 use crate::estimate::Model;
 use stretches::{bounded_autocorrelation_time, thinned};
 
-/// What is left of the rows that a search looks at, and what moves it.
+/// Residuals of the rows that a search looks at, and their derivatives.
 pub(crate) struct RoundView<'a> {
     pub(crate) now: &'a FitState,
     pub(crate) fitter: &'a Fitter<'a>,
     pub(crate) problem: WhitenedProblem<'a>,
-    /// How many rows of what is left count as one.
+    /// How many rows of correlated residuals count as one.
     pub(crate) autocorrelation_time: f64,
     torque: Vec<f64>,
     /// How far each joint yields, rad/Nm.

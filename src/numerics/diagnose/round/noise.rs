@@ -84,7 +84,7 @@ pub(super) struct PredictedRows<'a> {
 }
 
 impl PredictedRows<'_> {
-    /// What is left of rows beside points, of which kind each.
+    /// Residuals of rows that are no points, and the kind of each.
     fn beside_points(self, rows: &[usize]) -> Vec<(&'static str, Sample)> {
         let Self {
             model,
@@ -122,7 +122,7 @@ impl PredictedRows<'_> {
         Matrix3::from_diagonal(&self.data.points.sigma[row].map(|s| s * s))
     }
 
-    /// The joints' repeatability (rad) by what a fit leaves of `rows` that holds no structure any more.
+    /// The joints' repeatability (rad) from the residuals of `rows` after a fit that leaves no structure.
     pub(super) fn repeatability(self, fitted: &Fitted, rows: &[usize]) -> f64 {
         let data = self.data;
         let predicted = self.model.predict(data);
@@ -276,7 +276,7 @@ impl RepeatPairs {
         self.pairs.iter().filter_map(one).collect()
     }
 
-    /// The joints' repeatability by what the pairs differ beyond the motion that the model knows between them.
+    /// The joints' repeatability from the differences within pairs beyond the motion that the model knows between them.
     pub(crate) fn repeatability(&self, rows: PredictedRows) -> JointRepeatability {
         let repeats = self.pairs.len();
         let sigma = match repeats < *FEW {

@@ -17,7 +17,7 @@ use crate::criteria::setup::FEWEST;
 use compare::AsStated;
 
 /// Rows to fit and to validate with whole points: nothing else says where the arm is without its geometry. None where they are too few, or
-/// stand beside an outside simulation.
+/// were recorded together with an outside simulation.
 fn whole_points(question: &Question) -> Option<[Vec<usize>; 2]> {
     let whole = [question.fit, question.validate].map(|rows| {
         let rows = rows.iter().copied();

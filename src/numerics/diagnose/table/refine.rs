@@ -9,7 +9,7 @@ use crate::effect::{Basis, Form, Term, Variable};
 use rayon::prelude::*;
 
 /// ln of the evidence of a shape, and its amplitude.
-type Worth = (f64, f64);
+type ShapeEvidence = (f64, f64);
 
 /// A shape with other numbers, and its forms.
 type Variant<T> = (T, Vec<Form>);
@@ -101,7 +101,7 @@ impl CauseTable<'_, '_> {
                 .flatten()
         };
         let start = self.component_evidence(&best, state)?;
-        let found_as = |forms, (log, amplitude): Worth| Refined {
+        let found_as = |forms, (log, amplitude): ShapeEvidence| Refined {
             forms,
             shape: None,
             log,
@@ -128,8 +128,8 @@ impl CauseTable<'_, '_> {
                         .filter(|(_, forms)| !state.has_any(forms))
                         .collect::<Vec<_>>()
                 };
-                let (free, worth) = climb(*free, start, &near, &value, &|_, _| 0.0)?;
-                Some(found_as(forms_of(&free)?, worth))
+                let (free, evidence) = climb(*free, start, &near, &value, &|_, _| 0.0)?;
+                Some(found_as(forms_of(&free)?, evidence))
             }
             (Shapes::Listed(_), [form]) if !form.cause().is_nameless() => {
                 let near = |form: &Form, level| {
@@ -145,8 +145,8 @@ impl CauseTable<'_, '_> {
                         0.0
                     }
                 };
-                let (form, worth) = climb(form.clone(), start, &near, &value, &price)?;
-                Some(found_as(vec![form], worth))
+                let (form, evidence) = climb(form.clone(), start, &near, &value, &price)?;
+                Some(found_as(vec![form], evidence))
             }
             _ => None,
         }
@@ -193,31 +193,31 @@ fn forms_of(group: &ShapeGroup, shape: usize) -> Option<Vec<Form>> {
 /// if that is the first. `price` is what a step costs.
 fn climb<T: Clone>(
     first: T,
-    start: Worth,
+    start: ShapeEvidence,
     near: &dyn Fn(&T, i32) -> Vec<Variant<T>>,
-    value: &dyn Fn(&[Form]) -> Option<Worth>,
+    value: &dyn Fn(&[Form]) -> Option<ShapeEvidence>,
     price: &dyn Fn(&T, &T) -> f64,
-) -> Option<(T, Worth)> {
-    let (mut now, mut worth, mut moved) = (first, start, false);
+) -> Option<(T, ShapeEvidence)> {
+    let (mut now, mut evidence, mut moved) = (first, start, false);
     for level in 0..*LEVELS {
         loop {
             let tried = near(&now, level).into_iter();
             let tried = tried.filter_map(|(other, forms)| Some((value(&forms)?, other)));
-            let paid = |((log, _), other): &(Worth, T)| log - price(&now, other);
+            let paid = |((log, _), other): &(ShapeEvidence, T)| log - price(&now, other);
             let Some(next) = tried.max_by(|a, b| paid(a).total_cmp(&paid(b))) else {
                 break;
             };
-            if paid(&next) <= worth.0 + 1e-6 {
+            if paid(&next) <= evidence.0 + 1e-6 {
                 break;
             }
-            let gained = next.0.0 - worth.0;
-            (worth, now, moved) = (next.0, next.1, true);
+            let gained = next.0.0 - evidence.0;
+            (evidence, now, moved) = (next.0, next.1, true);
             if gained < 0.05 {
                 break;
             }
         }
     }
-    moved.then_some((now, worth))
+    moved.then_some((now, evidence))
 }
 
 /// Whether a form is a wave of whole periods a turn.

@@ -1,5 +1,5 @@
 //! The verdict: what the last round's causes are called, how probable that is, what is explained by them, before and after on held-out rows,
-//! and what is left.
+//! and the residual.
 
 use crate::closed_form::FormulaSearch;
 use crate::criteria::judge::FOLDS;
@@ -29,7 +29,7 @@ pub use not_observable::other_means;
 pub(crate) fn conclude(last: LastRound, before: &[Option<f64>]) -> Diagnosis {
     let fitter = last.view.fitter;
     let (data, state) = (&fitter.data, &last.state);
-    // What is predicted outside of the fitted rows is what everyone is told, and what programs are corrected with.
+    // What is predicted outside of the fitted rows is what is reported, and what programs are corrected with.
     let model = state.model.held_within(data, &state.screening.kept);
     let misfit = Misfit::of(
         fitter.question,
@@ -61,7 +61,7 @@ pub(crate) fn conclude(last: LastRound, before: &[Option<f64>]) -> Diagnosis {
         VerdictKind::NothingMissing if above_stated || fitter.correlated.is_some() => {
             VerdictKind::Unexplained
         }
-        // A noise that is taken from what is left cannot explain what is left.
+        // A noise that is estimated from the residual cannot explain the residual.
         VerdictKind::Explained if above_stated && basis == NoiseBasis::Inferred => {
             VerdictKind::Unexplained
         }
@@ -91,7 +91,7 @@ pub(crate) fn conclude(last: LastRound, before: &[Option<f64>]) -> Diagnosis {
     }
     .formulas(&findings);
     let LastRound { state, answer, .. } = last;
-    // The folds' errors are told as lengths.
+    // The folds' errors are reported as lengths.
     let lengths = misfit.dimension == Dimension::Length;
     let folds = lengths
         .then(|| cross_validate(&state.session(fitter), *FOLDS, fitter.question.seed))
@@ -206,7 +206,7 @@ fn verdict(
     }
 }
 
-/// What is left looks like, where it is not noise, and what else speaks for it.
+/// The pattern of the residual, where it is not noise, and what else supports it.
 fn signature(last: &LastRound, something_left: bool, remarks: [Option<&str>; 2]) -> Option<String> {
     let next = last.answer.next.as_deref().filter(|_| something_left);
     let parts: Vec<&str> = next

@@ -92,11 +92,11 @@ pub(crate) struct Ground {
     pub(crate) noise: f64,
     /// What the instrument explains of it; none where neither it nor standard deviations were stated.
     pub(crate) instrument: Option<f64>,
-    /// What is left at fitted rows.
+    /// Residual of fitted rows.
     pub(crate) left: f64,
-    /// Whether what is left is no more than the noise gives.
+    /// Whether the residual is no larger than the noise.
     pub(crate) agrees: bool,
-    /// What is left of held-out points, where they are off by more than what was fitted and the noise allow.
+    /// Residual of held-out points, where they are off by more than what was fitted and the noise allow.
     pub(crate) not_carried: Option<f64>,
     /// Whether only causes without a name were found.
     pub(crate) nameless: bool,
@@ -104,7 +104,7 @@ pub(crate) struct Ground {
     pub(crate) partly_nameless: bool,
     /// Whether the arm moved while it was measured: no pose can be measured twice.
     pub(crate) in_motion: bool,
-    /// Whether nothing was read but joints with the target brought to places: what is stated is how well that closes.
+    /// Whether nothing was read but joints with the target in contact: what is stated is the closing error.
     pub(crate) contacts_only: bool,
 }
 
@@ -129,7 +129,7 @@ impl Ground {
         }
     }
 
-    /// What is left beside the noise, after all that was found.
+    /// Residual beyond the noise, after all findings.
     fn leftover_text(&self) -> String {
         match self.agrees {
             true => format!("the residual agrees with {}", self.noise_text()),
@@ -188,7 +188,7 @@ impl Ground {
         }
     }
 
-    /// Without a stated instrument the noise is but a weight: what is left is what scatters.
+    /// Without a stated instrument the noise is but a weight: the residual is the scatter.
     fn scatter(&self) -> f64 {
         if self.instrument.is_some() {
             self.noise

@@ -86,7 +86,7 @@ impl ShapeSpan {
     }
 }
 
-/// By what share a shape number is moved for a difference.
+/// Relative step of a shape number for a finite difference.
 pub(super) const SHARE: f64 = 0.03;
 
 /// The slope of a function of a shape number.

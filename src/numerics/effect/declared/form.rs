@@ -1,4 +1,4 @@
-//! A declared effect: as a cause beside those of the library, and as a form at a place with its shape numbers, which carries its declaration
+//! A declared effect: as a cause next to those of the library, and as a form at a place with its shape numbers, which carries its declaration
 //! wherever it is kept.
 
 use super::declaration::{EffectDeclaration, ShapeRange};
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, PoisonError};
 
-/// A declared effect as a cause beside those of the library. Causes live as long as the program, as those of the library do: each declaration
+/// A declared effect as a cause next to those of the library. Causes live as long as the program, as those of the library do: each declaration
 /// is kept once, by its content.
 pub struct DeclaredCause {
     about: &'static Cause,
@@ -115,7 +115,7 @@ impl DeclaredCause {
     }
 }
 
-/// What a mechanic is told of a finding that a declared effect is.
+/// The sentence for a mechanic on a finding of a declared effect.
 fn sentence(summary: &Summary) -> String {
     let Some(cause) = summary
         .forms

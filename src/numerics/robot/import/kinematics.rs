@@ -132,7 +132,7 @@ pub(super) fn dh(
     let mut joints = Vec::new();
     for row in rows.items() {
         let row = row.map(&["kind", "theta", "d", "a", "alpha"]);
-        // What the joint itself moves is zero unless said otherwise; the rest has to be there.
+        // What the joint itself moves is zero unless the file states it; all other elements are required.
         let kind = row
             .opt("kind")
             .and_then(|kind| kind.choice(ROWS))

@@ -124,7 +124,7 @@ pub struct About {
 }
 
 impl About {
-    /// What `ingest` must be told of the controller's counting, as settings of `q`; none where it counts as the robot file does.
+    /// What the settings of `ingest` must state of the controller's counting, as settings of `q`; none where it counts as the robot file does.
     pub fn counting(&self) -> Option<String> {
         let one = |c: &CountedCoupling| {
             format!(
