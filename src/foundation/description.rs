@@ -1,5 +1,8 @@
 //! The robot as plain data, in SI and at its zero pose in the base frame: the one thing that estimator and twin share.
 
+use crate::units::Unit;
+use std::collections::BTreeMap;
+
 /// What a joint does along its axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JointKind {
@@ -70,6 +73,38 @@ pub struct DeclaredInertias {
     pub tolerance: Option<MassTolerance>,
 }
 
+/// What of an arm is made with a tolerance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Made {
+    /// The length and offset of a link, m.
+    Length,
+    /// The tilt of an axis, rad.
+    Axis,
+    /// The zero of a joint, rad (of one that slides: m).
+    Zero,
+    /// Each coordinate of the tool point, m.
+    Tool,
+    /// A reduction ratio, as a share of it.
+    Ratio,
+    /// The ratio of a coupling.
+    Coupling,
+    /// The compliance of a joint, rad/Nm.
+    Compliance,
+}
+
+impl Made {
+    /// All with the names of robot files and the units in which tables hold them.
+    pub const ALL: [(Self, &'static str, Unit); 7] = [
+        (Self::Length, "length", Unit::Millimetre),
+        (Self::Axis, "axis", Unit::Radian),
+        (Self::Zero, "zero", Unit::Radian),
+        (Self::Tool, "tool", Unit::Millimetre),
+        (Self::Ratio, "ratio", Unit::One),
+        (Self::Coupling, "coupling", Unit::One),
+        (Self::Compliance, "compliance", Unit::RadianPerNewtonMetre),
+    ];
+}
+
 /// A serial robot: joints from the base to the tool.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotDescription {
@@ -91,4 +126,6 @@ pub struct RobotDescription {
     pub gravity: [f64; 3],
     /// Inertias of the bodies, as far as they are declared.
     pub inertias: DeclaredInertias,
+    /// How far from nominal it is made where the file says so, one standard deviation, SI.
+    pub tolerances: BTreeMap<Made, f64>,
 }

@@ -22,9 +22,7 @@ pub(super) fn section(locale: &Locale, parameters: &Parameters, counting: Option
             "rows": rows.iter().map(|parameter| row(locale, parameter, rows)).collect::<Vec<_>>(),
         })
     });
-    let remarked = sorted
-        .iter()
-        .filter(|p| p.remark.is_some() || p.status == "redundant" || p.status == "unseen");
+    let remarked = sorted.iter().filter(|p| p.remark.is_some());
     let counting = counting.map(|difference| {
         say!(locale, "Zeros, ratios and couplings of joints stand in the robot file's counting; the controller counts otherwise ({difference}), and “calib export --format controller” writes them as it does.", difference)
     });
@@ -37,11 +35,19 @@ pub(super) fn section(locale: &Locale, parameters: &Parameters, counting: Option
             .map(|p| json!({
                 "name": p.name,
                 "place": p.place,
-                "status": p.status,
+                "status": known(p),
                 "remark": p.remark.clone().unwrap_or_default(),
             }))
             .collect::<Vec<_>>(),
     })
+}
+
+/// How much the data tell of a parameter that was estimated, else what the step did with it.
+fn known(p: &ParameterRow) -> &str {
+    match &p.determined {
+        Some(known) if p.status == "free" => known,
+        _ => &p.status,
+    }
 }
 
 /// Order of a name by its numbers (`j2` before `j10`), shifts before turns (`z` before `rx`).
@@ -102,7 +108,7 @@ fn row(locale: &Locale, p: &ParameterRow, group: &[&ParameterRow]) -> Value {
         "sigma": p.sigma.map(sigma).unwrap_or_default(),
         // Unit of change and sigma.
         "fine_unit": fine_unit,
-        "status": p.status,
+        "status": known(p),
         "step": p.step,
         "stored": if p.unit == "1" { stored } else { format!("{stored} {}", p.unit) },
     })

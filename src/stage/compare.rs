@@ -168,7 +168,7 @@ impl Compare {
         for (k, spec) in specs.filter(|(k, _)| !base.contains(k)) {
             let prior = Prior {
                 mean: model.x[k],
-                sigma: spec.prior_sigma,
+                sigma: spec.tolerance,
             };
             model.known.entry(k).or_default().prior = Some(prior);
         }

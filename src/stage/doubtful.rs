@@ -6,7 +6,7 @@
 use crate::compensate::{IdentifiedArm, Scatter, Uncertainty, doubts};
 use crate::error::{counted, first_of};
 use crate::estimate::{
-    Covariance, Fitted, Model, ParameterStatus, Remedy, Screening, Session, Suspect, SuspectKind,
+    Covariance, Fitted, Model, Remedy, Screening, Session, Suspect, SuspectKind,
     fit_screened, remedies,
 };
 use crate::robot::Measurements;
@@ -118,22 +118,18 @@ fn plain(mm: f64) -> String {
     format!("{mm:.*}", digits as usize)
 }
 
-/// Sentences for the remarks of redundant and unseen parameters, by name; the measurements that would show most are noted.
+/// Sentences for the remarks of parameters that the data do not determine, by name; the measurements that would determine most are noted.
 pub(crate) fn advice(context: &Context, session: &Session) -> BTreeMap<String, String> {
-    let Session { model, fitted, .. } = *session;
+    let model = session.model;
     let found = remedies(session);
     let last = model.robot.joints();
     let mut counts: BTreeMap<&Remedy, usize> = BTreeMap::new();
     let mut sentences = BTreeMap::new();
     for (k, remedy) in &found {
         *counts.entry(remedy).or_default() += 1;
-        let redundant = matches!(fitted.statuses[*k], ParameterStatus::Redundant(_));
         let sentence = match measure(remedy, last) {
-            Some(measure) => format!("{measure} would show it"),
-            None if redundant => {
-                "no measured point can: they move every point in the same way".into()
-            }
-            None => continue,
+            Some(measure) => format!("{measure} would determine it"),
+            None => "other parameters move every measured point in the same way".into(),
         };
         sentences.insert(model.stack.specs()[*k].name.clone(), sentence);
     }
@@ -144,7 +140,7 @@ pub(crate) fn advice(context: &Context, session: &Session) -> BTreeMap<String, S
         };
         if let Some(measure) = measure(remedy, last) {
             context.note(format!(
-                "{measure} would show {what} that these data do not"
+                "{measure} would determine {what} that these data do not"
             ));
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::effect::Load;
 use crate::error::{Result, counted, listed};
-use crate::estimate::{CONFLICT, Covariance, ParameterStatus, Session};
+use crate::estimate::{CONFLICT, Covariance, ParameterStatus, Session, beyond_tolerance};
 use crate::observation::noise;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::Context;
@@ -289,7 +289,7 @@ fn note(context: &Context, fitting: &Fitting) {
     let free = fitted.singular.len();
     let asked = fitted.singular_all.len();
     context.note(format!(
-        "{}, {free} of {} estimated, {} after {}",
+        "{}, {free} of {} determined, {} after {}",
         counted(rows.len(), "point"),
         counted(asked, "parameter"),
         fitted.stop.name(),
@@ -345,6 +345,21 @@ fn note(context: &Context, fitting: &Fitting) {
                 unit = spec.unit.symbol()
             ));
         }
+    }
+    let beyond = (0..model.x.len()).filter_map(|k| Some((k, beyond_tolerance(model, k)?)));
+    let beyond: Vec<String> = beyond
+        .map(|(k, times)| {
+            let spec = &model.stack.specs()[k];
+            let (value, unit) = (spec.unit.from_si(model.x[k]), spec.unit.symbol());
+            format!("{} {value:+.4} {unit} ({times:.0} times)", spec.name)
+        })
+        .collect();
+    if !beyond.is_empty() {
+        context.warn(format!(
+            "beyond what arms are made to, by more than four of their tolerances: {}; a wrong number in the robot file (tool, zero, length), a collision, \
+             or state `tolerances` there",
+            listed(&beyond)
+        ));
     }
     let specs = fitted.statuses.iter().zip(model.stack.specs());
     let stopped = specs.filter(|(status, _)| matches!(status, ParameterStatus::Bound(_)));

@@ -8,7 +8,8 @@ use crate::diagnose::{Question, wrong_setup};
 use crate::effect::{Effect, EffectContext, EffectStack, arm_effect, identified, names};
 use crate::error::{Error, Place, Result, instead, listed};
 use crate::estimate::{
-    Fitted, Model, ParameterStatus, Session, fit, gauge, known_places, placed_by_left_out,
+    Fitted, Model, ParameterStatus, Session, determined_directions, fit, gauge, known_places,
+    placed_by_left_out,
 };
 use crate::observation;
 use crate::robot::{Measurements, RobotModel};
@@ -238,12 +239,19 @@ fn geometric_rank(
         .iter()
         .filter(|name| **name != names::ANCHOR || anchored);
     let asked = needed.all(|name| has_effect(model, name));
-    use ParameterStatus::{Bound, Free};
-    let is_found = |k: &usize| matches!(fitted.statuses[*k], Free(_) | Bound(_));
     let geometry = GEOMETRY
         .iter()
         .flat_map(|name| model.stack.parameters_of(name));
-    let found = geometry.filter(is_found).count();
+    let geometry: Vec<usize> = geometry.collect();
+    let found = determined_directions(
+        &Session {
+            data,
+            rows,
+            model,
+            fitted,
+        },
+        &geometry,
+    );
     let held = model.stack.specs().len() != fitted.singular_all.len();
     // A prior makes its parameter known whatever the data see.
     let has_prior = model.known.values().any(|known| known.prior.is_some());

@@ -9,7 +9,9 @@ use crate::effect::{
     arm_effect, identified, names,
 };
 use crate::error::{Error, Result};
-use crate::estimate::{CONFLICT, Covariance, Fitted, Model, ParameterStatus, PriorCheck};
+use crate::estimate::{
+    CONFLICT, Covariance, Determined, Fitted, Model, ParameterStatus, PriorCheck, beyond_tolerance,
+};
 use crate::robot::{Anchor, MeasurementSetup, RobotModel, Shape, Target};
 use crate::spatial::Pose;
 use crate::units::Unit;
@@ -18,6 +20,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Pairs more correlated than this are worth a word: neither is known well alone.
 const CORRELATED: f64 = 0.9;
+/// The same of those of which one is not determined.
+const CONFOUNDED: f64 = 0.5;
 
 /// What parameters correct.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,45 +83,53 @@ impl Parameters {
                     continue;
                 }
                 let (nominal, value) = model.standing(k);
-                let names = |with: &[(usize, f64)]| {
-                    let list: Vec<&str> = with
-                        .iter()
-                        .take(4)
-                        .map(|(j, _)| specs[*j].name.as_str())
-                        .collect();
-                    if list.is_empty() {
-                        "several others".to_string()
-                    } else {
-                        list.join(", ")
-                    }
-                };
+                let determined = fitted.determined(model, k);
+                let tolerance = determined.map(|_| model.prior(k).sigma);
                 let (status, sigma, remark) = match &fitted.statuses[k] {
                     ParameterStatus::Free(sigma) => {
-                        let closest = fitted.covariance.as_ref().and_then(|covariance| covariance.closest(k));
-                        let pair = closest.filter(|(_, correlation)| correlation.abs() > CORRELATED);
-                        let pair = pair.map(|(other, c)| format!("moves with {} (correlation {c:+.2})", specs[other].name));
-                        let of_prior = fitted.prior_checks.get(&k).and_then(|check| against_prior(check, spec.unit));
-                        ("free", Some(spec.unit.from_si(*sigma)), joined([of_prior, pair]))
+                        let closest = fitted
+                            .covariance
+                            .as_ref()
+                            .and_then(|covariance| covariance.closest(k));
+                        let is_open = determined != Some(Determined::Determined);
+                        let least = if is_open { CONFOUNDED } else { CORRELATED };
+                        let pair = closest.filter(|(_, correlation)| correlation.abs() > least);
+                        let pair = pair.map(|(other, c)| {
+                            format!("moves with {} (correlation {c:+.2})", specs[other].name)
+                        });
+                        let of_prior = fitted
+                            .prior_checks
+                            .get(&k)
+                            .and_then(|check| against_prior(check, spec.unit));
+                        let beyond = beyond_tolerance(model, k)
+                            .map(|times| format!("{times:.1} times its tolerance"));
+                        (
+                            "free",
+                            Some(spec.unit.from_si(*sigma)),
+                            joined([of_prior, beyond, pair]),
+                        )
                     }
                     ParameterStatus::Bound(wanted) => {
-                        let end = if *wanted > model.x[k] { "upper" } else { "lower" };
+                        let end = if *wanted > model.x[k] {
+                            "upper"
+                        } else {
+                            "lower"
+                        };
                         let wanted = spec.unit.from_si(*wanted);
-                        ("bound", None, Some(format!("stopped by its {end} bound; the data would have it at {wanted:.4e}")))
+                        (
+                            "bound",
+                            None,
+                            Some(format!(
+                                "stopped by its {end} bound; the data would have it at {wanted:.4e}"
+                            )),
+                        )
                     }
-                    ParameterStatus::Kept if held.contains(&k) => {
-                        ("held", None, Some("held at nominal by the pipeline".to_string()))
-                    }
+                    ParameterStatus::Kept if held.contains(&k) => (
+                        "held",
+                        None,
+                        Some("held at nominal by the pipeline".to_string()),
+                    ),
                     ParameterStatus::Kept => ("held", None, None),
-                    ParameterStatus::Redundant(with) => (
-                        "redundant",
-                        None,
-                        Some(format!("the measured points cannot separate it from {}; kept at nominal", names(with))),
-                    ),
-                    ParameterStatus::Unseen => (
-                        "unseen",
-                        None,
-                        Some("no plausible value of it would move the measured points beyond their noise".to_string()),
-                    ),
                 };
                 let (nominal, value) = (spec.unit.from_si(nominal), spec.unit.from_si(value));
                 rows.push(ParameterRow {
@@ -130,6 +142,8 @@ impl Parameters {
                     change: value - nominal,
                     sigma: sigma.filter(|sigma| sigma.is_finite()),
                     status: status.into(),
+                    tolerance: tolerance.map(|tolerance| spec.unit.from_si(tolerance)),
+                    determined: determined.map(|known| known.name().into()),
                     step: step.into(),
                     remark,
                     form: form.clone(),

@@ -6,7 +6,7 @@
 
 use super::{JointConventionRow, JointConventions, Parameters, Robot, RobotRow, TorqueParameters};
 use crate::description::{
-    Coupling, DeclaredInertias, InertiaMoments, JointDescription, JointKind, MassTolerance,
+    Coupling, DeclaredInertias, InertiaMoments, JointDescription, JointKind, Made, MassTolerance,
     RobotDescription,
 };
 use crate::error::{Error, Result};
@@ -14,6 +14,7 @@ use crate::robot::{Bound, CountedCoupling, JointConvention};
 use crate::units::Unit;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// A cell of the column `couplings`; `by` counts from 1.
@@ -35,6 +36,16 @@ impl Robot {
             base.tolerance_mass = Some(tolerance.mass);
             base.tolerance_centre_mm = Some(Unit::Millimetre.from_si(tolerance.centre));
             base.tolerance_inertia = Some(tolerance.inertia);
+        }
+
+        if !robot.tolerances.is_empty() {
+            let cells = Made::ALL.iter().filter_map(|(made, name, unit)| {
+                let value = robot.tolerances.get(made)?;
+                Some((*name, unit.from_si(*value)))
+            });
+            let cells: BTreeMap<&str, f64> = cells.collect();
+            base.tolerances =
+                Some(serde_json::to_string(&cells).expect("numbers and names serialise"));
         }
 
         let mut tool = empty(robot.joints.len() + 1, "tool", "tool");
@@ -109,6 +120,7 @@ impl Robot {
             )?,
             gravity: down.map(|x| x * size),
             inertias: inertias(base, joints, tool),
+            tolerances: tolerances(base)?,
         })
     }
 }
@@ -240,6 +252,30 @@ fn inertias(base: &RobotRow, joints: &[RobotRow], tool: &RobotRow) -> DeclaredIn
         payload: moments(tool),
         tolerance: tolerance(),
     }
+}
+
+/// How far from nominal the arm is made, where its file says so, SI.
+fn tolerances(base: &RobotRow) -> Result<BTreeMap<Made, f64>> {
+    let Some(text) = &base.tolerances else {
+        return Ok(BTreeMap::new());
+    };
+    let cells: BTreeMap<String, f64> =
+        serde_json::from_str(text).map_err(|e| fault(base, &format!("tolerances: {e}")))?;
+    let one = |(name, value): (String, f64)| {
+        let mut all = Made::ALL.iter();
+        match all.find(|(_, known, _)| *known == name) {
+            Some((made, _, unit)) if value > 0.0 => Ok((*made, unit.to_si(value))),
+            Some(_) => Err(fault(
+                base,
+                &format!("tolerances: {name} is {value}; expected above 0"),
+            )),
+            None => Err(fault(
+                base,
+                &format!("tolerances: `{name}` is none of an arm"),
+            )),
+        }
+    };
+    cells.into_iter().map(one).collect()
 }
 
 fn couplings_of(moved: usize, row: &RobotRow, joints: usize) -> Result<Vec<Coupling>> {

@@ -114,6 +114,7 @@ impl Case {
             payload_centre: vector(&robot["tool"]),
             gravity: [0.0, 0.0, -9.81],
             inertias: Default::default(),
+            tolerances: Default::default(),
         };
         let position: Vec<Vector3<f64>> = numbers(&value["position"])
             .chunks(3)

@@ -46,6 +46,7 @@ fn robot(name: &str, chain: Chain, tool_mm: [f64; 3], masses: &[f64]) -> RobotDe
         payload_centre: metres([tool_mm[0] + 50.0, tool_mm[1], tool_mm[2] + 30.0]),
         gravity: [0.0, 0.0, -9.81],
         inertias: Default::default(),
+        tolerances: Default::default(),
     }
 }
 

@@ -47,6 +47,7 @@ fn lever() -> RobotDescription {
         payload_centre: [2.0, 0.0, 0.0],
         gravity: [0.0, 0.0, -10.0],
         inertias: Default::default(),
+        tolerances: Default::default(),
     }
 }
 

@@ -104,7 +104,7 @@ impl<'a> Attempt<'a> {
         let before = now
             .model
             .error_sizes(&fitter.data, fitter.scale.dimension());
-        tell(words::base_text(&now, &fitter));
+        tell(words::base_text(&now));
         let mut rounds = Rounds::default();
         loop {
             let view = RoundView::of(&now, &fitter);
@@ -120,7 +120,6 @@ impl<'a> Attempt<'a> {
             let next = fitter.fit(&now.model, round.causes);
             let Some(mut answer) = round.answer else {
                 now = next;
-                fitter.follow(&now);
                 continue;
             };
             // A residual that lasts from row to row of standing points is noise where no further cause would explain it, or where a cause
@@ -134,7 +133,7 @@ impl<'a> Attempt<'a> {
             {
                 let kept = fitter.take_correlation(&change, &next);
                 tell(words::correlation_text(&fitter));
-                now = fitter.refit(&next.model, kept);
+                now = fitter.fit(&next.model, kept);
                 rounds.again();
                 continue;
             }
@@ -142,7 +141,7 @@ impl<'a> Attempt<'a> {
             let quiet = settled || answer.found.is_empty();
             if let Some(sigma) = quiet.then(|| fitter.noise_left_by(&next)).flatten() {
                 fitter.learn(sigma);
-                now = fitter.refit(&next.model, next.causes);
+                now = fitter.fit(&next.model, next.causes);
                 rounds.again();
                 continue;
             }
@@ -153,7 +152,6 @@ impl<'a> Attempt<'a> {
             }
             if rounds.exchange() {
                 now = next;
-                fitter.follow(&now);
                 continue;
             }
             tell(words::conclusions_text(&next));
@@ -213,11 +211,11 @@ pub fn cell_evidence(question: &Question, given: &[GivenCell]) -> Result<Vec<Cel
     for _ in 0..if given.is_empty() { 0 } else { 2 } {
         let view = RoundView::of(&now, &fitter);
         let causes = given_causes(&view, given);
-        now = fitter.refit(&now.model, causes);
+        now = fitter.fit(&now.model, causes);
     }
     if let Some(sigma) = fitter.noise_left_by(&now) {
         fitter.learn(sigma);
-        now = fitter.refit(&now.model, now.causes);
+        now = fitter.fit(&now.model, now.causes);
     }
     Ok(answers(&RoundView::of(&now, &fitter), given))
 }

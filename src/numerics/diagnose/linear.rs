@@ -19,15 +19,28 @@ pub(crate) fn scale(column: &mut [f64]) -> f64 {
     length
 }
 
-/// An orthonormal basis of the columns of `matrix`, which are scaled to unit length first.
-pub(crate) fn orthonormal(matrix: &Mat<f64>) -> Mat<f64> {
-    let norm = |j: usize| matrix.col(j).norm_l2().max(1e-300);
-    let scale: Vec<f64> = (0..matrix.ncols()).map(norm).collect();
+/// An orthonormal basis of what the columns of `matrix` can do that shows: of the directions that whitened rows know better than the
+/// parameters' standard deviations before any measurement, `sigmas`, do. Columns beyond these have any size.
+pub(crate) fn shown_directions(matrix: &Mat<f64>, sigmas: &[f64]) -> Mat<f64> {
+    let scale = |j: usize| match sigmas.get(j) {
+        Some(sigma) => *sigma,
+        None => ANY / matrix.col(j).norm_l2().max(1e-300),
+    };
+    let scale: Vec<f64> = (0..matrix.ncols()).map(scale).collect();
     let scaled = Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-        matrix[(i, j)] / scale[j]
+        matrix[(i, j)] * scale[j]
     });
-    scaled.qr().compute_thin_Q()
+    let factors = scaled.qr();
+    let Ok(svd) = factors.thin_R().svd() else {
+        return factors.compute_thin_Q();
+    };
+    let sizes = svd.S().column_vector();
+    let shown = (0..sizes.nrows()).filter(|k| sizes[*k] > 1.0).count();
+    factors.compute_thin_Q() * svd.U().subcols(0, shown)
 }
+
+/// Length of a column of any size, in standard deviations.
+const ANY: f64 = 1e6;
 
 /// Removes from columns (one after another) what lies in the span of an orthonormal basis.
 pub(crate) fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {

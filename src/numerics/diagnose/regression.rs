@@ -3,7 +3,7 @@
 
 use crate::criteria::search::{IDLE, LEVELS};
 use crate::effect::{Form, Survey};
-use crate::linear::{dot, orthonormal, project, scale, subtract};
+use crate::linear::{dot, project, scale, subtract};
 use crate::whitened::WhitenedProblem;
 use faer::Mat;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -43,14 +43,13 @@ pub(super) struct Solution {
 }
 
 impl<'p, 'a> FormRegression<'p, 'a> {
-    /// `jacobian` is that of the model, which has `forms` besides; `residual` is what it leaves without these.
+    /// `base` is an orthonormal basis of what the model can do, which has `forms` besides; `residual` is what it leaves without these.
     pub(crate) fn new(
         problem: &'p WhitenedProblem<'a>,
-        jacobian: &Mat<f64>,
+        base: &Mat<f64>,
         forms: &[&Form],
         residual: &[f64],
     ) -> Self {
-        let base = orthonormal(jacobian);
         let mut residual = residual.to_vec();
         project(base.as_ref(), &mut residual);
         let mut basis: Vec<Vec<f64>> = (0..base.ncols())

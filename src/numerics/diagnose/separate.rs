@@ -53,11 +53,11 @@ pub fn discrimination_problem(
     }
     let mut nuisances = free.to_vec();
     nuisances.retain(|k| !forms.contains(k));
-    let jacobian = problem.jacobian(&nuisances);
+    let base = problem.basis(&nuisances);
     let open = problem.residual.iter().zip(&caused);
     let open: Vec<f64> = open.map(|(left, caused)| left + caused).collect();
     // As diagnosis names rivals: by what fits in place of the finding.
-    let reference = FormRegression::new(&problem, &jacobian, &[], &open);
+    let reference = FormRegression::new(&problem, &base, &[], &open);
     let others = rivals(&survey, &problem, model, (effect, place))?
         .into_iter()
         .filter(|form| finding != std::slice::from_ref(form));

@@ -1,6 +1,7 @@
 //! What yields in proportion to its load: joints, links, the base.
 
 use super::form::placed;
+use super::geometry::tolerance;
 use super::motion::{SHORT, extent};
 use super::unweighed_windup::UnweighedWindup;
 use super::{
@@ -8,6 +9,7 @@ use super::{
     OwnMotion, ParameterSpec, Place, Placed, Summary, Survey, Variable, names,
 };
 use crate::criteria::effect::{RARE, STIFFNESS_BEYOND, UNLIKELY};
+use crate::description::Made;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -65,12 +67,12 @@ pub(crate) struct Windup {
 impl Placed for Windup {
     placed! { self: Place::Joint(self.joint), &JOINT, [Variable::Load { joint: self.joint }], self }
 
-    fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
-        let prior_sigma = match self.load {
-            Load::GravityTorque => 1e-3,
-            Load::MotorCurrent => 1e-2,
+    fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
+        let tolerance = match self.load {
+            Load::GravityTorque => tolerance(robot, Made::Compliance),
+            Load::MotorCurrent => 1e-3,
         };
-        vec![(String::new(), self.load.unit_of_compliance(), prior_sigma)]
+        vec![(String::new(), self.load.unit_of_compliance(), tolerance)]
     }
 
     fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {

@@ -260,7 +260,7 @@ impl Form {
         } else {
             format!("{}.{variant}", place.tag())
         };
-        let spec = |(number, unit, prior_sigma): NumberSpec| ParameterSpec {
+        let spec = |(number, unit, tolerance): NumberSpec| ParameterSpec {
             name: if number.is_empty() {
                 format!("{name}.{middle}")
             } else {
@@ -268,7 +268,7 @@ impl Form {
             },
             place,
             unit,
-            prior_sigma,
+            tolerance,
         };
         self.numbers(robot).into_iter().map(spec).collect()
     }

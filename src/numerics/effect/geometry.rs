@@ -3,10 +3,33 @@
 
 use super::motion::MOTION;
 use super::{ArmState, Deflection, Effect, ParameterSpec, Place, names};
+use crate::description::Made;
 use crate::robot::{Anchor, Measurements, RobotModel, Shape, Target};
 use crate::spatial::{Pose, Twist, screw};
 use crate::units::Unit;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
+
+/// m and rad: a target that the recording places.
+const PLACED: f64 = 0.05;
+/// m: a link's length and offset are off by this, or by so much of its length where that is more.
+const LENGTH: f64 = 0.5e-3;
+const LENGTH_BY_LENGTH: f64 = 0.3e-3;
+
+/// One standard deviation of how far from nominal a robot is made, SI: as its file says, else as arms of this kind are. Lengths by
+/// [`length_variances`].
+pub(super) fn tolerance(robot: &RobotModel, made: Made) -> f64 {
+    let usual = match made {
+        Made::Length => LENGTH,
+        Made::Axis => 0.5e-3,
+        Made::Zero | Made::Tool => 3e-3,
+        // A quotient of tooth counts is off by what the measurement of its turns is.
+        Made::Ratio => 1e-4,
+        Made::Coupling => 3e-4,
+        Made::Compliance => 1e-5,
+    };
+    let stated = robot.description().tolerances.get(&made);
+    stated.copied().unwrap_or(usual)
+}
 
 /// What the names of parameters of an effect begin with, of something that has a name or not.
 fn prefix(effect: &str, name: &str) -> String {
@@ -57,7 +80,7 @@ impl Effect for AnchorShift {
                     } else {
                         Unit::Millimetre
                     },
-                    prior_sigma: 1.0,
+                    tolerance: 1.0,
                 })
         });
         all.collect()
@@ -129,7 +152,7 @@ impl Effect for BasePlacement {
             name: format!("base_frame.{axis}"),
             place: Place::Base,
             unit,
-            prior_sigma: if unit == Unit::Radian { 1.0 } else { 10.0 },
+            tolerance: if unit == Unit::Radian { 1.0 } else { 10.0 },
         });
         axes.collect()
     }
@@ -176,6 +199,7 @@ impl Effect for ToolOffset {
                 .map(|target| (target.name.as_str(), width(target)))
                 .collect(),
         };
+        let stated = tolerance(robot, Made::Tool);
         let all = targets.into_iter().flat_map(|(name, width)| {
             MOTION[..width]
                 .iter()
@@ -183,7 +207,11 @@ impl Effect for ToolOffset {
                     name: format!("{}{axis}", Self::prefix(name)),
                     place: Place::Tool,
                     unit: *unit,
-                    prior_sigma: 0.05,
+                    // Where the recording places a target, nothing else says where it is.
+                    tolerance: match name.is_empty() && *unit == Unit::Millimetre {
+                        true => stated,
+                        false => PLACED,
+                    },
                 })
         });
         all.collect()
@@ -219,14 +247,14 @@ impl Effect for ToolOffset {
 fn of_joints(
     effect: &str,
     robot: &RobotModel,
-    prior_sigma: f64,
+    tolerance: f64,
     unit: impl Fn(usize) -> Unit,
 ) -> Vec<ParameterSpec> {
     let spec = |joint: usize| ParameterSpec {
         name: format!("{effect}.j{}", joint + 1),
         place: Place::Joint(joint),
         unit: unit(joint),
-        prior_sigma,
+        tolerance,
     };
     (0..robot.joints()).map(spec).collect()
 }
@@ -240,7 +268,8 @@ impl Effect for JointOffset {
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        of_joints(names::JOINT_OFFSET, robot, 0.02, |joint| {
+        let zero = tolerance(robot, Made::Zero);
+        of_joints(names::JOINT_OFFSET, robot, zero, |joint| {
             if robot.is_revolute(joint) {
                 Unit::Radian
             } else {
@@ -272,7 +301,8 @@ impl Effect for ReductionRatio {
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        of_joints(names::REDUCTION_RATIO, robot, 0.01, |_| Unit::One)
+        let ratio = tolerance(robot, Made::Ratio);
+        of_joints(names::REDUCTION_RATIO, robot, ratio, |_| Unit::One)
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
@@ -307,11 +337,12 @@ impl Effect for DeclaredCouplings {
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
         let couplings = robot.description().couplings.iter();
+        let tolerance = tolerance(robot, Made::Coupling);
         let spec = |place: Place| ParameterSpec {
             name: format!("coupling_ratio.{}", place.tag()),
             place,
             unit: Unit::One,
-            prior_sigma: 0.01,
+            tolerance,
         };
         couplings
             .map(|coupling| spec(Place::Coupled(coupling.by, coupling.moved)))
@@ -355,6 +386,42 @@ fn directions(robot: &RobotModel, link: usize) -> impl Iterator<Item = (usize, b
     )
 }
 
+/// Covariance of where each joint's axis stands against the one before, m2, base axes at the zero pose. What moves an axis along itself moves
+/// the next one, and has no parameter of its own: it is handed on.
+fn length_variances(robot: &RobotModel) -> Vec<Matrix3<f64>> {
+    let mut handed_on = Matrix3::zeros();
+    let each = (0..robot.joints()).map(|joint| {
+        let before = match joint {
+            0 => robot.point(joint),
+            _ => robot.point(joint - 1),
+        };
+        let length = (robot.point(joint) - before).norm();
+        let stated = robot.description().tolerances.contains_key(&Made::Length);
+        let by_length = if stated {
+            0.0
+        } else {
+            LENGTH_BY_LENGTH * length
+        };
+        let tolerance = tolerance(robot, Made::Length).max(by_length);
+        // Where the first axis stands is a matter of the base.
+        let made = if joint == 0 {
+            0.0
+        } else {
+            tolerance * tolerance
+        };
+        let all = Matrix3::from_diagonal_element(made) + handed_on;
+        handed_on = match robot.is_revolute(joint) {
+            true => {
+                let axis = robot.axis(joint);
+                axis * axis.transpose() * axis.dot(&(all * axis))
+            }
+            false => all,
+        };
+        all
+    });
+    each.collect()
+}
+
 impl Effect for LinkGeometry {
     fn name(&self) -> &'static str {
         names::LINK_GEOMETRY
@@ -362,8 +429,12 @@ impl Effect for LinkGeometry {
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
         let mut out = Vec::new();
+        let tilts = tolerance(robot, Made::Axis);
+        let lengths = length_variances(robot);
         for link in 1..robot.joints() {
-            for (axis, tilt, _) in directions(robot, link) {
+            for (axis, tilt, twist) in directions(robot, link) {
+                let along = twist.fixed_rows::<3>(0).into_owned();
+                let length = along.dot(&(lengths[link] * along)).sqrt();
                 let letter = ['x', 'y', 'z'][axis];
                 out.push(ParameterSpec {
                     name: format!(
@@ -372,7 +443,7 @@ impl Effect for LinkGeometry {
                     ),
                     place: Place::Links(link - 1, link - 1),
                     unit: if tilt { Unit::Radian } else { Unit::Millimetre },
-                    prior_sigma: 5e-3, // 5 mm, 5 mrad
+                    tolerance: if tilt { tilts } else { length },
                 });
             }
         }

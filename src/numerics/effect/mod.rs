@@ -64,7 +64,7 @@ use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// A parameter of an effect: its name, its unit and how large it may plausibly be.
+/// A parameter of an effect: its name, its unit and how far from nominal arms are made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterSpec {
     /// E.g. `reduction_ratio.j2`; zero always means the nominal robot.
@@ -73,8 +73,8 @@ pub struct ParameterSpec {
     pub place: Place,
     /// The unit that people and tables see; values are SI.
     pub unit: Unit,
-    /// One sigma of what is known before any measurement, SI; wide.
-    pub prior_sigma: f64,
+    /// One standard deviation of how far from nominal it is before any measurement, SI: a prior of every fit.
+    pub tolerance: f64,
 }
 
 /// The circumstances of one row that effects may depend on.

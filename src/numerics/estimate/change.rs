@@ -51,7 +51,7 @@ pub fn changes(
         .filter(|k| !base.contains(k))
         .collect();
     let mut reduced = Reduced::of(before, after, &shared, &base);
-    let wide = |j: usize| stack.specs()[shared[j]].prior_sigma;
+    let wide = |j: usize| stack.specs()[shared[j]].tolerance;
     let mut ranks: Vec<Option<usize>> = vec![None; shared.len()];
     for rank in 1..=LIMIT {
         let open: Vec<usize> = (0..shared.len())
@@ -138,7 +138,7 @@ impl Reduced {
             rows[(height + i, width - 1)] = second.entry(i, s + b) + moved;
         }
         for (j, k) in shared.iter().enumerate() {
-            let sigma = before.model.stack.specs()[*k].prior_sigma;
+            let sigma = before.model.stack.specs()[*k].tolerance;
             rows[(2 * height + j, j)] = 1.0 / sigma;
             rows[(2 * height + j, width - 1)] = -before.model.x[*k] / sigma;
         }

@@ -1,13 +1,17 @@
-//! One identification: choose what the data can see, fit it robustly, learn how much stays unmodelled, state the uncertainty.
+//! One identification: fit all that is asked under its tolerances, robustly, learn how much stays unmodelled, state the uncertainty.
+//!
+//! Nothing is held: every parameter has a prior ([`Model::prior`]), so that a direction in which the data say nothing stays at nominal in the
+//! proportions in which arms are made badly, and every standard deviation is that of data and prior together.
 
 use super::cluster::clustered;
 use super::covariance::Covariance;
 use super::factor::TriangularFactor;
 use super::levenberg::{Effort, FINE, Iteration, ROUGH_TOLERANCE, Stop, minimise};
 use super::model::{Model, PriorCheck};
-use super::observe::{Visibility, indices, visibility};
+use super::observe::indices;
 use super::problem::{Evaluation, Problem, as_of_three, bound, columns, share};
 use super::repeats::{Poses, Repeated, autocorrelation_time};
+use crate::effect::Place;
 use crate::observation::{Dimension, ExcessSigma, Residual};
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
@@ -16,16 +20,48 @@ use std::collections::BTreeMap;
 /// How a fit treated a parameter of the stack.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParameterStatus {
-    /// Estimated, with its standard deviation (SI).
+    /// Estimated, with its standard deviation (SI) from data and prior together.
     Free(f64),
     /// On a bound that it would have to cross; with the value that the data would have (SI).
     Bound(f64),
     /// Not a candidate: kept.
     Kept,
-    /// As [`Visibility::Redundant`], with positions in the stack.
-    Redundant(Vec<(usize, f64)>),
-    /// The data do not show it.
-    Unseen,
+}
+
+/// How much of a parameter the data tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Determined {
+    /// They know it better than half of its tolerance.
+    Determined,
+    /// They narrow its tolerance.
+    Partly,
+    /// It stands where its tolerance leaves it.
+    ByTolerance,
+}
+
+/// Standard deviations below this share of the tolerance are of parameters that the data determine ...
+const DETERMINED: f64 = 0.5;
+/// ... and above this they add nothing to it.
+const BY_TOLERANCE: f64 = 0.9;
+
+impl Determined {
+    /// By the standard deviations before and after the measurement.
+    pub fn of(tolerance: f64, sigma: f64) -> Self {
+        match sigma / tolerance {
+            share if share < DETERMINED => Self::Determined,
+            share if share <= BY_TOLERANCE => Self::Partly,
+            _ => Self::ByTolerance,
+        }
+    }
+
+    /// As tables hold it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Determined => "determined",
+            Self::Partly => "partly",
+            Self::ByTolerance => "by tolerance",
+        }
+    }
 }
 
 /// What [`fit`] says of the model that it returns.
@@ -47,7 +83,8 @@ pub struct Fitted {
     pub downweighted: BTreeMap<usize, f64>,
     /// Parameters with a prior: what it says against what the data say.
     pub prior_checks: BTreeMap<usize, PriorCheck>,
-    /// Singular values of the free parameters (priors included) scaled by prior sigma, largest first.
+    /// Singular values of the data, columns scaled by prior sigma, largest first: of the directions that the data determine, which they know
+    /// better than the priors do. So many parameters the fit has used.
     pub singular: Vec<f64>,
     /// Singular values of all candidates, to show the gap behind the rank.
     pub singular_all: Vec<f64>,
@@ -89,6 +126,26 @@ impl Fitted {
         self.with_status(|status| matches!(status, ParameterStatus::Free(_)))
     }
 
+    /// How much the data tell of a parameter of the model; `None` where it was not estimated.
+    pub fn determined(&self, model: &Model, parameter: usize) -> Option<Determined> {
+        match self.statuses[parameter] {
+            ParameterStatus::Free(sigma) => {
+                Some(Determined::of(model.prior(parameter).sigma, sigma))
+            }
+            _ => None,
+        }
+    }
+
+    /// Parameters of the model that were estimated and that the data do not determine.
+    pub fn undetermined(&self, model: &Model) -> Vec<usize> {
+        let all = 0..self.statuses.len();
+        let open = |k: &usize| {
+            let known = self.determined(model, *k);
+            known.is_some_and(|known| known != Determined::Determined)
+        };
+        all.filter(open).collect()
+    }
+
     /// The same with those that a bound stops.
     pub(crate) fn estimated(&self) -> Vec<usize> {
         use ParameterStatus::{Bound, Free};
@@ -116,20 +173,21 @@ const ROUGH: Effort = Effort {
 };
 /// Effort of the first round, which only finds out how large the residual is and what it lets one see.
 const FIRST: Effort = Effort { limit: 4, ..ROUGH };
-/// A parameter that the nominal robot hid is taken up where the data know it this many times better than its prior sigma ...
-pub const CLEARLY: f64 = 10.0;
-/// ... and where they lower the cost by this and so much for each further one: chi-square as rare as five sigmas, so that
-/// hundreds of robots of one kind keep one set of parameters.
-const WORTH: [f64; 2] = [12.5, 1.75];
+/// Parameters of one kind that are farther off than this many of their tolerances, root mean square, are those of an arm that is made worse.
+const WORSE: f64 = 2.0;
+/// How often tolerances are learned.
+const WIDENINGS: usize = 3;
 /// Where at least one row in so many belongs to a repeated pose, rows are clustered.
 const REPEATING: usize = 4;
 /// Degrees of freedom that the noise of the weights counts as.
 const STATED: f64 = 2.0;
 /// Rounds of fit and new estimate of the unmodelled part; it settles in two or three.
 const ROUNDS: usize = 4;
+/// A direction that data know no better than this share of the prior's own information is left to it.
+const SEEN: f64 = 1.0;
 
-/// The model with those of the candidates (parameters of the stack in order of precedence) fitted to some rows that the data can see, from
-/// its values on. Everything else keeps its value.
+/// The model with the candidates (parameters of the stack) fitted to some rows under their priors, from its values on. Everything else keeps
+/// its value.
 pub fn fit(
     start: &Model,
     data: &Measurements,
@@ -141,56 +199,83 @@ pub fn fit(
     for k in candidates {
         model.x[*k] = model.within(*k, model.x[*k]);
     }
-    // The start may be far off: judge visibility with the instrument's noise, weight with what is left at the start.
-    let sight = problem.evaluate(&model, candidates);
-    problem.excess = excess_sigma(&problem, &sight, 0);
+    // The start may be far off: it is weighted with what is left there.
+    let first = problem.evaluate(&model, candidates);
+    problem.excess = excess_sigma(&problem, &first, 0);
     let mut search = Minimisation {
-        statuses: vec![ParameterStatus::Kept; model.x.len()],
         course: Vec::new(),
         stop: Stop::NothingFree,
-        free: Vec::new(),
     };
-    search.settle(&mut problem, &mut model, candidates, sight, true);
-    let mut all = problem.observe(&model, candidates);
-    let shown = problem
-        .shown(&model, candidates)
-        .unwrap_or_else(|| all.factor.clone());
-    if search.reconsider(&mut problem, &mut model, candidates, shown) {
-        all = problem.observe(&model, candidates);
+    search.settle(&mut problem, &mut model, candidates, FIRST);
+    for _ in 0..WIDENINGS {
+        if !widened(&problem, &mut model, candidates) {
+            break;
+        }
+        search.settle(&mut problem, &mut model, candidates, ROUGH);
     }
+    let all = problem.observe(&model, candidates);
     let fitted = stated(&problem, &model, candidates, search, all);
     (model, fitted)
 }
 
-/// Which of some further parameters the data can see around a fitted model next to those that were fitted, `times` better than their priors.
-pub fn seen(session: &Session, further: &[usize], times: f64) -> Vec<usize> {
-    let model = session.model;
-    let known = session.fitted.free();
-    let candidates: Vec<usize> = known.iter().chain(further).copied().collect();
-    let prior = |k: &usize| match known.contains(k) {
-        true => f64::INFINITY,
-        false => model.stack.specs()[*k].prior_sigma / times,
+/// Widens the tolerances of every kind of parameter that is farther off than arms are made: how badly an arm is made is learned from the
+/// parameters that the data determine, and never thought smaller than stated. Whether any was widened.
+fn widened(problem: &Problem, model: &mut Model, candidates: &[usize]) -> bool {
+    let Some(inverse) = problem.evaluate(model, candidates).factor.inverse() else {
+        return false;
     };
-    let seen = visibility(
-        &session.problem().observe(model, &candidates).factor,
-        &candidates.iter().map(prior).collect::<Vec<_>>(),
-    );
-    picked(&candidates, &seen)
-        .filter(|k| further.contains(k))
-        .collect()
-}
-
-/// The candidates that are seen.
-fn picked<'a>(candidates: &'a [usize], seen: &'a [Visibility]) -> impl Iterator<Item = usize> + 'a {
-    let pairs = candidates.iter().zip(seen);
-    pairs
-        .filter(|(_, verdict)| **verdict == Visibility::Seen)
-        .map(|(k, _)| *k)
-}
-
-fn prior_sigmas(model: &Model, parameters: &[usize]) -> Vec<f64> {
     let specs = model.stack.specs();
-    parameters.iter().map(|k| specs[*k].prior_sigma).collect()
+    let mut kinds: BTreeMap<(&str, &str), (f64, f64, Vec<usize>)> = BTreeMap::new();
+    for (row, k) in candidates.iter().enumerate() {
+        if model.known(*k).prior.is_some() {
+            continue;
+        }
+        let effect = specs[*k].name.split('.').next().unwrap_or_default();
+        let kind = kinds.entry((effect, specs[*k].unit.symbol())).or_default();
+        let tolerance = model.tolerances[*k];
+        kind.0 += (model.x[*k] / tolerance).powi(2);
+        kind.1 += (1.0 - (inverse.row_norm(row) / tolerance).powi(2)).max(0.0);
+        kind.2.push(*k);
+    }
+    let worse = |(square, told, _): &(f64, f64, Vec<usize>)| {
+        (*told >= 1.0 && *square > WORSE * WORSE * told).then(|| (square / told).sqrt())
+    };
+    let wider: Vec<(Vec<usize>, f64)> = kinds
+        .into_values()
+        .filter_map(|kind| worse(&kind).map(|times| (kind.2, times)))
+        .collect();
+    for (parameters, times) in &wider {
+        parameters
+            .iter()
+            .for_each(|k| model.tolerances[*k] *= times);
+    }
+    !wider.is_empty()
+}
+
+/// A number that is farther from nominal than this many tolerances is no matter of how arms are made.
+const BEYOND: f64 = 4.0;
+
+/// How many of its tolerances a number of the arm is off, where these are more than four.
+pub fn beyond_tolerance(model: &Model, parameter: usize) -> Option<f64> {
+    let spec = &model.stack.specs()[parameter];
+    let of_the_arm = !matches!(spec.place, Place::Base | Place::Anchor);
+    let times = model.x[parameter].abs() / spec.tolerance;
+    let is_known = model.known(parameter).prior.is_some();
+    (of_the_arm && !is_known && times > BEYOND).then_some(times)
+}
+
+/// How many directions of some parameters the rows determine better than the priors do, about a fitted model.
+pub fn determined_directions(session: &Session, parameters: &[usize]) -> usize {
+    let (problem, model) = (session.problem(), session.model);
+    let factor = problem
+        .shown(model, parameters)
+        .unwrap_or_else(|| problem.observe(model, parameters).factor);
+    determined(&factor.singular_values(&model.prior_sigmas(parameters)))
+}
+
+/// How many of the singular values, largest first, are of directions that the data determine.
+fn determined(singular: &[f64]) -> usize {
+    singular.iter().filter(|value| **value > SEEN).count()
 }
 
 /// What the data (`all`: in all candidates, at the minimum) say of a fitted model.
@@ -201,12 +286,12 @@ fn stated(
     search: Minimisation,
     all: Evaluation,
 ) -> Fitted {
-    let Minimisation {
-        mut statuses,
-        course,
-        stop,
-        free,
-    } = search;
+    let Minimisation { course, stop } = search;
+    let mut statuses = vec![ParameterStatus::Kept; model.x.len()];
+    for k in candidates {
+        statuses[*k] = ParameterStatus::Free(f64::NAN);
+    }
+    let free = candidates.to_vec();
     let errors = problem.errors(&all.residuals);
     let place = columns(model, candidates);
     let only = |free: &[usize]| {
@@ -223,11 +308,16 @@ fn stated(
         .map(|(k, _)| k)
         .collect();
     let data = only(&free);
+    let singular_all = problem
+        .shown(model, candidates)
+        .unwrap_or_else(|| all.factor.clone())
+        .singular_values(&model.prior_sigmas(candidates));
+    let singular = singular_all[..determined(&singular_all)].to_vec();
     // The noise is known up to a factor, what was known beforehand is not.
-    let scale = reduced(&errors, free.len()).sqrt() * lasting(problem, &all.residuals).sqrt();
+    let scale = reduced(&errors, singular.len()).sqrt() * lasting(problem, &all.residuals).sqrt();
     let weight = if scale > 0.0 { 1.0 / scale } else { 1.0 };
     let poses = Poses::of(problem.data, problem.rows);
-    let clusters = clusters(&poses, problem.rows.len(), free.len());
+    let clusters = clusters(&poses, problem.rows.len(), singular.len());
     let inverse = |data| model.with_priors(&free, data).0.inverse();
     let root = match clusters {
         Some(poses) => {
@@ -250,15 +340,6 @@ fn stated(
         .residuals
         .iter()
         .any(|residual| residual.dimension() == Dimension::Angle);
-    let (factor, _) = model.with_priors(&free, data);
-    let singular = factor.singular_values(&prior_sigmas(model, &free));
-    let singular_all = match problem.shown(model, candidates) {
-        None if free == candidates => singular.clone(),
-        shown => model
-            .with_priors(candidates, shown.unwrap_or(all.factor))
-            .0
-            .singular_values(&prior_sigmas(model, candidates)),
-    };
     Fitted {
         statuses,
         course,
@@ -273,7 +354,7 @@ fn stated(
             model,
             problem.data,
             whole_points(&all.residuals),
-            free.len(),
+            singular.len(),
         ),
         clusters: clusters.map_or(0, <[Vec<usize>]>::len),
         downweighted: downweighted(&all.residuals, &errors),
@@ -283,123 +364,52 @@ fn stated(
     }
 }
 
-/// The way to a minimum in what the data see.
+/// The way to a minimum.
 struct Minimisation {
-    statuses: Vec<ParameterStatus>,
     course: Vec<Iteration>,
     stop: Stop,
-    /// What was estimated last.
-    free: Vec<usize>,
 }
 
 impl Minimisation {
-    /// Takes up candidates that the nominal robot hid and the identified one (`all`, the data in all candidates there) shows: a
-    /// point meant to lie on the last axis never does. Whether any was worth it; else the model is as before.
-    fn reconsider(
-        &mut self,
-        problem: &mut Problem,
-        model: &mut Model,
-        candidates: &[usize],
-        all: TriangularFactor,
-    ) -> bool {
-        // What is estimated comes first, so that only what it cannot do counts as new.
-        let (sight, _) = model.with_priors(candidates, all);
-        let mut order: Vec<usize> = (0..candidates.len()).collect();
-        order.sort_by_key(|j| !self.free.contains(&candidates[*j]));
-        let ordered: Vec<usize> = order.iter().map(|j| candidates[*j]).collect();
-        let mut wary = prior_sigmas(model, &ordered);
-        wary.iter_mut().for_each(|sigma| *sigma /= CLEARLY);
-        let seen = visibility(&sight.select(&order), &wary);
-        let known = self.free.len();
-        let new: Vec<usize> = picked(&ordered[known..], &seen[known..]).collect();
-        if new.is_empty() {
-            return false;
-        }
-        let free: Vec<usize> = candidates
-            .iter()
-            .copied()
-            .filter(|k| self.free.contains(k) || new.contains(k))
-            .collect();
-        let (before, start) = (model.x.clone(), problem.evaluate(model, &free));
-        let cost = start.objective();
-        let (_, stop, end) = minimise(problem, model, &free, start, FINE);
-        if stop != Stop::Converged
-            || cost - end.objective() < WORTH[0] + WORTH[1] * (new.len() - 1) as f64
-        {
-            model.x = before;
-            return false;
-        }
-        self.settle(problem, model, &free, end, false);
-        true
-    }
-
-    /// Rounds of choosing what is seen of the candidates, fitting it, and learning how much stays unmodelled, from `sight`, the
-    /// problem in all candidates; far from the solution at the `first` time.
+    /// Rounds of fitting the candidates and learning how much stays unmodelled; the first with little effort.
     fn settle(
         &mut self,
         problem: &mut Problem,
         model: &mut Model,
         candidates: &[usize],
-        mut sight: Evaluation,
-        first: bool,
+        first: Effort,
     ) {
-        let mut candidates = candidates.to_vec();
         for round in 0..ROUNDS {
-            let prior = prior_sigmas(model, &candidates);
-            let shown = problem
-                .shown(model, &candidates)
-                .map(|factor| model.with_priors(&candidates, factor).0);
-            let seen = visibility(shown.as_ref().unwrap_or(&sight.factor), &prior);
-            for (k, verdict) in candidates.iter().zip(&seen) {
-                self.statuses[*k] = match verdict {
-                    Visibility::Seen => ParameterStatus::Free(f64::NAN),
-                    Visibility::Unseen => ParameterStatus::Unseen,
-                    Visibility::Redundant(with) => ParameterStatus::Redundant(
-                        with.iter()
-                            .map(|(j, share)| (candidates[*j], *share))
-                            .collect(),
-                    ),
-                };
-            }
-            let free: Vec<usize> = picked(&candidates, &seen).collect();
-            // What is dropped goes back to what was known beforehand and stays there.
-            for k in candidates.iter().filter(|k| !free.contains(k)) {
-                model.x[*k] = model.prior_value(*k);
-            }
-            let weighted_so = !first || round > 0 || problem.excess == ExcessSigma::default();
-            let start = if weighted_so && free == candidates {
-                sight
-            } else {
-                problem.evaluate(model, &free)
+            let effort = match round {
+                0 => first,
+                round if round + 1 < ROUNDS => ROUGH,
+                _ => FINE,
             };
-            let effort = if first && round == 0 {
-                FIRST
-            } else if round + 1 < ROUNDS {
-                ROUGH
-            } else {
-                FINE
-            };
-            let (steps, mut stop, mut end) = minimise(problem, model, &free, start, effort);
+            let start = problem.evaluate(model, candidates);
+            let (steps, mut stop, mut end) = minimise(problem, model, candidates, start, effort);
             self.course.extend(steps);
-            let mut next = excess_sigma(problem, &end, free.len());
+            let used = |end: &Evaluation, model: &Model| {
+                // Those of data and priors together: squares are one more.
+                let both = end.factor.singular_values(&model.prior_sigmas(candidates));
+                both.iter()
+                    .filter(|value| *value * *value > 1.0 + SEEN * SEEN)
+                    .count()
+            };
+            let mut next = excess_sigma(problem, &end, used(&end, model));
             let same = |one: f64, other: f64| (one - other).abs() <= 0.02 * one.max(other);
-            let settled = same(next.length, problem.excess.length)
-                && same(next.angle, problem.excess.angle)
-                && free.len() == candidates.len();
+            let settled =
+                same(next.length, problem.excess.length) && same(next.angle, problem.excess.angle);
             if settled && effort.tolerance > FINE.tolerance {
                 let steps;
-                (steps, stop, end) = minimise(problem, model, &free, end, FINE);
+                (steps, stop, end) = minimise(problem, model, candidates, end, FINE);
                 self.course.extend(steps.into_iter().skip(1));
-                next = excess_sigma(problem, &end, free.len());
+                next = excess_sigma(problem, &end, used(&end, model));
             }
             self.stop = stop;
             problem.excess = next;
-            self.free.clone_from(&free);
-            candidates = free;
             if settled {
                 break;
             }
-            sight = problem.evaluate(model, &candidates);
         }
     }
 }

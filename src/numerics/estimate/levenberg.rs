@@ -4,7 +4,7 @@
 
 use crate::estimate::factor::{TriangularFactor, axpy, norm};
 use crate::estimate::length::LengthTerm;
-use crate::estimate::model::{Known, Model};
+use crate::estimate::model::{Known, Model, Prior};
 use crate::estimate::problem::{Evaluation, Problem};
 use faer::Mat;
 
@@ -184,10 +184,18 @@ fn cosine(factor: &TriangularFactor, cost: f64, pinned: &[bool]) -> f64 {
 }
 
 impl Model {
-    /// Where a parameter stands that nothing estimates: its prior's mean or nominal, within its bounds.
-    pub(crate) fn prior_value(&self, parameter: usize) -> f64 {
-        let known = self.known(parameter);
-        self.within(parameter, known.prior.map_or(0.0, |prior| prior.mean))
+    /// What is known of a parameter before any measurement: its prior, else its tolerance about nominal.
+    pub fn prior(&self, parameter: usize) -> Prior {
+        let tolerance = Prior {
+            mean: 0.0,
+            sigma: self.tolerances[parameter],
+        };
+        self.known(parameter).prior.unwrap_or(tolerance)
+    }
+
+    /// Standard deviations of some parameters before any measurement, SI.
+    pub(crate) fn prior_sigmas(&self, parameters: &[usize]) -> Vec<f64> {
+        parameters.iter().map(|k| self.prior(*k).sigma).collect()
     }
 
     /// The nearest allowed value.
@@ -202,21 +210,17 @@ impl Model {
         self.known.get(&parameter).copied().unwrap_or_default()
     }
 
-    /// The factor with a row for every prior of the `free` parameters and for every known length, and what these add to the cost.
+    /// The factor with a row for the prior of each of the `free` parameters and for every known length, and what these add to the cost.
     pub(crate) fn with_priors(
         &self,
         free: &[usize],
         factor: TriangularFactor,
     ) -> (TriangularFactor, f64) {
-        let priors: Vec<(usize, f64, f64)> = free
-            .iter()
-            .enumerate()
-            .filter_map(|(j, k)| {
-                self.known(*k)
-                    .prior
-                    .map(|prior| (j, prior.sigma, (prior.mean - self.x[*k]) / prior.sigma))
-            })
-            .collect();
+        let prior = |k: &usize| {
+            let prior = self.prior(*k);
+            (prior.sigma, (prior.mean - self.x[*k]) / prior.sigma)
+        };
+        let priors: Vec<(f64, f64)> = free.iter().map(prior).collect();
         let lengths: Vec<LengthTerm> = self.length_terms().collect();
         if priors.is_empty() && lengths.is_empty() {
             return (factor, 0.0);
@@ -231,13 +235,13 @@ impl Model {
             }
             rows[(priors.len() + i, free.len())] = term.error;
         }
-        for (i, (j, sigma, off)) in priors.iter().enumerate() {
-            rows[(i, *j)] = 1.0 / sigma;
+        for (i, (sigma, off)) in priors.iter().enumerate() {
+            rows[(i, i)] = 1.0 / sigma;
             rows[(i, free.len())] = *off;
         }
         let squares = priors
             .iter()
-            .map(|(_, _, off)| off * off)
+            .map(|(_, off)| off * off)
             .chain(lengths.iter().map(|term| term.error * term.error));
         let cost = squares.map(|square| 0.5 * square).sum();
         (factor.stack(&TriangularFactor::of(&rows)), cost)

@@ -25,14 +25,15 @@ pub mod threads;
 pub use change::{ParameterChange, changes};
 pub use contacts::{Reseat, placed_by_left_out, reseated};
 pub use covariance::{Covariance, tail};
-pub use fit::{CLEARLY, Fitted, ParameterStatus, Session, fit, seen};
+pub use fit::{
+    Determined, Fitted, ParameterStatus, Session, beyond_tolerance, determined_directions, fit,
+};
 pub use folds::{
     FoldKind, Folds, NearbyFits, cross_validate, dealt, fold_poses, gather, leave_one_out,
 };
 pub use gauge::{align, align_points, gauge};
 pub use levenberg::{Iteration, Stop};
 pub use model::{Bounds, CONFLICT, Known, KnownLength, Model, Prior, PriorCheck, RowError};
-pub use observe::Visibility;
 pub(crate) use problem::columns;
 pub use remedy::{Remedy, remedies};
 pub use repeats::{Poses, Repeated, autocorrelation_time, spread};

@@ -18,7 +18,9 @@ pub struct Model {
     pub stack: Arc<EffectStack>,
     /// Parameter values, SI, in the order of the stack's specs.
     pub x: Vec<f64>,
-    /// What is known of some parameters beforehand, by position in the stack.
+    /// One standard deviation of each parameter before any measurement, SI: that of its spec, or wider where this arm is made worse.
+    pub tolerances: Vec<f64>,
+    /// What else is known of some parameters beforehand, by position in the stack; a prior stands in the tolerance's place.
     pub known: BTreeMap<usize, Known>,
     /// Lengths between anchors that are known from elsewhere.
     pub lengths: Vec<KnownLength>,
@@ -28,10 +30,12 @@ impl Model {
     /// The model with all parameters zero: the nominal robot.
     pub fn nominal(robot: RobotModel, stack: EffectStack) -> Self {
         let x = vec![0.0; stack.specs().len()];
+        let tolerances = stack.specs().iter().map(|spec| spec.tolerance).collect();
         Self {
             robot,
             stack: Arc::new(stack),
             x,
+            tolerances,
             known: BTreeMap::new(),
             lengths: Vec::new(),
         }

@@ -1,13 +1,12 @@
-//! What would show a parameter that the data do not: each possible measurement is tried on the model, no rule is written down.
+//! What would show a parameter that the data do not determine: each possible measurement is tried on the model, no rule is written down.
 //!
-//! To the factor of the recording come poses all over the joints' ranges, the same with another payload, or with a second target
-//! off the last axis whose place on the tool is unknown too. What is estimated stays first in precedence.
+//! To the factor of recording and priors come poses all over the joints' ranges, the same with another payload, or with a second target
+//! off the last axis whose place on the tool is unknown too.
 
 use super::choose::even;
 use super::factor::TriangularFactor;
-use super::fit::{ParameterStatus, Session};
+use super::fit::{Determined, Session};
 use super::model::Model;
-use super::observe::{Visibility, visibility};
 use super::problem::Problem;
 use crate::effect::names;
 use crate::robot::{Measurements, PointReadings, RobotModel};
@@ -24,7 +23,7 @@ pub enum Remedy {
     Payload,
     /// A second target off the axis of the last joint.
     SecondTarget,
-    /// Nothing of these: every measured point is the same whichever of the parameters is off.
+    /// Nothing of these: points are the same whichever of several parameters is off.
     Nothing,
 }
 
@@ -33,14 +32,12 @@ const FEWEST: usize = 60;
 const LIMIT: usize = 300;
 /// A joint that used less than this share of its range hardly moved.
 const HARDLY: f64 = 0.25;
-/// A remedy has to show a parameter this many times better than its prior sigma.
-const CLEARLY: f64 = 3.0;
 /// Distance of the second target from the last axis, m.
 const OFF_AXIS: f64 = 0.1;
 /// Where a target sits on a tool is known to this before any measurement, m.
 const TARGET_PRIOR: f64 = 0.1;
 
-/// What would show each redundant or unseen parameter of a fit to `rows`.
+/// What would show each parameter that a fit does not determine, by its position in the stack.
 pub fn remedies(session: &Session) -> BTreeMap<usize, Remedy> {
     let Session {
         data,
@@ -48,11 +45,9 @@ pub fn remedies(session: &Session) -> BTreeMap<usize, Remedy> {
         model,
         fitted,
     } = *session;
-    use ParameterStatus::{Redundant, Unseen};
-    let mut candidates = fitted.estimated();
-    let known = candidates.len();
-    candidates.extend(fitted.with_status(|status| matches!(status, Redundant(_) | Unseen)));
-    if candidates.len() == known || rows.is_empty() {
+    let candidates = fitted.free();
+    let open = fitted.undetermined(model);
+    if open.is_empty() || rows.is_empty() {
         return BTreeMap::new();
     }
     let excess = fitted.excess();
@@ -67,68 +62,64 @@ pub fn remedies(session: &Session) -> BTreeMap<usize, Remedy> {
     let spread = at(model, &poses(model, data, rows, &[usual]));
     let loaded = (declared > 0.0).then(|| at(model, &poses(model, data, rows, &[0.0, declared])));
     let target = at(&off_axis(model), &poses(model, data, rows, &[usual]));
-    let specs = model.stack.specs();
     let of_tool: Vec<usize> = model.stack.parameters_of(names::TOOL_OFFSET).collect();
     let tool: Vec<bool> = candidates.iter().map(|k| of_tool.contains(k)).collect();
-    let prior: Vec<f64> = candidates.iter().map(|k| specs[*k].prior_sigma).collect();
+    let prior = model.prior_sigmas(&candidates);
     let none = vec![false; candidates.len()];
     let tried = [
         (
             Remedy::Move(lazy(model, data, rows)),
-            Some(shown(&recorded, &spread, &none, &prior, known)),
+            Some(shown(&recorded, &spread, &none, &prior)),
         ),
         (
             Remedy::Payload,
-            loaded.map(|loaded| shown(&recorded, &loaded, &none, &prior, known)),
+            loaded.map(|loaded| shown(&recorded, &loaded, &none, &prior)),
         ),
         (
             Remedy::SecondTarget,
-            Some(shown(&recorded, &target, &tool, &prior, known)),
+            Some(shown(&recorded, &target, &tool, &prior)),
         ),
     ];
-    let mut out = BTreeMap::new();
-    for (j, k) in candidates.iter().enumerate().skip(known) {
-        let first = tried
-            .iter()
-            .find(|(_, shown)| shown.as_ref().is_some_and(|shown| shown[j - known]));
-        out.insert(
-            *k,
-            first.map_or(Remedy::Nothing, |(remedy, _)| remedy.clone()),
-        );
-    }
-    out
+    let remedy = |k: usize| {
+        let at = candidates.iter().position(|other| *other == k);
+        let mut shows = tried.iter().filter(|(_, shown)| {
+            let shown = shown.as_ref().zip(at);
+            shown.is_some_and(|(shown, at)| shown[at] == Determined::Determined)
+        });
+        shows
+            .next()
+            .map_or(Remedy::Nothing, |(remedy, _)| remedy.clone())
+    };
+    open.into_iter().map(|k| (k, remedy(k))).collect()
 }
 
-/// Which of the candidates behind the first `known` are seen with `more` rows, in which the columns `apart` are new unknowns.
+/// How well each parameter is known with `more` rows, in which the columns `apart` are new unknowns.
 fn shown(
     recorded: &TriangularFactor,
     more: &TriangularFactor,
     apart: &[bool],
     prior: &[f64],
-    known: usize,
-) -> Vec<bool> {
+) -> Vec<Determined> {
     let p = prior.len();
     let new: Vec<usize> = (0..p).filter(|j| apart[*j]).collect();
-    // Estimated ones, new ones, then those in question.
-    let place = |j: usize| if j < known { j } else { j + new.len() };
-    let mut rows = Mat::zeros(2 * p, p + new.len() + 1);
+    let all = p + new.len();
+    let mut rows = Mat::zeros(2 * p + all, all + 1);
     for j in 0..p {
-        let second = new
-            .iter()
-            .position(|other| *other == j)
-            .map_or(place(j), |extra| known + extra);
-        rows.col_as_slice_mut(place(j))[..=j].copy_from_slice(recorded.column(j));
+        let again = new.iter().position(|other| *other == j);
+        let second = again.map_or(j, |extra| p + extra);
+        rows.col_as_slice_mut(j)[..=j].copy_from_slice(recorded.column(j));
         rows.col_as_slice_mut(second)[p..=p + j].copy_from_slice(more.column(j));
     }
-    let mut sigma = vec![TARGET_PRIOR; p + new.len()];
-    for (j, prior) in prior.iter().enumerate() {
-        sigma[place(j)] = prior / CLEARLY;
+    for j in 0..all {
+        let sigma = prior.get(j).copied().unwrap_or(TARGET_PRIOR);
+        rows[(2 * p + j, j)] = 1.0 / sigma;
     }
-    let seen = visibility(&TriangularFactor::of(&rows), &sigma);
-    seen[known + new.len()..]
-        .iter()
-        .map(|verdict| *verdict == Visibility::Seen)
-        .collect()
+    let inverse = TriangularFactor::of(&rows).inverse();
+    let known = |j: usize| match &inverse {
+        Some(inverse) => Determined::of(prior[j], inverse.row_norm(j)),
+        None => Determined::ByTolerance,
+    };
+    (0..p).map(known).collect()
 }
 
 /// Poses all over the joints' ranges under the payloads in turn.

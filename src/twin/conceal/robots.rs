@@ -122,6 +122,7 @@ impl Kind {
             payload_centre: metres(std::array::from_fn(|i| point[i] + offset[i])),
             gravity: [0.0, 0.0, -9.81],
             inertias: DeclaredInertias::default(),
+            tolerances: Default::default(),
         }
     }
 

@@ -62,9 +62,9 @@ impl FormulaSearch<'_, '_> {
         let (place, variables) = self.variables(&forms)?;
         let others: Vec<&Form> = others.iter().map(|i| &causes[*i].form).collect();
         let problem = &self.view.problem;
-        let jacobian = problem.jacobian(self.view.fitter.free());
+        let base = problem.basis(&self.view.fitter.base());
         let residual = self.view.without_causes(self.state);
-        let given = FormRegression::new(problem, &jacobian, &others, &residual);
+        let given = FormRegression::new(problem, &base, &others, &residual);
         let Place::Joint(joint) = finding.place else {
             return None;
         };

@@ -40,7 +40,7 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
         let estimated = numbers.iter().copied();
         let estimated = estimated.filter(|k| covariance.parameters().contains(k));
         let (free, plausible): (Vec<usize>, f64) =
-            (estimated.collect(), specs[family[0]].prior_sigma);
+            (estimated.collect(), specs[family[0]].tolerance);
         let Some(size) = size(&state.model, covariance, &free, plausible) else {
             continue;
         };
@@ -55,7 +55,7 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
             false => size,
         };
         any = true;
-        let sigma = |k: usize| match specs[k].prior_sigma {
+        let sigma = |k: usize| match specs[k].tolerance {
             _ if family.contains(&k) => size,
             plausible if most > 0.0 && !is_shown(state, range.start + k) => plausible.min(most),
             plausible => plausible,

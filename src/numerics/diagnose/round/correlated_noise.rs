@@ -11,7 +11,7 @@ use crate::criteria::cells::COMMON;
 use crate::criteria::noise::{AS_GOOD, PLAIN};
 use crate::diagnose::table::{Answer, FoundCell};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
-use crate::linear::{orthonormal, project};
+use crate::linear::project;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::prelude::*;
@@ -118,7 +118,7 @@ impl<'a> Regression<'a> {
                 }
             }
         }
-        let base = orthonormal(&problem.jacobian(fitter.free()));
+        let base = problem.basis(&fitter.base());
         project(base.as_ref(), &mut points);
         AutocorrelatedNoise::without_gross(&mut points);
         let mut columns: Vec<f64> = (0..base.ncols())

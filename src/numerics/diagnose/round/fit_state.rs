@@ -9,8 +9,8 @@ use crate::effect::{
     Effect, EffectContext, EffectStack, Form, Load, arm_effect, identified, names,
 };
 use crate::estimate::{
-    CLEARLY, ErrorScale, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, align,
-    fit_screened, seen,
+    ErrorScale, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, align,
+    fit_screened,
 };
 use crate::robot::{Measurements, RobotModel};
 use std::ops::Range;
@@ -77,10 +77,8 @@ pub(crate) struct Fitter<'a> {
     pub(crate) data: Measurements,
     /// Unit in which errors of rows are compared and stated.
     pub(crate) scale: ErrorScale,
-    /// Base parameters to estimate, in order of precedence; at first all.
-    free: Vec<usize>,
-    /// Base parameters that the rows hardly show.
-    faint: Vec<usize>,
+    /// How many parameters the base model has; they come first.
+    base: usize,
     pub(crate) repeatability: JointRepeatability,
     /// What a deviation of the joints makes of every row's readings.
     spread: JointSpread,
@@ -107,8 +105,7 @@ impl<'a> Fitter<'a> {
             question,
             data: question.data.clone(),
             scale: ErrorScale::of(question.data, question.fit),
-            free: Vec::new(),
-            faint: Vec::new(),
+            base: 0,
             repeatability: JointRepeatability::default(),
             spread: JointSpread::default(),
             repeated: 0.0,
@@ -120,7 +117,8 @@ impl<'a> Fitter<'a> {
             keeps_all,
         };
         let base = base_model(question.robot, &fitter.data, question.fit, question.without);
-        let mut now = fitter.refit(&base, Vec::new());
+        fitter.base = base.x.len();
+        let mut now = fitter.fit(&base, Vec::new());
         fitter.spread = JointSpread::of(&now.model, &fitter.data);
         let kept = &now.screening.kept;
         let lasts = lasts(&now.model, &fitter.data, kept);
@@ -170,39 +168,9 @@ impl<'a> Fitter<'a> {
         self.repeatability.sigma > self.repeated && self.repeats(rows).is_none()
     }
 
-    /// Base parameters that are estimated.
-    pub(crate) fn free(&self) -> &[usize] {
-        &self.free
-    }
-
-    /// Base parameters that the rows show at all: what they could do is no cause.
-    pub(crate) fn seen(&self) -> Vec<usize> {
-        self.free.iter().chain(&self.faint).copied().collect()
-    }
-
-    /// Takes the base parameters that the rows show around a fitted model: a large effect that the model lacked had hidden them.
-    /// Those that they hardly show are not estimated.
-    pub(crate) fn follow(&mut self, state: &FitState) {
-        let first = state
-            .ranges
-            .first()
-            .map_or(state.model.x.len(), |range| range.start);
-        if self.free.is_empty() {
-            self.free = state.fitted.free();
-        }
-        let seen = |known: &[usize], times| {
-            let others: Vec<usize> = (0..first).filter(|k| !known.contains(k)).collect();
-            let session = Session {
-                data: &self.data,
-                rows: &state.screening.kept,
-                model: &state.model,
-                fitted: &state.fitted,
-            };
-            seen(&session, &others, times)
-        };
-        let clearly = seen(&self.free, CLEARLY);
-        self.free.extend(clearly);
-        self.faint = seen(&self.free, 1.0);
+    /// The parameters of the base model, by their positions in every model of this recording.
+    pub(crate) fn base(&self) -> Vec<usize> {
+        (0..self.base).collect()
     }
 
     /// How well the joints repeat (rad) by what is left of a residual without structure, if that is news: it is asked once, and where
@@ -271,14 +239,7 @@ impl<'a> Fitter<'a> {
     /// The base effects of `from` with other causes, which start at their coefficients, fitted to the rows that belong.
     pub(crate) fn fit(&self, from: &Model, causes: Vec<EstimatedCause>) -> FitState {
         let (start, ranges) = with_causes(from, &causes);
-        let first = ranges.first().map_or(start.x.len(), |range| range.start);
-        let all: Vec<usize> = (0..first).collect();
-        let base = if self.free.is_empty() {
-            &all
-        } else {
-            &self.free
-        };
-        let candidates: Vec<usize> = base.iter().copied().chain(first..start.x.len()).collect();
+        let candidates: Vec<usize> = (0..start.x.len()).collect();
         let set = (!self.keeps_all).then_some(self.question.set);
         let (model, fitted, screening) =
             fit_screened(&start, &self.data, self.question.fit, &candidates, set);
@@ -294,13 +255,6 @@ impl<'a> Fitter<'a> {
             causes,
             ranges,
         }
-    }
-
-    /// The same, and the base parameters that the rows show then.
-    pub(crate) fn refit(&mut self, from: &Model, causes: Vec<EstimatedCause>) -> FitState {
-        let state = self.fit(from, causes);
-        self.follow(&state);
-        state
     }
 }
 
@@ -365,7 +319,8 @@ pub(crate) fn with_causes(from: &Model, causes: &[EstimatedCause]) -> (Model, Ve
         .filter(|((effect, _), _)| effect.name() != names::BASE_FRAME)
     {
         debug_assert!(effect.form().is_none());
-        model.x[range].copy_from_slice(&from.x[found]);
+        model.x[range.clone()].copy_from_slice(&from.x[found.clone()]);
+        model.tolerances[range].copy_from_slice(&from.tolerances[found]);
     }
     let ranges: Vec<Range<usize>> = stack
         .effects()

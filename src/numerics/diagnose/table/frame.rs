@@ -6,7 +6,7 @@ use super::factored::{FactoredColumns, Functions, MotionRows, WeighedDirection, 
 use super::noise_shape::NoiseShape;
 use crate::diagnose::round::RoundView;
 use crate::effect::{Basis, Factor, Form, Law, Motion, Variable};
-use crate::linear::{orthonormal, product, project};
+use crate::linear::{product, project, shown_directions};
 use faer::{Mat, MatRef};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
@@ -69,10 +69,11 @@ impl<'a> SearchRows<'a> {
             motions: Vec::new(),
             variables: Vec::new(),
         };
-        let mut jacobian = problem.jacobian(&view.fitter.seen());
+        let parameters = view.fitter.base();
+        let mut jacobian = problem.jacobian(&parameters);
         (0..jacobian.ncols()).for_each(|j| out.weigh(jacobian.col_as_slice_mut(j)));
         out.weigh(&mut residual);
-        out.base = orthonormal(&jacobian);
+        out.base = shown_directions(&jacobian, &problem.prior_sigmas(&parameters));
         project(out.base.as_ref(), &mut residual);
         let base = &out.base;
         out.base_by_line = DMatrix::from_fn(base.ncols(), base.nrows(), |j, line| base[(line, j)]);

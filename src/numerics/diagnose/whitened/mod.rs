@@ -13,7 +13,7 @@ use crate::effect::{
     Term, Unknown, Variable,
 };
 use crate::estimate::{Model, Prior};
-use crate::linear::mean_square;
+use crate::linear::{mean_square, shown_directions};
 use crate::observation::{MeasurementKind, Residual, Sensitivity, kinds};
 use crate::robot::{Measurements, RobotModel};
 pub(crate) use crate::whitened::autocorrelated::AutocorrelatedNoise;
@@ -290,6 +290,17 @@ impl<'a> WhitenedProblem<'a> {
             motion.value(self.robot, self.data, *row, variable)
         };
         self.rows.iter().zip(&self.motions).map(one).collect()
+    }
+
+    /// An orthonormal basis of what some parameters of the model under their priors, and what each motor has of its own, can do.
+    pub(crate) fn basis(&self, parameters: &[usize]) -> Mat<f64> {
+        shown_directions(&self.jacobian(parameters), &self.prior_sigmas(parameters))
+    }
+
+    /// Standard deviations of some parameters before any measurement, SI.
+    pub(crate) fn prior_sigmas(&self, parameters: &[usize]) -> Vec<f64> {
+        let sigma = |k: &usize| self.model.prior(*k).sigma;
+        parameters.iter().map(sigma).collect()
     }
 
     /// Columns of some parameters of the model itself, and what each motor has of its own.

@@ -13,11 +13,11 @@ use crate::effect::Form;
 use crate::error::counted;
 
 /// The base model in a line.
-pub(crate) fn base_text(now: &FitState, fitter: &Fitter) -> String {
+pub(crate) fn base_text(now: &FitState) -> String {
     format!(
-        "{}, {} of the base model estimated",
+        "{}, which determine {} of the base model",
         counted(now.screening.kept.len(), "row"),
-        counted(fitter.free().len(), "parameter")
+        counted(now.fitted.singular.len(), "number")
     )
 }
 

@@ -246,7 +246,7 @@ fn known(model: &Model, priors: &[PriorSigma]) -> Vec<f64> {
         .stack
         .specs()
         .iter()
-        .map(|spec| sigma(&spec.name).map_or(1.0, |sigma| sigma / spec.prior_sigma))
+        .map(|spec| sigma(&spec.name).map_or(1.0, |sigma| sigma / spec.tolerance))
         .collect()
 }
 
@@ -296,7 +296,7 @@ pub fn propose_contacts(
         .step_by(4)
         .map(|set| sigmas(&gather(&rows, set), &before))
         .collect();
-    let prior: Vec<f64> = specs.iter().map(|spec| spec.prior_sigma).collect();
+    let prior: Vec<f64> = specs.iter().map(|spec| spec.tolerance).collect();
     let usual = |k: usize| median(random.iter().map(|all| all[k]).collect());
     let arm: Vec<usize> = (0..specs.len())
         .filter(|k| !specs[*k].name.starts_with(names::ANCHOR))
@@ -380,7 +380,7 @@ fn geometry(model: &Model, data: &Measurements, count: usize) -> Vec<f64> {
     let mut order: Vec<usize> = model.stack.parameters_of(names::ANCHOR).collect();
     let first = order.len();
     order.extend(&last);
-    let scale: Vec<f64> = last.iter().map(|k| UNIT / specs[*k].prior_sigma).collect();
+    let scale: Vec<f64> = last.iter().map(|k| UNIT / specs[*k].tolerance).collect();
     let all = factor(&PointJacobian::given(model, order, Vec::new()).rows(model, data));
     let p = last.len();
     let reduced = Mat::from_fn(p, p + 1, |i, j| {

@@ -48,7 +48,7 @@ impl PointJacobian {
         let rows: Vec<usize> = (0..data.rows()).collect();
         let problem = Problem::new(data, &rows, ExcessSigma::default());
         let factor = problem.evaluate(model, order).factor;
-        let prior = |k: &usize| model.stack.specs()[*k].prior_sigma;
+        let prior = |k: &usize| model.stack.specs()[*k].tolerance;
         let seen = visibility(&factor, &order.iter().map(prior).collect::<Vec<_>>());
         let free: Vec<usize> = order
             .iter()
@@ -68,7 +68,7 @@ impl PointJacobian {
         Self {
             prior: free
                 .iter()
-                .map(|k| model.stack.specs()[*k].prior_sigma)
+                .map(|k| model.stack.specs()[*k].tolerance)
                 .collect(),
             free,
             sized,

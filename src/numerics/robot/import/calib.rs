@@ -2,6 +2,7 @@
 
 use super::kinematics::{self, DhConvention};
 use super::place::{DocumentNode, Faults};
+use super::tolerances::tolerances;
 use super::{ChainBody, FrameChain, Imported, RobotFileText, about, inertia, urdf};
 use crate::description::{
     Coupling, DeclaredInertias, JointDescription, JointKind, RobotDescription,
@@ -39,6 +40,7 @@ pub fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<Imported
         "links",
         "payload",
         "mass_tolerance",
+        "tolerances",
         "gravity",
     ]);
     let format = root.get("calib_robot");
@@ -221,6 +223,7 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
             payload: payload_inertia,
             tolerance,
         },
+        tolerances: root.opt("tolerances").map(tolerances).unwrap_or_default(),
     }
 }
 

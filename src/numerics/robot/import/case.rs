@@ -111,6 +111,7 @@ pub fn read(file: RobotFileText) -> Result<Imported> {
                 .opt("inertia_tolerance")
                 .map(|value| inertia::tolerance(value, TOLERANCE, Unit::Millimetre)),
         },
+        tolerances: Default::default(),
     };
     let unused = root.keys().filter(|key| !KEYS.contains(key));
     let mut notes: Vec<String> = unused

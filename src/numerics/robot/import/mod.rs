@@ -18,6 +18,7 @@ mod case;
 mod inertia;
 mod kinematics;
 mod place;
+mod tolerances;
 mod urdf;
 
 use place::DocumentNode;
