@@ -136,7 +136,7 @@ const STATED: [&str; 5] = ["payload_kg", "temp_c", "time_s", "dir", "i_a"];
 impl Model {
     /// The arm of an identified model.
     pub(crate) fn new(identified: IdentifiedModel) -> Self {
-        let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
+        let arm = identified.arm();
         Self { identified, arm }
     }
 

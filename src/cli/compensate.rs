@@ -5,7 +5,7 @@ use super::feed_forward::{FeedForward, feed_forward};
 use super::pipeline_arguments::{ModelArguments, must_be_positive};
 use super::{note, put, readable, warn};
 use crate::api::usual_options;
-use crate::compensate::{CorrectionOptions, Corrector, Gate, GateLimits, IdentifiedArm, Stated};
+use crate::compensate::{CorrectionOptions, Corrector, Gate, GateLimits, Stated};
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
@@ -185,7 +185,7 @@ impl CompensateArguments {
             let message = "torques were identified, no positions: there is nothing to correct targets with; --torque gives the torques of a motion";
             return Err(Error::spec(&identified.origin, message));
         }
-        let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
+        let arm = identified.arm();
         let coverage = identified.coverage();
         let uncertainty = identified.uncertainty(&arm);
         let mut corrector = Corrector::new(&arm, coverage, uncertainty, manner(self, &identified)?);
@@ -215,7 +215,8 @@ impl CompensateArguments {
             let counting = identified.counting();
             let counting = counting.map_or_else(String::new, |line| format!("{line}\n"));
             let (origin, tally) = (&identified.origin, corrector.tally.summary());
-            note(format!("model: {origin}\n{counting}{tally}"));
+            let base = identified.base_in_words();
+            note(format!("model: {origin}\n{counting}{base}\n{tally}"));
         }
         let column = match language(&self.targets).is_some() || self.plain {
             true => "",

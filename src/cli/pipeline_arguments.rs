@@ -6,7 +6,7 @@ use super::surroundings::{cores, open_store, surroundings};
 use super::{emit_json, warn};
 use crate::compensate::GateLimits;
 use crate::error::{Error, Fault, Result};
-use crate::identified::{Files, IdentifiedModel, judges_of, steps_of};
+use crate::identified::{Files, IdentifiedModel, TargetBase, judges_of, steps_of};
 use crate::pipeline::{
     CompletedRun, Manifest, Override, Plan, Purpose, RunOptions, Selection, checked_plan, find_run,
     run,
@@ -16,7 +16,7 @@ use crate::raw::ending;
 use crate::shell::typed;
 use crate::store::Store;
 use crate::summary::LimitsSummary;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::json;
 use std::ffi::OsString;
@@ -128,6 +128,13 @@ impl ExecutionArguments {
     }
 }
 
+/// The base that targets are in.
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+enum BaseOfUse {
+    Own,
+    Smallest,
+}
+
 /// Where the model comes from.
 #[derive(Args)]
 pub(super) struct ModelArguments {
@@ -146,6 +153,10 @@ pub(super) struct ModelArguments {
     /// are the model of, as they are; a hash that does not hold is refused all the same
     #[arg(long)]
     unchecked: bool,
+    /// The base that targets are in: the robot's own, as it is identified under tolerances, or the one in which the robot as it was believed is
+    /// nearest to what was measured, for a cell that was taught with this robot
+    #[arg(long, value_name = "WHICH", value_enum, default_value_t = BaseOfUse::Own)]
+    base: BaseOfUse,
     /// Largest distance of the model's tool, or of a link or a joint's zero in mm, from the robot file's: a model beyond is refused
     #[arg(long, value_name = "MM", default_value_t = 50.0)]
     max_shift: f64,
@@ -183,8 +194,15 @@ impl ModelArguments {
             ("--max-tilt", Some(self.max_tilt)),
         ];
         Error::if_spec(must_be_positive(limits).collect())?;
-        let identified = self.identified(purpose, command_line)?;
+        let mut identified = self.identified(purpose, command_line)?;
         warn(&identified.warnings);
+        if self.base == BaseOfUse::Smallest {
+            if identified.data.is_none() {
+                let message = "needs the recording that the model was fitted to; a table of parameters alone has none: name a run";
+                return Err(Error::spec("--base", message));
+            }
+            identified.base = TargetBase::Smallest;
+        }
         self.judged(identified)
     }
 

@@ -3,7 +3,7 @@
 use super::pipeline_arguments::ModelArguments;
 use super::{emit_json, emit_lines, readable, write};
 use crate::api::usual_options;
-use crate::compensate::{CorrectionOptions, Corrector, IdentifiedArm};
+use crate::compensate::{CorrectionOptions, Corrector};
 use crate::error::{Error, Result, counted};
 use crate::identified::{Achieved, achieved};
 use crate::pipeline::Purpose;
@@ -53,7 +53,7 @@ impl VerifyRobotArguments {
         let place = self.second.display().to_string();
         let text = readable(&self.second, raw::text(&self.second))?;
         let identified = self.model.load(Purpose::Compensate, command_line)?;
-        let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
+        let arm = identified.arm();
         // As `compensate`: what depends on load is not predicted without one.
         let unstated = || identified.needed_load(&arm);
         let load = self.payload.is_none().then(unstated).flatten();

@@ -15,7 +15,7 @@ use crate::description::{JointDescription, JointKind, RobotDescription};
 use crate::effect::Load;
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::network::Correction;
-use crate::estimate::{Covariance, Model};
+use crate::estimate::{Covariance, Model, align};
 use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
 use crate::raw::ending;
 use crate::robot::{JointConvention, Measurements, RobotModel, Visited};
@@ -30,6 +30,16 @@ use std::path::{Path, PathBuf};
 
 /// How a stage's warning of a wrong set-up begins.
 const WRONG_SETUP: &str = "the set-up is wrong";
+
+/// The base that targets are in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TargetBase {
+    /// The robot's own, as it is identified under tolerances.
+    #[default]
+    Own,
+    /// That in which the robot as it was believed is nearest to what was measured: of a cell that was taught with this robot.
+    Smallest,
+}
 
 /// What was identified, and from what.
 pub struct IdentifiedModel {
@@ -65,6 +75,8 @@ pub struct IdentifiedModel {
     pub(crate) refusals: Vec<String>,
     /// The files that it was made from.
     pub(crate) sources: Vec<PathBuf>,
+    /// The base that targets are in.
+    pub(crate) base: TargetBase,
 }
 
 /// A table of parameters as a file, and the robot that they are of.
@@ -335,7 +347,35 @@ impl IdentifiedModel {
             stage_warnings: Vec::new(),
             refusals: Vec::new(),
             sources: Vec::new(),
+            base: TargetBase::Own,
         })
+    }
+
+    /// The arm that commands are corrected with, in the base that targets are in.
+    pub(crate) fn arm(&self) -> IdentifiedArm {
+        let arm = IdentifiedArm::new(self.model.clone(), self.correction.clone());
+        match (self.base, &self.data) {
+            (TargetBase::Smallest, Some(data)) => {
+                let mut as_identified = data.clone();
+                as_identified.points.position = arm.model().predict(data);
+                let rows: Vec<usize> = (0..data.rows()).collect();
+                let base = align(&self.model.robot, &as_identified, &rows);
+                arm.standing_at(base)
+            }
+            _ => arm,
+        }
+    }
+
+    /// The base that targets are in, in words.
+    pub(crate) fn base_in_words(&self) -> &'static str {
+        match self.base {
+            TargetBase::Own => {
+                "targets are in the robot's own base, as it is identified under tolerances"
+            }
+            TargetBase::Smallest => {
+                "targets are in the base in which the robot as it was believed is nearest to what was measured"
+            }
+        }
     }
 
     /// The largest load that was measured, kg; none where all rows carried nothing, or no recording is at hand.

@@ -6,8 +6,8 @@
 use crate::compensate::{IdentifiedArm, Scatter, Uncertainty, doubts};
 use crate::error::{counted, first_of};
 use crate::estimate::{
-    Covariance, Fitted, Model, Remedy, Screening, Session, Suspect, SuspectKind,
-    fit_screened, remedies,
+    Covariance, Fitted, Model, Remedy, Screening, Session, Suspect, SuspectKind, fit_screened,
+    remedies,
 };
 use crate::robot::Measurements;
 use crate::stage::Context;

@@ -243,15 +243,7 @@ fn geometric_rank(
         .iter()
         .flat_map(|name| model.stack.parameters_of(name));
     let geometry: Vec<usize> = geometry.collect();
-    let found = determined_directions(
-        &Session {
-            data,
-            rows,
-            model,
-            fitted,
-        },
-        &geometry,
-    );
+    let found = determined_directions(model, fitted, &geometry);
     let held = model.stack.specs().len() != fitted.singular_all.len();
     // A prior makes its parameter known whatever the data see.
     let has_prior = model.known.values().any(|known| known.prior.is_some());

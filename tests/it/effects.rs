@@ -42,7 +42,7 @@ fn all_effects(load: Load) -> Vec<Box<dyn Effect>> {
 fn values(stack: &EffectStack) -> Vec<f64> {
     let largest = |spec: &ParameterSpec| match spec.unit {
         Unit::RadianPerNewtonMetre => 1e-6,
-        _ => 0.02 * spec.prior_sigma.min(0.05),
+        _ => 0.02 * spec.tolerance.min(0.05),
     };
     stack
         .specs()
@@ -96,7 +96,7 @@ fn partials_are_central_differences() {
                 let step = if spec.unit == Unit::RadianPerNewtonMetre {
                     1e-8
                 } else {
-                    1e-4 * spec.prior_sigma.min(0.1)
+                    1e-4 * spec.tolerance.min(0.1)
                 };
                 let mut moved = x.clone();
                 moved[k] = x[k] + step;

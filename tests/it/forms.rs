@@ -277,8 +277,8 @@ fn plausible(form: &Form, robot: &RobotModel) -> Vec<f64> {
     let sized = specs.iter().enumerate().map(|(k, spec)| {
         let size = match spec.unit {
             Unit::RadianPerNewtonMetre => COMPLIANCE,
-            _ if spec.prior_sigma > 1e3 => 1.0,
-            _ => 1e-3 * spec.prior_sigma,
+            _ if spec.tolerance > 1e3 => 1.0,
+            _ => 1e-3 * spec.tolerance,
         };
         (0.5 + fixture::spread(k, 11)) * size
     });
@@ -395,7 +395,7 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
                 &spec.name,
                 &format!("{}.{}", form.name(), form.place().tag()),
             );
-            assert!(spec.prior_sigma > 0.0 && spec.prior_sigma.is_finite());
+            assert!(spec.tolerance > 0.0 && spec.tolerance.is_finite());
             assert_eq!(spec.place, form.place());
         }
         let variables: Vec<String> = form.variables().iter().map(ToString::to_string).collect();

@@ -73,6 +73,7 @@ mod store;
 mod suspects;
 mod swarm;
 mod tables;
+mod tolerances;
 mod torques;
 mod trail;
 mod transfer;

@@ -81,6 +81,11 @@ impl IdentifiedArm {
         }
     }
 
+    /// The same arm with targets in another base, given in the tracker's frame.
+    pub fn standing_at(self, base: Pose) -> Self {
+        Self { base, ..self }
+    }
+
     /// Nominal arm, effects and their values.
     pub fn model(&self) -> &Model {
         &self.model
@@ -117,7 +122,7 @@ impl IdentifiedArm {
         places.into_iter().collect()
     }
 
-    /// The base in the tracker's frame.
+    /// The base that targets are in, in the tracker's frame.
     pub fn base(&self) -> &Pose {
         &self.base
     }

@@ -15,6 +15,7 @@ use crate::effect::Place;
 use crate::observation::{Dimension, ExcessSigma, Residual};
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
 /// How a fit treated a parameter of the stack.
@@ -264,13 +265,20 @@ pub fn beyond_tolerance(model: &Model, parameter: usize) -> Option<f64> {
     (of_the_arm && !is_known && times > BEYOND).then_some(times)
 }
 
-/// How many directions of some parameters the rows determine better than the priors do, about a fitted model.
-pub fn determined_directions(session: &Session, parameters: &[usize]) -> usize {
-    let (problem, model) = (session.problem(), session.model);
-    let factor = problem
-        .shown(model, parameters)
-        .unwrap_or_else(|| problem.observe(model, parameters).factor);
-    determined(&factor.singular_values(&model.prior_sigmas(parameters)))
+/// How many directions of some parameters are known better than their tolerances leave them, whatever the others are: by the data, or by a
+/// prior that was stated.
+pub fn determined_directions(model: &Model, fitted: &Fitted, parameters: &[usize]) -> usize {
+    let covariance = fitted.covariance.as_ref();
+    let Some(covariance) = covariance.and_then(|all| all.block(parameters)) else {
+        return 0;
+    };
+    let scale = |i: usize| model.tolerances[parameters[i]];
+    let size = covariance.nrows();
+    let scaled = DMatrix::from_fn(size, size, |i, j| {
+        covariance[(i, j)] / (scale(i) * scale(j))
+    });
+    let shares = scaled.symmetric_eigenvalues();
+    shares.iter().filter(|share| **share < 0.5).count()
 }
 
 /// How many of the singular values, largest first, are of directions that the data determine.

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::fixture::all_rows;
 use calib::description::RobotDescription;
-use calib::estimate::ParameterStatus;
+use calib::estimate::{Determined, determined_directions};
 use calib::observation::rank;
 use calib::twin::touch::Fixture;
 
@@ -30,7 +30,11 @@ fn seen_knowing(
 ) -> usize {
     let data = touched(robot, &truth(robot, 1), fixtures, 7).measurements();
     let (model, fitted) = calibrated_knowing(robot, &data, lengths, effects, known);
-    let (setup, free) = (model.robot.setup(), fitted.free().len());
+    let all: Vec<usize> = (0..model.x.len()).collect();
+    let (setup, free) = (
+        model.robot.setup(),
+        determined_directions(&model, &fitted, &all),
+    );
     // Theory knows places of sockets, three numbers each, and no diameters.
     if effects.is_empty() && known.len().is_multiple_of(3) {
         let (rows, scaled) = (all_rows(&data), !lengths.is_empty());
@@ -127,34 +131,16 @@ fn wind_up_adds_one_for_each_joint_that_gravity_loads() {
         let fixtures = [socket("a", A, 60, 0.0), socket("c", C, 60, 0.0)];
         let data = touched(&robot, &truth(&robot, 1), &fixtures, 7).measurements();
         let (model, fitted) = calibrated(&robot, &data, &[], &["joint_compliance"]);
-        let wind_up: Vec<&ParameterStatus> = model
+        let wind_up: Vec<Determined> = model
             .stack
             .parameters_of("joint_compliance")
-            .map(|k| &fitted.statuses[k])
+            .filter_map(|k| fitted.determined(&model, k))
             .collect();
-        assert!(
-            wind_up
-                .iter()
-                .all(|status| !matches!(status, ParameterStatus::Redundant(_))),
-            "{}: {wind_up:?}",
-            robot.name
-        );
+        assert_eq!(wind_up.len(), n, "{}: {wind_up:?}", robot.name);
         // The first axis is vertical: nothing loads it. Masses near the axes of a wrist load these too little to be seen.
-        assert!(
-            matches!(wind_up[0], ParameterStatus::Unseen),
-            "{}: {wind_up:?}",
-            robot.name
-        );
-        let loaded = wind_up
-            .iter()
-            .filter(|status| matches!(status, ParameterStatus::Free(_)))
-            .count();
+        assert_eq!(wind_up[0], Determined::ByTolerance, "{}", robot.name);
+        let is_seen = |known: &&Determined| **known == Determined::Determined;
+        let loaded = wind_up.iter().filter(is_seen).count();
         assert!(loaded >= 3, "{}: {wind_up:?}", robot.name);
-        assert_eq!(
-            fitted.free().len() - model.robot.setup().first_of_anchor(2),
-            4 * n - 4 + loaded,
-            "{}",
-            robot.name
-        );
     }
 }
