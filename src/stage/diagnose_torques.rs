@@ -39,7 +39,7 @@ pub struct DiagnoseTorques {
     /// joints come and go.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) cutoff_hz: Option<f64>,
-    /// Causes that are not tried and never named.
+    /// Names that are not given: what such a cause explains is `unknown` at its place.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) without: Vec<String>,
 }

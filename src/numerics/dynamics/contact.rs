@@ -53,8 +53,10 @@ pub(super) fn contacts(
         .filter(|row| held_out || !problem.is_held_out(*row))
         .collect();
     let energy = |row: &usize| {
-        let joints = residual.iter().zip(sigma);
-        let squares = joints.map(|(course, sigma)| (course[*row] / sigma).powi(2));
+        let joints = residual.iter().zip(sigma).enumerate();
+        let squares = joints.map(|(joint, (course, sigma))| {
+            (course[*row] / sigma_of_row(problem, joint, *row, *sigma)).powi(2)
+        });
         squares.sum::<f64>() / sigma.len() as f64
     };
     let energy: Vec<f64> = shown.iter().map(energy).collect();
@@ -83,6 +85,14 @@ pub(super) fn contacts(
     }
     events.sort_by(|a: &ContactEvent, b| a.start.total_cmp(&b.start));
     events
+}
+
+/// Errors of differentiation last as long as a push does: so many times their size is noise.
+const NUMERICS: f64 = 3.0;
+
+/// Nm: the noise of a joint in a row with what differentiation may make there.
+fn sigma_of_row(problem: &TorqueProblem, joint: usize, row: usize, sigma: f64) -> f64 {
+    sigma.hypot(NUMERICS * problem.numerics[joint][row])
 }
 
 /// The window about `middle` in which a force gains most, if it explains the residual there.
@@ -171,10 +181,8 @@ fn pushed(
         let push = window.force(time[row]);
         let jacobian = problem.scene.tool_jacobian(problem.reduction.rows[row]);
         for (joint, along) in jacobian.iter().enumerate() {
-            let (column, value) = (
-                -along * push / sigma[joint],
-                residual[joint][row] / sigma[joint],
-            );
+            let sigma = sigma_of_row(problem, joint, row, sigma[joint]);
+            let (column, value) = (-along * push / sigma, residual[joint][row] / sigma);
             gram += column * column.transpose();
             right += column * value;
             square += value * value;
