@@ -15,6 +15,8 @@ use std::f64::consts::PI;
 const DURATIONS: [f64; 6] = [0.6, 0.9, 1.2, 1.6, 2.0, 2.6];
 /// Share of a push in which it rises and falls: all of it, or one that is held between.
 const TAPERS: [f64; 3] = [1.0, 0.4, 0.1];
+/// s: nothing shorter is a push, arms are pushed for about a second.
+const SHORTEST: f64 = 0.3;
 /// s about the highest point that are tried as middles: steps on either side, and their length.
 const STEPS: i32 = 6;
 const STEP: f64 = 0.1;
@@ -107,7 +109,7 @@ fn best_window(
     let mut look = |start: f64, duration: f64| {
         let first = time.partition_point(|time| *time < start);
         let last = time.partition_point(|time| *time <= start + duration);
-        if last >= first + *PUSH_FEWEST {
+        if last >= first + *PUSH_FEWEST && duration > SHORTEST {
             for taper in TAPERS {
                 let window = PushWindow {
                     start,

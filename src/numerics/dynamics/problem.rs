@@ -8,7 +8,9 @@ use super::cause::{
     COULOMB, OFFSET, ROTOR, TORQUE_CAUSES, TorqueCause, TorqueForm, VISCOUS, friction_of,
 };
 use super::columns::{ReducedRegressor, Reduction, TorqueColumn, TorqueColumns, columns_of};
-use super::recording::{RecordingClock, TorqueRecording, add, by_joint, ends, lagrange, largest};
+use super::recording::{
+    RecordingClock, TorqueRecording, add, by_joint, ends, lagrange, largest, square,
+};
 use super::scene::DynamicScene;
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueQuestion};
@@ -366,6 +368,9 @@ impl<'a> TorqueProblem<'a> {
 /// s about a row over which what numerics make is taken for as large as the largest of it: a jump of an acceleration is not exactly at a row.
 const AROUND: f64 = 0.12;
 
+/// Share of a torque that the digits of a recording do not hold.
+const DIGITS: f64 = 1e-5;
+
 /// Nm: by how much rigid torques (`[joint][judged row]`) differ with positions filtered otherwise.
 fn numerics_of(fine: &DynamicScene, coarse: &DynamicScene, reduction: &Reduction) -> Vec<Vec<f64>> {
     let courses = fine.rigid.iter().zip(&coarse.rigid);
@@ -379,7 +384,14 @@ fn numerics_of(fine: &DynamicScene, coarse: &DynamicScene, reduction: &Reduction
         };
         (0..course.len()).map(of_row).collect()
     };
-    apart.into_iter().map(widest).collect()
+    let rigid = reduction.reduce(fine.rigid.clone());
+    let whole = apart.into_iter().map(widest).zip(rigid);
+    whole
+        .map(|(course, rigid): (Vec<f64>, Vec<f64>)| {
+            let size = (square(&rigid) / rigid.len().max(1) as f64).sqrt();
+            course.iter().map(|made| made + DIGITS * size).collect()
+        })
+        .collect()
 }
 
 /// Runs of rows that count.

@@ -266,7 +266,7 @@ impl FileRows {
                     (moved > 0).then(|| {
                         let (name, moved) = (arm.called(joint), counted(moved, "row"));
                         format!(
-                            "{name} is logged within one turn and {moved} of it are beyond its limits: they are read a turn away, within them"
+                            "{name} is logged within one turn: {moved} beyond its limits, read a turn away, within them"
                         )
                     })
                 };

@@ -62,7 +62,7 @@ const CHUNK: usize = 1 << 16;
 const MOST_LABELS: usize = 100;
 
 crate::stage::stage! {
-    IngestTorques, "ingest_torques", 2, "reads joint positions with torques or motor currents of an arm that moves",
+    IngestTorques, "ingest_torques", 3, "reads joint positions with torques or motor currents of an arm that moves",
         IngestTorquesReads {
             robot: Robot,
         } -> IngestTorquesWrites {

@@ -9,6 +9,8 @@ use std::f64::consts::{PI, TAU};
 const NEAR: f64 = 0.5 * PI;
 /// rad: what rounding in the file's unit may add to a limit or to a window.
 const SLACK: f64 = 1e-3;
+/// rad: poses that are torn by the end of a turn lie on both sides of it; a joint a little beyond its limits is none.
+const SPREAD: f64 = 1.5 * PI;
 /// Windows of one turn that controllers log in, rad.
 const WINDOWS: [[f64; 2]; 2] = [[0.0, TAU], [-PI, PI]];
 
@@ -149,7 +151,13 @@ pub(super) fn within_limits(values: &mut [&mut f64], limits: [f64; 2]) -> usize 
     let fits = values.iter().all(|value| !is_beyond(within(**value)));
     let is_mixed = values.iter().any(|value| !is_beyond(**value));
     let after = ends(&mut values.iter().map(|value| within(**value)));
-    if !is_logged_so || !is_mixed || !fits || after[1] - after[0] > before[1] - before[0] + SLACK {
+    let is_spread = before[1] - before[0] > SPREAD;
+    if !is_logged_so
+        || !is_spread
+        || !is_mixed
+        || !fits
+        || after[1] - after[0] > before[1] - before[0] + SLACK
+    {
         return 0;
     }
     let mut moved = 0;
