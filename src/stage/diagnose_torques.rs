@@ -39,7 +39,7 @@ pub struct DiagnoseTorques {
     /// joints come and go.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) cutoff_hz: Option<f64>,
-    /// Causes that are not tried and never named.
+    /// Names that are not given: what such a cause explains is `unknown` at its place.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) without: Vec<String>,
 }
@@ -82,7 +82,7 @@ pub enum ConsistencySetting {
 const LAST: f64 = 0.3;
 
 crate::stage::stage! {
-    DiagnoseTorques, "diagnose_torques", 17, "names the physics that the simulated torques of a moving arm lack",
+    DiagnoseTorques, "diagnose_torques", 18, "names the physics that the simulated torques of a moving arm lack",
         DiagnoseTorquesReads {
             robot: Robot,
             motion: Chunks<ArmMotion>,
@@ -294,7 +294,7 @@ impl DiagnoseTorques {
 pub struct CompareTorques {}
 
 crate::stage::stage! {
-    CompareTorques, "compare_torques", 5, "tests what changed between two recordings of an arm's torques: payload, friction, offsets",
+    CompareTorques, "compare_torques", 6, "tests what changed between two recordings of an arm's torques: payload, friction, offsets",
         CompareTorquesReads {
             robot: Robot,
             motion: Chunks<ArmMotion>,

@@ -19,6 +19,7 @@ mod row;
 mod rows;
 mod stretch;
 mod torques;
+mod turns;
 mod verdict;
 mod write;
 

@@ -208,7 +208,10 @@ fn check_values(
             ));
         }
     }
-    Error::if_data(faults)
+    match Error::if_data(faults) {
+        Err(made) if !schema.given => Err(Error::Bug(made.to_string())),
+        checked => checked,
+    }
 }
 
 /// Whether all numbers are finite and in range, those in the place of null cells too.

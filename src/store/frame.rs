@@ -75,7 +75,7 @@ impl FrameBuilder {
         }
         Ok(())
     }
-    /// Checks the columns. Values out of range are errors of the data, all else is a bug of the stage.
+    /// Checks the columns. Values out of range are errors of the data in a table of what people gave, all else is a bug of the stage.
     pub fn finish(self) -> Result<Frame> {
         let schema = schema::of(&self.kind)?;
         Ok(Frame {

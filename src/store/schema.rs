@@ -47,6 +47,9 @@ pub struct TableSchema {
     pub version: Version,
     /// What a row is.
     pub description: String,
+    /// Whether people gave its values, so that one out of range is theirs to mend; else it is a bug of the stage that made it.
+    #[serde(default)]
+    pub(crate) given: bool,
     /// Columns that tell every row from every other.
     pub primary_key: Vec<String>,
     /// Columns that rows are in ascending order of: the primary key in some order.

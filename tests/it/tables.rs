@@ -347,3 +347,24 @@ fn the_schema_of_fleet_files_is_that_of_their_type() {
         "run: calib schema fleet > schemas/fleet.v1.schema.json"
     );
 }
+
+#[test]
+fn a_number_out_of_range_is_a_bug_in_what_calib_made_and_a_fault_in_what_people_gave() {
+    let made = table::Findings(vec![table::FindingRow {
+        probability: Some(-3e-14),
+        ..Default::default()
+    }]);
+    let given = table::Robot(vec![table::RobotRow {
+        kind: "base".into(),
+        gravity_m_s2: Some(-9.81),
+        ..Default::default()
+    }]);
+    let codes = [made.to_frame(), given.to_frame()].map(|frame| {
+        let error = frame.unwrap_err();
+        (
+            error.exit_code(),
+            error.to_string().contains("out of range"),
+        )
+    });
+    assert_eq!(codes, [(70, true), (10, true)]);
+}

@@ -7,6 +7,7 @@ mod feed_forward;
 mod friction;
 mod hostile;
 mod masses;
+mod nulls;
 mod results;
 mod rigid;
 

@@ -61,7 +61,8 @@ pub struct Evidence {
     pub f_statistic: f64,
     /// Chance that noise gives as much to this form alone: the search among many is in the probabilities, not in this.
     pub p_value: f64,
-    /// Twice ln of the evidence for it beside all others, without prior odds. Of torques: how much worse the criterion is without it.
+    /// Twice ln of the evidence for it beside all others, without prior odds; of what has no cell (a latency, a push) by its gain less ln of the rows
+    /// for each number, which it tends to.
     pub delta_bic: f64,
     /// `None` of positions. Of torques: fall of the rms error of held-out rows over all joints when what is left is fitted again (left as it
     /// is for wrong masses, for which tolerances would bend); `None` where none are held out.
@@ -79,7 +80,7 @@ pub struct RivalCause {
     pub effect: &'static str,
     /// Where it acts.
     pub place: Place,
-    /// Twice ln of the posterior odds of the finding against it. Of torques: how much worse the criterion is with it in place of the finding.
+    /// Twice ln of the posterior odds of the finding against it.
     pub delta_bic: f64,
     /// That it is this cause and not the finding's, see [`Probabilities`].
     pub probability: f64,
@@ -95,6 +96,14 @@ pub struct Probabilities {
     pub place: f64,
     /// That it is neither what it is called nor any of the rivals.
     pub none: f64,
+}
+
+impl Probabilities {
+    /// Of sums that rounding may carry beyond 0 or 1.
+    pub fn new(name: f64, place: f64, none: f64) -> Self {
+        let [name, place, none] = [name, place, none].map(|value| value.clamp(0.0, 1.0));
+        Self { name, place, none }
+    }
 }
 
 /// A cause of what the base model leaves.
@@ -154,11 +163,7 @@ impl Finding {
             parameters: Vec::new(),
             evidence: None,
             rivals: Vec::new(),
-            probabilities: Probabilities {
-                name: probability,
-                place: probability,
-                none: 1.0 - probability,
-            },
+            probabilities: Probabilities::new(probability, probability, 1.0 - probability),
             valid: None,
             forms: Vec::new(),
         }

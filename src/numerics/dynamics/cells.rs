@@ -346,6 +346,11 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         may_be.then_some((found.log, found.amplitude))
     }
 
+    /// ln of the odds of a form's cell before the rows are looked at.
+    pub(super) fn log_prior(&self, form: usize) -> f64 {
+        self.cells[self.cell_of[&form]].log_prior
+    }
+
     /// ln of the number of shapes of a cell that may be chosen.
     pub(super) fn log_count(&self, cell: usize) -> f64 {
         (self.open(cell).count().max(1) as f64).ln()

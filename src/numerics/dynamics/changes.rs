@@ -3,7 +3,7 @@
 
 use super::arm::{DynamicArm, INERTIAL_NUMBERS, unit_number};
 use super::cause::{
-    CENTRE, COULOMB_FRICTION, CURRENT_OFFSET, InertialChanges, PAYLOAD, TORQUE_CAUSES, TorqueForm,
+    CENTRE, COULOMB_FRICTION, CURRENT_OFFSET, InertialChanges, PAYLOAD, TorqueForm,
     VISCOUS_FRICTION,
 };
 use super::columns::{TorqueColumn, TorqueColumns};
@@ -177,7 +177,7 @@ fn prepared<'a>(
     problem.events = one.events.to_vec();
     problem.scene.believe(&about.inertials);
     problem.scene.friction = about.friction(&about.places()?.forms, &problem.scene);
-    problem.form(&TORQUE_CAUSES.map(|cause| cause.name.to_string()));
+    problem.form_base();
     Ok(problem)
 }
 

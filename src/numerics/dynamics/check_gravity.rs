@@ -1,9 +1,10 @@
 //! A recording against the gravity of the declared arm: torques in a wrong unit, with another sign or of another joint, and angles in a wrong
-//! unit or of another joint.
+//! unit or of another joint. Gravity itself is asked before them.
 
 use super::arm::{DeclaredInertials, DynamicArm};
 use super::newton_euler::at_rest;
 use super::recording::{TorqueRecording, add};
+use super::seen_gravity::SeenGravity;
 use crate::criteria::torque::{UNIT, WEIGHS, WEIGHTY};
 use crate::error::Fault;
 use crate::statistics::nearest;
@@ -12,6 +13,8 @@ use crate::statistics::nearest;
 const UNIT_RATIO: f64 = 50.0;
 /// Ratio of the squared error with another reading of the columns to that without.
 const EXCHANGED: f64 = 0.2;
+/// Share of the torques that another reading may leave, at most: one that makes gravity constant explains what is nearly nothing.
+const MEANT: f64 = 0.5;
 /// Nm: below it gravity shows nothing of units.
 const SMALL_TORQUE: f64 = 1e-3;
 /// Rows at which other readings of the angles are tried.
@@ -25,6 +28,10 @@ pub(super) fn gravity_faults(arm: &DynamicArm, recording: &TorqueRecording) -> V
         return Vec::new();
     };
     let theta = DeclaredInertials::of(arm, links).theta;
+    let seen = SeenGravity::of(arm, recording, &theta);
+    if let Some(fault) = seen.and_then(|seen| seen.fault(arm)) {
+        return vec![fault];
+    }
     let faults = torque_faults(arm, recording, &theta);
     if faults.is_empty() {
         angle_fault(arm, recording, &theta).into_iter().collect()
@@ -138,6 +145,8 @@ fn remedy(from_current: bool, times: f64) -> String {
 enum AngleReading {
     /// As they stand.
     Straight,
+    /// One position in all rows, so that gravity explains nothing.
+    Constant,
     Scaled(f64),
     /// The angles of two joints.
     Exchanged(usize, usize),
@@ -156,13 +165,14 @@ fn angle_fault(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -> 
         .chain(pairs().map(|(one, other)| AngleReading::Renamed(one, other)));
     let left = others.map(|reading| (reading, unexplained(arm, recording, theta, reading)));
     let (best, left) = left.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (left < EXCHANGED * straight).then(|| {
+    let whole = unexplained(arm, recording, theta, AngleReading::Constant);
+    (left < EXCHANGED * straight && left < MEANT * whole).then(|| {
         let better = (straight / left.max(f64::MIN_POSITIVE)).sqrt();
         let reading = match best {
             AngleReading::Scaled(factor) if factor > 1.0 => {
                 "angles were radians already and were converted from degrees once more".into()
             }
-            AngleReading::Straight | AngleReading::Scaled(_) => {
+            AngleReading::Straight | AngleReading::Constant | AngleReading::Scaled(_) => {
                 "angles are degrees where radians are expected".into()
             }
             AngleReading::Exchanged(one, other) => {
@@ -219,6 +229,7 @@ fn unexplained(
         let mut torque = recording.torque[row * n..(row + 1) * n].to_vec();
         match reading {
             AngleReading::Straight => (),
+            AngleReading::Constant => position.fill(0.0),
             AngleReading::Scaled(factor) => position.iter_mut().for_each(|angle| *angle *= factor),
             AngleReading::Exchanged(one, other) => position.swap(one, other),
             AngleReading::Renamed(one, other) => {

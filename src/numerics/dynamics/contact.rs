@@ -15,6 +15,8 @@ use std::f64::consts::PI;
 const DURATIONS: [f64; 6] = [0.6, 0.9, 1.2, 1.6, 2.0, 2.6];
 /// Share of a push in which it rises and falls: all of it, or one that is held between.
 const TAPERS: [f64; 3] = [1.0, 0.4, 0.1];
+/// s: nothing shorter is a push, arms are pushed for about a second.
+const SHORTEST: f64 = 0.3;
 /// s about the highest point that are tried as middles: steps on either side, and their length.
 const STEPS: i32 = 6;
 const STEP: f64 = 0.1;
@@ -53,8 +55,10 @@ pub(super) fn contacts(
         .filter(|row| held_out || !problem.is_held_out(*row))
         .collect();
     let energy = |row: &usize| {
-        let joints = residual.iter().zip(sigma);
-        let squares = joints.map(|(course, sigma)| (course[*row] / sigma).powi(2));
+        let joints = residual.iter().zip(sigma).enumerate();
+        let squares = joints.map(|(joint, (course, sigma))| {
+            (course[*row] / sigma_of_row(problem, joint, *row, *sigma)).powi(2)
+        });
         squares.sum::<f64>() / sigma.len() as f64
     };
     let energy: Vec<f64> = shown.iter().map(energy).collect();
@@ -85,6 +89,14 @@ pub(super) fn contacts(
     events
 }
 
+/// Errors of differentiation last as long as a push does: so many times their size is noise.
+const NUMERICS: f64 = 3.0;
+
+/// Nm: the noise of a joint in a row with what differentiation may make there.
+fn sigma_of_row(problem: &TorqueProblem, joint: usize, row: usize, sigma: f64) -> f64 {
+    sigma.hypot(NUMERICS * problem.numerics[joint][row])
+}
+
 /// The window about `middle` in which a force gains most, if it explains the residual there.
 fn best_window(
     problem: &TorqueProblem,
@@ -97,7 +109,7 @@ fn best_window(
     let mut look = |start: f64, duration: f64| {
         let first = time.partition_point(|time| *time < start);
         let last = time.partition_point(|time| *time <= start + duration);
-        if last >= first + *PUSH_FEWEST {
+        if last >= first + *PUSH_FEWEST && duration > SHORTEST {
             for taper in TAPERS {
                 let window = PushWindow {
                     start,
@@ -171,10 +183,8 @@ fn pushed(
         let push = window.force(time[row]);
         let jacobian = problem.scene.tool_jacobian(problem.reduction.rows[row]);
         for (joint, along) in jacobian.iter().enumerate() {
-            let (column, value) = (
-                -along * push / sigma[joint],
-                residual[joint][row] / sigma[joint],
-            );
+            let sigma = sigma_of_row(problem, joint, row, sigma[joint]);
+            let (column, value) = (-along * push / sigma, residual[joint][row] / sigma);
             gram += column * column.transpose();
             right += column * value;
             square += value * value;

@@ -62,7 +62,12 @@ impl<'a> FittedSet<'a> {
         let named = named.filter(|number| !is_silent(choice.form(*number)));
         let found = named.map(|number| {
             let odds = table.odds_in_place(&components, number);
-            weighed(self.finding(number, held_out), odds)
+            let log = odds.0 - table.log_prior(number);
+            let mut finding = self.finding(number, held_out);
+            if log.is_finite() {
+                finding.evidence.delta_bic = 2.0 * log;
+            }
+            weighed(finding, odds)
         });
         let is_named = |finding: &TorqueFinding| {
             [VISCOUS, COULOMB].contains(&finding.effect) || finding.probabilities.name >= *RIVAL
@@ -207,11 +212,7 @@ fn weighed(mut finding: TorqueFinding, (log_odds, rivals): CellOdds) -> TorqueFi
     finding
         .rivals
         .sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    finding.probabilities = Probabilities {
-        name: share(log_odds),
-        place: here,
-        none: share(0.0) + *MISLED,
-    };
+    finding.probabilities = Probabilities::new(share(log_odds), here, share(0.0) + *MISLED);
     finding
 }
 

@@ -35,6 +35,7 @@ mod problem;
 mod recording;
 mod refine;
 mod scene;
+mod seen_gravity;
 mod solve;
 mod sweep;
 mod thin;

@@ -161,15 +161,24 @@ impl InverseDynamics {
 
 /// Torques of an arm with inertial numbers that stands still at some positions.
 pub(super) fn at_rest(arm: &DynamicArm, theta: &[f64]) -> impl FnMut(&[f64]) -> Vec<f64> {
+    let mut torque_at = at_rest_under(arm, theta);
+    move |position| torque_at(position, &arm.gravity)
+}
+
+/// The same under any gravity, m/s^2 in the base frame.
+pub(super) fn at_rest_under(
+    arm: &DynamicArm,
+    theta: &[f64],
+) -> impl FnMut(&[f64], &Vector3<f64>) -> Vec<f64> {
     let (mut dynamics, still) = (InverseDynamics::new(arm), vec![0.0; arm.joints()]);
-    move |position| {
+    move |position, gravity| {
         let motion = MotionRow {
             position,
             velocity: &still,
             acceleration: &still,
         };
         let mut torque = still.clone();
-        dynamics.torque(motion, &arm.gravity, theta, &mut torque);
+        dynamics.torque(motion, gravity, theta, &mut torque);
         torque
     }
 }

@@ -1,7 +1,7 @@
 //! The answer to a diagnosis of torques, from what was solved.
 
 use super::arm::{INERTIAL_NAMES, INERTIAL_NUMBERS, inertial_unit};
-use super::cause::{FittedNumber, plain};
+use super::cause::{FittedNumber, UNKNOWN, plain};
 use super::cells::CauseChoice;
 use super::enforce::with_bodies;
 use super::findings::{FittedSet, contact, plain_finding, sigma_of};
@@ -14,7 +14,7 @@ use super::types::{
     TorqueFinding, TorqueLeftover, TorqueNoise, TorqueQuestion,
 };
 use super::weighted::{JointNoise, NoiseMemory};
-use crate::diagnose::VerdictKind;
+use crate::diagnose::{Probabilities, VerdictKind};
 use crate::effect::Place;
 use crate::error::counted;
 use crate::statistics::quantile;
@@ -54,6 +54,9 @@ pub(super) fn outcome(
     let mut found = fit.findings(&solved.silent, &held);
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));
+    found
+        .iter_mut()
+        .for_each(|one| nameless(one, &question.without));
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
     let leftover = leftover(problem, &last);
     let over = after.rms.iter().zip(&problem.noise);
@@ -122,6 +125,32 @@ fn filters_remark(problem: &TorqueProblem) -> String {
         "measured and simulated torques are low-passed alike at {:.1} Hz without delay; {:.1} rows a second are judged; the sign of friction turns over {:.3} rad/s{turns}",
         problem.reduction.cutoff, problem.reduction.rate, problem.scene.sign_width
     )
+}
+
+/// A finding whose name is not to be given is without one at its place, and so are its rivals.
+fn nameless(finding: &mut TorqueFinding, without: &[String]) {
+    let is_left_out = |effect: &str| without.iter().any(|name| name == effect);
+    if is_left_out(finding.effect) {
+        finding.effect = UNKNOWN;
+        finding.statement = format!("something without a name acts at {}", finding.place);
+    }
+    let here = (finding.effect, finding.place);
+    for rival in finding
+        .rivals
+        .iter_mut()
+        .filter(|rival| is_left_out(rival.effect))
+    {
+        rival.effect = UNKNOWN;
+    }
+    let probabilities = &mut finding.probabilities;
+    finding.rivals.retain(|rival| {
+        let is_same = (rival.effect, rival.place) == here;
+        if is_same {
+            let Probabilities { name, place, none } = *probabilities;
+            *probabilities = Probabilities::new(name + rival.probability, place, none);
+        }
+        !is_same
+    });
 }
 
 fn late(latency: &Latency) -> TorqueFinding {

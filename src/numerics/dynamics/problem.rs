@@ -8,7 +8,9 @@ use super::cause::{
     COULOMB, OFFSET, ROTOR, TORQUE_CAUSES, TorqueCause, TorqueForm, VISCOUS, friction_of,
 };
 use super::columns::{ReducedRegressor, Reduction, TorqueColumn, TorqueColumns, columns_of};
-use super::recording::{RecordingClock, TorqueRecording, add, by_joint, ends, lagrange};
+use super::recording::{
+    RecordingClock, TorqueRecording, add, by_joint, ends, lagrange, largest, square,
+};
 use super::scene::DynamicScene;
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueQuestion};
@@ -35,6 +37,9 @@ pub(super) struct TorqueProblem<'a> {
     torque: Vec<Vec<f64>>,
     /// s by which torques come late.
     pub(crate) latency: f64,
+    /// Nm, `[joint][judged row]`: how far differentiation and rounding of the positions may move the rigid torque, by how far it moves with the
+    /// filter of the positions; 0 where no masses are declared.
+    pub(crate) numerics: Vec<Vec<f64>>,
     /// `[joint]`: measured minus rigid torque of judged rows.
     pub(crate) measured: Vec<Vec<f64>>,
     /// Whether each judged row is held out.
@@ -70,8 +75,12 @@ impl<'a> TorqueProblem<'a> {
         );
         let temperature = recording.temperature.as_ref();
         let temperature = temperature.map(|all| ends(all.iter().copied()));
+        let coarse =
+            DynamicScene::half_band(arm, &recording, clock, cutoff, question.free_inertials);
+        let numerics = numerics_of(&scene, &coarse, &reduction);
         let rows = reduction.rows.iter();
         let mut problem = Self {
+            numerics,
             held_out: rows.map(|row| recording.held_out[*row]).collect(),
             all: TorqueColumns::default(),
             scene,
@@ -92,8 +101,8 @@ impl<'a> TorqueProblem<'a> {
         problem
     }
 
-    /// Forms the columns: of the base, and of all forms of all causes but `without`.
-    pub(crate) fn form(&mut self, without: &[String]) {
+    /// Forms the columns of the base alone.
+    pub(crate) fn form_base(&mut self) {
         let half_range = |joint: usize| {
             let course = self.torque_at(joint, self.latency).into_iter();
             let fitted = course.zip(&self.held_out).filter(|(_, held)| !**held);
@@ -102,11 +111,14 @@ impl<'a> TorqueProblem<'a> {
         };
         let torque = (0..self.joints()).map(half_range).collect();
         self.all = TorqueColumns::of_base(&self.scene, &self.regressor, torque);
+    }
+
+    /// Forms the columns: of the base, and of all forms of all causes.
+    pub(crate) fn form(&mut self) {
+        self.form_base();
         for cause in TORQUE_CAUSES {
-            if without.iter().all(|name| name != cause.name) {
-                for form in (cause.forms)(cause, &self.scene) {
-                    self.push(form);
-                }
+            for form in (cause.forms)(cause, &self.scene) {
+                self.push(form);
             }
         }
         self.all.listed = self.all.forms.len();
@@ -261,6 +273,14 @@ impl<'a> TorqueProblem<'a> {
         self.measured = self.difference(latency);
     }
 
+    /// Nm, rms over fitted rows of what numerics may make at some joints.
+    pub(crate) fn numerics_at(&self, joints: &[usize]) -> f64 {
+        let rows = self.counted_rows(false);
+        let courses = joints.iter().map(|joint| &self.numerics[*joint]);
+        let squares = courses.flat_map(|course| rows.iter().map(|row| course[*row].powi(2)));
+        (squares.sum::<f64>() / (rows.len() * joints.len()).max(1) as f64).sqrt()
+    }
+
     /// Courses of the regressor at each joint in some judged rows.
     pub(crate) fn base_courses(&self, rows: &[usize]) -> Vec<Vec<Vec<f64>>> {
         let numbers = 10 * self.joints();
@@ -345,6 +365,35 @@ impl<'a> TorqueProblem<'a> {
     }
 }
 
+/// s about a row over which what numerics make is taken for as large as the largest of it: a jump of an acceleration is not exactly at a row.
+const AROUND: f64 = 0.12;
+
+/// Share of a torque that the digits of a recording do not hold.
+const DIGITS: f64 = 1e-5;
+
+/// Nm: by how much rigid torques (`[joint][judged row]`) differ with positions filtered otherwise.
+fn numerics_of(fine: &DynamicScene, coarse: &DynamicScene, reduction: &Reduction) -> Vec<Vec<f64>> {
+    let courses = fine.rigid.iter().zip(&coarse.rigid);
+    let apart = courses.map(|(fine, coarse)| fine.iter().zip(coarse).map(|(a, b)| a - b).collect());
+    let apart = reduction.reduce(apart.collect());
+    let around = (AROUND * reduction.rate).ceil() as usize;
+    let widest = |course: Vec<f64>| {
+        let of_row = |row: usize| {
+            let first = row.saturating_sub(around);
+            largest(&course[first..(row + around + 1).min(course.len())])
+        };
+        (0..course.len()).map(of_row).collect()
+    };
+    let rigid = reduction.reduce(fine.rigid.clone());
+    let whole = apart.into_iter().map(widest).zip(rigid);
+    whole
+        .map(|(course, rigid): (Vec<f64>, Vec<f64>)| {
+            let size = (square(&rigid) / rigid.len().max(1) as f64).sqrt();
+            course.iter().map(|made| made + DIGITS * size).collect()
+        })
+        .collect()
+}
+
 /// Runs of rows that count.
 fn runs_where(rows: Range<usize>, counts: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let rows: Vec<usize> = rows.collect();
@@ -412,8 +461,12 @@ pub(super) fn noise_of_fit(
         residual = problem.residual(&sweep.solution());
     }
     let spent = problem.all.with_base(forms).len() as f64 / problem.joints() as f64;
-    let of_course = |course: &Vec<f64>| JointNoise::of(course, &runs, spent, memory);
-    (residual.iter().map(of_course).collect(), residual)
+    let courses = residual.iter().zip(&problem.numerics);
+    let noise = courses.map(|(course, numerics)| {
+        JointNoise::of(course, &runs, spent, memory)
+            .at_least(&JointNoise::of(numerics, &runs, 0.0, memory))
+    });
+    (noise.collect(), residual)
 }
 
 /// Noise by which what is found is weighed in the end: what the rich model leaves has lost its slow part with what is slow in that model, so

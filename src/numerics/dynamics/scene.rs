@@ -30,8 +30,8 @@ pub(super) struct DynamicScene<'a> {
     pub(crate) rigid: Vec<Vec<f64>>,
     /// Nm, of friction as it is believed at present.
     pub(crate) friction: Vec<Vec<f64>>,
-    /// Nm, under a gravity of 9.81 m/s^2 along x, then along y of the base: of the declared masses, once a tilt is known of those that are
-    /// believed.
+    /// Nm, under a gravity as strong as the declared one along two directions across it ([`across`]): of the declared masses, once a tilt is known
+    /// of those that are believed.
     pub(crate) sideways: [Vec<Vec<f64>>; 2],
     /// rad/s over which the sign of a velocity turns; at each joint, over that.
     pub(crate) sign_width: f64,
@@ -51,12 +51,32 @@ impl<'a> DynamicScene<'a> {
         cutoff: f64,
         free: bool,
     ) -> Self {
+        Self::filtered(arm, recording, clock, motion_band(cutoff, clock.rate), free)
+    }
+
+    /// The same with positions filtered at half the frequency: what differs is what differentiation and rounding make.
+    pub(crate) fn half_band(
+        arm: &'a DynamicArm,
+        recording: &TorqueRecording,
+        clock: &RecordingClock,
+        cutoff: f64,
+        free: bool,
+    ) -> Self {
+        let half = 0.5 * motion_band(cutoff, clock.rate);
+        Self::filtered(arm, recording, clock, half, free)
+    }
+
+    /// The same with positions filtered at `band`, Hz.
+    fn filtered(
+        arm: &'a DynamicArm,
+        recording: &TorqueRecording,
+        clock: &RecordingClock,
+        band: f64,
+        free: bool,
+    ) -> Self {
         let n = recording.joints;
         let (rows, first) = (recording.rows(), recording.time[0]);
-        let filter = ZeroPhase::new(
-            clock.rate,
-            (MOTION_BAND * cutoff).min(HIGHEST_BAND * clock.rate),
-        );
+        let filter = ZeroPhase::new(clock.rate, band);
         let nothing = || vec![vec![0.0; rows]; n];
         let declared = arm.links.as_ref().filter(|_| !free);
         let mut scene = Self {
@@ -154,8 +174,9 @@ impl<'a> DynamicScene<'a> {
 
     /// Takes 10 n inertial numbers for the torques of a gravity from the side.
     pub(crate) fn tilt(&mut self, theta: &[f64]) {
+        let length = self.arm.gravity.norm();
         self.sideways =
-            [Vector3::x(), Vector3::y()].map(|side| self.torques(theta, &(side * GRAVITY), false));
+            across(&self.arm.gravity).map(|side| self.torques(theta, &(side * length), false));
     }
 
     fn torques(&self, theta: &[f64], gravity: &Vector3<f64>, moving: bool) -> Vec<Vec<f64>> {
@@ -210,8 +231,27 @@ impl<'a> DynamicScene<'a> {
     }
 }
 
-/// m/s^2.
-pub(super) const GRAVITY: f64 = 9.81;
+/// Hz, at which positions are filtered before they are differentiated.
+fn motion_band(cutoff: f64, rate: f64) -> f64 {
+    (MOTION_BAND * cutoff).min(HIGHEST_BAND * rate)
+}
+
+/// Two unit vectors across a direction, by the axes of the base that are farthest from it, in their order: x and y for an arm that stands on a floor.
+fn across(direction: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let down = direction.try_normalize(0.0).unwrap_or_else(Vector3::z);
+    let along = down.iamax();
+    let mut axes = [0, 1, 2].into_iter().filter(|axis| *axis != along);
+    let mut next = || {
+        axes.next()
+            .map_or_else(Vector3::zeros, |axis| Vector3::ith(axis, 1.0))
+    };
+    let first: Vector3<f64> = next();
+    let first = (first - down * down.dot(&first)).normalize();
+    let second: Vector3<f64> = next();
+    let second = second - down * down.dot(&second) - first * first.dot(&second);
+    [first, second.normalize()]
+}
+
 /// rad/s, candidates of the width of a sign.
 pub(super) const SIGN_WIDTHS: [f64; 6] = [0.003, 0.006, 0.012, 0.025, 0.05, 0.1];
 

@@ -52,29 +52,23 @@ pub(super) fn solve<'a>(
     let mut problem = TorqueProblem::new(arm, recording, question, clock, cutoff);
     let width = sign_width(&mut problem);
     problem.scene.turn_over(width);
-    problem.form(&question.without);
-    let asked = |name: &str| question.without.iter().all(|without| without != name);
-    let touched = asked(super::CONTACT);
-    let found = clocked(&mut problem, question, asked(super::LATENCY));
+    problem.form();
+    let found = clocked(&mut problem);
     if let Some(latency) = &found {
         tell(format!(
             "torques come {:.1} ms after the positions",
             1e3 * latency.seconds
         ));
     }
-    if touched {
-        problem.events = first_contacts(&problem);
-    }
+    problem.events = first_contacts(&problem);
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted(&[]);
     let mut set = from_common(&CauseChoice::named(&problem, &weighted));
     tell(explained_by(&problem, &set));
     refine(&mut problem, &mut weighted, &mut set);
     set = again(&mut problem, &mut weighted, set);
-    if touched {
-        let residual = left_by(&problem, &weighted, &set);
-        problem.events = contacts(&problem, &residual, &problem.noise, true);
-    }
+    let residual = left_by(&problem, &weighted, &set);
+    problem.events = contacts(&problem, &residual, &problem.noise, true);
     learn(&mut problem, &set);
     weighted = problem.weighted_of(&set);
     polish(&mut problem, &mut weighted, &mut set);
@@ -110,6 +104,7 @@ pub(super) fn solve<'a>(
     problem.noise = noise_left(&problem, &set);
     weighted = problem.weighted(&set);
     silent.extend(faint(&CauseChoice::new(&problem, &weighted), &set, &silent));
+    silent.extend(too_small(&problem, &weighted, &set, &silent));
     problem.noise = rich;
     weighted = problem.weighted(&set);
     let priors = priors(&CauseChoice::new(&problem, &weighted), &set);
@@ -126,19 +121,15 @@ pub(super) fn solve<'a>(
 }
 
 /// Finds by how much torques come late and by how much friction turns before the velocity, each given the other, and takes both.
-fn clocked(
-    problem: &mut TorqueProblem,
-    question: &TorqueQuestion,
-    is_asked: bool,
-) -> Option<Latency> {
+fn clocked(problem: &mut TorqueProblem) -> Option<Latency> {
     let mut found = None;
     for _ in 0..CLOCK_ROUNDS {
-        found = latency(problem).filter(|_| is_asked);
+        found = latency(problem);
         problem.shift(found.map_or(0.0, |latency| latency.seconds));
         if !take_friction_lead(problem) {
             break;
         }
-        problem.form(&question.without);
+        problem.form();
     }
     found
 }
@@ -179,6 +170,24 @@ fn again(
 /// Takes noise from what the rich model and a set leave.
 fn learn(problem: &mut TorqueProblem, set: &[usize]) {
     problem.noise = noise_of_fit(problem, &rich_forms(problem, set), NoiseMemory::Short).0;
+}
+
+/// What of a set makes less torque than differentiation and rounding of the positions may.
+fn too_small(
+    problem: &TorqueProblem,
+    weighted: &WeightedColumns,
+    set: &[usize],
+    silent: &[usize],
+) -> Vec<usize> {
+    let solution = SweptColumns::base(&problem.all, weighted)
+        .with(set)
+        .solution();
+    let is_small = |form: &usize| {
+        let joints = problem.all.forms[*form].acts_on(problem.joints());
+        problem.rms_of(*form, &solution) < problem.numerics_at(&joints)
+    };
+    let asked = set.iter().copied().filter(|form| !silent.contains(form));
+    asked.filter(is_small).collect()
 }
 
 /// A set as a line.

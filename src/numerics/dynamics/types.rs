@@ -13,7 +13,7 @@ pub struct TorqueQuestion {
     /// Hz: of the low-pass applied alike to measured and simulated torque; `None`: chosen from how fast the joints come
     /// and go.
     pub cutoff: Option<f64>,
-    /// Names of causes that are not tried.
+    /// Names that are not given: what such a cause explains is without a name at its place.
     pub without: Vec<String>,
     /// Whether the numbers of declared links are moved to the nearest that bodies have.
     pub enforce_bodies: bool,

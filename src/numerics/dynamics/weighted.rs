@@ -258,6 +258,14 @@ impl JointNoise {
         }
     }
 
+    /// This noise, or white noise as large as another's course where that is larger: what is no noise does not lose by being slow.
+    pub(crate) fn at_least(self, floor: &Self) -> Self {
+        match floor.sigma > self.sigma {
+            true => Self::white(floor.sigma),
+            false => self,
+        }
+    }
+
     /// How many rows in a row count as one for what is slow.
     pub(crate) fn autocorrelation(&self) -> f64 {
         let gain = 1.0 - self.memory.iter().sum::<f64>();

@@ -6,6 +6,8 @@ use crate::observation::{DeclaredColumn, KINDS, MeasurementKind, Part};
 use crate::table::{Robot, recording_columns};
 use std::ops::Range;
 
+/// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
+const SLACK: f64 = 1e-6;
 pub(super) const UNLIMITED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 pub(super) struct RobotJoints {
@@ -57,10 +59,18 @@ impl RobotJoints {
             true => ("below its lower", lower),
             false => ("above its upper", upper),
         };
+        let (name, value, limit) = (self.called(joint), value * scale, limit * scale);
+        format!("{name} at {value:.4} {unit}, {side} limit of {limit:.4} {unit}")
+    }
+    /// The first joint (from 0) of a row that is beyond its limits.
+    pub(super) fn first_beyond(&self, q: &[f64]) -> Option<usize> {
+        let mut joints = q.iter().zip(&self.limits);
+        joints.position(|(q, [lower, upper])| *q < lower - SLACK || *q > upper + SLACK)
+    }
+    /// `joint 2 (`shoulder`)`, of a joint (from 0).
+    pub(super) fn called(&self, joint: usize) -> String {
         let name = self.names.get(joint).map(|name| format!(" (`{name}`)"));
-        let name = name.unwrap_or_default();
-        let (number, value, limit) = (joint + 1, value * scale, limit * scale);
-        format!("joint {number}{name} at {value:.4} {unit}, {side} limit of {limit:.4} {unit}")
+        format!("joint {}{}", joint + 1, name.unwrap_or_default())
     }
     /// What positions of a joint (from 0) are multiplied by for people, and their unit then.
     pub(super) fn shown_in(&self, joint: usize) -> (f64, &'static str) {

@@ -8,8 +8,6 @@ use super::stretch::{ALLOWED, ClockColumn, ClockTime};
 use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
 use crate::robot::ONE_AND_A_HALF_TURNS;
 
-/// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
-const SLACK: f64 = 1e-6;
 /// Numbers of rows go up to here: the targets of wide rows have room beyond.
 const LARGEST_SEQUENCE: i64 = 1 << 52;
 
@@ -243,20 +241,16 @@ impl<'a> RowReader<'a> {
             );
         }
         let q = row.values.get(self.arm.slots.q.clone()).unwrap_or_default();
-        for (joint, (q, [lower, upper])) in q.iter().zip(&self.arm.limits).enumerate() {
-            if *q < lower - SLACK || *q > upper + SLACK {
-                row.beyond = Some(joint);
-                if self.limits == LimitPolicy::Reject {
-                    let (scale, unit) = self.arm.shown_in(joint);
-                    let [at, lower, upper] = [q, lower, upper].map(|value| value * scale);
-                    let detail = format!(
-                        "joint {} at {at:.4} {unit}; allowed: {lower:.4} to {upper:.4} {unit}",
-                        joint + 1
-                    );
-                    return refuse(Reason::OutOfRange, detail);
-                }
-                break;
-            }
+        row.beyond = self.arm.first_beyond(q);
+        if let Some(joint) = row.beyond.filter(|_| self.limits == LimitPolicy::Reject) {
+            let (scale, unit) = self.arm.shown_in(joint);
+            let [lower, upper] = self.arm.limits[joint];
+            let [at, lower, upper] = [q[joint], lower, upper].map(|value| value * scale);
+            let detail = format!(
+                "joint {} at {at:.4} {unit}; allowed: {lower:.4} to {upper:.4} {unit}",
+                joint + 1
+            );
+            return refuse(Reason::OutOfRange, detail);
         }
         Ok(())
     }

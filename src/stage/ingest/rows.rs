@@ -4,12 +4,13 @@
 
 use super::Ingest;
 use super::arm::{RobotJoints, Slots};
-use super::columns::{Duplicates, FileLayout};
+use super::columns::{Duplicates, FileLayout, LimitPolicy};
 use super::motion::{JointSamples, Track};
 use super::reading::{OpenedFile, STRIDE};
 use super::refusal::{Refusals, beginning};
 use super::row::RecordedRow;
-use crate::error::{Error, Result};
+use super::turns::{TurnCounter, within_limits};
+use crate::error::{Error, Result, counted};
 use crate::stage::Context;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -227,8 +228,76 @@ impl FileRows {
         self.begin.push(begin);
     }
 
+    /// Reads joints that are logged within one turn as they are: by their neighbours in a `track`, by their limits at poses. A sentence for each
+    /// joint of which rows are read so.
+    fn turn(&mut self, arm: &RobotJoints, track: bool) -> Vec<String> {
+        let usable: Vec<usize> = self.usable().collect();
+        let (width, n) = (self.places.len(), arm.joints());
+        let column = |place: usize| self.places.binary_search(&place).ok();
+        let columns: Option<Vec<usize>> = arm.slots.q.clone().map(column).collect();
+        let Some(columns) = columns else {
+            return Vec::new();
+        };
+        let said = match track {
+            true => {
+                let mut turns = TurnCounter::new(arm);
+                let mut all: Vec<f64> = Vec::with_capacity(usable.len() * n);
+                for row in &usable {
+                    let end = all.len();
+                    all.extend(columns.iter().map(|k| self.values[row * width + k]));
+                    let (before, here) = all.split_at_mut(end);
+                    turns.next(self.line[*row], end > 0, here, before);
+                }
+                for (row, q) in usable.iter().zip(all.chunks_exact(n)) {
+                    for (k, value) in columns.iter().zip(q) {
+                        self.values[row * width + k] = *value;
+                    }
+                }
+                turns.remarks()
+            }
+            false => {
+                let turned = |joint: usize| {
+                    let is_usable = |row: usize| usable.binary_search(&row).is_ok();
+                    let rows = self.values.chunks_exact_mut(width).enumerate();
+                    let rows = rows.filter(|(row, _)| is_usable(*row));
+                    let mut values: Vec<&mut f64> =
+                        rows.map(|(_, row)| &mut row[columns[joint]]).collect();
+                    let moved = within_limits(&mut values, arm.limits[joint]);
+                    (moved > 0).then(|| {
+                        let (name, moved) = (arm.called(joint), counted(moved, "row"));
+                        format!(
+                            "{name} is logged within one turn: {moved} beyond its limits, read a turn away, within them"
+                        )
+                    })
+                };
+                let revolute = (0..n).filter(|joint| !arm.prismatic[*joint]);
+                revolute.filter_map(turned).collect()
+            }
+        };
+        if !said.is_empty() {
+            self.judge_anew(&usable, &columns, arm);
+        }
+        said
+    }
+
+    /// What is odd about joints that have been read otherwise.
+    fn judge_anew(&mut self, usable: &[usize], columns: &[usize], arm: &RobotJoints) {
+        (self.largest, self.beyond) = (0.0, FileOddities::default());
+        self.ranges.clear();
+        for row in usable {
+            let values = self.values(*row);
+            let q: Vec<f64> = columns.iter().map(|k| values[*k]).collect();
+            let beyond = arm.first_beyond(&q);
+            self.odd_joints(self.line[*row], &q, beyond, arm);
+        }
+    }
+
     fn odd(&mut self, row: &RecordedRow, arm: &RobotJoints) {
         let q = row.values.get(arm.slots.q.clone()).unwrap_or_default();
+        self.odd_joints(row.line, q, row.beyond, arm);
+    }
+
+    fn odd_joints(&mut self, line: u64, q: &[f64], beyond: Option<usize>, arm: &RobotJoints) {
         let joints = q.iter().zip(&arm.prismatic);
         let turning = joints.filter(|(_, prismatic)| !**prismatic);
         self.largest = turning.fold(self.largest, |largest, (q, _)| largest.max(q.abs()));
@@ -237,9 +306,9 @@ impl FileRows {
         for (value, [least, most]) in q.iter().zip(&mut self.ranges) {
             (*least, *most) = (least.min(*value), most.max(*value));
         }
-        if let Some(joint) = row.beyond {
+        if let Some(joint) = beyond {
             let value = q.get(joint).copied().unwrap_or(f64::NAN);
-            self.beyond.count(row.line, joint, value);
+            self.beyond.count(line, joint, value);
         }
     }
 }
@@ -276,7 +345,12 @@ pub(super) fn read(
     let mut all = all.into_iter().collect::<Result<Vec<_>>>()?;
     for (rows, layout) in all.iter_mut().zip(&settings.files) {
         context.warn_each(rows.loss.take());
-        if is_track(settings, layout) {
+        let track = is_track(settings, layout);
+        if settings.limits != LimitPolicy::Ignore && layout.columns.has("q") {
+            let said = rows.turn(arm, track).into_iter();
+            context.warn_each(said.map(|said| format!("{}: {said}", rows.label)));
+        }
+        if track {
             let samples = rows.samples(&arm.slots, layout.columns.has("velocity"));
             let count = rows.count();
             let track = samples.track(settings.motion.as_ref(), count, arm, &rows.label, context);

@@ -14,6 +14,7 @@ use crate::stage::ingest::refusal::{
 use crate::stage::ingest::row::RecordedRow;
 use crate::stage::ingest::rows::NO_ROW;
 use crate::stage::ingest::stretch::Stretches;
+use crate::stage::ingest::turns::TurnCounter;
 use crate::stage::ingest::{check, reading};
 use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable};
 use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, Robot, RobotRow, Table};
@@ -61,7 +62,7 @@ const CHUNK: usize = 1 << 16;
 const MOST_LABELS: usize = 100;
 
 crate::stage::stage! {
-    IngestTorques, "ingest_torques", 2, "reads joint positions with torques or motor currents of an arm that moves",
+    IngestTorques, "ingest_torques", 3, "reads joint positions with torques or motor currents of an arm that moves",
         IngestTorquesReads {
             robot: Robot,
         } -> IngestTorquesWrites {
@@ -144,6 +145,10 @@ struct MotionRows<'a> {
     chunk: ArmMotion,
     written: i64,
     stretches: Stretches,
+    turns: TurnCounter<'a>,
+    last_stretch: Option<i64>,
+    /// The first row in the chunk of the present stretch.
+    stretch_begins: usize,
     /// What a motor-side torque is multiplied by, a joint each.
     ratio: Vec<f64>,
     /// Which of `current` and `torque` the files have; the first file decides.
@@ -183,6 +188,9 @@ impl<'a> MotionRows<'a> {
             chunk: ArmMotion::default(),
             written: 0,
             stretches: Stretches::default(),
+            turns: TurnCounter::new(arm),
+            last_stretch: None,
+            stretch_begins: 0,
             ratio: ratio.collect::<Result<_>>()?,
             signal: None,
             channels: vec![TorqueChannel::default(); arm.joints()],
@@ -318,9 +326,18 @@ impl<'a> MotionRows<'a> {
             channel.push(*value);
         }
         let chunk = &mut self.chunk;
+        let goes_on = self.last_stretch == Some(stretch);
+        if !goes_on {
+            self.stretch_begins = chunk.rows();
+        }
+        self.last_stretch = Some(stretch);
+        let (begins, end) = (self.stretch_begins * q.len(), chunk.q.len());
+        chunk.q.extend_from_slice(q);
+        let (before, here) = chunk.q.split_at_mut(end);
+        let before = &mut before[begins..];
+        self.turns.next(row.line, goes_on, here, before);
         chunk.time.push(time);
         chunk.trajectory.push(stretch);
-        chunk.q.extend_from_slice(q);
         if self.signal == Some("current") {
             let all = chunk.current.get_or_insert_default();
             all.extend_from_slice(signal);
@@ -369,6 +386,7 @@ impl<'a> MotionRows<'a> {
             ..ArmMotion::default()
         };
         let mut full = std::mem::replace(&mut self.chunk, next);
+        self.stretch_begins = 0;
         full.joints = self.arm.joints();
         full.prismatic.clone_from(&self.arm.prismatic);
         self.sink.push(full.to_frame()?)
@@ -416,6 +434,7 @@ impl<'a> MotionRows<'a> {
             let clipped = channel.clipped();
             context.warn_each(clipped.map(|clipped| format!("the {name} {clipped}: saturated?")));
         }
+        context.warn_each(self.turns.remarks());
         if self.chunk.rows() > 0 || self.written == 0 {
             self.flush()?;
         }

@@ -2,7 +2,9 @@
 
 use super::{diagnose, nothing, write};
 use crate::answer::{calib, put, read, root};
+use crate::desk::shared;
 use calib::twin::torque::TorqueCase;
+use serde_json::Value;
 
 struct Sheet {
     header: Vec<String>,
@@ -288,4 +290,81 @@ fn files_of_one_name_in_two_folders_are_told_apart() {
         format!("{}{all}\n{after}", before.replace("${case}/", "")),
     );
     calib(folder.path(), "run p.yaml --until ingest_torques --quiet").ok();
+}
+
+/// What is found in a recording, and what is said of it.
+fn answered(robot: &str, change: impl FnOnce(&mut Sheet), more: &str) -> (Value, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let (case, mut sheet) = case(robot);
+    change(&mut sheet);
+    write(
+        folder,
+        &[case.recording()[0].clone(), ("recording.csv", sheet.text())],
+    );
+    let (text, store) = (
+        read(root("pipelines/dynamics/pipeline.yaml")),
+        folder.join("store"),
+    );
+    put(
+        folder,
+        "pipeline.yaml",
+        &text.replace("- uses: diagnose_torques", more),
+    );
+    let answer = calib(
+        ".",
+        &format!(
+            "diagnose --json --set case={} --store {} {}",
+            folder.display(),
+            store.display(),
+            folder.join("pipeline.yaml").display()
+        ),
+    );
+    assert_eq!(answer.code, Some(0), "{}", answer.err);
+    (serde_json::from_str(&answer.out).unwrap(), answer.err)
+}
+
+#[test]
+fn joints_that_are_logged_within_one_turn_are_read_as_going_on_and_that_is_said() {
+    let usual = "- uses: diagnose_torques";
+    // Joint 2 passes 0: it is logged as 359 deg and 1 deg.
+    let wrapped = |sheet: &mut Sheet| {
+        let (name, middle) = ("q2_deg", sheet.number(0, sheet.column("q2_deg")));
+        sheet.change(name, |q| q - middle);
+        sheet.change(name, |q| q.rem_euclid(360.0));
+        sheet.change(name, |q| q + middle);
+    };
+    let [(straight, _), (read, said)] = [
+        answered("compact6", |_| (), usual),
+        answered("compact6", wrapped, usual),
+    ];
+    assert!(
+        said.contains("joint 2") && said.contains("logged within one turn"),
+        "{said}"
+    );
+    assert_eq!(read["findings"], straight["findings"], "{read}");
+}
+
+/// Faults that others reported: folder, and what is said.
+const REPORTED: [(&str, &[&str]); 2] = [
+    (
+        "torque_wall_mounted",
+        &["`gravity: [0, -9.81, 0]`", "robot file"],
+    ),
+    ("torque_external_only", &["hold no gravity", "external"]),
+];
+
+#[test]
+fn gravity_and_what_a_column_means_are_asked_before_units() {
+    for (name, words) in REPORTED {
+        let Some(folder) = shared(&format!("review/faults5/{name}")) else {
+            return;
+        };
+        let store = tempfile::tempdir().unwrap();
+        let (pipeline, store) = (folder.join("pipeline.yaml"), store.path().display());
+        let answer = calib(".", &format!("run --store {store} {}", pipeline.display()));
+        assert_eq!(answer.code, Some(10), "{}", answer.err);
+        let says = |word: &&str| answer.err.contains(*word);
+        assert!(words.iter().all(says), "{}", answer.err);
+    }
 }

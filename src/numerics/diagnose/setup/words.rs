@@ -389,11 +389,7 @@ pub(super) fn explained(
             number("median_before", before * 1e3),
             number("median_after", after * 1e3),
         ],
-        probabilities: Probabilities {
-            name,
-            place: *NAMED,
-            none: 1.0 - *NAMED,
-        },
+        probabilities: Probabilities::new(name, *NAMED, 1.0 - *NAMED),
         ..finding(text)
     };
     Diagnosis {

@@ -39,11 +39,9 @@ impl FoundCell {
     /// That it is no cause at all with a probability, names and places as probable among the rest as before.
     pub(crate) fn or_nothing(&mut self, probability: f64) {
         let remaining = (1.0 - probability).max(0.0);
-        self.probabilities = Probabilities {
-            name: remaining * self.probabilities.name,
-            place: remaining * self.probabilities.place,
-            none: remaining * self.probabilities.none + probability,
-        };
+        let Probabilities { name, place, none } = self.probabilities;
+        let none = remaining * none + probability;
+        self.probabilities = Probabilities::new(remaining * name, remaining * place, none);
         for rival in &mut self.rivals {
             rival.probability *= remaining;
         }
@@ -197,7 +195,7 @@ impl CauseTable<'_, '_> {
             let bends = |found: &CellEvidence| {
                 let bent = (found.bent - found.log).exp().clamp(0.0, 1.0);
                 let paid = bent * (-*BENDS).exp();
-                paid / (paid + 1.0 - bent).max(f64::MIN_POSITIVE)
+                paid / (paid + (1.0 - bent)).max(f64::MIN_POSITIVE)
             };
             let bent = scan.closely.get(&k).map_or(0.0, bends);
             // What was refined stands for its cell.
@@ -230,11 +228,7 @@ impl CauseTable<'_, '_> {
         rivals.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         let rival_sum: f64 = rivals.iter().map(|rival| rival.probability).sum();
         (
-            Probabilities {
-                name,
-                place: at_place,
-                none: (1.0 - name - rival_sum).max(0.0),
-            },
+            Probabilities::new(name, at_place, 1.0 - name - rival_sum),
             rivals,
         )
     }

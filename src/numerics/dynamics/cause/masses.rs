@@ -7,7 +7,6 @@ use super::{
 use crate::arm::{INERTIAL_NAMES, INERTIAL_NUMBERS, inertial_unit, unit_number};
 use crate::effect::Place;
 use crate::recording::largest;
-use crate::scene::GRAVITY;
 
 /// A number times a factor.
 fn scaled(number: &FittedNumber, by: f64) -> FittedNumber {
@@ -182,7 +181,8 @@ fn tilt(fitted: &[FittedNumber]) -> FittedNumber {
     }
 }
 
-/// A base that does not stand as declared: gravity from the side, along x and y of the base.
+/// A base that does not stand as declared: gravity from the side, along two directions across the declared one, over its length. Mounts that are
+/// turned by more than some degrees are refused before.
 pub(super) static GRAVITY_DIRECTION: TorqueCause = TorqueCause {
     name: "gravity_direction",
     coefficients: &[("side_x", "1"), ("side_y", "1")],
@@ -195,7 +195,11 @@ pub(super) static GRAVITY_DIRECTION: TorqueCause = TorqueCause {
             place: Place::Base,
             ..TorqueForm::at_joint(cause, 0, 2)
         };
-        scene.declared.iter().map(form).collect()
+        let declared = scene.declared.iter().map(form);
+        match scene.arm.gravity.norm() > 0.0 {
+            true => declared.collect(),
+            false => Vec::new(),
+        }
     },
     torque: ColumnTorque::Row(|column, row| {
         column.scene.sideways[column.column][column.joint][row]
@@ -211,9 +215,8 @@ pub(super) static GRAVITY_DIRECTION: TorqueCause = TorqueCause {
     statement: |_, fitted| {
         let azimuth = fitted[1].value.atan2(fitted[0].value).to_degrees();
         format!(
-            "the base is tilted by {:.2} deg: gravity pulls towards {azimuth:.0} deg of its plane with {:.3} m/s2",
-            tilt(fitted).value.to_degrees(),
-            GRAVITY * size_of_two(fitted).value
+            "the base is tilted by {:.2} deg: gravity pulls towards {azimuth:.0} deg of the plane across the declared one",
+            tilt(fitted).value.to_degrees()
         )
     },
     ..PLAIN
