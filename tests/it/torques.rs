@@ -7,6 +7,7 @@ mod feed_forward;
 mod friction;
 mod hostile;
 mod masses;
+mod recordings;
 mod results;
 mod rigid;
 
