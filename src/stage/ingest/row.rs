@@ -7,6 +7,7 @@ use super::refusal::{Reason, RowRefusal, refuse};
 use super::stretch::{ALLOWED, ClockColumn, ClockTime};
 use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
 use crate::robot::ONE_AND_A_HALF_TURNS;
+use crate::units::Unit;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
@@ -380,6 +381,7 @@ fn in_range(record: &Record, cell: &NumberBinding, value: f64) -> Result<(), Row
     let [lower, upper] = [lower, cell.divisor * upper].map(|limit| round(unit.from_si(limit)));
     let allowed = match no_direction {
         true => "1, -1 or 0".to_string(),
+        false if unit == Unit::One => format!("{lower} to {upper}"),
         false => format!("{lower} to {upper} {unit}"),
     };
     let (name, text) = (&cell.name, shown(record, cell.column));

@@ -64,6 +64,14 @@ pub(crate) static PAYLOAD: TorqueCause = TorqueCause {
         if form.width == INERTIAL_NUMBERS && form.shape[0] == 0.0 {
             return whole > -LIGHTEST && values[4] + values[7] + values[9] >= 0.0;
         }
+        // The same of mass and centre, about the last joint.
+        let (arm, moments) = (part(form, 1), &values[1..]);
+        if form.width == 4 && form.shape[0] == 0.0 {
+            let shift = arm.dot(&Vector3::from_row_slice(moments));
+            if values[0] * arm.norm_squared() + 2.0 * shift < 0.0 {
+                return false;
+            }
+        }
         let is_near = |moment: &f64| moment.abs() < PAYLOAD_FARTHEST * whole.max(LIGHTEST);
         whole > -LIGHTEST && (form.width == INERTIAL_NUMBERS || values[1..].iter().all(is_near))
     },
