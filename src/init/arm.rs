@@ -9,7 +9,7 @@ use crate::error::{Error, Result, counted};
 use crate::init::InitRequest;
 use crate::init::columns::{Choice, ExaminedFile};
 use crate::init::names::{
-    CURRENTS, NAMED_JOINTS, TORQUES, TRAJECTORIES, VELOCITIES, WANTED, lists, numbered,
+    CURRENTS, NAMED_JOINTS, Name, TORQUES, TRAJECTORIES, VELOCITIES, WANTED, lists, numbered,
 };
 use crate::raw;
 use crate::robot::LibraryArm;
@@ -136,6 +136,8 @@ fn read(path: &Path) -> Result<(String, String)> {
 const WITH_TORQUES: [&str; 4] = ["time", "q", "usage", "temperature"];
 const OF_MOTORS: &str =
     "is it the torque at the joint? if at the motor: `torque_side: motor` next to `files`";
+const EXPECTED: &str =
+    "by its name what the controller's own model expects; is it the measured torque at the joint?";
 const EFFORT: &str = "drivers of ROS state torques or motor currents as effort";
 
 /// Whether the recordings are of torques: each has times, joints, and what drives them, and none has points. Then they are mapped as such.
@@ -164,6 +166,8 @@ impl ExaminedFile {
             let stem = name.stem();
             match joints.iter().position(|joint| stem.contains(joint)) {
                 Some(joint) => Some((stem.replace(joints[joint], "#"), joint)),
+                // One joint has no number.
+                None if count == 1 => Some(name.joint().unwrap_or((stem, 0))),
                 None => name.joint(),
             }
         };
@@ -189,13 +193,32 @@ impl ExaminedFile {
             .retain(|mapping| WITH_TORQUES.contains(&mapping.quantity));
         let [torques, currents, velocities] =
             [TORQUES, CURRENTS, VELOCITIES].map(|listed| self.by_joint(listed));
+        let wanted = |name: &Name| name.words.iter().any(|word| lists(WANTED, word));
+        let wanted: Vec<bool> = self.stated.iter().map(wanted).collect();
+        let is_wanted = |columns: &Vec<usize>| wanted[columns[0]];
+        // What a controller expects is no measurement, where it says what it measured.
+        let is_measured = currents.iter().any(|columns| !is_wanted(columns));
+        let (modelled, torques): (Vec<Vec<usize>>, Vec<Vec<usize>>) = torques
+            .into_iter()
+            .partition(|columns| is_measured && is_wanted(columns));
+        for columns in &modelled {
+            let names = self.shown(&columns[..1]);
+            self.remarks.push(format!(
+                "{} and so on: what the controller's own model expects, no measurement; currents are used",
+                quoted(&names)
+            ));
+        }
         let joints = self.get("q").map(|joints| &joints.choices[0].lines[0]);
         let degrees = joints.is_some_and(|line| line.contains("unit: deg"));
         if let Some(best) = torques.first() {
             let name = &self.stated[best[0]];
             let is_stated = name.unit_of(&["Nm"]).is_some();
             let effort = name.words.iter().any(|word| word.starts_with("effort"));
-            let more = if effort { EFFORT } else { OF_MOTORS };
+            let more = match (effort, is_wanted(best)) {
+                (true, _) => EFFORT,
+                (false, true) => EXPECTED,
+                (false, false) => OF_MOTORS,
+            };
             self.drive("torque", &torques, "Nm", is_stated, Some(more));
             if let (true, Some(mapping)) = (effort, self.mappings.last_mut()) {
                 let as_current = |line: &String| {

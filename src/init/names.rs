@@ -137,6 +137,12 @@ pub(super) fn joints(
         });
         found.extend(foreign.map(|(_, columns)| columns));
     }
+    // One joint has no number.
+    if found.is_empty() && count == 1 {
+        let alone = |column: &usize| lists(ONE_JOINT, &names[*column].stem()) && angle(*column);
+        found.extend((0..names.len()).filter(alone).map(|column| vec![column]));
+        found.truncate(1);
+    }
     let longest = found.first().map_or(0, Vec::len);
     found.retain(|columns| columns.len() == longest);
     found
@@ -207,6 +213,10 @@ pub(super) fn lists(list: &str, word: &str) -> bool {
 pub(super) const JOINTS: &str = "q a rax j joint axis theta achse gelenk axe asse eje jnt joint_angle joint_state joint_states \
     observation_state qpos observation_qpos articulación";
 
+/// What the only joint of an arm is called.
+const ONE_JOINT: &str =
+    "q pos position angle joint theta winkel actual_q joint_position actual_position";
+
 pub(super) const NAMED_JOINTS: [&[&str]; 3] = [
     &["s", "l", "u", "r", "b", "t"],
     &["s", "l", "e", "u", "r", "b", "t"],
@@ -221,11 +231,11 @@ pub(super) const NAMED_JOINTS: [&[&str]; 3] = [
 ];
 
 /// What joint torques, motor currents and joint velocities are called, apart from the number or name of a joint.
-pub(super) const TORQUES: &str = "tau torque torques trq effort efforts moment moments drehmoment drehmomente couple coppia momento \
+pub(super) const TORQUES: &str = "tau torque torques trq f effort efforts moment moments drehmoment drehmomente couple coppia momento \
     momente";
 pub(super) const CURRENTS: &str =
     "i iq cur curr current currents strom courant corriente corrente amps";
-pub(super) const VELOCITIES: &str = "dq qd qdot vel vels velocity velocities speed speeds geschwindigkeit vitesse velocidad velocità rate";
+pub(super) const VELOCITIES: &str = "dq qd qdot v vel vels velocity velocities speed speeds geschwindigkeit vitesse velocidad velocità rate";
 /// Which of several movements a row belongs to.
 pub(super) const TRAJECTORIES: &str =
     "traj trajectory trajectory_id episode episode_index run segment";

@@ -11,6 +11,8 @@ use std::path::Path;
 
 /// No angle in rad is beyond this.
 const MOST_RADIANS: f64 = 6.5;
+/// rad: no joint turns as often.
+const MOST_TURNS: f64 = 65.0;
 /// Beyond this coordinates are millimetres, by the size of robots.
 const MOST_METRES: f64 = 50.0;
 
@@ -95,9 +97,13 @@ impl ExaminedFile {
         let mut units = best.iter().map(|column| &self.stated[*column]);
         let (unit, why) = match units.find_map(|name| name.unit_of(&["deg", "rad"])) {
             Some(unit) => (unit, None),
-            None if self.largest(&turning) > MOST_RADIANS => {
+            None if self.largest(&turning) > MOST_RADIANS && !self.turn_often(&turning) => {
                 ("deg", Some("values beyond 6.5 cannot be radians"))
             }
+            None if self.largest(&turning) > MOST_RADIANS => (
+                "rad",
+                Some("few joints go beyond 6.5: several turns in radians; or degrees?"),
+            ),
             None => ("rad", Some("no value is beyond 6.5; are these degrees?")),
         };
         let why = why.map(String::from);
@@ -107,6 +113,13 @@ impl ExaminedFile {
         let checks = several.into_iter().chain(of_list).chain(why);
         let what = format!("{} joints", best.len());
         self.propose_joints("q", &rows, Some(unit), checks, &what);
+    }
+
+    /// Whether most joints stay within a turn in radians and the others within a few: joints may turn more than once.
+    fn turn_often(&self, turning: &[usize]) -> bool {
+        let far = turning.iter().map(|column| self.sheet.largest(*column));
+        let beyond: Vec<f64> = far.filter(|angle| *angle > MOST_RADIANS).collect();
+        2 * beyond.len() < turning.len() && beyond.iter().all(|angle| *angle < MOST_TURNS)
     }
 
     /// Whether four columns are a quaternion.

@@ -1,18 +1,13 @@
 //! `diagnose_torques`: which physics the rigid inverse dynamics of the robot file lacks while the arm moves.
-//!
-//! `compare_torques`: what changed between two recordings of one arm's torques: what is on the tool, friction, drives.
 
-use crate::dynamics::{
-    ContactEvent, DiagnosedRecording, DynamicArm, TorqueChange, TorqueModel, TorqueQuestion,
-    TorqueSource, changes, diagnose,
-};
+use crate::dynamics::{DynamicArm, TorqueQuestion, TorqueSource, diagnose};
 use crate::error::{Error, Place, Result, counted};
 use crate::stage::dynamic_arm::{HeldOut, RecordedTorques, dynamic_arm, must_be_bodies};
 use crate::stage::{Chunks, Context, Stage};
 use crate::table::{
     ArmMotion, BodyConsistencies, Contacts, FrictionCurves, Inertials, JointTorques, Robot,
-    TorqueChangeTable, TorqueCourse, TorqueCovariance, TorqueFindings, TorqueNumbers,
-    TorqueParameters, TorqueRivals, TorqueVerdict, VerdictSentences,
+    TorqueCourse, TorqueCovariance, TorqueFindings, TorqueNumbers, TorqueParameters, TorqueRivals,
+    TorqueVerdict, VerdictSentences,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -285,125 +280,5 @@ impl DiagnoseTorques {
             counted((rows - judging) as u64, "row")
         ));
         Ok(held_out)
-    }
-}
-
-/// Has no settings: `reads` names the earlier recording and its model.
-#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct CompareTorques {}
-
-crate::stage::stage! {
-    CompareTorques, "compare_torques", 6, "tests what changed between two recordings of an arm's torques: payload, friction, offsets",
-        CompareTorquesReads {
-            robot: Robot,
-            motion: Chunks<ArmMotion>,
-            parameters: TorqueParameters,
-            contacts: Contacts,
-            earlier_motion: Chunks<ArmMotion>,
-            earlier_parameters: TorqueParameters,
-            earlier_contacts: Contacts,
-        } -> CompareTorquesWrites {
-            changes: TorqueChangeTable,
-        }
-}
-
-impl Stage for CompareTorques {
-    fn run(&self, reads: CompareTorquesReads, context: &Context) -> Result<CompareTorquesWrites> {
-        if same_motion(&reads.motion, &reads.earlier_motion)? {
-            let message = "both recordings are the same: name the earlier one's stages, e.g. `reads: {earlier_motion: before, \
-                           earlier_parameters: first, earlier_contacts: first}`";
-            return Err(Error::spec("reads", message));
-        }
-        let robot = reads.robot.to_description()?;
-        for parameters in [&reads.earlier_parameters, &reads.parameters] {
-            parameters.must_be_of(&robot)?;
-        }
-        let (mut arm, _) = dynamic_arm(&robot)?;
-        let (first, second) = (
-            reads.earlier_parameters.to_model()?,
-            reads.parameters.to_model()?,
-        );
-        let whole = |model: &TorqueModel| (0..model.joints()).all(|link| model.is_whole(link));
-        if !whole(&first) {
-            arm.links = None;
-        }
-        let earlier = RecordedTorques::of(&reads.earlier_motion, &robot)?;
-        let later = RecordedTorques::of(&reads.motion, &robot)?;
-        let [first_events, second_events] =
-            [&reads.earlier_contacts, &reads.contacts].map(Contacts::events);
-        let diagnosed = |recording, model, events| DiagnosedRecording {
-            recording,
-            model,
-            events,
-        };
-        let found = changes(
-            &arm,
-            &diagnosed(&earlier, &first, &first_events),
-            &diagnosed(&later, &second, &second_events),
-        )?;
-        let (ranked, unchanged): (Vec<&TorqueChange>, Vec<&TorqueChange>) = found
-            .changes
-            .iter()
-            .partition(|change| change.rank.is_some());
-        for change in &ranked {
-            context.note(sentence(change));
-        }
-        if ranked.is_empty() {
-            context.note("nothing changed beyond noise");
-        }
-        for (joint, [before, after]) in (1..=found.rms.len()).zip(&found.rms) {
-            context.note(format!(
-                "joint {joint}: {before:.3} Nm rms are left where nothing changed, {after:.3} Nm with the changes"
-            ));
-        }
-        let unchanged = counted(unchanged.len(), "number");
-        context.note(format!("{unchanged} held to be unchanged"));
-        let previous = |name: &str| {
-            let mut rows = reads.earlier_parameters.0.iter();
-            Some(rows.find(|row| row.name == name)?.value)
-        };
-        Ok(CompareTorquesWrites {
-            changes: TorqueChangeTable::of(&found, previous),
-        })
-    }
-}
-
-/// Whether two motions are equal as far as their first chunks go, and as long.
-fn same_motion(one: &Chunks<ArmMotion>, other: &Chunks<ArmMotion>) -> Result<bool> {
-    let first = |motion: &Chunks<ArmMotion>| {
-        let mut first = None;
-        motion.each(|chunk| {
-            first.get_or_insert((chunk.time, chunk.q));
-            Ok(())
-        })?;
-        Ok::<_, Error>(first)
-    };
-    Ok(one.rows() == other.rows() && first(one)? == first(other)?)
-}
-
-fn sentence(change: &TorqueChange) -> String {
-    format!(
-        "{}. {}: {:+.4} +- {:.4} {}, probability {:.2}",
-        change.rank.unwrap_or_default(),
-        change.name,
-        change.change,
-        change.sigma,
-        change.unit,
-        change.probability
-    )
-}
-
-impl Contacts {
-    fn events(&self) -> Vec<ContactEvent> {
-        let event = |row: &crate::table::ContactRow| ContactEvent {
-            start: row.start_s,
-            end: row.end_s,
-            joints: Vec::new(),
-            force: [row.force_x_n, row.force_y_n, row.force_z_n],
-            sigma: [row.sigma_x_n, row.sigma_y_n, row.sigma_z_n],
-            gain: 0.0,
-        };
-        self.0.iter().map(event).collect()
     }
 }

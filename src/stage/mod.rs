@@ -13,6 +13,7 @@ use std::path::PathBuf;
 
 mod cell_evidence;
 mod compare;
+mod compare_torques;
 mod contact;
 mod curves;
 mod declared_effects;
@@ -39,9 +40,9 @@ mod validate;
 pub use crate::report::{Accepted, Report, ReportReads, ReportTorquesReads};
 pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given, TorqueEvidence};
 pub use compare::{Compare, CompareReads};
+pub use compare_torques::{CompareTorques, CompareTorquesReads};
 use diagnose::AskedRows;
 pub use diagnose::{CellPrior, Diagnose, DiagnoseReads};
-pub use diagnose_torques::{CompareTorques, CompareTorquesReads};
 pub use diagnose_torques::{
     ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut,
     InertialSetting,

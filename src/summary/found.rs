@@ -113,10 +113,13 @@ impl ShortFinding {
         } else {
             "Largest"
         };
-        let number = number(
-            phrase(effect).map_or(usual, |(_, shown)| shown),
-            &found.numbers,
-        );
+        let shown = phrase(effect).map_or(usual, |(_, shown)| shown);
+        let number = number(shown, &found.numbers);
+        // A mass that is not seen has no number, its moment has.
+        let number = number.or_else(|| match shown {
+            "mass" => self::number("moment", &found.numbers),
+            _ => None,
+        });
         let size = found.size();
         let of_rows = number.is_none() && size.is_none();
         let mut what = if of_rows {
@@ -234,7 +237,8 @@ fn number(shown: &str, all: &[FoundNumber]) -> Option<String> {
                 one.name.rsplit(['.', '_']).next() == Some(name) || one.name == name
             };
             let one = all.iter().find(is_called)?;
-            let is_more = ["mass", "relative", "offset"].contains(&name) && one.value > 0.0;
+            let is_more =
+                ["mass", "moment", "relative", "offset"].contains(&name) && one.value > 0.0;
             Some(format!(
                 "{}{}",
                 if is_more { "+" } else { "" },

@@ -1,5 +1,6 @@
 //! What a run, its tables, its diagnosis and the difference of two runs say, as text and as JSON; nothing is printed here.
 
+mod changed;
 mod columns;
 mod diagnosis;
 mod estimate;

@@ -2,14 +2,14 @@
 //! was found, the verdict, what is in doubt and one next step; in full the errors step by step, rivals of learned corrections, optimisers compared.
 
 use super::estimate::length;
-use super::{DiagnosisSummary, LimitsSummary, labelled, screen, tables};
+use super::{DiagnosisSummary, LimitsSummary, changed, labelled, screen, tables};
 use crate::error::{Result, counted};
 use crate::pipeline::{CompletedRun, Manifest, StageReport};
 use crate::stage::{DIAGNOSES, DeclaredStage, Transfer};
 use crate::store::Store;
 use crate::table::{
     Contradicted, Corrections, CorrectionsRow, Robot, Searches, SearchesRow, Standing, Statistics,
-    StatisticsRow, Table, Withdrawn, picked,
+    StatisticsRow, Table, TorqueChangeRow, TorqueChangeTable, Withdrawn, picked,
 };
 use crate::text::filled;
 use minijinja::context;
@@ -45,6 +45,9 @@ pub struct RunResult {
     statistics: Vec<StatisticsRow>,
     corrections: Vec<CorrectionsRow>,
     searches: Vec<SearchesRow>,
+    /// What changed between recordings of torques, where they are compared.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    changes: Vec<TorqueChangeRow>,
     rejected_rows: u64,
     report: Option<String>,
     documents: Vec<String>,
@@ -65,6 +68,7 @@ impl RunResult {
         let statistics = tables::<Statistics>(manifest, store)?.into_iter();
         let corrections = tables::<Corrections>(manifest, store)?.into_iter();
         let searches = tables::<Searches>(manifest, store)?.into_iter();
+        let changes = tables::<TorqueChangeTable>(manifest, store)?.into_iter();
         Ok(Self {
             status: "done",
             run_id: manifest.run_id.clone(),
@@ -78,6 +82,7 @@ impl RunResult {
             statistics: statistics.flat_map(|table| table.0).collect(),
             corrections: corrections.flat_map(|table| table.0).collect(),
             searches: searches.flat_map(|table| table.0).collect(),
+            changes: changes.flat_map(|table| table.0).collect(),
             rejected_rows: rejected_rows(manifest),
             report: documents.first().cloned(),
             documents,
@@ -85,8 +90,24 @@ impl RunResult {
     }
 
     /// The errors at the largest set that the step which stands was not fitted to, else at the one that it was fitted to; nothing where no
-    /// stage stated errors or diagnosed; where a model is carried to another recording, what it does there. A wrong set-up is stated alone.
+    /// stage stated errors, diagnosed or compared; where a model is carried to another recording, what it does there; where recordings of
+    /// torques are compared, what changed. A wrong set-up is stated alone.
     pub fn in_short(
+        &self,
+        manifest: &Manifest,
+        store: &Store,
+        on: ResultScreen,
+    ) -> Result<Option<String>> {
+        let short = self.of_steps(manifest, store, on)?;
+        if self.changes.is_empty() || self.wrong_setup.is_some() {
+            return Ok(short);
+        }
+        let table = TorqueChangeTable(self.changes.clone());
+        let changed = changed::lines(&table, screen::width(on.columns));
+        Ok(Some(short.unwrap_or_default() + &changed))
+    }
+
+    fn of_steps(
         &self,
         manifest: &Manifest,
         store: &Store,

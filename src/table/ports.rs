@@ -30,7 +30,7 @@ pub struct Port {
     pub(crate) chunked: bool,
 }
 
-/// What a field of a `reads!` struct may be: `T`, `Option<T>`, `Vec<Labelled<T>>` or `Chunks<T>`.
+/// What a field of a `reads!` struct may be: `T`, `Option<T>`, `Vec<Labelled<T>>`, `Chunks<T>`, or `Chunks<T>` with their labels.
 pub trait PortValue: Sized {
     /// How many tables it takes.
     const ARITY: Arity;
@@ -269,5 +269,28 @@ impl<T: Table> PortValue for Chunks<T> {
                 .1,
             PhantomData,
         ))
+    }
+}
+
+impl<T: Table> PortValue for Labelled<Chunks<T>> {
+    const ARITY: Arity = Arity::One;
+    const KIND: &'static str = T::KIND;
+    const CHUNKED: bool = true;
+    fn take(inputs: Vec<(String, InputTable)>) -> Result<Self> {
+        let all: Vec<Self> = PortValue::take(inputs)?;
+        Ok(all.into_iter().next().expect("the plan wired this port"))
+    }
+}
+
+impl<T: Table> PortValue for Vec<Labelled<Chunks<T>>> {
+    const ARITY: Arity = Arity::Every;
+    const KIND: &'static str = T::KIND;
+    const CHUNKED: bool = true;
+    fn take(inputs: Vec<(String, InputTable)>) -> Result<Self> {
+        let labelled = |(stage, input)| Labelled {
+            stage,
+            table: Chunks(input, PhantomData),
+        };
+        Ok(inputs.into_iter().map(labelled).collect())
     }
 }

@@ -22,7 +22,10 @@ use super::{
     TorqueVerdict, TorqueVerdictRow,
 };
 use crate::diagnose::VerdictKind;
-use crate::dynamics::{BodyConsistency, InertialBasis, TorqueChanges, TorqueDiagnosis};
+use crate::dynamics::{
+    BodyConsistency, InertialBasis, TorqueChange, TorqueChanges, TorqueDiagnosis,
+};
+use crate::effect::Place;
 
 beside_findings! { TorqueDiagnosis => TorqueNumbers of TorqueNumberRow, TorqueRivals of TorqueRivalRow }
 
@@ -191,9 +194,16 @@ impl BodyConsistencies {
 }
 
 impl TorqueChangeTable {
-    /// The table of a comparison; `previous` gives a number of the earlier model by name.
-    pub fn of(changes: &TorqueChanges, previous: impl Fn(&str) -> Option<f64>) -> Self {
+    /// The rows of a comparison of a recording with its reference; `previous` gives a number of the reference's model by name.
+    pub fn extend(
+        &mut self,
+        [recording, reference]: [&str; 2],
+        changes: &TorqueChanges,
+        previous: impl Fn(&str) -> Option<f64>,
+    ) {
         let rows = changes.changes.iter().map(|change| TorqueChangeRow {
+            recording: recording.into(),
+            reference: reference.into(),
             name: change.name.clone(),
             effect: change.effect.clone(),
             place: change.place.to_string(),
@@ -204,10 +214,17 @@ impl TorqueChangeTable {
             p_value: change.p_value,
             probability: change.probability,
             rank: change.rank.map(|rank| rank as i64),
+            rivals: rivals(change),
         });
-        let mut rows: Vec<TorqueChangeRow> = rows.collect();
-        rows.sort_by(|a, b| a.name.cmp(&b.name));
-        rows.dedup_by(|a, b| a.name == b.name);
-        Self(rows)
+        self.0.extend(rows);
+        let key = |row: &TorqueChangeRow| (row.recording.clone(), row.name.clone());
+        self.0.sort_by_key(key);
+        self.0.dedup_by(|a, b| key(a) == key(b));
     }
+}
+
+fn rivals(change: &TorqueChange) -> Option<String> {
+    let place = |(place, share): &(Place, f64)| format!("{place} ({:.0} %)", 100.0 * share);
+    let places: Vec<String> = change.rivals.iter().map(place).collect();
+    (!places.is_empty()).then(|| places.join(", "))
 }

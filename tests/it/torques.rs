@@ -8,6 +8,7 @@ mod friction;
 mod hostile;
 mod masses;
 mod nulls;
+mod recordings;
 mod results;
 mod rigid;
 

@@ -1,10 +1,10 @@
 //! One arm in two recordings: what of its torques changed, with payload, temperature, wear or repair. Both are fitted at once; masses and
 //! friction are common but for what the second recording shows to be another.
 
-use super::arm::{DynamicArm, INERTIAL_NUMBERS, unit_number};
+use super::arm::DynamicArm;
+use super::carried::{Carried, carried, seen_numbers};
 use super::cause::{
-    CENTRE, COULOMB_FRICTION, CURRENT_OFFSET, InertialChanges, PAYLOAD, TorqueForm,
-    VISCOUS_FRICTION,
+    COULOMB_FRICTION, CURRENT_OFFSET, InertialChanges, TORQUE_CAUSES, TorqueForm, VISCOUS_FRICTION,
 };
 use super::columns::{TorqueColumn, TorqueColumns};
 use super::model::TorqueModel;
@@ -22,10 +22,8 @@ use crate::estimate::tail;
 const FREEDOM: f64 = 1e4;
 /// True shapes differ a little from those of the library: differences of the criterion count for less than their exponent.
 const TEMPERATURE: f64 = 2.0;
-/// kg: less is nothing to have a centre.
-const LIGHTEST: f64 = 0.05;
-/// Name of what is on the tool.
-const ON_TOOL: &str = "payload";
+/// Another place of a mass is told from this share of probability on.
+const NOTABLE: f64 = 0.05;
 
 /// A recording, the model that its diagnosis identified, and the pushes that it found.
 pub struct DiagnosedRecording<'a> {
@@ -40,9 +38,9 @@ pub struct DiagnosedRecording<'a> {
 /// A number that may have changed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TorqueChange {
-    /// As in the model of torques; of what is on the tool `payload.mass`, `payload.centre_x`.
+    /// As in the model of torques; of what is carried `payload.mass`, `payload.centre_x`, `added_mass.l2.moment`: what the data see of it.
     pub name: String,
-    /// Canonical name of the cause; `payload`.
+    /// Canonical name of the cause; `payload`, `added_mass`.
     pub effect: String,
     /// Where it acts.
     pub place: Place,
@@ -58,6 +56,8 @@ pub struct TorqueChange {
     pub probability: f64,
     /// From 1, strongest first; `None`: held to be unchanged, the numbers are those that it would have alone.
     pub rank: Option<usize>,
+    /// Other places where the same mass would explain the data as well, with their probability, the likeliest first.
+    pub rivals: Vec<(Place, f64)>,
 }
 
 /// What changed.
@@ -108,9 +108,16 @@ pub fn changes(
     });
     let mut changes = Vec::new();
     for (rank, form) in set.iter().enumerate() {
-        changes.extend(change(&problems[1], &both, &fit, *form, Some(rank + 1)));
+        let rivals = both.rivals(&set, *form);
+        let of_form = change(&problems[1], &both, &fit, *form, Some(rank + 1));
+        changes.extend(of_form.into_iter().map(|change| TorqueChange {
+            rivals: rivals.clone(),
+            ..change
+        }));
     }
-    for form in (0..both.all.forms.len()).filter(|form| !set.contains(form)) {
+    // A mass that is nowhere is not told of each link.
+    let unchanged = |form: &usize| !set.contains(form) && !both.is_link(*form);
+    for form in (0..both.all.forms.len()).filter(unchanged) {
         let with = fit.with(&[form]);
         changes.extend(change(&problems[1], &both, &with, form, None));
     }
@@ -223,46 +230,41 @@ fn change(
     let covariance = fit.covariance(&columns);
     let gain = fit.loss(number, &solution).square;
     let count = values.len();
-    let p_value = tail(gain / count.max(1) as f64, count.max(1) as f64, FREEDOM);
+    let seen = fit.loss(number, &solution).rank.max(1) as f64;
+    let p_value = tail(gain / seen, seen, FREEDOM);
     let probability = 1.0 / (1.0 + (-(gain - both.penalty(number)) / (2.0 * TEMPERATURE)).exp());
-    let on_tool = form.place == Place::Tool;
-    let effect = if on_tool { ON_TOOL } else { form.cause.name };
-    let number = |name: &str, unit: &'static str, change: f64, variance: f64| TorqueChange {
-        name: match on_tool {
-            true => format!("{ON_TOOL}.{name}"),
-            false => format!("{effect}.{}.{name}", form.place.tag()),
-        },
-        effect: effect.into(),
-        place: form.place,
-        unit,
-        change,
-        sigma: variance.max(0.0).sqrt(),
-        p_value,
-        probability,
-        rank,
-    };
-    let entry = |a: usize, b: usize| covariance[a * count + b];
-    if !on_tool {
-        let names = form.coefficient_names().into_iter().enumerate();
-        return names
-            .map(|(k, (quantity, unit))| number(&quantity, unit, values[k], entry(k, k)))
+    let number =
+        |effect: &str, name: String, unit: &'static str, change: f64, sigma: f64| TorqueChange {
+            name,
+            effect: effect.into(),
+            place: form.place,
+            unit,
+            change,
+            sigma,
+            p_value,
+            probability,
+            rank,
+            rivals: Vec::new(),
+        };
+    if let Some(what) = Carried::of(form) {
+        let numbers = seen_numbers(what, problem.scene.arm, form, &values, &covariance);
+        let numbers = numbers.into_iter();
+        return numbers
+            .map(|one| {
+                let name = format!("{}.{}", what.tag(form), one.name);
+                number(what.name(), name, one.unit, one.value, one.sigma)
+            })
             .collect();
     }
-    let point = problem.scene.arm.points[problem.joints() - 1].coords;
-    let mass = values[0];
-    let mut all = vec![number("mass", "kg", mass, entry(0, 0))];
-    if mass.abs() > LIGHTEST && count == INERTIAL_NUMBERS {
-        for (axis, name) in CENTRE.into_iter().enumerate() {
-            let (moment, place) = (values[1 + axis], 1 + axis);
-            // The slope of moment over mass.
-            let slope = [-moment / (mass * mass), 1.0 / mass];
-            let variance = slope[0] * slope[0] * entry(0, 0)
-                + 2.0 * slope[0] * slope[1] * entry(0, place)
-                + slope[1] * slope[1] * entry(place, place);
-            all.push(number(name, "m", point[axis] + moment / mass, variance));
-        }
-    }
-    all
+    let names = form.coefficient_names().into_iter().enumerate();
+    names
+        .map(|(k, (quantity, unit))| {
+            let effect = form.cause.name;
+            let name = format!("{effect}.{}.{quantity}", form.place.tag());
+            let sigma = covariance[k * (count + 1)].max(0.0).sqrt();
+            number(effect, name, unit, values[k], sigma)
+        })
+        .collect()
 }
 
 // Two recordings in one least squares: what is common to both, and forms that only the second one has. Joints of the second count on from those of
@@ -324,7 +326,15 @@ impl StackedColumns {
         let columns_of = |form: usize| second.columns[second.of(form)].to_vec();
         let forms = second.forms.iter().cloned().enumerate();
         let forms = forms.map(|(number, form)| (form, columns_of(number)));
-        for (form, columns) in std::iter::once(payload(&problems[1])).chain(forms) {
+        let bodies = carried(&problems[1]);
+        let first_body = all.columns.len();
+        let of_bodies: usize = bodies.iter().map(|(_, columns, _)| columns.len()).sum();
+        let scales: Vec<f64> = bodies
+            .iter()
+            .flat_map(|(.., scale)| scale.clone())
+            .collect();
+        let bodies = bodies.into_iter().map(|(form, columns, _)| (form, columns));
+        for (form, columns) in bodies.chain(forms) {
             let both = columns.iter().map(|column| placed(1, column));
             let (plain, whitened): (Vec<_>, Vec<_>) = both.map(|[a, b]| (a, b)).unzip();
             white.extend(whitened);
@@ -335,6 +345,10 @@ impl StackedColumns {
         let weighted = WeightedColumns::of_white(white, whitened.concat(), &chosen);
         for number in chosen {
             all.prior[number] += UNKNOWN * weighted.gram[number][number] + f64::MIN_POSITIVE;
+        }
+        // What bodies on an arm may be at most keeps what the data do not see from being any number.
+        for (number, scale) in (first_body..first_body + of_bodies).zip(scales) {
+            all.prior[number] += scale.powi(-2);
         }
         Self {
             all,
@@ -349,9 +363,9 @@ impl StackedColumns {
     fn penalty(&self, form: usize) -> f64 {
         let rows = [0, self.joints].map(|joint| self.weighted.measured[joint].len());
         let rows: usize = rows.iter().sum();
-        PRICE
-            + self.all.of(form).len() as f64 * (rows as f64).ln()
-            + 2.0 * (self.all.forms.len() as f64).ln()
+        let columns = self.all.of(form);
+        let seen = columns.filter(|column| self.weighted.gram[*column][*column] > 0.0);
+        PRICE + seen.count() as f64 * (rows as f64).ln() + 2.0 * (self.all.forms.len() as f64).ln()
     }
 
     /// Common numbers and some forms.
@@ -365,7 +379,8 @@ impl StackedColumns {
         loop {
             let now = self.fit(&set);
             let worth = |form: usize| now.square - now.with(&[form]).square - self.penalty(form);
-            let others = (0..self.all.forms.len()).filter(|form| !set.contains(form));
+            let others = (0..self.all.forms.len())
+                .filter(|form| !set.contains(form) && self.is_body(&now, *form));
             let best = others
                 .map(|form| (form, worth(form)))
                 .max_by(|a, b| a.1.total_cmp(&b.1));
@@ -388,6 +403,51 @@ impl StackedColumns {
         }
     }
 
+    /// Whether a form is a mass on a link other than the last.
+    fn is_link(&self, form: usize) -> bool {
+        Carried::of(&self.all.forms[form]) == Some(Carried::OnLink)
+    }
+
+    /// Whether the numbers that a form would have are those of a body, where it is one.
+    fn is_body(&self, now: &SweptColumns, form: usize) -> bool {
+        if !self.is_link(form) {
+            return true;
+        }
+        let solution = now.with(&[form]).solution();
+        let values: Vec<f64> = (self.all.of(form))
+            .map(|column| value_of(&solution, column))
+            .collect();
+        let form = &self.all.forms[form];
+        (form.cause.is_possible)(form, &values)
+    }
+
+    /// Other places where what a form carries would explain the data as well, with their probability among all places.
+    fn rivals(&self, set: &[usize], form: usize) -> Vec<(Place, f64)> {
+        if Carried::of(&self.all.forms[form]).is_none() {
+            return Vec::new();
+        }
+        let others: Vec<usize> = set.iter().copied().filter(|one| *one != form).collect();
+        let without = self.fit(&others);
+        let is_other = |one: &usize| {
+            *one != form
+                && !set.contains(one)
+                && Carried::of(&self.all.forms[*one]).is_some()
+                && self.is_body(&without, *one)
+        };
+        let criterion = |one: usize| without.with(&[one]).square + self.penalty(one);
+        let here = criterion(form);
+        let odds = |one: usize| ((here - criterion(one)) / (2.0 * TEMPERATURE)).exp();
+        let all: Vec<(Place, f64)> = (0..self.all.forms.len())
+            .filter(is_other)
+            .map(|one| (self.all.forms[one].place, odds(one)))
+            .collect();
+        let whole = 1.0 + all.iter().map(|(_, odds)| odds).sum::<f64>();
+        let shares = all.into_iter().map(|(place, odds)| (place, odds / whole));
+        let mut rivals: Vec<(Place, f64)> = shares.filter(|(_, share)| *share > NOTABLE).collect();
+        rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
+        rivals
+    }
+
     /// Residual of the second recording after a fit, Nm rms per joint.
     fn residual_rms(&self, fit: &SweptColumns) -> Vec<f64> {
         let mut left = self.measured.clone();
@@ -400,15 +460,4 @@ impl StackedColumns {
         };
         left[self.joints..].iter().map(rms).collect()
     }
-}
-
-/// The last link's inertial numbers that torques can determine: all where masses are declared.
-fn payload(problem: &TorqueProblem) -> (TorqueForm, Vec<TorqueColumn>) {
-    let last = problem.joints() - 1;
-    let changes = (0..INERTIAL_NUMBERS).map(|number| (last, unit_number(number)));
-    let form = TorqueForm {
-        place: Place::Tool,
-        ..TorqueForm::at_joint(&PAYLOAD, last, INERTIAL_NUMBERS)
-    };
-    (form, problem.regressor.columns(&changes.collect()))
 }

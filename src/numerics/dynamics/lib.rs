@@ -8,6 +8,7 @@ use calib_foundation::statistics;
 use calib_numerics::{criteria, effect, error, estimate, spatial};
 
 mod arm;
+mod carried;
 #[cfg(test)]
 mod cases;
 #[cfg(test)]

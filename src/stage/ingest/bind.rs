@@ -2,7 +2,9 @@
 
 use super::arm::{KindSlots, RobotJoints};
 use super::columns::{Columns, FileLayout, WideTargets};
-use super::mapped::{ColumnRef, JointColumns, ScalarColumn, TextColumn};
+use super::mapped::{
+    ColumnRef, JointColumns, JointNames, PerJoint, ScalarColumn, Supply, TextColumn,
+};
 use super::stretch::CLOCK;
 use crate::error::{Error, Fault, Result, counted, did_you_mean, first_of};
 use crate::observation::{Convention, DeclaredColumn};
@@ -33,6 +35,10 @@ pub(super) struct Binding {
     pub(crate) points: Vec<(String, [NumberBinding; 3])>,
     /// Numbers that are the same in every row, SI.
     pub(crate) constants: Vec<(usize, f64)>,
+    /// The place of a time that is the row's number over a rate, Hz.
+    pub(crate) rated: Option<(usize, f64)>,
+    /// Torques of dc motors.
+    pub(crate) motors: Vec<MotorBinding>,
     /// Joints (from 0) from which so many times another one is taken off.
     pub(crate) coupled: Vec<(usize, usize, f64)>,
     /// Places of a row's numbers that may be filled, ascending.
@@ -68,6 +74,29 @@ pub(super) struct NumberBinding {
     /// Whether it holds clock times as text.
     pub(crate) is_clock: bool,
 }
+
+/// The torque of a dc motor by its voltage, which is a duty times a supply where one is.
+pub(super) struct MotorBinding {
+    /// Places of torque and velocity in a row's numbers.
+    pub(crate) torque: usize,
+    pub(crate) velocity: usize,
+    /// The voltage, or the duty.
+    pub(crate) drive: NumberBinding,
+    pub(crate) supply: Option<SupplyBinding>,
+    /// Nm/V.
+    pub(crate) per_volt: f64,
+    /// Nm s/rad.
+    pub(crate) per_speed: f64,
+}
+
+/// Volts.
+pub(super) enum SupplyBinding {
+    Volts(f64),
+    Column(NumberBinding),
+}
+
+/// V: no motor of an arm has more.
+const MOST_VOLTS: f64 = 2e3;
 
 /// A column whose numbers are added to those of another, times the sign.
 pub(super) struct Difference {
@@ -108,6 +137,13 @@ impl Binding {
             let columns = [Some(cell.column), other].into_iter().flatten();
             columns.map(|column| (column, !cell.optional))
         });
+        let supplies = self.motors.iter().filter_map(|motor| match &motor.supply {
+            Some(SupplyBinding::Column(cell)) => Some((cell.column, true)),
+            _ => None,
+        });
+        let drives = self.motors.iter();
+        let drives = drives.map(|motor| (motor.drive.column, !motor.drive.optional));
+        let numbers = numbers.chain(drives).chain(supplies);
         let points = self.points.iter().flat_map(|(_, cells)| cells);
         let others = points.map(|cell| cell.column).chain(self.sequence);
         let others = others.map(|column| (column, true));
@@ -117,7 +153,9 @@ impl Binding {
     pub(super) fn slots(&self) -> Vec<usize> {
         let cells = self.cells.iter().map(|cell| cell.index);
         let constants = self.constants.iter().map(|constant| constant.0);
-        cells.chain(constants).collect()
+        let rated = self.rated.iter().map(|rated| rated.0);
+        let motors = self.motors.iter().map(|motor| motor.torque);
+        cells.chain(constants).chain(rated).chain(motors).collect()
     }
 }
 
@@ -172,7 +210,9 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
             false => unit(scalar.unit.as_deref())?,
         };
         let index = arm.slots.of(declared.setting).start;
-        if let Some(value) = scalar.value {
+        if let Some(rate) = scalar.rate {
+            binder.binding.rated = Some((index, rate));
+        } else if let Some(value) = scalar.value {
             binder.binding.constants.push((index, unit.to_si(value)));
         } else if let Some(reference) = &scalar.column
             && let Some(column) = binder.column(reference, declared.setting, scalar.optional)
@@ -401,10 +441,15 @@ impl Binder<'_> {
             let name = pattern.replace("{j}", &(joint + 1).to_string());
             ColumnRef::Name(name.replace("{name}", called))
         };
-        let references: Vec<ColumnRef> = match (&joints.columns, &joints.column) {
-            (Some(list), _) => list.clone(),
-            (None, Some(pattern)) => (0..count).map(|joint| numbered(pattern, joint)).collect(),
-            (None, None) => return Err(Error::Bug("unchecked joint columns".into())),
+        let drive = joints.drive().map(|(names, _)| names);
+        let by_pattern =
+            |pattern: &String| (0..count).map(|joint| numbered(pattern, joint)).collect();
+        let references: Vec<ColumnRef> = match (drive, &joints.columns, &joints.column) {
+            (Some(JointNames::List(list)), ..) | (None, Some(list), _) => list.clone(),
+            (Some(JointNames::Pattern(pattern)), ..) | (None, None, Some(pattern)) => {
+                by_pattern(pattern)
+            }
+            (None, None, None) => return Err(Error::Bug("unchecked joint columns".into())),
         };
         if references.len() != count {
             let found = counted(references.len(), "column");
@@ -414,7 +459,11 @@ impl Binder<'_> {
         if !self.are_of_the_robot(joints, name, count) {
             return Ok(());
         }
-        let pattern = joints.column.as_ref();
+        let pattern = match drive {
+            Some(JointNames::Pattern(pattern)) => Some(pattern),
+            Some(JointNames::List(_)) => None,
+            None => joints.column.as_ref(),
+        };
         if let Some(pattern) = pattern.filter(|pattern| pattern.contains("{j}")) {
             let next = ColumnRef::Name(pattern.replace("{j}", &(count + 1).to_string()));
             if !self.find(&next).is_empty() {
@@ -437,6 +486,9 @@ impl Binder<'_> {
             self.fault(format!(
                 "`{name}` has {there} of its columns; the robot has {all}"
             ));
+        }
+        if drive.is_some() {
+            return self.motors(declared, joints, &references, arm);
         }
         for (joint, reference) in references.iter().enumerate() {
             let is_prismatic = arm.prismatic.get(joint).copied().unwrap_or(false);
@@ -469,6 +521,72 @@ impl Binder<'_> {
         let coupled = joints.coupled.iter();
         let coupled = coupled.map(|one| (one.joint - 1, one.by - 1, one.ratio));
         self.binding.coupled.extend(coupled);
+        Ok(())
+    }
+    /// Torques of dc motors, by the columns of what drives them.
+    fn motors(
+        &mut self,
+        declared: &DeclaredColumn,
+        joints: &JointColumns,
+        references: &[ColumnRef],
+        arm: &RobotJoints,
+    ) -> Result<()> {
+        let (torque, velocity) = (arm.slots.of("torque").start, arm.slots.of("velocity").start);
+        let (count, all) = (references.len(), counted(references.len(), "joint"));
+        for (setting, numbers) in [
+            ("kt_over_r", &joints.kt_over_r),
+            ("kt2_over_r", &joints.kt2_over_r),
+        ] {
+            if let Some(PerJoint::Each(each)) = numbers
+                && each.len() != count
+            {
+                let given = counted(each.len(), "number");
+                self.fault(format!(
+                    "`torque.{setting}` lists {given}; the robot has {all}"
+                ));
+            }
+        }
+        let full = joints.full_duty.unwrap_or(1.0);
+        for (joint, reference) in references.iter().enumerate() {
+            let Some(column) = self.column(reference, "torque", false) else {
+                continue;
+            };
+            let cell = |binder: &Self, column, divisor, range| NumberBinding {
+                range,
+                divisor,
+                optional: joints.optional,
+                sign: joints.sign.get(joint).copied().unwrap_or(1.0),
+                ..binder.cell(declared, false, torque + joint, column, Unit::One)
+            };
+            let (divisor, range) = match joints.duty.is_some() {
+                true => (full, [-1.0, 1.0]),
+                false => (1.0, [-MOST_VOLTS, MOST_VOLTS]),
+            };
+            let drive = cell(self, column, divisor, range);
+            let supply = match &joints.supply {
+                None => None,
+                Some(Supply::Volts(volts)) => Some(SupplyBinding::Volts(*volts)),
+                Some(Supply::Column(supply)) => {
+                    let Some(column) = self.column(&supply.column, "torque", false) else {
+                        continue;
+                    };
+                    let divisor = 1.0 / supply.scale.unwrap_or(1.0);
+                    Some(SupplyBinding::Column(NumberBinding {
+                        sign: 1.0,
+                        ..cell(self, column, divisor, [f64::MIN_POSITIVE, MOST_VOLTS])
+                    }))
+                }
+            };
+            let of = |numbers: &Option<PerJoint>| numbers.as_ref().and_then(|all| all.of(joint));
+            self.binding.motors.push(MotorBinding {
+                torque: torque + joint,
+                velocity: velocity + joint,
+                drive,
+                supply,
+                per_volt: of(&joints.kt_over_r).unwrap_or(1.0),
+                per_speed: of(&joints.kt2_over_r).unwrap_or(0.0),
+            });
+        }
         Ok(())
     }
     /// Whether signs, zeros and couplings are those of this robot's joints.

@@ -338,7 +338,7 @@ fn convention_schema(
 pub struct FileLayout {
     /// Path of the file: text in UTF-8 (with or without a byte-order mark) or Windows-1252, rows ending in LF or CRLF; a workbook
     /// (.xlsx, .xlsm), a sheet of which is read as text is; a file of columns (Parquet; Feather and streams of Arrow, uncompressed or by zstd; arrays of NumPy, .npz), for which only
-    /// `columns` matters: a list of numbers in it is a column for each, `state[1]`, `state[2]` and so on; or a recording of ROS 2 (.mcap, .db3,
+    /// `columns` matters: a list of numbers in it is a column for each, `state[1]`, `state[2]` and so on; JSON (a list of objects, or an object a line); or a recording of ROS 2 (.mcap, .db3,
     /// or the folder of its parts).
     pub(crate) file: RawFile,
     /// The sheet of a workbook; without it the only visible one with rows of numbers.

@@ -112,6 +112,9 @@ pub struct ScalarColumn {
     /// The number of every row, instead of a column.
     #[serde(default)]
     pub(crate) value: Option<f64>,
+    /// For `time`, instead of a column: rows a second, Hz, of a file whose rows come evenly; the first is at 0 s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) rate: Option<f64>,
     /// Unit of the file's numbers, e.g. `mm`; `clock` where a time is a time of day (08:15:03) or a date with a time (ISO 8601).
     #[serde(default)]
     pub(crate) unit: Option<String>,
@@ -168,9 +171,100 @@ pub struct JointColumns {
     /// Positions that hold a part of another joint's, as where a controller reports joint 3 against the horizon; the part is taken off.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) coupled: Vec<CoupledColumn>,
+    /// For `torque`, instead of its columns: the duty (share of the supply) that a dc motor is driven with, a pattern or a list of columns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) duty: Option<JointNames>,
+    /// What the file shows at full duty, e.g. 100 for percent; without it 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) full_duty: Option<f64>,
+    /// For `torque`, instead of its columns: the voltage of a dc motor, V, a pattern or a list of columns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) voltage: Option<JointNames>,
+    /// The supply of the motors, V: a number, or a column.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) supply: Option<Supply>,
+    /// Nm at the joint per volt (torque constant over resistance, times the ratio of the gear), for all joints or for each.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) kt_over_r: Option<PerJoint>,
+    /// Nm s/rad at the joint that the voltage of the turning motor takes (torque constant squared over resistance, times the ratio squared);
+    /// without it, it is found as viscous friction.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) kt2_over_r: Option<PerJoint>,
     /// The columns may be missing from the file, and their cells may be blank.
     #[serde(default)]
     pub(crate) optional: bool,
+}
+
+/// Columns, one for each joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected a pattern such as `duty{j}`, or a list of columns"
+)]
+pub enum JointNames {
+    /// A pattern as of `column`.
+    Pattern(String),
+    /// Names or numbers from the first joint to the last.
+    List(Vec<ColumnRef>),
+}
+
+/// The supply of motors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected volts, or `{column: ...}`")]
+pub enum Supply {
+    /// V, the same in every row.
+    Volts(f64),
+    /// A column of volts.
+    Column(SupplyColumn),
+}
+
+/// A column of the supply, V.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SupplyColumn {
+    /// Name or number of the column.
+    pub(crate) column: ColumnRef,
+    /// V per unit of the file, e.g. 0.1 where it counts tenths; without it 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) scale: Option<f64>,
+}
+
+/// A number for all joints, or one for each.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected a number, or a list of one for each joint"
+)]
+pub enum PerJoint {
+    /// For all.
+    All(f64),
+    /// From the first joint to the last.
+    Each(Vec<f64>),
+}
+
+impl PerJoint {
+    /// Of a joint, from 0; none beyond the list.
+    pub(super) fn of(&self, joint: usize) -> Option<f64> {
+        match self {
+            Self::All(number) => Some(*number),
+            Self::Each(all) => all.get(joint).copied(),
+        }
+    }
+    /// All that are stated.
+    pub(super) fn stated(&self) -> &[f64] {
+        match self {
+            Self::All(number) => std::slice::from_ref(number),
+            Self::Each(all) => all,
+        }
+    }
+}
+
+impl JointColumns {
+    /// What drives a motor instead of a torque, and its setting.
+    pub(super) fn drive(&self) -> Option<(&JointNames, &'static str)> {
+        let duty = self.duty.as_ref().map(|names| (names, "duty"));
+        duty.or_else(|| Some((self.voltage.as_ref()?, "voltage")))
+    }
 }
 
 /// The column of joint `joint` holds `ratio` times the position of joint `by` beside its own.

@@ -3,8 +3,8 @@
 use crate::error::{Error, Fault, Result, counted};
 use crate::program::{JointList, Language, MOST_BYTES, joint_list, listing as language};
 use crate::raw::{
-    self, BagRows, ColumnRows, DecimalMark, Delimiter, InputSource, Record, RecordReader,
-    TextLayout, TextRows, Workbook, failed, has_columns, is_bag, is_workbook, not_read,
+    self, BagRows, ColumnRows, DecimalMark, Delimiter, InputSource, JsonRows, Record, RecordReader,
+    TextLayout, TextRows, Workbook, failed, has_columns, is_bag, is_json, is_workbook, not_read,
 };
 use crate::stage::ingest::arm::{RobotJoints, UNLIMITED};
 use crate::stage::ingest::bind::{Binding, FileHeader, bind};
@@ -43,6 +43,7 @@ pub(crate) enum FileKind {
     /// A controller's, which declares joints.
     Program(Language),
     Columns,
+    Json,
     /// What is known and not read, and why.
     NotRead(&'static str),
     Text,
@@ -59,6 +60,8 @@ impl FileKind {
             Self::Program(language)
         } else if has_columns(head) {
             Self::Columns
+        } else if is_json(head) {
+            Self::Json
         } else {
             not_read(head).map_or(Self::Text, Self::NotRead)
         }
@@ -101,6 +104,7 @@ pub fn records(
         FileKind::Bag => Box::new(BagRows::open(reader.into_inner(), label, layout.topic)?),
         FileKind::Program(language) => Box::new(ListedRows::open(reader, label, language)?),
         FileKind::Columns => Box::new(ColumnRows::open(reader, label)?),
+        FileKind::Json => Box::new(JsonRows::open(reader, label)?),
         FileKind::NotRead(what) => return Err(data(what.into())),
         FileKind::Text => {
             let reader = raw::without_utf16(reader).map_err(|error| failed(label, &error))?;

@@ -1,12 +1,13 @@
 //! The quantities of one row, read from its record, or the reason why not.
 
 use super::arm::{KindSlots, RobotJoints};
-use super::bind::{Binding, NumberBinding, TextBinding};
+use super::bind::{Binding, NumberBinding, SupplyBinding, TextBinding};
 use super::columns::LimitPolicy;
 use super::refusal::{Reason, RowRefusal, refuse};
 use super::stretch::{ALLOWED, ClockColumn, ClockTime};
 use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
 use crate::robot::ONE_AND_A_HALF_TURNS;
+use crate::units::Unit;
 
 /// Numbers of rows go up to here: the targets of wide rows have room beyond.
 const LARGEST_SEQUENCE: i64 = 1 << 52;
@@ -118,7 +119,13 @@ impl<'a> RowReader<'a> {
                 *slot = *value;
             }
         }
+        if let Some((index, rate)) = self.binding.rated
+            && let Some(slot) = row.values.get_mut(index)
+        {
+            *slot = row.number.saturating_sub(1) as f64 / rate;
+        }
         self.numbers(record, row)?;
+        self.motors(record, row)?;
         self.points(record, row)?;
         self.conventions(row)?;
         self.measured(row)?;
@@ -146,6 +153,32 @@ impl<'a> RowReader<'a> {
         let q = q.unwrap_or_default();
         for (joint, by, ratio) in &self.binding.coupled {
             q[*joint] -= ratio * q[*by];
+        }
+        Ok(())
+    }
+
+    /// Torques of dc motors: those of their voltage less what the turning motor takes of it.
+    fn motors(&mut self, record: &Record, row: &mut RecordedRow) -> Result<(), RowRefusal> {
+        for motor in &self.binding.motors {
+            let mut read = |cell: &NumberBinding| -> Result<Option<f64>, RowRefusal> {
+                let found = value(&mut self.clock, self.mark, record, cell)?;
+                found.map_or(Ok(()), |found| in_range(record, cell, found))?;
+                Ok(found)
+            };
+            let Some(drive) = read(&motor.drive)? else {
+                continue;
+            };
+            let supply = match &motor.supply {
+                None => Some(1.0),
+                Some(SupplyBinding::Volts(volts)) => Some(*volts),
+                Some(SupplyBinding::Column(cell)) => read(cell)?,
+            };
+            let Some(supply) = supply else { continue };
+            let taken = match motor.per_speed {
+                0.0 => 0.0,
+                per_speed => per_speed * row.values[motor.velocity],
+            };
+            row.values[motor.torque] = motor.per_volt * drive * supply - taken;
         }
         Ok(())
     }
@@ -334,9 +367,15 @@ fn in_range(record: &Record, cell: &NumberBinding, value: f64) -> Result<(), Row
         return Ok(());
     }
     let unit = cell.unit;
+    let lower = if lower == -upper {
+        cell.divisor * lower
+    } else {
+        lower
+    };
     let [lower, upper] = [lower, cell.divisor * upper].map(|limit| round(unit.from_si(limit)));
     let allowed = match no_direction {
         true => "1, -1 or 0".to_string(),
+        false if unit == Unit::One => format!("{lower} to {upper}"),
         false => format!("{lower} to {upper} {unit}"),
     };
     let (name, text) = (&cell.name, shown(record, cell.column));

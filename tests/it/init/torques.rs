@@ -272,3 +272,74 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
         "{printed}"
     );
 }
+
+/// Columns by name with their numbers, forty rows.
+fn columns(all: &[(&str, &dyn Fn(usize) -> f64)]) -> String {
+    let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
+    let mut text = names.join(",") + "\n";
+    for k in 0..40 {
+        let cells: Vec<String> = all.iter().map(|(_, of)| format!("{:.5}", of(k))).collect();
+        text += &(cells.join(",") + "\n");
+    }
+    text
+}
+
+fn numbers(column: usize) -> impl Fn(usize) -> f64 {
+    move |row| (0.5 + 0.1 * column as f64) * (0.1 * row as f64 + column as f64).sin()
+}
+
+/// Six joints under each of some patterns.
+fn six(patterns: &[&str], turns: f64) -> String {
+    let time = |k: usize| 0.008 * k as f64;
+    let waves: Vec<_> = (0..6 * patterns.len()).map(numbers).collect();
+    // The last joint turns more than once.
+    let scaled = |n: usize| {
+        let wave = &waves[n];
+        let factor = if n == 5 { turns } else { 1.0 };
+        move |k: usize| factor * wave(k)
+    };
+    let waves_of: Vec<_> = (0..waves.len()).map(scaled).collect();
+    let names: Vec<String> = (0..waves.len())
+        .map(|n| patterns[n / 6].replace('#', &(n % 6).to_string()))
+        .collect();
+    let mut all: Vec<(&str, &dyn Fn(usize) -> f64)> = vec![("timestamp", &time)];
+    all.extend(
+        (names.iter().zip(&waves_of))
+            .map(|(name, wave)| (name.as_str(), wave as &dyn Fn(usize) -> f64)),
+    );
+    columns(&all)
+}
+
+#[test]
+fn what_a_controller_expects_is_no_measurement_where_currents_are() {
+    let log = six(
+        &[
+            "target_q_#",
+            "target_moment_#",
+            "actual_q_#",
+            "actual_qd_#",
+            "actual_current_#",
+            "target_current_#",
+        ],
+        1.0,
+    );
+    let made = made(&[("log.csv", log.into())]);
+    made.has(&[
+        "q: {columns: [\"actual_q_0\"",
+        "current: {columns: [\"actual_current_0\"",
+        "velocity: {columns: [\"actual_qd_0\"",
+    ]);
+    made.says(&["the controller's own model expects"]);
+    made.lacks(&["      torque: {columns: [\"target_moment_0\""]);
+}
+
+#[test]
+fn a_joint_that_turns_more_than_once_makes_no_degrees_of_the_others() {
+    let made = made(&[("log.csv", six(&["q#", "v#", "f#"], 20.0).into())]);
+    made.has(&[
+        "q: {columns: [\"q0\", \"q1\", \"q2\", \"q3\", \"q4\", \"q5\"], unit: rad}",
+        "velocity: {columns: [\"v0\"",
+        "torque: {columns: [\"f0\"",
+    ]);
+    made.says(&["several turns in radians"]);
+}

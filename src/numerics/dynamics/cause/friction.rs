@@ -173,13 +173,13 @@ fn falls(form: &TorqueForm, velocity: f64) -> f64 {
     }
 }
 
-/// Friction that grows with the torque that a gear transmits.
+/// Friction that grows with the torque that a gear transmits; a gear without preload has no other of one size.
 pub(super) static LOAD: TorqueCause = TorqueCause {
     name: "load_friction",
     coefficients: &[("share", "1")],
     of_sign: true,
     rich: |_| true,
-    modifies: &[COULOMB],
+    modifies: &[VISCOUS],
     positive: true,
     of_rigid: true,
     torque: ColumnTorque::Row(|column, row| {

@@ -1,12 +1,17 @@
 //! Bodies, a mounting, motors and drives that are not as declared.
 
+use super::InertialChanges;
 use super::{
     ColumnTorque, FittedNumber, PLAIN, TorqueCause, TorqueForm, at_each_joint, at_each_link, plain,
     shape, size_of_two, span,
 };
-use crate::arm::{INERTIAL_NAMES, INERTIAL_NUMBERS, inertial_unit, unit_number};
+use crate::arm::{
+    DynamicArm, INERTIAL_NAMES, INERTIAL_NUMBERS, Inertial, inertial_unit, numbers, unit_number,
+};
 use crate::effect::Place;
 use crate::recording::largest;
+use crate::scene::{DynamicScene, GRAVITY};
+use nalgebra::{Matrix3, Vector3};
 
 /// A number times a factor.
 fn scaled(number: &FittedNumber, by: f64) -> FittedNumber {
@@ -26,28 +31,55 @@ const INERTIA: usize = INERTIAL_NUMBERS - 4;
 /// Mass at the declared centre; mass and centre; all ten numbers.
 const PAYLOADS: [usize; 3] = [1, 4, INERTIAL_NUMBERS];
 
-/// A payload that is not the declared one. Shape: declared mass, kg.
+/// A payload that is not the declared one. Shape: declared mass, kg; its centre and the tool from the last joint's point, m. In three columns
+/// it is a point on the way to the tool, as of [`ADDED_MASS`], where no payload is declared.
 pub(crate) static PAYLOAD: TorqueCause = TorqueCause {
     name: "payload_error",
     price: |_| 4.0,
-    rich: |_| true,
+    rich: |form| form.width != POINT,
     inertial: true,
     forms: |cause, scene| {
-        let mass = scene.arm.payload.map_or(0.0, |payload| payload.mass);
+        let arm = scene.arm;
+        let mass = arm.payload.map_or(0.0, |payload| payload.mass);
+        let point = arm.points[arm.joints() - 1];
+        let centre = arm.payload.filter(|_| mass > 0.0);
+        let centre = centre.map_or(arm.tool, |payload| payload.centre) - point;
+        let tool = arm.tool - point;
+        let shape = [&[mass][..], centre.as_slice(), tool.as_slice()].concat();
         let form = |width| TorqueForm {
             place: Place::Tool,
-            ..TorqueForm::at_joint(cause, 0, width).shaped(&[mass])
+            ..TorqueForm::at_joint(cause, 0, width).shaped(&shape)
         };
+        let point = (mass == 0.0 && tool.norm() > SHORTEST).then_some(POINT);
+        let widths = || PAYLOADS.into_iter().chain(point);
         let declared = scene.declared.iter();
-        declared.flat_map(|_| PAYLOADS.map(form)).collect()
+        declared.flat_map(|_| widths().map(form)).collect()
     },
     is_possible: |form, values| {
+        if form.width == POINT {
+            return is_on_way(part(form, 4).norm(), values);
+        }
         let whole = form.shape[0] + values[0];
+        // Where no payload is declared nothing can be taken off: no body has less than no inertia.
+        if form.width == INERTIAL_NUMBERS && form.shape[0] == 0.0 {
+            return whole > -LIGHTEST && values[4] + values[7] + values[9] >= 0.0;
+        }
+        // The same of mass and centre, about the last joint.
+        let (arm, moments) = (part(form, 1), &values[1..]);
+        if form.width == 4 && form.shape[0] == 0.0 {
+            let shift = arm.dot(&Vector3::from_row_slice(moments));
+            if values[0] * arm.norm_squared() + 2.0 * shift < 0.0 {
+                return false;
+            }
+        }
         let is_near = |moment: &f64| moment.abs() < PAYLOAD_FARTHEST * whole.max(LIGHTEST);
         whole > -LIGHTEST && (form.width == INERTIAL_NUMBERS || values[1..].iter().all(is_near))
     },
     changes: Some(|form, declared| {
         let last = declared.tolerance.len() - 1;
+        if form.width == POINT {
+            return along(last, &part(form, 4)).to_vec();
+        }
         let column = |number: usize| match number {
             _ if form.width == INERTIAL_NUMBERS => unit_number(number),
             0 => declared.payload,
@@ -58,6 +90,12 @@ pub(crate) static PAYLOAD: TorqueCause = TorqueCause {
             .collect()
     }),
     parameters: |form, fitted| {
+        if form.width == POINT {
+            return point_parameters(part(form, 4).norm(), fitted);
+        }
+        if let Some(moment) = unseen_mass(form, fitted) {
+            return vec![plain("moment", moment, "kg m")];
+        }
         let mut all = vec![plain("mass", fitted[0], "kg")];
         let others = &fitted[1..];
         if form.width == INERTIAL_NUMBERS {
@@ -74,36 +112,246 @@ pub(crate) static PAYLOAD: TorqueCause = TorqueCause {
         all
     },
     statement: |form, fitted| {
+        let lever = part(form, 4).norm();
+        if form.width == POINT {
+            return point_statement("the last link carries", lever, fitted);
+        }
+        if let Some(moment) = unseen_mass(form, fitted) {
+            let at_tool = match lever > SHORTEST {
+                true => format!(
+                    ": {} if at the tool",
+                    grams(scaled(&moment, 1.0 / lever), "")
+                ),
+                false => String::new(),
+            };
+            return format!(
+                "what the last link carries has a moment of {} more about its joint than declared{at_tool}; its mass is not seen",
+                grams(moment, " m")
+            );
+        }
         let mass = fitted[0].value;
         let more = if mass >= 0.0 { "more" } else { "less" };
-        let centre = if form.width > 1 {
-            ", its centre elsewhere"
-        } else {
-            ""
+        let centre = match (form.width > 1, form.shape[0] > 0.0) {
+            (true, _) => ", its centre elsewhere",
+            (false, true) => "",
+            (false, false) => ", as a point at the tool",
+        };
+        let size = FittedNumber {
+            value: mass.abs(),
+            ..fitted[0]
         };
         format!(
-            "the payload is {:.2} kg {more} than declared{centre}",
-            mass.abs()
+            "the payload is {} {more} than declared{centre}",
+            grams(size, "")
         )
     },
     ..PLAIN
 };
 
+/// Columns of a point along a link.
+const POINT: usize = 3;
+/// A number is seen whose standard deviation is below this share of it.
+const SEEN: f64 = 0.5;
+/// m: what is carried stands out by as much at least.
+const SHORT_ARM: f64 = 0.1;
+/// Share of a place beyond which it is not told.
+const PRECISE: f64 = 0.2;
+
+/// Three shape numbers as a vector.
+fn part(form: &TorqueForm, first: usize) -> Vector3<f64> {
+    Vector3::from_row_slice(&form.shape[first..first + 3])
+}
+
+fn is_seen(number: &FittedNumber) -> bool {
+    number.sigma > 0.0 && number.sigma < SEEN * number.value.abs()
+}
+
+/// The moment about the last joint's point, kg m, of a payload whose mass the data do not see beside it.
+fn unseen_mass(form: &TorqueForm, fitted: &[FittedNumber]) -> Option<FittedNumber> {
+    if form.width == 1 {
+        return None;
+    }
+    let (mass, moments) = (fitted[0], &fitted[1..4]);
+    let from_mass = match form.width == INERTIAL_NUMBERS {
+        true => Vector3::zeros(),
+        false => mass.value * part(form, 1),
+    };
+    let moment = Vector3::from_fn(|axis, _| from_mass[axis] + moments[axis].value);
+    let variance = moments.iter().map(|moment| moment.sigma.powi(2));
+    let moment = FittedNumber {
+        value: moment.norm(),
+        sigma: variance.sum::<f64>().sqrt(),
+    };
+    let lever = part(form, 4).norm().max(SHORT_ARM);
+    let is_small = mass.sigma > 0.0 && mass.sigma * lever < SEEN * moment.value;
+    let is_unseen = !is_seen(&mass) && !is_small && is_seen(&moment);
+    is_unseen.then_some(moment)
+}
+
+/// `1.20 kg`, or `105 +- 1 g` below a kilogram; the rest of the unit follows.
+fn grams(number: FittedNumber, rest: &str) -> String {
+    match number.value.abs() < 1.0 {
+        true if number.sigma > 0.0 => {
+            let (value, sigma) = (1e3 * number.value, 1e3 * number.sigma);
+            let decimals = usize::from(sigma < 1.0);
+            format!("{value:.decimals$} +- {sigma:.decimals$} g{rest}")
+        }
+        true => format!("{:.0} g{rest}", 1e3 * number.value),
+        false => format!("{:.2} kg{rest}", number.value),
+    }
+}
+
+/// Whether mass, moment and inertia along a way are those of a point on it.
+fn is_on_way(length: f64, values: &[f64]) -> bool {
+    let [mass, moment, inertia] = [values[0], values[1], values[2]];
+    let is_there = |distance: f64| (-OVERHANG..1.0 + OVERHANG).contains(&(distance / length));
+    let by_mass = mass == 0.0 || is_there(moment / mass);
+    by_mass && (moment == 0.0 || inertia == 0.0 || is_there(inertia / moment))
+}
+
+/// What is seen of a point on a way: mass and place, or its moment with the mass and place that inertia says.
+fn seen_point(length: f64, fitted: &[FittedNumber]) -> [Option<FittedNumber>; 3] {
+    let [mass, moment, inertia] = [fitted[0], fitted[1], fitted[2]];
+    let ratio = |a: FittedNumber, b: FittedNumber| FittedNumber {
+        value: a.value / b.value,
+        sigma: (a.value / b.value).abs() * (a.sigma / a.value).hypot(b.sigma / b.value),
+    };
+    if is_seen(&mass) {
+        let place = is_seen(&moment).then(|| ratio(moment, mass));
+        return [Some(mass), None, place];
+    }
+    let place = (is_seen(&moment) && is_seen(&inertia)).then(|| ratio(inertia, moment));
+    let place = place.filter(|place| place.sigma < PRECISE * length);
+    let point = place.map(|place| ratio(moment, place));
+    [point, Some(moment), place]
+}
+
+fn point_parameters(length: f64, fitted: &[FittedNumber]) -> Vec<super::TorqueParameter> {
+    let [mass, moment, place] = seen_point(length, fitted);
+    let mass = mass.map(|mass| plain("mass", mass, "kg"));
+    let moment = moment.map(|moment| plain("moment", moment, "kg m"));
+    let place = place.map(|place| plain("distance", scaled(&place, 1e3), "mm"));
+    [mass, moment, place].into_iter().flatten().collect()
+}
+
+fn point_statement(what: &str, length: f64, fitted: &[FittedNumber]) -> String {
+    let at = |place: Option<FittedNumber>| {
+        place.map_or_else(String::new, |place| {
+            format!(", {:.0} mm from its joint", 1e3 * place.value)
+        })
+    };
+    match seen_point(length, fitted) {
+        [Some(mass), None, place] => format!("{what} {}{}", grams(mass, ""), at(place)),
+        [mass, Some(moment), place] => {
+            let size = grams(moment, " m");
+            let point = match mass {
+                Some(mass) => format!("{}{}", grams(mass, ""), at(place)),
+                None => {
+                    let end = grams(scaled(&moment, 1.0 / length), "");
+                    format!(
+                        "{end} if at the end of the link, {:.0} mm out",
+                        1e3 * length
+                    )
+                }
+            };
+            format!("{what} something with a moment of {size} about its joint: {point}")
+        }
+        _ => format!("{what} something"),
+    }
+}
+
+/// A point mass on a link, its place along the link free. Coefficients: mass, mass times distance from the joint's point, mass times its
+/// square. Shape: from the joint's point to the next one, to the tool of the last link, m.
+pub(crate) static ADDED_MASS: TorqueCause = TorqueCause {
+    name: "added_mass",
+    coefficients: &[("mass", "kg"), ("moment", "kg m"), ("inertia", "kg m2")],
+    price: |_| 10.0,
+    inertial: true,
+    is_possible: |form, values| is_on_way(part(form, 0).norm(), values),
+    ..PLAIN
+};
+
+/// Points on the links before the last, where masses are declared; what the last one carries is payload.
+fn points_on_links(cause: &'static TorqueCause, scene: &DynamicScene) -> Vec<TorqueForm> {
+    let last = scene.joints() - 1;
+    let all = scene.declared.iter();
+    let all = all.flat_map(|_| masses_on_links(cause, scene.arm));
+    all.map(|(form, _)| form)
+        .filter(|form| form.link() < last)
+        .collect()
+}
+
+/// Share of a link's length by which what is on it may stand over.
+const OVERHANG: f64 = 0.2;
+/// m: shorter links have no place along them.
+const SHORTEST: f64 = 1e-3;
+
+/// A mass on each link that has a length, with the changes of its numbers.
+pub(crate) fn masses_on_links(
+    cause: &'static TorqueCause,
+    arm: &DynamicArm,
+) -> Vec<(TorqueForm, InertialChanges)> {
+    let ends = arm.points.iter().skip(1).chain([&arm.tool]);
+    let spans = arm.points.iter().zip(ends).map(|(from, to)| to - from);
+    let links = spans.enumerate().filter(|(_, span)| span.norm() > SHORTEST);
+    let of_link = |(link, span): (usize, Vector3<f64>)| {
+        let form = TorqueForm {
+            place: Place::Links(link, link),
+            ..TorqueForm::at_joint(cause, link, POINT).shaped(span.as_slice())
+        };
+        (form, along(link, &span).to_vec())
+    };
+    links.map(of_link).collect()
+}
+
+/// Changes of a link's numbers by a point on a way from its joint's point: mass, moment and inertia.
+fn along(link: usize, way: &Vector3<f64>) -> [(usize, [f64; INERTIAL_NUMBERS]); POINT] {
+    let point = Inertial {
+        mass: 1.0,
+        centre: way.normalize().into(),
+        inertia: Matrix3::zeros(),
+    };
+    let at_one = numbers(&point, &Vector3::zeros());
+    let part = |kept: std::ops::Range<usize>| {
+        let of = |k: usize| if kept.contains(&k) { at_one[k] } else { 0.0 };
+        (link, std::array::from_fn(of))
+    };
+    [part(0..1), part(1..4), part(4..INERTIAL_NUMBERS)]
+}
+
 /// Shares of the declared mass: what errs by more is no error of a declaration.
 const MASSES: std::ops::RangeInclusive<f64> = -0.7..=1.0;
 
-/// A link that is heavier or lighter than declared, all its numbers in proportion.
+/// A link that is heavier or lighter than declared: all its numbers in proportion, or in three columns by what is bolted on at a point of it, as
+/// of [`ADDED_MASS`].
 pub(super) static LINK_MASS: TorqueCause = TorqueCause {
     name: "link_mass",
     inertial: true,
-    forms: |cause, scene| at_each_link(cause, scene, 1),
-    is_possible: |_, values| MASSES.contains(&values[0]),
+    forms: |cause, scene| {
+        let mut forms = at_each_link(cause, scene, 1);
+        forms.extend(points_on_links(cause, scene));
+        forms
+    },
+    is_possible: |form, values| match form.width {
+        POINT => is_on_way(part(form, 0).norm(), values),
+        _ => MASSES.contains(&values[0]),
+    },
     changes: Some(|form, declared| {
+        if form.width == POINT {
+            return along(form.link(), &part(form, 0)).to_vec();
+        }
         let link = &declared.links[INERTIAL_NUMBERS * form.link()..];
         vec![(form.link(), std::array::from_fn(|number| link[number]))]
     }),
-    parameters: |_, fitted| vec![plain("relative", fitted[0], "1")],
+    parameters: |form, fitted| match form.width {
+        POINT => point_parameters(part(form, 0).norm(), fitted),
+        _ => vec![plain("relative", fitted[0], "1")],
+    },
     statement: |form, fitted| {
+        if form.width == POINT {
+            let what = format!("{} carries", form.place);
+            return point_statement(&what, part(form, 0).norm(), fitted);
+        }
         format!(
             "{} weighs {:+.1} % against what is declared",
             form.place,

@@ -16,7 +16,7 @@ use crate::effect::Place;
 pub(super) use angle::{CURRENT_OFFSET, OFFSET, UNKNOWN};
 pub use friction::COULOMB;
 pub(super) use friction::{COULOMB_FRICTION, VISCOUS, VISCOUS_FRICTION, line_of_power};
-pub(super) use masses::{CENTRE, PAYLOAD, ROTOR, TORQUE_CONSTANT};
+pub(super) use masses::{ADDED_MASS, CENTRE, PAYLOAD, ROTOR, TORQUE_CONSTANT, masses_on_links};
 
 /// A fitted number of a finding.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,9 @@
 mod files;
 
 use super::columns::{Columns, FileLayout, HELD, SIMULATED, WideTargets};
-use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn, TextColumn};
+use super::mapped::{
+    ColumnRef, ConventionColumns, JointColumns, JointNames, ScalarColumn, Supply, TextColumn,
+};
 use super::stretch::CLOCK;
 use super::{Ingest, later, noise};
 use crate::error::{Place, counted, did_you_mean};
@@ -219,6 +221,16 @@ fn conventions(
 }
 
 fn scalar(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayout, at: &mut Place) {
+    if let Some(rate) = scalar.rate {
+        let is_time = quantity == Quantity::Time;
+        at.at("rate").must(is_time, "is of `time` alone");
+        let possible = rate > 0.0 && rate.is_finite();
+        let message = format!("a rate of {rate} Hz; allowed: above 0, e.g. 200");
+        at.at("rate").must(possible, message);
+        let is_alone = scalar.column.is_none() && scalar.value.is_none() && scalar.unit.is_none();
+        let message = "says when each row is; leave `column`, `value` and `unit` out";
+        return at.at("rate").must(is_alone, message);
+    }
     let given = [scalar.column.is_some(), scalar.value.is_some()];
     one_of(given, "`column` or `value`", at);
     column(scalar.column.as_ref(), file, at);
@@ -253,8 +265,101 @@ fn scalar(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayout, at: &mut
     }
 }
 
+/// What a dc motor is driven with, instead of a torque.
+fn motor(declared: &DeclaredColumn, joints: &JointColumns, file: &FileLayout, at: &mut Place) {
+    let Some((names, setting)) = joints.drive() else {
+        return;
+    };
+    if declared.setting != "torque" {
+        return at.at(setting).fault("is of `torque` alone");
+    }
+    if joints.column.is_some() || joints.columns.is_some() || joints.unit.is_some() {
+        at.fault(format!(
+            "`{setting}` stands for the columns of the torque; leave `column`, `columns` and `unit` out"
+        ));
+    }
+    if joints.duty.is_some() && joints.voltage.is_some() {
+        at.fault("say `duty` or `voltage`, one of them");
+    }
+    match names {
+        JointNames::Pattern(pattern)
+            if !["{j}", "{name}"].iter().any(|mark| pattern.contains(mark)) =>
+        {
+            at.at(setting).fault(format!(
+                "`{pattern}` has neither {{j}} for the joint's number nor {{name}}; e.g. `{setting}{{j}}`, or a list of columns"
+            ));
+        }
+        JointNames::Pattern(_) if !file.header => at
+            .at(setting)
+            .fault("there is no header with names; list numbers"),
+        JointNames::Pattern(_) => {}
+        JointNames::List(all) => {
+            for (index, entry) in all.iter().enumerate() {
+                column(Some(entry), file, &mut at.at(setting).item(index));
+            }
+        }
+    }
+    let is_positive = |number: f64| number > 0.0 && number.is_finite();
+    if joints.duty.is_some() {
+        match &joints.supply {
+            None => at
+                .at("supply")
+                .fault("not stated; a duty is a share of it, e.g. 12, V"),
+            Some(Supply::Volts(volts)) => {
+                let message = format!("a supply of {volts} V; allowed: above 0 V");
+                at.at("supply").must(is_positive(*volts), message);
+            }
+            Some(Supply::Column(supply)) => {
+                column(Some(&supply.column), file, &mut at.at("supply.column"));
+                let scale = supply.scale.is_none_or(is_positive);
+                at.at("supply.scale")
+                    .must(scale, "allowed: above 0, V per unit of the file");
+            }
+        }
+        let full = joints.full_duty.is_none_or(is_positive);
+        at.at("full_duty")
+            .must(full, "allowed: above 0, e.g. 100 for percent");
+    } else {
+        let message = "is of a duty; `voltage` is in volts";
+        at.at("supply").must(joints.supply.is_none(), message);
+        at.at("full_duty").must(joints.full_duty.is_none(), message);
+    }
+    match &joints.kt_over_r {
+        None => at
+            .at("kt_over_r")
+            .fault("not stated; expected Nm at the joint per volt, e.g. 0.35; where no mass is known any number will do, and masses are relative to it"),
+        Some(all) => {
+            let possible = all.stated().iter().all(|number| *number != 0.0 && number.is_finite());
+            at.at("kt_over_r").must(possible, "allowed: any number but 0, Nm/V");
+        }
+    }
+    if let Some(all) = &joints.kt2_over_r {
+        let possible = all
+            .stated()
+            .iter()
+            .all(|number| *number >= 0.0 && number.is_finite());
+        at.at("kt2_over_r")
+            .must(possible, "allowed: 0 and above, Nm s/rad");
+        let message = "needs `velocity`; leave it out, and it is found as viscous friction";
+        at.at("kt2_over_r")
+            .must(file.columns.has("velocity"), message);
+    }
+}
+
 fn joints(declared: &DeclaredColumn, joints: &JointColumns, file: &FileLayout, at: &mut Place) {
     let quantity = declared.quantity;
+    if joints.drive().is_some() {
+        return motor(declared, joints, file, at);
+    }
+    for (setting, given) in [
+        ("supply", joints.supply.is_some()),
+        ("full_duty", joints.full_duty.is_some()),
+        ("kt_over_r", joints.kt_over_r.is_some()),
+        ("kt2_over_r", joints.kt2_over_r.is_some()),
+    ] {
+        at.at(setting)
+            .must(!given, "belongs to `duty` or `voltage` of `torque`");
+    }
     let given = [joints.column.is_some(), joints.columns.is_some()];
     let names = "`column` (a pattern with {j}) or `columns` (a list)";
     one_of(given, names, at);
