@@ -67,6 +67,8 @@ pub(super) struct NumberBinding {
     pub(crate) difference: Option<Difference>,
     /// Whether it holds clock times as text.
     pub(crate) is_clock: bool,
+    /// The setting that states its unit.
+    pub(crate) unit_setting: &'static str,
 }
 
 /// A column whose numbers are added to those of another, times the sign.
@@ -386,6 +388,7 @@ impl Binder<'_> {
             name: self.name(column),
             difference: None,
             is_clock: false,
+            unit_setting: "unit",
         }
     }
     fn joints(
@@ -462,6 +465,7 @@ impl Binder<'_> {
                     optional: joints.optional,
                     sign,
                     zero,
+                    unit_setting: setting,
                     ..cell
                 });
             }
