@@ -117,19 +117,19 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
     if let Some(file) = &arguments.export_effect {
         write_new(file, &diagnosis.effect_file(arguments.finding)?)?;
     }
-    let store = arguments.means.store_again();
+    let again = arguments.means.store_again();
     if let Some(file) = &arguments.html {
-        write_new(file, &diagnosis.page(&store)?)?;
+        write_new(file, &diagnosis.page(&again)?)?;
     }
     if arguments.json {
-        emit_json(&diagnosis.document(&store))?;
+        emit_json(&diagnosis.document(&again))?;
     } else {
         let text = if arguments.details {
-            diagnosis.text(&store)
+            diagnosis.text(&again)
         } else {
-            diagnosis.short(&store, columns())
+            diagnosis.short(&again, columns())
         };
-        emit_lines(&(text + &rejected(&manifest)))?;
+        emit_lines(&(text + &rejected(&manifest, &store)?))?;
     }
     Ok(if diagnosis.is_wrong_setup() {
         WRONG_SETUP

@@ -1,14 +1,16 @@
 //! `calib init`: a commented robot file and pipeline to start from, made for the columns of one's own files.
 
 use super::{emit, note, warn};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, did_you_mean, visible};
 use crate::init::{InitRequest, StarterFiles, TYPICAL, start, typical};
 use crate::raw::ending;
 use crate::robot::{LIBRARY, LibraryArm};
 use crate::text::filled;
-use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, TypedValueParser};
+use clap::error::ErrorKind;
+use clap::{Arg, Args, Command};
 use minijinja::context;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Write a robot file and a pipeline to start from: with comments, for the columns found in your recordings.
@@ -27,7 +29,7 @@ pub(super) struct InitArguments {
     /// The robot to start from: an arm of the library (`calib robots` lists them), or a typical one whose numbers you replace
     ///
     /// Without it the robot.yaml of the folder; where there is none, the first typical one.
-    #[arg(long, value_name = "ARM", value_parser = kinds())]
+    #[arg(long, value_name = "ARM", value_parser = Arms)]
     robot: Option<&'static LibraryArm>,
     /// Takes the robot from this URDF instead, or says where the URDF lies that the folder's robot.yaml refers to
     #[arg(long, value_name = "FILE")]
@@ -47,18 +49,41 @@ const EXAMPLES: &str = "Examples:
   calib init --robot seven";
 
 /// Typical robots as values of an option, each with its line of help; arms of the library are taken by name and listed by `calib robots`.
-fn kinds() -> impl TypedValueParser<Value = &'static LibraryArm> {
-    let typicals = TYPICAL
-        .iter()
-        .map(|(arm, help)| PossibleValue::new(arm.name).help(*help));
-    let arms = LIBRARY
-        .iter()
-        .map(|arm| PossibleValue::new(arm.name).hide(true));
-    PossibleValuesParser::new(typicals.chain(arms)).try_map(|name| {
-        typical(&name)
-            .or_else(|| LibraryArm::find(&name))
-            .ok_or("no such arm")
-    })
+#[derive(Clone)]
+struct Arms;
+
+impl TypedValueParser for Arms {
+    type Value = &'static LibraryArm;
+
+    fn parse_ref(
+        &self,
+        command: &Command,
+        _: Option<&Arg>,
+        value: &OsStr,
+    ) -> std::result::Result<Self::Value, clap::Error> {
+        let name = value.to_string_lossy();
+        let found = typical(&name).or_else(|| LibraryArm::find(&name));
+        found.ok_or_else(|| {
+            let typical: Vec<&str> = TYPICAL.iter().map(|(arm, _)| arm.name).collect();
+            let arms = LIBRARY.iter().map(|arm| arm.name);
+            let near = did_you_mean(&name, arms.chain(typical.iter().copied()));
+            let message = format!(
+                "--robot: no arm `{}`{near}{} allowed: {}, or one of the {} arms that `calib robots` lists\n",
+                visible(&name),
+                if near.is_empty() { ";" } else { "" },
+                typical.join(", "),
+                LIBRARY.len()
+            );
+            command.clone().error(ErrorKind::InvalidValue, message)
+        })
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        let typical = TYPICAL.iter();
+        Some(Box::new(
+            typical.map(|(arm, help)| PossibleValue::new(arm.name).help(*help)),
+        ))
+    }
 }
 
 impl InitArguments {

@@ -58,7 +58,7 @@ pub(super) struct RunArguments {
     /// Prints what stages note while they run, and the errors of every step and set, cross-validated and beside reference figures, too
     #[arg(long, conflicts_with = "json")]
     details: bool,
-    /// PageLanguage of the report, instead of the one that the pipeline names
+    /// Language of the report, instead of the one that the pipeline names
     #[arg(long, value_name = "LANGUAGE", value_parser = PossibleValuesParser::new(PageLanguage::ALL.map(PageLanguage::code)))]
     language: Option<String>,
     /// Runs again though cached: all selected stages, or this one (give it after PIPELINE)
@@ -162,7 +162,7 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     if result.wrong_setup.is_none() {
         text.push_str(&result.limits.text());
     }
-    text.push_str(&summary::rejected(&outcome.manifest));
+    text.push_str(&summary::rejected(&outcome.manifest, &store)?);
     let more = if arguments.details || short.is_none() {
         ""
     } else {
@@ -275,13 +275,21 @@ impl CheckArguments {
             emit(&graph(&plan))?;
         }
         let stages = counted(plan.stages.len(), "stage");
+        let unread = if self.data {
+            ""
+        } else {
+            ", rows are not read (--data reads them)"
+        };
         let (label, text) = match to_fill {
             0 if self.means.overrides() || !self.means.store_again().is_empty() => {
-                ("ready", format!("{stages} can run"))
+                ("ready", format!("{stages} are wired{unread}"))
             }
             0 => (
                 "ready",
-                format!("{stages} can run: calib run {}", self.pipeline.display()),
+                format!(
+                    "{stages} are wired{unread}: calib run {}",
+                    self.pipeline.display()
+                ),
             ),
             1 => (
                 "not yet",

@@ -9,7 +9,7 @@ use crate::identified::{Achieved, achieved};
 use crate::pipeline::Purpose;
 use crate::raw;
 use crate::report::{AchievedTables, achieved_page};
-use crate::robot::RobotModel;
+use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::summary::labelled;
 use crate::targets::{Layout, Units, measured};
 use clap::Args;
@@ -81,7 +81,8 @@ impl VerifyRobotArguments {
             identified.uncertainty(&arm),
             options,
         );
-        let found = achieved(&arm, &nominal, &mut corrector, &rows, self.new_base)?;
+        let noise = identified.data.as_ref().map_or(0.0, instrument_noise);
+        let found = achieved(&arm, &nominal, &mut corrector, &rows, self.new_base, noise)?;
         if let Some(path) = &self.html {
             write(path, &page(&identified.origin, &found, self.new_base)?)?;
         }
@@ -90,6 +91,16 @@ impl VerifyRobotArguments {
         }
         emit_lines(&report_text(&identified.origin, &found, self.new_base))
     }
+}
+
+/// Rms length of the noise of the points that the model was identified by, m; 0 where it is not known.
+fn instrument_noise(data: &Measurements) -> f64 {
+    if data.noise_basis == NoiseBasis::Inferred {
+        return 0.0;
+    }
+    let rows = (0..data.rows()).filter(|row| data.has_point(*row));
+    let squares: Vec<f64> = rows.map(|row| data.noise(row).powi(2)).collect();
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
 /// Mean, 95th percentile and largest, mm.
@@ -114,7 +125,8 @@ fn rows(found: &Achieved, new_base: bool) -> Vec<(&'static str, [f64; 3], String
     };
     let achieved = format!("measured, {}{base}", counted(found.achieved.len(), "point"));
     let before = "of the uncorrected targets, by the model".to_string();
-    let predicted = "within which 95 % of corrected targets were to be".to_string();
+    let predicted =
+        "within which 95 % of corrected targets were to be measured, noise included".to_string();
     let all = [
         ("before", &found.before, before),
         ("predicted", &found.predicted, predicted),

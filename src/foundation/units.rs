@@ -110,6 +110,31 @@ impl Unit {
     pub fn symbol(self) -> &'static str {
         self.row().1
     }
+    /// In words, of many: `millimetres`; the symbol where that is what people say.
+    pub fn plural(self) -> &'static str {
+        match self {
+            Self::Millimetre => "millimetres",
+            Self::Micrometre => "micrometres",
+            Self::Metre => "metres",
+            Self::Inch => "inches",
+            Self::Radian => "radians",
+            Self::Degree => "degrees",
+            Self::Second => "seconds",
+            Self::Millisecond => "milliseconds",
+            Self::Ampere => "amperes",
+            Self::Milliampere => "milliamperes",
+            Self::Celsius => "degrees Celsius",
+            Self::Kelvin => "kelvin",
+            other => other.symbol(),
+        }
+    }
+    /// The first other unit of its quantity in which `value`, as it is read in this one (SI), lies in a range (SI); none where none does.
+    pub fn misread(self, value: f64, [lower, upper]: [f64; 2]) -> Option<Unit> {
+        let others = UNITS.iter().map(|row| row.0);
+        let mut others =
+            others.filter(|other| *other != self && other.quantity() == self.quantity());
+        others.find(|other| (lower..=upper).contains(&other.to_si(self.from_si(value))))
+    }
     /// What it measures.
     pub fn quantity(self) -> Quantity {
         self.row().2

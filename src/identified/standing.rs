@@ -195,7 +195,7 @@ const FEWEST: usize = 4;
 pub struct Achieved {
     /// How far the uncorrected commands would be off by the model.
     pub(crate) before: Vec<f64>,
-    /// Within which the corrected ones were predicted to be with 95 %; empty where the model has no covariance.
+    /// Within which the corrected ones were predicted to be measured with 95 %, by an instrument as before; empty where the model has no covariance.
     pub(crate) predicted: Vec<f64>,
     /// How far the measured points are from the wanted ones.
     pub(crate) achieved: Vec<f64>,
@@ -216,13 +216,18 @@ pub struct RepeatedPose {
     pub(crate) repeatability: f64,
 }
 
-/// Compares; `new_base` finds the tracker's place anew from these points. Fails where they are too few for that.
+/// Within so many times its rms length the noise of a point stays with 95 %: chi-square of three.
+const OF_NOISE: f64 = 1.614;
+
+/// Compares; `new_base` finds the tracker's place anew from these points, each of which was measured with `noise` (rms length, m). Fails where
+/// they are too few for that.
 pub fn achieved(
     arm: &IdentifiedArm,
     nominal: &RobotModel,
     corrector: &mut Corrector,
     rows: &[MeasuredTarget],
     new_base: bool,
+    noise: f64,
 ) -> Result<Achieved> {
     let convention = corrector.convention().clone();
     let wanted = |row: &MeasuredTarget| {
@@ -247,9 +252,10 @@ pub fn achieved(
     };
     for answer in corrector.batch(rows.iter().map(|row| row.target.clone()).collect()) {
         found.before.push(answer.uncorrected);
+        let within = |u95: f64| (answer.residual + u95).hypot(OF_NOISE * noise);
         found
             .predicted
-            .extend(answer.uncertainty.map(|known| answer.residual + known.u95));
+            .extend(answer.uncertainty.as_ref().map(|known| within(known.u95)));
         found.unreached += usize::from(answer.q.is_none());
     }
     let mut repeated: BTreeMap<Vec<i64>, Vec<Vector3<f64>>> = BTreeMap::new();

@@ -345,11 +345,15 @@ impl ExaminedFile {
         for column in columns.iter().filter(|column| !is_known(column)) {
             let name = quoted(&self.sheet.names[*column]);
             self.remarks.push(format!(
-                "{name} cannot be read as time; allowed: s or ms as numbers that never decrease, 08:15:03, or 2026-11-22T08:15:03"
+                "{name} cannot be read as time; allowed: s or ms as numbers that never decrease, 08:15:03, 2026-11-22T08:15:03, 22.11.2026 08:15:03, or 11/22/2026 8:15:03 AM"
             ));
         }
         let Some((unit, is_stated)) = running.first().and_then(|column| unit(*column)) else {
-            self.map("time", &clocks, Some("clock"), None);
+            let has_slash =
+                |column: &usize| self.sheet.texts(*column).any(|cell| cell.contains('/'));
+            let slashes = clocks.iter().any(has_slash);
+            let check = slashes.then(|| "the month stands before the day".to_string());
+            self.map("time", &clocks, Some("clock"), check);
             return;
         };
         self.second = if unit == "ms" { 1e-3 } else { 1.0 };

@@ -3,7 +3,7 @@
 use super::columns::{ExaminedFile, MOST_NAMED};
 use super::names;
 use super::sheet::number;
-use crate::stage::ingest::last_number;
+use crate::stage::ingest::{ClocksApart, clock_seconds, clocks_apart, last_number};
 use crate::statistics;
 use crate::yaml::quoted;
 use std::collections::BTreeSet;
@@ -58,7 +58,9 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Vec<String> {
         }
         return by_id(one, two, &best, &pairs, running);
     }
-    if let Some(timing) = timing.filter(|timing| timing.overlap || sizes[0] != sizes[1]) {
+    if let Some(timing) =
+        timing.filter(|timing| timing.overlap || timing.apart.is_some() || sizes[0] != sizes[1])
+    {
         label(one, two);
         return by_time(&timing, [one, two]);
     }
@@ -322,16 +324,23 @@ struct Timing {
     /// Usual time between rows of the file with fewer, s.
     step: f64,
     overlap: bool,
+    /// What pairs rows of clocks that do not overlap.
+    apart: Option<ClocksApart>,
     /// First time of the second file less that of the first, s.
-    apart: f64,
+    firsts: f64,
     rows: [usize; 2],
 }
 
 fn timing(one: &ExaminedFile, two: &ExaminedFile) -> Option<Timing> {
     let times = |file: &ExaminedFile| -> Option<Vec<f64>> {
         let column = *file.get("time")?.choices.first()?.columns.first()?;
-        let times = file.sheet.numbers(column).map(|time| time * file.second);
-        let mut times: Vec<f64> = times.collect();
+        let mut times: Vec<f64> = match file.sheet.is_numeric(column) {
+            true => {
+                let times = file.sheet.numbers(column).map(|time| time * file.second);
+                times.collect()
+            }
+            false => clock_seconds(file.sheet.texts(column)),
+        };
         times.sort_by(f64::total_cmp);
         (times.len() > 1).then_some(times)
     };
@@ -353,7 +362,8 @@ fn timing(one: &ExaminedFile, two: &ExaminedFile) -> Option<Timing> {
         near,
         step,
         overlap: near <= 0.5 * step,
-        apart: second[0] - first[0],
+        apart: clocks_apart(&first, &second, 0.1 * step).filter(|_| near > 0.5 * step),
+        firsts: second[0] - first[0],
         rows: [first.len(), second.len()],
     })
 }
@@ -372,9 +382,15 @@ fn by_time(timing: &Timing, files: [&ExaminedFile; 2]) -> Vec<String> {
             timing.near
         )
     } else {
+        let (offset, why) = match &timing.apart {
+            Some(found) => (found.offset, found.in_words()),
+            None => (
+                timing.firsts,
+                "the clocks do not overlap; this offset puts the first rows together".into(),
+            ),
+        };
         format!(
-            "      join: {{by: time, tolerance_s: {tolerance}, offset_s: {:.3}}}       # CHECK: the clocks do not overlap; this offset puts the first rows together",
-            timing.apart
+            "      join: {{by: time, tolerance_s: {tolerance}, offset_s: {offset:.3}}}       # CHECK: {why}"
         )
     };
     let mut lines = vec![line];

@@ -4,6 +4,7 @@
 //! what is there. A folder of parts is one recording.
 
 mod content;
+mod json;
 mod mcap;
 mod message;
 mod sqlite;
@@ -23,6 +24,9 @@ const HEAD_BYTES: usize = 64 << 20;
 /// Names of joints may come and go: so many columns at most.
 const WIDEST: usize = 4096;
 
+/// How messages that are read may be encoded.
+const ENCODINGS: [&str; 2] = ["cdr", "json"];
+
 /// What is recorded under one name.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 struct Topic {
@@ -37,7 +41,7 @@ impl Topic {
     fn known(&self) -> Option<&'static MessageKind> {
         KINDS
             .iter()
-            .find(|kind| self.encoding == "cdr" && kind.name == self.kind)
+            .find(|kind| ENCODINGS.contains(&self.encoding.as_str()) && kind.name == self.kind)
     }
 }
 

@@ -44,7 +44,7 @@ pub struct Report {
     pub title: Option<String>,
     /// The held-out set that the first sentence speaks of; without it, the one with most points after the step that stands for the run.
     pub set: Option<String>,
-    /// PageLanguage of the page with its certificate: `en` or `de`.
+    /// Language of the page with its certificate: `en` or `de`.
     pub language: PageLanguage,
     /// What is accepted: of the held-out points of the diagnosed model, without a diagnosis after the last step. Beyond it `calib run` says
     /// so and ends with code 1.

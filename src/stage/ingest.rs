@@ -3,6 +3,7 @@
 //! Every file is read once (`rows`), row by row: bytes to records (`raw`), records to quantities or the reason why not (`row`). What all rows
 //! together say is decided (`pair`, `verdict`), then rows are written (`write`). Per file, accepted + rejected = read.
 
+mod apart;
 mod arm;
 mod bind;
 mod check;
@@ -23,6 +24,7 @@ mod turns;
 mod verdict;
 mod write;
 
+pub use apart::{ClocksApart, clocks_apart};
 pub use columns::Columns;
 pub use columns::{Axis, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
 pub use later::LaterFiles;
@@ -34,7 +36,7 @@ pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
 pub(crate) use reading::FileKind;
 pub use reading::{TableLayout, records};
-pub use stretch::is_clock_time;
+pub use stretch::{clock_seconds, is_clock_time};
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 
 use pair::Measurement;

@@ -5,7 +5,7 @@ use super::estimate::{angle, length};
 use super::found::{Found, FoundRival, ShortFinding, words};
 use super::screen::{self, NextStep, declared_in_yaml};
 use super::{labelled, robot_of};
-use crate::diagnose::VerdictKind;
+use crate::diagnose::{VerdictKind, advised};
 use crate::effect::names;
 use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
@@ -34,7 +34,8 @@ pub struct DiagnosisSummary {
     /// Whether it is of torques.
     of_torques: bool,
     is_wrong_setup: bool,
-    is_noise_inferred: bool,
+    /// What shows the noise, where it is inferred.
+    advice: Option<&'static str>,
     /// What was measured, and the errors before and after, as lines.
     head: String,
     /// The verdict in at most twelve words.
@@ -143,7 +144,11 @@ impl DiagnosisSummary {
             "shares": !shares.is_empty(), "grid": grid.text(), "causes_found": grid, "aside": aside, "joints": [],
         });
         let summary = Self {
-            is_noise_inferred: v.is_noise_inferred(),
+            advice: v
+                .statement
+                .as_deref()
+                .filter(|_| v.is_noise_inferred())
+                .and_then(advised),
             head: head_of_positions(&subject, &v, rows.len()),
             verdict: verdict_of_positions(&v, &rows),
             at: match v.leftover_rms_mm {
@@ -447,9 +452,8 @@ impl DiagnosisSummary {
                 return step(what, Some(command.clone()));
             }
         }
-        if self.is_noise_inferred {
-            let what = "state `instrument` in `ingest`, and measure ten poses twice";
-            return step(what.into(), None);
+        if let Some(advice) = self.advice {
+            return step(advice.into(), None);
         }
         let mut lines = self.not_observable.iter();
         let joint = lines.find(|line| line.starts_with("joint "))?;

@@ -352,21 +352,28 @@ fn rejected_rows(manifest: &Manifest) -> u64 {
         .sum()
 }
 
-/// Nothing where nothing was rejected.
-pub fn rejected(manifest: &Manifest) -> String {
-    let line = |output: &crate::pipeline::OutputRecord| {
+/// Rejected rows that are named one by one.
+const NAMED: usize = 3;
+
+/// The first rejected rows with their reasons, and how many there are; nothing where nothing was rejected.
+pub fn rejected(manifest: &Manifest, store: &Store) -> Result<String> {
+    let mut text = String::new();
+    for output in manifest.tables(crate::table::Rejected::KIND) {
+        let count = output.table.rows;
+        if count == 0 {
+            continue;
+        }
         let path = output.path.as_deref().unwrap_or_default();
-        labelled(
-            "rejected",
-            &format!(
-                "{}, each with its reason in {path}",
-                counted(output.table.rows, "row")
-            ),
-        )
-    };
-    manifest
-        .tables(crate::table::Rejected::KIND)
-        .filter(|output| output.table.rows > 0)
-        .map(line)
-        .collect()
+        let all = format!("{}, each with its reason in {path}", counted(count, "row"));
+        text += &labelled("rejected", &all);
+        let rows = crate::table::Rejected::from_frame(&store.load(&output.table)?)?;
+        for row in rows.0.iter().take(NAMED) {
+            let line = format!("{}:{}: {}", row.file, row.line, row.detail);
+            text += &labelled("", &line);
+        }
+        if let Some(more) = (count as usize).checked_sub(NAMED).filter(|more| *more > 0) {
+            text += &labelled("", &format!("and {more} more"));
+        }
+    }
+    Ok(text)
 }

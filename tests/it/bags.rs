@@ -9,7 +9,7 @@ use calib::table::{Intake, Recording, Rejected, from_file};
 use mcap::Compression;
 use std::io::Cursor;
 use std::path::Path;
-use write::{FRAMES, JOINTS, Message, POINT, db3, frames, joint_state, mcap, point};
+use write::{FRAMES, JOINTS, Message, POINT, db3, frames, joint_state, mcap, mcap_in, point};
 
 /// Joints of a UR10 as its driver calls them.
 pub const ARM: [&str; 6] = [
@@ -550,4 +550,88 @@ fn a_doubled_stamp_is_one_of_the_same_joints() {
         faults.push(record.fault.as_ref().map(|(fault, _)| *fault));
     }
     assert_eq!(faults, [Some(RecordFault::Foreign), None].repeat(4));
+}
+
+#[test]
+fn messages_in_json_give_the_rows_that_those_in_cdr_give() {
+    let stamp = |k: i64| START + k * SECOND;
+    let header = |k: i64, frame: &str| {
+        let (sec, nanosec) = (stamp(k) / SECOND, stamp(k) % SECOND);
+        format!(
+            r#""header": {{"stamp": {{"sec": {sec}, "nanosec": {nanosec}}}, "frame_id": "{frame}"}}"#
+        )
+    };
+    let names = ARM.map(|name| format!("{name:?}")).join(", ");
+    let states = |k: i64| {
+        let q = [0.1 * k as f64; 6].map(|q| format!("{q:?}")).join(", ");
+        format!(
+            r#"{{{}, "name": [{names}], "position": [{q}], "velocity": [], "effort": []}}"#,
+            header(k, "base_link")
+        )
+    };
+    let place = |k: i64| {
+        format!(
+            r#"{{{}, "point": {{"x": 1, "y": {:?}, "z": 0.5}}}}"#,
+            header(k, "tracker"),
+            0.01 * k as f64
+        )
+    };
+    let frame = |k: i64| {
+        let turn = r#""rotation": {"x": 0, "y": 0, "z": 0, "w": 1}"#;
+        let transform = format!(r#"{{"translation": {{"x": {k}, "y": 2, "z": 3.5}}, {turn}}}"#);
+        format!(
+            r#" {{"transforms": [{{{}, "child_frame_id": "tool", "transform": {transform}}}]}}"#,
+            header(k, "world")
+        )
+    };
+    let (mut json, mut cdr): (Vec<Message>, Vec<Message>) = Default::default();
+    for k in 1..4 {
+        json.push(("/joint_states", JOINTS, stamp(k), states(k).into_bytes()));
+        json.push(("/reflector", POINT, stamp(k), place(k).into_bytes()));
+        json.push(("/tf", FRAMES, stamp(k), frame(k).into_bytes()));
+        let pose = [k as f64, 2.0, 3.5, 0.0, 0.0, 0.0, 1.0];
+        let q = [0.1 * k as f64; 6];
+        cdr.push((
+            "/joint_states",
+            JOINTS,
+            stamp(k),
+            joint_state(false, stamp(k), &ARM, [&q, &[], &[]]),
+        ));
+        cdr.push((
+            "/reflector",
+            POINT,
+            stamp(k),
+            point(false, stamp(k), [1.0, 0.01 * k as f64, 0.5]),
+        ));
+        cdr.push((
+            "/tf",
+            FRAMES,
+            stamp(k),
+            frames(stamp(k), &[("world", "tool", pose)]),
+        ));
+    }
+    let [json_bag, cdr_bag] = [("json", &json), ("cdr", &cdr)]
+        .map(|(encoding, messages)| mcap_in(encoding, Some(Compression::Zstd), messages));
+    for topic in ["/joint_states", "/reflector", "/tf world->tool"] {
+        assert_eq!(
+            rows(&json_bag, Some(topic)),
+            rows(&cdr_bag, Some(topic)),
+            "{topic}"
+        );
+    }
+    let torn: Vec<Message> = vec![(
+        "/reflector",
+        POINT,
+        START,
+        b"{\"point\": {\"x\": 1".to_vec(),
+    )];
+    has(
+        &refused(&mcap_in("json", None, &torn), Some("/reflector")),
+        "/reflector",
+    );
+    let other = mcap_in("protobuf", None, &json);
+    has(
+        &refused(&other, Some("/joint_states")),
+        "topic `/joint_states` holds sensor_msgs/msg/JointState encoded as `protobuf`, which is not read; allowed: cdr, json",
+    );
 }

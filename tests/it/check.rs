@@ -59,7 +59,7 @@ const POINTS: &str = "id,x,y,z\nA,1,2,3\n";
 #[test]
 fn a_sound_pipeline_is_ready_and_shows_its_graph_on_demand() {
     let (code, out, err) = checked(ROBOT, PIPELINE, ARM, POINTS);
-    let ready = "ready     2 stages can run: calib run pipeline.yaml\n";
+    let ready = "ready     2 stages are wired, rows are not read (--data reads them): calib run pipeline.yaml\n";
     assert_eq!((code, err.as_str(), out.as_str()), (0, "", ready));
     let folder = folder(ROBOT, PIPELINE, ARM, POINTS);
     let out = calib(folder.path(), "check pipeline.yaml --details").out;

@@ -133,3 +133,54 @@ fn shells_and_readers_of_manuals_are_served() {
     assert!(page.out.contains(".TH calib-compensate"));
     calib(folder.path(), "man compensat").code(2);
 }
+
+#[test]
+fn an_arm_that_is_not_known_is_answered_by_the_nearest_of_the_library() {
+    let folder = tempfile::tempdir().unwrap();
+    let answer = calib(folder.path(), "init cell --robot kr10_r1101").code(2);
+    has(
+        &answer.err,
+        [
+            "--robot: no arm `kr10_r1101`; did you mean `kr10_r1100`?",
+            "arms that `calib robots` lists",
+        ],
+    );
+    let strange = calib(folder.path(), "init cell --robot zzzzzzzzz").code(2);
+    has(&strange.err, "no arm `zzzzzzzzz`; allowed: spherical6");
+}
+
+#[test]
+fn clocks_that_do_not_overlap_are_joined_by_the_offset_that_pairs_all_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut controller, mut tracker) = (
+        String::from("time,J1,J2,J3,J4,J5,J6\n"),
+        String::from("time,X,Y,Z\n"),
+    );
+    for k in 0..30 {
+        let q: Vec<String> = (0..6)
+            .map(|j| format!("{:.3}", 50.0 * f64::from(k * 7 + j).sin()))
+            .collect();
+        let (minute, second) = (k / 3, 20 * (k % 3));
+        let stamp = |hour, more| format!("2026-10-05T{hour:02}:{minute:02}:{second:02}{more}");
+        writeln!(controller, "{},{}", stamp(8, ".000Z"), q.join(",")).unwrap();
+        writeln!(
+            tracker,
+            "{},{}.5,-200,{}",
+            stamp(10, ".700"),
+            1500 + k,
+            900 + k * k
+        )
+        .unwrap();
+    }
+    put(folder.path(), "controller.csv", controller);
+    put(folder.path(), "tracker.csv", tracker);
+    calib(folder.path(), "init . --data controller.csv tracker.csv").code(0);
+    has(
+        &read(folder.path().join("pipeline.yaml")),
+        [
+            "join: {by: time, tolerance_s: 2, offset_s: 7200.700}",
+            "CHECK: the clocks are 7200.7 s apart in all rows (2 h and 0.7 s: UTC against local time)",
+        ],
+    );
+    calib(folder.path(), "run pipeline.yaml --until split --quiet").code(0);
+}

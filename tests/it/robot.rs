@@ -1,6 +1,6 @@
 //! Robot files: every description of one arm is the same arm, and the same as another program's.
 
-use crate::answer::root;
+use crate::answer::{has, root};
 use crate::desk::{Desk, shared};
 use crate::fixture::robot_of;
 use calib::description::{Coupling, JointKind, RobotDescription};
@@ -427,4 +427,34 @@ fn the_stage_reads_the_urdf_beside_a_robot_file() {
         .and_then(|table| table.to_description())
         .unwrap();
     assert!(distance(&robot, &read_urdf("seven")) < 1e-12);
+}
+
+#[test]
+fn masses_that_no_arm_of_this_length_has_are_said() {
+    let arm = |payload: f64, link: f64| {
+        format!(
+            "calib_robot: 1\nname: arm\nunits: {{length: mm, angle: deg}}\nkinematics:\n  dh:\n\
+             \x20   - {{theta: 0, d: 400, a: 25, alpha: -90}}\n\x20   - {{theta: 0, d: 0, a: 560, alpha: 0}}\n\
+             tool: {{point: [0, 0, 100]}}\n\
+             links:\n  - {{mass: {link}, centre: [0, 0, 0], frame: link}}\n  - {{mass: {link}, centre: [0, 0, 0], frame: link}}\n\
+             payload: {{mass: {payload}, centre: [0, 0, 100]}}\n"
+        )
+    };
+    let notes = |payload: f64, link: f64| {
+        let text = arm(payload, link);
+        read_calib(RobotFileText::new("robot.yaml", &text), None)
+            .unwrap()
+            .notes
+            .join("\n")
+    };
+    assert_eq!(notes(10.0, 30.0), "");
+    let grams = notes(5000.0, 30_000.0);
+    has(
+        &grams,
+        [
+            "payload.mass: 5000 kg on an arm of 1.",
+            "links: 60000 kg on an arm of",
+            "if the file holds grams, divide by 1000",
+        ],
+    );
 }

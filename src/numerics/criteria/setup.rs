@@ -24,6 +24,8 @@ criteria! {
     SECOND: usize = 6, "errors", "judgement: bounds time", "";
     /// Points by which countings of all joints are compared before they are placed.
     SCREENED: usize = 60, "rows", "judgement: bounds time", "";
+    /// Rows by which all orders of the columns of joints are compared first.
+    ORDERED: usize = 24, "rows", "count: fifteen numbers of an affine image and a seat", "";
     /// A zero that is this near to quarter turns is counted from there, whatever it is off by beyond that.
     QUARTERLY: f64 = 5.0, "deg", "physics: zeros are mastered to degrees at worst", "";
     /// Between these the largest angle of an arm's joints lies, in the right unit.

@@ -44,6 +44,7 @@ pub use types::{
     SpectrumLine, VerdictKind,
 };
 pub use verdict::other_means;
+pub use words::advised;
 
 use crate::criteria::cells::SETTLED;
 use crate::criteria::screen::{MISTAKES, NO_WORSE};

@@ -1,7 +1,7 @@
 //! What a bag holds: its topics with their rates and gaps, which of them are read, and what is lost.
 
 use super::message::{self, KINDS};
-use super::{Message, Messages, Topic};
+use super::{ENCODINGS, Message, Messages, Topic};
 use crate::error::{self, Error, Result, counted};
 use crate::raw::{InputSource, failed};
 use std::collections::BTreeMap;
@@ -12,7 +12,8 @@ pub struct BagTopic {
     /// As the setting `topic` names it.
     pub(crate) name: String,
     pub(crate) kind: String,
-    /// Whether messages of this type are read.
+    encoding: String,
+    /// Whether messages of this type, encoded so, are read.
     pub(crate) is_read: bool,
     pub(crate) messages: u64,
     /// When the first and the last were received, s since 1970.
@@ -40,7 +41,12 @@ impl BagTopic {
         } else {
             String::new()
         };
-        let not = ["; this type is not read", ""][usize::from(self.is_read)];
+        let is_known = KINDS.iter().any(|kind| kind.name == self.kind);
+        let not = match (self.is_read, is_known) {
+            (true, _) => String::new(),
+            (false, true) => format!("; encoded as `{}`, which is not read", self.encoding),
+            (false, false) => "; this type is not read".into(),
+        };
         let (name, messages) = (&self.name, counted(self.messages, "message"));
         format!("topic `{name}`: {}, {messages}{rate}{not}", self.kind)
     }
@@ -60,6 +66,7 @@ pub fn bag_content(source: Box<dyn InputSource>, label: &str) -> Result<BagConte
     let unseen = |name: String, topic: &Topic| BagTopic {
         name,
         kind: topic.kind.clone(),
+        encoding: topic.encoding.clone(),
         is_read: topic.known().is_some(),
         ..BagTopic::default()
     };
@@ -67,8 +74,8 @@ pub fn bag_content(source: Box<dyn InputSource>, label: &str) -> Result<BagConte
     while messages.next(&|_| true, &mut message) {
         let topic = &message.topic;
         let names = match of_frames(topic) {
-            true => message::frames(&message.data)
-                .into_iter()
+            true => (topic.known().into_iter())
+                .flat_map(|kind| message::frames(kind, &message.data))
                 .map(|frames| format!("{} {frames}", topic.name))
                 .collect(),
             false => vec![topic.name.clone()],
@@ -128,6 +135,13 @@ fn listed(found: &[BagTopic]) -> String {
 pub(super) fn no_topic(topic: &str, content: &BagContent) -> String {
     let found = &content.topics;
     let message = match found.iter().find(|other| other.name == topic) {
+        Some(other) if !other.is_read && KINDS.iter().any(|kind| kind.name == other.kind) => {
+            let (kind, encoding) = (&other.kind, &other.encoding);
+            format!(
+                "topic `{topic}` holds {kind} encoded as `{encoding}`, which is not read; allowed: {}",
+                error::listed(ENCODINGS.iter().copied())
+            )
+        }
         Some(other) if !other.is_read => {
             format!(
                 "topic `{topic}` holds {}, which is not read; allowed: {}",

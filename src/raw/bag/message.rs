@@ -2,10 +2,12 @@
 //!
 //! CDR is read here by hand: a dozen lines for each kind of value, without a description of types that must be compiled first.
 
+use super::json::{in_cdr, is_json};
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 /// A part of a message, in the order in which they stand.
-enum FieldType {
+pub(super) enum FieldType {
     /// The time of the header and its frame: the columns `stamp` and `frame_id`.
     Header,
     /// A text: a column of this name.
@@ -25,7 +27,7 @@ pub(super) struct MessageKind {
     pub(crate) name: &'static str,
     /// It holds any number of them; its two frames select the one that is read.
     pub(crate) of_frames: bool,
-    parts: &'static [FieldType],
+    pub(crate) parts: &'static [FieldType],
 }
 
 use FieldType::{Dimensions, Header, List, Names, Numbers, OfNames, Text};
@@ -314,7 +316,8 @@ pub(super) fn read(
     cells: &mut MessageCells,
 ) -> Result<bool, FieldFault> {
     cells.cells.fill(FieldValue::Absent);
-    let mut cdr = Cdr::open(message)?;
+    let message = plain(kind, message)?;
+    let mut cdr = Cdr::open(&message)?;
     let Some(wanted) = frames else {
         return parts(kind, &mut cdr, cells).map(|()| true);
     };
@@ -337,9 +340,20 @@ fn frames_of(cdr: &mut Cdr) -> Result<String, FieldFault> {
     Ok(format!("{parent}->{child}"))
 }
 
+/// The message in CDR, whatever it was encoded in.
+fn plain<'m>(kind: &MessageKind, message: &'m [u8]) -> Result<Cow<'m, [u8]>, FieldFault> {
+    match is_json(message) {
+        true => in_cdr(kind, message).map(Cow::Owned),
+        false => Ok(Cow::Borrowed(message)),
+    }
+}
+
 /// All frames of a message of frames; none where it cannot be read.
-pub(super) fn frames(message: &[u8]) -> Vec<String> {
-    let Ok(mut cdr) = Cdr::open(message) else {
+pub(super) fn frames(kind: &MessageKind, message: &[u8]) -> Vec<String> {
+    let Ok(message) = plain(kind, message) else {
+        return Vec::new();
+    };
+    let Ok(mut cdr) = Cdr::open(&message) else {
         return Vec::new();
     };
     let count = cdr.list("transforms").unwrap_or_default();

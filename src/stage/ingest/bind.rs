@@ -73,6 +73,8 @@ pub(super) struct NumberBinding {
     pub(crate) difference: Option<Difference>,
     /// Whether it holds clock times as text.
     pub(crate) is_clock: bool,
+    /// The setting that states its unit.
+    pub(crate) unit_setting: &'static str,
 }
 
 /// The torque of a dc motor by its voltage, which is a duty times a supply where one is.
@@ -426,6 +428,7 @@ impl Binder<'_> {
             name: self.name(column),
             difference: None,
             is_clock: false,
+            unit_setting: "unit",
         }
     }
     fn joints(
@@ -514,6 +517,7 @@ impl Binder<'_> {
                     optional: joints.optional,
                     sign,
                     zero,
+                    unit_setting: setting,
                     ..cell
                 });
             }

@@ -9,22 +9,22 @@ use crate::stage::ingest::columns::{Duplicates, Join};
 use crate::stage::ingest::refusal::{Reason, RowRefusal};
 use crate::stage::ingest::rows::{FileRows, GivenUp};
 use std::collections::{BTreeSet, HashMap};
-use std::ops::Range;
 
 /// By file but the first, the row that belongs to each row of the first. Empty without a join.
 pub(super) type Partners = Vec<Vec<Option<usize>>>;
 
-/// Gives up duplicates and rows without partners. Files that continue each other share their ids.
+/// Gives up duplicates and rows without partners. Ids count within their file; of files that continue each other copies are one row.
 pub(super) fn decide(files: &mut [FileRows], settings: &Ingest, time: usize) -> Partners {
     let joined = settings.is_joined();
     let count = files.len();
-    let groups: Vec<Range<usize>> = match joined {
-        true => (0..count).map(|file| file..file + 1).collect(),
-        false => std::iter::once(0..count).collect(),
-    };
-    for group in groups {
-        for (file, row, duplicate) in duplicates(files, group, settings.duplicates) {
+    for file in 0..count {
+        for (row, duplicate) in duplicates(files, file, settings.duplicates) {
             files[file].given_up.insert(row, duplicate);
+        }
+    }
+    if !joined && settings.duplicates != Duplicates::Keep {
+        for (file, row, copy) in copies(files) {
+            files[file].given_up.insert(row, copy);
         }
     }
     let Some((first, others)) = files.split_first_mut().filter(|_| joined) else {
@@ -79,46 +79,64 @@ pub(super) fn decide(files: &mut [FileRows], settings: &Ingest, time: usize) -> 
     partners
 }
 
-/// All rows of each id but one, or all, by their files. Copies of one row are one row: they do not contradict each other.
-fn duplicates(
-    files: &[FileRows],
-    group: Range<usize>,
-    duplicates: Duplicates,
-) -> Vec<(usize, usize, GivenUp)> {
+/// All rows of each id of a file but one, or all. Copies of one row are one row: they do not contradict each other.
+fn duplicates(files: &[FileRows], file: usize, duplicates: Duplicates) -> Vec<(usize, GivenUp)> {
     let mut given_up = Vec::new();
     if duplicates == Duplicates::Keep {
         return given_up;
     }
-    let rows = group.flat_map(|file| {
-        let rows = files[file].usable();
-        rows.map(move |row| (files[file].id(row), file, row))
-    });
-    let mut rows: Vec<(&str, usize, usize)> = rows.filter(|(id, ..)| !id.is_empty()).collect();
+    let all = &files[file];
+    let mut rows: Vec<(&str, usize)> = all.usable().map(|row| (all.id(row), row)).collect();
+    rows.retain(|(id, _)| !id.is_empty());
     // Ids that count upwards are in this order already.
-    rows.sort_by_key(|(id, ..)| (id.len(), *id));
+    rows.sort_by_key(|(id, _)| (id.len(), *id));
     let of_one_id = rows.chunk_by(|a, b| a.0 == b.0);
     for same in of_one_id.filter(|same| same.len() > 1) {
-        let copies = |k: usize, other: usize| {
-            let ((_, a, row), (_, b, twin)) = (same[k], same[other]);
-            files[a].says_same(row, &files[b], twin)
-        };
+        let copies = |k: usize, other: usize| all.says_same(same[k].1, all, same[other].1);
         let stays = match duplicates {
             Duplicates::Reject if !(1..same.len()).all(|k| copies(k, 0)) => None,
             Duplicates::Last => Some(same.len() - 1),
             _ => Some(0),
         };
-        for (k, (_, file, row)) in same.iter().enumerate().filter(|(k, _)| Some(*k) != stays) {
+        for (k, (_, row)) in same.iter().enumerate().filter(|(k, _)| Some(*k) != stays) {
             let other = stays.unwrap_or(if k == 0 { same.len() - 1 } else { 0 });
-            let (_, of_other, twin) = same[other];
             let why = GivenUp::Duplicate {
-                file: of_other,
-                row: twin,
+                file,
+                row: same[other].1,
                 copied: stays.is_some() && copies(k, other),
             };
-            given_up.push((*file, *row, why));
+            given_up.push((*row, why));
         }
     }
     given_up
+}
+
+/// Rows that an earlier file has too, with the same id and the same values; in every file an id is used once.
+fn copies(files: &[FileRows]) -> Vec<(usize, usize, GivenUp)> {
+    let mut seen: HashMap<&str, Vec<(usize, usize)>> = HashMap::new();
+    let mut out = Vec::new();
+    for (file, rows) in files.iter().enumerate() {
+        for row in rows.usable().filter(|row| rows.is_used(*row)) {
+            if rows.id(row).is_empty() {
+                continue;
+            }
+            let earlier = seen.entry(rows.id(row)).or_default();
+            let mut twins = earlier.iter();
+            match twins.find(|(other, twin)| rows.says_same(row, &files[*other], *twin)) {
+                Some((other, twin)) => {
+                    let (other, twin) = (*other, *twin);
+                    let why = GivenUp::Duplicate {
+                        file: other,
+                        row: twin,
+                        copied: true,
+                    };
+                    out.push((file, row, why));
+                }
+                None => earlier.push((file, row)),
+            }
+        }
+    }
+    out
 }
 
 /// Pairs of rows with one id; every id stands once in a file.
@@ -239,7 +257,7 @@ impl Measurement<'_> {
                 (Reason::Unmatched, detail)
             }
         };
-        RowRefusal { reason, detail }
+        RowRefusal::new(reason, detail)
     }
     /// How much later (s) than its joints, of the file `moving`, the point of a row was measured; none where files are not joined by time.
     pub(super) fn later(&self, moving: usize, joined: &JoinedRow) -> Option<f64> {

@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::raw::RecordFault;
 use crate::stage::{Context, Sink, StreamedTable};
 use crate::table::{Rejected, RejectedRow, Table};
+use crate::units::Unit;
 use std::collections::BTreeMap;
 
 /// Why a row is not used; the stable word in the table `rejected`.
@@ -61,9 +62,19 @@ impl From<RecordFault> for Reason {
 pub(super) struct RowRefusal {
     pub(crate) reason: Reason,
     pub(crate) detail: String,
+    /// The setting of a unit, and the unit in which the number is in range.
+    pub(crate) misread: Option<(&'static str, Unit)>,
 }
 
 impl RowRefusal {
+    pub(super) fn new(reason: Reason, detail: String) -> Self {
+        Self {
+            reason,
+            detail,
+            misread: None,
+        }
+    }
+
     /// The row of the table, of the file that tables call `file`.
     pub(super) fn rejected(self, file: &str, line: u64, id: &str, begin: &str) -> RejectedRow {
         RejectedRow {
@@ -108,7 +119,7 @@ pub(super) fn tally(counts: &mut RefusalCounts, line: u64, refusal: &RowRefusal)
 }
 
 pub(super) fn refuse<T>(reason: Reason, detail: String) -> Result<T, RowRefusal> {
-    Err(RowRefusal { reason, detail })
+    Err(RowRefusal::new(reason, detail))
 }
 
 /// Rejected rows in memory at once, where they come in order.

@@ -387,7 +387,13 @@ fn in_range(record: &Record, cell: &NumberBinding, value: f64) -> Result<(), Row
             format!("{name} {sign} {second}: `{text}` {sign} `{difference}`")
         }
     };
-    refuse(Reason::OutOfRange, format!("{found}; allowed: {allowed}"))
+    Err(RowRefusal {
+        misread: unit
+            .misread(value, cell.range)
+            .filter(|_| !no_direction)
+            .map(|unit| (cell.unit_setting, unit)),
+        ..RowRefusal::new(Reason::OutOfRange, format!("{found}; allowed: {allowed}"))
+    })
 }
 
 #[cold]

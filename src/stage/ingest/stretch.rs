@@ -3,7 +3,7 @@
 //! ClockColumn times as text: a time of day, or a date with a time (ISO 8601, a blank for its T too).
 
 use jiff::Timestamp;
-use jiff::civil::{DateTime, Time};
+use jiff::civil::{Date, DateTime, Time};
 use jiff::tz::TimeZone;
 
 /// A gap is longer than so many steps of the clock.
@@ -127,7 +127,16 @@ impl Stretches {
 /// The word that stands for a unit where times are clock times.
 pub(super) const CLOCK: &str = "clock";
 /// What may stand in such a column, for people.
-pub(super) const ALLOWED: &str = "a time of day (08:15:03.25) or a date with a time (2026-11-22T08:15:03, with or without its zone)";
+pub(super) const ALLOWED: &str = "a time of day (08:15:03.25) or a date with a time (2026-11-22T08:15:03, with or without its zone; \
+    22.11.2026 08:15:03; 11/22/2026 8:15:03 AM, the month first)";
+
+/// The clock times of a column, s, in the order of its cells.
+pub fn clock_seconds<'t>(cells: impl Iterator<Item = &'t str>) -> Vec<f64> {
+    let mut column = ClockColumn::default();
+    cells
+        .filter_map(|cell| column.read(cell.as_bytes()))
+        .collect()
+}
 
 /// Whether text is a clock time that [`Ingest`](super::Ingest) reads with the unit `clock`.
 pub fn is_clock_time(text: &str) -> bool {
@@ -180,15 +189,63 @@ impl ClockTime {
         if !text.contains(':') {
             return None;
         }
+        if let Some((date, of_day)) = text
+            .split_once([' ', 'T'])
+            .filter(|(date, _)| date.contains(['.', '/']))
+        {
+            let day = written_day(date.trim_end_matches(','))?;
+            let time = day.to_datetime(written_time(of_day)?);
+            let time = time.to_zoned(TimeZone::UTC).ok()?.timestamp();
+            return Some(Self::Dated(time.as_duration().as_secs_f64()));
+        }
         if text.contains('-') {
             let time: DateTime = text.parse().ok()?;
             let time = time.to_zoned(TimeZone::UTC).ok()?.timestamp();
             return Some(Self::Dated(time.as_duration().as_secs_f64()));
         }
-        let time: Time = text.parse().ok()?;
+        let time = written_time(text)?;
         let of_day = time.duration_since(Time::midnight());
         Some(Self::OfDay(of_day.as_secs_f64()))
     }
+}
+
+/// `20.11.2026`, the day first; `11/20/2026`, the month first; `2026/11/20`.
+fn written_day(text: &str) -> Option<Date> {
+    let mark = if text.contains('.') { '.' } else { '/' };
+    let parts: Vec<&str> = text.split(mark).collect();
+    let [a, b, c] = parts[..] else { return None };
+    let [year, month, day] = match (mark, a.len()) {
+        (_, 4) => [a, b, c],
+        ('.', _) => [c, b, a],
+        _ => [c, a, b],
+    };
+    (year.len() == 4).then_some(())?;
+    Date::new(year.parse().ok()?, month.parse().ok()?, day.parse().ok()?).ok()
+}
+
+/// `08:15:03.25`, `8:15:03 PM`.
+fn written_time(text: &str) -> Option<Time> {
+    let text = text.trim();
+    let lower = text.to_ascii_lowercase();
+    let half = [("am", false), ("pm", true)].into_iter();
+    let mut half = half.filter_map(|(word, is_late)| Some((lower.strip_suffix(word)?, is_late)));
+    let half = half.next();
+    let clock = half.map_or(text, |(clock, _)| clock.trim());
+    let padded = match clock.find(':') {
+        Some(1) => format!("0{clock}"),
+        _ => clock.to_string(),
+    };
+    let time: Time = padded.parse().ok()?;
+    let Some((_, is_late)) = half else {
+        return Some(time);
+    };
+    let hour = match (time.hour(), is_late) {
+        (1..=11, true) => time.hour() + 12,
+        (12, false) => 0,
+        (1..=12, _) => time.hour(),
+        _ => return None,
+    };
+    time.with().hour(hour).build().ok()
 }
 
 #[cfg(test)]
@@ -251,6 +308,11 @@ mod tests {
             "2024-02-29 12:00:00",
             "2024-02-29T13:00:00+01:00",
             "2024-02-29T12:00:00.000",
+            "29.02.2024 12:00:00",
+            "29.2.2024 12:00:00,000",
+            "02/29/2024 12:00:00 PM",
+            "2/29/2024 12:00",
+            "2024/02/29 12:00:00",
         ] {
             assert_eq!(parsed(text), Some(ClockTime::Dated(noon)), "{text}");
         }

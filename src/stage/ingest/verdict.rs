@@ -1,5 +1,6 @@
 //! What is wrong with a file as a whole, or with several files as copies of each other: errors for the owner of the measurements, before any table is written.
 
+use super::apart::{Trimmed, clocks_apart, least_apart, zone};
 use super::arm::RobotJoints;
 use super::columns::{Columns, Join, LimitPolicy};
 use super::pair::Measurement;
@@ -8,6 +9,7 @@ use super::rows::{FileRows, GivenUp};
 use crate::error::{Error, Fault, Result, counted};
 use crate::robot::too_far;
 use crate::stage::Context;
+use crate::units::Unit;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Beyond this largest angle, deg, a file in degrees is believed to be one.
@@ -83,13 +85,22 @@ fn implausible(
         // Joints that turn this far are in the unit that is declared, whatever they are counted from.
         && (arm.prismatic.get(joint) == Some(&true) || unit != "deg" && rows.largest_turn() < FAR)
     {
-        let degrees = match unit {
-            "deg" => "",
-            _ => "; if the file holds degrees, say `unit: deg`",
+        let slides = arm.prismatic.get(joint) == Some(&true);
+        let linear = columns.joint("q")?.linear_unit.as_deref();
+        let linear = linear.filter(|_| slides).and_then(Unit::parse);
+        let linear = linear.and_then(|unit| unit.misread(value, arm.limits[joint]));
+        let other = match (linear, unit) {
+            (Some(linear), _) => format!(
+                "; if the file holds {}, say `linear_unit: {}`",
+                linear.plural(),
+                linear.symbol()
+            ),
+            (None, "rad") if !slides => "; if the file holds degrees, say `unit: deg`".into(),
+            _ => String::new(),
         };
         let message = format!(
             "{} of {judged} rows are beyond the robot's joint limits, here {}; allowed: the unit and order of columns that the file has, or \
-             `limits: ignore`{degrees}",
+             `limits: ignore`{other}",
             rows.beyond.rows,
             arm.beyond(joint, value)
         );
@@ -107,14 +118,15 @@ fn too_many_rejected(all: &Measurement, index: usize) -> Option<Fault> {
         return None;
     }
     let duplicates = |of_copies: bool| {
-        let lines = rows.given_up.values().filter_map(move |why| match why {
-            GivenUp::Duplicate { file, row, copied } if *copied == of_copies => {
-                Some(files[*file].line(*row))
-            }
-            _ => None,
-        });
-        let count = lines.clone().count() as u64;
-        (count, lines.min().unwrap_or_default())
+        let all = rows
+            .given_up
+            .iter()
+            .filter_map(move |(here, why)| match why {
+                GivenUp::Duplicate { copied, .. } if *copied == of_copies => Some(*here),
+                _ => None,
+            });
+        let first = all.clone().min().map(|here| rows.line(here));
+        (all.count() as u64, first.unwrap_or_default())
     };
     let ((ids, first_id), (copies, first_copy)) = (duplicates(false), duplicates(true));
     let unmatched = rows.given_up.len() as u64 - ids - copies;
@@ -133,6 +145,7 @@ fn too_many_rejected(all: &Measurement, index: usize) -> Option<Fault> {
         Some(other) => {
             let by_id = matches!(all.settings.join, Some(Join::Id {}));
             let unlike = by_id.then(|| unlike(all, [index, other])).flatten();
+            let unlike = unlike.or_else(|| apart(all, [index, other]));
             let unlike = unlike.unwrap_or_default();
             format!("no partner in {}{unlike}", files[other].label)
         }
@@ -178,23 +191,69 @@ fn too_many_rejected(all: &Measurement, index: usize) -> Option<Fault> {
         }
         _ => rows.label.clone(),
     };
-    let smaller = smaller(rows, &all.settings.files[index].columns);
+    let misread = misread(rows);
     let message = format!(
-        "{share}; allowed: up to {allowed} % (`max_rejected_fraction`); reasons: {}{smaller}",
+        "{share}; allowed: up to {allowed} % (`max_rejected_fraction`); reasons: {}{misread}",
         listed.join("; ")
     );
     Some(Fault::new(place, message))
 }
 
-/// What points that are too large for their unit usually are, where most are.
-fn smaller(rows: &FileRows, columns: &Columns) -> &'static str {
-    let most = 2 * out_of_range(rows) > rows.count() as u64;
-    let x = columns.number("x").filter(|_| most);
-    match x.and_then(|x| x.unit.as_deref()) {
-        Some("mm") => "; if the file holds micrometres, say `unit: um`",
-        Some("m") => "; if the file holds millimetres, say `unit: mm`",
-        _ => "",
+/// The unit in which the numbers that are out of range lie in it, where that goes for most rows.
+fn misread(rows: &FileRows) -> String {
+    let mut counts: Vec<((&str, Unit), usize)> = Vec::new();
+    for found in rows.refused.values().filter_map(|refusal| refusal.misread) {
+        match counts.iter_mut().find(|(other, _)| *other == found) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((found, 1)),
+        }
     }
+    let most = counts.into_iter().max_by_key(|(_, count)| *count);
+    match most.filter(|(_, count)| 2 * count > rows.count()) {
+        Some(((setting, unit), _)) => {
+            let (all, symbol) = (unit.plural(), unit.symbol());
+            format!("; if the file holds {all}, say `{setting}: {symbol}`")
+        }
+        None => String::new(),
+    }
+}
+
+/// By how much the clocks of two files that are joined by time are apart.
+fn apart(all: &Measurement, [one, other]: [usize; 2]) -> Option<String> {
+    let Some(Join::Time {
+        tolerance_s,
+        offset_s,
+    }) = &all.settings.join
+    else {
+        return None;
+    };
+    // The first file is that to which the others are joined.
+    let (second, stated) = match one.max(other) {
+        1 => (1, *offset_s),
+        later => (later, 0.0),
+    };
+    let times = |file: usize, offset: f64| -> Vec<f64> {
+        let rows = &all.files[file];
+        let times = rows
+            .usable()
+            .map(|row| rows.value(row, all.arm.slots.time) - offset);
+        times.filter(|time| time.is_finite()).collect()
+    };
+    let (here, there) = (times(0, 0.0), times(second, stated));
+    if let Some(found) = clocks_apart(&here, &there, *tolerance_s) {
+        let (words, offset) = (found.in_words(), Trimmed(stated + found.offset));
+        let remedy = match second {
+            1 => format!(": `join: {{by: time, tolerance_s: {tolerance_s}, offset_s: {offset}}}`"),
+            _ => String::new(),
+        };
+        return Some(format!("; {words}{remedy}"));
+    }
+    let least = least_apart(&here, &there).filter(|least| least > tolerance_s)?;
+    let zone = zone(least).map_or_else(String::new, |zone| format!(" ({zone}: `offset_s`)"));
+    Some(format!(
+        "; the nearest rows are {} s apart{zone}",
+        Trimmed(least)
+    ))
 }
 
 /// An id of each of two files that the other one lacks, where both have such: of a pair that differs in case alone, if there is one.

@@ -92,6 +92,11 @@ pub fn frames(ns: i64, all: &[(&str, &str, [f64; 7])]) -> Vec<u8> {
 
 /// A bag in MCAP; without compression also without chunks and index.
 pub fn mcap(compression: Option<Compression>, messages: &[Message]) -> Vec<u8> {
+    mcap_in("cdr", compression, messages)
+}
+
+/// The same of messages in another encoding.
+pub fn mcap_in(encoding: &str, compression: Option<Compression>, messages: &[Message]) -> Vec<u8> {
     let options = WriteOptions::new()
         .compression(compression)
         .use_chunks(compression.is_some())
@@ -102,7 +107,7 @@ pub fn mcap(compression: Option<Compression>, messages: &[Message]) -> Vec<u8> {
         let channel = *channels.entry(*topic).or_insert_with(|| {
             let schema = writer.add_schema(kind, "ros2msg", b"").unwrap();
             writer
-                .add_channel(schema, topic, "cdr", &BTreeMap::new())
+                .add_channel(schema, topic, encoding, &BTreeMap::new())
                 .unwrap()
         });
         let header = MessageHeader {

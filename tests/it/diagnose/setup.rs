@@ -687,3 +687,33 @@ fn a_wrong_unit_does_not_hide_how_a_controller_counts_its_joints() {
         );
     }
 }
+
+#[test]
+fn the_order_of_the_columns_of_joints_is_named_and_given_as_yaml() {
+    let orders: [([usize; 6], &str, &str); 3] = [
+        // As simulators list joints by breadth.
+        ([0, 3, 1, 4, 2, 5], "1, 4, 2, 5, 3, 6", "1 3 5 2 4 6"),
+        ([5, 4, 3, 2, 1, 0], "6, 5, 4, 3, 2, 1", "6 5 4 3 2 1"),
+        ([1, 2, 0, 3, 4, 5], "2, 3, 1, 4, 5, 6", "3 1 2 4 5 6"),
+    ];
+    for (robot, (order, holds, columns)) in arms().iter().zip(orders) {
+        let mut inputs = recorded(robot, 61, json!([]));
+        joints(&mut inputs, |q| {
+            let all = q.to_vec();
+            order.iter().zip(q).for_each(|(joint, q)| *q = all[*joint]);
+        });
+        let diagnosis = diagnosed(&inputs).unwrap();
+        let columns: Vec<String> = columns
+            .split(' ')
+            .map(|column| format!("<joint {column}>"))
+            .collect();
+        has(
+            diagnosis.wrong(),
+            [
+                format!("one after another they hold joints {holds};"),
+                format!("columns: [{}]}}", columns.join(", ")),
+            ],
+        );
+        assert!(diagnosis.left_mm() < 10.0, "{}", diagnosis.wrong());
+    }
+}

@@ -316,3 +316,37 @@ fn files_that_do_not_fit_together_are_faults_of_the_settings() {
         assert_eq!(faults(first, second, tail), expected);
     }
 }
+
+#[test]
+fn the_hint_of_a_unit_names_the_setting_and_the_unit_that_fit_the_number() {
+    let rail = |unit: &str, at: [&str; 3]| {
+        let text: String = at
+            .iter()
+            .map(|rail| format!("P{rail},{rail},20,1,2,3\n"))
+            .collect();
+        let settings = format!("unit: deg, linear_unit: {unit}");
+        let yaml = TWO.replace("unit: deg", &settings);
+        refusal(&rows(&text), &yaml, robot("pr", 1.0))
+    };
+    has(
+        &rail("m", ["288.2", "2206.3", "2945.0"]),
+        "; if the file holds millimetres, say `linear_unit: mm`",
+    );
+    has(
+        &rail("mm", ["288200.1", "2206300.2", "2945000.3"]),
+        "; if the file holds micrometres, say `linear_unit: um`",
+    );
+    // Within what any rail has, and beyond this one's.
+    let beyond = rail("m", ["28.2", "106.3", "145.0"]);
+    has(
+        &beyond,
+        "; if the file holds millimetres, say `linear_unit: mm`",
+    );
+    assert!(!beyond.contains("unit: deg"), "{beyond}");
+    let far = "P1,1,20,900,900,900\nP2,2,20,800,900,900\n";
+    let metres = TWO.replace("unit: mm", "unit: m");
+    has(
+        &refusal(&rows(far), &metres, rr()),
+        "; if the file holds millimetres, say `unit: mm`",
+    );
+}

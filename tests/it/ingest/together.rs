@@ -326,7 +326,7 @@ fn a_cut_file_is_blamed_for_the_partners_that_it_lacks() {
 }
 
 #[test]
-fn files_that_continue_each_other_share_their_ids() {
+fn ids_of_files_that_continue_each_other_count_within_their_file() {
     let part = TWO.replace("files:\n", "");
     let yaml = format!(
         "files:{}{}join: {{by: append}}\n",
@@ -337,15 +337,20 @@ fn files_that_continue_each_other_share_their_ids() {
         .with("a.csv", format!("{HEAD}{}", good(3)))
         .with(
             "b/a.csv",
-            format!("{HEAD}N,1,2,3,4,5\ng2,1,2,3,4,5\nM,1,2,3,4,5\n"),
+            format!(
+                "{HEAD}N,1,2,3,4,5\ng2,1,2,3,4,5\n{}M,1,2,3,4,5\nM,1,2,3,4,6\n",
+                good(1)
+            ),
         );
     let taken = take(&desk, &yaml, rr()).unwrap();
-    assert_eq!(taken.recording.sequence, [1, 3, 4, 6]);
+    assert_eq!(taken.recording.sequence, [1, 2, 3, 4, 5]);
+    assert_eq!(taken.recording.point_id, ["g1", "g2", "g3", "N", "g2"]);
     assert_eq!(
         refused(&taken.rejected),
         [
-            "a.csv:3 duplicate_id: point id `g2` also stands on line 3 of a.csv (2)",
-            "a.csv (2):3 duplicate_id: point id `g2` also stands on line 3 of a.csv"
+            "a.csv (2):4 duplicate_row: a copy of line 2 of a.csv: the same id, the same values",
+            "a.csv (2):5 duplicate_id: point id `M` also stands on line 6",
+            "a.csv (2):6 duplicate_id: point id `M` also stands on line 5"
         ]
     );
 }

@@ -12,6 +12,7 @@ use crate::robot::RobotModel;
 use crate::round::FitState;
 use crate::setup::counting::Counting;
 use crate::setup::mixture::{TwoSetups, is_in_parts};
+use crate::setup::order::ColumnOrder;
 use crate::setup::placement::{FreeNumber, Placement, PointPairs, place, sampled};
 use crate::setup::wrong::{LENGTHS, RowOrder, WrongSetup};
 use crate::types::Question;
@@ -119,7 +120,7 @@ impl<'a> AsStated<'a> {
         let price = if number.is_some() { *OWN_NUMBERS } else { 1.0 };
         // One error of the list is found by its kind; what has more freedom must leave what a robot that is set up rightly does.
         let is_free =
-            number.is_some() || wrong.len() > 1 || matches!(wrong[..], [WrongSetup::Counting(_)]);
+            number.is_some() || wrong.len() > 1 || wrong.iter().any(|one| one.is_of_all_joints());
         let most = if is_free { *GOOD } else { *NOMINAL } * pairs.reach();
         let explains = counts
             && *BETTER * price * share < self.share()
@@ -157,7 +158,7 @@ impl<'a> AsStated<'a> {
         is_right.then(|| found.with_all_rows(&pairs(&self.rows), &self.rows))
     }
 
-    /// What explains it: one set-up error as a right set-up does, else the whole counting of joints, else one as far as it goes, else a
+    /// What explains it: one set-up error as a right set-up does, else the order or the whole counting of joints, else one as far as it goes, else a
     /// counting and a unit, else two.
     pub(crate) fn explained(&self) -> Option<ExplainedSetup> {
         let in_order = self.rows.iter().map(|row| (*row, *row));
@@ -180,7 +181,10 @@ impl<'a> AsStated<'a> {
                 .collect()
         };
         let counted = countings(&[]);
-        let found = chosen(&try_each(counted.clone())).or(first);
+        let ordered = ColumnOrder::likely(&self.mended(&[])).into_iter();
+        let ordered = ordered.map(|order| vec![WrongSetup::Columns(order)]);
+        let of_all_joints = ordered.chain(counted.clone()).collect();
+        let found = chosen(&try_each(of_all_joints)).or(first);
         if found.is_some() {
             return found;
         }
@@ -224,9 +228,9 @@ fn chosen(tries: &[Try]) -> Option<ExplainedSetup> {
         .iter()
         .filter(|tried| tried.share <= *SAME * least);
     let best = least_ones.next()?;
-    // Countings that leave the same are the same by kinematics.
+    // Countings and orders that leave the same are the same by kinematics.
     let is_same = |tried: &Try| {
-        matches!(tried.wrong[..], [WrongSetup::Counting(_)]) && tried.share <= *SAME * least
+        tried.wrong.iter().all(|one| one.is_of_all_joints()) && tried.share <= *SAME * least
     };
     let is_rival = |tried: &&&Try| {
         tried.wrong != best.wrong

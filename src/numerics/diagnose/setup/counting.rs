@@ -121,11 +121,8 @@ impl Counting {
         if robot.joints() > LIMIT {
             return Vec::new();
         }
-        let some: Vec<usize> = (0..pairs.rows())
-            .step_by(pairs.rows().div_ceil(*SCREENED).max(1))
-            .collect();
         let affine = AffineImage {
-            pairs: &pairs.only(&some),
+            pairs: &pairs.every(*SCREENED),
         };
         let searched = Searched::all(robot);
         // The zeros with the longest levers are tried all: no descent leads from one of them to another.
@@ -181,8 +178,8 @@ fn best(mut all: Vec<(f64, Counting)>, most: usize) -> Vec<Counting> {
     out
 }
 
-struct AffineImage<'a, 'b> {
-    pairs: &'b PointPairs<'a>,
+pub(super) struct AffineImage<'a, 'b> {
+    pub(crate) pairs: &'b PointPairs<'a>,
 }
 
 impl AffineImage<'_, '_> {
@@ -236,13 +233,17 @@ impl AffineImage<'_, '_> {
         }
     }
 
-    /// What a counting leaves of the points, as a share of how far they are apart; far points trimmed once.
     fn left(&self, counting: Counting) -> f64 {
+        self.left_with(|q| counting.to_robot(q))
+    }
+
+    /// What is left of the points with the joints of every row changed, as a share of how far the points are apart; far ones trimmed once.
+    pub(crate) fn left_with(&self, change: impl Fn(&mut [f64])) -> f64 {
         let pairs = self.pairs;
         let poses: Vec<Pose> = (0..pairs.rows())
             .map(|row| {
                 let mut q = pairs.q(row).to_vec();
-                counting.to_robot(&mut q);
+                change(&mut q);
                 bodies(pairs.robot, &q)[pairs.joints()]
             })
             .collect();

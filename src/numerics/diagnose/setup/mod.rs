@@ -7,6 +7,7 @@
 mod compare;
 mod counting;
 mod mixture;
+mod order;
 mod placement;
 mod words;
 mod wrong;

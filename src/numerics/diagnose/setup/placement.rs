@@ -273,6 +273,13 @@ impl<'a> PointPairs<'a> {
         }
     }
 
+    /// So many of the rows at most, evenly over all of them.
+    pub(crate) fn every(&self, most: usize) -> Self {
+        let step = self.rows().div_ceil(most).max(1);
+        let rows: Vec<usize> = (0..self.rows()).step_by(step).collect();
+        self.only(&rows)
+    }
+
     pub(crate) fn with_points(&self, change: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
         Self {
             points: self.points.iter().map(change).collect(),

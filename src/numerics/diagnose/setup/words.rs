@@ -53,15 +53,18 @@ pub(super) fn words(
         WrongSetup::Exchanged(a, b) => {
             let mut order: Vec<usize> = (0..joints).collect();
             order.swap(a, b);
-            let order = order.iter().map(|k| format!("<joint {}>", k + 1));
-            let order = order.collect::<Vec<_>>().join(", ");
             (
                 format!("joints {} and {} are exchanged", a + 1, b + 1),
-                format!(
-                    "in `ingest`, with the columns in the order in which they are mapped now: `columns: {{q: {{.., columns: [{order}]}}}}`"
-                ),
+                order_of_columns(&order),
             )
         }
+        WrongSetup::Columns(order) => (
+            format!(
+                "the columns of joints are not in the order of the robot's: one after another they hold joints {}",
+                numbered(&order.joints(joints))
+            ),
+            order_of_columns(&order.columns(joints)),
+        ),
         WrongSetup::Zero(joint, quarters) => return zero_words(&[(joint, quarters)], joints),
         WrongSetup::Zeros { joint, quarters, next } => {
             let what = format!(
@@ -110,6 +113,15 @@ pub(super) fn together(
         all.push(SetupWords::of(what, mend));
     }
     all
+}
+
+/// The columns of the joints, each by its number, from 0, among those that are mapped now.
+fn order_of_columns(columns: &[usize]) -> String {
+    let order = columns.iter().map(|k| format!("<joint {}>", k + 1));
+    let order = order.collect::<Vec<_>>().join(", ");
+    format!(
+        "in `ingest`, with the columns in the order in which they are mapped now: `columns: {{q: {{.., columns: [{order}]}}}}`"
+    )
 }
 
 /// Joints, from 0, that turn the other way.
@@ -418,7 +430,7 @@ pub(super) fn implausible(question: &Question, numbers: &[String]) -> Diagnosis 
 pub(super) fn unexplained(question: &Question, stated: &AsStated) -> Diagnosis {
     let statement = format!(
         "the set-up is wrong: with base and tool fitted the nominal robot is {} off the points (median), {:.1} % of its reach, and \
-         none of the usual errors explains it (units, signs, zeros, exchanged or coupled joints, a mirrored frame, the order of rows, \
+         none of the usual errors explains it (units, signs, zeros, the order of columns, coupled joints, a mirrored frame, the order of rows, \
          one length). Check that the robot file is this arm's (lines marked REPLACE or CHECK, the DH convention), and that the \
          joints belong to these points",
         mm(stated.placed.left),

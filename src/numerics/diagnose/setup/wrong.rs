@@ -10,6 +10,7 @@
 use crate::criteria::setup::{FARTHEST, LONG, SHIFTS, SORTED};
 use crate::robot::RobotModel;
 use crate::setup::counting::Counting;
+use crate::setup::order::ColumnOrder;
 use crate::setup::placement::{FreeNumber, PointPairs, median, turning};
 use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -25,6 +26,8 @@ pub(super) enum WrongSetup {
     /// Joints turn the other way.
     Signs(SignGroup),
     Exchanged(usize, usize),
+    /// More than two columns of joints stand in another order.
+    Columns(ColumnOrder),
     /// What is reported at the robot file's zero, in quarters of a turn: 1, -1, or 2.
     Zero(usize, i32),
     /// The same of a joint and of the parallel one that follows it, such that only the link between them has another direction.
@@ -104,13 +107,18 @@ impl WrongSetup {
     /// The place of its mend in the order in which `ingest` applies them: columns, units, zeros, signs, couplings.
     pub(crate) fn rank(self) -> usize {
         match self {
-            Self::Order(_) | Self::Exchanged(..) => 0,
+            Self::Order(_) | Self::Exchanged(..) | Self::Columns(_) => 0,
             Self::PointUnit(_) | Self::InRadians | Self::InDegrees | Self::Mirrored => 1,
             Self::Zero(..) | Self::Zeros { .. } => 2,
             Self::Signs(_) | Self::Counting(_) => 3,
             Self::Coupled { .. } => 4,
             Self::Number(_) => 5,
         }
+    }
+
+    /// Whether it says of all joints at once how they are read.
+    pub(crate) fn is_of_all_joints(self) -> bool {
+        matches!(self, Self::Columns(_) | Self::Counting(_))
     }
 
     /// The number of the robot file that is to be found.
@@ -146,6 +154,7 @@ impl WrongSetup {
                 pairs.with_joints(|q| group.joints().for_each(|joint| q[joint] = -q[joint]))
             }
             Self::Exchanged(a, b) => pairs.with_joints(|q| q.swap(a, b)),
+            Self::Columns(order) => pairs.with_joints(|q| order.to_robot(q)),
             Self::Zero(joint, quarters) => {
                 pairs.with_joints(|q| q[joint] -= f64::from(quarters) * FRAC_PI_2)
             }

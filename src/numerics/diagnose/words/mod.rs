@@ -2,6 +2,7 @@
 
 mod statement;
 
+pub use statement::advised;
 pub(crate) use statement::{
     Ground, hidden, left_out, not_so, sentence, slower_than_noise, small, statement, with_size,
 };

@@ -212,14 +212,30 @@ impl Ground {
     }
 
     fn advice(&self) -> &'static str {
-        match (self.instrument.is_some(), self.in_motion) {
-            (true, _) if self.contacts_only => "close ten postures twice",
-            (true, false) => "measure ten poses twice",
-            (true, true) => "measure ten poses twice with the arm at rest",
-            (false, false) => "state `instrument` in `ingest`, and measure ten poses twice",
-            (false, true) => "state `instrument` in `ingest`",
-        }
+        let at = match (self.instrument.is_some(), self.in_motion) {
+            (true, _) if self.contacts_only => 0,
+            (true, false) => 1,
+            (true, true) => 2,
+            (false, false) => 3,
+            (false, true) => 4,
+        };
+        ADVICE[at]
     }
+}
+
+/// What shows the noise where neither repeats nor the instrument do.
+const ADVICE: [&str; 5] = [
+    "close ten postures twice",
+    "measure ten poses twice",
+    "measure ten poses twice with the arm at rest",
+    "state `instrument` in `ingest`, and measure ten poses twice",
+    "state `instrument` in `ingest`",
+];
+
+/// What a statement advises, so that the noise is known; the longest that it says.
+pub fn advised(statement: &str) -> Option<&'static str> {
+    let said = ADVICE.iter().filter(|advice| statement.contains(**advice));
+    said.max_by_key(|advice| advice.len()).copied()
 }
 
 /// The verdict in a sentence without its full stop.
@@ -271,6 +287,15 @@ mod tests {
             in_motion: false,
             contacts_only: false,
         }
+    }
+
+    #[test]
+    fn what_is_advised_is_what_the_statement_says() {
+        let stated = "21 um remain; 21 um scatter at random, of which the instrument explains 17: measure ten poses twice";
+        assert_eq!(super::advised(stated), Some("measure ten poses twice"));
+        let longest = "state `instrument` in `ingest`, and measure ten poses twice";
+        assert_eq!(super::advised(&format!("31 um: {longest}")), Some(longest));
+        assert_eq!(super::advised("nothing found"), None);
     }
 
     #[test]

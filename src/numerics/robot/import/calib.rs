@@ -63,6 +63,7 @@ pub fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<Imported
         units.length,
     );
     notes.extend(faults.finish()?);
+    notes.extend(robot.iter().flat_map(implausible));
     match robot {
         Some(robot) => Ok(Imported {
             robot,
@@ -425,6 +426,41 @@ fn couplings(list: DocumentNode, joints: usize) -> Vec<Coupling> {
     }
     couplings.sort_by_key(|c| (c.moved, c.by));
     couplings
+}
+
+/// No arm carries more, or has heavier links, for the square of its length, kg/m2; the heaviest that are made have a quarter of it.
+const CARRIED: f64 = 600.0;
+const HEAVIEST: f64 = 2000.0;
+
+/// Masses that no arm of this length has; those in grams are of this kind.
+fn implausible(robot: &RobotDescription) -> Vec<String> {
+    let points = robot.joints.iter().map(|joint| Vector3::from(joint.point));
+    let points: Vec<Vector3<f64>> = points.chain([Vector3::from(robot.tool)]).collect();
+    let travel = robot
+        .joints
+        .iter()
+        .filter(|joint| joint.kind == JointKind::Prismatic);
+    let travel = travel.filter_map(|joint| Some(joint.limits?[1] - joint.limits?[0]));
+    let length = points
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).norm())
+        .sum::<f64>()
+        + travel.filter(|travel| travel.is_finite()).sum::<f64>();
+    let links: f64 = robot.joints.iter().filter_map(|joint| joint.mass).sum();
+    let said = |what: &str, mass: f64, most: f64| {
+        let most = most * length * length;
+        (mass > most && length > 0.0).then(|| {
+            format!(
+                "{what}: {mass} kg on an arm of {length:.2} m between its axes, of which none has more than {most:.0} kg; masses are in kg: \
+                 if the file holds grams, divide by 1000"
+            )
+        })
+    };
+    let payload = said("payload.mass", robot.payload_mass, CARRIED);
+    payload
+        .into_iter()
+        .chain(said("links", links, HEAVIEST))
+        .collect()
 }
 
 /// Rated payload, zero pose, base frame.
