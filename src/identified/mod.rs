@@ -1,5 +1,6 @@
 //! The identified model of a run, or of tables that were taken out of a store: what commands are corrected with and what is exported.
 
+mod controller_base;
 mod standing;
 mod torques;
 
@@ -7,6 +8,7 @@ pub use standing::{
     Achieved, RepeatedPose, achieved, convention_of, counted_otherwise, robot_file, standing_of,
     wrong_setup_of,
 };
+pub(crate) use standing::placed;
 use standing::{last, output, unexplained_of, written};
 pub use torques::IdentifiedTorques;
 
