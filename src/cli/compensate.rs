@@ -10,8 +10,8 @@ use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
 use crate::program::{
-    self, Frames, Language, Partial, Program, ProgramFile, ProgramLoad, ProgramRules, RobotTool, has_mark,
-    with_mark,
+    self, Frames, Language, Partial, Program, ProgramFile, ProgramLoad, ProgramRules, RobotTool,
+    has_mark, with_mark,
 };
 use crate::raw;
 use crate::targets::{Layout, Units, Unreached, parquet, text, whole};
@@ -212,7 +212,8 @@ impl CompensateArguments {
             force: self.model.force,
         };
         let remarks = remarks(self, &identified);
-        let unreached = threads.install(|| corrected(self, &layout, (&remarks, &identified), &mut corrector))?;
+        let unreached = threads
+            .install(|| corrected(self, &layout, (&remarks, &identified), &mut corrector))?;
         if !self.model.quiet {
             let counting = identified.counting();
             let counting = counting.map_or_else(String::new, |line| format!("{line}\n"));
@@ -468,7 +469,9 @@ fn rewritten(
         put(out, text)?;
         if let (1, Some(out), false) = (k, out, arguments.model.quiet) {
             let (list, out) = (files[k].display(), out.display());
-            note(format!("{list}, to whose points the program moves, is corrected too: {out}\n"));
+            note(format!(
+                "{list}, to whose points the program moves, is corrected too: {out}\n"
+            ));
         }
     }
     Ok(())
@@ -480,7 +483,10 @@ fn holds_targets(file: &Path, program: &Path) -> bool {
         return true;
     };
     let companions = Companions::of(program, Language::Krl, &[]);
-    let companions = companions.as_ref().map(Companions::files).unwrap_or_default();
+    let companions = companions
+        .as_ref()
+        .map(Companions::files)
+        .unwrap_or_default();
     let read = Program::parse_with(&text, Language::Krl, Partial::Left, &companions);
     read.map_or(true, |program| !program.literals().is_empty())
 }
@@ -496,7 +502,10 @@ fn outs(arguments: &CompensateArguments, files: &[PathBuf]) -> Result<Vec<PathBu
             list.display(),
             list.file_name().unwrap_or_default().to_string_lossy()
         );
-        return Err(Error::spec(arguments.targets.display().to_string(), message));
+        return Err(Error::spec(
+            arguments.targets.display().to_string(),
+            message,
+        ));
     };
     let ending = list.extension().unwrap_or_default();
     let beside = out.with_extension(ending);

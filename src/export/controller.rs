@@ -122,7 +122,9 @@ impl<'a> ControllerList<'a> {
             Some(wanted.error(&moved))
         };
         let nothing = anew(&vec![0.0; tolerances.len()]);
-        let anew = nothing.zip(anew(&solved.values)).map(|(nothing, left)| [nothing, left]);
+        let anew = nothing
+            .zip(anew(&solved.values))
+            .map(|(nothing, left)| [nothing, left]);
         Self {
             identified,
             entries,
@@ -136,8 +138,8 @@ impl<'a> ControllerList<'a> {
     fn lines(&self) -> Vec<String> {
         let robot = &self.identified.model.robot;
         let convention = self.identified.convention.clone();
-        let convention = convention
-            .unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
+        let convention =
+            convention.unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
         let share = |(position, entry): (usize, &DeviationEntry)| Share {
             position,
             status: self.status(position, entry.tolerance()),
@@ -147,7 +149,8 @@ impl<'a> ControllerList<'a> {
         let shares: Vec<Share> = self.entries.iter().enumerate().map(share).collect();
         let line = |entry: DeviationEntry| {
             let known = shares.iter().filter(|share| share.by.holds(entry));
-            let at_joint: Vec<(&Share, f64)> = known.map(|share| (share, share.by.at(entry))).collect();
+            let at_joint: Vec<(&Share, f64)> =
+                known.map(|share| (share, share.by.at(entry))).collect();
             if at_joint.is_empty() {
                 return None;
             }
@@ -162,7 +165,9 @@ impl<'a> ControllerList<'a> {
                 entry.place()
             ))
         };
-        DeviationEntry::all(robot.joints()).filter_map(line).collect()
+        DeviationEntry::all(robot.joints())
+            .filter_map(line)
+            .collect()
     }
 
     /// Whether the poses say what a number is, or its tolerance does.
@@ -177,18 +182,27 @@ impl<'a> ControllerList<'a> {
 
     /// Standard deviation of a sum of numbers, each times a factor.
     fn sigma(&self, shares: &[(&Share, f64)]) -> f64 {
-        let pairs = shares.iter().flat_map(|a| shares.iter().map(move |b| (a, b)));
+        let pairs = shares
+            .iter()
+            .flat_map(|a| shares.iter().map(move |b| (a, b)));
         let part = |((a, by), (b, other)): (&(&Share, f64), &(&Share, f64))| {
             by * other * self.solved.covariance[(a.position, b.position)]
         };
-        pairs.map(|(a, b)| part((a, b))).sum::<f64>().max(0.0).sqrt()
+        pairs
+            .map(|(a, b)| part((a, b)))
+            .sum::<f64>()
+            .max(0.0)
+            .sqrt()
     }
 
     /// The tool in the flange's frame, where the robot file or the library of arms knows that.
     fn tool_lines(&self, export: &Export) -> String {
         let robot = &self.identified.model.robot;
         let targets = &robot.setup().targets;
-        let (place, nominal) = (&self.identified.robot, Vector3::from(self.identified.robot.tool));
+        let (place, nominal) = (
+            &self.identified.robot,
+            Vector3::from(self.identified.robot.tool),
+        );
         let flange = export.flange();
         let (frame, said) = match &flange {
             Some((frame, said)) => (*frame, format!("frame of the flange, {said}")),
@@ -202,7 +216,10 @@ impl<'a> ControllerList<'a> {
             false => robot.setup().target(""),
         };
         let Some(number) = number else {
-            return format!("# not carried: where targets sit; the tool of {} stays as it is\n", one_line(&place.name));
+            return format!(
+                "# not carried: where targets sit; the tool of {} stays as it is\n",
+                one_line(&place.name)
+            );
         };
         let at = self.entries.len() + 3 * number;
         let off = Vector3::from_column_slice(&self.solved.values[at..at + 3]);

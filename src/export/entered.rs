@@ -109,7 +109,9 @@ pub(super) fn solve(
                 };
                 let pairs = moved(step).into_iter().zip(moved(-step));
                 let scale = tolerances[k] / (2.0 * step * sigma);
-                pairs.map(|(ahead, behind)| (ahead - behind) * scale).collect()
+                pairs
+                    .map(|(ahead, behind)| (ahead - behind) * scale)
+                    .collect()
             })
             .collect();
         let off: Vec<Vector3<f64>> = (wanted.points.iter().zip(&at))
@@ -168,7 +170,11 @@ mod tests {
         assert!((found.values[0] - 1e-3).abs() < 1e-8, "{:?}", found.values);
         // The sum is shown; its parts stand as their variances.
         assert!((found.values[1] - 1.8e-3).abs() < 1e-6 && (found.values[2] - 0.2e-3).abs() < 1e-6);
-        assert!(found.left.rms < 1e-6 && found.nothing.rms > 1e-3 && !found.left.is_worse(&found.nothing));
+        assert!(
+            found.left.rms < 1e-6
+                && found.nothing.rms > 1e-3
+                && !found.left.is_worse(&found.nothing)
+        );
         assert!(found.covariance[(1, 1)].sqrt() > 0.5e-3);
     }
 }

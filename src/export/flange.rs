@@ -14,11 +14,18 @@ const SAME: f64 = 1e-6;
 impl Export {
     /// The flange at the zero pose in the base frame, and who says so; none where neither the robot file nor the library does.
     pub(super) fn flange(&self) -> Option<(Pose, String)> {
-        let of_the_file = self
-            .imported()
-            .and_then(|imported| Some((imported.flange?, "as the kinematics of the robot file end".into())));
+        let of_the_file = self.imported().and_then(|imported| {
+            Some((
+                imported.flange?,
+                "as the kinematics of the robot file end".into(),
+            ))
+        });
         let robot = &self.identified.robot;
-        let arms = || LIBRARY.iter().filter_map(|arm| Some((arm.name, arm.read().ok()?)));
+        let arms = || {
+            LIBRARY
+                .iter()
+                .filter_map(|arm| Some((arm.name, arm.read().ok()?)))
+        };
         let of_the_library = || {
             let (name, arm) = arms().find(|(_, arm)| is_same_arm(&arm.robot, robot))?;
             let rows = arm.robot.tool_rotation;
@@ -33,15 +40,25 @@ impl Export {
     pub(super) fn imported(&self) -> Option<Imported> {
         let sources = &self.identified.sources;
         let with_ending = |wanted: [&str; 2]| -> Vec<(String, String)> {
-            let found = sources.iter().filter(|path| wanted.contains(&ending(path).as_str()));
-            let read = |path: &std::path::PathBuf| Some((path.display().to_string(), raw::text(path).ok()?));
+            let found = sources
+                .iter()
+                .filter(|path| wanted.contains(&ending(path).as_str()));
+            let read = |path: &std::path::PathBuf| {
+                Some((path.display().to_string(), raw::text(path).ok()?))
+            };
             found.filter_map(read).collect()
         };
         let urdfs = with_ending(["urdf", "xml"]);
-        let urdf = urdfs.first().map(|(label, text)| RobotFileText { label, text });
+        let urdf = urdfs
+            .first()
+            .map(|(label, text)| RobotFileText { label, text });
         let files = with_ending(["yaml", "yml"]);
-        let read = |(label, text): &(String, String)| read_calib(RobotFileText { label, text }, urdf).ok();
-        files.iter().filter_map(read).find(|imported| imported.robot == self.identified.robot)
+        let read =
+            |(label, text): &(String, String)| read_calib(RobotFileText { label, text }, urdf).ok();
+        files
+            .iter()
+            .filter_map(read)
+            .find(|imported| imported.robot == self.identified.robot)
     }
 }
 
@@ -53,6 +70,8 @@ fn is_same_arm(ours: &RobotDescription, theirs: &RobotDescription) -> bool {
             let axis = Vector3::from(ours.axis);
             let away = Vector3::from(ours.point) - Vector3::from(theirs.point);
             let apart = (away - axis * axis.dot(&away)).norm();
-            ours.kind == theirs.kind && (axis - Vector3::from(theirs.axis)).norm() < SAME && apart < SAME
+            ours.kind == theirs.kind
+                && (axis - Vector3::from(theirs.axis)).norm() < SAME
+                && apart < SAME
         })
 }

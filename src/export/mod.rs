@@ -139,17 +139,16 @@ impl Export {
             lines.extend(self.insisted());
             return lines;
         }
-        let mut lines = vec![
-            format!(
-                "corrected geometry of {}, {}",
-                one_line(&self.corrected.name),
-                self.identified.origin
-            ),
-        ];
+        let mut lines = vec![format!(
+            "corrected geometry of {}, {}",
+            one_line(&self.corrected.name),
+            self.identified.origin
+        )];
         let left_out = match geometry {
             CarriedGeometry::Rigid => {
-                let [residual, nothing] = [self.residual, self.nothing]
-                    .map(|(rms, most)| format!("{:.4} mm rms, {:.4} mm at most", rms * 1e3, most * 1e3));
+                let [residual, nothing] = [self.residual, self.nothing].map(|(rms, most)| {
+                    format!("{:.4} mm rms, {:.4} mm at most", rms * 1e3, most * 1e3)
+                });
                 lines.push(format!(
                     "rigid geometry alone stands {residual} from the identified model over {} {which}; the nominal geometry {nothing}",
                     self.poses

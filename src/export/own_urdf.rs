@@ -84,7 +84,11 @@ impl OwnUrdf {
                 "is not the description that the model was identified with: its joints are others";
             return Err(Error::data(&label, message));
         };
-        own.file = path.file_name().unwrap_or_default().to_string_lossy().into();
+        own.file = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into();
         Ok(Some(own))
     }
 
@@ -155,7 +159,10 @@ impl OwnUrdf {
     /// Whether a link of it is called so.
     pub(crate) fn has_link(&self, name: &str) -> bool {
         let of_chain = self.joints.iter().any(|joint| joint.child == name);
-        of_chain || name == self.base || name == self.tip.0 || self.others.iter().any(|one| one == name)
+        of_chain
+            || name == self.base
+            || name == self.tip.0
+            || self.others.iter().any(|one| one == name)
     }
 }
 

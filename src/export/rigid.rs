@@ -82,7 +82,11 @@ fn urdf(export: &Export) -> Result<String> {
         }
         None => remarks.push("tool0 is the point that was measured, not the flange".into()),
     }
-    document(&remarks, include_str!("urdf.xml"), arm(export, own.as_ref()))
+    document(
+        &remarks,
+        include_str!("urdf.xml"),
+        arm(export, own.as_ref()),
+    )
 }
 
 /// What the link of the measured point is called beside those of a file.
@@ -202,7 +206,13 @@ fn frames(own: Option<&OwnUrdf>, parent: &str, before: &Pose, tool: &Pose) -> Ve
     let flange = *before * (last.frame.inverse() * *at);
     let measured = measured_name(own);
     if tip == parent {
-        return vec![frame("measured_point_joint", parent, &measured, before, tool)];
+        return vec![frame(
+            "measured_point_joint",
+            parent,
+            &measured,
+            before,
+            tool,
+        )];
     }
     vec![
         frame("flange_joint", parent, tip, before, &flange),
@@ -231,7 +241,8 @@ fn shortfalls(export: &Export) -> Vec<String> {
         let friction = positive(torques, FRICTION, index)?;
         let own = export.body(index).map(|body| about_axis(&body, joint));
         let least: f64 = LEAST[1].parse().unwrap_or_default();
-        let inertia = own.unwrap_or(least).max(least) + positive(torques, ARMATURE, index).unwrap_or(0.0);
+        let inertia =
+            own.unwrap_or(least).max(least) + positive(torques, ARMATURE, index).unwrap_or(0.0);
         let speed = friction * (1.0 - impedance) * time / (2.0 * inertia);
         (speed > SLOW).then(|| {
             format!(
@@ -241,7 +252,13 @@ fn shortfalls(export: &Export) -> Vec<String> {
             )
         })
     };
-    export.corrected.joints.iter().enumerate().filter_map(line).collect()
+    export
+        .corrected
+        .joints
+        .iter()
+        .enumerate()
+        .filter_map(line)
+        .collect()
 }
 
 /// What a body has against its joint: kg m2 about its axis, or kg along it.

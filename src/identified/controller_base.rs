@@ -39,7 +39,10 @@ impl IdentifiedModel {
             tree.at("kinematics.urdf.base")?.text()
         })?;
         let (label, text) = (path.display().to_string(), raw::text(path).ok()?);
-        let file = RobotFileText { label: &label, text: &text };
+        let file = RobotFileText {
+            label: &label,
+            text: &text,
+        };
         let base = controller_base(file, &ours)?;
         let (turn, shift) = (base.rotation_vector(), base.translation);
         if turn.norm() < SAME[0] && shift.norm() < SAME[1] {
@@ -62,14 +65,21 @@ fn half_turned(robot: &RobotDescription) -> Option<String> {
     let arms = LIBRARY.iter().filter(|arm| arm.name.starts_with("ur"));
     let is = |theirs: &RobotDescription, base: &Pose| {
         robot.joints.len() == theirs.joints.len()
-            && robot.joints.iter().zip(&theirs.joints).all(|(ours, theirs)| {
-                let axis = Vector3::from(ours.axis);
-                let away = base.point(&Vector3::from(theirs.point)) - Vector3::from(ours.point);
-                let apart = (away - axis * axis.dot(&away)).norm();
-                (axis - base.rotation * Vector3::from(theirs.axis)).norm() < NEAR[0] && apart < NEAR[1]
-            })
+            && robot
+                .joints
+                .iter()
+                .zip(&theirs.joints)
+                .all(|(ours, theirs)| {
+                    let axis = Vector3::from(ours.axis);
+                    let away = base.point(&Vector3::from(theirs.point)) - Vector3::from(ours.point);
+                    let apart = (away - axis * axis.dot(&away)).norm();
+                    (axis - base.rotation * Vector3::from(theirs.axis)).norm() < NEAR[0]
+                        && apart < NEAR[1]
+                })
     };
-    let arms: Vec<RobotDescription> = arms.filter_map(|arm| Some(arm.read().ok()?.robot)).collect();
+    let arms: Vec<RobotDescription> = arms
+        .filter_map(|arm| Some(arm.read().ok()?.robot))
+        .collect();
     let as_it_is = arms.iter().any(|arm| is(arm, &Pose::identity()));
     (!as_it_is && arms.iter().any(|arm| is(arm, &half))).then(|| {
         "the pose stands in the controller's base, and the robot file's is turned by 180 deg about z against it, as `base_link` of ROS is: describe \
@@ -84,7 +94,10 @@ fn lower_than_the_world(robot: &RobotDescription) -> Option<String> {
     if model.joints() < 2 || !model.is_revolute(0) || !model.is_revolute(1) {
         return None;
     }
-    let height = model.axis(0).dot(&Vector3::from(robot.joints[1].point)).abs();
+    let height = model
+        .axis(0)
+        .dot(&Vector3::from(robot.joints[1].point))
+        .abs();
     let crossed = model.axis(0).dot(model.axis(1)).abs() < 0.1;
     (crossed && height > NEAR[1]).then(|| {
         format!(

@@ -4,11 +4,11 @@ mod controller_base;
 mod standing;
 mod torques;
 
+pub(crate) use standing::placed;
 pub use standing::{
     Achieved, RepeatedPose, achieved, convention_of, counted_otherwise, robot_file, standing_of,
     wrong_setup_of,
 };
-pub(crate) use standing::placed;
 use standing::{last, output, unexplained_of, written};
 pub use torques::IdentifiedTorques;
 

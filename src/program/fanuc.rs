@@ -208,7 +208,9 @@ impl<'p> Reader<'_, 'p> {
                 );
                 self.found.warn(place, message);
                 let numbers = stated.numbers.iter();
-                let axes = numbers.map(|(name, ((value, span), _))| (format!("{name} of group {group}"), span.start, *value));
+                let axes = numbers.map(|(name, ((value, span), _))| {
+                    (format!("{name} of group {group}"), span.start, *value)
+                });
                 self.found.externals.extend(axes);
             }
         }

@@ -74,11 +74,9 @@ pub fn left_out(model: &Model, data: &Measurements, carried: &[&str]) -> Vec<Lef
     let whole = model.predict(data);
     let specs = model.stack.specs();
     let mut places: Vec<(String, Place)> = Vec::new();
-    for (effect, range) in model
-        .stack
-        .effects()
-        .filter(|(effect, _)| effect.name() != names::BASE_FRAME && !carried.contains(&effect.name()))
-    {
+    for (effect, range) in model.stack.effects().filter(|(effect, _)| {
+        effect.name() != names::BASE_FRAME && !carried.contains(&effect.name())
+    }) {
         for k in range.filter(|k| model.x[*k] != 0.0) {
             let key = (effect.name().to_string(), specs[k].place);
             if !places.contains(&key) {
