@@ -34,7 +34,7 @@
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
 //! | [`stage`] | one file per step of a pipeline | compensate, program, raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
-//! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, targets, table, numerics |
+//! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, program, raw, stage, store, targets, table, numerics, yaml |
 //! | `export` | the identified model for other programs, one file per format | compensate, criteria, dynamics, effect, estimate, identified, raw, robot, spatial, table, text, yaml |
 //! | `init` | what given files are, and the pipeline that reads them | program, raw, robot, stage, yaml |
 //! | [`excitation`] | which motion to record for torques, for a robot file | identified, numerics, stage |

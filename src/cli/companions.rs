@@ -46,6 +46,15 @@ impl Companions {
     }
 }
 
+/// The data list of a program of KUKA's: the file of its name that ends in `dat`; none of a data list itself.
+pub(super) fn data_list(program: &Path) -> Option<PathBuf> {
+    let is_list = |path: &Path| raw::ending(path) == "dat";
+    let mut beside = found(program).into_iter();
+    let its_name = stem(program);
+    let list = beside.find(|path| is_list(path) && stem(path) == its_name);
+    list.filter(|_| !is_list(program))
+}
+
 /// Files of the same name, then the system's data.
 fn found(program: &Path) -> Vec<PathBuf> {
     let folder = program

@@ -1,6 +1,6 @@
 //! `calib compensate`: joint or Cartesian targets in, commands out that bring the real arm there.
 
-use super::companions::Companions;
+use super::companions::{Companions, data_list};
 use super::feed_forward::{FeedForward, feed_forward};
 use super::pipeline_arguments::{ModelArguments, must_be_positive};
 use super::{note, put, readable, warn};
@@ -10,8 +10,8 @@ use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
 use crate::program::{
-    self, Frames, Language, Partial, ProgramFile, ProgramLoad, ProgramRules, RobotTool, has_mark,
-    with_mark,
+    self, Frames, Language, Partial, Program, ProgramFile, ProgramLoad, ProgramRules, RobotTool,
+    has_mark, with_mark,
 };
 use crate::raw;
 use crate::targets::{Layout, Units, Unreached, parquet, text, whole};
@@ -38,8 +38,10 @@ use std::path::{Path, PathBuf};
 /// are followed through branches, loops and calls, by the declarations of the file, of the file of the same name next to it (.src, .dat), of $config.dat
 /// and the files of --with. The tool is taken as the robot file's where the program has one, and --tool says which it is where it has several.
 /// What is not known so, is computed when the program runs, or moves (conveyors, tools that stand still) is refused (--assume-frames), and so
-/// are programs and tables without a payload where the model depends on load: of RAPID it is the mass of the motion's tool (tooldata, or
+/// are programs whose external axes move, poses in a base that is not the robot file's (of ROS base_link against base; FANUC's world is at the height of
+/// axis 2), and programs and tables without a payload where the model depends on load: of RAPID it is the mass of the motion's tool (tooldata, or
 /// \TLoad), of KRL that of $LOAD in force; --payload overrules it. Routines of files that were not read are taken to set nothing.
+/// The points of a KRL program in the .dat of its name are corrected with it, into a .dat beside --out.
 /// A corrected program carries a comment, a table its columns, by which calib refuses to correct it once more; one written with --plain
 /// carries nothing and is not recognised. A target that is not understood exactly, not reached, or that
 /// may or may not be one, refuses the whole program with code 10. Left as they are, with a warning for each line: poses that the program
@@ -210,7 +212,8 @@ impl CompensateArguments {
             force: self.model.force,
         };
         let remarks = remarks(self, &identified);
-        let unreached = threads.install(|| corrected(self, &layout, &remarks, &mut corrector))?;
+        let unreached = threads
+            .install(|| corrected(self, &layout, (&remarks, &identified), &mut corrector))?;
         if !self.model.quiet {
             let counting = identified.counting();
             let counting = counting.map_or_else(String::new, |line| format!("{line}\n"));
@@ -392,26 +395,14 @@ fn remarks(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Vec
     insisted.into_iter().chain(unexplained).collect()
 }
 
-/// A controller's program, whole.
+/// A controller's program, whole, and the data list of its name, whose points it moves to.
 fn rewritten(
     arguments: &CompensateArguments,
     language: Language,
     layout: &Layout,
-    remarks: &[&str],
+    (remarks, identified): (&[&str], &IdentifiedModel),
     corrector: &mut Corrector,
 ) -> Result<()> {
-    let text = readable(&arguments.targets, raw::bytes(&arguments.targets))?;
-    let companions = Companions::of(&arguments.targets, language, &arguments.with)?;
-    let source = ProgramFile {
-        place: layout.place,
-        text: &text,
-        language,
-        companions: &companions.files(),
-    };
-    if has_mark(&text, language) && !arguments.model.force {
-        let message = "was compensated by calib already: a second correction would move the robot twice as far. Take the program of before, or insist with --force";
-        return Err(Error::data(layout.place, message));
-    }
     let rules = ProgramRules {
         partial: match arguments.leave_partial {
             true => Partial::Left,
@@ -430,27 +421,117 @@ fn rewritten(
             .tool
             .as_deref()
             .and_then(|tool| RobotTool::parse(tool).ok()),
+        base: identified.base_differs(language),
     };
-    if !arguments.model.quiet {
-        note(companions.summary_line().unwrap_or_default());
+    let list = match language {
+        Language::Krl => data_list(&arguments.targets),
+        _ => None,
+    };
+    let list = list.filter(|path| holds_targets(path, &arguments.targets));
+    let mut files = vec![arguments.targets.clone()];
+    if let (Some(list), false) = (&list, holds_targets(&arguments.targets, &arguments.targets)) {
+        let message = format!(
+            "has no targets: those that it moves to stand in {}, which is corrected by itself",
+            list.display()
+        );
+        return Err(Error::data(layout.place, message));
     }
-    let mut rewritten = program::corrected(&source, rules, layout.robot, corrector)?;
-    rewritten.bytes = with_mark(&rewritten.bytes, &text, language, remarks);
-    let warnings = rewritten.warnings.iter();
-    warn(warnings.map(|note| format!("{}: {}", source.at(note), note.message)));
-    put(arguments.out.as_deref(), rewritten.bytes)
+    files.extend(list);
+    let outs = outs(arguments, &files)?;
+    let mut texts = Vec::new();
+    for (k, file) in files.iter().enumerate() {
+        let place = match k {
+            0 => layout.place.to_string(),
+            _ => file.display().to_string(),
+        };
+        let text = readable(file, raw::bytes(file))?;
+        let companions = Companions::of(file, language, &arguments.with)?;
+        let source = ProgramFile {
+            place: &place,
+            text: &text,
+            language,
+            companions: &companions.files(),
+        };
+        if has_mark(&text, language) && !arguments.model.force {
+            let message = "was compensated by calib already: a second correction would move the robot twice as far. Take the program of before, or insist with --force";
+            return Err(Error::data(&place, message));
+        }
+        if !arguments.model.quiet {
+            note(companions.summary_line().unwrap_or_default());
+        }
+        let mut rewritten = program::corrected(&source, rules.clone(), layout.robot, corrector)?;
+        rewritten.bytes = with_mark(&rewritten.bytes, &text, language, remarks);
+        let warnings = rewritten.warnings.iter();
+        warn(warnings.map(|note| format!("{}: {}", source.at(note), note.message)));
+        texts.push(rewritten.bytes);
+    }
+    for (k, text) in texts.into_iter().enumerate() {
+        let out = outs.get(k).map(PathBuf::as_path);
+        put(out, text)?;
+        if let (1, Some(out), false) = (k, out, arguments.model.quiet) {
+            let (list, out) = (files[k].display(), out.display());
+            note(format!(
+                "{list}, to whose points the program moves, is corrected too: {out}\n"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Whether a file of a program of KUKA's has targets of its own; one that cannot be read as a program may have some.
+fn holds_targets(file: &Path, program: &Path) -> bool {
+    let Ok(text) = raw::bytes(file) else {
+        return true;
+    };
+    let companions = Companions::of(program, Language::Krl, &[]);
+    let companions = companions
+        .as_ref()
+        .map(Companions::files)
+        .unwrap_or_default();
+    let read = Program::parse_with(&text, Language::Krl, Partial::Left, &companions);
+    read.map_or(true, |program| !program.literals().is_empty())
+}
+
+/// Where a program and its data list are written: the list beside the program, under its name. Fails where there is no such place.
+fn outs(arguments: &CompensateArguments, files: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let Some(list) = files.get(1) else {
+        return Ok(arguments.out.iter().cloned().collect());
+    };
+    let Some(out) = &arguments.out else {
+        let message = format!(
+            "moves to points of {}, which must be corrected with it, and standard output takes one file: name --out FILE, {} is written beside it",
+            list.display(),
+            list.file_name().unwrap_or_default().to_string_lossy()
+        );
+        return Err(Error::spec(
+            arguments.targets.display().to_string(),
+            message,
+        ));
+    };
+    let ending = list.extension().unwrap_or_default();
+    let beside = out.with_extension(ending);
+    if raw::same_file(&beside, list) || beside == *out {
+        let message = format!(
+            "{} would be written over {}: name a file in another folder, e.g. corrected/{}",
+            beside.display(),
+            list.display(),
+            out.file_name().unwrap_or_default().to_string_lossy()
+        );
+        return Err(Error::spec("--out", message));
+    }
+    Ok(vec![out.clone(), beside])
 }
 
 /// Reads, corrects and writes.
 fn corrected(
     arguments: &CompensateArguments,
     layout: &Layout,
-    remarks: &[&str],
+    about: (&[&str], &IdentifiedModel),
     corrector: &mut Corrector,
 ) -> Result<Unreached> {
     let targets = &arguments.targets;
     if let Some(language) = language(targets) {
-        rewritten(arguments, language, layout, remarks, corrector)?;
+        rewritten(arguments, language, layout, about, corrector)?;
         return Ok(Unreached::default());
     }
     match &arguments.out {

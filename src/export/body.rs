@@ -133,11 +133,6 @@ pub(super) fn document(remarks: &[String], template: &str, values: Value) -> Res
     Ok(format!("<?xml version=\"1.0\"?>\n{head}{body}"))
 }
 
-/// A point as seen from another.
-pub(super) fn offset(point: [f64; 3], from: [f64; 3]) -> String {
-    numbers(point.iter().zip(from).map(|(now, then)| now - then))
-}
-
 /// Numbers with blanks between them, each the shortest text that reads as the same number.
 pub(super) fn numbers(values: impl IntoIterator<Item = f64>) -> String {
     let texts = values.into_iter().map(|value| format!("{value:?}"));

@@ -2,98 +2,243 @@
 //!
 //! By how much joints stand elsewhere than commanded, as an affine map of the commanded positions, and that map as a controller counts.
 
-use super::{CarriedTorques, Export, Format};
-use crate::effect::Place;
-use crate::error::Result;
-use crate::estimate::Covariance;
-use crate::identified::IdentifiedModel;
+use super::entered::{self, EnteredNumbers, PointError, WantedPoints, tolerance};
+use super::{CarriedGeometry, CarriedTorques, Export, Format};
+use crate::effect::{Place, names};
+use crate::error::{Error, Result, one_line};
+use crate::identified::{IdentifiedModel, placed};
 use crate::robot::{JointConvention, RobotModel};
+use crate::spatial::Pose;
 use crate::units::Unit;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 use std::collections::BTreeSet;
 
 pub(super) const CONTROLLER: Format = Format {
     name: "controller",
     help: "Joint zeros, ratios, couplings and tool, as a list, as the controller counts its joints",
     comment: "#",
+    geometry: CarriedGeometry::Numbers(&[
+        names::TOOL_OFFSET,
+        names::JOINT_OFFSET,
+        names::REDUCTION_RATIO,
+        names::COUPLING_RATIO,
+    ]),
     carries: CarriedTorques::Nothing,
     text,
 };
 
 fn text(export: &Export) -> Result<String> {
+    let list = ControllerList::of(export);
+    let EnteredNumbers { nothing, left, .. } = &list.solved;
+    if left.is_worse(nothing) && !export.insisted {
+        let [nothing, left] = [nothing.mean, left.mean].map(|mean| mean * 1e3);
+        let message = format!(
+            "the best list of these numbers leaves {left:.3} mm, entering nothing {nothing:.3} mm: there is nothing to enter; allowed: \
+             calib compensate, which uses the whole model, or --force"
+        );
+        return Err(Error::data(&export.identified.origin, message));
+    }
     let mut text: String = export.head(&CONTROLLER);
+    let base = list.anew.as_ref().map(|[nothing, left]| {
+        let [nothing, left] = [nothing.mean, left.mean].map(|mean| mean * 1e3);
+        format!("# the same once the base is taught anew: {left:.4} mm mean; nothing entered {nothing:.4} mm mean\n")
+    });
+    let [before, after] = [nothing, left].map(|error| {
+        let [mean, most] = [error.mean, error.most].map(|length| length * 1e3);
+        format!("{mean:.4} mm mean, {most:.4} mm at most")
+    });
+    text.push_str(&format!(
+        "# error that is left with this list: {after}; nothing entered: {before} ({} {}, against the identified model in the robot's own base; \
+         the list holds no base)\n",
+        list.wanted.rows.len(),
+        export.poses_said()
+    ));
+    text.extend(base);
     text.push_str(
-        "# true position = factor * commanded + zero (+ coupling * the other joint); sigma is one standard deviation\n",
+        "# solved anew, all else nominal; true position = factor * commanded + zero (+ coupling * the other joint); sigma is one standard deviation\n",
     );
     text.push_str("quantity,where,value,unit,sigma,status\n");
-    text.extend(lines(&export.identified));
-    let tools = [export.corrected.tool, export.identified.robot.tool];
-    for (k, axis) in ["x", "y", "z"].iter().enumerate() {
-        let [now, nominal] = tools.map(|tool| tool[k] * 1e3);
-        text.push_str(&format!(
-            "tool {axis} (zero pose; base frame),tool,{now:.6},mm,,was {nominal:.6}\n"
-        ));
-    }
+    text.extend(list.lines());
+    text.push_str(&list.tool_lines(export));
     Ok(text)
 }
 
-/// A parameter, and what the numbers of the list are by it. SI.
-struct Share<'a> {
-    /// In the stack.
-    position: Option<usize>,
-    status: &'a str,
+/// A number of the list, and what the numbers of the controller are by it.
+struct Share {
+    /// Among those that were solved.
+    position: usize,
+    status: &'static str,
+    /// SI.
     value: f64,
-    sigma: Option<f64>,
-    /// By a unit of the parameter.
+    /// By a unit of the number.
     by: JointDeviation,
 }
 
-fn shares<'a>(identified: &'a IdentifiedModel, convention: &JointConvention) -> Vec<Share<'a>> {
-    let specs = identified.model.stack.specs();
-    let rows = identified.parameters.0.iter().filter_map(|row| {
-        let entry = DeviationEntry::of(&row.effect, &row.place)?;
-        let unit = Unit::parse(&row.unit).unwrap_or(Unit::One);
-        Some(Share {
-            position: specs.iter().position(|spec| spec.name == row.name),
-            status: &row.status,
-            value: unit.to_si(row.value),
-            sigma: row.sigma.map(|sigma| unit.to_si(sigma)),
-            by: JointDeviation::unit(entry, convention.zero().len()).counted(convention),
-        })
-    });
-    rows.collect()
+/// What the list is solved for.
+struct ControllerList<'a> {
+    identified: &'a IdentifiedModel,
+    /// Joints' numbers in the robot file's counting.
+    entries: Vec<DeviationEntry>,
+    wanted: WantedPoints,
+    /// The entries, then three coordinates of each target.
+    solved: EnteredNumbers,
+    /// Entering nothing, and with the list, where the base is fitted anew.
+    anew: Option<[PointError; 2]>,
 }
 
-/// The numbers that the model has parameters for; as a controller counts, one may be of several parameters.
-fn lines(identified: &IdentifiedModel) -> Vec<String> {
-    let robot = &identified.model.robot;
-    let convention = identified
-        .convention
-        .clone()
-        .unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
-    let shares = shares(identified, &convention);
-    let line = |entry: DeviationEntry| {
-        let known = shares.iter().filter(|share| share.by.holds(entry));
-        let at_joint: Vec<(&Share, f64)> = known.map(|share| (share, share.by.at(entry))).collect();
-        if at_joint.is_empty() {
-            return None;
+impl<'a> ControllerList<'a> {
+    fn of(export: &'a Export) -> Self {
+        let (identified, data) = (&export.identified, &export.data);
+        let robot = &identified.model.robot;
+        let wanted = WantedPoints::of(&identified.model, data);
+        let rows = identified.parameters.0.iter();
+        let entries: Vec<DeviationEntry> = rows
+            .filter_map(|row| DeviationEntry::of(&row.effect, &row.place))
+            .collect();
+        let targets = robot.setup().targets.len().max(1);
+        let joints = robot.joints();
+        let predicted = |values: &[f64]| -> Vec<Vector3<f64>> {
+            let (numbers, tools) = values.split_at(entries.len());
+            let mut deviation = JointDeviation::none(joints);
+            for (entry, value) in entries.iter().zip(numbers) {
+                deviation.add(*entry, *value);
+            }
+            let point = |row: &usize| {
+                let target = robot.setup().target(data.target(*row)).unwrap_or(0);
+                let tool = Vector3::from_column_slice(&tools[3 * target..3 * target + 3]);
+                let mounting = robot.mounting_at(data, *row).translation;
+                let q = deviation.applied(data.q(*row));
+                robot.last_body(&q).point(&(mounting + tool))
+            };
+            wanted.rows.iter().map(point).collect()
+        };
+        let mut tolerances: Vec<f64> = entries.iter().map(|entry| entry.tolerance()).collect();
+        tolerances.extend(vec![tolerance::TOOL; 3 * targets]);
+        let solved = entered::solve(&tolerances, &wanted, predicted);
+        let anew = |values: &[f64]| {
+            let points = predicted(values);
+            let base = placed(&points, &wanted.points).ok()?;
+            let moved: Vec<Vector3<f64>> = points.iter().map(|point| base.point(point)).collect();
+            Some(wanted.error(&moved))
+        };
+        let nothing = anew(&vec![0.0; tolerances.len()]);
+        let anew = nothing
+            .zip(anew(&solved.values))
+            .map(|(nothing, left)| [nothing, left]);
+        Self {
+            identified,
+            entries,
+            wanted,
+            solved,
+            anew,
         }
-        let (quantity, scale, unit, decimals) = shown(entry, robot);
-        let values = at_joint.iter().map(|(share, by)| share.value * by);
-        let value = values.sum::<f64>() * scale;
-        let sigma = sigma(&at_joint, identified.covariance.as_ref());
-        let sigma = sigma.map(|sigma| format!("{:.3e}", sigma * scale));
-        let sigma = sigma.unwrap_or_default();
-        let statuses: BTreeSet<&str> = at_joint.iter().map(|(share, _)| share.status).collect();
-        let status = statuses.into_iter().collect::<Vec<_>>().join(" and ");
-        Some(format!(
-            "{quantity},{},{value:.decimals$},{unit},{sigma},{status}\n",
-            entry.place()
-        ))
-    };
-    DeviationEntry::all(robot.joints())
-        .filter_map(line)
-        .collect()
+    }
+
+    /// The numbers of the joints; as a controller counts, one may be of several.
+    fn lines(&self) -> Vec<String> {
+        let robot = &self.identified.model.robot;
+        let convention = self.identified.convention.clone();
+        let convention =
+            convention.unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
+        let share = |(position, entry): (usize, &DeviationEntry)| Share {
+            position,
+            status: self.status(position, entry.tolerance()),
+            value: self.solved.values[position],
+            by: JointDeviation::unit(*entry, robot.joints()).counted(&convention),
+        };
+        let shares: Vec<Share> = self.entries.iter().enumerate().map(share).collect();
+        let line = |entry: DeviationEntry| {
+            let known = shares.iter().filter(|share| share.by.holds(entry));
+            let at_joint: Vec<(&Share, f64)> =
+                known.map(|share| (share, share.by.at(entry))).collect();
+            if at_joint.is_empty() {
+                return None;
+            }
+            let (quantity, scale, unit, decimals) = shown(entry, robot);
+            let values = at_joint.iter().map(|(share, by)| share.value * by);
+            let value = values.sum::<f64>() * scale;
+            let sigma = self.sigma(&at_joint) * scale;
+            let statuses: BTreeSet<&str> = at_joint.iter().map(|(share, _)| share.status).collect();
+            let status = statuses.into_iter().collect::<Vec<_>>().join(" and ");
+            Some(format!(
+                "{quantity},{},{value:.decimals$},{unit},{sigma:.3e},{status}\n",
+                entry.place()
+            ))
+        };
+        DeviationEntry::all(robot.joints())
+            .filter_map(line)
+            .collect()
+    }
+
+    /// Whether the poses say what a number is, or its tolerance does.
+    fn status(&self, position: usize, tolerance: f64) -> &'static str {
+        let sigma = self.solved.covariance[(position, position)].max(0.0).sqrt();
+        match sigma / tolerance {
+            share if share < DETERMINED => "determined",
+            share if share < BY_TOLERANCE => "partly",
+            _ => "by tolerance",
+        }
+    }
+
+    /// Standard deviation of a sum of numbers, each times a factor.
+    fn sigma(&self, shares: &[(&Share, f64)]) -> f64 {
+        let pairs = shares
+            .iter()
+            .flat_map(|a| shares.iter().map(move |b| (a, b)));
+        let part = |((a, by), (b, other)): (&(&Share, f64), &(&Share, f64))| {
+            by * other * self.solved.covariance[(a.position, b.position)]
+        };
+        pairs
+            .map(|(a, b)| part((a, b)))
+            .sum::<f64>()
+            .max(0.0)
+            .sqrt()
+    }
+
+    /// The tool in the flange's frame, where the robot file or the library of arms knows that.
+    fn tool_lines(&self, export: &Export) -> String {
+        let robot = &self.identified.model.robot;
+        let targets = &robot.setup().targets;
+        let (place, nominal) = (
+            &self.identified.robot,
+            Vector3::from(self.identified.robot.tool),
+        );
+        let flange = export.flange();
+        let (frame, said) = match &flange {
+            Some((frame, said)) => (*frame, format!("frame of the flange, {said}")),
+            None => (
+                Pose::identity(),
+                "base frame at the zero pose: the robot file knows no flange".into(),
+            ),
+        };
+        let number = match targets.is_empty() {
+            true => Some(0),
+            false => robot.setup().target(""),
+        };
+        let Some(number) = number else {
+            return format!(
+                "# not carried: where targets sit; the tool of {} stays as it is\n",
+                one_line(&place.name)
+            );
+        };
+        let at = self.entries.len() + 3 * number;
+        let off = Vector3::from_column_slice(&self.solved.values[at..at + 3]);
+        let turn = frame.rotation.transpose();
+        let covariance = self.solved.covariance.fixed_view::<3, 3>(at, at);
+        let covariance = turn * covariance * frame.rotation;
+        let inverse = frame.inverse();
+        let [now, was] = [nominal + off, nominal].map(|point| inverse.point(&point) * 1e3);
+        let mut out = format!("# tool: {said}; its turn (A, B, C) stays as it is\n");
+        for (k, axis) in ["x", "y", "z"].iter().enumerate() {
+            out.push_str(&format!(
+                "tool {axis},tool,{:.6},mm,{:.3e},was {:.6}\n",
+                now[k],
+                covariance[(k, k)].max(0.0).sqrt() * 1e3,
+                was[k]
+            ));
+        }
+        out
+    }
 }
 
 /// What a number is called, what it is multiplied with from SI, its unit, and the decimals that keep a joint within 1e-9 rad.
@@ -119,30 +264,10 @@ fn shown(entry: DeviationEntry, robot: &RobotModel) -> (&'static str, f64, Strin
     }
 }
 
-/// Standard deviation of a sum of parameters, each times a factor: of those that were estimated. None where none was, and of several
-/// where their covariance is not known.
-fn sigma(shares: &[(&Share, f64)], covariance: Option<&Covariance>) -> Option<f64> {
-    let with_sigma = |(share, by): &(&Share, f64)| Some((share.position, *by, share.sigma?));
-    let estimated: Vec<(Option<usize>, f64, f64)> = shares.iter().filter_map(with_sigma).collect();
-    if let [(_, by, sigma)] = estimated[..] {
-        return Some(sigma * by.abs());
-    }
-    let covariance = covariance?;
-    let known = |(position, ..): &(Option<usize>, f64, f64)| {
-        position.is_some_and(|position| covariance.parameters().contains(&position))
-    };
-    if estimated.is_empty() || !estimated.iter().all(known) {
-        return None;
-    }
-    let by = |position: usize| -> f64 {
-        let same = estimated.iter().filter(|one| one.0 == Some(position));
-        same.map(|(_, by, _)| by).sum()
-    };
-    let part = |(a, b, value, _): (usize, usize, f64, f64)| {
-        by(a) * by(b) * value * if a == b { 1.0 } else { 2.0 }
-    };
-    Some(covariance.pairs().map(part).sum::<f64>().sqrt())
-}
+/// Of its tolerance: below it a number is determined by the poses.
+const DETERMINED: f64 = 0.5;
+/// From here on it stands by its tolerance alone.
+const BY_TOLERANCE: f64 = 0.95;
 
 /// A share below this one of the largest is rounding.
 const ROUNDING: f64 = 1e-12;
@@ -179,6 +304,14 @@ impl DeviationEntry {
         }
     }
 
+    /// One standard deviation before anything is measured, SI.
+    fn tolerance(self) -> f64 {
+        match self {
+            Self::Zero(_) => tolerance::ZERO,
+            Self::Factor(_) | Self::Coupling { .. } => tolerance::RATIO,
+        }
+    }
+
     pub(crate) fn place(self) -> Place {
         match self {
             Self::Zero(joint) | Self::Factor(joint) => Place::Joint(joint),
@@ -192,12 +325,30 @@ impl DeviationEntry {
 pub(super) struct JointDeviation(DMatrix<f64>);
 
 impl JointDeviation {
+    fn none(joints: usize) -> Self {
+        Self(DMatrix::zeros(joints, joints + 1))
+    }
+
     /// One number of 1, all others 0, in the robot file's counting.
-    pub(crate) fn unit(entry: DeviationEntry, joints: usize) -> Self {
-        let mut out = Self(DMatrix::zeros(joints, joints + 1));
-        let place = out.place(entry);
-        out.0[place] = 1.0;
+    fn unit(entry: DeviationEntry, joints: usize) -> Self {
+        let mut out = Self::none(joints);
+        out.add(entry, 1.0);
         out
+    }
+
+    fn add(&mut self, entry: DeviationEntry, value: f64) {
+        let place = self.place(entry);
+        self.0[place] += value;
+    }
+
+    /// Where joints that were commanded to `q` stand.
+    fn applied(&self, q: &[f64]) -> Vec<f64> {
+        let one = |(joint, at): (usize, &f64)| {
+            let row = self.0.row(joint);
+            let slope: f64 = q.iter().zip(row.iter()).map(|(q, by)| q * by).sum();
+            at + slope + row[q.len()]
+        };
+        q.iter().enumerate().map(one).collect()
     }
 
     fn place(&self, entry: DeviationEntry) -> (usize, usize) {

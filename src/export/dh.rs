@@ -1,6 +1,6 @@
 //! DH and modified DH tables as calib's own robot file, so that calib reads back what it wrote.
 
-use super::{CarriedTorques, Export, Format};
+use super::{CarriedGeometry, CarriedTorques, Export, Format};
 use crate::description::JointKind;
 use crate::error::{Error, Result, one_line};
 use crate::estimate::choose::spread;
@@ -22,6 +22,7 @@ pub(super) const DH: Format = Format {
     name: "dh",
     help: "calib's robot file with a Denavit-Hartenberg table",
     comment: "#",
+    geometry: CarriedGeometry::Rigid,
     carries: CarriedTorques::Nothing,
     text: |export| text(export, false),
 };
@@ -36,6 +37,7 @@ pub(super) const MDH: Format = Format {
 /// The table with what its reader must know, and how well it stands for the corrected geometry when read back.
 fn text(export: &Export, modified: bool) -> Result<String> {
     let format = if modified { &MDH } else { &DH };
+    export.refuse_worse()?;
     let then = RobotModel::new(export.corrected.clone());
     let table = DhTable::of(&then);
     if !export.insisted {

@@ -113,7 +113,7 @@ impl Export {
     /// What the reader of a format must know, a sentence a line: of torques, each cause that it leaves out, with its size.
     pub(crate) fn remarks_in(&self, format: &Format) -> Vec<String> {
         let mut lines = vec![self.mark(format.name).to_string()];
-        lines.extend(self.remarks());
+        lines.extend(self.remarks(format.geometry));
         let Some(torques) = &self.identified.torques else {
             return lines;
         };

@@ -3,7 +3,7 @@
 //! Friction, inertials and all other causes of the torques as one plain JSON document, with sigma.
 
 use super::friction::{ARMATURE, DAMPING, FRICTION, of_line, stands_alone};
-use super::{CarriedTorques, Export, Format};
+use super::{CarriedGeometry, CarriedTorques, Export, Format};
 use crate::description::JointKind;
 use crate::dynamics::{FittedNumber, INERTIAL_NAMES, INERTIAL_NUMBERS, TorqueTerm};
 use crate::effect::Place;
@@ -16,6 +16,7 @@ pub(super) const JSON: Format = Format {
     name: "json",
     help: "Everything: description, parameters with sigma, remarks",
     comment: "\"origin\"",
+    geometry: CarriedGeometry::Rigid,
     carries: CarriedTorques::All,
     text,
 };
@@ -72,6 +73,7 @@ pub(super) const DYNAMICS: Format = Format {
     name: "dynamics",
     help: "Friction, inertials and all other causes of the torques with sigma, as plain JSON",
     comment: "\"origin\"",
+    geometry: CarriedGeometry::Rigid,
     carries: CarriedTorques::All,
     text: torques,
 };

@@ -3,20 +3,25 @@
 mod body;
 mod controller;
 mod dh;
+mod entered;
+mod flange;
 mod friction;
 mod json;
 mod mark;
+mod own_urdf;
 mod rigid;
 mod ur_kinematics;
 mod xacro;
 
 pub use mark::Belonging;
 
-use crate::compensate::{LeftOut, distance, left_out, rigid};
+use crate::compensate::{LeftOut, RIGID, distance, left_out, rigid};
 use crate::description::RobotDescription;
-use crate::error::{Result, one_line};
+use crate::error::{Error, Result, one_line};
 use crate::estimate::choose::spread;
 use crate::identified::IdentifiedModel;
+use crate::robot::Measurements;
+use crate::spatial::Pose;
 
 /// A way to write the model down.
 pub(crate) struct Format {
@@ -26,10 +31,21 @@ pub(crate) struct Format {
     pub(crate) help: &'static str,
     /// How lines begin that say whence it is, and may differ between exports of one model: comments, where it has some.
     pub(crate) comment: &'static str,
+    /// What it holds of identified geometry.
+    pub(crate) geometry: CarriedGeometry,
     /// What it holds of identified torques.
     pub(crate) carries: CarriedTorques,
     /// The whole file, which begins with `Export::head` or has its mark elsewhere. Fails where the format cannot hold this arm at all.
     pub(crate) text: fn(&Export) -> Result<String>,
+}
+
+/// What a format holds of identified geometry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum CarriedGeometry {
+    /// All that is rigid.
+    Rigid,
+    /// Numbers of these effects, solved anew with all else nominal.
+    Numbers(&'static [&'static str]),
 }
 
 /// What a format holds of identified torques.
@@ -63,10 +79,14 @@ const POSES: usize = 500;
 /// The model that is exported.
 pub struct Export {
     identified: IdentifiedModel,
+    /// The recording, or poses spread over the joint limits.
+    data: Measurements,
     corrected: RobotDescription,
     left_out: Vec<LeftOut>,
     /// Rms and maximum distance of the corrected description from the model, m, and over how many poses.
     residual: (f64, f64),
+    /// The same of the nominal description.
+    nothing: (f64, f64),
     poses: usize,
     /// Whether someone insists on what is refused.
     insisted: bool,
@@ -85,22 +105,28 @@ impl Export {
             .unwrap_or_else(|| spread(&identified.model.robot, POSES));
         let corrected = rigid(&identified.model);
         Self {
-            left_out: left_out(&identified.model, &data),
+            left_out: left_out(&identified.model, &data, &RIGID),
+            nothing: distance(&identified.model, &identified.robot, &data),
             residual: distance(&identified.model, &corrected, &data),
             corrected,
             poses: data.rows(),
             recorded,
             insisted,
+            data,
             identified,
         }
     }
 
-    /// What the reader of an export must know, a sentence a line.
-    pub(crate) fn remarks(&self) -> Vec<String> {
-        let which = match self.recorded {
+    fn poses_said(&self) -> &'static str {
+        match self.recorded {
             true => "recorded poses",
             false => "poses spread over the joint limits",
-        };
+        }
+    }
+
+    /// What the reader of an export must know, a sentence a line.
+    pub(crate) fn remarks(&self, geometry: CarriedGeometry) -> Vec<String> {
+        let which = self.poses_said();
         if self.identified.is_of_torques_alone() {
             let name = one_line(&self.corrected.name);
             let mut lines = vec![format!(
@@ -113,20 +139,28 @@ impl Export {
             lines.extend(self.insisted());
             return lines;
         }
-        let mut lines = vec![
-            format!(
-                "corrected geometry of {}, {}",
-                one_line(&self.corrected.name),
-                self.identified.origin
-            ),
-            format!(
-                "rigid geometry alone stands {:.4} mm rms, {:.4} mm at most from the identified model over {} {which}",
-                self.residual.0 * 1e3,
-                self.residual.1 * 1e3,
-                self.poses
-            ),
-        ];
-        lines.extend(self.measured_apart());
+        let mut lines = vec![format!(
+            "corrected geometry of {}, {}",
+            one_line(&self.corrected.name),
+            self.identified.origin
+        )];
+        let left_out = match geometry {
+            CarriedGeometry::Rigid => {
+                let [residual, nothing] = [self.residual, self.nothing].map(|(rms, most)| {
+                    format!("{:.4} mm rms, {:.4} mm at most", rms * 1e3, most * 1e3)
+                });
+                lines.push(format!(
+                    "rigid geometry alone stands {residual} from the identified model over {} {which}; the nominal geometry {nothing}",
+                    self.poses
+                ));
+                lines.extend(self.measured_apart());
+                lines.push(self.base_said());
+                self.left_out.clone()
+            }
+            CarriedGeometry::Numbers(carried) => {
+                left_out(&self.identified.model, &self.data, carried)
+            }
+        };
         if self.identified.convention.is_none() {
             lines.extend(self.identified.counting());
         }
@@ -139,7 +173,7 @@ impl Export {
                  robot file, the list of numbers for the controller in the controller's"
             )
         }));
-        lines.extend(self.left_out.iter().map(|out| {
+        lines.extend(left_out.iter().map(|out| {
             let (effect, place) = (&out.effect, &out.place);
             let [rms, most] = [out.rms * 1e3, out.most * 1e3];
             format!("not carried: {effect} at {place}, {rms:.4} mm rms, {most:.4} mm at most")
@@ -149,6 +183,32 @@ impl Export {
             lines.push("not carried: the learned correction".into());
         }
         lines
+    }
+
+    /// Where the robot's base stands in the measured frame: files of the arm begin at its base.
+    fn base_said(&self) -> String {
+        let base = self.identified.model.base();
+        let (place, turn) = body::origin(&Pose::identity(), &base);
+        format!(
+            "not carried: where the base stands in the measured frame: at {} m, turned by roll, pitch, yaw {} rad",
+            body::numbers(place),
+            body::numbers(turn)
+        )
+    }
+
+    /// Fails where these numbers are worse than nominal ones and nobody insists.
+    fn refuse_worse(&self) -> Result<()> {
+        let ((left, _), (nothing, _)) = (self.residual, self.nothing);
+        if self.insisted || left <= nothing {
+            return Ok(());
+        }
+        let message = format!(
+            "entering this geometry leaves {:.4} mm rms, entering nothing {:.4} mm: what it does not carry outweighs it; allowed: calib compensate, \
+             which uses the whole model, or --force",
+            left * 1e3,
+            nothing * 1e3
+        );
+        Err(Error::data(&self.identified.origin, message))
     }
 
     /// What the tool has of the targets that were measured, where they are not its point alone.

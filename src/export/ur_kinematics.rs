@@ -2,7 +2,7 @@
 //! before, whose z is the joint's axis. Frames stay as near as axes allow to those of the model's meshes.
 
 use super::body::{moved, origin, tool};
-use super::{CarriedTorques, Export, Format};
+use super::{CarriedGeometry, CarriedTorques, Export, Format};
 use crate::description::RobotDescription;
 use crate::error::{Error, Result};
 use crate::robot::LIBRARY;
@@ -13,6 +13,7 @@ pub(super) const UR_KINEMATICS: Format = Format {
     name: "ur_kinematics",
     help: "Universal Robots' kinematics_params_file, for their ROS drivers and ur_description",
     comment: "#",
+    geometry: CarriedGeometry::Rigid,
     carries: CarriedTorques::Nothing,
     text,
 };
@@ -71,6 +72,7 @@ fn text(export: &Export) -> Result<String> {
                        base_link); allowed for other arms: --format urdf, xacro";
         Error::data(&robot.name, message)
     })?;
+    export.refuse_worse()?;
     let mut out: String = export.head(&UR_KINEMATICS);
     let (mut before, mut links) = (base, String::new());
     for (index, (link, frame)) in LINKS.iter().zip(&nominal).enumerate() {

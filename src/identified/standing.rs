@@ -286,7 +286,7 @@ fn repeated_pose(off: &[Vector3<f64>]) -> RepeatedPose {
 }
 
 /// The rigid motion that brings points of the base onto measured ones, least squares (Kabsch).
-fn placed(base: &[Vector3<f64>], measured: &[Vector3<f64>]) -> Result<Pose> {
+pub(crate) fn placed(base: &[Vector3<f64>], measured: &[Vector3<f64>]) -> Result<Pose> {
     if base.len() < FEWEST {
         let message = format!("needs {FEWEST} points or more, found {}", base.len());
         return Err(Error::spec("--new-base", message));

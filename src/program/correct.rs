@@ -73,6 +73,8 @@ pub struct ProgramRules {
     pub load: ProgramLoad,
     /// Which tool of the program is the robot file's, where a person says.
     pub tool: Option<RobotTool>,
+    /// Why the base in which the controller counts poses is not the robot file's, where that is known.
+    pub base: Option<String>,
 }
 
 /// The program with its targets corrected; fails with every fault of it.
@@ -87,6 +89,7 @@ pub fn corrected(
         frames,
         load,
         tool,
+        base,
     } = rules;
     let robot = RobotModel::new(robot.clone());
     if robot.joints() != JOINTS {
@@ -102,16 +105,25 @@ pub fn corrected(
     program
         .relate_tools(&robot, tool.as_ref())
         .map_err(|message| Error::spec(source.place, message))?;
+    if let Some(why) = &base {
+        program.base_differs(why);
+    }
+    let refused = |notes: &[Note]| {
+        let accepted = |note: &Note| Note {
+            message: format!("{}; --assume-frames accepts it", note.message),
+            ..note.clone()
+        };
+        let faults = notes.iter().map(accepted).collect();
+        source.refused(ProgramRefusal { faults, partial: 0 })
+    };
+    if frames == Frames::Refused && !program.moving().is_empty() {
+        return Err(refused(program.moving()));
+    }
     // Joint targets are the same in every frame.
     let mut literals = program.literals().iter();
     let cartesian = literals.any(|literal| !literal.kind.is_of_joints());
     if frames == Frames::Refused && cartesian && !program.frames().is_empty() {
-        let refused = |note: &Note| Note {
-            message: format!("{}; --assume-frames accepts it", note.message),
-            ..note.clone()
-        };
-        let faults = program.frames().iter().map(refused).collect();
-        return Err(source.refused(ProgramRefusal { faults, partial: 0 }));
+        return Err(refused(program.frames()));
     }
     let mut literals = program.literals().iter();
     match load {

@@ -207,6 +207,11 @@ impl<'p> Reader<'_, 'p> {
                     "group {group} stays as it is: calib assumed that it does not move the robot"
                 );
                 self.found.warn(place, message);
+                let numbers = stated.numbers.iter();
+                let axes = numbers.map(|(name, ((value, span), _))| {
+                    (format!("{name} of group {group}"), span.start, *value)
+                });
+                self.found.externals.extend(axes);
             }
         }
         if groups == 0 {

@@ -154,6 +154,8 @@ pub struct Program<'p> {
     frames: Vec<Note>,
     /// Tools that its files declare.
     tools: Vec<ToolInForce>,
+    /// Where each external axis first stands elsewhere than before.
+    moving: Vec<Note>,
 }
 
 /// The answer to one literal.
@@ -193,6 +195,8 @@ struct Gathered {
     frames: Messages,
     /// Tools that its files declare.
     tools: Vec<ToolInForce>,
+    /// External axes that no literal holds: their names, bytes and positions.
+    externals: Vec<(String, usize, f64)>,
     /// Positions that are poses, where joints are listed.
     poses: usize,
 }
@@ -305,7 +309,9 @@ impl<'p> Program<'p> {
             warnings: Vec::new(),
             frames: Vec::new(),
             tools: found.tools,
+            moving: Vec::new(),
         };
+        program.moving = placed(bytes, moving(&program.literals, found.externals));
         program.note(found.warnings, found.frames);
         Ok(program)
     }
@@ -362,6 +368,19 @@ impl<'p> Program<'p> {
         &self.frames
     }
 
+    /// Where external axes move: the first place at which each stands elsewhere than before.
+    pub fn moving(&self) -> &[Note] {
+        &self.moving
+    }
+
+    /// A frame that is not applied at the first Cartesian target, if there is one.
+    fn base_differs(&mut self, why: &str) {
+        let mut literals = self.literals.iter();
+        if let Some(first) = literals.find(|literal| !literal.kind.is_of_joints()) {
+            self.note(Vec::new(), vec![(first.at(), why.into())]);
+        }
+    }
+
     /// What was assumed, or left as it is.
     pub fn warnings(&self) -> &[Note] {
         &self.warnings
@@ -409,6 +428,31 @@ impl<'p> Program<'p> {
         warnings.sort_by_key(|note| (note.line, note.column));
         Ok(Rewritten { bytes, warnings })
     }
+}
+
+/// Positions that differ by less are the same, deg or mm.
+const STILL: f64 = 1e-6;
+
+/// External axes that stand at two positions or more in a program.
+fn moving(literals: &[Literal], others: Vec<(String, usize, f64)>) -> Messages {
+    let of_literal = |literal: &Literal| -> Vec<(String, usize, f64)> {
+        let axes = (1..).zip(&literal.external);
+        let stated = axes.filter_map(|(axis, at)| Some((format!("E{axis}"), literal.at(), (*at)?)));
+        stated.collect()
+    };
+    let mut first: BTreeMap<String, f64> = BTreeMap::new();
+    let mut out: BTreeMap<String, (usize, String)> = BTreeMap::new();
+    for (axis, at, value) in literals.iter().flat_map(of_literal).chain(others) {
+        let before = *first.entry(axis.clone()).or_insert(value);
+        if (value - before).abs() > STILL {
+            let message = format!(
+                "the external axis {axis} moves ({before} to {value}): how the robot's base moves with it is not stated, and targets stand in a base \
+                 that stands still"
+            );
+            out.entry(axis).or_insert((at, message));
+        }
+    }
+    out.into_values().collect()
 }
 
 /// Bytes as lines and columns, in order.

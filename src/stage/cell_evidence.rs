@@ -42,7 +42,7 @@ pub struct Given {
 }
 
 crate::stage::stage! {
-    CellEvidence, "cell_evidence", 7, "says what every possible cause explains of one robot, for the sum over a fleet",
+    CellEvidence, "cell_evidence", 8, "says what every possible cause explains of one robot, for the sum over a fleet",
         DiagnoseReads -> CellEvidenceWrites {
             cell_evidence: CellEvidenceTable,
         }

@@ -25,7 +25,7 @@ pub struct Compare {
 }
 
 crate::stage::stage! {
-    Compare, "compare", 5, "tests which parameters changed since an earlier recording of the same robot",
+    Compare, "compare", 6, "tests which parameters changed since an earlier recording of the same robot",
         CompareReads {
             robot: Robot,
             recording: Recording,

@@ -92,7 +92,7 @@ fn half() -> f64 {
 }
 
 crate::stage::stage! {
-    Ingest, "ingest", 8, "reads raw files into a recording, and lists every rejected row with its reason",
+    Ingest, "ingest", 9, "reads raw files into a recording, and lists every rejected row with its reason",
         IngestReads {
             robot: Robot,
         } -> IngestWrites {

@@ -37,7 +37,7 @@ pub struct ReadRobot {
 }
 
 crate::stage::stage! {
-    ReadRobot, "robot", 2, "reads a robot file (screws, DH, modified DH, URDF, or a practice robot.json)",
+    ReadRobot, "robot", 3, "reads a robot file (screws, DH, modified DH, URDF, or a practice robot.json)",
         RobotReads {} -> RobotWrites {
             robot: Robot,
         }

@@ -20,7 +20,7 @@ begun=$(date +%s)
 echo "wheel: $(du -h "$work"/wheel/*.whl | cut -f1) after $(($(date +%s) - begun)) s"
 
 "$python" -m venv "$work/fresh"
-"$work/fresh/bin/pip" install --quiet --disable-pip-version-check "$work"/wheel/*.whl pytest pandas polars pyarrow matplotlib
+"$work/fresh/bin/pip" install --quiet --disable-pip-version-check "$work"/wheel/*.whl pytest pandas polars pyarrow matplotlib mujoco pin
 # Where no Rust is, and not among the sources.
 tests=$(pwd)/tests/python
 cd "$work"

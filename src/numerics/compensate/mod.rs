@@ -21,7 +21,7 @@ pub use gate::{Gate, GateLimits};
 pub use posture::StatedPosture;
 use remark::beyond_limits;
 pub use remark::{CorrectedCommand, Remark, doubts};
-pub use rigid::{LeftOut, distance, left_out, rigid};
+pub use rigid::{LeftOut, RIGID, distance, left_out, rigid};
 pub use sides::{ArmSides, SideShares, StatedSides};
 pub use solve::{
     Chain, CommandSolution, Nominal, SETTLED, ToolGoal, inverse, least_change, one_step,

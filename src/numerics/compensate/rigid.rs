@@ -11,7 +11,7 @@ use crate::robot::{Measurements, RobotModel};
 use nalgebra::{Matrix3, Vector3};
 
 /// Effects that a description holds.
-const RIGID: [&str; 4] = [
+pub const RIGID: [&str; 4] = [
     names::BASE_FRAME,
     names::TOOL_OFFSET,
     names::LINK_GEOMETRY,
@@ -68,16 +68,15 @@ fn only(model: &Model, keep: impl Fn(&str, Place) -> bool) -> Model {
     out
 }
 
-/// Every effect at every place that [`rigid`] leaves out, with what it does to the point over the rows of `data`; the largest first.
-pub fn left_out(model: &Model, data: &Measurements) -> Vec<LeftOut> {
+/// Every effect but those `carried` and where the base stands, at every place, with what it does to the point over the rows of `data`; the
+/// largest first.
+pub fn left_out(model: &Model, data: &Measurements, carried: &[&str]) -> Vec<LeftOut> {
     let whole = model.predict(data);
     let specs = model.stack.specs();
     let mut places: Vec<(String, Place)> = Vec::new();
-    for (effect, range) in model
-        .stack
-        .effects()
-        .filter(|(effect, _)| !RIGID.contains(&effect.name()))
-    {
+    for (effect, range) in model.stack.effects().filter(|(effect, _)| {
+        effect.name() != names::BASE_FRAME && !carried.contains(&effect.name())
+    }) {
         for k in range.filter(|k| model.x[*k] != 0.0) {
             let key = (effect.name().to_string(), specs[k].place);
             if !places.contains(&key) {

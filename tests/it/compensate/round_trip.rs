@@ -85,6 +85,7 @@ impl Trip {
             frames,
             load: ProgramLoad::Optional,
             tool,
+            base: None,
         };
         let source = ProgramFile {
             place: "program",

@@ -9,6 +9,7 @@ use crate::description::{
 };
 use crate::error::Result;
 use crate::robot::Bound;
+use crate::spatial::Pose;
 use crate::units::{Quantity, Unit};
 use nalgebra::{
     Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3,
@@ -56,6 +57,7 @@ pub fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<Imported
         .as_ref()
         .map(|chain| chain.notes.clone())
         .unwrap_or_default();
+    let flange = chain.as_ref().and_then(flange);
     let robot = chain.map(|chain| describe(&root, chain, units));
     let about = about(
         root.get("about"),
@@ -69,6 +71,7 @@ pub fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<Imported
             robot,
             notes,
             about,
+            flange,
         }),
         None => Err(crate::error::Error::Bug(
             "a robot file without kinematics had no fault".into(),
@@ -151,6 +154,13 @@ fn chain(
         return Ok(None);
     }
     Ok(Some(chain))
+}
+
+/// Where the last frame of the chain stands, where its format knows frames.
+fn flange(chain: &FrameChain) -> Option<Pose> {
+    let knows = chain.joints.iter().any(|joint| joint.frame.is_some());
+    let turn = chain.tip.rotation.to_rotation_matrix().into_inner();
+    knows.then(|| Pose::new(turn, chain.tip.translation.vector))
 }
 
 fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDescription {

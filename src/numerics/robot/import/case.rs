@@ -119,6 +119,7 @@ pub fn read(file: RobotFileText) -> Result<Imported> {
         .collect();
     notes.extend(faults.finish()?);
     Ok(Imported {
+        flange: None,
         robot,
         notes,
         about: super::About::default(),

@@ -6,10 +6,11 @@
 pub use calib::read as read_calib;
 pub use case::read as read_case;
 pub use inertia::impossible_inertia;
-pub use urdf::{UrdfOutline, outline as urdf_outline};
+pub use urdf::{UrdfOutline, controller_base, outline as urdf_outline};
 
 use crate::description::{InertiaMoments, JointKind, RobotDescription};
 use crate::robot::{Bound, CountedCoupling};
+use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -48,6 +49,8 @@ pub struct Imported {
     pub notes: Vec<String>,
     /// What the file says of itself.
     pub about: About,
+    /// The frame in which its kinematics end, zero pose, base frame, m; none where they know no such frame (screws).
+    pub flange: Option<Pose>,
 }
 
 /// What every kinematic format is converted to: joints and frames at the zero pose in the base frame, SI.

@@ -1,4 +1,4 @@
-//! URDF: the chain from a base link to a tip link, as ROS defines it (<http://wiki.ros.org/urdf/XML>): m and rad, a joint's
+//! URDF: the chain from a base link (on the way to the tip, or fixed to a link that is) to a tip link, as ROS defines it (<http://wiki.ros.org/urdf/XML>): m and rad, a joint's
 //! `origin` from the parent link's frame, its `axis` in its own. What hangs rigidly on a moved link adds to that link's mass;
 //! branches that move by themselves (a gripper) add as they are at their zero. Mimic, floating and planar joints are refused.
 
@@ -7,6 +7,7 @@ use super::{ChainBody, ChainJoint, FrameChain, RobotFileText, inertia};
 use crate::description::JointKind;
 use crate::error::{Error, Fault, Result, did_you_mean};
 use crate::robot::Bound;
+use crate::spatial::Pose;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::{BTreeMap, BTreeSet};
@@ -96,6 +97,45 @@ pub fn outline(file: RobotFileText, tip: &str) -> Result<UrdfOutline> {
     })
 }
 
+/// Where the link `base` stands in the frame of the link `base_link` of a URDF (m), if fixed joints join both: in the one a controller counts
+/// poses, in the other ROS does (REP 199).
+pub fn controller_base(file: RobotFileText, base_link: &str) -> Option<Pose> {
+    let document = parse(file).ok()?;
+    let mut reader = Reader {
+        label: file.label,
+        document: &document,
+        faults: Vec::new(),
+        notes: Vec::new(),
+    };
+    let root = document.root_element();
+    let links = root.children().filter(|node| node.has_tag_name("link"));
+    let links: BTreeMap<&str, Node> = links
+        .filter_map(|node| Some((node.attribute("name")?, node)))
+        .collect();
+    let joints = reader.joints(root, &links)?;
+    let up = |link: &'_ str| {
+        let mut way = vec![(link.to_string(), Isometry3::identity())];
+        while let Some((link, from)) = way.last().cloned()
+            && let Some(joint) = joints.get(link.as_str())
+            && joint.node.attribute("type") == Some("fixed")
+            && way.len() <= joints.len()
+        {
+            way.push((joint.parent.to_string(), joint.origin * from));
+        }
+        way
+    };
+    if !links.contains_key("base") || base_link == "base" {
+        return None;
+    }
+    let (ours, theirs) = (up(base_link), up("base"));
+    let common = ours.iter().find_map(|(link, from)| {
+        let (_, other) = theirs.iter().find(|(one, _)| one == link)?;
+        Some(from.inverse() * other)
+    })?;
+    let turn = common.rotation.to_rotation_matrix().into_inner();
+    Some(Pose::new(turn, common.translation.vector))
+}
+
 /// The first element of that name in another one.
 fn element<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
     node.children().find(|child| child.has_tag_name(name))
@@ -156,8 +196,8 @@ impl<'a> Reader<'a> {
         if !self.faults.is_empty() {
             return None;
         }
-        let path = self.path(root, &joints, base, tip)?;
-        Some(self.walk(&joints, &links, &path))
+        let (start, path) = self.path(root, &joints, base, tip)?;
+        Some(self.walk(&joints, &links, start, &path))
     }
 
     /// Every joint of the file, by the link it moves.
@@ -213,17 +253,32 @@ impl<'a> Reader<'a> {
         Some(joints)
     }
 
-    /// The joints from base to tip.
+    /// The joints from base to tip, and the frame in the base's of the link from which the first of them goes: the base itself, or a link
+    /// below which the base hangs by fixed joints, as `base` beside `base_link`.
     fn path(
         &mut self,
         root: Node,
         joints: &BTreeMap<&'a str, UrdfJoint<'a>>,
         base: &str,
         tip: &str,
-    ) -> Option<Vec<&'a str>> {
+    ) -> Option<(Isometry3<f64>, Vec<&'a str>)> {
+        let (mut above, mut from) = (vec![base], vec![Isometry3::identity()]);
+        let mut moves = None;
+        while let Some(joint) = joints.get(above[above.len() - 1]) {
+            if joint.node.attribute("type") != Some("fixed") {
+                moves = Some(joint);
+                break;
+            }
+            if above.len() > joints.len() {
+                break;
+            }
+            from.push(joint.origin * from[from.len() - 1]);
+            above.push(joint.parent);
+        }
         let mut path = Vec::new();
         let mut link = tip;
-        while link != base {
+        let meets = |link: &str| above.iter().position(|one| *one == link);
+        while meets(link).is_none() {
             match joints.get(link) {
                 Some(joint) if path.len() < joints.len() => {
                     path.push(joint.child);
@@ -237,22 +292,29 @@ impl<'a> Reader<'a> {
                     return None;
                 }
                 None => {
-                    self.fault(root, format!("no chain from `{base}` to `{tip}`: the way up from `{tip}` ends at `{link}`"));
+                    let moves = moves.map_or_else(String::new, |joint| {
+                        format!(
+                            "; up from `{base}` the joint `{}` moves, and a base hangs on the chain by fixed joints alone",
+                            joint.name
+                        )
+                    });
+                    self.fault(root, format!("no chain from `{base}` to `{tip}`: the way up from `{tip}` ends at `{link}`{moves}"));
                     return None;
                 }
             }
         }
         path.reverse();
-        Some(path)
+        Some((from[meets(link)?].inverse(), path))
     }
 
     fn walk(
         &mut self,
         joints: &BTreeMap<&'a str, UrdfJoint<'a>>,
         links: &BTreeMap<&'a str, Node<'a, 'a>>,
+        start: Isometry3<f64>,
         path: &[&'a str],
     ) -> FrameChain {
-        let mut frame = Isometry3::identity();
+        let mut frame = start;
         let mut chain = Vec::new();
         for link in path {
             let joint = &joints[link];
