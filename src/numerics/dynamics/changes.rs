@@ -4,7 +4,7 @@
 use super::arm::DynamicArm;
 use super::carried::{Carried, carried, seen_numbers};
 use super::cause::{
-    COULOMB_FRICTION, CURRENT_OFFSET, InertialChanges, TORQUE_CAUSES, TorqueForm, VISCOUS_FRICTION,
+    COULOMB_FRICTION, CURRENT_OFFSET, InertialChanges, TorqueForm, VISCOUS_FRICTION,
 };
 use super::columns::{TorqueColumn, TorqueColumns};
 use super::model::TorqueModel;

@@ -10,7 +10,7 @@ use crate::arm::{
 };
 use crate::effect::Place;
 use crate::recording::largest;
-use crate::scene::{DynamicScene, GRAVITY};
+use crate::scene::DynamicScene;
 use nalgebra::{Matrix3, Vector3};
 
 /// A number times a factor.
