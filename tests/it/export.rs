@@ -421,14 +421,6 @@ fn a_mujoco_model_is_the_arm_that_was_identified_with_its_limits_and_known_masse
         .collect();
     has(&remarks, "not carried: reduction_ratio at joint 3");
     has(&remarks, "bodies whose mass is not known have 0.001 kg");
-    // MuJoCo's own softness lets light joints creep at a tenth of their dry friction.
-    has(
-        &text,
-        [
-            "solreffriction=\"0.004 1.0\"",
-            "solimpfriction=\"0.9999 0.9999 ",
-        ],
-    );
 }
 
 /// A number of a sentence, behind `before`.
