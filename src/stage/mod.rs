@@ -17,6 +17,7 @@ mod contact;
 mod curves;
 mod declared_effects;
 mod diagnose;
+mod diagnose_drives;
 mod diagnose_torques;
 mod doubtful;
 mod dynamic_arm;
@@ -41,6 +42,7 @@ pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given, TorqueEvidence}
 pub use compare::{Compare, CompareReads};
 use diagnose::AskedRows;
 pub use diagnose::{CellPrior, Diagnose, DiagnoseReads};
+pub use diagnose_drives::{DiagnoseDrives, DiagnoseDrivesReads, DiagnoseDrivesWrites};
 pub use diagnose_torques::{CompareTorques, CompareTorquesReads};
 pub use diagnose_torques::{
     ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut,
@@ -225,7 +227,8 @@ fn on(sets: &[String]) -> Vec<(String, String)> {
 }
 
 /// Stages whose tables are a diagnosis, as `calib diagnose` runs and shows them.
-pub(crate) const DIAGNOSES: [&str; 2] = [Diagnose::NAME, DiagnoseTorques::NAME];
+pub(crate) const DIAGNOSES: [&str; 3] =
+    [Diagnose::NAME, DiagnoseTorques::NAME, DiagnoseDrives::NAME];
 
 /// Every kind of stage, one line each.
 pub const STAGES: &[StageEntry] = &[
@@ -241,6 +244,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<ingest::IngestTorques>(),
     StageEntry::of::<DiagnoseTorques>(),
     StageEntry::of::<TorqueEvidence>(),
+    StageEntry::of::<DiagnoseDrives>(),
     StageEntry::of::<Masses>(),
     StageEntry::of::<CompareTorques>(),
     StageEntry::of::<ReportTorques>(),

@@ -24,7 +24,7 @@ use super::{
 use crate::diagnose::VerdictKind;
 use crate::dynamics::{BodyConsistency, InertialBasis, TorqueChanges, TorqueDiagnosis};
 
-beside_findings! { TorqueDiagnosis => TorqueNumbers of TorqueNumberRow, TorqueRivals of TorqueRivalRow }
+beside_findings! { TorqueDiagnosis => TorqueNumbers::of of TorqueNumberRow, TorqueRivals::of of TorqueRivalRow }
 
 impl TorqueFindings {
     /// A row for each finding.
