@@ -9,9 +9,7 @@ use crate::dynamics::InertialTolerance;
 use crate::engine::Options;
 use crate::error::{Error, Fault, Place, Result, did_you_mean, listed};
 use crate::stage::{Context, RawFile, Stage};
-use crate::table::{
-    DriveVerdict, FindingNumbers, Findings, JointDrives, Rivals, VerdictSentences,
-};
+use crate::table::{DriveVerdict, FindingNumbers, Findings, JointDrives, Rivals, VerdictSentences};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -140,13 +138,23 @@ impl Stage for DiagnoseDrives {
             let message = format!("no cause `{name}`{hint} (causes: {})", listed(&names));
             at.at(format!("without[{k}]")).must(known, message);
         }
-        for (key, column) in [("command", &self.columns.command), ("angle", &self.columns.angle)] {
-            at.at("columns").at(key).must(column.contains("{j}"), "expected a name with `{j}`, which stands for the joint, from 1");
+        for (key, column) in [
+            ("command", &self.columns.command),
+            ("angle", &self.columns.angle),
+        ] {
+            at.at("columns").at(key).must(
+                column.contains("{j}"),
+                "expected a name with `{j}`, which stands for the joint, from 1",
+            );
         }
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
-        let one = [("robot", &self.robot), ("drives", &self.drives), ("recording", &self.recording)];
+        let one = [
+            ("robot", &self.robot),
+            ("drives", &self.drives),
+            ("recording", &self.recording),
+        ];
         let one = one.map(|(name, file)| (name.to_string(), file.clone()));
         let includes = self.includes.iter().enumerate();
         let includes = includes.map(|(k, file)| (format!("includes[{k}]"), file.clone()));
@@ -170,44 +178,87 @@ impl Stage for DiagnoseDrives {
 
 impl DiagnoseDrives {
     fn problem(&self, context: &Context) -> Result<Drives> {
-        let (label, text) = context.text(&self.drives, "a JSON of gains and encoders", MOST_BYTES)?;
+        let (label, text) =
+            context.text(&self.drives, "a JSON of gains and encoders", MOST_BYTES)?;
         let file: DriveFile = serde_json::from_str(&text).map_err(|error| {
             let place = format!("{label}:{}", error.line());
             Error::spec(place, format!("{error}; expected `command_rate_hz`, and `joints` with `joint`, `kp`, `kd`, `encoder_rad` each"))
         })?;
         if !(file.command_rate_hz > 0.0 && file.command_rate_hz.is_finite()) {
-            return Err(Error::spec(format!("{label}: command_rate_hz"), "allowed: above 0"));
+            return Err(Error::spec(
+                format!("{label}: command_rate_hz"),
+                "allowed: above 0",
+            ));
         }
-        let names: Vec<String> = file.joints.iter().map(|joint| joint.joint.clone()).collect();
-        let includes: Result<Vec<(String, String)>> = self.includes.iter().map(|file| context.text(file, "an MJCF", MOST_BYTES)).collect();
+        let names: Vec<String> = file
+            .joints
+            .iter()
+            .map(|joint| joint.joint.clone())
+            .collect();
+        let includes: Result<Vec<(String, String)>> = self
+            .includes
+            .iter()
+            .map(|file| context.text(file, "an MJCF", MOST_BYTES))
+            .collect();
         let includes = includes?;
-        let includes: Vec<MjcfText> = includes.iter().map(|(label, text)| MjcfText { label, text }).collect();
+        let includes: Vec<MjcfText> = includes
+            .iter()
+            .map(|(label, text)| MjcfText { label, text })
+            .collect();
         let (robot, text) = context.text(&self.robot, "an MJCF", MOST_BYTES)?;
-        let arm = mjcf::read(MjcfText { label: &robot, text: &text }, &includes, &names)?;
+        let arm = mjcf::read(
+            MjcfText {
+                label: &robot,
+                text: &text,
+            },
+            &includes,
+            &names,
+        )?;
         arm.notes.iter().for_each(|note| context.note(note));
         let joints = joints(&label, &file, &arm)?;
         let reference: Vec<f64> = arm.joints.iter().map(|joint| joint.reference).collect();
-        let links = arm.arm.links.clone().ok_or_else(|| Error::Bug("an MJCF without links".into()))?;
+        let links = arm
+            .arm
+            .links
+            .clone()
+            .ok_or_else(|| Error::Bug("an MJCF without links".into()))?;
         let physics = Physics {
             joints,
-            bodies: Bodies { links, gravity: arm.arm.gravity },
+            bodies: Bodies {
+                links,
+                gravity: arm.arm.gravity,
+            },
             tool: arm.arm.tool,
             hold: 0.0,
             sag: 0.0,
         };
-        let tolerance = file.inertia_tolerance.as_ref().map_or(arm.arm.tolerance, |stated| InertialTolerance {
-            mass_relative: stated.mass_rel,
-            centre: 1e-3 * stated.com_mm,
-            inertia_relative: stated.inertia_rel,
-        });
+        let tolerance = file
+            .inertia_tolerance
+            .as_ref()
+            .map_or(arm.arm.tolerance, |stated| InertialTolerance {
+                mass_relative: stated.mass_rel,
+                centre: 1e-3 * stated.com_mm,
+                inertia_relative: stated.inertia_rel,
+            });
         let recording = self.recorded(&file, context)?;
-        Ok(Drives::new(Chain::new(&arm.arm, &reference), physics, recording, tolerance))
+        Ok(Drives::new(
+            Chain::new(&arm.arm, &reference),
+            physics,
+            recording,
+            tolerance,
+        ))
     }
 
     fn recorded(&self, file: &DriveFile, context: &Context) -> Result<Recording> {
-        let (label, text) = context.text(&self.recording, "a CSV of commands and angles", MOST_BYTES)?;
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
-        let head = reader.headers().map_err(|error| Error::data(&label, error.to_string()))?.clone();
+        let (label, text) =
+            context.text(&self.recording, "a CSV of commands and angles", MOST_BYTES)?;
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        let head = reader
+            .headers()
+            .map_err(|error| Error::data(&label, error.to_string()))?
+            .clone();
         let find = |name: &str| head.iter().position(|column| column == name);
         let n = file.joints.len();
         let mut faults = Vec::new();
@@ -215,18 +266,31 @@ impl DiagnoseDrives {
             find(&name).unwrap_or_else(|| {
                 let hint = did_you_mean(&name, head.iter());
                 let all: Vec<&str> = head.iter().collect();
-                faults.push(Fault::new(&*label, format!("no column `{name}`{hint} (columns: {}); name others in `columns`", listed(&all))));
+                faults.push(Fault::new(
+                    &*label,
+                    format!(
+                        "no column `{name}`{hint} (columns: {}); name others in `columns`",
+                        listed(&all)
+                    ),
+                ));
                 0
             })
         };
         let of = |name: &str, joint: usize| name.replace("{j}", &(joint + 1).to_string());
         let time = needed(self.columns.time.clone());
-        let commands: Vec<usize> = (0..n).map(|joint| needed(of(&self.columns.command, joint))).collect();
-        let angles: Vec<usize> = (0..n).map(|joint| needed(of(&self.columns.angle, joint))).collect();
+        let commands: Vec<usize> = (0..n)
+            .map(|joint| needed(of(&self.columns.command, joint)))
+            .collect();
+        let angles: Vec<usize> = (0..n)
+            .map(|joint| needed(of(&self.columns.angle, joint)))
+            .collect();
         Error::if_data(faults)?;
         let (more, most) = (of(&self.columns.angle, n), n + 1);
         if find(&more).is_some() {
-            return Err(Error::data(&label, format!("has angles of joint {most} (`{more}`), the drives file names {n} joints")));
+            return Err(Error::data(
+                &label,
+                format!("has angles of joint {most} (`{more}`), the drives file names {n} joints"),
+            ));
         }
         let (trajectory, usage) = (find(&self.columns.trajectory), find(&self.columns.usage));
         let mut recording = Recording {
@@ -250,7 +314,13 @@ impl DiagnoseDrives {
                 let cell = record.get(column).unwrap_or_default();
                 match cell.parse::<f64>() {
                     Ok(value) if value.is_finite() => Ok(value),
-                    _ => Err(Error::data(&place, format!("column `{}` holds `{cell}`; expected a finite number", &head[column]))),
+                    _ => Err(Error::data(
+                        &place,
+                        format!(
+                            "column `{}` holds `{cell}`; expected a finite number",
+                            &head[column]
+                        ),
+                    )),
                 }
             };
             recording.time.push(number(time)?);
@@ -260,18 +330,37 @@ impl DiagnoseDrives {
             for column in &angles {
                 recording.angle.push(by * number(*column)?);
             }
-            let here = (trajectory.map(|column| record[column].to_string()), usage.map(|column| record[column].to_string()));
+            let here = (
+                trajectory.map(|column| record[column].to_string()),
+                usage.map(|column| record[column].to_string()),
+            );
             if last.as_ref() != Some(&here) {
-                let held_out = here.1.as_ref().is_some_and(|usage| !self.on.contains(usage));
-                recording.trajectories.push(Trajectory { rows: row..row, held_out });
+                let held_out = here
+                    .1
+                    .as_ref()
+                    .is_some_and(|usage| !self.on.contains(usage));
+                recording.trajectories.push(Trajectory {
+                    rows: row..row,
+                    held_out,
+                });
                 last = Some(here);
             }
             if let Some(trajectory) = recording.trajectories.last_mut() {
                 trajectory.rows.end = row + 1;
             }
         }
-        if recording.trajectories.iter().all(|trajectory| trajectory.held_out) {
-            return Err(Error::data("with.on", format!("no row of {label} is left to fit; to fit: {}", self.on.join(", "))));
+        if recording
+            .trajectories
+            .iter()
+            .all(|trajectory| trajectory.held_out)
+        {
+            return Err(Error::data(
+                "with.on",
+                format!(
+                    "no row of {label} is left to fit; to fit: {}",
+                    self.on.join(", ")
+                ),
+            ));
         }
         recording.check(&label)?;
         Ok(recording)

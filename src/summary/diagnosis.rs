@@ -15,10 +15,10 @@ use crate::stage::{DeclaredStage, Diagnose, DiagnoseDrives, DiagnoseTorques};
 use crate::store::Store;
 use crate::table::{
     CauseGrid, Cells, ContactRow, Contacts, DriveVerdict, DriveVerdictRow, FindingNumbers,
-    FindingRow, Findings, FormRow, Forms, JointDrives, JointTorqueRow, JointTorques, Rivals, ShareRow, Shares, Suspects, SuspectsRow, Table,
-    TablesByKind, TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict, TorqueVerdictRow,
-    Verdict, VerdictRow, VerdictSentences, VerdictTopic, is_separable_by_poses, of_kind, picked,
-    picked_of,
+    FindingRow, Findings, FormRow, Forms, JointDrives, JointTorqueRow, JointTorques, Rivals,
+    ShareRow, Shares, Suspects, SuspectsRow, Table, TablesByKind, TorqueFindings, TorqueNumbers,
+    TorqueRivals, TorqueVerdict, TorqueVerdictRow, Verdict, VerdictRow, VerdictSentences,
+    VerdictTopic, is_separable_by_poses, of_kind, picked, picked_of,
 };
 use crate::text::filled;
 use crate::units::Unit;
@@ -229,7 +229,11 @@ impl DiagnosisSummary {
             ("after", v.after_rms_rad, v.after_fitted_rms_rad),
         ] {
             let joints = joints.iter().map(|row| {
-                let rms = if when == "before" { row.before_rms_rad } else { row.after_rms_rad };
+                let rms = if when == "before" {
+                    row.before_rms_rad
+                } else {
+                    row.after_rms_rad
+                };
                 json!({ "joint": row.joint, "rms_mrad": mrad(rms) })
             });
             document[when] = json!({

@@ -65,7 +65,11 @@ fn folder() -> Folder {
     let joint = json!({ "joint": "j1", "kp": 20.0, "kd": 0.5, "kd_on": "speed", "torque_limit_nm": 5.0, "encoder_rad": 1e-3, "noise_rad": 1e-4 });
     let rows = (0..200).map(|row| {
         let angle = 0.4 * (0.05 * f64::from(row)).sin();
-        format!("{:.2},1,fit,{angle:.5},{:.5}\n", 0.01 * f64::from(row), 0.9 * angle)
+        format!(
+            "{:.2},1,fit,{angle:.5},{:.5}\n",
+            0.01 * f64::from(row),
+            0.9 * angle
+        )
     });
     Folder {
         robot: robot.into(),
@@ -97,13 +101,22 @@ fn bad_input_of_drives_is_refused_with_its_place_and_what_is_allowed() {
         }
     };
     let mut bare = folder();
-    bare.robot = bare.robot.replace("<inertial pos=\"0.1 0 0\" mass=\"0.5\" diaginertia=\"0.001 0.001 0.001\"/>", "");
+    bare.robot = bare.robot.replace(
+        "<inertial pos=\"0.1 0 0\" mass=\"0.5\" diaginertia=\"0.001 0.001 0.001\"/>",
+        "",
+    );
     says(&bare, &["robot.xml", "body `link` has no <inertial>"]);
     let mut other = folder();
     other.drives["joints"][0]["joint"] = "shoulder".into();
-    says(&other, &["no hinge or slide joint `shoulder`", "joints: j1"]);
+    says(
+        &other,
+        &["no hinge or slide joint `shoulder`", "joints: j1"],
+    );
     let mut looped = folder();
-    looped.robot = looped.robot.replace("</worldbody>", "</worldbody><equality><weld body1=\"link\"/></equality>");
+    looped.robot = looped.robot.replace(
+        "</worldbody>",
+        "</worldbody><equality><weld body1=\"link\"/></equality>",
+    );
     says(&looped, &["<weld> closes a loop"]);
     let mut gainless = folder();
     gainless.drives["joints"][0]["kp"] = Value::Null;
@@ -121,10 +134,13 @@ fn bad_input_of_drives_is_refused_with_its_place_and_what_is_allowed() {
     backwards.recording = backwards.recording.replace("\n0.50,", "\n0.48,");
     says(&backwards, &["row 51", "does not come after"]);
     let mut still = folder();
-    let lines = still.recording.lines().map(|line| match line.rsplit_once(',') {
-        Some((rest, last)) if last != "q1_rad" => format!("{rest},0.1\n"),
-        _ => format!("{line}\n"),
-    });
+    let lines = still
+        .recording
+        .lines()
+        .map(|line| match line.rsplit_once(',') {
+            Some((rest, last)) if last != "q1_rad" => format!("{rest},0.1\n"),
+            _ => format!("{line}\n"),
+        });
     still.recording = lines.collect();
     says(&still, &["joint 1 never moves"]);
 }

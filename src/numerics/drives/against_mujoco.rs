@@ -68,7 +68,12 @@ fn a_roll_out_is_that_of_mujoco_to_a_ten_thousandth_of_the_motion() {
     let (chain, bodies) = parts(&arm);
     let all: Value = serde_json::from_str(include_str!("mujoco/motion.json")).unwrap();
     let flat = |name: &str| -> Vec<f64> {
-        all[name].as_array().unwrap().iter().flat_map(numbers).collect()
+        all[name]
+            .as_array()
+            .unwrap()
+            .iter()
+            .flat_map(numbers)
+            .collect()
     };
     let (command, angle) = (flat("command"), flat("angle"));
     let period = all["period"].as_f64().unwrap();
@@ -135,18 +140,30 @@ fn what_is_not_read_is_refused_by_its_element() {
     let names = ["j1", "j2", "j3", "j4"];
     let muscle = ARM.replace("<general joint=\"j4\"", "<muscle joint=\"j4\"");
     let text = fault(&muscle, &names);
-    assert!(text.contains("<muscle>") && text.contains("allowed: position"), "{text}");
-    let bare = ARM.replace("<inertial pos=\"0.03 0 0.01\" mass=\"0.6\" diaginertia=\"0.003 0.002 0.002\"/>", "");
+    assert!(
+        text.contains("<muscle>") && text.contains("allowed: position"),
+        "{text}"
+    );
+    let bare = ARM.replace(
+        "<inertial pos=\"0.03 0 0.01\" mass=\"0.6\" diaginertia=\"0.003 0.002 0.002\"/>",
+        "",
+    );
     let text = fault(&bare, &names);
     assert!(text.contains("body `three` has no <inertial>"), "{text}");
-    let weld = ARM.replace("<actuator>", "<equality><weld body1=\"four\" body2=\"base\"/></equality><actuator>");
+    let weld = ARM.replace(
+        "<actuator>",
+        "<equality><weld body1=\"four\" body2=\"base\"/></equality><actuator>",
+    );
     let text = fault(&weld, &names);
     assert!(text.contains("closes a loop"), "{text}");
     let text = fault(ARM, &["j1", "j2", "j5"]);
     assert!(text.contains("no hinge or slide joint `j5`"), "{text}");
     let text = fault(ARM, &["j1", "held", "j3"]);
     assert!(text.contains("is not carried by joint `held`"), "{text}");
-    let text = fault(&ARM.replace("<worldbody>", "<include file=\"more.xml\"/><worldbody>"), &names);
+    let text = fault(
+        &ARM.replace("<worldbody>", "<include file=\"more.xml\"/><worldbody>"),
+        &names,
+    );
     assert!(text.contains("more.xml"), "{text}");
 }
 
@@ -154,7 +171,11 @@ fn what_is_not_read_is_refused_by_its_element() {
 fn an_included_file_counts_as_if_it_stood_there() {
     let at = ARM.find("<default>").unwrap();
     let end = ARM.rfind("</default>").unwrap() + "</default>".len();
-    let outer = format!("{}<include file=\"defaults.xml\"/>{}", &ARM[..at], &ARM[end..]);
+    let outer = format!(
+        "{}<include file=\"defaults.xml\"/>{}",
+        &ARM[..at],
+        &ARM[end..]
+    );
     let inner = format!("<mujoco>{}</mujoco>", &ARM[at..end]);
     let names = ["j1", "j2", "j3", "j4"].map(String::from);
     let included = MjcfText {

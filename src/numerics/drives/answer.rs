@@ -98,13 +98,17 @@ const REMAINS: f64 = 1.1;
 pub fn diagnose(problem: &Drives, options: &Options, tell: impl FnMut(String)) -> DriveDiagnosis {
     let answer = calib_engine::diagnose(problem, options, tell);
     let findings = answer.findings.iter();
-    let findings = findings.map(|finding| problem.finding(&answer.after, finding)).collect();
+    let findings = findings
+        .map(|finding| problem.finding(&answer.after, finding))
+        .collect();
     let physics = problem.physics(&answer.after.inertia, &answer.after.set);
     let before = problem.angles(&problem.base, Which::All);
     let after = problem.angles(&physics, Which::All);
     let n = problem.chain.joints();
     let held_out = problem.recording.trajectories.iter().any(|t| t.held_out);
-    let mut joints: Vec<JointError> = (0..n).map(|joint| problem.errors(Some(joint), [&before, &after])).collect();
+    let mut joints: Vec<JointError> = (0..n)
+        .map(|joint| problem.errors(Some(joint), [&before, &after]))
+        .collect();
     let rows = problem.fitted().count();
     let squares = problem.squares(&after);
     for (joint, square) in joints.iter_mut().zip(&squares) {
@@ -131,15 +135,32 @@ impl Drives {
 
     fn errors(&self, joint: Option<usize>, angles: [&Vec<f64>; 2]) -> JointError {
         let n = self.chain.joints();
-        let of = |row: usize| -> Vec<usize> { (0..n).filter(|j| joint.is_none_or(|one| one == *j)).map(|j| row * n + j).collect() };
+        let of = |row: usize| -> Vec<usize> {
+            (0..n)
+                .filter(|j| joint.is_none_or(|one| one == *j))
+                .map(|j| row * n + j)
+                .collect()
+        };
         let rms = |held: bool, angles: &Vec<f64>| {
-            let rows = self.recording.trajectories.iter().filter(|t| t.held_out == held).flat_map(|t| t.rows.clone());
-            let all: Vec<f64> = rows.flat_map(of).map(|at| (self.recording.angle[at] - angles[at]).powi(2)).collect();
+            let rows = self
+                .recording
+                .trajectories
+                .iter()
+                .filter(|t| t.held_out == held)
+                .flat_map(|t| t.rows.clone());
+            let all: Vec<f64> = rows
+                .flat_map(of)
+                .map(|at| (self.recording.angle[at] - angles[at]).powi(2))
+                .collect();
             (all.iter().sum::<f64>() / all.len().max(1) as f64).sqrt()
         };
         let any = self.recording.trajectories.iter().any(|t| t.held_out);
-        let noise = |j: usize| self.recording.noise[j].powi(2) + self.recording.encoder[j].powi(2) / 12.0;
-        let noises: Vec<f64> = (0..n).filter(|j| joint.is_none_or(|one| one == *j)).map(noise).collect();
+        let noise =
+            |j: usize| self.recording.noise[j].powi(2) + self.recording.encoder[j].powi(2) / 12.0;
+        let noises: Vec<f64> = (0..n)
+            .filter(|j| joint.is_none_or(|one| one == *j))
+            .map(noise)
+            .collect();
         JointError {
             noise: (noises.iter().sum::<f64>() / noises.len() as f64).sqrt(),
             fitted: angles.map(|angles| rms(false, angles)),
@@ -152,9 +173,18 @@ impl Drives {
         let one = &finding.accepted;
         let at = fit.set.iter().position(|other| other.cell == one.cell);
         let sigma = at.map_or(&[][..], |at| &fit.sigma[at][..]);
-        let rest: Vec<Accepted<Key>> = fit.set.iter().filter(|other| other.cell != one.cell).cloned().collect();
+        let rest: Vec<Accepted<Key>> = fit
+            .set
+            .iter()
+            .filter(|other| other.cell != one.cell)
+            .cloned()
+            .collect();
         let without = self.angles(&self.physics(&fit.inertia, &rest), Which::Fitted);
-        let rows: Vec<f64> = self.fitted().flat_map(|row| row * self.chain.joints()..(row + 1) * self.chain.joints()).map(|k| (without[k] - fit.angles[k]).powi(2)).collect();
+        let rows: Vec<f64> = self
+            .fitted()
+            .flat_map(|row| row * self.chain.joints()..(row + 1) * self.chain.joints())
+            .map(|k| (without[k] - fit.angles[k]).powi(2))
+            .collect();
         let cell = &one.cell;
         let numbers = cell.cause.numbers.iter().zip(&one.numbers).enumerate();
         let mut parameters: Vec<DriveNumber> = numbers
@@ -162,14 +192,29 @@ impl Drives {
                 let sigma = sigma.get(k).copied().filter(|sigma| *sigma > 0.0);
                 let value = if number.by_logarithm { x.exp() } else { *x };
                 let by = if number.by_logarithm { value } else { 1.0 };
-                DriveNumber { name: number.name.into(), value, unit: number.unit, sigma: sigma.map(|sigma| sigma * by) }
+                DriveNumber {
+                    name: number.name.into(),
+                    value,
+                    unit: number.unit,
+                    sigma: sigma.map(|sigma| sigma * by),
+                }
             })
             .collect();
         if let Key::Ripple(_, waves) = cell.key {
-            parameters.push(DriveNumber { name: "waves per turn".into(), value: f64::from(waves), unit: "1", sigma: None });
+            parameters.push(DriveNumber {
+                name: "waves per turn".into(),
+                value: f64::from(waves),
+                unit: "1",
+                sigma: None,
+            });
         }
         if let Key::Coupling(_, by) = cell.key {
-            parameters.push(DriveNumber { name: "by joint".into(), value: by as f64 + 1.0, unit: "1", sigma: None });
+            parameters.push(DriveNumber {
+                name: "by joint".into(),
+                value: by as f64 + 1.0,
+                unit: "1",
+                sigma: None,
+            });
         }
         DriveFinding {
             effect: cell.cause.name,
@@ -198,6 +243,8 @@ impl Drives {
 fn sentence(words: &str, place: &str) -> String {
     let text = words.replace("{}", place);
     let mut letters = text.chars();
-    let first = letters.next().map(|letter| letter.to_uppercase().to_string());
+    let first = letters
+        .next()
+        .map(|letter| letter.to_uppercase().to_string());
     first.unwrap_or_default() + letters.as_str() + "."
 }

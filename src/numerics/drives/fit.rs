@@ -18,8 +18,16 @@ struct Patience {
 }
 
 /// Of a trial among many, and of what stands.
-const TRIAL: Patience = Patience { steps: 6, fall: 0.5, share: 5e-4 };
-const STANDS: Patience = Patience { steps: 10, fall: 0.05, share: 1e-5 };
+const TRIAL: Patience = Patience {
+    steps: 6,
+    fall: 0.5,
+    share: 5e-4,
+};
+const STANDS: Patience = Patience {
+    steps: 10,
+    fall: 0.05,
+    share: 1e-5,
+};
 
 /// A fitted model.
 #[derive(Debug, Clone)]
@@ -58,7 +66,12 @@ pub(crate) struct Normal {
 
 impl Normal {
     pub(crate) fn new(count: usize) -> Self {
-        Self { count, gram: vec![0.0; count * count], gradient: vec![0.0; count], square: 0.0 }
+        Self {
+            count,
+            gram: vec![0.0; count * count],
+            gradient: vec![0.0; count],
+            square: 0.0,
+        }
     }
 
     pub(crate) fn add(&mut self, x: &[f64], residual: f64) {
@@ -67,7 +80,9 @@ impl Normal {
             if x[i] != 0.0 {
                 self.gradient[i] += x[i] * residual;
                 let line = &mut self.gram[i * self.count..(i + 1) * self.count];
-                line.iter_mut().zip(x).for_each(|(sum, x_k)| *sum += x[i] * x_k);
+                line.iter_mut()
+                    .zip(x)
+                    .for_each(|(sum, x_k)| *sum += x[i] * x_k);
             }
         }
     }
@@ -127,9 +142,18 @@ impl DriveFit {
     /// ln of the evidence, where so large a share of the rows is independent.
     pub fn log_evidence(&self, independence: f64) -> f64 {
         let scale = (self.square / self.freedom).max(1.0);
-        let whole = &self.gram * (independence / scale) + DMatrix::identity(self.gram.nrows(), self.gram.ncols());
-        let log_det = whole.cholesky().map_or(f64::INFINITY, |factor| 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>());
-        log_likelihood(self.square, self.freedom, independence) - 0.5 * self.penalty - 0.5 * log_det + self.log_prior
+        let whole = &self.gram * (independence / scale)
+            + DMatrix::identity(self.gram.nrows(), self.gram.ncols());
+        let log_det = whole.cholesky().map_or(f64::INFINITY, |factor| {
+            2.0 * factor
+                .l_dirty()
+                .diagonal()
+                .iter()
+                .map(|d| d.ln())
+                .sum::<f64>()
+        });
+        log_likelihood(self.square, self.freedom, independence) - 0.5 * self.penalty - 0.5 * log_det
+            + self.log_prior
     }
 }
 
@@ -137,22 +161,36 @@ impl Drives {
     /// Columns of inertials and of the numbers of a fit.
     pub(crate) fn base_columns(&self, fit: &DriveFit, anew: bool) -> BaseColumns {
         let now = self.physics(&fit.inertia, &fit.set);
-        let mut columns = BaseColumns { directions: Vec::new(), sources: Vec::new(), precision: Vec::new(), numbers: Vec::new() };
+        let mut columns = BaseColumns {
+            directions: Vec::new(),
+            sources: Vec::new(),
+            precision: Vec::new(),
+            numbers: Vec::new(),
+        };
         for k in 0..fit.inertia.len() {
             columns.precision.push(1.0);
             if !anew && k < fit.responses.len() {
-                columns.sources.push(Source::Known(fit.responses.clone(), k));
+                columns
+                    .sources
+                    .push(Source::Known(fit.responses.clone(), k));
                 continue;
             }
             let mut inertia = fit.inertia.clone();
             inertia[k] += 0.1;
             let changed = self.physics(&inertia, &fit.set);
-            columns.sources.push(Source::Carried(columns.directions.len(), 0.1));
+            columns
+                .sources
+                .push(Source::Carried(columns.directions.len(), 0.1));
             columns.directions.push(Direction::between(&now, &changed));
         }
         for (c, accepted) in fit.set.iter().enumerate() {
             let shape = &accepted.cell.shapes[accepted.shape];
-            for (k, usual) in shape.usual.iter().enumerate().filter(|(_, usual)| **usual > 0.0) {
+            for (k, usual) in shape
+                .usual
+                .iter()
+                .enumerate()
+                .filter(|(_, usual)| **usual > 0.0)
+            {
                 let memory = accepted.cell.key.has_memory();
                 let size = if memory { 0.02 * usual } else { 2e-3 * usual };
                 let mut set = fit.set.clone();
@@ -162,7 +200,11 @@ impl Drives {
                     true => {
                         let mut rolled = self.angles(&changed, Which::Fitted);
                         for (angle, before) in rolled.iter_mut().zip(&fit.angles) {
-                            *angle = if angle.is_finite() { *angle - before } else { 0.0 };
+                            *angle = if angle.is_finite() {
+                                *angle - before
+                            } else {
+                                0.0
+                            };
                         }
                         Source::Rolled(rolled, size)
                     }
@@ -183,12 +225,21 @@ impl Drives {
     fn evaluated(&self, inertia: &[f64], set: &[Accepted<Key>]) -> (Vec<f64>, f64) {
         let angles = self.angles(&self.physics(inertia, set), Which::Fitted);
         let square: f64 = self.squares(&angles).iter().sum();
-        let square = if square.is_finite() { square } else { f64::INFINITY };
+        let square = if square.is_finite() {
+            square
+        } else {
+            f64::INFINITY
+        };
         (angles, square)
     }
 
     /// Fits inertials and a set's numbers from where they are.
-    pub(crate) fn fitted_with(&self, set: &[Accepted<Key>], before: Option<&DriveFit>, anew: bool) -> DriveFit {
+    pub(crate) fn fitted_with(
+        &self,
+        set: &[Accepted<Key>],
+        before: Option<&DriveFit>,
+        anew: bool,
+    ) -> DriveFit {
         let anew = anew || before.is_none();
         let patience = if anew { &STANDS } else { &TRIAL };
         let n = self.chain.joints();
@@ -204,7 +255,10 @@ impl Drives {
             independence: before.map_or(1.0, |fit| fit.independence),
             penalty: 0.0,
             sigma: Vec::new(),
-            log_prior: set.iter().map(|one| one.cell.log_prior + one.cell.shapes[one.shape].log_weight).sum(),
+            log_prior: set
+                .iter()
+                .map(|one| one.cell.log_prior + one.cell.shapes[one.shape].log_weight)
+                .sum(),
             gram: DMatrix::zeros(0, 0),
             responses: before.map_or_else(Default::default, |fit| fit.responses.clone()),
         };
@@ -226,7 +280,8 @@ impl Drives {
             step += 1;
             let gram = normal.gram_matrix() * weight;
             let precision = DVector::from_column_slice(&columns.precision);
-            let gradient = DVector::from_column_slice(&normal.gradient) * weight - distance.component_mul(&precision);
+            let gradient = DVector::from_column_slice(&normal.gradient) * weight
+                - distance.component_mul(&precision);
             let whole = gram + DMatrix::from_diagonal(&precision);
             let Some(factor) = whole.cholesky() else {
                 break columns;
@@ -267,8 +322,14 @@ impl Drives {
         fit.penalty = self.penalty(&fit);
         let roots: Vec<f64> = columns.precision.iter().map(|p| 1.0 / p.sqrt()).collect();
         let gram = normal.gram_matrix();
-        fit.gram = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, k| roots[i] * gram[(i, k)] * roots[k]);
-        fit.sigma = fit.set.iter().map(|one| vec![0.0; one.numbers.len()]).collect();
+        fit.gram = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, k| {
+            roots[i] * gram[(i, k)] * roots[k]
+        });
+        fit.sigma = fit
+            .set
+            .iter()
+            .map(|one| vec![0.0; one.numbers.len()])
+            .collect();
         let weight = weigh(&fit);
         let whole = &fit.gram * weight + DMatrix::identity(gram.nrows(), gram.ncols());
         if let Some(inverse) = whole.cholesky().map(|factor| factor.inverse()) {
@@ -286,17 +347,28 @@ impl Drives {
         let physics = self.physics(&fit.inertia, &fit.set);
         let mut normal = Normal::new(columns.count());
         let mut x = vec![0.0; columns.count()];
-        let anew = matches!(columns.sources.first(), Some(Source::Carried(..))).then_some(fit.inertia.len());
+        let anew = matches!(columns.sources.first(), Some(Source::Carried(..)))
+            .then_some(fit.inertia.len());
         let mut responses = vec![vec![0.0; fit.angles.len()]; anew.unwrap_or(0)];
-        roll(&self.chain, &physics, &self.recording, &columns.directions, Which::Fitted, |row| {
-            for joint in 0..n {
-                let at = row.row * n + joint;
-                let sigma = self.sigma[at];
-                columns.at(at, row.change[joint], sigma, &mut x);
-                responses.iter_mut().zip(&x).for_each(|(response, x)| response[at] = x * sigma);
-                normal.add(&x, (self.recording.angle[at] - row.angle[joint]) / sigma);
-            }
-        });
+        roll(
+            &self.chain,
+            &physics,
+            &self.recording,
+            &columns.directions,
+            Which::Fitted,
+            |row| {
+                for joint in 0..n {
+                    let at = row.row * n + joint;
+                    let sigma = self.sigma[at];
+                    columns.at(at, row.change[joint], sigma, &mut x);
+                    responses
+                        .iter_mut()
+                        .zip(&x)
+                        .for_each(|(response, x)| response[at] = x * sigma);
+                    normal.add(&x, (self.recording.angle[at] - row.angle[joint]) / sigma);
+                }
+            },
+        );
         if anew.is_some() {
             fit.responses = Arc::new(responses);
         }
@@ -320,7 +392,9 @@ impl Drives {
             .map(|one| {
                 let shape = &one.cell.shapes[one.shape];
                 let all = one.numbers.iter().zip(&shape.centre).zip(&shape.usual);
-                all.filter(|(_, usual)| **usual > 0.0).map(|((x, at), usual)| ((x - at) / usual).powi(2)).sum::<f64>()
+                all.filter(|(_, usual)| **usual > 0.0)
+                    .map(|((x, at), usual)| ((x - at) / usual).powi(2))
+                    .sum::<f64>()
             })
             .sum();
         inertia + numbers
@@ -340,7 +414,11 @@ impl Drives {
                 }
             }
         }
-        let correlation = if own > 0.0 && own.is_finite() { (next / own).clamp(0.0, 0.998) } else { 0.0 };
+        let correlation = if own > 0.0 && own.is_finite() {
+            (next / own).clamp(0.0, 0.998)
+        } else {
+            0.0
+        };
         (1.0 - correlation) / (1.0 + correlation)
     }
 }

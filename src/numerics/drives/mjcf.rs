@@ -392,7 +392,10 @@ impl<'a> Reader<'a> {
             Some([x, y, z]) => Vector3::new(*x, *y, *z),
             Some(other) => {
                 let found = other.len();
-                self.fault(node, format!("{attribute}: expected 3 numbers, found {found}"));
+                self.fault(
+                    node,
+                    format!("{attribute}: expected 3 numbers, found {found}"),
+                );
                 default
             }
         }
@@ -461,8 +464,8 @@ impl<'a> Reader<'a> {
             match z[..] {
                 [x, y, z] => {
                     let to = Vector3::new(x, y, z);
-                    turn = UnitQuaternion::rotation_between(&Vector3::z(), &to)
-                        .unwrap_or_else(|| {
+                    turn =
+                        UnitQuaternion::rotation_between(&Vector3::z(), &to).unwrap_or_else(|| {
                             UnitQuaternion::from_axis_angle(
                                 &Vector3::x_axis(),
                                 std::f64::consts::PI,
@@ -526,7 +529,9 @@ impl<'a> Reader<'a> {
         }
         if is_body {
             let mut own = children(node, "inertial");
-            let inertial = own.next().and_then(|inertial| self.inertial(inertial, &place));
+            let inertial = own
+                .next()
+                .and_then(|inertial| self.inertial(inertial, &place));
             tree.bodies.push(TreeBody {
                 name: node.attribute("name").unwrap_or("?").to_string(),
                 inertial,
@@ -608,7 +613,10 @@ impl<'a> Reader<'a> {
                     let hint = did_you_mean(name, all.iter().copied());
                     self.fault(
                         root,
-                        format!("no hinge or slide joint `{name}`{hint} (joints: {})", listed(&all)),
+                        format!(
+                            "no hinge or slide joint `{name}`{hint} (joints: {})",
+                            listed(&all)
+                        ),
                     );
                 }
             }
@@ -714,7 +722,10 @@ impl<'a> Reader<'a> {
         for name in ["damping", "stiffness"] {
             let more = self.numbers(node, class, name).unwrap_or_default();
             if more.iter().skip(1).any(|number| *number != 0.0) {
-                self.fault(node, format!("{name}: one number is read, found a polynomial"));
+                self.fault(
+                    node,
+                    format!("{name}: one number is read, found a polynomial"),
+                );
             }
         }
         let mut of = |name: &str| self.number(node, class, name).unwrap_or_default();
@@ -813,7 +824,11 @@ impl<'a> Reader<'a> {
                     let bias = |k: usize| bias.get(k).copied().unwrap_or_default();
                     match text(self, "biastype").as_deref().unwrap_or("none") {
                         "none" => (0.0, 0.0),
-                        "affine" if bias(0) == 0.0 && (gain + bias(1)).abs() <= 1e-9 * gain.abs() => (gain, -bias(2)),
+                        "affine"
+                            if bias(0) == 0.0 && (gain + bias(1)).abs() <= 1e-9 * gain.abs() =>
+                        {
+                            (gain, -bias(2))
+                        }
                         "affine" => {
                             self.fault(node, format!("<general> of joint `{name}`: expected a position servo, gainprm=\"kp\" biasprm=\"0 -kp -kv\""));
                             continue;
@@ -830,7 +845,12 @@ impl<'a> Reader<'a> {
             let limit = limit.map_or(f64::INFINITY, |force| force * gear.abs());
             let limit = limit.min(most.unwrap_or(f64::INFINITY));
             if tag == "position" && gear != 1.0 {
-                self.fault(node, format!("gear of a position actuator of joint `{name}` is not read; allowed: 1"));
+                self.fault(
+                    node,
+                    format!(
+                        "gear of a position actuator of joint `{name}` is not read; allowed: 1"
+                    ),
+                );
             }
             let before = sum.unwrap_or(Servo {
                 kp: 0.0,
@@ -864,8 +884,7 @@ pub(crate) fn joined(a: &Inertial, b: &Inertial) -> Inertial {
     if mass <= 0.0 {
         return *a;
     }
-    let centre: Point3<f64> =
-        ((a.centre.coords * a.mass + b.centre.coords * b.mass) / mass).into();
+    let centre: Point3<f64> = ((a.centre.coords * a.mass + b.centre.coords * b.mass) / mass).into();
     let about = |body: &Inertial| {
         let arm = body.centre - centre;
         body.inertia

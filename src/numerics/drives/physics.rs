@@ -223,7 +223,11 @@ impl Joint {
         };
         let error = commanded.angle + self.offset - seen_q;
         let felt = error - error.clamp(-self.dead_band, self.dead_band);
-        let speed = if self.kd_on_error { commanded.speed } else { 0.0 };
+        let speed = if self.kd_on_error {
+            commanded.speed
+        } else {
+            0.0
+        };
         let asked = self.kp * felt + self.kd * (speed - seen_v) + commanded.integral;
         let limit = self.limit * sag;
         let drive = (asked * sag).clamp(-limit, limit);

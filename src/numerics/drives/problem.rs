@@ -38,11 +38,26 @@ pub struct Drives {
 
 impl Drives {
     /// The problem of an arm and its recording.
-    pub fn new(chain: Chain, base: Physics, recording: Recording, tolerance: InertialTolerance) -> Self {
+    pub fn new(
+        chain: Chain,
+        base: Physics,
+        recording: Recording,
+        tolerance: InertialTolerance,
+    ) -> Self {
         let sigma = recording.sigma();
-        let duration = recording.time.last().copied().unwrap_or_default() - recording.time.first().copied().unwrap_or_default();
+        let duration = recording.time.last().copied().unwrap_or_default()
+            - recording.time.first().copied().unwrap_or_default();
         let usual = usual(&chain, &base, &recording);
-        Self { chain, base, recording, tolerance, without: Vec::new(), sigma, usual, duration }
+        Self {
+            chain,
+            base,
+            recording,
+            tolerance,
+            without: Vec::new(),
+            sigma,
+            usual,
+            duration,
+        }
     }
 
     /// The simulation with inertials within their tolerance and a set of causes.
@@ -56,7 +71,10 @@ impl Drives {
             link.inertia *= (1.0 + self.tolerance.inertia_relative * by[4]).max(0.01);
         }
         for accepted in set {
-            accepted.cell.key.apply(&accepted.numbers, &self.usual, self.duration, &mut physics);
+            accepted
+                .cell
+                .key
+                .apply(&accepted.numbers, &self.usual, self.duration, &mut physics);
         }
         physics
     }
@@ -94,7 +112,13 @@ impl Drives {
 /// What the simulation as it is does.
 fn usual(chain: &Chain, base: &Physics, recording: &Recording) -> Vec<Usual> {
     let n = chain.joints();
-    let mut usual = vec![Usual { range: [f64::MAX, f64::MIN], ..Usual::default() }; n];
+    let mut usual = vec![
+        Usual {
+            range: [f64::MAX, f64::MIN],
+            ..Usual::default()
+        };
+        n
+    ];
     let (mut rows, mut before) = (0.0, vec![0.0; n]);
     let mut before_row: Option<usize> = None;
     roll(chain, base, recording, &[], Which::Fitted, |row| {
@@ -119,7 +143,12 @@ fn usual(chain: &Chain, base: &Physics, recording: &Recording) -> Vec<Usual> {
         before_row = Some(row.row);
     });
     for u in &mut usual {
-        for sum in [&mut u.torque[0], &mut u.speed[0], &mut u.error, &mut u.acceleration] {
+        for sum in [
+            &mut u.torque[0],
+            &mut u.speed[0],
+            &mut u.error,
+            &mut u.acceleration,
+        ] {
             *sum = (*sum / rows).sqrt();
         }
     }
@@ -145,20 +174,34 @@ impl Problem for Drives {
         let above = |joint: usize| squares[joint] > level;
         let any = (0..n).any(above);
         let asked = |cell: &Cell<Key>| {
-            let excluded = self.without.iter().any(|name| name == cell.cause.name) || fit.set.iter().any(|one| cell.key.excludes(one.cell.key));
+            let excluded = self.without.iter().any(|name| name == cell.cause.name)
+                || fit.set.iter().any(|one| cell.key.excludes(one.cell.key));
             let seen = match cell.key {
                 Key::Hold | Key::Sag => any,
-                Key::Integral(j) | Key::SpeedLimit(j) | Key::Presliding(j) | Key::Backlash(j, _) | Key::Elasticity(j) => above(j),
+                Key::Integral(j)
+                | Key::SpeedLimit(j)
+                | Key::Presliding(j)
+                | Key::Backlash(j, _)
+                | Key::Elasticity(j) => above(j),
                 _ => true,
             };
             !excluded && seen
         };
-        let all = cells(&self.base, &self.usual, self.duration, self.recording.period);
+        let all = cells(
+            &self.base,
+            &self.usual,
+            self.duration,
+            self.recording.period,
+        );
         let all: Vec<Cell<Key>> = all.into_iter().filter(asked).collect();
         // Where each column comes from, in the order of cells, shapes and columns.
         let asked: Vec<(Key, &Vec<f64>)> = all
             .iter()
-            .flat_map(|cell| cell.shapes.iter().flat_map(|shape| shape.columns.iter().map(|x| (cell.key, x))))
+            .flat_map(|cell| {
+                cell.shapes
+                    .iter()
+                    .flat_map(|shape| shape.columns.iter().map(|x| (cell.key, x)))
+            })
             .collect();
         let columns: Vec<Column> = asked
             .par_iter()
@@ -169,7 +212,11 @@ impl Problem for Drives {
                     true => {
                         let mut angles = self.angles(&changed, Which::Fitted);
                         for (angle, before) in angles.iter_mut().zip(&fit.angles) {
-                            *angle = if angle.is_finite() { *angle - before } else { 0.0 };
+                            *angle = if angle.is_finite() {
+                                *angle - before
+                            } else {
+                                0.0
+                            };
                         }
                         Column::Rolled(angles)
                     }
@@ -195,51 +242,64 @@ impl Problem for Drives {
             blocks.push((from, shape.columns.len()));
             from += shape.columns.len();
         }
-        let mut grams: Vec<DMatrix<f64>> = blocks.iter().map(|(_, k)| DMatrix::zeros(*k, *k)).collect();
+        let mut grams: Vec<DMatrix<f64>> =
+            blocks.iter().map(|(_, k)| DMatrix::zeros(*k, *k)).collect();
         let mut own = Normal::new(nb);
         let mut cross = vec![0.0; nb * count];
         let (mut gradient, mut rms) = (vec![0.0; count], vec![0.0; count]);
         let (mut x, mut b) = (vec![0.0; count], vec![0.0; nb]);
-        roll(&self.chain, &now, &self.recording, &carried, Which::Fitted, |row| {
-            for joint in 0..n {
-                let at = row.row * n + joint;
-                let sigma = self.sigma[at];
-                let residual = (self.recording.angle[at] - row.angle[joint]) / sigma;
-                base.at(at, row.change[joint], sigma, &mut b);
-                for (c, column) in columns.iter().enumerate() {
-                    let change = match (column, place[c]) {
-                        (Column::Rolled(angles), _) => angles[at],
-                        (_, Some(k)) => row.change[joint][k],
-                        _ => 0.0,
-                    };
-                    x[c] = change / sigma;
-                    rms[c] += change * change;
-                    gradient[c] += x[c] * residual;
-                }
-                own.add(&b, residual);
-                for (k, b) in b.iter().enumerate() {
-                    if *b != 0.0 {
-                        let line = &mut cross[k * count..(k + 1) * count];
-                        line.iter_mut().zip(&x).for_each(|(sum, x)| *sum += b * x);
+        roll(
+            &self.chain,
+            &now,
+            &self.recording,
+            &carried,
+            Which::Fitted,
+            |row| {
+                for joint in 0..n {
+                    let at = row.row * n + joint;
+                    let sigma = self.sigma[at];
+                    let residual = (self.recording.angle[at] - row.angle[joint]) / sigma;
+                    base.at(at, row.change[joint], sigma, &mut b);
+                    for (c, column) in columns.iter().enumerate() {
+                        let change = match (column, place[c]) {
+                            (Column::Rolled(angles), _) => angles[at],
+                            (_, Some(k)) => row.change[joint][k],
+                            _ => 0.0,
+                        };
+                        x[c] = change / sigma;
+                        rms[c] += change * change;
+                        gradient[c] += x[c] * residual;
                     }
-                }
-                for ((from, k), gram) in blocks.iter().zip(&mut grams) {
-                    let x = &x[*from..from + k];
-                    for i in 0..*k {
-                        if x[i] != 0.0 {
-                            for j in 0..*k {
-                                gram[(i, j)] += x[i] * x[j];
+                    own.add(&b, residual);
+                    for (k, b) in b.iter().enumerate() {
+                        if *b != 0.0 {
+                            let line = &mut cross[k * count..(k + 1) * count];
+                            line.iter_mut().zip(&x).for_each(|(sum, x)| *sum += b * x);
+                        }
+                    }
+                    for ((from, k), gram) in blocks.iter().zip(&mut grams) {
+                        let x = &x[*from..from + k];
+                        for i in 0..*k {
+                            if x[i] != 0.0 {
+                                for j in 0..*k {
+                                    gram[(i, j)] += x[i] * x[j];
+                                }
                             }
                         }
                     }
                 }
-            }
-        });
+            },
+        );
         let freedom = rows_a_joint * n as f64;
         let scale = (fit.square / freedom).max(1.0);
         let precision = DVector::from_vec(base.precision.iter().map(|p| p * scale).collect());
-        let gradient_of_base = DVector::from_column_slice(&own.gradient) ;
-        let mut rows = Rows::new((own.square, freedom), &own.gram_matrix(), gradient_of_base, &precision);
+        let gradient_of_base = DVector::from_column_slice(&own.gradient);
+        let mut rows = Rows::new(
+            (own.square, freedom),
+            &own.gram_matrix(),
+            gradient_of_base,
+            &precision,
+        );
         rows.square = rows.square.max(freedom);
         rows.independence = fit.independence;
         rows.unit = UNIT;
@@ -247,7 +307,10 @@ impl Problem for Drives {
             gram: gram.clone(),
             gradient: DVector::from_column_slice(&gradient[from..from + k]),
             cross: DMatrix::from_fn(nb, k, |i, j| cross[i * count + from + j]),
-            rms: rms[from..from + k].iter().map(|sum| (sum / freedom).sqrt()).collect(),
+            rms: rms[from..from + k]
+                .iter()
+                .map(|sum| (sum / freedom).sqrt())
+                .collect(),
         };
         let mut next = 0;
         let mut scanned = Vec::new();
@@ -293,7 +356,11 @@ fn begun(shape: &calib_engine::Shape, log: f64, size: &[f64]) -> (f64, Vec<f64>)
     let whole = shape.columns.len() == 1 && shape.columns[0] == shape.start;
     if whole {
         // The other way round it is not this cause.
-        let log = if size[0] > 0.0 { log } else { f64::NEG_INFINITY };
+        let log = if size[0] > 0.0 {
+            log
+        } else {
+            f64::NEG_INFINITY
+        };
         return (log, shape.start.clone());
     }
     let mut numbers = shape.start.clone();

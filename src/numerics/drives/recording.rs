@@ -65,10 +65,7 @@ impl Recording {
         let n = self.joints();
         let fail = |message: String| Err(Error::data(label, message));
         if self.rows() < 20 {
-            return fail(format!(
-                "has {} rows; expected at least 20",
-                self.rows()
-            ));
+            return fail(format!("has {} rows; expected at least 20", self.rows()));
         }
         if self.command.len() != n * self.rows() || self.angle.len() != n * self.rows() {
             return fail("commands and angles are not of equal length".into());
@@ -77,7 +74,10 @@ impl Recording {
             for row in trajectory.rows.clone().skip(1) {
                 if self.time[row] <= self.time[row - 1] {
                     let (before, after) = (self.time[row - 1], self.time[row]);
-                    return fail(format!("row {}: time {after} s does not come after {before} s; within a trajectory times rise", row + 1));
+                    return fail(format!(
+                        "row {}: time {after} s does not come after {before} s; within a trajectory times rise",
+                        row + 1
+                    ));
                 }
             }
         }
@@ -101,10 +101,14 @@ impl Recording {
         let still: Vec<String> = (0..n)
             .filter(|joint| {
                 let all = || (0..self.rows()).map(|row| self.angle[row * n + joint]);
-                let (low, high) = (all().fold(f64::MAX, f64::min), all().fold(f64::MIN, f64::max));
+                let (low, high) = (
+                    all().fold(f64::MAX, f64::min),
+                    all().fold(f64::MIN, f64::max),
+                );
                 let sent = || (0..self.rows()).map(|row| self.command[row * n + joint]);
                 let asked = sent().fold(f64::MIN, f64::max) - sent().fold(f64::MAX, f64::min);
-                high - low < 3.0 * self.encoder[*joint].max(self.noise[*joint]) && asked > 10.0 * self.encoder[*joint].max(1e-3)
+                high - low < 3.0 * self.encoder[*joint].max(self.noise[*joint])
+                    && asked > 10.0 * self.encoder[*joint].max(1e-3)
             })
             .map(|joint| (joint + 1).to_string())
             .collect();
@@ -204,16 +208,16 @@ impl Recording {
         let mut speed = vec![0.0; value.len()];
         for k in 1..time.len() {
             for joint in 0..n {
-                speed[k * n + joint] = (value[k * n + joint] - value[(k - 1) * n + joint])
-                    / (counts[k] * self.period);
+                speed[k * n + joint] =
+                    (value[k * n + joint] - value[(k - 1) * n + joint]) / (counts[k] * self.period);
             }
         }
         let summed = |of: &[f64]| {
             let mut sums = vec![0.0; of.len()];
             for k in 1..time.len() {
                 for joint in 0..n {
-                    sums[k * n + joint] =
-                        sums[(k - 1) * n + joint] + of[(k - 1) * n + joint] * (time[k] - time[k - 1]);
+                    sums[k * n + joint] = sums[(k - 1) * n + joint]
+                        + of[(k - 1) * n + joint] * (time[k] - time[k - 1]);
                 }
             }
             sums
@@ -232,12 +236,7 @@ impl Recording {
     fn between(&self, rows: &Range<usize>, row: usize, joint: usize, share: f64) -> f64 {
         let n = self.joints();
         let at = |row: usize| self.command[row.clamp(rows.start, rows.end - 1) * n + joint];
-        let (p, a, b, c) = (
-            at(row.saturating_sub(2)),
-            at(row - 1),
-            at(row),
-            at(row + 1),
-        );
+        let (p, a, b, c) = (at(row.saturating_sub(2)), at(row - 1), at(row), at(row + 1));
         let (m, k) = (0.5 * (b - p), 0.5 * (c - a));
         let (t, t2, t3) = (share, share * share, share * share * share);
         a * (2.0 * t3 - 3.0 * t2 + 1.0)

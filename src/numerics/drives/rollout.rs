@@ -144,7 +144,12 @@ pub fn roll(
             continue;
         }
         let commands = recording.commands(trajectory, physics.hold);
-        roller.start(&recording.start(trajectory), &commands, recording, trajectory.rows.start);
+        roller.start(
+            &recording.start(trajectory),
+            &commands,
+            recording,
+            trajectory.rows.start,
+        );
         let mut guess = 0;
         for row in trajectory.rows.clone() {
             roller.show(row, &mut see);
@@ -174,14 +179,17 @@ impl Roller<'_> {
         self.chain.pose(at, &self.physics.bodies, &mut self.posed);
         let mut weight = [0.0; MOST];
         let gravity = &self.physics.bodies.gravity;
-        self.chain.torques(&self.posed, gravity, &[0.0; MOST], None, &mut weight);
+        self.chain
+            .torques(&self.posed, gravity, &[0.0; MOST], None, &mut weight);
         for joint in 0..self.n {
             let physics = &self.physics.joints[joint];
             let command = commands.mean(joint, time, time + 1e-6, 0)[0];
             self.set_point[joint] = command;
             self.driven[joint] = physics.kp * (command + physics.offset - at[joint]);
             let dry = physics.friction.max(1e-9);
-            let held = self.driven[joint] - weight[joint] - physics.spring[0] * (at[joint] - physics.spring[1]);
+            let held = self.driven[joint]
+                - weight[joint]
+                - physics.spring[0] * (at[joint] - physics.spring[1]);
             self.bent[joint] = (held / dry).clamp(-1.0, 1.0);
             let rotor = self.rotor[joint];
             if let Some(gear) = &physics.gear {
@@ -252,11 +260,13 @@ impl Roller<'_> {
             middle[i] = self.q[i] + 0.5 * h * self.v[i];
             ahead[i] = self.v[i] + 0.5 * h * self.a[i];
         }
-        self.chain.pose(&middle[..n], &physics.bodies, &mut self.posed);
+        self.chain
+            .pose(&middle[..n], &physics.bodies, &mut self.posed);
         let (mut mass, mut bias) = ([[0.0; MOST]; MOST], [0.0; MOST]);
         self.chain.mass_matrix(&self.posed, &mut mass);
         let gravity = &physics.bodies.gravity;
-        self.chain.torques(&self.posed, gravity, &ahead[..n], None, &mut bias);
+        self.chain
+            .torques(&self.posed, gravity, &ahead[..n], None, &mut bias);
         let sag = 1.0 - (physics.sag * self.drawn).clamp(0.0, 0.9);
         let (q, v, a, driven) = (self.q, self.v, self.a, self.driven);
         let motion = Motion {
@@ -270,7 +280,8 @@ impl Roller<'_> {
         let mut sent = [Commanded::default(); MOST];
         for j in 0..n {
             let joint = &physics.joints[j];
-            let [angle, speed] = commands.mean(j, time - joint.delay, time + h - joint.delay, guess);
+            let [angle, speed] =
+                commands.mean(j, time - joint.delay, time + h - joint.delay, guess);
             let way = joint.speed_limit * h;
             self.set_point[j] += (angle - self.set_point[j]).clamp(-way, way);
             sent[j] = Commanded {
@@ -329,25 +340,43 @@ impl Roller<'_> {
             }
         }
         let mut new = self.slid(&w, &free, &limit, h);
-        if new[..m].iter().any(|speed| !speed.is_finite() || speed.abs() > 1e4) {
+        if new[..m]
+            .iter()
+            .any(|speed| !speed.is_finite() || speed.abs() > 1e4)
+        {
             new = [f64::NAN; MOST];
         }
         if !self.directions.is_empty() {
             let before = self.dv.clone();
             let mut forces = std::mem::take(&mut self.forces);
             forces.iter_mut().for_each(|column| column.fill(0.0));
-            let sg: Row = std::array::from_fn(|i| if limit[i] > 0.0 { self.push[i] / (h * limit[i]) } else { sign(self.v[i]) });
+            let sg: Row = std::array::from_fn(|i| {
+                if limit[i] > 0.0 {
+                    self.push[i] / (h * limit[i])
+                } else {
+                    sign(self.v[i])
+                }
+            });
             for (d, direction) in self.directions.iter().enumerate() {
                 for (j, changed) in &direction.joints {
                     let (r, base) = (self.rotor[*j], &physics.joints[*j]);
                     let mut with = sent[*j];
                     if changed.delay != base.delay {
-                        let [angle, speed] = commands.mean(*j, time - changed.delay, time + h - changed.delay, guess);
+                        let [angle, speed] = commands.mean(
+                            *j,
+                            time - changed.delay,
+                            time + h - changed.delay,
+                            guess,
+                        );
                         (with.angle, with.speed) = (angle, speed);
                     }
                     let t = changed.torque(*j, r, &motion, &with, sag);
                     let slides = sg[r].abs() > 0.999_999;
-                    let dry = if slides { sg[r] * (t.limit - torques[*j].limit) } else { 0.0 };
+                    let dry = if slides {
+                        sg[r] * (t.limit - torques[*j].limit)
+                    } else {
+                        0.0
+                    };
                     let rotor = changed.armature - base.armature;
                     forces[r][d] += t.smooth - torques[*j].smooth - dry - rotor * self.a[r];
                     if r != *j {
@@ -374,7 +403,8 @@ impl Roller<'_> {
             if joint.integral[0] != 0.0 {
                 let error = sent[j].angle + joint.offset - self.q[r];
                 let most = joint.integral[1];
-                self.integral[j] = (self.integral[j] + joint.integral[0] * error * h).clamp(-most, most);
+                self.integral[j] =
+                    (self.integral[j] + joint.integral[0] * error * h).clamp(-most, most);
             }
             if joint.presliding > 0.0 {
                 let v = 0.5 * (self.v[r] + new[r]);
@@ -429,7 +459,8 @@ impl Roller<'_> {
         let n = self.n;
         let mut here = [0.0; MOST];
         let gravity = &self.physics.bodies.gravity;
-        self.chain.torques(&self.posed, gravity, &v[..n], Some(&self.a[..n]), &mut here);
+        self.chain
+            .torques(&self.posed, gravity, &v[..n], Some(&self.a[..n]), &mut here);
         let mut posed = Posed::default();
         for (d, direction) in self.directions.iter().enumerate() {
             let Some(bodies) = &direction.bodies else {
@@ -437,7 +468,13 @@ impl Roller<'_> {
             };
             let mut there = [0.0; MOST];
             self.chain.pose(&q[..n], bodies, &mut posed);
-            self.chain.torques(&posed, &bodies.gravity, &v[..n], Some(&self.a[..n]), &mut there);
+            self.chain.torques(
+                &posed,
+                &bodies.gravity,
+                &v[..n],
+                Some(&self.a[..n]),
+                &mut there,
+            );
             for i in 0..n {
                 self.by_bodies[i][d] = here[i] - there[i];
             }
@@ -470,7 +507,11 @@ impl Roller<'_> {
             if invert(&inner, held.len(), &mut inverse) {
                 for row in 0..m {
                     for (b, k) in held.iter().enumerate() {
-                        let share: f64 = held.iter().enumerate().map(|(a, i)| w[row][*i] * inverse[a][b]).sum();
+                        let share: f64 = held
+                            .iter()
+                            .enumerate()
+                            .map(|(a, i)| w[row][*i] * inverse[a][b])
+                            .sum();
                         keep[row][*k] -= share;
                     }
                 }

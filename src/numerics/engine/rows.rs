@@ -92,9 +92,7 @@ impl Rows {
 }
 
 /// Scanned cells, likeliest first: of each the likeliest shape begins a fit, all of them count.
-pub fn ranked<K: Clone>(
-    cells: Vec<(Cell<K>, Vec<(f64, Vec<f64>)>)>,
-) -> Vec<Scanned<K>> {
+pub fn ranked<K: Clone>(cells: Vec<(Cell<K>, Vec<(f64, Vec<f64>)>)>) -> Vec<Scanned<K>> {
     let mut all: Vec<Scanned<K>> = cells
         .into_iter()
         .filter_map(|(cell, shapes)| {

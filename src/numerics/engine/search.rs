@@ -64,7 +64,8 @@ fn candidates<P: Problem>(
 ) -> Vec<Scanned<P::Key>> {
     let free = |one: &Scanned<P::Key>| {
         let key = &one.accepted.cell.key;
-        set.iter().all(|other| !problem.excludes(key, &other.cell.key))
+        set.iter()
+            .all(|other| !problem.excludes(key, &other.cell.key))
     };
     let mut kept: Vec<Scanned<P::Key>> = Vec::new();
     for one in scanned.into_iter().filter(free) {
@@ -122,7 +123,10 @@ pub fn search<P: Problem>(
         let tried = trials(problem, &fit, asked, independence);
         for trial in tried.iter().take(4) {
             let (name, place) = (trial.cell.cause.name, &trial.cell.place);
-            tell(format!("  {name} at {place}: ln odds {:.1}", trial.log - now));
+            tell(format!(
+                "  {name} at {place}: ln odds {:.1}",
+                trial.log - now
+            ));
         }
         let Some(best) = tried.into_iter().next() else {
             break;
@@ -130,7 +134,10 @@ pub fn search<P: Problem>(
         if best.log - now < options.joins {
             break;
         }
-        tell(format!("{} at {} joins", best.cell.cause.name, best.cell.place));
+        tell(format!(
+            "{} at {} joins",
+            best.cell.cause.name, best.cell.place
+        ));
         fit = problem.settled(&best.fit);
         fit = revised(problem, fit, options, &mut tell);
     }
@@ -153,7 +160,10 @@ fn revised<P: Problem>(
         let without = problem.fit(&rest, Some(&fit));
         let log = problem.log_evidence(&without, independence);
         if now - log < options.leaves {
-            tell(format!("{} at {} leaves", out.cell.cause.name, out.cell.place));
+            tell(format!(
+                "{} at {} leaves",
+                out.cell.cause.name, out.cell.place
+            ));
             fit = problem.settled(&without);
             continue;
         }
@@ -163,11 +173,7 @@ fn revised<P: Problem>(
 }
 
 /// What stands, each with what else could stand in its place.
-pub fn posterior<P: Problem>(
-    problem: &P,
-    fit: &P::Fit,
-    options: &Options,
-) -> Vec<Finding<P::Key>> {
+pub fn posterior<P: Problem>(problem: &P, fit: &P::Fit, options: &Options) -> Vec<Finding<P::Key>> {
     let set = problem.set(fit);
     let independence = problem.independence(fit);
     let now = problem.log_evidence(fit, independence);
@@ -203,7 +209,10 @@ pub fn posterior<P: Problem>(
             let rivals = others
                 .iter()
                 .map(|trial| Rival {
-                    accepted: problem.set(&trial.fit).pop().unwrap_or_else(|| accepted.clone()),
+                    accepted: problem
+                        .set(&trial.fit)
+                        .pop()
+                        .unwrap_or_else(|| accepted.clone()),
                     probability: share(trial.log),
                     log_odds: trial.log - now,
                 })
@@ -235,7 +244,8 @@ pub fn diagnose<P: Problem>(
     for _ in 0..EXCHANGES {
         let better = findings.iter().find_map(|finding| {
             let rival = finding.rivals.first()?;
-            (rival.log_odds > options.exchanges).then(|| (finding.accepted.clone(), rival.accepted.clone()))
+            (rival.log_odds > options.exchanges)
+                .then(|| (finding.accepted.clone(), rival.accepted.clone()))
         });
         let Some((out, into)) = better else {
             break;
