@@ -2,9 +2,9 @@
 //!
 //! # The map
 //! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> observation -> estimate -> diagnose`)
-//! has no files and no frames: the package `calib-numerics` in `src/numerics`, and above it `calib-diagnose` and `calib-dynamics` in folders
-//! of that. The **twin** is another package, `calib-twin` in `src/twin`, which does not depend on them. What both use is the package
-//! `calib-foundation` in `src/foundation`. All five are handed on here, and the compiler keeps their walls. **Columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
+//! has no files and no frames: the package `calib-numerics` in `src/numerics`, and above it `calib-diagnose`, `calib-dynamics`,
+//! `calib-engine` and `calib-drives` in folders of that. The **twin** is another package, `calib-twin` in `src/twin`, which does not depend on them. What both use is the package
+//! `calib-foundation` in `src/foundation`. All seven are handed on here, and the compiler keeps their walls. **Columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
 //! [`stage`] is the only place where both towers are used; [`pipeline`] is the only caller of stages. Data goes one way:
 //! YAML -> draft -> `Plan` -> stage -> tables -> report. Nothing is updated in place, no layer calls back up.
 //!
@@ -27,6 +27,8 @@
 //! | [`targets`] | tables of targets (text, Parquet) with their joints replaced, planned motions with their torques | compensate, dynamics, raw, robot |
 //! | [`diagnose`] | where recording and simulation differ, which cause explains it | criteria, effect, estimate, observation, robot, spatial |
 //! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | criteria, diagnose, effect, estimate, spatial |
+//! | [`engine`] | one search for what a model lacks, whatever was recorded | diagnose |
+//! | [`drives`] | robots from MJCF, their drives rolled out along commands, and which physics that simulation lacks | dynamics, engine |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | raw |
 //! | `diff` | two tables or two runs compared | raw, store, text |
@@ -151,7 +153,9 @@
 #![warn(missing_docs)]
 
 pub use calib_diagnose as diagnose;
+pub use calib_drives as drives;
 pub use calib_dynamics as dynamics;
+pub use calib_engine as engine;
 pub use calib_foundation::{description, statistics, units};
 pub use calib_numerics::{
     compensate, criteria, effect, error, estimate, observation, robot, spatial, yaml,

@@ -18,6 +18,7 @@ mod contact;
 mod curves;
 mod declared_effects;
 mod diagnose;
+mod diagnose_drives;
 mod diagnose_torques;
 mod doubtful;
 mod dynamic_arm;
@@ -43,6 +44,7 @@ pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};
 use diagnose::AskedRows;
 pub use diagnose::{CellPrior, Diagnose, DiagnoseReads};
+pub use diagnose_drives::{DiagnoseDrives, DiagnoseDrivesReads, DiagnoseDrivesWrites};
 pub use diagnose_torques::{
     ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut,
     InertialSetting,
@@ -226,7 +228,8 @@ fn on(sets: &[String]) -> Vec<(String, String)> {
 }
 
 /// Stages whose tables are a diagnosis, as `calib diagnose` runs and shows them.
-pub(crate) const DIAGNOSES: [&str; 2] = [Diagnose::NAME, DiagnoseTorques::NAME];
+pub(crate) const DIAGNOSES: [&str; 3] =
+    [Diagnose::NAME, DiagnoseTorques::NAME, DiagnoseDrives::NAME];
 
 /// Every kind of stage, one line each.
 pub const STAGES: &[StageEntry] = &[
@@ -242,6 +245,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<ingest::IngestTorques>(),
     StageEntry::of::<DiagnoseTorques>(),
     StageEntry::of::<TorqueEvidence>(),
+    StageEntry::of::<DiagnoseDrives>(),
     StageEntry::of::<Masses>(),
     StageEntry::of::<CompareTorques>(),
     StageEntry::of::<ReportTorques>(),

@@ -11,14 +11,14 @@ use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
 use crate::report::{diagnosed_page, result};
 use crate::shell::typed;
-use crate::stage::{DeclaredStage, Diagnose, DiagnoseTorques};
+use crate::stage::{DeclaredStage, Diagnose, DiagnoseDrives, DiagnoseTorques};
 use crate::store::Store;
 use crate::table::{
-    CauseGrid, Cells, ContactRow, Contacts, FindingNumbers, FindingRow, Findings, FormRow, Forms,
-    JointTorqueRow, JointTorques, Rivals, ShareRow, Shares, Suspects, SuspectsRow, Table,
-    TablesByKind, TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict, TorqueVerdictRow,
-    Verdict, VerdictRow, VerdictSentences, VerdictTopic, is_separable_by_poses, of_kind, picked,
-    picked_of,
+    CauseGrid, Cells, ContactRow, Contacts, DriveVerdict, DriveVerdictRow, FindingNumbers,
+    FindingRow, Findings, FormRow, Forms, JointDrives, JointTorqueRow, JointTorques, Rivals,
+    ShareRow, Shares, Suspects, SuspectsRow, Table, TablesByKind, TorqueFindings, TorqueNumbers,
+    TorqueRivals, TorqueVerdict, TorqueVerdictRow, Verdict, VerdictRow, VerdictSentences,
+    VerdictTopic, is_separable_by_poses, of_kind, picked, picked_of,
 };
 use crate::text::filled;
 use crate::units::Unit;
@@ -33,6 +33,8 @@ pub struct DiagnosisSummary {
     step: String,
     /// Whether it is of torques.
     of_torques: bool,
+    /// Whether it is of commands and responses.
+    of_drives: bool,
     is_wrong_setup: bool,
     /// What shows the noise, where it is inferred.
     advice: Option<&'static str>,
@@ -99,10 +101,10 @@ impl DiagnosisSummary {
             robot: robot_of(stage, store)?,
             rows: recording.map_or(0, |input| input.table.rows),
         };
-        if stage.uses == DiagnoseTorques::NAME {
-            Self::of_torques(subject, &load)
-        } else {
-            Self::of_positions(subject, &load)
+        match &*stage.uses {
+            DiagnoseTorques::NAME => Self::of_torques(subject, &load),
+            DiagnoseDrives::NAME => Self::of_drives(subject, &load),
+            _ => Self::of_positions(subject, &load),
         }
     }
 
@@ -217,6 +219,48 @@ impl DiagnosisSummary {
         summary.with(subject, step, (document, shown), findings, evidence, ranges)
     }
 
+    /// What a stage `diagnose_drives` says by its tables.
+    fn of_drives(subject: Subject, tables: &TablesByKind) -> Result<Self> {
+        let v = the_verdict(table::<DriveVerdict>(tables)?.0)?;
+        let (Findings(rows), numbers, rivals): (_, FindingNumbers, Rivals) =
+            (table(tables)?, table(tables)?, table(tables)?);
+        let JointDrives(joints) = table(tables)?;
+        let findings = result::findings(&rows, &numbers.0, &rivals.0);
+        let mrad = |rad: f64| 1e3 * rad;
+        let mut document = picked(&v, "verdict statement rows held_out");
+        document["noise_mrad"] = mrad(v.noise_rad).into();
+        for (when, rms, fitted) in [
+            ("before", v.before_rms_rad, v.before_fitted_rms_rad),
+            ("after", v.after_rms_rad, v.after_fitted_rms_rad),
+        ] {
+            let joints = joints.iter().map(|row| {
+                let rms = if when == "before" {
+                    row.before_rms_rad
+                } else {
+                    row.after_rms_rad
+                };
+                json!({ "joint": row.joint, "rms_mrad": mrad(rms) })
+            });
+            document[when] = json!({
+                "validate_rms_mrad": mrad(rms), "fit_rms_mrad": mrad(fitted), "joints": joints.collect::<Vec<Value>>(),
+            });
+        }
+        document["leftover"] = picked_of(&joints, "joint over_noise=leftover_over_noise");
+        let shown = json!({ "v": v, "drives": joints, "joints": [], "aside": [] });
+        let summary = Self {
+            of_torques: true,
+            of_drives: true,
+            head: head_of_drives(&subject, &v, rows.len()),
+            verdict: verdict_of_drives(&v),
+            at: " rms",
+            ..Self::default()
+        };
+        let evidence = "delta_bic effect_rms_rad";
+        let step = (v.step.clone(), table(tables)?);
+        let ranges = vec![json!({}); rows.len()];
+        summary.with(subject, step, (document, shown), findings, evidence, ranges)
+    }
+
     /// The same with what both have: sentences and findings.
     fn with(
         mut self,
@@ -282,7 +326,7 @@ impl DiagnosisSummary {
         let fault = |message| Error::spec("--export-effect", message);
         if self.of_torques {
             return Err(fault(
-                "findings on torques have no formula of their own".into(),
+                "findings on torques and drives have no formula of their own".into(),
             ));
         }
         let is_asked = |row: &&FormRow| row.proposed && finding.is_none_or(|rank| row.rank == rank);
@@ -370,7 +414,7 @@ impl DiagnosisSummary {
         if self.of_torques {
             return Err(Error::spec(
                 "--html",
-                "of torques the page is the pipeline's report: put `- uses: report` last",
+                "of torques the page is the pipeline's report: put `- uses: report` last; of drives there is none",
             ));
         }
         diagnosed_page(self.shown(store))
@@ -423,7 +467,7 @@ impl DiagnosisSummary {
         text += &screen::names("not seen", &Vec::from_iter(not_seen), width);
         let next = self
             .next_step(&self.run, store)
-            .or_else(|| (!wrong).then(|| NextStep::correct(&self.run, store)));
+            .or_else(|| (!wrong && !self.of_drives).then(|| NextStep::correct(&self.run, store)));
         text += &next.map_or_else(String::new, |step| step.text(width));
         let more = match self.of_torques {
             false => "--details prints numbers, places, formulas, reasons and every rival",
@@ -436,6 +480,9 @@ impl DiagnosisSummary {
     /// not seen.
     pub(super) fn next_step(&self, run: &str, store: &str) -> Option<NextStep> {
         let step = |what: String, command: Option<String>| Some(NextStep { what, command });
+        if self.of_drives {
+            return None;
+        }
         if self.of_torques {
             let command = format!("calib compensate {run} motion.csv --torque{store}");
             return step("feed torques forward".into(), Some(command));
@@ -574,6 +621,40 @@ fn head_of_positions(subject: &Subject, v: &VerdictRow, found: usize) -> String 
         }));
     }
     text
+}
+
+fn head_of_drives(subject: &Subject, v: &DriveVerdictRow, found: usize) -> String {
+    let noise = angle(v.noise_rad);
+    let rows = screen::measured(
+        subject.robot.as_deref(),
+        &format!("{} rows of commands and angles fitted", v.rows),
+        Some(&screen::noise(&noise, None)),
+    );
+    let held_out = match v.held_out {
+        true => "held out",
+        false => "fitted rows: flattered",
+    };
+    let line = |label: &str, rad: f64, what: &str| {
+        let mrad = 1e3 * rad;
+        labelled(label, &format!("{mrad:>8.3} mrad rms, rolled out  {what}"))
+    };
+    let simulated = format!("simulation as it is, {held_out}");
+    rows + &line("before", v.before_rms_rad, &simulated)
+        + &line("after", v.after_rms_rad, with_findings(found))
+}
+
+fn verdict_of_drives(v: &DriveVerdictRow) -> String {
+    let (left, noise) = (1e3 * v.after_fitted_rms_rad, 1e3 * v.noise_rad);
+    let is = |kind: VerdictKind| v.verdict == kind.name();
+    match () {
+        () if is(VerdictKind::NothingMissing) => {
+            format!("nothing missing: {left:.3} mrad remain, the noise is {noise:.3} mrad")
+        }
+        () if is(VerdictKind::Explained) => {
+            format!("explained: {left:.3} mrad remain, the noise is {noise:.3} mrad")
+        }
+        () => format!("unexplained: {left:.3} mrad remain, the noise is {noise:.3} mrad"),
+    }
 }
 
 fn head_of_torques(subject: &Subject, v: &TorqueVerdictRow, found: usize) -> String {

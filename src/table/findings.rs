@@ -50,10 +50,10 @@ pub(super) fn sum<P: From<f64> + Into<Option<f64>>>(one: P, other: P) -> P {
 
 /// The tables of a diagnosis that stand beside its findings: their numbers, and their rivals.
 macro_rules! beside_findings {
-    ($diagnosis:ty => $numbers:ident of $number_row:ident, $rivals:ident of $rival_row:ident) => {
+    ($diagnosis:ty => $numbers:ident::$of:ident of $number_row:ident, $rivals:ident::$rivals_of:ident of $rival_row:ident) => {
         impl $numbers {
             /// A row for each number of each finding.
-            pub fn of(diagnosis: &$diagnosis) -> Self {
+            pub fn $of(diagnosis: &$diagnosis) -> Self {
                 let rows = $crate::table::findings::ranked(&diagnosis.findings).flat_map(
                     |(rank, finding)| {
                         finding.parameters.iter().map(move |number| $number_row {
@@ -71,7 +71,7 @@ macro_rules! beside_findings {
 
         impl $rivals {
             /// A row for each rival of each finding.
-            pub fn of(diagnosis: &$diagnosis) -> Self {
+            pub fn $rivals_of(diagnosis: &$diagnosis) -> Self {
                 let rows = $crate::table::findings::ranked(&diagnosis.findings).flat_map(
                     |(rank, finding)| {
                         finding.rivals.iter().map(move |rival| $rival_row {
@@ -105,7 +105,7 @@ macro_rules! beside_findings {
 }
 pub(super) use beside_findings;
 
-beside_findings! { Diagnosis => FindingNumbers of FindingNumberRow, Rivals of RivalRow }
+beside_findings! { Diagnosis => FindingNumbers::of of FindingNumberRow, Rivals::of of RivalRow }
 
 impl Findings {
     /// A row for each finding.

@@ -116,6 +116,7 @@ macro_rules! tables {
 }
 
 mod cause_grid;
+mod drives;
 mod findings;
 mod motion;
 mod network;
@@ -143,6 +144,7 @@ tables! {
     covariance => CovarianceTable of CovarianceRow,
     curves => Curves of CurveRow,
     document => Document of DocumentRow,
+    drive_verdict => DriveVerdict of DriveVerdictRow,
     finding_numbers => FindingNumbers of FindingNumberRow,
     findings => Findings of FindingRow,
     fit => Fit of FitRow,
@@ -155,6 +157,7 @@ tables! {
     friction_curves => FrictionCurves of FrictionCurveRow,
     inertials => Inertials of InertialRow,
     intake => Intake of IntakeRow,
+    joint_drives => JointDrives of JointDriveRow,
     joint_torques => JointTorques of JointTorqueRow,
     motion => ArmMotion,
     network => Network of NetworkRow,

@@ -27,7 +27,7 @@ use crate::dynamics::{
 };
 use crate::effect::Place;
 
-beside_findings! { TorqueDiagnosis => TorqueNumbers of TorqueNumberRow, TorqueRivals of TorqueRivalRow }
+beside_findings! { TorqueDiagnosis => TorqueNumbers::of of TorqueNumberRow, TorqueRivals::of of TorqueRivalRow }
 
 impl TorqueFindings {
     /// A row for each finding.

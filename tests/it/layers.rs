@@ -8,7 +8,7 @@ use crate::source::{Source, sources, uses};
 
 /// What every layer may use without saying so.
 const FREE: [&str; 3] = ["error", "units", "statistics"];
-const NUMERICS: [&str; 8] = [
+const NUMERICS: [&str; 10] = [
     "description",
     "spatial",
     "robot",
@@ -17,6 +17,8 @@ const NUMERICS: [&str; 8] = [
     "estimate",
     "diagnose",
     "dynamics",
+    "engine",
+    "drives",
 ];
 
 fn source() -> PathBuf {
@@ -70,7 +72,7 @@ fn every_layer_is_a_row_of_the_map_and_every_row_a_layer() {
                 .strip_suffix(';')
                 .map(String::from)
         })
-        .chain(["diagnose", "dynamics", "twin"].map(String::from))
+        .chain(["diagnose", "drives", "dynamics", "engine", "twin"].map(String::from))
         .collect();
     assert_eq!(declared, table().into_keys().collect::<BTreeSet<_>>());
 }

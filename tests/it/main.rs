@@ -30,6 +30,7 @@ mod desk;
 mod diagnose;
 mod diff;
 mod digests;
+mod drives;
 mod effects;
 mod export;
 mod fixture;

@@ -1,0 +1,250 @@
+//! What a diagnosis of drives says.
+
+use crate::causes::Key;
+use crate::chain::Chain;
+use crate::fit::DriveFit;
+use crate::physics::Physics;
+use crate::problem::Drives;
+use crate::rollout::Which;
+use calib_engine::{Accepted, Finding, Options};
+
+/// A number of a finding.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveNumber {
+    /// What it is.
+    pub name: String,
+    /// In its unit.
+    pub value: f64,
+    /// Its unit.
+    pub unit: &'static str,
+    /// One standard deviation; `None` where it was chosen from a few.
+    pub sigma: Option<f64>,
+}
+
+/// What else a finding may be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveRival {
+    /// A cause.
+    pub effect: &'static str,
+    /// Where it would act.
+    pub place: String,
+    /// Twice the ln of the odds of the finding against it.
+    pub delta_bic: f64,
+    /// Probability that it is this.
+    pub probability: f64,
+}
+
+/// A cause that the simulation lacks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveFinding {
+    /// Its cause.
+    pub effect: &'static str,
+    /// Where it acts.
+    pub place: String,
+    /// A sentence for a person.
+    pub statement: String,
+    /// Its numbers.
+    pub parameters: Vec<DriveNumber>,
+    /// rad, rms of the whole effect over the fitted rows.
+    pub effect_rms: f64,
+    /// Of its name at its place.
+    pub probability: f64,
+    /// Of its place.
+    pub place_probability: f64,
+    /// That there is nothing.
+    pub none_probability: f64,
+    /// Twice the ln of the odds against the model without it.
+    pub delta_bic: f64,
+    /// What else it may be.
+    pub rivals: Vec<DriveRival>,
+}
+
+/// Errors of a joint, rad rms.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct JointError {
+    /// Of the noise as stated.
+    pub noise: f64,
+    /// Fitted rows, before and after.
+    pub fitted: [f64; 2],
+    /// Held-out rows, before and after; those of fitted rows where none are held out.
+    pub held_out: [f64; 2],
+    /// Whitened, of fitted rows after.
+    pub over_noise: f64,
+}
+
+/// A diagnosis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveDiagnosis {
+    /// Causes, strongest first.
+    pub findings: Vec<DriveFinding>,
+    /// By joint.
+    pub joints: Vec<JointError>,
+    /// Whether rows were held out.
+    pub held_out: bool,
+    /// rad rms over all joints: noise; fitted before and after; held out before and after.
+    pub overall: JointError,
+    /// The simulation with what was found.
+    pub physics: Physics,
+    /// Whether noise alone remains.
+    pub explained: bool,
+    /// Rows that were fitted.
+    pub rows: usize,
+}
+
+/// Times the noise from which on something remains.
+const REMAINS: f64 = 1.1;
+
+/// Diagnoses a recording of drives; `tell` receives the progress.
+pub fn diagnose(problem: &Drives, options: &Options, tell: impl FnMut(String)) -> DriveDiagnosis {
+    let answer = calib_engine::diagnose(problem, options, tell);
+    let findings = answer.findings.iter();
+    let findings = findings
+        .map(|finding| problem.finding(&answer.after, finding))
+        .collect();
+    let physics = problem.physics(&answer.after.inertia, &answer.after.set);
+    let before = problem.angles(&problem.base, Which::All);
+    let after = problem.angles(&physics, Which::All);
+    let n = problem.chain.joints();
+    let held_out = problem.recording.trajectories.iter().any(|t| t.held_out);
+    let mut joints: Vec<JointError> = (0..n)
+        .map(|joint| problem.errors(Some(joint), [&before, &after]))
+        .collect();
+    let rows = problem.fitted().count();
+    let squares = problem.squares(&after);
+    for (joint, square) in joints.iter_mut().zip(&squares) {
+        joint.over_noise = (square / rows as f64).sqrt();
+    }
+    let mut overall = problem.errors(None, [&before, &after]);
+    overall.over_noise = (squares.iter().sum::<f64>() / (rows * n) as f64).sqrt();
+    DriveDiagnosis {
+        findings,
+        explained: joints.iter().all(|joint| joint.over_noise < REMAINS),
+        joints,
+        held_out,
+        overall,
+        physics,
+        rows,
+    }
+}
+
+impl Drives {
+    /// The chain of the arm.
+    pub fn chain(&self) -> &Chain {
+        &self.chain
+    }
+
+    fn errors(&self, joint: Option<usize>, angles: [&Vec<f64>; 2]) -> JointError {
+        let n = self.chain.joints();
+        let of = |row: usize| -> Vec<usize> {
+            (0..n)
+                .filter(|j| joint.is_none_or(|one| one == *j))
+                .map(|j| row * n + j)
+                .collect()
+        };
+        let rms = |held: bool, angles: &Vec<f64>| {
+            let rows = self
+                .recording
+                .trajectories
+                .iter()
+                .filter(|t| t.held_out == held)
+                .flat_map(|t| t.rows.clone());
+            let all: Vec<f64> = rows
+                .flat_map(of)
+                .map(|at| (self.recording.angle[at] - angles[at]).powi(2))
+                .collect();
+            (all.iter().sum::<f64>() / all.len().max(1) as f64).sqrt()
+        };
+        let any = self.recording.trajectories.iter().any(|t| t.held_out);
+        let noise =
+            |j: usize| self.recording.noise[j].powi(2) + self.recording.encoder[j].powi(2) / 12.0;
+        let noises: Vec<f64> = (0..n)
+            .filter(|j| joint.is_none_or(|one| one == *j))
+            .map(noise)
+            .collect();
+        JointError {
+            noise: (noises.iter().sum::<f64>() / noises.len() as f64).sqrt(),
+            fitted: angles.map(|angles| rms(false, angles)),
+            held_out: angles.map(|angles| rms(any, angles)),
+            over_noise: 0.0,
+        }
+    }
+
+    fn finding(&self, fit: &DriveFit, finding: &Finding<Key>) -> DriveFinding {
+        let one = &finding.accepted;
+        let at = fit.set.iter().position(|other| other.cell == one.cell);
+        let sigma = at.map_or(&[][..], |at| &fit.sigma[at][..]);
+        let rest: Vec<Accepted<Key>> = fit
+            .set
+            .iter()
+            .filter(|other| other.cell != one.cell)
+            .cloned()
+            .collect();
+        let without = self.angles(&self.physics(&fit.inertia, &rest), Which::Fitted);
+        let rows: Vec<f64> = self
+            .fitted()
+            .flat_map(|row| row * self.chain.joints()..(row + 1) * self.chain.joints())
+            .map(|k| (without[k] - fit.angles[k]).powi(2))
+            .collect();
+        let cell = &one.cell;
+        let numbers = cell.cause.numbers.iter().zip(&one.numbers).enumerate();
+        let mut parameters: Vec<DriveNumber> = numbers
+            .map(|(k, (number, x))| {
+                let sigma = sigma.get(k).copied().filter(|sigma| *sigma > 0.0);
+                let value = if number.by_logarithm { x.exp() } else { *x };
+                let by = if number.by_logarithm { value } else { 1.0 };
+                DriveNumber {
+                    name: number.name.into(),
+                    value,
+                    unit: number.unit,
+                    sigma: sigma.map(|sigma| sigma * by),
+                }
+            })
+            .collect();
+        if let Key::Ripple(_, waves) = cell.key {
+            parameters.push(DriveNumber {
+                name: "waves per turn".into(),
+                value: f64::from(waves),
+                unit: "1",
+                sigma: None,
+            });
+        }
+        if let Key::Coupling(_, by) = cell.key {
+            parameters.push(DriveNumber {
+                name: "by joint".into(),
+                value: by as f64 + 1.0,
+                unit: "1",
+                sigma: None,
+            });
+        }
+        DriveFinding {
+            effect: cell.cause.name,
+            place: cell.place.clone(),
+            statement: sentence(cell.cause.sentence, &cell.place),
+            parameters,
+            effect_rms: (rows.iter().sum::<f64>() / rows.len().max(1) as f64).sqrt(),
+            probability: finding.probability,
+            place_probability: finding.place_probability,
+            none_probability: finding.none_probability,
+            delta_bic: 2.0 * finding.log_odds,
+            rivals: finding
+                .rivals
+                .iter()
+                .map(|rival| DriveRival {
+                    effect: rival.accepted.cell.cause.name,
+                    place: rival.accepted.cell.place.clone(),
+                    delta_bic: -2.0 * rival.log_odds,
+                    probability: rival.probability,
+                })
+                .collect(),
+        }
+    }
+}
+
+fn sentence(words: &str, place: &str) -> String {
+    let text = words.replace("{}", place);
+    let mut letters = text.chars();
+    let first = letters
+        .next()
+        .map(|letter| letter.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str() + "."
+}

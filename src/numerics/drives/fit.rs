@@ -1,0 +1,424 @@
+//! Everything at once, in the roll-out itself: Gauss-Newton on the numbers of causes and on inertials under their tolerance.
+
+use crate::causes::Key;
+use crate::problem::{Drives, FREE};
+use crate::rollout::{Direction, Which, roll};
+use calib_engine::Accepted;
+use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
+
+/// The statement of the noise counts as so many rows.
+const NU: f64 = 20.0;
+
+/// Steps of Gauss and Newton at most, and the fall of the objective, and the share of it, below which no further one is made.
+struct Patience {
+    steps: usize,
+    fall: f64,
+    share: f64,
+}
+
+/// Of a trial among many, and of what stands.
+const TRIAL: Patience = Patience {
+    steps: 6,
+    fall: 0.5,
+    share: 5e-4,
+};
+const STANDS: Patience = Patience {
+    steps: 10,
+    fall: 0.05,
+    share: 1e-5,
+};
+
+/// A fitted model.
+#[derive(Debug, Clone)]
+pub struct DriveFit {
+    /// Causes with their numbers.
+    pub set: Vec<Accepted<Key>>,
+    /// Inertials, in standard deviations of their tolerance, five a link.
+    pub inertia: Vec<f64>,
+    /// Simulated angles of fitted rows, rad.
+    pub angles: Vec<f64>,
+    /// Whitened squared residual of fitted rows.
+    pub square: f64,
+    /// Fitted numbers.
+    pub freedom: f64,
+    /// Effective rows a row.
+    pub independence: f64,
+    /// Squared distance of all numbers from where they are expected, in their usual sizes.
+    pub penalty: f64,
+    /// One standard deviation of each number of the set, as it is fitted.
+    pub sigma: Vec<Vec<f64>>,
+    /// ln of the prior odds of the set.
+    pub log_prior: f64,
+    /// Products of the columns in units of their priors.
+    gram: DMatrix<f64>,
+    /// Responses to the inertials, each rows x joints, rad: they hardly change with the causes.
+    responses: Arc<Vec<Vec<f64>>>,
+}
+
+/// Sums of products of columns.
+pub(crate) struct Normal {
+    count: usize,
+    gram: Vec<f64>,
+    pub(crate) gradient: Vec<f64>,
+    pub(crate) square: f64,
+}
+
+impl Normal {
+    pub(crate) fn new(count: usize) -> Self {
+        Self {
+            count,
+            gram: vec![0.0; count * count],
+            gradient: vec![0.0; count],
+            square: 0.0,
+        }
+    }
+
+    pub(crate) fn add(&mut self, x: &[f64], residual: f64) {
+        self.square += residual * residual;
+        for i in 0..self.count {
+            if x[i] != 0.0 {
+                self.gradient[i] += x[i] * residual;
+                let line = &mut self.gram[i * self.count..(i + 1) * self.count];
+                line.iter_mut()
+                    .zip(x)
+                    .for_each(|(sum, x_k)| *sum += x[i] * x_k);
+            }
+        }
+    }
+
+    pub(crate) fn gram_matrix(&self) -> DMatrix<f64> {
+        DMatrix::from_row_slice(self.count, self.count, &self.gram)
+    }
+}
+
+/// Where a column comes from: a direction, or a roll-out of its own (rows x joints, rad); and the size of the change.
+enum Source {
+    Carried(usize, f64),
+    Rolled(Vec<f64>, f64),
+    /// One of the responses to the inertials.
+    Known(Arc<Vec<Vec<f64>>>, usize),
+}
+
+/// Columns of all that is free in a model.
+pub(crate) struct BaseColumns {
+    /// Those that the step's derivative carries, the first of a roll-out's.
+    pub(crate) directions: Vec<Direction>,
+    sources: Vec<Source>,
+    /// Of the priors.
+    pub(crate) precision: Vec<f64>,
+    /// Cause and number of each column beyond the inertials.
+    numbers: Vec<(usize, usize)>,
+}
+
+impl BaseColumns {
+    pub(crate) fn count(&self) -> usize {
+        self.sources.len()
+    }
+
+    /// The columns at a row and joint, whitened.
+    pub(crate) fn at(&self, at: usize, change: &[f64], sigma: f64, out: &mut [f64]) {
+        for (out, source) in out.iter_mut().zip(&self.sources) {
+            *out = match source {
+                Source::Carried(k, size) => change[*k] / (size * sigma),
+                Source::Rolled(changes, size) => changes[at] / (size * sigma),
+                Source::Known(responses, k) => responses[*k][at] / sigma,
+            };
+        }
+    }
+}
+
+/// ln of the likelihood of a squared residual: with the scale of the noise integrated where it is above its statement.
+fn log_likelihood(square: f64, rows: f64, independence: f64) -> f64 {
+    let n = rows * independence;
+    if square < rows {
+        -0.5 * independence * (square - rows)
+    } else {
+        -0.5 * (n + NU) * ((NU + square * independence) / (NU + n)).ln()
+    }
+}
+
+impl DriveFit {
+    /// ln of the evidence, where so large a share of the rows is independent.
+    pub fn log_evidence(&self, independence: f64) -> f64 {
+        let scale = (self.square / self.freedom).max(1.0);
+        let whole = &self.gram * (independence / scale)
+            + DMatrix::identity(self.gram.nrows(), self.gram.ncols());
+        let log_det = whole.cholesky().map_or(f64::INFINITY, |factor| {
+            2.0 * factor
+                .l_dirty()
+                .diagonal()
+                .iter()
+                .map(|d| d.ln())
+                .sum::<f64>()
+        });
+        log_likelihood(self.square, self.freedom, independence) - 0.5 * self.penalty - 0.5 * log_det
+            + self.log_prior
+    }
+}
+
+impl Drives {
+    /// Columns of inertials and of the numbers of a fit.
+    pub(crate) fn base_columns(&self, fit: &DriveFit, anew: bool) -> BaseColumns {
+        let now = self.physics(&fit.inertia, &fit.set);
+        let mut columns = BaseColumns {
+            directions: Vec::new(),
+            sources: Vec::new(),
+            precision: Vec::new(),
+            numbers: Vec::new(),
+        };
+        for k in 0..fit.inertia.len() {
+            columns.precision.push(1.0);
+            if !anew && k < fit.responses.len() {
+                columns
+                    .sources
+                    .push(Source::Known(fit.responses.clone(), k));
+                continue;
+            }
+            let mut inertia = fit.inertia.clone();
+            inertia[k] += 0.1;
+            let changed = self.physics(&inertia, &fit.set);
+            columns
+                .sources
+                .push(Source::Carried(columns.directions.len(), 0.1));
+            columns.directions.push(Direction::between(&now, &changed));
+        }
+        for (c, accepted) in fit.set.iter().enumerate() {
+            let shape = &accepted.cell.shapes[accepted.shape];
+            for (k, usual) in shape
+                .usual
+                .iter()
+                .enumerate()
+                .filter(|(_, usual)| **usual > 0.0)
+            {
+                let memory = accepted.cell.key.has_memory();
+                let size = if memory { 0.02 * usual } else { 2e-3 * usual };
+                let mut set = fit.set.clone();
+                set[c].numbers[k] += size;
+                let changed = self.physics(&fit.inertia, &set);
+                let source = match memory {
+                    true => {
+                        let mut rolled = self.angles(&changed, Which::Fitted);
+                        for (angle, before) in rolled.iter_mut().zip(&fit.angles) {
+                            *angle = if angle.is_finite() {
+                                *angle - before
+                            } else {
+                                0.0
+                            };
+                        }
+                        Source::Rolled(rolled, size)
+                    }
+                    false => {
+                        columns.directions.push(Direction::between(&now, &changed));
+                        Source::Carried(columns.directions.len() - 1, size)
+                    }
+                };
+                columns.sources.push(source);
+                columns.precision.push(1.0 / (usual * usual));
+                columns.numbers.push((c, k));
+            }
+        }
+        columns
+    }
+
+    /// Simulated angles of a set, and their whitened square; infinite where the simulation runs away.
+    fn evaluated(&self, inertia: &[f64], set: &[Accepted<Key>]) -> (Vec<f64>, f64) {
+        let angles = self.angles(&self.physics(inertia, set), Which::Fitted);
+        let square: f64 = self.squares(&angles).iter().sum();
+        let square = if square.is_finite() {
+            square
+        } else {
+            f64::INFINITY
+        };
+        (angles, square)
+    }
+
+    /// Fits inertials and a set's numbers from where they are.
+    pub(crate) fn fitted_with(
+        &self,
+        set: &[Accepted<Key>],
+        before: Option<&DriveFit>,
+        anew: bool,
+    ) -> DriveFit {
+        let anew = anew || before.is_none();
+        let patience = if anew { &STANDS } else { &TRIAL };
+        let n = self.chain.joints();
+        let inertia = before.map_or_else(|| vec![0.0; FREE * n], |fit| fit.inertia.clone());
+        let freedom = (self.fitted().count() * n) as f64;
+        let (angles, square) = self.evaluated(&inertia, set);
+        let mut fit = DriveFit {
+            set: set.to_vec(),
+            inertia,
+            angles,
+            square,
+            freedom,
+            independence: before.map_or(1.0, |fit| fit.independence),
+            penalty: 0.0,
+            sigma: Vec::new(),
+            log_prior: set
+                .iter()
+                .map(|one| one.cell.log_prior + one.cell.shapes[one.shape].log_weight)
+                .sum(),
+            gram: DMatrix::zeros(0, 0),
+            responses: before.map_or_else(Default::default, |fit| fit.responses.clone()),
+        };
+        if before.is_none() {
+            fit.independence = self.independence_of(&fit.angles);
+        }
+        let weigh = |fit: &DriveFit| fit.independence / (fit.square / freedom).max(1.0);
+        let mut normal;
+        let mut step = 0;
+        let columns = loop {
+            let columns = self.base_columns(&fit, anew && step < 2);
+            normal = self.normal(&mut fit, &columns);
+            let weight = weigh(&fit);
+            let distance = self.distances(&fit, &columns);
+            let penalty = self.penalty(&fit);
+            if step == patience.steps || !fit.square.is_finite() || columns.count() == 0 {
+                break columns;
+            }
+            step += 1;
+            let gram = normal.gram_matrix() * weight;
+            let precision = DVector::from_column_slice(&columns.precision);
+            let gradient = DVector::from_column_slice(&normal.gradient) * weight
+                - distance.component_mul(&precision);
+            let whole = gram + DMatrix::from_diagonal(&precision);
+            let Some(factor) = whole.cholesky() else {
+                break columns;
+            };
+            let change = factor.solve(&gradient);
+            let objective = weight * fit.square + penalty;
+            let (mut by, mut moved) = (1.0, None);
+            while by > 0.02 {
+                let mut trial = fit.clone();
+                let nb = trial.inertia.len();
+                for (k, number) in trial.inertia.iter_mut().enumerate() {
+                    *number += by * change[k];
+                }
+                for ((c, k), by_column) in columns.numbers.iter().zip(change.iter().skip(nb)) {
+                    let usual = trial.set[*c].cell.shapes[trial.set[*c].shape].usual[*k];
+                    // No further than the linear model can be believed.
+                    trial.set[*c].numbers[*k] += (by * by_column).clamp(-3.0 * usual, 3.0 * usual);
+                }
+                (trial.angles, trial.square) = self.evaluated(&trial.inertia, &trial.set);
+                let now = weight * trial.square + self.penalty(&trial);
+                if now < objective {
+                    moved = Some((trial, objective - now));
+                    break;
+                }
+                by *= 0.4;
+            }
+            let Some((next, fall)) = moved else {
+                break columns;
+            };
+            fit = next;
+            if fall < patience.fall.max(patience.share * objective) {
+                let columns = self.base_columns(&fit, anew);
+                normal = self.normal(&mut fit, &columns);
+                break columns;
+            }
+        };
+        fit.independence = self.independence_of(&fit.angles);
+        fit.penalty = self.penalty(&fit);
+        let roots: Vec<f64> = columns.precision.iter().map(|p| 1.0 / p.sqrt()).collect();
+        let gram = normal.gram_matrix();
+        fit.gram = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, k| {
+            roots[i] * gram[(i, k)] * roots[k]
+        });
+        fit.sigma = fit
+            .set
+            .iter()
+            .map(|one| vec![0.0; one.numbers.len()])
+            .collect();
+        let weight = weigh(&fit);
+        let whole = &fit.gram * weight + DMatrix::identity(gram.nrows(), gram.ncols());
+        if let Some(inverse) = whole.cholesky().map(|factor| factor.inverse()) {
+            let nb = fit.inertia.len();
+            for (at, (c, k)) in columns.numbers.iter().enumerate() {
+                fit.sigma[*c][*k] = inverse[(nb + at, nb + at)].sqrt() * roots[nb + at];
+            }
+        }
+        fit
+    }
+
+    /// Products of the columns around a fit; responses to the inertials are kept where they were made anew.
+    fn normal(&self, fit: &mut DriveFit, columns: &BaseColumns) -> Normal {
+        let n = self.chain.joints();
+        let physics = self.physics(&fit.inertia, &fit.set);
+        let mut normal = Normal::new(columns.count());
+        let mut x = vec![0.0; columns.count()];
+        let anew = matches!(columns.sources.first(), Some(Source::Carried(..)))
+            .then_some(fit.inertia.len());
+        let mut responses = vec![vec![0.0; fit.angles.len()]; anew.unwrap_or(0)];
+        roll(
+            &self.chain,
+            &physics,
+            &self.recording,
+            &columns.directions,
+            Which::Fitted,
+            |row| {
+                for joint in 0..n {
+                    let at = row.row * n + joint;
+                    let sigma = self.sigma[at];
+                    columns.at(at, row.change[joint], sigma, &mut x);
+                    responses
+                        .iter_mut()
+                        .zip(&x)
+                        .for_each(|(response, x)| response[at] = x * sigma);
+                    normal.add(&x, (self.recording.angle[at] - row.angle[joint]) / sigma);
+                }
+            },
+        );
+        if anew.is_some() {
+            fit.responses = Arc::new(responses);
+        }
+        normal
+    }
+
+    /// Of every number from where it is expected.
+    fn distances(&self, fit: &DriveFit, columns: &BaseColumns) -> DVector<f64> {
+        let numbers = columns.numbers.iter().map(|(c, k)| {
+            let one = &fit.set[*c];
+            one.numbers[*k] - one.cell.shapes[one.shape].centre[*k]
+        });
+        DVector::from_iterator(columns.count(), fit.inertia.iter().copied().chain(numbers))
+    }
+
+    fn penalty(&self, fit: &DriveFit) -> f64 {
+        let inertia: f64 = fit.inertia.iter().map(|x| x * x).sum();
+        let numbers: f64 = fit
+            .set
+            .iter()
+            .map(|one| {
+                let shape = &one.cell.shapes[one.shape];
+                let all = one.numbers.iter().zip(&shape.centre).zip(&shape.usual);
+                all.filter(|(_, usual)| **usual > 0.0)
+                    .map(|((x, at), usual)| ((x - at) / usual).powi(2))
+                    .sum::<f64>()
+            })
+            .sum();
+        inertia + numbers
+    }
+
+    /// Effective rows a row, by the correlation of the residual from row to row.
+    fn independence_of(&self, angles: &[f64]) -> f64 {
+        let n = self.chain.joints();
+        let (mut next, mut own) = (0.0, 0.0);
+        for trajectory in self.recording.trajectories.iter().filter(|t| !t.held_out) {
+            for at in trajectory.rows.start * n..trajectory.rows.end * n {
+                let whitened = |at: usize| (self.recording.angle[at] - angles[at]) / self.sigma[at];
+                let here = whitened(at);
+                own += here * here;
+                if at >= trajectory.rows.start * n + n {
+                    next += here * whitened(at - n);
+                }
+            }
+        }
+        let correlation = if own > 0.0 && own.is_finite() {
+            (next / own).clamp(0.0, 0.998)
+        } else {
+            0.0
+        };
+        (1.0 - correlation) / (1.0 + correlation)
+    }
+}

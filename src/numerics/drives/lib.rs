@@ -1,0 +1,25 @@
+//! Commands and responses of a simulated arm: which physics its simulation leaves out, without tracker and without torques.
+//!
+//! The simulation is rolled out along the commands; the residual is measured minus simulated angle. A cause is a change of the
+//! simulation's physics; its columns are the responses of the linearised closed loop, and what is accepted goes into the simulation, which
+//! is rolled out again. [`Drives`] is a problem of the one engine (`calib_engine`).
+
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+#[cfg(test)]
+mod against_mujoco;
+mod answer;
+mod causes;
+pub mod chain;
+mod fit;
+pub mod mjcf;
+pub mod physics;
+mod problem;
+pub mod recording;
+pub mod rollout;
+
+pub use answer::{DriveDiagnosis, DriveFinding, DriveNumber, DriveRival, JointError, diagnose};
+pub use causes::{CAUSES, Key, Usual};
+pub use fit::DriveFit;
+pub use problem::Drives;

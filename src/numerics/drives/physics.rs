@@ -1,0 +1,291 @@
+//! What a simulated drive and its joint do: torques of one instant, as a function of the motion and of the physics alone.
+
+use crate::chain::Bodies;
+use nalgebra::Point3;
+
+/// A function of one variable by its values at even knots, which is held beyond them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// What it follows.
+    pub over: Over,
+    /// The first knot, and the distance between two.
+    pub knots: [f64; 2],
+    /// Nm at the knots.
+    pub values: Vec<f64>,
+    /// Whether it is a limit of dry friction rather than a torque.
+    pub dry: bool,
+}
+
+/// What a curve follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Over {
+    /// Position of a joint.
+    Angle(usize),
+    /// Speed of a joint without its sign.
+    Speed(usize),
+    /// Signed speed of a joint.
+    Velocity(usize),
+    /// Acceleration of a joint.
+    Acceleration(usize),
+    /// Time.
+    Time,
+}
+
+impl Curve {
+    fn at(&self, motion: &Motion) -> f64 {
+        let x = match self.over {
+            Over::Angle(joint) => motion.q[joint],
+            Over::Speed(joint) => motion.v[joint].abs(),
+            Over::Velocity(joint) => motion.v[joint],
+            Over::Acceleration(joint) => motion.a[joint],
+            Over::Time => motion.time,
+        };
+        let last = self.values.len() - 1;
+        let at = ((x - self.knots[0]) / self.knots[1]).clamp(0.0, last as f64);
+        let k = (at as usize).min(last.saturating_sub(1));
+        let share = at - k as f64;
+        self.values[k] * (1.0 - share) + self.values[(k + 1).min(last)] * share
+    }
+}
+
+/// A spring between rotor and link, with play.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gear {
+    /// Nm/rad.
+    pub stiffness: f64,
+    /// Nm s/rad.
+    pub damping: f64,
+    /// rad, the whole of it.
+    pub play: f64,
+    /// Whether the encoder is on the link instead of the rotor.
+    pub encoder_on_link: bool,
+}
+
+/// Share of the armature that is on the rotor's side of a gear that yields.
+pub const ROTOR_SHARE: f64 = 0.95;
+
+/// A joint and its drive; a value that changes nothing is 0, infinite or empty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Joint {
+    /// Nm/rad.
+    pub kp: f64,
+    /// Nm s/rad.
+    pub kd: f64,
+    /// Whether the commanded speed is in the damping.
+    pub kd_on_error: bool,
+    /// Nm.
+    pub limit: f64,
+    /// rad, added to the command.
+    pub offset: f64,
+    /// s.
+    pub delay: f64,
+    /// rad.
+    pub dead_band: f64,
+    /// rad/s of the set point.
+    pub speed_limit: f64,
+    /// Nm/(rad s), and the most of it, Nm.
+    pub integral: [f64; 2],
+    /// Nm s/rad.
+    pub damping: f64,
+    /// Nm.
+    pub friction: f64,
+    /// Nm, and rad/s in which it is gone.
+    pub stribeck: [f64; 2],
+    /// Nm of friction per Nm of drive torque: driving, driven back.
+    pub load_friction: [f64; 2],
+    /// rad until friction is whole.
+    pub presliding: f64,
+    /// Share of friction more at the beginning, and s in which it goes.
+    pub warm_up: [f64; 2],
+    /// kg m^2.
+    pub armature: f64,
+    /// Nm/rad, and rad where it is at rest.
+    pub spring: [f64; 2],
+    /// Waves a turn, Nm of cosine and sine.
+    pub ripple: Vec<[f64; 3]>,
+    /// Joint whose drive's torque is felt here, and which share.
+    pub coupling: Vec<(usize, f64)>,
+    /// Curves without a law.
+    pub curves: Vec<Curve>,
+    /// A gear that yields.
+    pub gear: Option<Gear>,
+}
+
+/// The whole simulation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Physics {
+    /// Joints with their drives.
+    pub joints: Vec<Joint>,
+    /// What they carry.
+    pub bodies: Bodies,
+    /// The tool point at the reference pose, m.
+    pub tool: Point3<f64>,
+    /// s between two commands that are taken; 0 takes all.
+    pub hold: f64,
+    /// Share of the torque that is lost per Nm that all drives together give.
+    pub sag: f64,
+}
+
+/// s, in which the supply's voltage follows the load.
+pub const SAG_LAG: f64 = 0.02;
+
+/// An instant of the motion.
+#[derive(Debug, Clone, Copy)]
+pub struct Motion<'a> {
+    /// Positions: of links, then of rotors that move by themselves.
+    pub q: &'a [f64],
+    /// Speeds.
+    pub v: &'a [f64],
+    /// Accelerations of the step before.
+    pub a: &'a [f64],
+    /// s.
+    pub time: f64,
+    /// Nm of the drives in the step before.
+    pub driven: &'a [f64],
+}
+
+/// What is commanded in a step, and what a drive remembers.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Commanded {
+    /// rad, mean over the step.
+    pub angle: f64,
+    /// rad/s.
+    pub speed: f64,
+    /// Nm of the integral of the error.
+    pub integral: f64,
+    /// rad of presliding, from -1 to 1 of the travel.
+    pub bent: f64,
+}
+
+/// Torques on a joint.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Torque {
+    /// Of the drive, Nm.
+    pub drive: f64,
+    /// All of it but dry friction, on the rotor where that moves by itself, else on the link.
+    pub smooth: f64,
+    /// On the link where the rotor moves by itself.
+    pub link: f64,
+    /// Nm, up to which dry friction holds.
+    pub limit: f64,
+    /// Fall of `smooth` per rad and per rad/s.
+    pub stiffness: f64,
+    /// See there.
+    pub damping: f64,
+    /// Fall of the gear's torque per rad and rad/s between its sides.
+    pub gear: [f64; 2],
+}
+
+impl Default for Joint {
+    /// Neither drive nor friction, nor anything that limits.
+    fn default() -> Self {
+        Self {
+            kp: 0.0,
+            kd: 0.0,
+            kd_on_error: false,
+            limit: f64::INFINITY,
+            offset: 0.0,
+            delay: 0.0,
+            dead_band: 0.0,
+            speed_limit: f64::INFINITY,
+            integral: [0.0; 2],
+            damping: 0.0,
+            friction: 0.0,
+            stribeck: [0.0, 1.0],
+            load_friction: [0.0; 2],
+            presliding: 0.0,
+            warm_up: [0.0, 1.0],
+            armature: 0.0,
+            spring: [0.0; 2],
+            ripple: Vec::new(),
+            coupling: Vec::new(),
+            curves: Vec::new(),
+            gear: None,
+        }
+    }
+}
+
+impl Joint {
+    /// The torques of joint `joint`, whose rotor is degree of freedom `rotor`; `sag` scales what the drive gives.
+    pub fn torque(
+        &self,
+        joint: usize,
+        rotor: usize,
+        motion: &Motion,
+        commanded: &Commanded,
+        sag: f64,
+    ) -> Torque {
+        let mut out = Torque::default();
+        let (q, v) = (motion.q[rotor], motion.v[rotor]);
+        let (seen_q, seen_v, seen) = match &self.gear {
+            Some(gear) if gear.encoder_on_link => (motion.q[joint], motion.v[joint], 0.0),
+            _ => (q, v, 1.0),
+        };
+        let error = commanded.angle + self.offset - seen_q;
+        let felt = error - error.clamp(-self.dead_band, self.dead_band);
+        let speed = if self.kd_on_error {
+            commanded.speed
+        } else {
+            0.0
+        };
+        let asked = self.kp * felt + self.kd * (speed - seen_v) + commanded.integral;
+        let limit = self.limit * sag;
+        let drive = (asked * sag).clamp(-limit, limit);
+        if drive.abs() < limit || limit.is_infinite() {
+            out.damping += self.kd * sag * seen;
+            if self.dead_band == 0.0 || felt != 0.0 {
+                out.stiffness += self.kp * sag * seen;
+            }
+        }
+        out.drive = drive;
+        out.smooth = drive - self.damping * v - self.spring[0] * (q - self.spring[1]);
+        out.damping += self.damping;
+        out.stiffness += self.spring[0].max(0.0);
+        for [waves, cosine, sine] in &self.ripple {
+            let (s, c) = libm::sincos(waves * q);
+            out.smooth += cosine * c + sine * s;
+        }
+        for (by, share) in &self.coupling {
+            out.smooth += share * motion.driven[*by];
+        }
+        let mut dry = self.friction;
+        if self.stribeck[0] != 0.0 {
+            let ratio = v / self.stribeck[1];
+            dry += self.stribeck[0] * libm::exp(-ratio * ratio);
+        }
+        if self.warm_up[0] != 0.0 {
+            dry *= 1.0 + self.warm_up[0] * libm::exp(-motion.time / self.warm_up[1]);
+        }
+        if self.load_friction != [0.0; 2] {
+            let back = drive * v < 0.0;
+            dry += self.load_friction[usize::from(back)] * drive.abs();
+        }
+        for curve in &self.curves {
+            let value = curve.at(motion);
+            match curve.dry {
+                true => dry += value,
+                false => out.smooth += value,
+            }
+        }
+        let dry = dry.max(0.0);
+        if self.presliding > 0.0 {
+            // A spring in place of the stop: it bends with the way and slides when it is bent by its travel.
+            out.smooth -= dry * commanded.bent;
+            out.stiffness += dry / self.presliding * (1.0 - commanded.bent.abs()).max(0.0);
+        } else {
+            out.limit = dry;
+        }
+        if let Some(gear) = &self.gear {
+            let (way, rate) = (q - motion.q[joint], v - motion.v[joint]);
+            let half = 0.5 * gear.play;
+            let bent = way - way.clamp(-half, half);
+            if bent != 0.0 || half == 0.0 {
+                let torque = gear.stiffness * bent + gear.damping * rate;
+                out.smooth -= torque;
+                out.link += torque;
+                out.gear = [gear.stiffness, gear.damping];
+            }
+        }
+        out
+    }
+}

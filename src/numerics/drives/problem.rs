@@ -1,0 +1,377 @@
+//! Commands and responses as a problem of the engine: residual is measured minus simulated angle, whitened by encoder and noise.
+
+use crate::causes::{Key, Usual, cells};
+use crate::chain::Chain;
+use crate::fit::{DriveFit, Normal};
+use crate::physics::Physics;
+use crate::recording::Recording;
+use crate::rollout::{Direction, Which, roll};
+use calib_dynamics::InertialTolerance;
+use calib_engine::{Accepted, Block, Cell, Problem, Rows, Scanned, ranked};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Inertial numbers of a link that are free within their tolerance: mass, centre, inertia.
+pub(crate) const FREE: usize = 5;
+/// rad rms of a unit of amplitude: the amplitudes of the table of causes are those of metres at a tool.
+const UNIT: f64 = 10.0;
+/// Standard deviations of what noise alone makes of a joint's squared residual, above which causes with a memory are asked there.
+const ABOVE_NOISE: f64 = 4.0;
+
+/// A simulated arm and its recording.
+pub struct Drives {
+    /// What moves.
+    pub chain: Chain,
+    /// The simulation as its user has it.
+    pub base: Physics,
+    /// What was commanded and measured.
+    pub recording: Recording,
+    /// One standard deviation of the declared inertials.
+    pub tolerance: InertialTolerance,
+    /// Causes that are not tried.
+    pub without: Vec<String>,
+    pub(crate) sigma: Vec<f64>,
+    pub(crate) usual: Vec<Usual>,
+    /// s.
+    pub(crate) duration: f64,
+}
+
+impl Drives {
+    /// The problem of an arm and its recording.
+    pub fn new(
+        chain: Chain,
+        base: Physics,
+        recording: Recording,
+        tolerance: InertialTolerance,
+    ) -> Self {
+        let sigma = recording.sigma();
+        let duration = recording.time.last().copied().unwrap_or_default()
+            - recording.time.first().copied().unwrap_or_default();
+        let usual = usual(&chain, &base, &recording);
+        Self {
+            chain,
+            base,
+            recording,
+            tolerance,
+            without: Vec::new(),
+            sigma,
+            usual,
+            duration,
+        }
+    }
+
+    /// The simulation with inertials within their tolerance and a set of causes.
+    pub(crate) fn physics(&self, inertia: &[f64], set: &[Accepted<Key>]) -> Physics {
+        let mut physics = self.base.clone();
+        for (link, by) in physics.bodies.links.iter_mut().zip(inertia.chunks(FREE)) {
+            link.mass *= (1.0 + self.tolerance.mass_relative * by[0]).max(0.01);
+            for axis in 0..3 {
+                link.centre[axis] += self.tolerance.centre * by[1 + axis];
+            }
+            link.inertia *= (1.0 + self.tolerance.inertia_relative * by[4]).max(0.01);
+        }
+        for accepted in set {
+            accepted
+                .cell
+                .key
+                .apply(&accepted.numbers, &self.usual, self.duration, &mut physics);
+        }
+        physics
+    }
+
+    /// Simulated angles of rows, 0 of those that are not rolled out.
+    pub(crate) fn angles(&self, physics: &Physics, which: Which) -> Vec<f64> {
+        let n = self.chain.joints();
+        let mut angles = vec![0.0; self.recording.angle.len()];
+        roll(&self.chain, physics, &self.recording, &[], which, |row| {
+            angles[row.row * n..(row.row + 1) * n].copy_from_slice(row.angle);
+        });
+        angles
+    }
+
+    /// Rows that are fitted.
+    pub(crate) fn fitted(&self) -> impl Iterator<Item = usize> + '_ {
+        let fitted = self.recording.trajectories.iter().filter(|t| !t.held_out);
+        fitted.flat_map(|t| t.rows.clone())
+    }
+
+    /// Whitened squared residual of fitted rows, joint by joint.
+    pub(crate) fn squares(&self, angles: &[f64]) -> Vec<f64> {
+        let n = self.chain.joints();
+        let mut squares = vec![0.0; n];
+        for row in self.fitted() {
+            for (joint, square) in squares.iter_mut().enumerate() {
+                let at = row * n + joint;
+                *square += ((self.recording.angle[at] - angles[at]) / self.sigma[at]).powi(2);
+            }
+        }
+        squares
+    }
+}
+
+/// What the simulation as it is does.
+fn usual(chain: &Chain, base: &Physics, recording: &Recording) -> Vec<Usual> {
+    let n = chain.joints();
+    let mut usual = vec![
+        Usual {
+            range: [f64::MAX, f64::MIN],
+            ..Usual::default()
+        };
+        n
+    ];
+    let (mut rows, mut before) = (0.0, vec![0.0; n]);
+    let mut before_row: Option<usize> = None;
+    roll(chain, base, recording, &[], Which::Fitted, |row| {
+        rows += 1.0;
+        for (j, u) in usual.iter_mut().enumerate() {
+            let command = recording.command[row.row * n + j];
+            let angle = recording.angle[row.row * n + j];
+            u.torque[0] += row.drive[j].powi(2);
+            u.torque[1] = u.torque[1].max(row.drive[j].abs());
+            u.speed[0] += row.speed[j].powi(2);
+            u.speed[1] = u.speed[1].max(row.speed[j].abs());
+            u.error += (command - row.angle[j]).powi(2);
+            u.range = [u.range[0].min(angle), u.range[1].max(angle)];
+            if let Some(last) = before_row.filter(|last| last + 1 == row.row) {
+                let dt = recording.time[row.row] - recording.time[last];
+                u.acceleration += ((row.speed[j] - before[j]) / dt).powi(2);
+                let sent = (command - recording.command[last * n + j]) / recording.period;
+                u.commanded = u.commanded.max(sent.abs());
+            }
+            before[j] = row.speed[j];
+        }
+        before_row = Some(row.row);
+    });
+    for u in &mut usual {
+        for sum in [
+            &mut u.torque[0],
+            &mut u.speed[0],
+            &mut u.error,
+            &mut u.acceleration,
+        ] {
+            *sum = (*sum / rows).sqrt();
+        }
+    }
+    usual
+}
+
+/// A column of a scan: a change that the step's derivative carries, or a roll-out of its own.
+enum Column {
+    Carried(Direction),
+    Rolled(Vec<f64>),
+}
+
+impl Problem for Drives {
+    type Key = Key;
+    type Fit = DriveFit;
+
+    fn scan(&self, fit: &DriveFit) -> Vec<Scanned<Key>> {
+        let n = self.chain.joints();
+        let now = self.physics(&fit.inertia, &fit.set);
+        let rows_a_joint = self.fitted().count() as f64;
+        let squares = self.squares(&fit.angles);
+        let level = rows_a_joint * (1.0 + ABOVE_NOISE * (2.0 / rows_a_joint).sqrt());
+        let above = |joint: usize| squares[joint] > level;
+        let any = (0..n).any(above);
+        let asked = |cell: &Cell<Key>| {
+            let excluded = self.without.iter().any(|name| name == cell.cause.name)
+                || fit.set.iter().any(|one| cell.key.excludes(one.cell.key));
+            let seen = match cell.key {
+                Key::Hold | Key::Sag => any,
+                Key::Integral(j)
+                | Key::SpeedLimit(j)
+                | Key::Presliding(j)
+                | Key::Backlash(j, _)
+                | Key::Elasticity(j) => above(j),
+                _ => true,
+            };
+            !excluded && seen
+        };
+        let all = cells(
+            &self.base,
+            &self.usual,
+            self.duration,
+            self.recording.period,
+        );
+        let all: Vec<Cell<Key>> = all.into_iter().filter(asked).collect();
+        // Where each column comes from, in the order of cells, shapes and columns.
+        let asked: Vec<(Key, &Vec<f64>)> = all
+            .iter()
+            .flat_map(|cell| {
+                cell.shapes
+                    .iter()
+                    .flat_map(|shape| shape.columns.iter().map(|x| (cell.key, x)))
+            })
+            .collect();
+        let columns: Vec<Column> = asked
+            .par_iter()
+            .map(|(key, x)| {
+                let mut changed = now.clone();
+                key.apply(x, &self.usual, self.duration, &mut changed);
+                match key.has_memory() {
+                    true => {
+                        let mut angles = self.angles(&changed, Which::Fitted);
+                        for (angle, before) in angles.iter_mut().zip(&fit.angles) {
+                            *angle = if angle.is_finite() {
+                                *angle - before
+                            } else {
+                                0.0
+                            };
+                        }
+                        Column::Rolled(angles)
+                    }
+                    false => Column::Carried(Direction::between(&now, &changed)),
+                }
+            })
+            .collect();
+        let base = self.base_columns(fit, true);
+        let (nb, count) = (base.count(), columns.len());
+        let mut carried = base.directions.clone();
+        let mut place = Vec::with_capacity(count);
+        for column in &columns {
+            if let Column::Carried(direction) = column {
+                place.push(Some(carried.len()));
+                carried.push(direction.clone());
+            } else {
+                place.push(None);
+            }
+        }
+        let mut blocks: Vec<(usize, usize)> = Vec::new();
+        let mut from = 0;
+        for shape in all.iter().flat_map(|cell| &cell.shapes) {
+            blocks.push((from, shape.columns.len()));
+            from += shape.columns.len();
+        }
+        let mut grams: Vec<DMatrix<f64>> =
+            blocks.iter().map(|(_, k)| DMatrix::zeros(*k, *k)).collect();
+        let mut own = Normal::new(nb);
+        let mut cross = vec![0.0; nb * count];
+        let (mut gradient, mut rms) = (vec![0.0; count], vec![0.0; count]);
+        let (mut x, mut b) = (vec![0.0; count], vec![0.0; nb]);
+        roll(
+            &self.chain,
+            &now,
+            &self.recording,
+            &carried,
+            Which::Fitted,
+            |row| {
+                for joint in 0..n {
+                    let at = row.row * n + joint;
+                    let sigma = self.sigma[at];
+                    let residual = (self.recording.angle[at] - row.angle[joint]) / sigma;
+                    base.at(at, row.change[joint], sigma, &mut b);
+                    for (c, column) in columns.iter().enumerate() {
+                        let change = match (column, place[c]) {
+                            (Column::Rolled(angles), _) => angles[at],
+                            (_, Some(k)) => row.change[joint][k],
+                            _ => 0.0,
+                        };
+                        x[c] = change / sigma;
+                        rms[c] += change * change;
+                        gradient[c] += x[c] * residual;
+                    }
+                    own.add(&b, residual);
+                    for (k, b) in b.iter().enumerate() {
+                        if *b != 0.0 {
+                            let line = &mut cross[k * count..(k + 1) * count];
+                            line.iter_mut().zip(&x).for_each(|(sum, x)| *sum += b * x);
+                        }
+                    }
+                    for ((from, k), gram) in blocks.iter().zip(&mut grams) {
+                        let x = &x[*from..from + k];
+                        for i in 0..*k {
+                            if x[i] != 0.0 {
+                                for j in 0..*k {
+                                    gram[(i, j)] += x[i] * x[j];
+                                }
+                            }
+                        }
+                    }
+                }
+            },
+        );
+        let freedom = rows_a_joint * n as f64;
+        let scale = (fit.square / freedom).max(1.0);
+        let precision = DVector::from_vec(base.precision.iter().map(|p| p * scale).collect());
+        let gradient_of_base = DVector::from_column_slice(&own.gradient);
+        let mut rows = Rows::new(
+            (own.square, freedom),
+            &own.gram_matrix(),
+            gradient_of_base,
+            &precision,
+        );
+        rows.square = rows.square.max(freedom);
+        rows.independence = fit.independence;
+        rows.unit = UNIT;
+        let block = |(from, k): (usize, usize), gram: &DMatrix<f64>| Block {
+            gram: gram.clone(),
+            gradient: DVector::from_column_slice(&gradient[from..from + k]),
+            cross: DMatrix::from_fn(nb, k, |i, j| cross[i * count + from + j]),
+            rms: rms[from..from + k]
+                .iter()
+                .map(|sum| (sum / freedom).sqrt())
+                .collect(),
+        };
+        let mut next = 0;
+        let mut scanned = Vec::new();
+        for cell in all {
+            let mut shapes = Vec::new();
+            for shape in &cell.shapes {
+                let (log, size) = rows.evidence(&block(blocks[next], &grams[next]));
+                next += 1;
+                shapes.push(begun(shape, log, &size));
+            }
+            scanned.push((cell, shapes));
+        }
+        ranked(scanned)
+    }
+
+    fn fit(&self, set: &[Accepted<Key>], before: Option<&DriveFit>) -> DriveFit {
+        self.fitted_with(set, before, false)
+    }
+
+    fn settled(&self, fit: &DriveFit) -> DriveFit {
+        self.fitted_with(&fit.set, Some(fit), true)
+    }
+
+    fn set(&self, fit: &DriveFit) -> Vec<Accepted<Key>> {
+        fit.set.clone()
+    }
+
+    fn independence(&self, fit: &DriveFit) -> f64 {
+        fit.independence
+    }
+
+    fn log_evidence(&self, fit: &DriveFit, independence: f64) -> f64 {
+        fit.log_evidence(independence)
+    }
+
+    fn excludes(&self, one: &Key, other: &Key) -> bool {
+        one.excludes(*other)
+    }
+}
+
+/// The numbers from which a shape's fit begins.
+fn begun(shape: &calib_engine::Shape, log: f64, size: &[f64]) -> (f64, Vec<f64>) {
+    let whole = shape.columns.len() == 1 && shape.columns[0] == shape.start;
+    if whole {
+        // The other way round it is not this cause.
+        let log = if size[0] > 0.0 {
+            log
+        } else {
+            f64::NEG_INFINITY
+        };
+        return (log, shape.start.clone());
+    }
+    let mut numbers = shape.start.clone();
+    for (column, size) in shape.columns.iter().zip(size) {
+        for (k, number) in numbers.iter_mut().enumerate() {
+            *number += size * (column[k] - shape.start[k]);
+        }
+    }
+    for (k, number) in numbers.iter_mut().enumerate() {
+        let (at, wide) = (shape.centre[k], 3.0 * shape.usual[k]);
+        *number = number.clamp(at - wide, at + wide);
+    }
+    (log, numbers)
+}

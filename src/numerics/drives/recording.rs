@@ -1,0 +1,278 @@
+//! What was commanded and what the joints did.
+
+use calib_numerics::error::{Error, Result};
+use std::ops::Range;
+
+/// A trajectory: rows of the recording, one after the other, that begin at rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    /// Its rows.
+    pub rows: Range<usize>,
+    /// Whether it judges instead of being fitted.
+    pub held_out: bool,
+}
+
+/// A recording: `rows x joints`, row-major, rad and s.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// s, strictly rising within a trajectory.
+    pub time: Vec<f64>,
+    /// Commanded angles, sent after the row was measured and held until the next.
+    pub command: Vec<f64>,
+    /// Measured angles.
+    pub angle: Vec<f64>,
+    /// Stretches from rest to rest.
+    pub trajectories: Vec<Trajectory>,
+    /// s between two commands.
+    pub period: f64,
+    /// rad, steps of the encoder, by joint.
+    pub encoder: Vec<f64>,
+    /// rad, one standard deviation beside them, by joint.
+    pub noise: Vec<f64>,
+}
+
+/// Commands of one trajectory with those put back whose rows are missing.
+#[derive(Debug, Clone)]
+pub(crate) struct Commands {
+    time: Vec<f64>,
+    /// `time x joints`.
+    value: Vec<f64>,
+    speed: Vec<f64>,
+    /// Integral of value and speed up to each time.
+    summed: Vec<f64>,
+    summed_speed: Vec<f64>,
+    joints: usize,
+}
+
+/// Rows that may be missing between two.
+const GAP: f64 = 12.0;
+/// s at the beginning in which a trajectory rests.
+const REST: f64 = 0.4;
+
+impl Recording {
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.encoder.len()
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Fails where rows cannot be simulated; `label` names the recording.
+    pub fn check(&self, label: &str) -> Result<()> {
+        let n = self.joints();
+        let fail = |message: String| Err(Error::data(label, message));
+        if self.rows() < 20 {
+            return fail(format!("has {} rows; expected at least 20", self.rows()));
+        }
+        if self.command.len() != n * self.rows() || self.angle.len() != n * self.rows() {
+            return fail("commands and angles are not of equal length".into());
+        }
+        for trajectory in &self.trajectories {
+            for row in trajectory.rows.clone().skip(1) {
+                if self.time[row] <= self.time[row - 1] {
+                    let (before, after) = (self.time[row - 1], self.time[row]);
+                    return fail(format!(
+                        "row {}: time {after} s does not come after {before} s; within a trajectory times rise",
+                        row + 1
+                    ));
+                }
+            }
+        }
+        let mut steps: Vec<f64> = self
+            .trajectories
+            .iter()
+            .flat_map(|t| t.rows.clone().skip(1))
+            .map(|row| self.time[row] - self.time[row - 1])
+            .collect();
+        steps.sort_by(f64::total_cmp);
+        let median = steps.get(steps.len() / 2).copied().unwrap_or_default();
+        if (median / self.period - 1.0).abs() > 0.3 {
+            return fail(format!(
+                "rows are {:.4} s apart, the stated rate of commands is {:.4} Hz ({:.4} s): state the rate at which commands are sent, \
+                 `command_rate_hz`, and time in s",
+                median,
+                1.0 / self.period,
+                self.period
+            ));
+        }
+        let still: Vec<String> = (0..n)
+            .filter(|joint| {
+                let all = || (0..self.rows()).map(|row| self.angle[row * n + joint]);
+                let (low, high) = (
+                    all().fold(f64::MAX, f64::min),
+                    all().fold(f64::MIN, f64::max),
+                );
+                let sent = || (0..self.rows()).map(|row| self.command[row * n + joint]);
+                let asked = sent().fold(f64::MIN, f64::max) - sent().fold(f64::MAX, f64::min);
+                high - low < 3.0 * self.encoder[*joint].max(self.noise[*joint])
+                    && asked > 10.0 * self.encoder[*joint].max(1e-3)
+            })
+            .map(|joint| (joint + 1).to_string())
+            .collect();
+        if !still.is_empty() {
+            return fail(format!(
+                "joint {} never moves though it is commanded to; is its column the right one? A joint that is held is left out of `joints`",
+                still.join(", ")
+            ));
+        }
+        Ok(())
+    }
+
+    /// Where a trajectory rests at its beginning.
+    pub(crate) fn start(&self, trajectory: &Trajectory) -> Vec<f64> {
+        let n = self.joints();
+        let begin = self.time[trajectory.rows.start];
+        let rows: Vec<usize> = trajectory
+            .rows
+            .clone()
+            .filter(|row| self.time[*row] - begin < REST)
+            .collect();
+        let mean = |joint: usize| {
+            rows.iter()
+                .map(|row| self.angle[row * n + joint])
+                .sum::<f64>()
+                / rows.len() as f64
+        };
+        (0..n).map(mean).collect()
+    }
+
+    /// Standard deviation of each angle: of a coarse encoder one and the same error stands in all rows in which its count does not change.
+    pub(crate) fn sigma(&self) -> Vec<f64> {
+        let n = self.joints();
+        let mut sigma = vec![0.0; self.angle.len()];
+        for trajectory in &self.trajectories {
+            for joint in 0..n {
+                let step = self.encoder[joint];
+                let mut row = trajectory.rows.start;
+                while row < trajectory.rows.end {
+                    let value = self.angle[row * n + joint];
+                    let mut end = row + 1;
+                    while end < trajectory.rows.end
+                        && (self.angle[end * n + joint] - value).abs() < 0.5 * step
+                    {
+                        end += 1;
+                    }
+                    let variance = self.noise[joint] * self.noise[joint]
+                        + step * step / 12.0 * (end - row) as f64;
+                    for k in row..end {
+                        sigma[k * n + joint] = variance.sqrt().max(1e-9);
+                    }
+                    row = end;
+                }
+            }
+        }
+        sigma
+    }
+
+    pub(crate) fn commands(&self, trajectory: &Trajectory, hold: f64) -> Commands {
+        let n = self.joints();
+        let rows = trajectory.rows.clone();
+        let (mut time, mut value, mut counts) = (Vec::new(), Vec::new(), Vec::new());
+        for row in rows.clone() {
+            if row > rows.start {
+                let (a, b) = (self.time[row - 1], self.time[row]);
+                let gap = ((b - a) / self.period).round();
+                if gap > 1.0 && gap < GAP {
+                    for k in 1..gap as usize {
+                        let share = k as f64 / gap;
+                        time.push(a + (b - a) * share);
+                        counts.push(1.0);
+                        for joint in 0..n {
+                            value.push(self.between(&rows, row, joint, share));
+                        }
+                    }
+                    counts.push(1.0);
+                } else {
+                    counts.push(gap.max(1.0));
+                }
+            } else {
+                counts.push(1.0);
+            }
+            time.push(self.time[row]);
+            value.extend_from_slice(&self.command[row * n..(row + 1) * n]);
+        }
+        if hold > 0.0 {
+            // Commands that come between two that are taken are lost.
+            let (mut taken, mut last) = (0, f64::MIN);
+            for k in 0..time.len() {
+                let slot = ((time[k] - time[0]) / hold + 1e-6).floor();
+                if slot > last {
+                    (taken, last) = (k, slot);
+                }
+                value.copy_within(taken * n..(taken + 1) * n, k * n);
+            }
+        }
+        let mut speed = vec![0.0; value.len()];
+        for k in 1..time.len() {
+            for joint in 0..n {
+                speed[k * n + joint] =
+                    (value[k * n + joint] - value[(k - 1) * n + joint]) / (counts[k] * self.period);
+            }
+        }
+        let summed = |of: &[f64]| {
+            let mut sums = vec![0.0; of.len()];
+            for k in 1..time.len() {
+                for joint in 0..n {
+                    sums[k * n + joint] = sums[(k - 1) * n + joint]
+                        + of[(k - 1) * n + joint] * (time[k] - time[k - 1]);
+                }
+            }
+            sums
+        };
+        Commands {
+            summed: summed(&value),
+            summed_speed: summed(&speed),
+            time,
+            value,
+            speed,
+            joints: n,
+        }
+    }
+
+    /// A command between rows `row - 1` and `row`, by the cubic through the neighbours (Catmull and Rom).
+    fn between(&self, rows: &Range<usize>, row: usize, joint: usize, share: f64) -> f64 {
+        let n = self.joints();
+        let at = |row: usize| self.command[row.clamp(rows.start, rows.end - 1) * n + joint];
+        let (p, a, b, c) = (at(row.saturating_sub(2)), at(row - 1), at(row), at(row + 1));
+        let (m, k) = (0.5 * (b - p), 0.5 * (c - a));
+        let (t, t2, t3) = (share, share * share, share * share * share);
+        a * (2.0 * t3 - 3.0 * t2 + 1.0)
+            + m * (t3 - 2.0 * t2 + t)
+            + b * (3.0 * t2 - 2.0 * t3)
+            + k * (t3 - t2)
+    }
+}
+
+impl Commands {
+    /// Number of the last command sent at a time, from a guess.
+    pub(crate) fn index(&self, time: f64, guess: usize) -> usize {
+        let mut k = guess.min(self.time.len() - 1);
+        while k > 0 && self.time[k] > time {
+            k -= 1;
+        }
+        while k + 1 < self.time.len() && self.time[k + 1] <= time {
+            k += 1;
+        }
+        k
+    }
+
+    /// Means of command and commanded speed between two times.
+    pub(crate) fn mean(&self, joint: usize, from: f64, to: f64, guess: usize) -> [f64; 2] {
+        let (a, b) = (self.index(from, guess), self.index(to, guess));
+        let n = self.joints;
+        if a == b {
+            return [self.value[a * n + joint], self.speed[a * n + joint]];
+        }
+        let integral = |of: &[f64], sums: &[f64], k: usize, time: f64| {
+            sums[k * n + joint] + of[k * n + joint] * (time - self.time[k])
+        };
+        [
+            (&self.value, &self.summed),
+            (&self.speed, &self.summed_speed),
+        ]
+        .map(|(of, sums)| (integral(of, sums, b, to) - integral(of, sums, a, from)) / (to - from))
+    }
+}

@@ -1,0 +1,571 @@
+//! The simulation rolled out along the commands, and how its angles change with the physics.
+//!
+//! A step is an implicit midpoint for all that is stiff (second order: implicit Euler adds kd dt / 2 to the inertia); dry friction is set-valued: its
+//! impulses, coupled over the joints by the inverse mass, stop what they can (projected Gauss-Seidel). Derivatives are those of the step:
+//! a change of physics is a change of torques at the same motion, which the linearised step carries on.
+
+use crate::chain::{Bodies, Chain, MOST, Posed, Row, Square, invert};
+use crate::physics::{Commanded, Joint, Motion, Physics, ROTOR_SHARE, SAG_LAG, Torque};
+use crate::recording::{Commands, Recording};
+
+/// A change of the physics whose response is wanted: joints and bodies as they would be.
+#[derive(Debug, Clone, Default)]
+pub struct Direction {
+    /// Changed joints.
+    pub joints: Vec<(usize, Joint)>,
+    /// Changed bodies.
+    pub bodies: Option<Bodies>,
+}
+
+impl Direction {
+    /// What differs between two simulations; nothing of what they remember.
+    pub fn between(base: &Physics, changed: &Physics) -> Self {
+        let joints = base.joints.iter().zip(&changed.joints).enumerate();
+        Self {
+            joints: joints
+                .filter(|(_, (before, after))| before != after)
+                .map(|(joint, (_, after))| (joint, after.clone()))
+                .collect(),
+            bodies: (base.bodies != changed.bodies).then(|| changed.bodies.clone()),
+        }
+    }
+}
+
+/// A row of the recording as it is simulated.
+pub struct SimulatedRow<'a> {
+    /// Its number.
+    pub row: usize,
+    /// Simulated angles as the encoders see them.
+    pub angle: &'a [f64],
+    /// Speeds of the links.
+    pub speed: &'a [f64],
+    /// Torques of the drives, Nm.
+    pub drive: &'a [f64],
+    /// By joint, the change of the angle with each direction.
+    pub change: &'a [&'a [f64]],
+}
+
+/// Which trajectories are rolled out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Which {
+    /// Those that are fitted.
+    Fitted,
+    /// All.
+    All,
+}
+
+/// s of a step at most, and where a gear yields.
+const STEP: f64 = 1e-3;
+const GEARED_STEP: f64 = 5e-4;
+/// Sweeps of the impulses of dry friction at most, and rad/s at which they are settled.
+const SWEEPS: usize = 20;
+const SETTLED: f64 = 1e-9;
+/// Steps between two evaluations of what a change of bodies asks for.
+const BODIES_EVERY: usize = 4;
+/// rad by which gravity's stiffness is looked at.
+const TURN: f64 = 1e-4;
+
+/// State of a roll-out.
+struct Roller<'a> {
+    chain: &'a Chain,
+    physics: &'a Physics,
+    directions: &'a [Direction],
+    n: usize,
+    /// Degrees of freedom, and the one that each joint's drive turns.
+    freedoms: usize,
+    rotor: Vec<usize>,
+    q: Row,
+    v: Row,
+    a: Row,
+    push: Row,
+    integral: Row,
+    bent: Row,
+    set_point: Row,
+    driven: Row,
+    drawn: f64,
+    posed: Posed,
+    /// Nm/rad of gravity.
+    gravity: Square,
+    /// By degree of freedom.
+    dq: Vec<Vec<f64>>,
+    dv: Vec<Vec<f64>>,
+    forces: Vec<Vec<f64>>,
+    by_bodies: Vec<Vec<f64>>,
+    step: usize,
+}
+
+/// Rolls a simulation out; `see` is handed each row.
+pub fn roll(
+    chain: &Chain,
+    physics: &Physics,
+    recording: &Recording,
+    directions: &[Direction],
+    which: Which,
+    mut see: impl FnMut(&SimulatedRow),
+) {
+    let n = chain.joints();
+    let mut rotor: Vec<usize> = (0..n).collect();
+    let mut freedoms = n;
+    for (joint, physics) in physics.joints.iter().enumerate() {
+        if physics.gear.is_some() && freedoms < MOST {
+            rotor[joint] = freedoms;
+            freedoms += 1;
+        }
+    }
+    let columns = vec![vec![0.0; directions.len()]; freedoms];
+    let mut roller = Roller {
+        chain,
+        physics,
+        directions,
+        n,
+        freedoms,
+        rotor,
+        q: [0.0; MOST],
+        v: [0.0; MOST],
+        a: [0.0; MOST],
+        push: [0.0; MOST],
+        integral: [0.0; MOST],
+        bent: [0.0; MOST],
+        set_point: [0.0; MOST],
+        driven: [0.0; MOST],
+        drawn: 0.0,
+        posed: Posed::default(),
+        gravity: [[0.0; MOST]; MOST],
+        dq: columns.clone(),
+        dv: columns.clone(),
+        forces: columns.clone(),
+        by_bodies: columns,
+        step: 0,
+    };
+    let begin = recording.time.first().copied().unwrap_or_default();
+    let most = if freedoms > n { GEARED_STEP } else { STEP };
+    for trajectory in &recording.trajectories {
+        if which == Which::Fitted && trajectory.held_out {
+            continue;
+        }
+        let commands = recording.commands(trajectory, physics.hold);
+        roller.start(
+            &recording.start(trajectory),
+            &commands,
+            recording,
+            trajectory.rows.start,
+        );
+        let mut guess = 0;
+        for row in trajectory.rows.clone() {
+            roller.show(row, &mut see);
+            if row + 1 == trajectory.rows.end {
+                break;
+            }
+            let (from, to) = (recording.time[row], recording.time[row + 1]);
+            let steps = ((to - from) / most - 1e-6).ceil().max(1.0) as usize;
+            let h = (to - from) / steps as f64;
+            if !directions.is_empty() {
+                roller.look_at_gravity();
+            }
+            for k in 0..steps {
+                let time = from + h * k as f64;
+                guess = commands.index(time, guess);
+                roller.advance(&commands, guess, time, time - begin, h);
+            }
+        }
+    }
+}
+
+impl Roller<'_> {
+    /// At rest at the beginning of a trajectory: friction, integral and warmth run on.
+    fn start(&mut self, at: &[f64], commands: &Commands, recording: &Recording, row: usize) {
+        let time = recording.time[row];
+        self.q[..self.n].copy_from_slice(at);
+        self.chain.pose(at, &self.physics.bodies, &mut self.posed);
+        let mut weight = [0.0; MOST];
+        let gravity = &self.physics.bodies.gravity;
+        self.chain
+            .torques(&self.posed, gravity, &[0.0; MOST], None, &mut weight);
+        for joint in 0..self.n {
+            let physics = &self.physics.joints[joint];
+            let command = commands.mean(joint, time, time + 1e-6, 0)[0];
+            self.set_point[joint] = command;
+            self.driven[joint] = physics.kp * (command + physics.offset - at[joint]);
+            let dry = physics.friction.max(1e-9);
+            let held = self.driven[joint]
+                - weight[joint]
+                - physics.spring[0] * (at[joint] - physics.spring[1]);
+            self.bent[joint] = (held / dry).clamp(-1.0, 1.0);
+            let rotor = self.rotor[joint];
+            if let Some(gear) = &physics.gear {
+                // The gear carries the weight, on the flank that it leans on.
+                let bend = weight[joint] / gear.stiffness + 0.5 * gear.play * sign(weight[joint]);
+                match gear.encoder_on_link {
+                    true => self.q[rotor] = at[joint] + bend,
+                    false => {
+                        self.q[rotor] = at[joint];
+                        self.q[joint] = at[joint] - bend;
+                    }
+                }
+            }
+        }
+        self.v = [0.0; MOST];
+        self.a = [0.0; MOST];
+        self.push = [0.0; MOST];
+        for columns in [&mut self.dq, &mut self.dv] {
+            columns.iter_mut().for_each(|column| column.fill(0.0));
+        }
+        self.step = 0;
+    }
+
+    fn show(&self, row: usize, see: &mut impl FnMut(&SimulatedRow)) {
+        let seen = |joint: usize| match &self.physics.joints[joint].gear {
+            Some(gear) if gear.encoder_on_link => joint,
+            _ => self.rotor[joint],
+        };
+        let mut angle = [0.0; MOST];
+        (0..self.n).for_each(|joint| angle[joint] = self.q[seen(joint)]);
+        let change: [&[f64]; MOST] = std::array::from_fn(|joint| match joint < self.n {
+            true => &self.dq[seen(joint)][..],
+            false => &[],
+        });
+        see(&SimulatedRow {
+            row,
+            angle: &angle[..self.n],
+            speed: &self.v[..self.n],
+            drive: &self.driven[..self.n],
+            change: &change[..self.n],
+        });
+    }
+
+    /// Gravity's stiffness at the present position.
+    fn look_at_gravity(&mut self) {
+        let (chain, bodies, mut posed) = (self.chain, &self.physics.bodies, self.posed.clone());
+        let mut torque = |q: &Row| {
+            let mut torque = [0.0; MOST];
+            chain.pose(&q[..self.n], bodies, &mut posed);
+            chain.torques(&posed, &bodies.gravity, &[0.0; MOST], None, &mut torque);
+            torque
+        };
+        let here = torque(&self.q);
+        for joint in 0..self.n {
+            let mut moved = self.q;
+            moved[joint] += TURN;
+            let there = torque(&moved);
+            for other in 0..self.n {
+                self.gravity[other][joint] = (there[other] - here[other]) / TURN;
+            }
+        }
+    }
+
+    fn advance(&mut self, commands: &Commands, guess: usize, time: f64, since: f64, h: f64) {
+        let (n, m, physics) = (self.n, self.freedoms, self.physics);
+        let (mut middle, mut ahead) = ([0.0; MOST], [0.0; MOST]);
+        for i in 0..n {
+            middle[i] = self.q[i] + 0.5 * h * self.v[i];
+            ahead[i] = self.v[i] + 0.5 * h * self.a[i];
+        }
+        self.chain
+            .pose(&middle[..n], &physics.bodies, &mut self.posed);
+        let (mut mass, mut bias) = ([[0.0; MOST]; MOST], [0.0; MOST]);
+        self.chain.mass_matrix(&self.posed, &mut mass);
+        let gravity = &physics.bodies.gravity;
+        self.chain
+            .torques(&self.posed, gravity, &ahead[..n], None, &mut bias);
+        let sag = 1.0 - (physics.sag * self.drawn).clamp(0.0, 0.9);
+        let (q, v, a, driven) = (self.q, self.v, self.a, self.driven);
+        let motion = Motion {
+            q: &q[..m],
+            v: &v[..m],
+            a: &a[..m],
+            time: since,
+            driven: &driven[..n],
+        };
+        let mut torques = [Torque::default(); MOST];
+        let mut sent = [Commanded::default(); MOST];
+        for j in 0..n {
+            let joint = &physics.joints[j];
+            let [angle, speed] =
+                commands.mean(j, time - joint.delay, time + h - joint.delay, guess);
+            let way = joint.speed_limit * h;
+            self.set_point[j] += (angle - self.set_point[j]).clamp(-way, way);
+            sent[j] = Commanded {
+                angle: self.set_point[j],
+                speed,
+                integral: self.integral[j],
+                bent: self.bent[j],
+            };
+            torques[j] = joint.torque(j, self.rotor[j], &motion, &sent[j], sag);
+        }
+        let (mut force, mut limit) = ([0.0; MOST], [0.0; MOST]);
+        let (mut stiff, mut damp) = ([[0.0; MOST]; MOST], [[0.0; MOST]; MOST]);
+        for j in 0..n {
+            let (t, r) = (&torques[j], self.rotor[j]);
+            force[j] -= bias[j];
+            force[r] += t.smooth;
+            limit[r] = t.limit;
+            stiff[r][r] += t.stiffness;
+            damp[r][r] += t.damping;
+            let armature = physics.joints[j].armature;
+            if r == j {
+                mass[j][j] += armature;
+            } else {
+                mass[j][j] += (1.0 - ROTOR_SHARE) * armature;
+                mass[r][r] = (ROTOR_SHARE * armature).max(1e-9);
+                force[j] += t.link;
+                for (matrix, value) in [(&mut stiff, t.gear[0]), (&mut damp, t.gear[1])] {
+                    matrix[r][r] += value;
+                    matrix[j][j] += value;
+                    matrix[r][j] -= value;
+                    matrix[j][r] -= value;
+                }
+            }
+        }
+        let mut implicit = mass;
+        for i in 0..m {
+            for k in 0..m {
+                implicit[i][k] += 0.5 * h * damp[i][k] + 0.25 * h * h * stiff[i][k];
+            }
+        }
+        let mut w = [[0.0; MOST]; MOST];
+        if !invert(&implicit, m, &mut w) {
+            // Bodies that no mass matrix belongs to: the angles say it.
+            self.q = [f64::NAN; MOST];
+            return;
+        }
+        let mut free = self.v;
+        let mut pulled = [0.0; MOST];
+        for i in 0..m {
+            let by_speed: f64 = (0..m).map(|k| stiff[i][k] * self.v[k]).sum();
+            pulled[i] = h * (force[i] - 0.5 * h * by_speed);
+        }
+        for i in 0..m {
+            for k in 0..m {
+                free[i] += w[i][k] * pulled[k];
+            }
+        }
+        let mut new = self.slid(&w, &free, &limit, h);
+        if new[..m]
+            .iter()
+            .any(|speed| !speed.is_finite() || speed.abs() > 1e4)
+        {
+            new = [f64::NAN; MOST];
+        }
+        if !self.directions.is_empty() {
+            let before = self.dv.clone();
+            let mut forces = std::mem::take(&mut self.forces);
+            forces.iter_mut().for_each(|column| column.fill(0.0));
+            let sg: Row = std::array::from_fn(|i| {
+                if limit[i] > 0.0 {
+                    self.push[i] / (h * limit[i])
+                } else {
+                    sign(self.v[i])
+                }
+            });
+            for (d, direction) in self.directions.iter().enumerate() {
+                for (j, changed) in &direction.joints {
+                    let (r, base) = (self.rotor[*j], &physics.joints[*j]);
+                    let mut with = sent[*j];
+                    if changed.delay != base.delay {
+                        let [angle, speed] = commands.mean(
+                            *j,
+                            time - changed.delay,
+                            time + h - changed.delay,
+                            guess,
+                        );
+                        (with.angle, with.speed) = (angle, speed);
+                    }
+                    let t = changed.torque(*j, r, &motion, &with, sag);
+                    let slides = sg[r].abs() > 0.999_999;
+                    let dry = if slides {
+                        sg[r] * (t.limit - torques[*j].limit)
+                    } else {
+                        0.0
+                    };
+                    let rotor = changed.armature - base.armature;
+                    forces[r][d] += t.smooth - torques[*j].smooth - dry - rotor * self.a[r];
+                    if r != *j {
+                        forces[*j][d] += t.link - torques[*j].link;
+                    }
+                }
+            }
+            if self.step.is_multiple_of(BODIES_EVERY) {
+                self.look_at_bodies(&middle, &ahead);
+            }
+            for i in 0..n {
+                for (force, by) in forces[i].iter_mut().zip(&self.by_bodies[i]) {
+                    *force += by;
+                }
+            }
+            self.carry(&before, &forces, (&w, &stiff, &damp), &limit, h);
+            self.forces = forces;
+        }
+        let total: f64 = torques[..n].iter().map(|t| t.drive.abs()).sum();
+        self.drawn += (total - self.drawn) * (h / SAG_LAG).min(1.0);
+        for j in 0..n {
+            let (joint, r) = (&physics.joints[j], self.rotor[j]);
+            self.driven[j] = torques[j].drive;
+            if joint.integral[0] != 0.0 {
+                let error = sent[j].angle + joint.offset - self.q[r];
+                let most = joint.integral[1];
+                self.integral[j] =
+                    (self.integral[j] + joint.integral[0] * error * h).clamp(-most, most);
+            }
+            if joint.presliding > 0.0 {
+                let v = 0.5 * (self.v[r] + new[r]);
+                let rate = v.abs() * h / joint.presliding;
+                self.bent[j] = (self.bent[j] + sign(v) * rate) / (1.0 + rate);
+            }
+        }
+        for i in 0..m {
+            self.q[i] += 0.5 * h * (self.v[i] + new[i]);
+            self.a[i] = (new[i] - self.v[i]) / h;
+            self.v[i] = new[i];
+        }
+        self.step += 1;
+    }
+
+    /// Speeds after dry friction: impulses within their limits stop what they can.
+    fn slid(&mut self, w: &Square, free: &Row, limit: &Row, h: f64) -> Row {
+        let m = self.freedoms;
+        let mut new = *free;
+        for i in 0..m {
+            self.push[i] = self.push[i].clamp(-h * limit[i], h * limit[i]);
+            for k in 0..m {
+                new[k] -= w[k][i] * self.push[i];
+            }
+        }
+        for _ in 0..SWEEPS {
+            let mut most: f64 = 0.0;
+            for i in 0..m {
+                if limit[i] == 0.0 {
+                    continue;
+                }
+                let top = h * limit[i];
+                let push = (self.push[i] + new[i] / w[i][i]).clamp(-top, top);
+                let change = push - self.push[i];
+                if change != 0.0 {
+                    self.push[i] = push;
+                    for k in 0..m {
+                        new[k] -= w[k][i] * change;
+                    }
+                    most = most.max((w[i][i] * change).abs());
+                }
+            }
+            if most < SETTLED {
+                break;
+            }
+        }
+        new
+    }
+
+    /// What changed bodies ask for, with its sign turned.
+    fn look_at_bodies(&mut self, q: &Row, v: &Row) {
+        let n = self.n;
+        let mut here = [0.0; MOST];
+        let gravity = &self.physics.bodies.gravity;
+        self.chain
+            .torques(&self.posed, gravity, &v[..n], Some(&self.a[..n]), &mut here);
+        let mut posed = Posed::default();
+        for (d, direction) in self.directions.iter().enumerate() {
+            let Some(bodies) = &direction.bodies else {
+                continue;
+            };
+            let mut there = [0.0; MOST];
+            self.chain.pose(&q[..n], bodies, &mut posed);
+            self.chain.torques(
+                &posed,
+                &bodies.gravity,
+                &v[..n],
+                Some(&self.a[..n]),
+                &mut there,
+            );
+            for i in 0..n {
+                self.by_bodies[i][d] = here[i] - there[i];
+            }
+        }
+    }
+
+    /// The step's derivative: changes of angles and speeds with every direction.
+    fn carry(
+        &mut self,
+        before: &[Vec<f64>],
+        forces: &[Vec<f64>],
+        (w, stiff, damp): (&Square, &Square, &Square),
+        limit: &Row,
+        h: f64,
+    ) {
+        let m = self.freedoms;
+        // What friction holds keeps its speed of zero.
+        let held: Vec<usize> = (0..m)
+            .filter(|i| limit[*i] > 0.0 && self.push[*i].abs() < 0.999_999 * h * limit[*i])
+            .collect();
+        let mut keep = [[0.0; MOST]; MOST];
+        (0..m).for_each(|i| keep[i][i] = 1.0);
+        if !held.is_empty() {
+            let (mut inner, mut inverse) = ([[0.0; MOST]; MOST], [[0.0; MOST]; MOST]);
+            for (a, i) in held.iter().enumerate() {
+                for (b, k) in held.iter().enumerate() {
+                    inner[a][b] = w[*i][*k];
+                }
+            }
+            if invert(&inner, held.len(), &mut inverse) {
+                for row in 0..m {
+                    for (b, k) in held.iter().enumerate() {
+                        let share: f64 = held
+                            .iter()
+                            .enumerate()
+                            .map(|(a, i)| w[row][*i] * inverse[a][b])
+                            .sum();
+                        keep[row][*k] -= share;
+                    }
+                }
+            }
+        }
+        let mut through = [[0.0; MOST]; MOST];
+        for i in 0..m {
+            for k in 0..m {
+                through[i][k] = (0..m).map(|j| keep[i][j] * w[j][k]).sum();
+            }
+        }
+        // new dv = keep dv + through h (f - K (dq + h/2 dv) - D dv)
+        let (mut by_speed, mut by_angle) = ([[0.0; MOST]; MOST], [[0.0; MOST]; MOST]);
+        for i in 0..m {
+            for k in 0..m {
+                let (mut speed, mut angle) = (0.0, 0.0);
+                for j in 0..m {
+                    let whole = stiff[j][k] + self.gravity[j][k];
+                    angle -= through[i][j] * whole * h;
+                    speed -= through[i][j] * (0.5 * h * whole + damp[j][k]) * h;
+                }
+                by_angle[i][k] = angle;
+                by_speed[i][k] = keep[i][k] + speed;
+            }
+        }
+        for i in 0..m {
+            let out = &mut self.dv[i];
+            out.fill(0.0);
+            for k in 0..m {
+                let (s, a, f) = (by_speed[i][k], by_angle[i][k], h * through[i][k]);
+                if s == 0.0 && a == 0.0 && f == 0.0 {
+                    continue;
+                }
+                let columns = before[k].iter().zip(&self.dq[k]).zip(&forces[k]);
+                for (out, ((dv, dq), force)) in out.iter_mut().zip(columns) {
+                    *out += s * dv + a * dq + f * force;
+                }
+            }
+        }
+        for i in 0..m {
+            let speeds = before[i].iter().zip(&self.dv[i]);
+            for (dq, (old, new)) in self.dq[i].iter_mut().zip(speeds) {
+                *dq += 0.5 * h * (old + new);
+            }
+        }
+    }
+}
+
+fn sign(x: f64) -> f64 {
+    if x > 0.0 {
+        1.0
+    } else if x < 0.0 {
+        -1.0
+    } else {
+        0.0
+    }
+}

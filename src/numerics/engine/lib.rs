@@ -1,0 +1,141 @@
+//! One search for the physics that a model leaves out, whatever was recorded.
+//!
+//! A [`Problem`] says which [`Cell`]s there are, what each would do to the rows around the present fit (a [`Block`] of columns by its products),
+//! and fits a set of them with everything that is not linear in it. [`search`] adds, exchanges and drops cells by one price, the evidence;
+//! [`posterior`] says of each cell that stands which others could stand in its place. No cause is known here by its name.
+//!
+//! The formula of the evidence is that of the table of causes (`calib_diagnose`).
+
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+mod rows;
+mod search;
+
+pub use rows::{Block, Rows, ranked};
+pub use search::{Answer, Options, diagnose, posterior, search};
+
+/// A cause: a row of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cause {
+    /// In tables and JSON.
+    pub name: &'static str,
+    /// What it does at a place `{}`, for a person.
+    pub sentence: &'static str,
+    /// Its numbers.
+    pub numbers: &'static [Number],
+    /// ln of the prior odds that it is there, of all its places together.
+    pub log_prior: f64,
+}
+
+/// A number of a cause.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Number {
+    /// What it is.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Whether it is fitted as its logarithm.
+    pub by_logarithm: bool,
+}
+
+/// What may be missing: a cause at a place, whatever its size and shape.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell<K> {
+    /// What the problem knows it by.
+    pub key: K,
+    /// Its cause.
+    pub cause: &'static Cause,
+    /// Where it acts, in words: `joint 2`.
+    pub place: String,
+    /// ln of its prior odds.
+    pub log_prior: f64,
+    /// How it may look.
+    pub shapes: Vec<Shape>,
+}
+
+/// A shape of a cell: where its numbers begin, and how far they usually are from there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// Numbers at which a fit begins, as they are fitted.
+    pub start: Vec<f64>,
+    /// One standard deviation of each about `centre`; 0 holds it.
+    pub usual: Vec<f64>,
+    /// Where they are expected.
+    pub centre: Vec<f64>,
+    /// Numbers of which the columns of a scan are the whole effects.
+    pub columns: Vec<Vec<f64>>,
+    /// ln of its share of the cell.
+    pub log_weight: f64,
+}
+
+/// A cell that stands in a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Accepted<K> {
+    /// Which.
+    pub cell: Cell<K>,
+    /// Which of its shapes.
+    pub shape: usize,
+    /// Its numbers as they are fitted.
+    pub numbers: Vec<f64>,
+}
+
+/// A cell as a scan saw it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scanned<K> {
+    /// With the shape and the numbers from which a fit begins.
+    pub accepted: Accepted<K>,
+    /// ln of its posterior odds against nothing, by the linear model.
+    pub log_odds: f64,
+}
+
+/// Another name for a finding.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rival<K> {
+    /// What it would be, as fitted in the finding's place.
+    pub accepted: Accepted<K>,
+    /// Probability of it.
+    pub probability: f64,
+    /// ln of its odds against the finding.
+    pub log_odds: f64,
+}
+
+/// A cell that stands, with what else could.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding<K> {
+    /// What stands.
+    pub accepted: Accepted<K>,
+    /// Probability of its name at its place.
+    pub probability: f64,
+    /// Probability of its place, whatever the name.
+    pub place_probability: f64,
+    /// Probability that nothing is there.
+    pub none_probability: f64,
+    /// ln of the odds of the model with it against that without.
+    pub log_odds: f64,
+    /// What else it may be, likeliest first.
+    pub rivals: Vec<Rival<K>>,
+}
+
+/// What was recorded, and how a model of it is fitted.
+pub trait Problem: Sync {
+    /// What it knows cells by.
+    type Key: Clone + PartialEq + Send + Sync;
+    /// A fitted model.
+    type Fit: Clone + Send + Sync;
+
+    /// What every cell of the table would do around a fit, those of no use left out; likeliest first.
+    fn scan(&self, fit: &Self::Fit) -> Vec<Scanned<Self::Key>>;
+    /// Everything fitted at once, from the numbers of the set and the fit before.
+    fn fit(&self, set: &[Accepted<Self::Key>], before: Option<&Self::Fit>) -> Self::Fit;
+    /// The same with every derivative made anew, to the end: a trial among many may reuse those of the fit before.
+    fn settled(&self, fit: &Self::Fit) -> Self::Fit;
+    /// The set with its numbers as fitted.
+    fn set(&self, fit: &Self::Fit) -> Vec<Accepted<Self::Key>>;
+    /// How far noise is from independent around a fit: effective rows a row.
+    fn independence(&self, fit: &Self::Fit) -> f64;
+    /// ln of the evidence of a fit, priors of its cells included, where so large a share of the rows is independent.
+    fn log_evidence(&self, fit: &Self::Fit, independence: f64) -> f64;
+    /// Whether two cells do the same in these rows' words, so that one must not stand beside the other.
+    fn excludes(&self, one: &Self::Key, other: &Self::Key) -> bool;
+}

@@ -1,0 +1,407 @@
+//! `diagnose_drives`: which physics the simulation of commanded joints lacks, from commands and measured angles alone.
+
+use crate::drives::chain::{Bodies, Chain};
+use crate::drives::mjcf::{self, MjcfArm, MjcfText};
+use crate::drives::physics::{Joint, Physics};
+use crate::drives::recording::{Recording, Trajectory};
+use crate::drives::{CAUSES, Drives, diagnose};
+use crate::dynamics::InertialTolerance;
+use crate::engine::Options;
+use crate::error::{Error, Fault, Place, Result, did_you_mean, listed};
+use crate::stage::{Context, RawFile, Stage};
+use crate::table::{DriveVerdict, FindingNumbers, Findings, JointDrives, Rivals, VerdictSentences};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+// Bytes: a million rows of six joints are 200 MB.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// Settings of `diagnose_drives`.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DiagnoseDrives {
+    /// The robot as it is simulated, an MJCF.
+    pub(crate) robot: RawFile,
+    /// Files that the MJCF includes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) includes: Vec<RawFile>,
+    /// Gains, limits, encoders and the rate of the commands, JSON: `command_rate_hz`, `joints: [{joint, kp, kd, kd_on, torque_limit_nm,
+    /// encoder_rad, noise_rad}]`, `inertia_tolerance: {mass_rel, com_mm, inertia_rel}`.
+    pub(crate) drives: RawFile,
+    /// Commands and measured angles over time, CSV.
+    pub(crate) recording: RawFile,
+    /// Columns of the recording.
+    #[serde(default)]
+    pub(crate) columns: DriveColumns,
+    /// Labels of the recording's `usage` to fit; all other trajectories judge.
+    #[serde(default = "crate::stage::fit_set")]
+    pub(crate) on: Vec<String>,
+    /// Causes that are not tried and never named.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) without: Vec<String>,
+}
+
+/// Columns of a recording of drives; `{j}` stands for the joint, from 1.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DriveColumns {
+    /// Time, s.
+    pub(crate) time: String,
+    /// What tells trajectories apart; without such a column all is one.
+    pub(crate) trajectory: String,
+    /// What rows are for; without such a column all are fitted.
+    pub(crate) usage: String,
+    /// Commanded angles.
+    pub(crate) command: String,
+    /// Measured angles.
+    pub(crate) angle: String,
+    /// Unit of both.
+    pub(crate) unit: AngleUnit,
+}
+
+impl Default for DriveColumns {
+    fn default() -> Self {
+        Self {
+            time: "time_s".into(),
+            trajectory: "traj".into(),
+            usage: "use".into(),
+            command: "cmd{j}_rad".into(),
+            angle: "q{j}_rad".into(),
+            unit: AngleUnit::Rad,
+        }
+    }
+}
+
+/// A unit of angles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AngleUnit {
+    /// Radians.
+    Rad,
+    /// Degrees.
+    Deg,
+}
+
+crate::stage::stage! {
+    DiagnoseDrives, "diagnose_drives", 1, "names the physics that the simulation of commanded joints lacks, from commands and angles",
+        DiagnoseDrivesReads {} -> DiagnoseDrivesWrites {
+            verdict: DriveVerdict,
+            sentences: VerdictSentences,
+            findings: Findings,
+            numbers: FindingNumbers,
+            rivals: Rivals,
+            joints: JointDrives,
+        }
+}
+
+/// What `drives.json` says; further fields are not read.
+#[derive(Deserialize)]
+struct DriveFile {
+    command_rate_hz: f64,
+    joints: Vec<DriveOfJoint>,
+    inertia_tolerance: Option<ToleranceFile>,
+}
+
+#[derive(Deserialize)]
+struct DriveOfJoint {
+    joint: String,
+    kp: Option<f64>,
+    kd: Option<f64>,
+    kd_on: Option<DampedSpeed>,
+    torque_limit_nm: Option<f64>,
+    encoder_rad: f64,
+    #[serde(default)]
+    noise_rad: f64,
+}
+
+#[derive(Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum DampedSpeed {
+    Error,
+    Speed,
+}
+
+#[derive(Deserialize)]
+struct ToleranceFile {
+    mass_rel: f64,
+    com_mm: f64,
+    inertia_rel: f64,
+}
+
+impl Stage for DiagnoseDrives {
+    fn faults(&self, at: &mut Place) {
+        crate::stage::must_name_sets(&self.on, "fit", at);
+        let names: Vec<&str> = CAUSES.iter().map(|cause| cause.name).collect();
+        for (k, name) in self.without.iter().enumerate() {
+            let known = names.contains(&name.as_str());
+            let hint = did_you_mean(name, names.iter().copied());
+            let message = format!("no cause `{name}`{hint} (causes: {})", listed(&names));
+            at.at(format!("without[{k}]")).must(known, message);
+        }
+        for (key, column) in [
+            ("command", &self.columns.command),
+            ("angle", &self.columns.angle),
+        ] {
+            at.at("columns").at(key).must(
+                column.contains("{j}"),
+                "expected a name with `{j}`, which stands for the joint, from 1",
+            );
+        }
+    }
+
+    fn files(&self) -> Vec<(String, RawFile)> {
+        let one = [
+            ("robot", &self.robot),
+            ("drives", &self.drives),
+            ("recording", &self.recording),
+        ];
+        let one = one.map(|(name, file)| (name.to_string(), file.clone()));
+        let includes = self.includes.iter().enumerate();
+        let includes = includes.map(|(k, file)| (format!("includes[{k}]"), file.clone()));
+        one.into_iter().chain(includes).collect()
+    }
+
+    fn run(&self, _reads: DiagnoseDrivesReads, context: &Context) -> Result<DiagnoseDrivesWrites> {
+        let mut drives = self.problem(context)?;
+        drives.without.clone_from(&self.without);
+        let diagnosis = diagnose(&drives, &Options::default(), |line| context.note(line));
+        Ok(DiagnoseDrivesWrites {
+            verdict: DriveVerdict::of(context.id, &diagnosis),
+            sentences: VerdictSentences::of(context.id, &[]),
+            findings: Findings::of_drives(&diagnosis),
+            numbers: FindingNumbers::of_drives(&diagnosis),
+            rivals: Rivals::of_drives(&diagnosis),
+            joints: JointDrives::of(&diagnosis),
+        })
+    }
+}
+
+impl DiagnoseDrives {
+    fn problem(&self, context: &Context) -> Result<Drives> {
+        let (label, text) =
+            context.text(&self.drives, "a JSON of gains and encoders", MOST_BYTES)?;
+        let file: DriveFile = serde_json::from_str(&text).map_err(|error| {
+            let place = format!("{label}:{}", error.line());
+            Error::spec(place, format!("{error}; expected `command_rate_hz`, and `joints` with `joint`, `kp`, `kd`, `encoder_rad` each"))
+        })?;
+        if !(file.command_rate_hz > 0.0 && file.command_rate_hz.is_finite()) {
+            return Err(Error::spec(
+                format!("{label}: command_rate_hz"),
+                "allowed: above 0",
+            ));
+        }
+        let names: Vec<String> = file
+            .joints
+            .iter()
+            .map(|joint| joint.joint.clone())
+            .collect();
+        let includes: Result<Vec<(String, String)>> = self
+            .includes
+            .iter()
+            .map(|file| context.text(file, "an MJCF", MOST_BYTES))
+            .collect();
+        let includes = includes?;
+        let includes: Vec<MjcfText> = includes
+            .iter()
+            .map(|(label, text)| MjcfText { label, text })
+            .collect();
+        let (robot, text) = context.text(&self.robot, "an MJCF", MOST_BYTES)?;
+        let arm = mjcf::read(
+            MjcfText {
+                label: &robot,
+                text: &text,
+            },
+            &includes,
+            &names,
+        )?;
+        arm.notes.iter().for_each(|note| context.note(note));
+        let joints = joints(&label, &file, &arm)?;
+        let reference: Vec<f64> = arm.joints.iter().map(|joint| joint.reference).collect();
+        let links = arm
+            .arm
+            .links
+            .clone()
+            .ok_or_else(|| Error::Bug("an MJCF without links".into()))?;
+        let physics = Physics {
+            joints,
+            bodies: Bodies {
+                links,
+                gravity: arm.arm.gravity,
+            },
+            tool: arm.arm.tool,
+            hold: 0.0,
+            sag: 0.0,
+        };
+        let tolerance = file
+            .inertia_tolerance
+            .as_ref()
+            .map_or(arm.arm.tolerance, |stated| InertialTolerance {
+                mass_relative: stated.mass_rel,
+                centre: 1e-3 * stated.com_mm,
+                inertia_relative: stated.inertia_rel,
+            });
+        let recording = self.recorded(&file, context)?;
+        Ok(Drives::new(
+            Chain::new(&arm.arm, &reference),
+            physics,
+            recording,
+            tolerance,
+        ))
+    }
+
+    fn recorded(&self, file: &DriveFile, context: &Context) -> Result<Recording> {
+        let (label, text) =
+            context.text(&self.recording, "a CSV of commands and angles", MOST_BYTES)?;
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        let head = reader
+            .headers()
+            .map_err(|error| Error::data(&label, error.to_string()))?
+            .clone();
+        let find = |name: &str| head.iter().position(|column| column == name);
+        let n = file.joints.len();
+        let mut faults = Vec::new();
+        let mut needed = |name: String| {
+            find(&name).unwrap_or_else(|| {
+                let hint = did_you_mean(&name, head.iter());
+                let all: Vec<&str> = head.iter().collect();
+                faults.push(Fault::new(
+                    &*label,
+                    format!(
+                        "no column `{name}`{hint} (columns: {}); name others in `columns`",
+                        listed(&all)
+                    ),
+                ));
+                0
+            })
+        };
+        let of = |name: &str, joint: usize| name.replace("{j}", &(joint + 1).to_string());
+        let time = needed(self.columns.time.clone());
+        let commands: Vec<usize> = (0..n)
+            .map(|joint| needed(of(&self.columns.command, joint)))
+            .collect();
+        let angles: Vec<usize> = (0..n)
+            .map(|joint| needed(of(&self.columns.angle, joint)))
+            .collect();
+        Error::if_data(faults)?;
+        let (more, most) = (of(&self.columns.angle, n), n + 1);
+        if find(&more).is_some() {
+            return Err(Error::data(
+                &label,
+                format!("has angles of joint {most} (`{more}`), the drives file names {n} joints"),
+            ));
+        }
+        let (trajectory, usage) = (find(&self.columns.trajectory), find(&self.columns.usage));
+        let mut recording = Recording {
+            time: Vec::new(),
+            command: Vec::new(),
+            angle: Vec::new(),
+            trajectories: Vec::new(),
+            period: 1.0 / file.command_rate_hz,
+            encoder: file.joints.iter().map(|joint| joint.encoder_rad).collect(),
+            noise: file.joints.iter().map(|joint| joint.noise_rad).collect(),
+        };
+        let by = match self.columns.unit {
+            AngleUnit::Rad => 1.0,
+            AngleUnit::Deg => 1f64.to_radians(),
+        };
+        let mut last = None;
+        for (row, record) in reader.records().enumerate() {
+            let place = format!("{label}:{}", row + 2);
+            let record = record.map_err(|error| Error::data(&place, error.to_string()))?;
+            let number = |column: usize| -> Result<f64> {
+                let cell = record.get(column).unwrap_or_default();
+                match cell.parse::<f64>() {
+                    Ok(value) if value.is_finite() => Ok(value),
+                    _ => Err(Error::data(
+                        &place,
+                        format!(
+                            "column `{}` holds `{cell}`; expected a finite number",
+                            &head[column]
+                        ),
+                    )),
+                }
+            };
+            recording.time.push(number(time)?);
+            for column in &commands {
+                recording.command.push(by * number(*column)?);
+            }
+            for column in &angles {
+                recording.angle.push(by * number(*column)?);
+            }
+            let here = (
+                trajectory.map(|column| record[column].to_string()),
+                usage.map(|column| record[column].to_string()),
+            );
+            if last.as_ref() != Some(&here) {
+                let held_out = here
+                    .1
+                    .as_ref()
+                    .is_some_and(|usage| !self.on.contains(usage));
+                recording.trajectories.push(Trajectory {
+                    rows: row..row,
+                    held_out,
+                });
+                last = Some(here);
+            }
+            if let Some(trajectory) = recording.trajectories.last_mut() {
+                trajectory.rows.end = row + 1;
+            }
+        }
+        if recording
+            .trajectories
+            .iter()
+            .all(|trajectory| trajectory.held_out)
+        {
+            return Err(Error::data(
+                "with.on",
+                format!(
+                    "no row of {label} is left to fit; to fit: {}",
+                    self.on.join(", ")
+                ),
+            ));
+        }
+        recording.check(&label)?;
+        Ok(recording)
+    }
+}
+
+/// Joints with their drives, as the robot file and the drives file say.
+fn joints(label: &str, file: &DriveFile, arm: &MjcfArm) -> Result<Vec<Joint>> {
+    let mut faults = Vec::new();
+    let joints = file.joints.iter().zip(&arm.joints).enumerate();
+    let joints = joints
+        .map(|(k, (drive, joint))| {
+            let mut place = |key: &str, message: &str| faults.push(Fault::new(format!("{label}: joints[{k}].{key}"), message));
+            let servo = joint.servo;
+            let kp = drive.kp.or(servo.map(|servo| servo.kp)).unwrap_or_else(|| {
+                place("kp", "is missing, and the robot file has no position actuator of this joint; state it in Nm/rad");
+                1.0
+            });
+            let kd = drive.kd.or(servo.map(|servo| servo.kd)).unwrap_or_default();
+            let limit = drive.torque_limit_nm.or(servo.map(|servo| servo.limit)).unwrap_or(f64::INFINITY);
+            for (key, value, allowed) in [("kp", kp, "allowed: above 0"), ("torque_limit_nm", limit, "allowed: above 0"), ("encoder_rad", drive.encoder_rad + drive.noise_rad, "allowed: above 0, or with a noise above 0")] {
+                if value.is_nan() || value <= 0.0 {
+                    place(key, allowed);
+                }
+            }
+            if kd.is_nan() || kd < 0.0 {
+                place("kd", "allowed: 0 and above");
+            }
+            Joint {
+                kp,
+                kd,
+                kd_on_error: drive.kd_on == Some(DampedSpeed::Error),
+                limit,
+                damping: joint.damping,
+                friction: joint.friction,
+                armature: joint.armature,
+                spring: [joint.stiffness, joint.spring_reference],
+                ..Joint::default()
+            }
+        })
+        .collect();
+    Error::if_spec(faults)?;
+    Ok(joints)
+}
