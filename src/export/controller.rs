@@ -2,10 +2,12 @@
 //!
 //! By how much joints stand elsewhere than commanded, as an affine map of the commanded positions, and that map as a controller counts.
 
-use super::entered::{self, EnteredNumbers, PointError, WantedPoints, tolerance};
+use super::entered::{self, EnteredNumbers, PointError, WantedPoints};
 use super::{CarriedGeometry, CarriedTorques, Export, Format};
-use crate::effect::{Place, names};
+use crate::description::Made;
+use crate::effect::{Place, names, tolerance};
 use crate::error::{Error, Result, one_line};
+use crate::estimate::Determined;
 use crate::identified::{IdentifiedModel, placed};
 use crate::robot::{JointConvention, RobotModel};
 use crate::spatial::Pose;
@@ -112,8 +114,11 @@ impl<'a> ControllerList<'a> {
             };
             wanted.rows.iter().map(point).collect()
         };
-        let mut tolerances: Vec<f64> = entries.iter().map(|entry| entry.tolerance()).collect();
-        tolerances.extend(vec![tolerance::TOOL; 3 * targets]);
+        let mut tolerances: Vec<f64> = entries
+            .iter()
+            .map(|entry| tolerance(robot, entry.made()))
+            .collect();
+        tolerances.extend(vec![tolerance(robot, Made::Tool); 3 * targets]);
         let solved = entered::solve(&tolerances, &wanted, predicted);
         let anew = |values: &[f64]| {
             let points = predicted(values);
@@ -142,7 +147,7 @@ impl<'a> ControllerList<'a> {
             convention.unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
         let share = |(position, entry): (usize, &DeviationEntry)| Share {
             position,
-            status: self.status(position, entry.tolerance()),
+            status: self.status(position, tolerance(robot, entry.made())),
             value: self.solved.values[position],
             by: JointDeviation::unit(*entry, robot.joints()).counted(&convention),
         };
@@ -173,11 +178,7 @@ impl<'a> ControllerList<'a> {
     /// Whether the poses say what a number is, or its tolerance does.
     fn status(&self, position: usize, tolerance: f64) -> &'static str {
         let sigma = self.solved.covariance[(position, position)].max(0.0).sqrt();
-        match sigma / tolerance {
-            share if share < DETERMINED => "determined",
-            share if share < BY_TOLERANCE => "partly",
-            _ => "by tolerance",
-        }
+        Determined::of(tolerance, sigma).name()
     }
 
     /// Standard deviation of a sum of numbers, each times a factor.
@@ -264,11 +265,6 @@ fn shown(entry: DeviationEntry, robot: &RobotModel) -> (&'static str, f64, Strin
     }
 }
 
-/// Of its tolerance: below it a number is determined by the poses.
-const DETERMINED: f64 = 0.5;
-/// From here on it stands by its tolerance alone.
-const BY_TOLERANCE: f64 = 0.95;
-
 /// A share below this one of the largest is rounding.
 const ROUNDING: f64 = 1e-12;
 
@@ -304,11 +300,12 @@ impl DeviationEntry {
         }
     }
 
-    /// One standard deviation before anything is measured, SI.
-    fn tolerance(self) -> f64 {
+    /// What of the arm it is.
+    fn made(self) -> Made {
         match self {
-            Self::Zero(_) => tolerance::ZERO,
-            Self::Factor(_) | Self::Coupling { .. } => tolerance::RATIO,
+            Self::Zero(_) => Made::Zero,
+            Self::Factor(_) => Made::Ratio,
+            Self::Coupling { .. } => Made::Coupling,
         }
     }
 

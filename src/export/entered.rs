@@ -6,16 +6,6 @@ use crate::estimate::Model;
 use crate::robot::Measurements;
 use nalgebra::{DMatrix, DVector, Vector3};
 
-/// How well arms are made and tools are known, one standard deviation, SI, where nothing else is said of a number.
-pub(super) mod tolerance {
-    /// Zero of a joint that turns, rad, or slides, m.
-    pub(crate) const ZERO: f64 = 3e-3;
-    /// Coordinate of a tool, m.
-    pub(crate) const TOOL: f64 = 3e-3;
-    /// Ratio or coupling.
-    pub(crate) const RATIO: f64 = 1e-4;
-}
-
 /// Poses that a list is solved on, at most: evenly among the recorded ones.
 const MOST_POSES: usize = 400;
 /// Rounds of Gauss and Newton, each with the error of the round before as the standard deviation of a coordinate.

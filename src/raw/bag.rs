@@ -4,7 +4,6 @@
 //! what is there. A folder of parts is one recording.
 
 mod content;
-mod json;
 mod mcap;
 mod message;
 mod sqlite;

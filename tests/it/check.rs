@@ -251,7 +251,7 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
         "rejected  10 rows, unmatched: P35 (arm.csv: ",
         "after `nominal`, 35 points\n",
         "after `geometry`, 35 points\n",
-        "parameters can be estimated\n",
+        "parameters determined\n",
     ];
     has(&out, parts);
     assert!(folder.path().join("kept").exists() && !folder.path().join(".calib").exists());

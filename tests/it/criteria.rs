@@ -22,9 +22,10 @@ const ROOMS: [&str; 3] = [
 ];
 
 /// Numbers of those rooms that decide nothing: how work is dealt out, steps and bounds of solvers and of grids, roundings, units.
-const MECHANICS: [&str; 40] = [
+const MECHANICS: [&str; 41] = [
     "AMPLITUDES",
     "ANGLE",
+    "ANY",
     "AR1_COEFFICIENTS",
     "ARCSEC",
     "ARROWS",

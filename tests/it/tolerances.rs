@@ -150,7 +150,9 @@ fn zeros_and_base_are_those_of_the_arm_where_the_shoulder_has_an_offset() {
                 ..data.clone()
             };
             let points = model.predict(&data).into_iter();
-            points.map(|point| base.inverse_point(&point)).collect()
+            points
+                .map(|point| base.rotation.tr_mul(&(point - base.translation)))
+                .collect()
         };
         let (model_has, is) = (own(&model, &data.q), own(&real, &at_truth));
         let apart = model_has.iter().zip(&is).map(|(a, b)| (a - b).norm());
@@ -167,7 +169,7 @@ fn standard_deviations_are_honest_whether_the_data_or_the_tolerances_tell() {
         for seed in 0..7 {
             let mut draw = Draw::new(100 + seed);
             let mut truth = nominal(&robot, away());
-            let base = truth.stack.parameters_of("base_frame").len();
+            let base = truth.stack.parameters_of("base_frame").count();
             // Six tenths of what the tolerances allow: 0.3 mm, 0.3 mrad, 0.1 deg.
             for k in base..truth.x.len() {
                 truth.x[k] = 0.6 * truth.tolerances[k] * draw.normal();

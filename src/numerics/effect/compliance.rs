@@ -1,12 +1,11 @@
 //! What yields in proportion to its load: joints, links, the base.
 
 use super::form::placed;
-use super::geometry::tolerance;
 use super::motion::{SHORT, extent};
 use super::unweighed_windup::UnweighedWindup;
 use super::{
     ArmState, Cause, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec,
-    OwnMotion, ParameterSpec, Place, Placed, Summary, Survey, Variable, names,
+    OwnMotion, ParameterSpec, Place, Placed, Summary, Survey, Variable, names, tolerance,
 };
 use crate::criteria::effect::{RARE, STIFFNESS_BEYOND, UNLIKELY};
 use crate::description::Made;

@@ -15,9 +15,9 @@ const PLACED: f64 = 0.05;
 const LENGTH: f64 = 0.5e-3;
 const LENGTH_BY_LENGTH: f64 = 0.3e-3;
 
-/// One standard deviation of how far from nominal a robot is made, SI: as its file says, else as arms of this kind are. Lengths by
-/// [`length_variances`].
-pub(super) fn tolerance(robot: &RobotModel, made: Made) -> f64 {
+/// One standard deviation of how far from nominal a robot is made, SI: as its file says, else as arms of this kind are; long links
+/// are off by more.
+pub fn tolerance(robot: &RobotModel, made: Made) -> f64 {
     let usual = match made {
         Made::Length => LENGTH,
         Made::Axis => 0.5e-3,

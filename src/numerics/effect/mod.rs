@@ -40,7 +40,7 @@ pub use declared::{
 };
 pub use deflection::{BeyondRange, Deflection, Direction};
 pub use form::{Form, NumberSpec, Placed, Term};
-pub use geometry::{AnchorShift, BasePlacement, ToolOffset};
+pub use geometry::{AnchorShift, BasePlacement, ToolOffset, tolerance};
 pub use law::{Factor, Law};
 pub use law_row::{At, Follows, LawRow, Limit, Times, Turning};
 pub use law_shapes::{Warmth, moved_with_the_payload};

@@ -3,7 +3,10 @@
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
 use super::placed_row::{PlacedRow, PlacementBuffers, Rates, Station, Turns};
-use super::{ArmState, BeyondRange, Deflection, Direction, Effect, Law, ParameterSpec, Variable};
+use super::{
+    ArmState, BasePlacement, BeyondRange, Deflection, Direction, Effect, Law, ParameterSpec,
+    Variable, names,
+};
 use crate::robot::{Measurements, Posture, RobotModel, Travel};
 use crate::spatial::Pose;
 use nalgebra::{Matrix3, Matrix3x6, Vector3};
@@ -51,6 +54,22 @@ impl EffectStack {
         Self {
             effects: numbered,
             specs,
+            base,
+        }
+    }
+
+    /// The same effects with another start of `base_frame`, about which its parameters count from zero.
+    pub(crate) fn standing_at(&self, base: Pose) -> Self {
+        let again = |member: &Member| {
+            let effect: Arc<dyn Effect> = match member.effect.name() {
+                names::BASE_FRAME => Arc::new(BasePlacement::new(base)),
+                _ => member.effect.clone(),
+            };
+            Member::new(effect, member.range.clone())
+        };
+        Self {
+            effects: self.effects.iter().map(again).collect(),
+            specs: self.specs.clone(),
             base,
         }
     }

@@ -11,12 +11,13 @@ use super::model::{Model, PriorCheck};
 use super::observe::indices;
 use super::problem::{Evaluation, Problem, as_of_three, bound, columns, share};
 use super::repeats::{Poses, Repeated, autocorrelation_time};
-use crate::effect::Place;
+use crate::effect::{Place, names};
 use crate::observation::{Dimension, ExcessSigma, Residual};
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// How a fit treated a parameter of the stack.
 #[derive(Debug, Clone, PartialEq)]
@@ -177,7 +178,7 @@ const FIRST: Effort = Effort { limit: 4, ..ROUGH };
 /// Parameters of one kind that are farther off than this many of their tolerances, root mean square, are those of an arm that is made worse.
 const WORSE: f64 = 2.0;
 /// How often tolerances are learned.
-const WIDENINGS: usize = 3;
+const WIDENINGS: usize = 8;
 /// Where at least one row in so many belongs to a repeated pose, rows are clustered.
 const REPEATING: usize = 4;
 /// Degrees of freedom that the noise of the weights counts as.
@@ -214,14 +215,37 @@ pub fn fit(
         }
         search.settle(&mut problem, &mut model, candidates, ROUGH);
     }
+    stand_where_found(&mut model, candidates);
     let all = problem.observe(&model, candidates);
     let fitted = stated(&problem, &model, candidates, search, all);
     (model, fitted)
 }
 
-/// Widens the tolerances of every kind of parameter that is farther off than arms are made: how badly an arm is made is learned from the
-/// parameters that the data determine, and never thought smaller than stated. Whether any was widened.
+/// Lets the corrections of the base count from where it was found: far from there they are no small motions in the axes of the tracker, and a
+/// covariance of theirs would be of other numbers than those that a stored model has.
+fn stand_where_found(model: &mut Model, candidates: &[usize]) {
+    let base: Vec<usize> = model.stack.parameters_of(names::BASE_FRAME).collect();
+    if base.is_empty() || !base.iter().all(|k| candidates.contains(k)) {
+        return;
+    }
+    model.stack = Arc::new(model.stack.standing_at(model.base()));
+    base.iter().for_each(|k| model.x[*k] = 0.0);
+}
+
+/// Widens tolerances that this arm is not made to: first of the one number that is farthest beyond its own, since one wrong number is likelier
+/// than a little error of all others that would do the same; then of every kind of parameter that is farther off than arms are made, as far as
+/// the data determine them. Never thought smaller than stated. Whether any was widened.
 fn widened(problem: &Problem, model: &mut Model, candidates: &[usize]) -> bool {
+    let beyond = |k: &usize| model.x[*k].abs() / model.tolerances[*k];
+    let farthest = candidates
+        .iter()
+        .copied()
+        .filter(|k| beyond_tolerance(model, *k).is_some() && beyond(k) > BEYOND)
+        .max_by(|a, b| beyond(a).total_cmp(&beyond(b)));
+    if let Some(k) = farthest {
+        model.tolerances[k] = model.x[k].abs();
+        return true;
+    }
     let Some(inverse) = problem.evaluate(model, candidates).factor.inverse() else {
         return false;
     };

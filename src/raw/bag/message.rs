@@ -2,7 +2,9 @@
 //!
 //! CDR is read here by hand: a dozen lines for each kind of value, without a description of types that must be compiled first.
 
-use super::json::{in_cdr, is_json};
+mod json;
+
+use json::{in_cdr, is_json};
 use std::borrow::Cow;
 use std::collections::HashMap;
 

@@ -710,8 +710,8 @@ fn the_order_of_the_columns_of_joints_is_named_and_given_as_yaml() {
         has(
             diagnosis.wrong(),
             [
-                format!("one after another they hold joints {holds};"),
-                format!("columns: [{}]}}", columns.join(", ")),
+                format!("one after another they hold joints {holds};").as_str(),
+                format!("columns: [{}]}}", columns.join(", ")).as_str(),
             ],
         );
         assert!(diagnosis.left_mm() < 10.0, "{}", diagnosis.wrong());

@@ -1,6 +1,6 @@
 //! Messages of ROS 2 in JSON, as bridges to browsers record them, as the same bytes that CDR has.
 
-use super::message::{FieldFault, FieldType, MessageKind};
+use super::{FieldFault, FieldType, MessageKind};
 use serde_json::{Map, Value};
 
 /// Whether a message is JSON: CDR begins with a zero.
