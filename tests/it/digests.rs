@@ -70,6 +70,11 @@ const TRIALS: &[(&str, &str, &str)] = &[
         "torques",
         "{diagnose: {}, given: [{cell: \"viscous_friction@joint 2\", size: 1}]}",
     ),
+    (
+        "diagnose_drives",
+        "drives",
+        "{robot: robot.xml, drives: drives.json, recording: drives.csv}",
+    ),
     ("masses", "torques", "{}"),
     ("compare_torques", "torques", "{}"),
     ("report_torques", "torques", "{}"),
@@ -288,6 +293,9 @@ fn run(entry: &StageEntry, name: &str, settings: &str) -> StageDigest {
             "recording.csv",
             read(self::folder().join("torques/recording.csv")),
         ),
+        ("robot.xml", read(self::folder().join("drives/robot.xml"))),
+        ("drives.json", read(self::folder().join("drives/drives.json"))),
+        ("drives.csv", read(self::folder().join("drives/recording.csv"))),
         (
             "parameters.parquet",
             read(self::folder().join("points/identify.parameters.parquet")),

@@ -177,6 +177,10 @@ const ROUGH: Effort = Effort {
 const FIRST: Effort = Effort { limit: 4, ..ROUGH };
 /// Parameters of one kind that are farther off than this many of their tolerances, root mean square, are those of an arm that is made worse.
 const WORSE: f64 = 2.0;
+/// Without regard to tolerances: so many times as wide ...
+const AFAR: f64 = 100.0;
+/// ... where less than this share of what stays unmodelled is left.
+const AFAR_WORTH: f64 = 0.5;
 /// How often tolerances are learned.
 const WIDENINGS: usize = 8;
 /// Where at least one row in so many belongs to a repeated pose, rows are clustered.
@@ -209,6 +213,7 @@ pub fn fit(
         stop: Stop::NothingFree,
     };
     search.settle(&mut problem, &mut model, candidates, FIRST);
+    search.settle_from_afar(&mut problem, &mut model, candidates);
     for _ in 0..WIDENINGS {
         if !widened(&problem, &mut model, candidates) {
             break;
@@ -403,6 +408,26 @@ struct Minimisation {
 }
 
 impl Minimisation {
+    /// What stays unmodelled may be a number that is far beyond its tolerance, which a noise as large hides: where the rows are fitted far better
+    /// without regard to tolerances, it goes on from there.
+    fn settle_from_afar(&mut self, problem: &mut Problem, model: &mut Model, candidates: &[usize]) {
+        let near = problem.excess;
+        if near == ExcessSigma::default() {
+            return;
+        }
+        let (x, tolerances) = (model.x.clone(), model.tolerances.clone());
+        candidates.iter().for_each(|k| model.tolerances[*k] *= AFAR);
+        self.settle(problem, model, candidates, ROUGH);
+        model.tolerances = tolerances;
+        let far = problem.excess;
+        if far.length < AFAR_WORTH * near.length || far.angle < AFAR_WORTH * near.angle {
+            self.settle(problem, model, candidates, ROUGH);
+        } else {
+            model.x = x;
+            problem.excess = near;
+        }
+    }
+
     /// Rounds of fitting the candidates and learning how much stays unmodelled; the first with little effort.
     fn settle(
         &mut self,

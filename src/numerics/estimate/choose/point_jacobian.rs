@@ -47,7 +47,7 @@ impl PointJacobian {
     pub(super) fn of(model: &Model, data: &Measurements, order: &[usize]) -> Self {
         let rows: Vec<usize> = (0..data.rows()).collect();
         let problem = Problem::new(data, &rows, ExcessSigma::default());
-        let factor = problem.evaluate(model, order).factor;
+        let factor = problem.observe(model, order).factor;
         let prior = |k: &usize| model.stack.specs()[*k].tolerance;
         let seen = visibility(&factor, &order.iter().map(prior).collect::<Vec<_>>());
         let free: Vec<usize> = order
