@@ -190,6 +190,7 @@ impl CompensateArguments {
         let arm = identified.arm();
         let coverage = identified.coverage();
         let uncertainty = identified.uncertainty(&arm);
+        let known = uncertainty.as_ref().map(|known| known.own_base);
         let mut corrector = Corrector::new(&arm, coverage, uncertainty, manner(self, &identified)?);
         let threads = self.model.threads()?;
         let place = match self.targets.as_os_str() == "-" {
@@ -218,7 +219,7 @@ impl CompensateArguments {
             let counting = identified.counting();
             let counting = counting.map_or_else(String::new, |line| format!("{line}\n"));
             let (origin, tally) = (&identified.origin, corrector.tally.summary());
-            let base = identified.base_in_words();
+            let base = identified.base_in_words(known.unwrap_or_default());
             note(format!("model: {origin}\n{counting}{base}\n{tally}"));
         }
         let column = match language(&self.targets).is_some() || self.plain {

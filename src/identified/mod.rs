@@ -368,14 +368,16 @@ impl IdentifiedModel {
         }
     }
 
-    /// The base that targets are in, in words.
-    pub(crate) fn base_in_words(&self) -> &'static str {
+    /// The base that targets are in, in words; `known`: how well points are known in the robot's own, m, 95 %.
+    pub(crate) fn base_in_words(&self, known: f64) -> String {
+        let within = match known > 0.0 {
+            true => format!(", and known there to {:.2} mm (95 %)", known * 1e3),
+            false => String::new(),
+        };
         match self.base {
-            TargetBase::Own => {
-                "targets are in the robot's own base, as it is identified under tolerances"
-            }
+            TargetBase::Own => format!("targets are in the robot's own base, as it is identified{within}"),
             TargetBase::Smallest => {
-                "targets are in the base in which the robot as it was believed is nearest to what was measured"
+                "targets are in the base in which the robot as it was believed is nearest to what was measured".into()
             }
         }
     }

@@ -294,8 +294,14 @@ fn run(entry: &StageEntry, name: &str, settings: &str) -> StageDigest {
             read(self::folder().join("torques/recording.csv")),
         ),
         ("robot.xml", read(self::folder().join("drives/robot.xml"))),
-        ("drives.json", read(self::folder().join("drives/drives.json"))),
-        ("drives.csv", read(self::folder().join("drives/recording.csv"))),
+        (
+            "drives.json",
+            read(self::folder().join("drives/drives.json")),
+        ),
+        (
+            "drives.csv",
+            read(self::folder().join("drives/recording.csv")),
+        ),
         (
             "parameters.parquet",
             read(self::folder().join("points/identify.parameters.parquet")),

@@ -207,7 +207,7 @@ fn every_target_adds_three_to_the_rank_and_their_places_come_out() {
         cell.disturb(&mut data);
         let (model, fitted) = cell.fit(&data, nothing);
         let name = &cell.description.name;
-        assert_eq!(fitted.free().len(), axes + 9, "{name}");
+        assert_eq!(fitted.singular.len(), axes + 9, "{name}");
         assert!(
             fitted.clusters == 60,
             "{name}: rows of a pose stay together, {} clusters",
@@ -251,7 +251,7 @@ fn targets_known_from_elsewhere_show_the_zero_of_the_last_joint() {
     assert!(sigma < 1e-4, "{sigma:e} rad");
     // What a turn of the last joint cannot be told from without the targets' places stays where it is.
     let (_, blind) = cell.fit(&data, nothing);
-    assert!(fitted.free().len() > blind.free().len());
+    assert!(fitted.singular.len() > blind.singular.len());
 }
 
 #[test]
@@ -264,7 +264,7 @@ fn poses_add_the_orientation_of_the_tool_to_the_rank() {
         cell.turn(&mut data);
         let (model, fitted) = cell.fit(&data, nothing);
         let name = &cell.description.name;
-        assert_eq!(fitted.free().len(), axes + 6, "{name}");
+        assert_eq!(fitted.singular.len(), axes + 6, "{name}");
         // The median of 80 scatters by a tenth.
         assert!(
             fitted.excess_sigma < 0.6 * SIGMA,
@@ -299,7 +299,7 @@ fn distances_from_one_anchor_see_all_but_where_the_cell_stands() {
     data.points.position.fill(Vector3::zeros());
     data.points.sigma.fill(Vector3::repeat(f64::INFINITY));
     let (model, fitted) = cell.fit(&data, nothing);
-    assert_eq!(fitted.free().len(), 27 + 3 - 6);
+    assert_eq!(fitted.singular.len(), 27 + 3 - 6);
     let errors = model.row_errors(&data).into_iter();
     let rms = rms(errors.map(|error| error.length));
     let expected = 2e-5 * (1.0f64 - 24.0 / 200.0).sqrt();
@@ -320,7 +320,7 @@ fn an_anchor_beside_a_tracker_is_placed_where_it_is() {
     ];
     cell.reach(&mut data, &anchors, 3e-5);
     let (model, fitted) = cell.fit(&data, nothing);
-    assert_eq!(fitted.free().len(), 27 + 6);
+    assert_eq!(fitted.singular.len(), 27 + 6);
     for k in model.stack.parameters_of("anchor") {
         let spec = &model.stack.specs()[k];
         let (_, place) = spec.name.split_once('.').unwrap();
@@ -353,7 +353,7 @@ fn rows_of_one_axis_count_for_that_axis_alone() {
         data.points.sigma[row].y = f64::INFINITY;
     }
     let (model, fitted) = cell.fit(&data, nothing);
-    assert_eq!(fitted.free().len(), 27);
+    assert_eq!(fitted.singular.len(), 27);
     assert_eq!(fitted.values, 3 * 60 + 60);
     let half = laws::select(&data, &(0..60).collect::<Vec<_>>());
     let (_, few) = cell.fit(&half, nothing);

@@ -120,7 +120,7 @@ fn position_data_see_four_parameters_a_revolute_joint_two_a_prismatic_one_and_th
     for (description, expected) in fixture::all().into_iter().zip([27, 27, 31, 29]) {
         let (data, _) = recording(&description, &GEOMETRY, 120, 1);
         let (_, fitted) = identify(&data, &description, &GEOMETRY, &all_rows(&data));
-        assert_eq!(fitted.free().len(), expected, "{}", description.name);
+        assert_eq!(fitted.singular.len(), expected, "{}", description.name);
         let gap = fitted.singular_all[expected - 1] / fitted.singular_all[expected].max(1e-300);
         assert!(
             gap > 1e6,
@@ -212,7 +212,12 @@ fn scores(
     let all: Vec<usize> = (0..rows).collect();
     let (data, _) = recording(description, &[], rows, 0);
     let (model, fitted) = identify(&data, description, effects, &all);
-    let free = fitted.free();
+    // What tolerances hardly have a part in: the truth is drawn otherwise than they say.
+    let by_the_data = |k: &usize| {
+        let known = fitted.covariance.as_ref().and_then(|all| all.block(&[*k]));
+        known.is_some_and(|known| known[(0, 0)].sqrt() < 0.02 * model.tolerances[*k])
+    };
+    let free: Vec<usize> = fitted.free().into_iter().filter(by_the_data).collect();
     let names = free
         .iter()
         .map(|k| model.stack.specs()[*k].name.clone())
@@ -231,7 +236,6 @@ fn scores(
                 score.push((model.x[*k] - truth.x[*k]) / sigma);
             }
         }
-        assert_eq!(fitted.free().len(), free.len());
     }
     (names, scores)
 }

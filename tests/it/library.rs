@@ -58,7 +58,7 @@ fn an_arm_is_identified_from_arrays() {
         .unwrap();
     let sigma = zero.sigma.unwrap();
     assert!(
-        (zero.value - 1.5e-3).abs() < 4.0 * sigma && sigma < 1e-4,
+        (zero.value - 1.5e-3).abs() < 4.0 * sigma && sigma < 1e-3,
         "{} +- {sigma}",
         zero.value
     );

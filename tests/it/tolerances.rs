@@ -130,12 +130,13 @@ fn zeros_and_base_are_those_of_the_arm_where_the_shoulder_has_an_offset() {
             let mut specs = model.stack.specs().iter();
             specs.position(|spec| spec.name == name).unwrap()
         };
-        for joint in 1..zeros.len() - 1 {
+        let between = zeros.iter().enumerate().skip(1).take(zeros.len() - 2);
+        for (joint, is) in between {
             let k = zero(joint);
             let ParameterStatus::Free(sigma) = fitted.statuses[k] else {
                 panic!("{name}: joint {} is held", joint + 1)
             };
-            let off = (model.x[k] - zeros[joint]) / sigma;
+            let off = (model.x[k] - is) / sigma;
             assert!(
                 off.abs() < 4.0,
                 "{name}: zero {}: {off:.1} sigma",

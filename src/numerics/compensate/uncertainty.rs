@@ -3,6 +3,7 @@
 //! How certain a correction is, and which finding leaves it open.
 
 use crate::compensate::arm::{BeyondFitted, IdentifiedArm, Reach};
+use crate::effect::names;
 use crate::estimate::choose::median;
 use crate::estimate::{Covariance, columns};
 use crate::robot::Measurements;
@@ -48,6 +49,8 @@ pub struct Uncertainty {
     usual: f64,
     /// m: length of one standard deviation of the instrument there, rms over the rows.
     instrument: f64,
+    /// m, 95 %: how far points may be off in the robot's own base, where that is known no better than by tolerances; usual at the recorded poses.
+    pub own_base: f64,
 }
 
 impl Uncertainty {
@@ -81,6 +84,7 @@ impl Uncertainty {
             names,
             usual: 0.0,
             instrument: 0.0,
+            own_base: 0.0,
         }
     }
 
@@ -95,6 +99,23 @@ impl Uncertainty {
         let squares = (0..rows).map(|row| data.noise(row).powi(2)).filter(finite);
         self.instrument = (squares.sum::<f64>() / rows.max(1) as f64).sqrt();
         self.usual = if usual.is_empty() { 0.0 } else { median(usual) };
+        // What moves base and links together shows in no measured point, but in those of the robot's own base.
+        let mut against_base = Self {
+            row: self.row.clone(),
+            covariance: self.covariance.clone(),
+            sources: Vec::new(),
+            names: Vec::new(),
+            ..self
+        };
+        let base = arm.model().stack.parameters_of(names::BASE_FRAME);
+        base.for_each(|k| against_base.row[k] = None);
+        let some = (0..rows).step_by(rows.div_ceil(POSES).max(1));
+        let radius = |row| {
+            let all = against_base.of_parameters(&mut reach, data.q(row));
+            radius_95(all.trace(), all.norm_squared())
+        };
+        let radii: Vec<f64> = some.map(radius).filter(finite).collect();
+        self.own_base = if radii.is_empty() { 0.0 } else { median(radii) };
         self
     }
 

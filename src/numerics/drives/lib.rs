@@ -5,6 +5,8 @@
 //! is rolled out again. [`Drives`] is a problem of the one engine (`calib_engine`).
 
 #![forbid(unsafe_code)]
+// Matrices of joints are read by their indices, as the recursions are written.
+#![allow(clippy::needless_range_loop)]
 #![warn(missing_docs)]
 
 #[cfg(test)]

@@ -234,7 +234,7 @@ impl<'a> Reader<'a> {
         let tool = carried
             .clone()
             .find(|(name, ..)| name == "tool")
-            .or(carried.clone().last())
+            .or(carried.clone().next_back())
             .map(|(_, at, _)| *at);
         let end = tree
             .bodies

@@ -430,11 +430,10 @@ impl Effect for LinkGeometry {
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
         let mut out = Vec::new();
         let tilts = tolerance(robot, Made::Axis);
-        let lengths = length_variances(robot);
-        for link in 1..robot.joints() {
+        for (link, lengths) in length_variances(robot).iter().enumerate().skip(1) {
             for (axis, tilt, twist) in directions(robot, link) {
                 let along = twist.fixed_rows::<3>(0).into_owned();
-                let length = along.dot(&(lengths[link] * along)).sqrt();
+                let length = along.dot(&(lengths * along)).sqrt();
                 let letter = ['x', 'y', 'z'][axis];
                 out.push(ParameterSpec {
                     name: format!(

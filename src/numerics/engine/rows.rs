@@ -42,7 +42,7 @@ impl Rows {
         precision: &DVector<f64>,
     ) -> Self {
         let whole = gram + DMatrix::from_diagonal(precision);
-        let factor = (gradient.len() > 0).then(|| whole.cholesky()).flatten();
+        let factor = (!gradient.is_empty()).then(|| whole.cholesky()).flatten();
         let explained = factor
             .as_ref()
             .map_or(0.0, |factor| gradient.dot(&factor.solve(&gradient)));
@@ -91,8 +91,11 @@ impl Rows {
     }
 }
 
+/// A cell with the evidence and the numbers of each of its shapes.
+pub type CellAnswers<K> = (Cell<K>, Vec<(f64, Vec<f64>)>);
+
 /// Scanned cells, likeliest first: of each the likeliest shape begins a fit, all of them count.
-pub fn ranked<K: Clone>(cells: Vec<(Cell<K>, Vec<(f64, Vec<f64>)>)>) -> Vec<Scanned<K>> {
+pub fn ranked<K: Clone>(cells: Vec<CellAnswers<K>>) -> Vec<Scanned<K>> {
     let mut all: Vec<Scanned<K>> = cells
         .into_iter()
         .filter_map(|(cell, shapes)| {

@@ -136,7 +136,7 @@ pub fn clocks_apart(first: &[f64], second: &[f64], tolerance: f64) -> Option<Clo
     let is_other = |(count, offset): &(usize, f64)| {
         *count == best.0 && (offset - best.1).abs() > 2.0 * tolerance
     };
-    (!found.iter().any(is_other)).then(|| ClocksApart {
+    (!found.iter().any(is_other)).then_some(ClocksApart {
         offset: sign * best.1,
         paired: best.0,
         tried: tried.len(),

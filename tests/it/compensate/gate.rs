@@ -142,7 +142,7 @@ fn a_table_of_parameters_without_a_verdict_is_held_to_the_same_limits() {
             fed(folder.path(), &words, HEADER)
         };
         if is_far {
-            let reason = "link_geometry at link 2";
+            let reason = "joint_offset at joint 2";
             let err = with("").refused();
             has(
                 &err,

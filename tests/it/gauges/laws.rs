@@ -276,7 +276,7 @@ fn the_rank_of_every_kind_is_that_of_theory() {
             let (model, fitted) = truth.fit(&data, |_| true);
             let name = format!("{}, {}", truth.description.name, kind.about().name);
             let expected = rank(&model.robot, &data, &rows, false, 0);
-            assert_eq!(Some(fitted.free().len()), expected, "{name}");
+            assert_eq!(Some(fitted.singular.len()), expected, "{name}");
         }
     }
 }

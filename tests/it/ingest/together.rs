@@ -329,7 +329,7 @@ fn a_cut_file_is_blamed_for_the_partners_that_it_lacks() {
 fn ids_of_files_that_continue_each_other_count_within_their_file() {
     let part = TWO.replace("files:\n", "");
     let yaml = format!(
-        "files:{}{}join: {{by: append}}\n",
+        "files:{}{}join: {{by: append}}\nmax_rejected_fraction: 0.9\n",
         part,
         part.replace("a.csv", "b/a.csv")
     );

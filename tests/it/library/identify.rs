@@ -3,7 +3,7 @@ use calib::error::Result;
 use calib::table::ParameterRow;
 
 /// Parameters of an arm, from joint positions (rad, a row of them for each pose) and measured points (mm, in the tracker's frame, wherever
-/// it stands). Those that the data cannot determine keep their nominal value; `status` says why.
+/// it stands). `sigma` is that of data and tolerances together, `determined` says which of both tells.
 pub fn parameters(
     robot_file: &str,
     joints_rad: Vec<f64>,

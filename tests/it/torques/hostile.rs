@@ -309,7 +309,7 @@ fn answered(robot: &str, change: impl FnOnce(&mut Sheet), more: &str) -> (Value,
     put(
         folder,
         "pipeline.yaml",
-        &text.replace("- uses: diagnose_torques", more),
+        text.replace("- uses: diagnose_torques", more),
     );
     let answer = calib(
         ".",

@@ -28,7 +28,10 @@ fn moved(time: f64, seed: u64) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for k in 1..6u64 {
         let size = 0.1 + 0.4 * chance(seed * 100 + k);
-        let (pace, phase) = (0.628 * k as f64, 6.28 * chance(seed * 100 + k + 50));
+        let (pace, phase) = (
+            0.628 * k as f64,
+            std::f64::consts::TAU * chance(seed * 100 + k + 50),
+        );
         let (sine, cosine) = (pace * time + phase).sin_cos();
         sum[0] += size * sine;
         sum[1] += size * pace * cosine;
