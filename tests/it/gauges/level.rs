@@ -137,8 +137,9 @@ fn a_level_alone_finds_the_offsets_of_joints_that_tilt_it() {
         .iter()
         .zip(&model.x)
         .zip(&fitted.statuses)
-        .filter_map(|((spec, value), fate)| match fate {
-            ParameterStatus::Free(sigma) if is_offset(&spec.name) => {
+        .zip(&model.tolerances)
+        .filter_map(|(((spec, value), fate), tolerance)| match fate {
+            ParameterStatus::Free(sigma) if is_offset(&spec.name) && *sigma < 0.9 * tolerance => {
                 Some((spec.name.as_str(), *value, *sigma))
             }
             _ => None,
