@@ -3,7 +3,7 @@
 use crate::fixture::{self, fit_all};
 use crate::identify::{GEOMETRY, model, recording};
 use calib::description::RobotDescription;
-use calib::estimate::{Fitted, Model, ParameterStatus, Remedy, Session, align, remedies};
+use calib::estimate::{Fitted, Model, Remedy, Session, align, remedies};
 use calib::robot::{Measurements, RobotModel};
 
 fn identify(
@@ -32,10 +32,7 @@ fn remedy(
         .iter()
         .position(|spec| spec.name == name)
         .unwrap();
-    assert!(
-        !matches!(fitted.statuses[k], ParameterStatus::Free(_)),
-        "{name} is seen"
-    );
+    assert!(fitted.undetermined(&model).contains(&k), "{name} is seen");
     remedies(&Session {
         data,
         rows: &rows,

@@ -162,7 +162,8 @@ fn a_urdf_fault_names_its_line() {
     );
     assert_eq!(
         urdf(ARM, "upper", "base_link"),
-        "arm.urdf:1: no chain from `upper` to `base_link`: the way up from `base_link` ends at `base_link`"
+        "arm.urdf:1: no chain from `upper` to `base_link`: the way up from `base_link` ends at `base_link`; up from `upper` the joint `j1` \
+         moves, and a base hangs on the chain by fixed joints alone"
     );
     assert_eq!(
         urdf("<sdf/>", "a", "b"),
