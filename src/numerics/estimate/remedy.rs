@@ -84,7 +84,7 @@ pub fn remedies(session: &Session) -> BTreeMap<usize, Remedy> {
         let at = candidates.iter().position(|other| *other == k);
         let mut shows = tried.iter().filter(|(_, shown)| {
             let shown = shown.as_ref().zip(at);
-            shown.is_some_and(|(shown, at)| shown[at] == Determined::Determined)
+            shown.is_some_and(|(shown, at)| shown[at] != Determined::ByTolerance)
         });
         shows
             .next()
