@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 crate::stage::stage! {
-    Report, "report", 25, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
+    Report, "report", 26, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
         ReportReads -> ReportWrites {
             document: Document,
             acceptance: Acceptance,
@@ -188,7 +188,7 @@ pub struct ReportTorques {
 }
 
 crate::stage::stage! {
-    ReportTorques, "report_torques", 5, "writes one self-contained HTML file: torques before and after, friction, what was found",
+    ReportTorques, "report_torques", 6, "writes one self-contained HTML file: torques before and after, friction, what was found",
         ReportTorquesReads -> ReportTorquesWrites {
             document: Document,
         }

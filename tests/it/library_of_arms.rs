@@ -1,6 +1,7 @@
 //! The library of arms: reach as published, axes as public models have them, and a run of each from `init --robot`.
 
 use crate::answer::{calib, put};
+use crate::fixture::spread;
 use calib::robot::{LIBRARY, RobotModel};
 use calib::spatial::Pose;
 use calib::table::{Prediction, from_parquet};
@@ -130,18 +131,14 @@ pub(super) fn recording(robot: &RobotModel, coupled: &[calib::robot::CountedCoup
     let mut text = String::from("point");
     (1..=joints).for_each(|j| write!(text, ",A{j}").unwrap());
     text.push_str(",x,y,z\n");
-    for k in 0..160_u32 {
-        // A sequence that fills the ranges evenly.
-        let drawn = |j: usize| {
-            (f64::from(k) * f64::from(2 * u32::try_from(j).unwrap() + 3).sqrt() + 0.13).fract()
-        };
+    for k in 0..160 {
         let range = |j: usize| {
             robot.description().joints[j]
                 .limits
                 .map_or([-2.0, 2.0], |limits| limits.map(|end| end.clamp(-2.6, 2.6)))
         };
         let q: Vec<f64> = (0..joints)
-            .map(|j| range(j)[0] + drawn(j) * (range(j)[1] - range(j)[0]))
+            .map(|j| range(j)[0] + spread(k, j) * (range(j)[1] - range(j)[0]))
             .collect();
         let point = tracker().point(&robot.forward(&real(&q)).point(&REFLECTOR));
         let mut shown = q.clone();

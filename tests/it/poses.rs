@@ -141,7 +141,13 @@ fn scatter(
         "joint_compliance",
     ];
     let rows: Vec<usize> = (0..poses.rows()).collect();
-    let mut squares = vec![0.0; free.len()];
+    // The base counts from where a fit finds it.
+    let base = model(robot, &effects);
+    let base: Vec<usize> = base.stack.parameters_of("base_frame").collect();
+    let compared: Vec<(usize, f64)> = (free.iter().copied().zip(scale.iter().copied()))
+        .filter(|(parameter, _)| !base.contains(parameter))
+        .collect();
+    let mut squares = vec![0.0; compared.len()];
     for seed in 0..fits {
         let mut draw = ChaCha8Rng::seed_from_u64(100 + seed);
         let mut normal = || (0..12).map(|_| draw.random::<f64>()).sum::<f64>() - 6.0;
@@ -161,14 +167,20 @@ fn scatter(
             .position
             .iter_mut()
             .for_each(|point| *point += Vector3::from_fn(|_, _| SIGMA * normal()));
-        let (fitted, outcome) = fit(&model(robot, &effects), &data, &rows, free);
-        for (k, parameter) in free.iter().enumerate() {
+        // The poses' own promise knows no tolerances.
+        let mut start = model(robot, &effects);
+        start
+            .tolerances
+            .iter_mut()
+            .for_each(|tolerance| *tolerance *= 100.0);
+        let (fitted, outcome) = fit(&start, &data, &rows, free);
+        for (square, (parameter, sigma)) in squares.iter_mut().zip(&compared) {
             assert!(
                 matches!(outcome.statuses[*parameter], ParameterStatus::Free(_)),
                 "{}",
                 fitted.stack.specs()[*parameter].name
             );
-            squares[k] += ((fitted.x[*parameter] - truth.x[*parameter]) / scale[k]).powi(2);
+            *square += ((fitted.x[*parameter] - truth.x[*parameter]) / sigma).powi(2);
         }
     }
     squares

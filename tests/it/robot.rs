@@ -437,7 +437,7 @@ fn masses_that_no_arm_of_this_length_has_are_said() {
              \x20   - {{theta: 0, d: 400, a: 25, alpha: -90}}\n\x20   - {{theta: 0, d: 0, a: 560, alpha: 0}}\n\
              tool: {{point: [0, 0, 100]}}\n\
              links:\n  - {{mass: {link}, centre: [0, 0, 0], frame: link}}\n  - {{mass: {link}, centre: [0, 0, 0], frame: link}}\n\
-             payload: {{mass: {payload}, centre: [0, 0, 100]}}\n"
+             payload: {{mass: {payload}, offset: [0, 0, 100]}}\n"
         )
     };
     let notes = |payload: f64, link: f64| {
@@ -452,7 +452,7 @@ fn masses_that_no_arm_of_this_length_has_are_said() {
     has(
         &grams,
         [
-            "payload.mass: 5000 kg on an arm of 1.",
+            "payload.mass: 5000 kg on an arm of 0.97 m between its axes",
             "links: 60000 kg on an arm of",
             "if the file holds grams, divide by 1000",
         ],

@@ -11,12 +11,12 @@ mod postures;
 mod rank;
 mod twins;
 
-use crate::fixture::{self, fit_all};
+use crate::fixture::{self, all_rows, fit_all};
 use crate::identify::{GEOMETRY, model, normal};
 use crate::recorded::made;
 use calib::description::RobotDescription;
 use calib::effect::names;
-use calib::estimate::{Fitted, KnownLength, Model, Prior, gauge};
+use calib::estimate::{Fitted, KnownLength, Model, Prior, determined_directions, gauge};
 use calib::robot::{Measurements, Named, RobotModel};
 use calib::stage::{Simulate, SimulateReads, Stage};
 use calib::table::{Recording, Robot};
@@ -169,6 +169,17 @@ fn calibrated_knowing(
         model.known.entry(k).or_default().prior = Some(Prior { mean, sigma });
     }
     fit_all(&model, data, &rows)
+}
+
+/// How many directions of all parameters the data tell, however wide tolerances are: the rank that theory speaks of.
+fn directions(fitted: &Model, data: &Measurements) -> usize {
+    let mut wide = fitted.clone();
+    wide.tolerances
+        .iter_mut()
+        .for_each(|tolerance| *tolerance *= 100.0);
+    let (model, fitted) = fit_all(&wide, data, &all_rows(data));
+    let all: Vec<usize> = (0..model.x.len()).collect();
+    determined_directions(&model, &fitted, &all)
 }
 
 /// What a socket's known place (mm) says of its parameters.

@@ -106,8 +106,8 @@ fn without_the_remainder_every_true_parameter_comes_back_and_nothing_but_noise_i
             compared += 1;
         }
     }
-    // 27 of geometry without the six of the base, 6 ratios, 1 coupling, 6 compliances.
-    assert_eq!(compared, 34);
+    // 28 of geometry without the base, 6 ratios, 1 coupling, 6 compliances.
+    assert_eq!(compared, 41);
     let prediction: Prediction = joint.get();
     for set in ["unloaded_check", "check"] {
         let rows: Vec<_> = prediction.0.iter().filter(|row| row.set == set).collect();

@@ -51,17 +51,19 @@ pub fn remedies(session: &Session) -> BTreeMap<usize, Remedy> {
         return BTreeMap::new();
     }
     let excess = fitted.excess();
-    let at = |model: &Model, data: &Measurements| {
+    let at = |model: &Model, mut data: Measurements| {
+        // Points where the model has them: others would be taken for outliers.
+        data.points.position = model.predict(&data);
         let rows: Vec<usize> = (0..data.rows()).collect();
-        let problem = Problem::new(data, &rows, excess);
+        let problem = Problem::new(&data, &rows, excess);
         problem.observe(model, &candidates).factor
     };
     let recorded = session.problem().observe(model, &candidates).factor;
     let declared = model.robot.description().payload_mass;
     let usual = data.payload[rows[0]];
-    let spread = at(model, &poses(model, data, rows, &[usual]));
-    let loaded = (declared > 0.0).then(|| at(model, &poses(model, data, rows, &[0.0, declared])));
-    let target = at(&off_axis(model), &poses(model, data, rows, &[usual]));
+    let spread = at(model, poses(model, data, rows, &[usual]));
+    let loaded = (declared > 0.0).then(|| at(model, poses(model, data, rows, &[0.0, declared])));
+    let target = at(&off_axis(model), poses(model, data, rows, &[usual]));
     let of_tool: Vec<usize> = model.stack.parameters_of(names::TOOL_OFFSET).collect();
     let tool: Vec<bool> = candidates.iter().map(|k| of_tool.contains(k)).collect();
     let prior = model.prior_sigmas(&candidates);

@@ -1,6 +1,6 @@
 //! Sockets beside points of a tracker in one estimation: the tracker tells scale and place, the sockets add to the arm.
 
-use super::{calibrated, fixture, socket, touched, true_points, truth};
+use super::{calibrated, directions, fixture, socket, touched, true_points, truth};
 use crate::identify::normal;
 use calib::estimate::scale;
 use calib::observation::{only_contacts, rank};
@@ -62,7 +62,7 @@ fn points_of_a_tracker_tell_the_scale_of_sockets() {
         let (model, fitted) = calibrated(&robot, &data, &[], &[]);
         assert_eq!(
             rank(&model.robot, &data, &rows, false, 0),
-            Some(fitted.free().len()),
+            Some(directions(&model, &data)),
             "{}",
             robot.name
         );

@@ -1,12 +1,12 @@
 //! What such data show is what theory says, counted at joints that close; the volume term is the derivative that it claims to be.
 
 use super::{
-    Length, calibrated, calibrated_knowing, fixture, known_place, plane, socket, sphere, touched,
-    truth,
+    Length, calibrated, calibrated_knowing, directions, fixture, known_place, plane, socket,
+    sphere, touched, truth,
 };
 use crate::fixture::all_rows;
 use calib::description::RobotDescription;
-use calib::estimate::{Determined, determined_directions};
+use calib::estimate::Determined;
 use calib::observation::rank;
 use calib::twin::touch::Fixture;
 
@@ -29,12 +29,8 @@ fn seen_knowing(
     known: &[(String, f64, f64)],
 ) -> usize {
     let data = touched(robot, &truth(robot, 1), fixtures, 7).measurements();
-    let (model, fitted) = calibrated_knowing(robot, &data, lengths, effects, known);
-    let all: Vec<usize> = (0..model.x.len()).collect();
-    let (setup, free) = (
-        model.robot.setup(),
-        determined_directions(&model, &fitted, &all),
-    );
+    let (model, _) = calibrated_knowing(robot, &data, lengths, effects, known);
+    let (setup, free) = (model.robot.setup(), directions(&model, &data));
     // Theory knows places of sockets, three numbers each, and no diameters.
     if effects.is_empty() && known.len().is_multiple_of(3) {
         let (rows, scaled) = (all_rows(&data), !lengths.is_empty());

@@ -9,7 +9,6 @@ use crate::fixture::rms;
 use crate::identify::normal;
 use calib::description::RobotDescription;
 use calib::estimate::scale;
-use calib::observation::rank;
 use calib::twin::touch::Fixture;
 use nalgebra::{DVector, Vector3};
 
@@ -48,9 +47,9 @@ fn robot(seed: usize) -> RobotDescription {
 }
 
 #[test]
-fn stated_sigmas_of_distances_hold_and_the_rank_is_that_of_theory() {
+fn stated_sigmas_of_distances_hold() {
     let count = recordings();
-    let (mut scores, mut wrong) = (Vec::new(), Vec::new());
+    let mut scores = Vec::new();
     for seed in 0..count {
         let robot = robot(seed);
         let truth = truth(&robot, seed);
@@ -63,14 +62,6 @@ fn stated_sigmas_of_distances_hold_and_the_rank_is_that_of_theory() {
             &[length("a/0", "a/1", 1), length("b/0", "b/1", 2)],
             &[],
         );
-        let rows: Vec<usize> = (0..data.rows()).collect();
-        if rank(&model.robot, &data, &rows, true, 0) != Some(fitted.free().len()) {
-            wrong.push(format!(
-                "{} {seed}: {} free",
-                robot.name,
-                fitted.free().len()
-            ));
-        }
         let Some(covariance) = &fitted.covariance else {
             panic!("{} {seed}: singular", robot.name)
         };
@@ -107,7 +98,6 @@ fn stated_sigmas_of_distances_hold_and_the_rank_is_that_of_theory() {
     let scatter = rms(scores.iter().copied());
     let covered =
         scores.iter().filter(|score| score.abs() < 1.96).count() as f64 / scores.len() as f64;
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     // Twelve twins leave room for chance.
     let (scatters, coverage) = if count >= 100 {
         (0.85..1.18, 0.92..0.98)
