@@ -1,9 +1,9 @@
 //! Every pipeline of the repository: checked, and run where its data are at hand.
 
 use crate::answer::{put, read};
-use crate::desk;
+use crate::desk::{self, shared};
 use calib::error::Error;
-use calib::pipeline::Plan;
+use calib::pipeline::{Override, Plan};
 use calib::stage::STAGES;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -27,8 +27,10 @@ fn pipelines() -> Vec<PathBuf> {
 }
 
 /// What keeps a pipeline from running here: files that are not in the repository.
-fn missing_data(file: &Path) -> Option<String> {
-    match Plan::load(file, &[], STAGES) {
+fn missing_data(file: &Path, settings: &[String]) -> Option<String> {
+    let stated = settings.iter().skip(1).step_by(2);
+    let overrides: Vec<Override> = stated.map(|text| Override::parse(text).unwrap()).collect();
+    match Plan::load(file, &overrides, STAGES) {
         Ok(_) => None,
         Err(Error::Spec(faults))
             if faults
@@ -50,18 +52,40 @@ fn missing_data(file: &Path) -> Option<String> {
 /// Settings with which a pipeline runs every stage that it has in seconds instead of minutes: fewer seeds, every sixth row.
 fn shorter(name: &str, folder: &Path) -> Vec<String> {
     const SERIES: &str = "Series_C/measurements_random_poses.csv";
+    const GRID: &str = "3D_UR5_uncalibrated_grid_cleaned.csv";
+    const RANDOM: &str = "3D_UR5_uncalibrated_random_cleaned.csv";
+    let thinned = |text: &str| {
+        let (header, rows) = text.split_once('\n').unwrap();
+        let kept = std::iter::once(header).chain(rows.lines().step_by(6));
+        kept.collect::<Vec<_>>().join("\n")
+    };
     let set = |target: &str| ["--set".to_string(), target.to_string()];
     match name {
         "pipelines/swarm/pipeline.yaml" => [set("table2.seeds=20"), set("ten.seeds=3")].concat(),
         "pipelines/ur10/pipeline.yaml" => {
-            let whole = read(root().join("../shared/data/ipa_ur10").join(SERIES));
-            let (header, rows) = whole.split_once('\n').unwrap();
-            let kept: Vec<&str> = std::iter::once(header)
-                .chain(rows.lines().step_by(6))
-                .collect();
+            let Some(data) = shared("data/ipa_ur10") else {
+                return Vec::new();
+            };
+            let whole = read(data.join(SERIES));
             std::fs::create_dir_all(folder.join("Series_C")).unwrap();
-            put(folder, SERIES, kept.join("\n"));
+            put(folder, SERIES, thinned(&whole));
             set(&format!("data={}", folder.display())).to_vec()
+        }
+        "pipelines/ur5/pipeline.yaml" => {
+            let Some(data) = shared("data/ur5_gts3800") else {
+                return Vec::new();
+            };
+            put(folder, GRID, thinned(&read(data.join(GRID))));
+            put(folder, RANDOM, read(data.join(RANDOM)));
+            let sets = set("split.sets=[{set: fit, rows: 167}, {set: validate}]");
+            [set(&format!("data={}", folder.display())), sets].concat()
+        }
+        // Its users bring their own recording.
+        "pipelines/drives/pipeline.yaml" => {
+            let Some(cases) = shared("practice_drives") else {
+                return Vec::new();
+            };
+            set(&format!("case={}", cases.join("p01").display())).to_vec()
         }
         _ => Vec::new(),
     }
@@ -86,15 +110,15 @@ fn every_pipeline_is_sound_and_runs_where_its_data_are() {
     assert!(pipelines().len() >= 3);
     for file in pipelines() {
         let name = file.strip_prefix(root()).unwrap().display().to_string();
-        if let Some(missing) = missing_data(&file) {
+        let store = tempfile::tempdir().unwrap();
+        let settings = shorter(&name, store.path());
+        if let Some(missing) = missing_data(&file, &settings) {
             desk::missing(&format!(
                 "{name}: {}",
                 missing.lines().next().unwrap_or_default()
             ));
             continue;
         }
-        let store = tempfile::tempdir().unwrap();
-        let settings = shorter(&name, store.path());
         let run = || {
             let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
             command
