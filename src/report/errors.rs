@@ -122,6 +122,7 @@ pub(super) fn errors_section(
         // The sets still held out after the step that stands, before and after; the first is what the page speaks of.
         "judged": last.iter().map(|after| json!({ "before": before(rows, after), "after": after })).collect::<Vec<_>>(),
         "withdrawn": tables.withdrawn.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "left_out": last.first().and_then(|after| after.without_points()),
         "doubts": last.first().and_then(|after| after.doubts()),
         // Sets still held out after the step that stands, the verdict's first; then those that a later step was fitted to.
         "held_out": held_out.chain(used).collect::<Vec<_>>(),

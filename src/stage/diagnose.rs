@@ -222,7 +222,7 @@ impl Stage for Diagnose {
             &held_out,
             covariance,
         )
-        .with_suspects(diagnosis.screening.set_aside())
+        .with_suspects(&diagnosis.screening)
         .with_weights(&diagnosis.kept, &diagnosis.fitted)
         .with_folds(errors)
         .with_remarks(doubtful.remarks(data, &unseen));

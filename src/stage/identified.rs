@@ -257,7 +257,7 @@ impl Identified {
             of_model.as_ref(),
         )
         .with_places(&fitting.placed)
-        .with_suspects(screening.set_aside())
+        .with_suspects(screening)
         .with_weights(rows, fitted)
         .with_folds(errors)
         .with_remarks(known.remarks(data, &fitting.doubtful));

@@ -1,11 +1,13 @@
 //! `split`: which rows of the recording serve what. Every row belongs to exactly one named set.
 //!
-//! Neighbouring rows with the same joints are repeats of one pose: blocks and random choice keep them together, since a pose
-//! that was seen in training is no test. Targets that are measured one after the other in a pose are never parted. Copies of a row under
-//! other ids go wherever they stand to the set of that row.
+//! Rows of one pose, wherever they stand, go to one set, since a pose that was seen in training is no test: those whose joints are as near as
+//! encoders repeat, and shots by name (`7_1`, `7_2`). Along a path neighbours know each other just as well, and stretches of it are dealt.
+//! What the user states by label, name or number of rows is dealt as stated; a warning says where it tears a pose.
 
 use crate::error::{Error, Place, Result, counted, listed};
-use crate::robot::pose_groups::{NEAR, SAME, near};
+use crate::estimate::Units;
+use crate::robot::Measurements;
+use crate::robot::pose_groups::near;
 use crate::stage::remarks::{copied_rows, copies_remark};
 use crate::stage::{Context, Stage, matches};
 use crate::table::{Recording, Split, SplitRow};
@@ -15,27 +17,25 @@ use rand::seq::SliceRandom;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 
 /// How rows are dealt out to sets.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
 pub enum SplitBy {
-    /// Every n-th row in the order of recording goes to `set`, the others to `rest`; where several targets are measured in a pose,
-    /// every n-th pose with all of them. Repeats of a pose are not kept together.
+    /// Every n-th pose in the order of recording goes to `set` with all of its rows, the others to `rest`; along a path every n-th stretch.
     Every {
-        /// One of how many rows, from 2.
+        /// One of how many poses, from 2.
         n: u64,
         /// Which one, from 0 to n - 1; the last if not given.
         #[serde(default)]
         offset: Option<u64>,
-        /// The set of every n-th row.
+        /// The set of every n-th pose.
         #[serde(default = "validate")]
         set: String,
         /// The set of the other rows.
         #[serde(default = "fit")]
         rest: String,
-        /// Rows are counted anew for every name in this column, so that each socket, plane, sphere or target gives its share.
+        /// Poses are counted anew for every name in this column, so that each socket, plane, sphere or target gives its share.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         within: Option<NamedColumn>,
     },
@@ -65,7 +65,7 @@ pub enum SplitBy {
     },
     /// A fraction of the rows, drawn by the pipeline's seed, goes to `set`, the others to `rest`.
     Random {
-        /// Between 0 and 1; to the nearest pose.
+        /// Between 0 and 1; to the nearest pose, along a path to the nearest stretch.
         fraction: f64,
         /// The set of the drawn rows.
         #[serde(default = "validate")]
@@ -110,7 +110,7 @@ fn fit() -> String {
 }
 
 crate::stage::stage! {
-    SplitBy, "split", 4, "deals rows out to named sets: every n-th, by name, blocks, random, by usage, by order",
+    SplitBy, "split", 5, "deals rows out to named sets: every n-th, by name, blocks, random, by usage, by order",
         SplitReads {
             recording: Recording,
         } -> SplitWrites {
@@ -216,6 +216,10 @@ impl Stage for SplitBy {
             .map(|(set, rows)| format!("{set} {rows}"))
             .collect();
         context.note(format!("rows: {}", all.join(", ")));
+        match self.keeps_poses() {
+            true => self.units(recording).words().into_iter().for_each(|line| context.note(line)),
+            false => context.warn_each(torn(recording, &sets)),
+        }
         let row = |(row, set): (usize, String)| SplitRow {
             sequence: recording.sequence[row],
             point_id: recording.point_id[row].clone(),
@@ -259,6 +263,28 @@ impl SplitBy {
         Error::data(format!("with.{setting}"), message)
     }
 
+    /// Whether poses are kept together whatever the settings say.
+    fn keeps_poses(&self) -> bool {
+        matches!(
+            self,
+            Self::Every { .. } | Self::Random { .. } | Self::Blocks { .. }
+        )
+    }
+
+    /// What is dealt: poses, whatever the arm carries in them, and stretches of a path.
+    fn units(&self, recording: &Recording) -> Units {
+        let data = recording.measurements();
+        let rows: Vec<usize> = (0..recording.rows()).collect();
+        let any = |_, _| true;
+        let stretches = match self {
+            Self::Every { n, .. } => AT_LEAST * *n as f64,
+            Self::Random { fraction, .. } => AT_LEAST / fraction,
+            _ => return shots_together(Units::poses(&data, &rows, any), recording, &data),
+        };
+        let stretches = stretches.ceil().clamp(1.0, rows.len().max(1) as f64) as usize;
+        shots_together(Units::of(&data, &rows, stretches, any), recording, &data)
+    }
+
     /// The set of each row.
     fn deal(&self, recording: &Recording, seed: u64) -> Result<Vec<String>> {
         let rows = recording.rows();
@@ -274,13 +300,14 @@ impl SplitBy {
                 let names = within.map(|column| column.of(recording, "within"));
                 let names = names.transpose()?;
                 let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
-                let mut dealt = Vec::with_capacity(rows);
-                for stop in stops(recording) {
-                    let name = names.as_ref().map_or("", |names| names[stop.start]);
+                let mut dealt = vec![rest.clone(); rows];
+                for unit in self.units(recording).all {
+                    let name = names.as_ref().map_or("", |names| names[unit[0]]);
                     let count = counts.entry(name).or_default();
-                    let set = if *count % n == offset { set } else { rest };
+                    if *count % n == offset {
+                        unit.iter().for_each(|row| dealt[*row].clone_from(set));
+                    }
                     *count += 1;
-                    dealt.resize(stop.end, set.clone());
                 }
                 Ok(dealt)
             }
@@ -309,17 +336,17 @@ impl SplitBy {
                 length,
                 sets,
             } => {
-                let mut dealt = Vec::with_capacity(rows);
-                for pose in poses(recording) {
+                let mut dealt = vec![String::new(); rows];
+                for pose in self.units(recording).all {
                     // A pose belongs to the block in which it begins.
                     let block = match (count, length) {
                         (Some(count), _) => {
-                            (pose.start as u128 * u128::from(*count) / rows.max(1) as u128) as usize
+                            (pose[0] as u128 * u128::from(*count) / rows.max(1) as u128) as usize
                         }
-                        (None, length) => pose.start / length.unwrap_or(1).max(1) as usize,
+                        (None, length) => pose[0] / length.unwrap_or(1).max(1) as usize,
                     };
-                    let set = sets.get(block % sets.len().max(1)).cloned();
-                    dealt.resize(pose.end, set.unwrap_or_default());
+                    let set = &sets[block % sets.len()];
+                    pose.iter().for_each(|row| dealt[*row].clone_from(set));
                 }
                 Ok(dealt)
             }
@@ -328,17 +355,17 @@ impl SplitBy {
                 set,
                 rest,
             } => {
-                let mut poses = poses(recording);
-                poses.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+                let mut units = self.units(recording).all;
+                units.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
                 let wanted = (fraction * rows as f64).round() as usize;
                 let (mut dealt, mut drawn) = (vec![rest.clone(); rows], 0);
-                for pose in poses {
-                    // Half of a pose beyond the wanted number is nearer to it than half of a pose below.
-                    if drawn + pose.len().div_ceil(2) > wanted {
+                for unit in units {
+                    // Half of a unit beyond the wanted number is nearer to it than half of one below.
+                    if drawn + unit.len().div_ceil(2) > wanted {
                         continue;
                     }
-                    drawn += pose.len();
-                    dealt[pose].fill(set.clone());
+                    drawn += unit.len();
+                    unit.iter().for_each(|row| dealt[*row].clone_from(set));
                 }
                 Ok(dealt)
             }
@@ -401,38 +428,77 @@ fn by_order(rows: usize, sets: &[Stretch]) -> Result<Vec<String>> {
     Ok(dealt)
 }
 
-/// Rows one by one, or where targets are named, all that were measured one after the other in a pose.
-pub(super) fn stops(recording: &Recording) -> Vec<Range<usize>> {
-    let mut stops: Vec<Range<usize>> = Vec::new();
-    for row in 0..recording.rows() {
-        let joins = |stop: &Range<usize>| {
-            let Some(targets) = &recording.target else {
-                return false;
-            };
-            let new = stop.clone().all(|other| targets[other] != targets[row]);
-            new && near(recording.q(stop.start), recording.q(row), NEAR)
-        };
-        match stops.last_mut() {
-            Some(last) if joins(last) => last.end = row + 1,
-            _ => stops.push(row..row + 1),
-        }
-    }
-    stops
+/// Stretches of a path that are held out.
+const AT_LEAST: f64 = 3.0;
+/// Shots that names put together are one pose where joints are closer (0.3 deg in rad; m).
+const BY_NAME: f64 = 5.2e-3;
+/// Digits of the number of a shot.
+const SHOT_DIGITS: usize = 2;
+
+/// The pose in the name of a shot: `7` of `7_2`, `P12` of `P12-3`.
+fn pose_named(name: &str) -> Option<&str> {
+    let (pose, shot) = name.rsplit_once(['_', '-', '.', '/', ' ', '#'])?;
+    let is_number = (1..=SHOT_DIGITS).contains(&shot.len())
+        && shot.bytes().all(|byte| byte.is_ascii_digit());
+    (is_number && !pose.is_empty()).then_some(pose)
 }
 
-/// Stretches of neighbouring rows with the same joints, the targets of a pose together.
-pub(super) fn poses(recording: &Recording) -> Vec<Range<usize>> {
-    let mut poses: Vec<Range<usize>> = Vec::new();
-    for stop in stops(recording) {
-        let (named, joints) = (stop.len() > 1, recording.q(stop.start));
-        let limit = if named { NEAR } else { SAME };
-        match poses.last_mut() {
-            Some(last) if near(recording.q(last.start), joints, limit) => last.end = stop.end,
-            _ => poses.push(stop),
+/// Units with those made one that names call shots of a pose, where joints do not speak against it.
+fn shots_together(units: Units, recording: &Recording, data: &Measurements) -> Units {
+    if units.stretches > 0 {
+        return units;
+    }
+    let mut first: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut all: Vec<Vec<usize>> = Vec::new();
+    for unit in units.all {
+        let name = pose_named(&recording.point_id[unit[0]]);
+        let earlier = name.and_then(|name| first.get(name).copied());
+        match earlier.filter(|k| near(data.q(all[*k][0]), data.q(unit[0]), BY_NAME)) {
+            Some(k) => all[k].extend(unit),
+            None => {
+                first.extend(name.map(|name| (name, all.len())));
+                all.push(unit);
+            }
         }
     }
-    poses
+    all.iter_mut().for_each(|unit| unit.sort_unstable());
+    Units { all, ..units }
 }
+
+/// What is said where a stated split has rows of a pose, loaded alike, in several sets; none where it has not.
+fn torn(recording: &Recording, sets: &[String]) -> Option<String> {
+    let data = recording.measurements();
+    let rows: Vec<usize> = (0..recording.rows()).collect();
+    let loaded_alike = |a: usize, b: usize| data.payload[a] == data.payload[b];
+    let poses = Units::poses(&data, &rows, loaded_alike);
+    let poses = shots_together(poses, recording, &data).all;
+    let mut pairs: Vec<[usize; 2]> = poses
+        .iter()
+        .filter_map(|pose| {
+            let other = pose.iter().find(|row| sets[**row] != sets[pose[0]])?;
+            Some([pose[0], *other])
+        })
+        .collect();
+    let count = pairs.len();
+    pairs.truncate(TORN_NAMED);
+    let id = |row: usize| &recording.point_id[row];
+    let named = pairs.iter().map(|[one, other]| {
+        let [a, b] = [one, other].map(|row| &sets[*row]);
+        format!("{} in `{a}`, {} in `{b}`", id(*one), id(*other))
+    });
+    (count > 0).then(|| {
+        let more = if count > TORN_NAMED { "; ..." } else { "" };
+        format!(
+            "{count} of {} are in several sets ({}{more}): errors of a set that is held out say there how well a pose repeats, not how well new poses are \
+             met; deal whole poses, as `by: every` does",
+            counted(poses.len(), "pose"),
+            named.collect::<Vec<_>>().join("; ")
+        )
+    })
+}
+
+/// Poses that are named of many.
+const TORN_NAMED: usize = 3;
 
 /// A column of names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

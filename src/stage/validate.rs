@@ -1,6 +1,6 @@
 //! `validate`: statistics of the position error after every step, held-out and training rows apart.
 
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result, counted, first_of};
 use crate::robot::NoiseBasis;
 use crate::stage::doubtful::{named, suspicion};
 use crate::stage::{Context, Labelled, Stage};
@@ -66,6 +66,7 @@ impl Stage for Validate {
         }
         let mut statistics = Statistics::default();
         let mut suspected = None;
+        let proven = proven(&reads.prediction);
         for (order, step) in (0..).zip(&reads.prediction) {
             let mut fits = reads.observability.iter();
             let fit = fits.find(|fit| fit.stage == step.stage);
@@ -89,13 +90,19 @@ impl Stage for Validate {
                 let line = suspicion(whole.map(|row| [row.error_mm, row.noise_mm]), 0);
                 suspected =
                     suspected.or(line.map(|line| format!("{name} on {set}, held out: {line}")));
+                let (left, counted) = left_out(rows, held_out, &proven);
+                let rows = counted;
                 let mut row = describe(order, name, &set, held_out, &rows);
+                without(&mut row, &rows, &left, &proven);
                 row.expected_rms_mm = expected(held_out, &rows, unmodelled);
                 cross_validate(&mut row, &rows, inflation);
                 statistics.0.push(row);
             }
         }
         for row in statistics.0.iter().filter(|row| row.held_out) {
+            if let Some(line) = row.without_points() {
+                context.note(format!("{} on {}: {line}", row.step, row.set));
+            }
             if let Some(without) = row.mean_without_mm {
                 let suspects = counted(row.suspects, "suspect");
                 let them = if row.suspects == 1 { "it" } else { "them" };
@@ -132,6 +139,59 @@ impl Stage for Validate {
         }
         Ok(ValidateWrites { statistics })
     }
+}
+
+/// Rows by what names them in all tables of a recording.
+type Named<'a> = BTreeMap<(i64, &'a str), &'a str>;
+
+/// Rows that are proven to be others', with the reasons: by the last step that screened its rows, whose model is the best.
+fn proven(steps: &[Labelled<Prediction>]) -> Named<'_> {
+    let screened =
+        |step: &&Labelled<Prediction>| step.table.0.iter().any(|row| row.suspect);
+    let last = steps.iter().rev().find(screened);
+    let rows = last.into_iter().flat_map(|step| &step.table.0);
+    rows.filter_map(|row| Some(((row.sequence, row.point_id.as_str()), row.left_out.as_deref()?)))
+        .collect()
+}
+
+/// The rows of a group that are in no figure, and those that are: of held-out ones.
+fn left_out<'a>(
+    rows: Vec<&'a PredictionRow>,
+    held_out: bool,
+    proven: &Named,
+) -> (Vec<&'a PredictionRow>, Vec<&'a PredictionRow>) {
+    let is_proven = |row: &PredictionRow| proven.contains_key(&(row.sequence, row.point_id.as_str()));
+    match held_out && rows.iter().any(|row| !is_proven(row)) {
+        true => rows.into_iter().partition(|row| is_proven(row)),
+        false => (Vec::new(), rows),
+    }
+}
+
+/// Points that are named of many.
+const NAMED: usize = 3;
+
+/// States which points are in no figure of a row, and what the figures were with them.
+fn without(
+    row: &mut StatisticsRow,
+    rows: &[&PredictionRow],
+    left: &[&PredictionRow],
+    proven: &Named,
+) {
+    if !row.held_out {
+        return;
+    }
+    row.left_out = Some(left.len() as i64);
+    if left.is_empty() {
+        return;
+    }
+    let reasons: Vec<&str> = left
+        .iter()
+        .filter_map(|row| proven.get(&(row.sequence, row.point_id.as_str())).copied())
+        .collect();
+    row.left_out_points = Some(first_of(&reasons, NAMED));
+    let all = || rows.iter().chain(left).map(|row| row.error_mm);
+    row.mean_all_mm = Some(all().sum::<f64>() / all().count() as f64);
+    row.max_all_mm = all().max_by(f64::total_cmp);
 }
 
 type RowsByStepAndSet<'a> = BTreeMap<(&'a str, Cow<'a, str>, bool), Vec<&'a PredictionRow>>;

@@ -166,6 +166,11 @@ impl RunResult {
         };
         text += &error(label, after, least);
         text.extend(
+            after
+                .without_points()
+                .map(|line| labelled("left out", &line)),
+        );
+        text.extend(
             diagnosed
                 .iter()
                 .map(|diagnosis| screen::found(&diagnosis.in_few_words, width)),
@@ -302,27 +307,16 @@ fn error(label: &str, row: &StatisticsRow, least: f64) -> String {
             counted(row.points as usize, "point")
         ),
     };
-    let text = screen::errors(
-        label,
-        [row.mean_mm, row.max_mm],
-        least,
-        &format!("step {}, {rows}", row.step),
-    );
-    let without = row
-        .mean_without_mm
-        .zip(row.max_without_mm)
-        .map(|(mean, max)| {
-            screen::errors(
-                "",
-                [mean, max],
-                least,
-                &format!(
-                    "without {}",
-                    counted(row.suspects as usize, "suspected outlier")
-                ),
-            )
-        });
-    text + &without.unwrap_or_default()
+    let all = |label: &str, what: &str| {
+        let subject = format!("step {}, {rows}{what}", row.step);
+        screen::errors(label, [row.mean_mm, row.max_mm], least, &subject)
+    };
+    let Some(clean) = row.mean_without_mm.zip(row.max_without_mm) else {
+        return all(label, "");
+    };
+    let suspects = counted(row.suspects as usize, "suspected outlier");
+    let subject = format!("step {}, without {suspects}", row.step);
+    screen::errors(label, clean.into(), least, &subject) + &all("", ", with these")
 }
 
 /// The residual where no stage diagnosed it.

@@ -176,10 +176,18 @@ impl Prediction {
         self
     }
 
-    /// The same with the rows marked that a screen set aside.
-    pub(crate) fn with_suspects(mut self, suspects: impl Iterator<Item = usize>) -> Self {
-        for row in suspects {
+    /// The same with the rows marked that a screen set aside, and why those are in no headline that bear another row's name.
+    pub(crate) fn with_suspects(mut self, screening: &Screening) -> Self {
+        for row in screening.set_aside() {
             self.0[row].suspect = true;
+        }
+        for suspect in screening.suspects.iter().filter(|one| one.bears_another_name()) {
+            let partner = suspect.partner.map(|row| self.0[row].point_id.clone());
+            let (id, partner) = (
+                &self.0[suspect.row].point_id,
+                partner.unwrap_or_else(|| "another row".into()),
+            );
+            self.0[suspect.row].left_out = Some(format!("{id} lies where the joints of {partner} put it"));
         }
         self
     }
@@ -277,6 +285,18 @@ impl StatisticsRow {
         Some(format!(
             "{remarked} of {}: the correction is uncertain by more than half of itself; mean {mean:.4} mm, max {max:.4} mm there; {points}",
             counted(self.points as usize, "point")
+        ))
+    }
+
+    /// Which held-out points are in none of its figures, and what these were with them; none where there are none.
+    pub fn without_points(&self) -> Option<String> {
+        let (mean, max) = self.mean_all_mm.zip(self.max_all_mm)?;
+        let left = self.left_out?;
+        Some(format!(
+            "{left} of {} left out: {}; with {} mean {mean:.3} mm, largest {max:.3} mm",
+            counted((self.points + left) as usize, "held-out point"),
+            self.left_out_points.as_deref().unwrap_or_default(),
+            if left == 1 { "it" } else { "them" },
         ))
     }
 

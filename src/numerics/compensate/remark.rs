@@ -140,7 +140,11 @@ pub(crate) fn beyond_limits(robot: &RobotDescription, q: &[f64]) -> Vec<usize> {
         .collect()
 }
 
-/// A remark for each of `rows`, in their order; none where the model holds.
+/// An error that is this share of the stated uncertainty (95 %) refutes it, but once in six times.
+const REFUTED: f64 = 0.1;
+
+/// A remark for each of `rows`, in their order; none where the model holds, nor where the measured point shows that it does: within a tenth of what
+/// would be uncertain.
 pub fn doubts(
     arm: &IdentifiedArm,
     uncertainty: &Uncertainty,
@@ -148,14 +152,22 @@ pub fn doubts(
     rows: &[usize],
 ) -> Vec<Option<Remark>> {
     let asked = rows.par_iter().map_init(
-        || (arm.reach(), Nominal::new(&arm.model().robot)),
-        |(reach, nominal), row| {
+        || {
+            let model = arm.model();
+            let scratch = model.stack.scratch(&model.robot);
+            (arm.reach(), Nominal::new(&model.robot), scratch)
+        },
+        |(reach, nominal, scratch), row| {
             reach.under(&Circumstance::of_row(data, *row));
             let q = data.q(*row);
             let off =
                 arm.base().rotation * (reach.place(q).translation - nominal.place(q).translation);
             let certainty = uncertainty.of_correction(reach, q, &off);
-            Remark::of_certainty(&certainty)
+            let measured = data.point(*row);
+            let error =
+                measured.map(|point| (point - arm.model().place(data, *row, scratch).point).norm());
+            let refuted = error.is_some_and(|error| error < REFUTED * certainty.u95);
+            Remark::of_certainty(&certainty).filter(|_| !refuted)
         },
     );
     asked.collect()

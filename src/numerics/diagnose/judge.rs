@@ -87,10 +87,10 @@ impl Alternatives<'_> {
 
 /// Rows of the folds that judge a state; the same for every model that is compared. `None` where the poses are too few.
 fn folds(now: &FitState, fitter: &Fitter) -> Option<Vec<Vec<usize>>> {
-    // Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
-    let kind = match fitter.correlated {
-        Some(_) => FoldKind::Blocks,
-        None => FoldKind::Random(fitter.question.seed),
+    // Where noise is correlated or rows follow a path, a row is known by its neighbours: whole stretches are left out.
+    let kind = match fitter.correlated.is_some() || fitter.dense {
+        true => FoldKind::Blocks,
+        false => FoldKind::Random(fitter.question.seed),
     };
     dealt(kind, &now.session(fitter), *FOLDS)
 }
@@ -101,6 +101,32 @@ pub(crate) fn fold_error(now: &FitState, fitter: &Fitter) -> Option<f64> {
     let folds = folds(now, fitter)?;
     let errors = session.without_each(&folds, fitter.scale);
     Some(rms(&session, &folds, &errors))
+}
+
+/// Causes of findings without which stretches of a path are predicted better, taken out one finding after the other, the worst first; none where
+/// rows follow no path.
+pub(crate) fn unconfirmed(state: &FitState, found: &[Vec<usize>], fitter: &Fitter) -> Vec<usize> {
+    let mut out: Vec<usize> = Vec::new();
+    let mut left: Vec<&Vec<usize>> = found.iter().collect();
+    let Some(mut now) = fitter.dense.then(|| fold_error(state, fitter)).flatten() else {
+        return out;
+    };
+    loop {
+        let without = |members: &Vec<usize>| {
+            let kept = (0..state.causes.len()).filter(|i| !out.contains(i) && !members.contains(i));
+            let kept = kept.map(|i| state.causes[i].clone()).collect();
+            fold_error(&fitter.fit(&state.model, kept), fitter)
+        };
+        let errors = left.iter().map(|members| without(members).unwrap_or(f64::INFINITY));
+        let best = errors.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        match best.filter(|(_, error)| *error <= now) {
+            Some((at, error)) => {
+                now = error;
+                out.extend(left.remove(at));
+            }
+            None => return out,
+        }
+    }
 }
 
 /// From the errors of each fold's rows.

@@ -151,6 +151,12 @@ impl<'a> Attempt<'a> {
             if rounds.again_without(&empty(&next, &answer)) {
                 continue;
             }
+            // What stretches of a path do not confirm is made of neighbours.
+            let found = answer.found.iter().map(|found| found.members.clone());
+            let found: Vec<Vec<usize>> = found.collect();
+            if rounds.again_without(&judge::unconfirmed(&next, &found, &fitter)) {
+                continue;
+            }
             if rounds.exchange() {
                 now = next;
                 continue;

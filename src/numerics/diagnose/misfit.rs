@@ -28,7 +28,7 @@ pub(crate) struct Misfit {
     pub(crate) chi_square: f64,
     /// Reduced chi-square at fitted rows against the stated or recorded uncertainty alone.
     pub(crate) beyond_stated: f64,
-    /// Rows of the figures, suspects among them: held-out ones, else those that were fitted.
+    /// Rows of the figures, suspects among them but those that bear another row's name: held-out ones, else those that were fitted.
     pub(crate) figures: Vec<usize>,
     /// Rms size of what is left at `rows`.
     left_here: f64,
@@ -98,6 +98,12 @@ impl Misfit {
         let aside: Vec<usize> = aside.map(|suspect| suspect.row).collect();
         let mut judges = question.validate.to_vec();
         judges.retain(|row| !aside.contains(row));
+        let mut figures = question.validate.to_vec();
+        let elsewhere = |row: usize| {
+            let mut all = screening.suspects.iter();
+            all.any(|suspect| suspect.row == row && suspect.bears_another_name())
+        };
+        figures.retain(|row| !elsewhere(*row));
         let held_out = !judges.is_empty();
         let kept = &screening.kept;
         let size = |rows: &[usize]| rms(rows.iter().map(|row| left[*row].size));
@@ -128,7 +134,7 @@ impl Misfit {
             chi_square: whitened(kept) / freedom,
             beyond_stated: stated / freedom,
             figures: match held_out {
-                true => question.validate.to_vec(),
+                true => figures,
                 false => rows.clone(),
             },
             left_here: size(&rows),

@@ -177,6 +177,8 @@ const ROUGH: Effort = Effort {
 const FIRST: Effort = Effort { limit: 4, ..ROUGH };
 /// Parameters of one kind that are farther off than this many of their tolerances, root mean square, are those of an arm that is made worse.
 const WORSE: f64 = 2.0;
+/// Where a number is farther off than so many of its tolerances, one of them may be far beyond.
+const PULLED: f64 = 2.0;
 /// Without regard to tolerances: so many times as wide ...
 const AFAR: f64 = 100.0;
 /// ... where less than this share of what stays unmodelled is left.
@@ -412,7 +414,8 @@ impl Minimisation {
     /// without regard to tolerances, it goes on from there.
     fn settle_from_afar(&mut self, problem: &mut Problem, model: &mut Model, candidates: &[usize]) {
         let near = problem.excess;
-        if near == ExcessSigma::default() {
+        let pulled = |k: &usize| model.x[*k].abs() > PULLED * model.tolerances[*k];
+        if near == ExcessSigma::default() || !candidates.iter().any(pulled) {
             return;
         }
         let (x, tolerances) = (model.x.clone(), model.tolerances.clone());

@@ -1,5 +1,5 @@
 //! Cross-validation: every fitted row predicted by a fit that has not seen its pose, in folds drawn at random and in contiguous
-//! blocks. Rows of one pose stay together: a pose that was seen is no test; of a moving arm stretches of rows do. Where rows are
+//! blocks. Rows of one pose stay together: a pose that was seen is no test; of a moving arm and on a path stretches of rows do. Where rows are
 //! contacts, a block is a place: sockets of one plate, which names with one beginning (`front/0`, `front/1`) are.
 //!
 //! A fold's fit is the whole one less the fold's rows, one step away ([`NearbyFits`]). Where that step is not small, the fit is repeated
@@ -15,8 +15,8 @@ use crate::estimate::factor::TriangularFactor;
 use crate::estimate::fit::{Session, fit};
 use crate::estimate::model::Model;
 use crate::estimate::problem::{ObservationTerm, Problem, share};
-use crate::estimate::repeats::Poses;
 use crate::estimate::scale::ErrorScale;
+use crate::estimate::units::Units;
 use crate::observation::{ExcessSigma, KINDS, contacts};
 use crate::robot::Measurements;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
@@ -30,6 +30,8 @@ use std::collections::BTreeMap;
 
 /// Stretches into which the recording of a moving arm is cut.
 const STRETCHES: usize = 40;
+/// Stretches of a path for each fold: few, so that what lasts along it lies within one.
+const ALONG: usize = 3;
 
 /// Errors (m) of rows under fits without them, in the order of the fitted rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,7 +50,7 @@ pub struct Folds {
 /// What the whole fit saw is estimated; which rows were set aside is taken over.
 pub fn cross_validate(whole: &Session, count: usize, seed: u64) -> Option<Folds> {
     let Session { data, rows, .. } = *whole;
-    let parts = parts(data, rows);
+    let parts = parts(data, rows, ALONG * count);
     let order = whole.divisible(&parts, count)?;
     let blocks = blocks(data, rows, &order, count);
     let random = at_random(order, rows.len(), count, seed);
@@ -64,7 +66,7 @@ pub fn cross_validate(whole: &Session, count: usize, seed: u64) -> Option<Folds>
 /// Takes every pose off a fit in turn; both kinds of folds are the same then. `None` where one pose less leaves too few rows.
 pub fn leave_one_out(whole: &Session) -> Option<Folds> {
     let Session { data, rows, .. } = *whole;
-    let folds = parts(data, rows);
+    let folds = parts(data, rows, STRETCHES);
     let longest = folds.iter().map(Vec::len).max().unwrap_or_default();
     if folds.len() < 2 || 3 * (rows.len() - longest) <= whole.fitted.estimated().len() {
         return None;
@@ -84,7 +86,7 @@ pub fn leave_one_out(whole: &Session) -> Option<Folds> {
 
 /// Poses of the rows, of which folds are made; of a moving arm stretches of rows.
 pub fn fold_poses(data: &Measurements, rows: &[usize]) -> usize {
-    parts(data, rows).len()
+    parts(data, rows, STRETCHES).len()
 }
 
 /// How rows are dealt into folds.
@@ -99,7 +101,7 @@ pub enum FoldKind {
 /// Rows of one kind of [`Folds`], each sorted. `None` where the poses are too few.
 pub fn dealt(kind: FoldKind, whole: &Session, count: usize) -> Option<Vec<Vec<usize>>> {
     let Session { data, rows, .. } = *whole;
-    let parts = parts(data, rows);
+    let parts = parts(data, rows, ALONG * count);
     let order = whole.divisible(&parts, count)?;
     Some(match kind {
         FoldKind::Random(seed) => at_random(order, rows.len(), count, seed),
@@ -137,11 +139,12 @@ impl Session<'_> {
     }
 }
 
-/// Rows that belong together, in the order of recording: those of one pose; of a moving arm, whose neighbouring rows know each other,
-/// stretches of rows.
-fn parts(data: &Measurements, rows: &[usize]) -> Vec<Vec<usize>> {
+/// Rows that belong together, in the order of recording: those of one pose; of a moving arm and on a path, where neighbouring rows know each
+/// other, stretches of rows.
+fn parts(data: &Measurements, rows: &[usize], stretches: usize) -> Vec<Vec<usize>> {
     if !data.in_motion(rows) {
-        return Poses::of(data, rows).all().to_vec();
+        let loaded_alike = |a: usize, b: usize| data.payload[a] == data.payload[b];
+        return Units::of(data, rows, stretches, loaded_alike).all;
     }
     rows.chunks(rows.len().div_ceil(STRETCHES).max(1))
         .map(<[usize]>::to_vec)

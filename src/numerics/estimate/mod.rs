@@ -21,6 +21,7 @@ mod scale;
 mod screen;
 pub mod swarm;
 pub mod threads;
+mod units;
 
 pub use change::{ParameterChange, changes};
 pub use contacts::{Reseat, placed_by_left_out, reseated};
@@ -39,3 +40,4 @@ pub use remedy::{Remedy, remedies};
 pub use repeats::{Poses, Repeated, autocorrelation_time, spread};
 pub use scale::{ArmScale, ErrorScale, known_places, noise, scale};
 pub use screen::{Screening, Suspect, SuspectKind, fit_screened};
+pub use units::Units;

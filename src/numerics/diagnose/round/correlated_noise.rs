@@ -9,6 +9,7 @@ use super::fit_state::{FitState, Fitter};
 use super::stretches::{CorrelationChange, first_of_pose, thinned};
 use crate::criteria::cells::COMMON;
 use crate::criteria::noise::{AS_GOOD, PLAIN};
+use crate::diagnose::judge::unconfirmed;
 use crate::diagnose::table::{Answer, FoundCell};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::linear::project;
@@ -48,7 +49,9 @@ pub(crate) fn correlation_left_by(
         // What noise alone explains as well has no other name.
         let best = best + price_of(&answer.found, &|_| true);
         let (alone, of_noise) = regression(&vec![false; slow.len()]).likeliest();
-        let keeps_causes = best < alone - *PLAIN;
+        let found: Vec<Vec<usize>> = answer.found.iter().map(|one| one.members.clone()).collect();
+        let keeps_causes =
+            best < alone - *PLAIN && unconfirmed(settled, &found, fitter).is_empty();
         return Some(CorrelationChange {
             noise: if keeps_causes { noise } else { of_noise },
             keeps_causes,

@@ -2,14 +2,14 @@
 
 use super::noise::{JointSpread, PredictedRows, RepeatPairs};
 use super::stretches::{CorrelationChange, PathCorrelation, follow_a_path, lasts};
-use crate::criteria::noise::{ESTIMATES, REPEATS, SETTLED};
+use crate::criteria::noise::{ESTIMATES, REPEATS, SETTLED, STRETCHES as DENSE_STRETCHES};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::effect::{
     Effect, EffectContext, EffectStack, Form, Load, arm_effect, identified, names,
 };
 use crate::estimate::{
-    ErrorScale, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, align,
+    ErrorScale, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, Units, align,
     fit_screened,
 };
 use crate::robot::{Measurements, RobotModel};
@@ -94,6 +94,8 @@ pub(crate) struct Fitter<'a> {
     estimated: usize,
     /// Correlation of rows along a path.
     on_path: PathCorrelation,
+    /// Whether the rows to fit follow a path: neighbours know each other, and stretches judge what is found.
+    pub(crate) dense: bool,
     /// Whether no row is set aside: where many stand out, it may be the model that is wrong.
     keeps_all: bool,
 }
@@ -114,6 +116,8 @@ impl<'a> Fitter<'a> {
             correlated: None,
             estimated: 0,
             on_path: PathCorrelation::Unasked,
+            dense: Units::of(question.data, question.fit, *DENSE_STRETCHES, |_, _| true)
+                .follow_a_path(),
             keeps_all,
         };
         let base = base_model(question.robot, &fitter.data, question.fit, question.without);

@@ -43,6 +43,14 @@ impl Suspect {
     pub fn used(&self) -> bool {
         self.kind == SuspectKind::Event
     }
+
+    /// Whether the recording itself proves the mistake: the point is that of another row's joints.
+    pub fn bears_another_name(&self) -> bool {
+        matches!(
+            self.kind,
+            SuspectKind::Exchanged | SuspectKind::Mislabelled
+        )
+    }
 }
 
 /// What a screen found.
