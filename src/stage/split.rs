@@ -217,7 +217,11 @@ impl Stage for SplitBy {
             .collect();
         context.note(format!("rows: {}", all.join(", ")));
         match self.keeps_poses() {
-            true => self.units(recording).words().into_iter().for_each(|line| context.note(line)),
+            true => self
+                .units(recording)
+                .words()
+                .into_iter()
+                .for_each(|line| context.note(line)),
             false => context.warn_each(torn(recording, &sets)),
         }
         let row = |(row, set): (usize, String)| SplitRow {
@@ -438,8 +442,8 @@ const SHOT_DIGITS: usize = 2;
 /// The pose in the name of a shot: `7` of `7_2`, `P12` of `P12-3`.
 fn pose_named(name: &str) -> Option<&str> {
     let (pose, shot) = name.rsplit_once(['_', '-', '.', '/', ' ', '#'])?;
-    let is_number = (1..=SHOT_DIGITS).contains(&shot.len())
-        && shot.bytes().all(|byte| byte.is_ascii_digit());
+    let is_number =
+        (1..=SHOT_DIGITS).contains(&shot.len()) && shot.bytes().all(|byte| byte.is_ascii_digit());
     (is_number && !pose.is_empty()).then_some(pose)
 }
 

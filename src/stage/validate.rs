@@ -146,12 +146,16 @@ type Named<'a> = BTreeMap<(i64, &'a str), &'a str>;
 
 /// Rows that are proven to be others', with the reasons: by the last step that screened its rows, whose model is the best.
 fn proven(steps: &[Labelled<Prediction>]) -> Named<'_> {
-    let screened =
-        |step: &&Labelled<Prediction>| step.table.0.iter().any(|row| row.suspect);
+    let screened = |step: &&Labelled<Prediction>| step.table.0.iter().any(|row| row.suspect);
     let last = steps.iter().rev().find(screened);
     let rows = last.into_iter().flat_map(|step| &step.table.0);
-    rows.filter_map(|row| Some(((row.sequence, row.point_id.as_str()), row.left_out.as_deref()?)))
-        .collect()
+    rows.filter_map(|row| {
+        Some((
+            (row.sequence, row.point_id.as_str()),
+            row.left_out.as_deref()?,
+        ))
+    })
+    .collect()
 }
 
 /// The rows of a group that are in no figure, and those that are: of held-out ones.
@@ -160,7 +164,8 @@ fn left_out<'a>(
     held_out: bool,
     proven: &Named,
 ) -> (Vec<&'a PredictionRow>, Vec<&'a PredictionRow>) {
-    let is_proven = |row: &PredictionRow| proven.contains_key(&(row.sequence, row.point_id.as_str()));
+    let is_proven =
+        |row: &PredictionRow| proven.contains_key(&(row.sequence, row.point_id.as_str()));
     match held_out && rows.iter().any(|row| !is_proven(row)) {
         true => rows.into_iter().partition(|row| is_proven(row)),
         false => (Vec::new(), rows),

@@ -181,13 +181,18 @@ impl Prediction {
         for row in screening.set_aside() {
             self.0[row].suspect = true;
         }
-        for suspect in screening.suspects.iter().filter(|one| one.bears_another_name()) {
+        for suspect in screening
+            .suspects
+            .iter()
+            .filter(|one| one.bears_another_name())
+        {
             let partner = suspect.partner.map(|row| self.0[row].point_id.clone());
             let (id, partner) = (
                 &self.0[suspect.row].point_id,
                 partner.unwrap_or_else(|| "another row".into()),
             );
-            self.0[suspect.row].left_out = Some(format!("{id} lies where the joints of {partner} put it"));
+            self.0[suspect.row].left_out =
+                Some(format!("{id} lies where the joints of {partner} put it"));
         }
         self
     }

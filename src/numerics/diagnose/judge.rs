@@ -117,7 +117,9 @@ pub(crate) fn unconfirmed(state: &FitState, found: &[Vec<usize>], fitter: &Fitte
             let kept = kept.map(|i| state.causes[i].clone()).collect();
             fold_error(&fitter.fit(&state.model, kept), fitter)
         };
-        let errors = left.iter().map(|members| without(members).unwrap_or(f64::INFINITY));
+        let errors = left
+            .iter()
+            .map(|members| without(members).unwrap_or(f64::INFINITY));
         let best = errors.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
         match best.filter(|(_, error)| *error <= now) {
             Some((at, error)) => {

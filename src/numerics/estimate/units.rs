@@ -81,7 +81,10 @@ impl Units {
         let rows: usize = self.all.iter().map(Vec::len).sum();
         match self.stretches {
             _ if self.all.len() == rows => None,
-            0 => Some(format!("rows of a pose stay together: {rows} rows, {} poses", self.all.len())),
+            0 => Some(format!(
+                "rows of a pose stay together: {rows} rows, {} poses",
+                self.all.len()
+            )),
             count => Some(format!(
                 "{} rows follow a path, on which neighbours know each other: they are dealt in {count} stretches",
                 self.rows_on_path
@@ -106,10 +109,12 @@ fn runs(data: &Measurements, poses: &[Vec<usize>]) -> Vec<Vec<usize>> {
         let each = mean.iter_mut().zip(q(*stop));
         each.for_each(|(mean, q)| *mean += q / stops.len() as f64);
     }
-    let square = |a: &[f64], b: &[f64]| -> f64 {
-        a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
-    };
-    let spread = stops.iter().map(|stop| square(q(*stop), &mean)).sum::<f64>();
+    let square =
+        |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum() };
+    let spread = stops
+        .iter()
+        .map(|stop| square(q(*stop), &mean))
+        .sum::<f64>();
     let dense = DENSE * DENSE * spread / stops.len().max(1) as f64;
     let near = |a: &usize, b: &usize| square(q(*a), q(*b)) < dense;
     stops
@@ -175,7 +180,12 @@ mod tests {
     fn neighbours_on_a_path_are_stretches_and_poses_at_random_are_not() {
         let found = units(&along(500, 0.0));
         assert!((11..=13).contains(&found.all.len()) && found.follow_a_path());
-        assert!(found.all.iter().all(|unit| unit.windows(2).all(|w| w[0] + 1 == w[1])));
+        assert!(
+            found
+                .all
+                .iter()
+                .all(|unit| unit.windows(2).all(|w| w[0] + 1 == w[1]))
+        );
         let found = units(&at_random(200));
         assert_eq!((found.all.len(), found.stretches), (200, 0));
     }

@@ -50,8 +50,7 @@ pub(crate) fn correlation_left_by(
         let best = best + price_of(&answer.found, &|_| true);
         let (alone, of_noise) = regression(&vec![false; slow.len()]).likeliest();
         let found: Vec<Vec<usize>> = answer.found.iter().map(|one| one.members.clone()).collect();
-        let keeps_causes =
-            best < alone - *PLAIN && unconfirmed(settled, &found, fitter).is_empty();
+        let keeps_causes = best < alone - *PLAIN && unconfirmed(settled, &found, fitter).is_empty();
         return Some(CorrelationChange {
             noise: if keeps_causes { noise } else { of_noise },
             keeps_causes,

@@ -3,6 +3,7 @@
 use super::noise::{JointSpread, PredictedRows, RepeatPairs};
 use super::stretches::{CorrelationChange, PathCorrelation, follow_a_path, lasts};
 use crate::criteria::noise::{ESTIMATES, REPEATS, SETTLED, STRETCHES as DENSE_STRETCHES};
+use crate::criteria::search::SIGNIFICANT;
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::effect::{
@@ -34,6 +35,17 @@ impl FitState {
             model: &self.model,
             fitted: &self.fitted,
         }
+    }
+
+    /// Whether most of what the model leaves at rows of one pose is the same at all of them: the mean square between poses exceeds that within
+    /// by more than the number of rows of a pose.
+    pub(crate) fn shots_share_errors(&self) -> bool {
+        self.fitted.repeated.as_ref().is_some_and(|repeated| {
+            let more = repeated.freedom as f64 / (3 * repeated.poses.max(1)) as f64;
+            repeated
+                .lack_of_fit
+                .is_some_and(|(ratio, chance)| ratio > 2.0 + more && chance <= *SIGNIFICANT)
+        })
     }
 
     /// Whether any of its causes follows time.

@@ -13,7 +13,7 @@ pub(crate) use fit_state::{EstimatedCause, FitState, Fitter, with_causes};
 use crate::diagnose::whitened::{WhitenedProblem, add_columns};
 use crate::effect::Survey;
 use crate::estimate::Model;
-use stretches::{bounded_autocorrelation_time, thinned};
+use stretches::{bounded_autocorrelation_time, first_of_pose, thinned};
 
 /// Residuals of the rows that a search looks at, and their derivatives.
 pub(crate) struct RoundView<'a> {
@@ -31,8 +31,11 @@ impl<'a> RoundView<'a> {
     pub(crate) fn of(now: &'a FitState, fitter: &'a Fitter<'a>) -> Self {
         let data = &fitter.data;
         let compliance = compliance(&now.model);
-        let mut problem =
-            WhitenedProblem::new(&now.model, data, thinned(data, &now.screening.kept));
+        // What shots of a pose have in common is one reading, however often it was taken.
+        let kept = &now.screening.kept;
+        let alone = now.shots_share_errors().then(|| first_of_pose(data, kept));
+        let rows = thinned(data, alone.as_ref().unwrap_or(kept));
+        let mut problem = WhitenedProblem::new(&now.model, data, rows);
         if compliance.iter().any(|compliance| *compliance > 0.0) {
             problem = problem.with_currents();
         }

@@ -46,10 +46,7 @@ impl Suspect {
 
     /// Whether the recording itself proves the mistake: the point is that of another row's joints.
     pub fn bears_another_name(&self) -> bool {
-        matches!(
-            self.kind,
-            SuspectKind::Exchanged | SuspectKind::Mislabelled
-        )
+        matches!(self.kind, SuspectKind::Exchanged | SuspectKind::Mislabelled)
     }
 }
 
