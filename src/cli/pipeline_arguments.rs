@@ -14,9 +14,11 @@ use crate::pipeline::{
 use crate::progress::{Progress, Verbosity};
 use crate::raw::ending;
 use crate::shell::typed;
+use crate::spatial::Pose;
 use crate::store::Store;
 use crate::summary::LimitsSummary;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use nalgebra::Vector3;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::json;
 use std::ffi::OsString;
@@ -128,11 +130,33 @@ impl ExecutionArguments {
     }
 }
 
-/// The base that targets are in.
-#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
-enum BaseOfUse {
-    Own,
-    Smallest,
+/// Reads `own`, `smallest` or six numbers.
+fn target_base(text: &str) -> std::result::Result<TargetBase, String> {
+    match text {
+        "own" => return Ok(TargetBase::Own),
+        "smallest" => return Ok(TargetBase::Smallest),
+        _ => {}
+    }
+    let numbers: Vec<f64> = text
+        .split(',')
+        .map_while(|number| number.trim().parse().ok())
+        .filter(|number: &f64| number.is_finite())
+        .collect();
+    let Ok([x, y, z, rx, ry, rz]) = <[f64; 6]>::try_from(numbers) else {
+        return Err(
+            "allowed: own, smallest, or the base in the tracker's frame as six numbers X,Y,Z,RX,RY,RZ in mm and deg (turned about the fixed axes x, \
+             then y, then z)"
+                .into(),
+        );
+    };
+    let turn = |axis: [f64; 3], angle: f64| {
+        Pose::from_rotation_vector(Vector3::from(axis) * angle.to_radians(), Vector3::zeros())
+    };
+    let turned = turn([0.0, 0.0, 1.0], rz) * turn([0.0, 1.0, 0.0], ry) * turn([1.0, 0.0, 0.0], rx);
+    Ok(TargetBase::Given(Pose {
+        translation: Vector3::new(x, y, z) * 1e-3,
+        ..turned
+    }))
 }
 
 /// Where the model comes from.
@@ -153,10 +177,11 @@ pub(super) struct ModelArguments {
     /// are the model of, as they are; a hash that does not hold is refused all the same
     #[arg(long)]
     unchecked: bool,
-    /// The base that targets are in: the robot's own, as it is identified under tolerances, or the one in which the robot as it was believed is
-    /// nearest to what was measured, for a cell that was taught with this robot
-    #[arg(long, value_name = "WHICH", value_enum, default_value_t = BaseOfUse::Own)]
-    base: BaseOfUse,
+    /// The base that targets are in: `own`, the robot's as it is identified under tolerances; `smallest`, the one in which the robot as it was
+    /// believed is nearest to what was measured, for a cell that was taught with this robot; or where it was measured, in the tracker's frame:
+    /// X,Y,Z,RX,RY,RZ in mm and deg about the fixed axes x, then y, then z
+    #[arg(long, value_name = "WHICH", value_parser = target_base, default_value = "own", allow_hyphen_values = true)]
+    base: TargetBase,
     /// Largest distance of the model's tool, or of a link or a joint's zero in mm, from the robot file's: a model beyond is refused
     #[arg(long, value_name = "MM", default_value_t = 50.0)]
     max_shift: f64,
@@ -196,12 +221,13 @@ impl ModelArguments {
         Error::if_spec(must_be_positive(limits).collect())?;
         let mut identified = self.identified(purpose, command_line)?;
         warn(&identified.warnings);
-        if self.base == BaseOfUse::Smallest {
-            if identified.data.is_none() {
-                let message = "needs the recording that the model was fitted to; a table of parameters alone has none: name a run";
-                return Err(Error::spec("--base", message));
-            }
-            identified.base = TargetBase::Smallest;
+        if self.base == TargetBase::Smallest && identified.data.is_none() {
+            let message = "needs the recording that the model was fitted to; a table of parameters alone has none: name a run";
+            return Err(Error::spec("--base", message));
+        }
+        identified.base = self.base;
+        if self.base == TargetBase::Own {
+            identified.refusals.extend(identified.base_turned());
         }
         self.judged(identified)
     }

@@ -12,7 +12,10 @@ pub use standing::{
 use standing::{last, output, unexplained_of, written};
 pub use torques::IdentifiedTorques;
 
-use crate::compensate::{Gate, GateLimits, IdentifiedArm, Scatter, Uncertainty, load_matters};
+use crate::compensate::{
+    Chain, Circumstance, Gate, GateLimits, IdentifiedArm, Nominal, Scatter, Uncertainty,
+    load_matters,
+};
 use crate::description::{JointDescription, JointKind, RobotDescription};
 use crate::effect::Load;
 use crate::error::{Error, Fault, Result, instead};
@@ -21,6 +24,7 @@ use crate::estimate::{Covariance, Model, align};
 use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
 use crate::raw::ending;
 use crate::robot::{JointConvention, Measurements, RobotModel, Visited};
+use crate::spatial::Pose;
 use crate::stage::{DeclaredStage, Diagnose};
 use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
@@ -34,14 +38,21 @@ use std::path::{Path, PathBuf};
 const WRONG_SETUP: &str = "the set-up is wrong";
 
 /// The base that targets are in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum TargetBase {
     /// The robot's own, as it is identified under tolerances.
     #[default]
     Own,
     /// That in which the robot as it was believed is nearest to what was measured: of a cell that was taught with this robot.
     Smallest,
+    /// Where it was measured, or a frame of the user's: in the tracker's frame.
+    Given(Pose),
 }
+
+/// How far commands miss in the robot's own base may exceed what they miss in the base of least change by this factor ...
+const TURNED: f64 = 4.0 / 3.0;
+/// ... and by this much (m): else the own base is not that which the robot as it was believed has.
+const MOVED: f64 = 0.1e-3;
 
 /// What was identified, and from what.
 pub struct IdentifiedModel {
@@ -358,14 +369,49 @@ impl IdentifiedModel {
         let arm = IdentifiedArm::new(self.model.clone(), self.correction.clone());
         match (self.base, &self.data) {
             (TargetBase::Smallest, Some(data)) => {
-                let mut as_identified = data.clone();
-                as_identified.points.position = arm.model().predict(data);
-                let rows: Vec<usize> = (0..data.rows()).collect();
-                let base = align(&self.model.robot, &as_identified, &rows);
+                let base = self.base_of_least_change(&arm, data);
                 arm.standing_at(base)
             }
+            (TargetBase::Given(base), _) => arm.standing_at(base),
             _ => arm,
         }
+    }
+
+    /// The base in which the robot as it was believed is nearest to what the model says of the recorded poses.
+    fn base_of_least_change(&self, arm: &IdentifiedArm, data: &Measurements) -> Pose {
+        let mut as_identified = data.clone();
+        as_identified.points.position = arm.model().predict(data);
+        let rows: Vec<usize> = (0..data.rows()).collect();
+        align(&self.model.robot, &as_identified, &rows)
+    }
+
+    /// Why targets in the robot's own base would be moved by far more than the robot is wrong; none where they are not.
+    pub(crate) fn base_turned(&self) -> Option<String> {
+        let data = self.data.as_ref().filter(|data| data.rows() > 0)?;
+        let own = IdentifiedArm::new(self.model.clone(), self.correction.clone());
+        let least = self.base_of_least_change(&own, data);
+        let missed = |arm: &IdentifiedArm| -> f64 {
+            let (mut reach, mut nominal) = (arm.reach(), Nominal::new(&arm.model().robot));
+            let mut sum = 0.0;
+            for row in 0..data.rows() {
+                reach.under(&Circumstance::of_row(data, row));
+                let q = data.q(row);
+                sum += (reach.place(q).translation - nominal.place(q).translation).norm();
+            }
+            sum / data.rows() as f64
+        };
+        let own_missed = missed(&own);
+        let least_missed = missed(&own.standing_at(least));
+        let turned = own_missed > TURNED * least_missed && own_missed - least_missed > MOVED;
+        turned.then(|| {
+            format!(
+                "targets in the robot's own base are {:.2} mm off uncorrected, where the robot as it was believed leaves {:.2} mm of the same poses: where \
+                 the base is hangs on parameters that these data do not determine; measure it and state it (--base X,Y,Z,RX,RY,RZ), or take the base of \
+                 least change (--base smallest)",
+                own_missed * 1e3,
+                least_missed * 1e3
+            )
+        })
     }
 
     /// The base that targets are in, in words; `known`: how well points are known in the robot's own, m, 95 %.
@@ -379,6 +425,7 @@ impl IdentifiedModel {
             TargetBase::Smallest => {
                 "targets are in the base in which the robot as it was believed is nearest to what was measured".into()
             }
+            TargetBase::Given(_) => "targets are in the base that --base states".into(),
         }
     }
 

@@ -54,7 +54,7 @@ fn all_effects() -> Vec<String> {
 }
 
 crate::stage::stage! {
-    Identify, "identify", 20, "identifies geometry, transmission and compliance from the nominal robot in one estimation",
+    Identify, "identify", 21, "identifies geometry, transmission and compliance from the nominal robot in one estimation",
         IdentifyReads {
             robot: Robot,
             recording: Recording,
@@ -354,7 +354,7 @@ crate::stage::identified::identification! {
 }
 
 crate::stage::stage! {
-    Stiffness, "stiffness", 19, "identifies joint compliance from loaded poses; everything identified before is kept",
+    Stiffness, "stiffness", 20, "identifies joint compliance from loaded poses; everything identified before is kept",
         StiffnessReads {
             robot: Robot,
             recording: Recording,

@@ -26,7 +26,7 @@ crate::stage::identified::identification! {
 }
 
 crate::stage::stage! {
-    Transfer, "transfer", 16, "tests an identified model on another recording of the robot; only its base is estimated anew",
+    Transfer, "transfer", 17, "tests an identified model on another recording of the robot; only its base is estimated anew",
         TransferReads {
             robot: Robot,
             recording: Recording,

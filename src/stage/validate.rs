@@ -41,7 +41,7 @@ pub(crate) struct PublishedErrors {
 }
 
 crate::stage::stage! {
-    Validate, "validate", 5, "states the position error after every step, held-out and training rows apart",
+    Validate, "validate", 6, "states the position error after every step, held-out and training rows apart",
         ValidateReads {
             prediction: Vec<Labelled<Prediction>>,
             observability: Vec<Labelled<Observability>>,

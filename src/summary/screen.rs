@@ -100,7 +100,10 @@ pub(super) fn found(findings: &[ShortFinding], width: usize) -> String {
     let mut cells: Vec<String> = sizes
         .iter()
         .zip(&findings)
-        .map(|(size, one)| cut(&format!("{size:>right$}  {}", one.what), room))
+        .map(|(size, one)| {
+            let either = one.either.as_deref().unwrap_or_default();
+            cut(&format!("{size:>right$}  {}{either}", one.what), room)
+        })
         .collect();
     if smaller > 0 {
         cells.push(format!("{:right$}  and {smaller} smaller", ""));
@@ -280,6 +283,7 @@ mod tests {
             size,
             what: what.into(),
             number: Some("14.8 +- 0.4 arcsec".into()),
+            either: None,
             instead: None,
         }
     }

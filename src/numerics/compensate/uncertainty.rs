@@ -3,12 +3,12 @@
 //! How certain a correction is, and which finding leaves it open.
 
 use crate::compensate::arm::{BeyondFitted, IdentifiedArm, Reach};
-use crate::effect::names;
+use crate::effect::{Place, names};
 use crate::estimate::choose::median;
 use crate::estimate::{Covariance, columns};
 use crate::robot::Measurements;
 use crate::statistics::radius_95;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// How the arm scatters about the model, whatever its parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -100,23 +100,40 @@ impl Uncertainty {
         self.instrument = (squares.sum::<f64>() / rows.max(1) as f64).sqrt();
         self.usual = if usual.is_empty() { 0.0 } else { median(usual) };
         // What moves base and links together shows in no measured point, but in those of the robot's own base.
-        let mut against_base = Self {
-            row: self.row.clone(),
-            covariance: self.covariance.clone(),
-            sources: Vec::new(),
-            names: Vec::new(),
-            ..self
-        };
-        let base = arm.model().stack.parameters_of(names::BASE_FRAME);
-        base.for_each(|k| against_base.row[k] = None);
+        let own = self.against_own_base(arm);
         let some = (0..rows).step_by(rows.div_ceil(POSES).max(1));
         let radius = |row| {
-            let all = against_base.of_parameters(&mut reach, data.q(row));
+            let jacobian = self.jacobian(&mut reach, data.q(row));
+            let rates = DMatrix::from_fn(3, jacobian.len(), |axis, k| jacobian[k][axis]);
+            let all = &rates * &own * rates.transpose();
             radius_95(all.trace(), all.norm_squared())
         };
         let radii: Vec<f64> = some.map(radius).filter(finite).collect();
         self.own_base = if radii.is_empty() { 0.0 } else { median(radii) };
         self
+    }
+
+    /// Covariance of the parameters but for where the base stands. The zero of joint 1 is what the base is turned by: it is no error there.
+    fn against_own_base(&self, arm: &IdentifiedArm) -> DMatrix<f64> {
+        let parameters = self.covariance.parameters();
+        let Some(mut own) = self.covariance.block(parameters) else {
+            return DMatrix::zeros(parameters.len(), parameters.len());
+        };
+        let (stack, specs) = (&arm.model().stack, arm.model().stack.specs());
+        let turns = stack.parameters_of(names::JOINT_OFFSET);
+        let mut turns = turns.filter(|k| specs[*k].place == Place::Joint(0));
+        if let Some(turn) = turns.next().and_then(|k| self.row[k]) {
+            let (column, variance) = (own.column(turn).into_owned(), own[(turn, turn)]);
+            own -= &column * column.transpose() / variance.max(f64::MIN_POSITIVE);
+        }
+        for k in stack
+            .parameters_of(names::BASE_FRAME)
+            .filter_map(|k| self.row[k])
+        {
+            own.row_mut(k).fill(0.0);
+            own.column_mut(k).fill(0.0);
+        }
+        own
     }
 
     fn jacobian(&self, reach: &mut Reach, q: &[f64]) -> Vec<Vector3<f64>> {

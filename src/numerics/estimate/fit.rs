@@ -177,8 +177,8 @@ const ROUGH: Effort = Effort {
 const FIRST: Effort = Effort { limit: 4, ..ROUGH };
 /// Parameters of one kind that are farther off than this many of their tolerances, root mean square, are those of an arm that is made worse.
 const WORSE: f64 = 2.0;
-/// Where a number is farther off than so many of its tolerances, one of them may be far beyond.
-const PULLED: f64 = 2.0;
+/// Only where a number is farther off than its tolerance may one be far beyond; ...
+const PULLED: f64 = 1.0;
 /// Without regard to tolerances: so many times as wide ...
 const AFAR: f64 = 100.0;
 /// ... where less than this share of what stays unmodelled is left.
