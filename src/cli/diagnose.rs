@@ -8,7 +8,7 @@ use crate::audit::{diagnosis, the_stage};
 use crate::error::{Error, Result};
 use crate::pipeline::{Purpose, Selection};
 use crate::raw::ending;
-use crate::stage::DIAGNOSES;
+use crate::stage::{DIAGNOSES, DeclaredStage, Diagnose};
 use crate::summary::{DiagnosisSummary, rejected};
 use clap::Args;
 use std::ffi::OsString;
@@ -85,6 +85,10 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
                 "has no stage `diagnose`; put `- uses: diagnose` after the split, or `- uses: diagnose_torques` after `ingest_torques`",
             ));
         };
+        // Before minutes are spent on what cannot be shown.
+        if arguments.html.is_some() && plan.stages[at].entry.name != Diagnose::NAME {
+            return Err(DiagnosisSummary::no_page());
+        }
         let id = id.to_string();
         let plan = plan.needed_for(at);
         let shown = shown(arguments.quiet, arguments.details);

@@ -409,13 +409,16 @@ impl DiagnosisSummary {
         shown
     }
 
+    /// The fault of a page that is asked for of torques or drives.
+    pub(crate) fn no_page() -> Error {
+        let message = "of torques the page is the pipeline's report, which `calib run` writes (`- uses: report_torques` last); of drives there is none";
+        Error::spec("--html", message)
+    }
+
     /// The diagnosis as one HTML file; `store` as in [`Self::document`], of torques it is in the report.
     pub fn page(&self, store: &str) -> Result<String> {
         if self.of_torques {
-            return Err(Error::spec(
-                "--html",
-                "of torques the page is the pipeline's report: put `- uses: report` last; of drives there is none",
-            ));
+            return Err(Self::no_page());
         }
         diagnosed_page(self.shown(store))
     }

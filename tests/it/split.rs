@@ -83,7 +83,8 @@ fn blocks_are_dealt_in_turn_and_break_at_poses() {
 
 #[test]
 fn random_choice_keeps_repeats_together_and_follows_the_seed() {
-    let poses: Vec<i32> = (0..300).map(|row| row / 3).collect();
+    // No path: neighbours are far apart.
+    let poses: Vec<i32> = (0..300).map(|row| row / 3 * 37 % 100).collect();
     let first = sets("{by: random, fraction: 0.25}", recording(&poses)).unwrap();
     let drawn = first.iter().filter(|set| *set == "validate").count();
     assert!((74..=76).contains(&drawn), "{drawn}");

@@ -105,15 +105,21 @@ pub(super) fn steiner(mass: f64, arm: &Vector3<f64>) -> Matrix3<f64> {
     (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass
 }
 
-/// Two bodies as one.
-fn joined(a: &Inertial, b: &Inertial) -> Inertial {
-    let mass = a.mass + b.mass;
-    let centre = ((a.centre.coords * a.mass + b.centre.coords * b.mass) / mass.max(1e-9)).into();
-    let of_body = |body: &Inertial| body.inertia + steiner(body.mass, &(body.centre - centre));
-    Inertial {
-        mass,
-        centre,
-        inertia: of_body(a) + of_body(b),
+impl Inertial {
+    /// Two bodies as one; the first where neither has a mass.
+    pub fn joined(&self, other: &Inertial) -> Inertial {
+        let mass = self.mass + other.mass;
+        if mass <= 0.0 {
+            return *self;
+        }
+        let moment = self.centre.coords * self.mass + other.centre.coords * other.mass;
+        let centre = (moment / mass).into();
+        let of_body = |body: &Inertial| body.inertia + steiner(body.mass, &(body.centre - centre));
+        Inertial {
+            mass,
+            centre,
+            inertia: of_body(self) + of_body(other),
+        }
     }
 }
 
@@ -149,7 +155,7 @@ impl DeclaredInertials {
         }
         let tolerance = all().map(|(link, body)| {
             let whole = match &arm.payload {
-                Some(payload) if link == last => joined(body, payload),
+                Some(payload) if link == last => body.joined(payload),
                 _ => *body,
             };
             tolerance(arm, &whole, &point(link))

@@ -6,8 +6,11 @@ use crate::fixture;
 use crate::recorded::{Recorded, made, settings};
 use calib::description::RobotDescription;
 use calib::error::Error;
+use calib::estimate::align;
+use calib::robot::RobotModel;
 use calib::stage::{Simulate, SimulateReads};
 use calib::table::{FindingRow, Findings, Recording, Robot};
+use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -576,6 +579,36 @@ fn two_set_ups_in_one_recording_are_named_with_the_rows_of_each() {
         "1, 3, 5, 7, ... (36 rows)",
         "2, 4, 6, 8, ... (36 rows)",
     );
+}
+
+#[test]
+fn a_tool_that_was_taken_off_twice_is_named_twice_with_its_rows() {
+    let mut inputs = recorded(&fixture::spherical(), 52, json!([]));
+    let data = inputs.recording.measurements();
+    let robot = RobotModel::new(inputs.robot.clone());
+    let rows: Vec<usize> = (0..data.rows()).collect();
+    let base = align(&robot, &data, &rows);
+    for row in 24..data.rows() {
+        let moved = match row < 48 {
+            true => Vector3::new(0.0, 0.4e-3, 0.2e-3),
+            false => Vector3::new(0.3e-3, -0.3e-3, 0.0),
+        };
+        let moved = base.rotation * (robot.forward(data.q(row)).rotation * moved);
+        let point = &mut inputs.recording.position[row];
+        *point = (Vector3::from(*point) + moved).into();
+    }
+    let findings = diagnosed(&inputs).unwrap().findings;
+    let found: Vec<(&str, &str)> = findings
+        .iter()
+        .map(|row| (&*row.effect, &*row.place))
+        .collect();
+    assert_eq!(found, [("tool_shift", "tool"); 2], "{findings:#?}");
+    let told = findings
+        .iter()
+        .map(|row| row.statement.clone())
+        .collect::<Vec<_>>()
+        .join("\n");
+    has(&told, ["from row 25", "from row 49"]);
 }
 
 /// A maker's counting: signs, what is shown at the robot file's zeros in quarters of a turn, and whether joint 3 holds joint 2's angle; what is

@@ -10,7 +10,7 @@ use crate::effect::{
 use crate::estimate::{Model, ParameterStatus, tail};
 use crate::observation::Dimension;
 use crate::round::{FitState, RoundView};
-use crate::types::{Evidence, Finding, RivalCause};
+use crate::types::{Evidence, Finding, Probabilities, RivalCause};
 use crate::verdict::not_observable::{faults, rows_apart};
 use crate::verdict::windup::turns_back;
 use crate::whitened::add_columns;
@@ -26,7 +26,9 @@ pub(super) fn findings(
     if let Some(offset) = state.screening.apart {
         return vec![rows_apart(offset, last)];
     }
-    let mut out: Vec<Finding> = without_details(last, something_left)
+    let mut found = without_details(last, something_left);
+    name_what_happened_again(&mut found);
+    let mut out: Vec<Finding> = found
         .iter()
         .map(|(found, details)| finding(last, found, details))
         .collect();
@@ -89,6 +91,35 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
     }
     let all = out.into_iter();
     all.map(|(_, found, details)| (found, details)).collect()
+}
+
+/// A cause of the table is searched once; what happened again (a tool that was taken off twice) was found without a name, and the cause itself,
+/// which was found before, is the likeliest of its rivals.
+fn name_what_happened_again(all: &mut [(FoundCell, Vec<usize>)]) {
+    let named: Vec<(&'static str, Place)> = all
+        .iter()
+        .map(|(found, _)| (found.effect, found.place))
+        .filter(|(effect, _)| *effect != names::UNKNOWN)
+        .collect();
+    for (found, _) in all.iter_mut().filter(|(one, _)| one.effect == names::UNKNOWN) {
+        let rivals = found.rivals.iter().enumerate();
+        let likeliest = rivals.max_by(|a, b| a.1.probability.total_cmp(&b.1.probability));
+        let Some((k, rival)) = likeliest else { continue };
+        let again = named.contains(&(rival.effect, rival.place));
+        let Probabilities { name, none, .. } = found.probabilities;
+        if !again || rival.probability <= name + none {
+            continue;
+        }
+        let unnamed = RivalCause {
+            effect: found.effect,
+            place: found.place,
+            probability: name,
+            ..rival.clone()
+        };
+        let rival = std::mem::replace(&mut found.rivals[k], unnamed);
+        (found.effect, found.place) = (rival.effect, rival.place);
+        found.probabilities.name = rival.probability;
+    }
 }
 
 /// A finding with its numbers in the whole model.
