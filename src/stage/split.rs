@@ -286,7 +286,15 @@ impl SplitBy {
             _ => return shots_together(Units::poses(&data, &rows, any), recording, &data),
         };
         let stretches = stretches.ceil().clamp(1.0, rows.len().max(1) as f64) as usize;
-        shots_together(Units::of(&data, &rows, stretches, any), recording, &data)
+        let units = shots_together(Units::of(&data, &rows, stretches, any), recording, &data);
+        match units.all.len() {
+            // One pose has no other to be held out: what fits it says why that is no geometry, and how the point creeps.
+            1 => Units {
+                all: rows.into_iter().map(|row| vec![row]).collect(),
+                ..Units::default()
+            },
+            _ => units,
+        }
     }
 
     /// The set of each row.

@@ -168,7 +168,7 @@ fn standard_deviations_are_honest_whether_the_data_or_the_tolerances_tell() {
     let (mut squares, mut inside, mut all) = ([0.0; 3], 0, [0usize; 3]);
     for name in ["kr10_r1100", "ur5e", "gp25"] {
         let robot = arm(name);
-        for seed in 0..7 {
+        for seed in 0..20 {
             let mut draw = Draw::new(100 + seed);
             let mut truth = nominal(&robot, away());
             let base = truth.stack.parameters_of("base_frame").count();
@@ -196,12 +196,14 @@ fn standard_deviations_are_honest_whether_the_data_or_the_tolerances_tell() {
             }
         }
     }
+    let share = inside as f64 / all.iter().sum::<usize>() as f64;
+    println!("{:.1} % within 1.96 sigma", 100.0 * share);
     for (family, what) in ["zeros", "lengths", "tilts"].into_iter().enumerate() {
         let z = (squares[family] / all[family] as f64).sqrt();
+        println!("{what}: {z:.2} sigma rms");
         assert!((0.5..1.2).contains(&z), "{what}: {z:.2} sigma rms");
     }
-    let share = inside as f64 / all.iter().sum::<usize>() as f64;
-    assert!((0.93..=0.999).contains(&share), "{:.1} %", 100.0 * share);
+    assert!((0.93..=0.99).contains(&share), "{:.1} %", 100.0 * share);
 }
 
 #[test]

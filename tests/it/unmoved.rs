@@ -106,6 +106,6 @@ fn a_joint_that_never_moves_is_said() {
     assert_eq!(code, Some(0), "{printed}");
     has(
         &printed,
-        "never moves in the 40 rows to fit: joint 4 (at 12.500 deg)",
+        "never moves in the 41 rows to fit: joint 4 (at 12.500 deg)",
     );
 }

@@ -26,9 +26,7 @@ pub(super) fn findings(
     if let Some(offset) = state.screening.apart {
         return vec![rows_apart(offset, last)];
     }
-    let mut found = without_details(last, something_left);
-    name_what_happened_again(&mut found);
-    let mut out: Vec<Finding> = found
+    let mut out: Vec<Finding> = without_details(last, something_left)
         .iter()
         .map(|(found, details)| finding(last, found, details))
         .collect();
@@ -54,8 +52,10 @@ pub(super) fn findings(
 /// at its place, or a trace of the largest of all, is a misfit of their shapes. So is, as long as the residual exceeds the noise, whatever is
 /// weaker at the place of a finding without a name.
 fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Vec<usize>)> {
-    let sized = |found: &FoundCell| (size(last, &found.members), found.clone(), Vec::new());
-    let mut all: Vec<(f64, FoundCell, Vec<usize>)> = last.answer.found.iter().map(sized).collect();
+    let mut found = last.answer.found.clone();
+    name_what_happened_again(&mut found);
+    let sized = |found: FoundCell| (size(last, &found.members), found, Vec::new());
+    let mut all: Vec<(f64, FoundCell, Vec<usize>)> = found.into_iter().map(sized).collect();
     let logs = last.answer.found.iter().map(|found| found.log);
     let strongest = logs.fold(0.0, f64::max);
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -95,16 +95,18 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
 
 /// A cause of the table is searched once; what happened again (a tool that was taken off twice) was found without a name, and the cause itself,
 /// which was found before, is the likeliest of its rivals.
-fn name_what_happened_again(all: &mut [(FoundCell, Vec<usize>)]) {
+fn name_what_happened_again(all: &mut [FoundCell]) {
     let named: Vec<(&'static str, Place)> = all
         .iter()
-        .map(|(found, _)| (found.effect, found.place))
+        .map(|found| (found.effect, found.place))
         .filter(|(effect, _)| *effect != names::UNKNOWN)
         .collect();
-    for (found, _) in all.iter_mut().filter(|(one, _)| one.effect == names::UNKNOWN) {
+    for found in all.iter_mut().filter(|one| one.effect == names::UNKNOWN) {
         let rivals = found.rivals.iter().enumerate();
         let likeliest = rivals.max_by(|a, b| a.1.probability.total_cmp(&b.1.probability));
-        let Some((k, rival)) = likeliest else { continue };
+        let Some((k, rival)) = likeliest else {
+            continue;
+        };
         let again = named.contains(&(rival.effect, rival.place));
         let Probabilities { name, none, .. } = found.probabilities;
         if !again || rival.probability <= name + none {

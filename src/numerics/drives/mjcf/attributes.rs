@@ -100,7 +100,12 @@ impl<'a> Reader<'a> {
     }
 
     /// Numbers of an attribute; none where it is not there.
-    pub(super) fn numbers(&mut self, node: Node<'a, 'a>, class: &str, attribute: &str) -> Option<Vec<f64>> {
+    pub(super) fn numbers(
+        &mut self,
+        node: Node<'a, 'a>,
+        class: &str,
+        attribute: &str,
+    ) -> Option<Vec<f64>> {
         let text = self.value(node, class, attribute)?;
         let numbers: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse).collect();
         match numbers {
@@ -116,7 +121,12 @@ impl<'a> Reader<'a> {
         }
     }
 
-    pub(super) fn number(&mut self, node: Node<'a, 'a>, class: &str, attribute: &str) -> Option<f64> {
+    pub(super) fn number(
+        &mut self,
+        node: Node<'a, 'a>,
+        class: &str,
+        attribute: &str,
+    ) -> Option<f64> {
         self.numbers(node, class, attribute)?.first().copied()
     }
 

@@ -187,7 +187,12 @@ impl<'a> Reader<'a> {
     }
 
     /// What the actuators of a joint do together.
-    pub(super) fn servo(&mut self, root: Node<'a, 'a>, name: &str, most: Option<f64>) -> Option<Servo> {
+    pub(super) fn servo(
+        &mut self,
+        root: Node<'a, 'a>,
+        name: &str,
+        most: Option<f64>,
+    ) -> Option<Servo> {
         let all = children(root, "actuator").flat_map(|node| node.children());
         let own: Vec<Node> = all
             .filter(|node| node.is_element())

@@ -92,7 +92,11 @@ impl<'a> Reader<'a> {
         }
     }
 
-    pub(super) fn inertial(&mut self, node: Node<'a, 'a>, place: &Isometry3<f64>) -> Option<Inertial> {
+    pub(super) fn inertial(
+        &mut self,
+        node: Node<'a, 'a>,
+        place: &Isometry3<f64>,
+    ) -> Option<Inertial> {
         let Some(mass) = self.number(node, "", "mass") else {
             self.fault(node, "<inertial> without `mass`");
             return None;
