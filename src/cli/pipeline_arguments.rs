@@ -227,7 +227,10 @@ impl ModelArguments {
         }
         identified.base = self.base;
         if self.base == TargetBase::Own {
-            identified.refusals.extend(identified.base_turned());
+            match identified.base_turned() {
+                Some((message, true)) => identified.refusals.push(message),
+                turned => warn(turned.map(|(message, _)| message)),
+            }
         }
         self.judged(identified)
     }

@@ -51,8 +51,9 @@ pub enum TargetBase {
 
 /// How far commands miss in the robot's own base may exceed what they miss in the base of least change by this factor ...
 const TURNED: f64 = 4.0 / 3.0;
-/// ... and by this much (m): else the own base is not that which the robot as it was believed has.
+/// ... and by this much (m): else it is said; from so many times on it is refused.
 const MOVED: f64 = 0.1e-3;
+const ELSEWHERE: f64 = 3.0;
 
 /// What was identified, and from what.
 pub struct IdentifiedModel {
@@ -385,8 +386,8 @@ impl IdentifiedModel {
         align(&self.model.robot, &as_identified, &rows)
     }
 
-    /// Why targets in the robot's own base would be moved by far more than the robot is wrong; none where they are not.
-    pub(crate) fn base_turned(&self) -> Option<String> {
+    /// Why targets in the robot's own base would be moved by more than the robot is wrong, and whether by far more; none where they are not.
+    pub(crate) fn base_turned(&self) -> Option<(String, bool)> {
         let data = self.data.as_ref().filter(|data| data.rows() > 0)?;
         let own = IdentifiedArm::new(self.model.clone(), self.correction.clone());
         let least = self.base_of_least_change(&own, data);
@@ -404,13 +405,14 @@ impl IdentifiedModel {
         let least_missed = missed(&own.standing_at(least));
         let turned = own_missed > TURNED * least_missed && own_missed - least_missed > MOVED;
         turned.then(|| {
-            format!(
+            let message = format!(
                 "targets in the robot's own base are {:.2} mm off uncorrected, where the robot as it was believed leaves {:.2} mm of the same poses: where \
                  the base is hangs on parameters that these data do not determine; measure it and state it (--base X,Y,Z,RX,RY,RZ), or take the base of \
                  least change (--base smallest)",
                 own_missed * 1e3,
                 least_missed * 1e3
-            )
+            );
+            (message, own_missed > ELSEWHERE * least_missed)
         })
     }
 
