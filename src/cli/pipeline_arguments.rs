@@ -137,12 +137,14 @@ fn target_base(text: &str) -> std::result::Result<TargetBase, String> {
         "smallest" => return Ok(TargetBase::Smallest),
         _ => {}
     }
-    let numbers: Vec<f64> = text
-        .split(',')
-        .map_while(|number| number.trim().parse().ok())
-        .filter(|number: &f64| number.is_finite())
-        .collect();
-    let Ok([x, y, z, rx, ry, rz]) = <[f64; 6]>::try_from(numbers) else {
+    let number = |part: &str| {
+        part.trim()
+            .parse()
+            .ok()
+            .filter(|value: &f64| value.is_finite())
+    };
+    let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
+    let Ok([x, y, z, rx, ry, rz]) = <[f64; 6]>::try_from(numbers.unwrap_or_default()) else {
         return Err(
             "allowed: own, smallest, or the base in the tracker's frame as six numbers X,Y,Z,RX,RY,RZ in mm and deg (turned about the fixed axes x, \
              then y, then z)"
@@ -327,4 +329,23 @@ pub(super) fn must_be_positive<const N: usize>(
         let message = format!("expected a number above 0, found {given}");
         Some(Fault::new(option, message))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_base_is_a_word_or_six_numbers_and_nothing_else() {
+        assert_eq!(target_base("smallest"), Ok(TargetBase::Smallest));
+        let Ok(TargetBase::Given(base)) = target_base("1500, -900, 200, 0, 0, 90") else {
+            panic!("six numbers are a base");
+        };
+        let tip = base.point(&Vector3::new(0.1, 0.0, 0.0));
+        assert!((tip - Vector3::new(1.5, -0.8, 0.2)).norm() < 1e-12, "{tip}");
+        for wrong in ["", "measured", "1,2,3", "1,2,3,4,5,6,x", "1,2,3,4,5,nan"] {
+            let message = target_base(wrong).unwrap_err();
+            assert!(message.starts_with("allowed: own, smallest, or"), "{wrong}");
+        }
+    }
 }

@@ -90,8 +90,7 @@ impl Stage for Validate {
                 let line = suspicion(whole.map(|row| [row.error_mm, row.noise_mm]), 0);
                 suspected =
                     suspected.or(line.map(|line| format!("{name} on {set}, held out: {line}")));
-                let (left, counted) = left_out(rows, held_out, &proven);
-                let rows = counted;
+                let (left, rows) = left_out(rows, held_out, &proven);
                 let mut row = describe(order, name, &set, held_out, &rows);
                 without(&mut row, &rows, &left, &proven);
                 row.expected_rms_mm = expected(held_out, &rows, unmodelled);
@@ -141,7 +140,7 @@ impl Stage for Validate {
     }
 }
 
-/// Rows by what names them in all tables of a recording.
+/// A text for each row, by its sequence and point id.
 type Named<'a> = BTreeMap<(i64, &'a str), &'a str>;
 
 /// Rows that are proven to be others', with the reasons: by the last step that screened its rows, whose model is the best.

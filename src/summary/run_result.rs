@@ -168,7 +168,7 @@ impl RunResult {
         text.extend(
             after
                 .without_points()
-                .map(|line| labelled("left out", &line)),
+                .map(|line| screen::sentence("left out", &line, width)),
         );
         text.extend(
             diagnosed

@@ -1,6 +1,6 @@
 //! Causes of error: what each is stands in its row of the [table](CAUSES).
 
-use super::law_row::LawRow;
+use super::law_row::{Follows, LawRow};
 use super::{
     CAUSES, Effect, EffectContext, Form, HiddenSize, Hypothesis, NumberSpec, Place, Summary,
     Survey, Term, Variable, names,
@@ -106,6 +106,13 @@ impl Cause {
                     .flat_map(|motion| (motion.propose)(survey)),
             )
             .collect()
+    }
+
+    /// Whether it is a step in time, which may occur more than once in a recording.
+    pub fn is_a_step(&self) -> bool {
+        self.laws
+            .iter()
+            .any(|law| matches!(law.follows, Follows::Step))
     }
 
     /// What a mechanic is told of a finding, without its size at the tool.

@@ -4,8 +4,8 @@ use crate::criteria::cells::{DETAIL, FAINT, IDENTITY, SMALLEST, TRACE};
 use crate::criteria::words::FIRM;
 use crate::diagnose::table::{Answer, FoundCell, places};
 use crate::effect::{
-    Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Survey, Variable,
-    figure, moved_with_the_payload, names, people, turned_holder,
+    Cause, Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Survey,
+    Variable, cause, figure, moved_with_the_payload, names, people, turned_holder,
 };
 use crate::estimate::{Model, ParameterStatus, tail};
 use crate::observation::Dimension;
@@ -53,7 +53,7 @@ pub(super) fn findings(
 /// weaker at the place of a finding without a name.
 fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Vec<usize>)> {
     let mut found = last.answer.found.clone();
-    name_what_happened_again(&mut found);
+    name_repeated_steps(&mut found);
     let sized = |found: FoundCell| (size(last, &found.members), found, Vec::new());
     let mut all: Vec<(f64, FoundCell, Vec<usize>)> = found.into_iter().map(sized).collect();
     let logs = last.answer.found.iter().map(|found| found.log);
@@ -93,9 +93,9 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
     all.map(|(_, found, details)| (found, details)).collect()
 }
 
-/// A cause of the table is searched once; what happened again (a tool that was taken off twice) was found without a name, and the cause itself,
-/// which was found before, is the likeliest of its rivals.
-fn name_what_happened_again(all: &mut [FoundCell]) {
+/// Every cause is searched once. A second step of the same cause (a tool that was taken off twice) is therefore found as unknown, with that cause
+/// as its likeliest rival: it gets the name of the cause.
+fn name_repeated_steps(all: &mut [FoundCell]) {
     let named: Vec<(&'static str, Place)> = all
         .iter()
         .map(|found| (found.effect, found.place))
@@ -107,7 +107,8 @@ fn name_what_happened_again(all: &mut [FoundCell]) {
         let Some((k, rival)) = likeliest else {
             continue;
         };
-        let again = named.contains(&(rival.effect, rival.place));
+        let steps = cause(rival.effect).is_some_and(Cause::is_a_step);
+        let again = steps && named.contains(&(rival.effect, rival.place));
         let Probabilities { name, none, .. } = found.probabilities;
         if !again || rival.probability <= name + none {
             continue;
