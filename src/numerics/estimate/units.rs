@@ -194,7 +194,8 @@ mod tests {
     fn a_stretch_ends_where_the_path_does_and_a_pause_is_one_pose() {
         let mut poses = along(100, 0.0);
         poses.extend(vec![poses[99].clone(); 300]);
-        poses.extend(along(100, 3.0));
+        // Between the poses of before: one that comes again later is one with them.
+        poses.extend(along(100, 3.03));
         let found = units(&poses);
         assert!(found.follow_a_path());
         let pause = found.all.iter().find(|unit| unit.contains(&150)).unwrap();
