@@ -2,7 +2,7 @@
 //! copies of each other, joints that never move, links without masses, a tool out of place, logs that are rounded.
 
 use crate::description::JointDescription;
-use crate::effect::{ToolOffset, figure};
+use crate::effect::{STANDS, ToolOffset, figure};
 use crate::error::{Error, Result, counted, listed};
 use crate::estimate::{Fitted, Model, ParameterStatus};
 use crate::robot::{Measurements, RobotModel};
@@ -73,8 +73,6 @@ pub(super) fn copies_remark(copies: &[(usize, usize)], recording: &Recording) ->
     })
 }
 
-/// A joint that moves by less stands: rad or m.
-const STILL: f64 = 1e-3;
 /// Fewer points show no drift.
 const DRIFT_FEWEST: usize = 6;
 /// Standard deviations by which a drift must be beyond noise.
@@ -88,7 +86,7 @@ fn unmoved_joints(data: &Measurements, rows: &[usize]) -> Vec<(usize, f64)> {
         let (least, most) = positions.fold((first, first), |(least, most), q| {
             (least.min(q), most.max(q))
         });
-        (most - least < STILL).then_some((joint, first))
+        (most - least < STANDS).then_some((joint, first))
     };
     (0..data.joints).filter_map(stands).collect()
 }

@@ -61,6 +61,7 @@ mod recorded;
 mod remedies;
 mod repeats;
 mod report;
+mod reported;
 mod resume;
 mod robot;
 mod robot_faults;

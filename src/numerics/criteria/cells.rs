@@ -121,8 +121,6 @@ criteria! {
     ALIKE: f64 = 0.2, "share", "judgement: less explains something else", "";
     /// Share of two components' covariances in common above which one is estimated anew when the other joins.
     COUPLED: f64 = 0.01, "share", "judgement: bounds time", "";
-    /// Residual rows up to which products of a cell's columns are had row by row: above, whole columns take less time.
-    ROW_BY_ROW: usize = 1500, "rows", "judgement: bounds time; an arm of 2,080 points takes four times as long row by row", "";
     /// How often a step of a shape's number is halved.
     LEVELS: i32 = 5, "levels", "judgement: bounds time", "";
     /// Exchanges of a search at most.

@@ -3,6 +3,8 @@
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use nalgebra::DMatrix;
+use std::ops::Deref;
+use std::sync::OnceLock;
 
 /// Takes off a column what it has of another one of unit length.
 pub(crate) fn subtract(column: &mut [f64], other: &[f64]) {
@@ -72,6 +74,36 @@ pub(crate) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
     let out = MatMut::from_column_major_slice_mut(products.as_mut_slice(), a.ncols(), b.ncols());
     matmul(out, Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
     products
+}
+
+/// Columns, one after another, and the same line by line once somebody asks.
+pub(crate) struct Columns {
+    columns: DMatrix<f64>,
+    by_line: OnceLock<DMatrix<f64>>,
+}
+
+impl Columns {
+    /// Columns x lines.
+    pub(crate) fn by_line(&self) -> &DMatrix<f64> {
+        self.by_line.get_or_init(|| self.columns.transpose())
+    }
+}
+
+impl From<DMatrix<f64>> for Columns {
+    fn from(columns: DMatrix<f64>) -> Self {
+        Self {
+            columns,
+            by_line: OnceLock::new(),
+        }
+    }
+}
+
+impl Deref for Columns {
+    type Target = DMatrix<f64>;
+
+    fn deref(&self) -> &DMatrix<f64> {
+        &self.columns
+    }
 }
 
 /// A matrix of one library as the other one sees it.

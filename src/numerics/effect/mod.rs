@@ -51,7 +51,7 @@ pub use stack::{EffectStack, PointMotion};
 pub use summary::{
     FittedForms, HiddenSize, ModelledFinding, ParameterEstimate, Summary, people, turned_holder,
 };
-pub use survey::{Hypothesis, Survey};
+pub use survey::{Hypothesis, STANDS, Survey};
 pub use table::CAUSES;
 pub use unknown::Unknown;
 pub use variable::Variable;

@@ -31,6 +31,9 @@ pub struct Survey<'a> {
 /// At either end of a recording so many rows must lie beyond a change point: fewer are a few wrong points.
 const EDGE: usize = 5;
 
+/// A joint that moves by less stands: rad or m.
+pub const STANDS: f64 = 1e-3;
+
 impl<'a> Survey<'a> {
     /// Ranges and times of the fitted rows; `torque` (Nm) row-major by fitted row, `compliance` (rad/Nm) by joint.
     pub fn new(
@@ -104,6 +107,11 @@ impl<'a> Survey<'a> {
     /// How far a joint moves, rad or m.
     pub fn travel(&self, joint: usize) -> f64 {
         (self.range[joint][1] - self.range[joint][0]).max(0.0)
+    }
+
+    /// Whether a joint stands in all rows.
+    pub fn stands(&self, joint: usize) -> bool {
+        self.travel(joint) < STANDS
     }
 
     /// Load torques of a joint, Nm.

@@ -136,6 +136,14 @@ impl Variable {
         self.joint_mut().copied()
     }
 
+    /// The joint without whose motion it says nothing.
+    pub fn by_motion_of(self) -> Option<usize> {
+        match self {
+            Self::Load { .. } | Self::Push { .. } | Self::Current { .. } | Self::Circumstance { .. } => None,
+            _ => self.joint(),
+        }
+    }
+
     pub(super) fn constant(mut self) -> Option<f64> {
         self.constant_mut().copied()
     }

@@ -2,7 +2,6 @@
 
 use super::{diagnose, nothing, write};
 use crate::answer::{calib, put, read, root};
-use crate::desk::shared;
 use calib::twin::torque::TorqueCase;
 use serde_json::Value;
 
@@ -343,28 +342,4 @@ fn joints_that_are_logged_within_one_turn_are_read_as_going_on_and_that_is_said(
         "{said}"
     );
     assert_eq!(read["findings"], straight["findings"], "{read}");
-}
-
-/// Faults that others reported: folder, and what is said.
-const REPORTED: [(&str, &[&str]); 2] = [
-    (
-        "torque_wall_mounted",
-        &["`gravity: [0, -9.81, 0]`", "robot file"],
-    ),
-    ("torque_external_only", &["hold no gravity", "external"]),
-];
-
-#[test]
-fn gravity_and_what_a_column_means_are_asked_before_units() {
-    for (name, words) in REPORTED {
-        let Some(folder) = shared(&format!("review/faults5/{name}")) else {
-            return;
-        };
-        let store = tempfile::tempdir().unwrap();
-        let (pipeline, store) = (folder.join("pipeline.yaml"), store.path().display());
-        let answer = calib(".", &format!("run --store {store} {}", pipeline.display()));
-        assert_eq!(answer.code, Some(10), "{}", answer.err);
-        let says = |word: &&str| answer.err.contains(*word);
-        assert!(words.iter().all(says), "{}", answer.err);
-    }
 }

@@ -2,7 +2,7 @@
 
 use super::cell::{CauseCell, FreeShape, Over, ShapeGroup, Shapes};
 use super::component::{CellColumns, ColumnProducts, Component, PartProducts};
-use super::frame::SearchRows;
+use super::frame::{MultipliedColumns, SearchRows};
 use super::state::KnownState;
 use super::{generated, listed};
 use crate::criteria::cells::{ALIKE, CLOSELY, COMPONENTS, USUAL_MOST};
@@ -24,6 +24,8 @@ pub(super) struct CauseTable<'f, 'a> {
     products: BTreeMap<u64, DMatrix<f64>>,
     pub(crate) parts: PartProducts,
     known: ColumnProducts,
+    /// Cells by the motion of their coarse columns: what a component has in common with its directions is computed once.
+    of_motions: Vec<Vec<usize>>,
     /// The first of all coarse columns of each cell, and their number.
     pub(crate) first: Vec<usize>,
     columns: usize,
@@ -102,6 +104,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             products: BTreeMap::new(),
             parts: PartProducts::default(),
             known: ColumnProducts::default(),
+            of_motions: Vec::new(),
             first: Vec::new(),
             columns: 0,
             next: 0,
@@ -134,6 +137,12 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             self.coarse.push(block);
             self.cells.push(cell);
         }
+        let mut of_motions: BTreeMap<Result<usize, usize>, Vec<usize>> = BTreeMap::new();
+        for (cell, block) in self.coarse.iter().enumerate() {
+            let motion = block.motion().ok_or(cell);
+            of_motions.entry(motion).or_default().push(cell);
+        }
+        self.of_motions = of_motions.into_values().collect();
         self.products.clear();
     }
 
@@ -217,13 +226,21 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     pub(crate) fn know(&mut self, components: &[Component]) {
         for component in components {
             if !self.products.contains_key(&component.id) {
-                let with = |block: &CellColumns| {
-                    component.by_part(&self.known.of(component, block, self.frame))
+                let of_motion = |cells: &Vec<usize>| {
+                    let columns = self.frame.multiplied(&component.values);
+                    let with = |cell: &usize| {
+                        let block = &self.coarse[*cell];
+                        let product = self.known.of(component, &columns, block, self.frame);
+                        (*cell, component.by_part(&product))
+                    };
+                    cells.iter().map(with).collect::<Vec<_>>()
                 };
-                let all: Vec<DMatrix<f64>> = self.coarse.par_iter().map(with).collect();
-                let mut values = Vec::with_capacity(component.part.ncols() * self.columns);
-                for products in &all {
-                    values.extend_from_slice(products.as_slice());
+                let all = self.of_motions.par_iter().flat_map_iter(of_motion);
+                let rows = component.part.ncols();
+                let mut values = vec![0.0; rows * self.columns];
+                for (cell, products) in all.collect::<Vec<_>>() {
+                    let first = rows * self.first[cell];
+                    values[first..first + products.len()].copy_from_slice(products.as_slice());
                 }
                 self.products.insert(
                     component.id,
@@ -348,11 +365,23 @@ impl<'f, 'a> CauseTable<'f, 'a> {
 
     /// L^-1 Z'X of a block's columns given a state.
     pub(crate) fn across_block(&self, block: &CellColumns, state: &KnownState) -> DMatrix<f64> {
-        let part =
-            |component: &Component| component.by_part(&self.known.of(component, block, self.frame));
+        let part = |component: &Component| {
+            let columns = self.frame.multiplied(&component.values);
+            component.by_part(&self.known.of(component, &columns, block, self.frame))
+        };
         let parts: Vec<DMatrix<f64>> = state.components.iter().map(part).collect();
         let parts: Vec<&DMatrix<f64>> = parts.iter().collect();
         state.solved(stacked(&parts, 0..block.count()))
+    }
+
+    /// The same of a block that is asked once, by the columns of the state.
+    pub(crate) fn across_once(
+        &self,
+        block: &CellColumns,
+        state: &KnownState,
+        columns: &MultipliedColumns,
+    ) -> DMatrix<f64> {
+        state.solved(block.products(columns, self.frame))
     }
 
     pub(crate) fn state(&self, components: &[Component], kappa: Option<f64>) -> KnownState {

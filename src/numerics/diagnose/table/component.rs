@@ -3,10 +3,9 @@
 
 use super::cell::{CellShape, ShapeGroup};
 use super::factored::{FactoredColumns, unit};
-use super::frame::SearchRows;
-use crate::criteria::cells::ROW_BY_ROW;
+use super::frame::{MultipliedColumns, SearchRows};
 use crate::effect::Form;
-use crate::linear::{product, view};
+use crate::linear::{Columns, product, view};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, Par};
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -49,7 +48,7 @@ pub(super) struct CellColumns {
     /// Where all of them are directions times functions.
     factored: Option<Vec<FactoredColumns>>,
     /// Residual rows x columns, once somebody wants them.
-    values: OnceLock<Arc<DMatrix<f64>>>,
+    values: OnceLock<Arc<Columns>>,
     /// Its possible amplitudes, m.
     pub(crate) between: [f64; 2],
 }
@@ -57,9 +56,7 @@ pub(super) struct CellColumns {
 impl CellColumns {
     pub(crate) fn of(groups: Vec<ShapeGroup>, frame: &SearchRows) -> Self {
         let forms = groups.iter().flat_map(|group| &group.forms);
-        let factored: Option<Vec<_>> = (frame.residual().len() <= *ROW_BY_ROW)
-            .then(|| forms.clone().map(|form| frame.factored(form)).collect())
-            .flatten();
+        let factored: Option<Vec<_>> = forms.clone().map(|form| frame.factored(form)).collect();
         let values = OnceLock::new();
         let (square, counts) = match &factored {
             Some(factored) => {
@@ -133,13 +130,18 @@ impl CellColumns {
         }
     }
 
+    /// The position of the motion of its first columns among those of the frame; none of what is no product.
+    pub(crate) fn motion(&self) -> Option<usize> {
+        Some(self.factored.as_ref()?.first()?.motion)
+    }
+
     /// How many columns it has.
     pub(crate) fn count(&self) -> usize {
         self.square.len()
     }
 
     /// Residual rows x columns.
-    pub(crate) fn values(&self, frame: &SearchRows) -> &Arc<DMatrix<f64>> {
+    pub(crate) fn values(&self, frame: &SearchRows) -> &Arc<Columns> {
         self.values.get_or_init(|| {
             let forms = self.groups.iter().flat_map(|seen| &seen.group.forms);
             frame.columns(&forms.cloned().collect::<Vec<_>>()).0.values
@@ -147,10 +149,10 @@ impl CellColumns {
     }
 
     /// The transpose of columns of which the base is projected off times these.
-    fn products(&self, with: &DMatrix<f64>, frame: &SearchRows) -> DMatrix<f64> {
+    pub(crate) fn products(&self, with: &MultipliedColumns, frame: &SearchRows) -> DMatrix<f64> {
         match &self.factored {
             Some(factored) => frame.with_factored(with, factored),
-            None => product(view(with), view(self.values(frame))),
+            None => product(view(with.columns), view(self.values(frame))),
         }
     }
 
@@ -194,7 +196,7 @@ pub(super) struct Component {
     /// Whether its coefficients are positive, and the largest that makes sense, SI.
     pub(crate) positive: bool,
     pub(crate) largest: f64,
-    pub(crate) values: Arc<DMatrix<f64>>,
+    pub(crate) values: Arc<Columns>,
     pub(crate) square: Arc<Vec<f64>>,
     /// Rms motion at the tool, m.
     pub(crate) amplitude: f64,
@@ -272,15 +274,16 @@ struct ProductCache {
 
 struct KnownProduct {
     /// What it is of: as long as it is known, nothing else comes to lie there.
-    _of: (Weak<DMatrix<f64>>, Weak<Vec<f64>>),
+    _of: (Weak<Columns>, Weak<Vec<f64>>),
     product: Arc<DMatrix<f64>>,
 }
 
 impl ColumnProducts {
-    /// The transpose of a component's columns times those of a block.
+    /// The transpose of a component's columns, which are multiplied as `with`, times those of a block.
     pub(crate) fn of(
         &self,
         component: &Component,
+        with: &MultipliedColumns,
         block: &CellColumns,
         frame: &SearchRows,
     ) -> Arc<DMatrix<f64>> {
@@ -291,7 +294,7 @@ impl ColumnProducts {
         {
             return known.product.clone();
         }
-        let product = Arc::new(block.products(a, frame));
+        let product = Arc::new(block.products(with, frame));
         if let Ok(mut cache) = self.0.write() {
             // 128 MB.
             if cache.size > 1 << 24 {

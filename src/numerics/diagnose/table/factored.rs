@@ -205,6 +205,14 @@ impl FactoredColumns {
             .iter()
             .map(|by_row| {
                 let mut sums = Mat::zeros(count, functions);
+                if functions == 1 {
+                    let out = sums.col_as_slice_mut(0);
+                    for (row, value) in self.functions.at(0).iter().enumerate() {
+                        let each = out.iter_mut().zip(column(by_row, row));
+                        each.for_each(|(sum, product)| *sum += value * product);
+                    }
+                    return sums;
+                }
                 let (columns, functions) = (view(by_row), view(&self.functions.values));
                 let out = sums.as_mut();
                 matmul(out, Accum::Replace, columns, functions, 1.0, Par::Seq);

@@ -6,19 +6,25 @@ use super::factored::{FactoredColumns, Functions, MotionRows, WeighedDirection, 
 use super::noise_shape::NoiseShape;
 use crate::diagnose::round::RoundView;
 use crate::effect::{Basis, Factor, Form, Law, Motion, Variable};
-use crate::linear::{product, project, shown_directions};
+use crate::linear::{Columns, product, project, shown_directions};
 use faer::{Mat, MatRef};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Columns of unit rms motion at the tool.
 pub(super) struct UnitColumns {
     /// Residual rows x columns.
-    pub(crate) values: Arc<DMatrix<f64>>,
+    pub(crate) values: Arc<Columns>,
     /// Mean squared motion (m2 or rad2) by a unit of each coefficient.
     pub(crate) square: Vec<f64>,
+}
+
+/// Columns with their products with the directions of each motion, row by row, each computed once.
+pub(super) struct MultipliedColumns<'c> {
+    pub(super) columns: &'c Columns,
+    by_row: Vec<OnceLock<Vec<DMatrix<f64>>>>,
 }
 
 /// A variable at every row, none where some row does not tell it; and functions of it.
@@ -202,20 +208,29 @@ impl<'a> SearchRows<'a> {
         out.by_row(&self.base_by_line, &self.residual, row_of)
     }
 
-    /// The transpose of some columns, of which the base is projected off, times factored ones.
+    /// Some columns, of which the base is projected off, to be multiplied with factored ones.
+    pub(crate) fn multiplied<'c>(&self, columns: &'c Columns) -> MultipliedColumns<'c> {
+        MultipliedColumns {
+            columns,
+            by_row: self.motions.iter().map(|_| OnceLock::new()).collect(),
+        }
+    }
+
+    /// The transpose of some columns times factored ones.
     pub(crate) fn with_factored(
         &self,
-        columns: &DMatrix<f64>,
+        with: &MultipliedColumns,
         factored: &[FactoredColumns],
     ) -> DMatrix<f64> {
-        let (by_line, row_of) = (columns.transpose(), self.view.problem.rows_of_readings());
+        let row_of = self.view.problem.rows_of_readings();
         let mut out = Vec::new();
         for form in factored {
-            let by_row = self.motions[form.motion].with(&by_line, row_of);
-            form.sums(&by_row, &mut out);
+            let by_row = with.by_row[form.motion]
+                .get_or_init(|| self.motions[form.motion].with(with.columns.by_line(), row_of));
+            form.sums(by_row, &mut out);
         }
-        let count = out.len() / columns.ncols().max(1);
-        DMatrix::from_vec(columns.ncols(), count, out)
+        let count = out.len() / with.columns.ncols().max(1);
+        DMatrix::from_vec(with.columns.ncols(), count, out)
     }
 
     /// Products of factored columns with each other and with the residual, the base projected off; none of several motions.
@@ -255,7 +270,7 @@ impl<'a> SearchRows<'a> {
         let square: Vec<f64> = each.into_iter().flat_map(|block| block.square).collect();
         (
             UnitColumns {
-                values: Arc::new(DMatrix::from_vec(rows, square.len(), values)),
+                values: Arc::new(DMatrix::from_vec(rows, square.len(), values).into()),
                 square,
             },
             counts,

@@ -37,7 +37,7 @@ use super::round::{EstimatedCause, RoundView};
 use super::types::Located;
 use crate::criteria::cells::{IDLE, OPEN, ROUNDS, UNEXPLAINED};
 use crate::criteria::screen::MISTAKES;
-use crate::effect::{Basis, Form, Law, Place, Survey, names};
+use crate::effect::{Basis, Form, Law, Place, Survey, Variable, names};
 use crate::estimate::Prior;
 use crate::observation::only_contacts;
 use cause_table::CauseTable;
@@ -287,12 +287,16 @@ fn is_kept(cell: &CauseCell, view: &RoundView, survey: &Survey) -> bool {
         && (cell.place == Place::Base
             || cell.place == Place::Joint(0) && cell.name == names::ZERO_SHIFT);
     let values = |variable| view.problem.values(variable);
-    let is_slow = || {
-        cell.groups(survey, &values, false)
-            .iter()
-            .any(|group| group.forms.iter().any(Form::follows_time))
+    let groups = cell.groups(survey, &values, false);
+    let mut forms = groups.iter().flat_map(|group| &group.forms);
+    let stands = |form: &Form| {
+        let mut joints = form.variables().into_iter().filter_map(Variable::by_motion_of);
+        joints.any(|joint| survey.stands(joint))
     };
-    !(unseen || fitter.causes_of_the_arm_first() && is_slow())
+    // A joint that stands says nothing by its motion: what is left of that is the noise of its encoder.
+    !(unseen
+        || fitter.causes_of_the_arm_first() && forms.clone().any(Form::follows_time)
+        || !groups.is_empty() && forms.all(stands))
 }
 
 /// Components as causes of the whole model, each with what the evidence says of the size of its coefficients; waves that the rows could not

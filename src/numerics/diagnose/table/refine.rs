@@ -2,6 +2,7 @@
 
 use super::cause_table::CauseTable;
 use super::cell::{FreeShape, Over, ShapeGroup, Shapes, fields};
+use super::component::CellColumns;
 use super::scan::{CellEvidence, CellScan, Refined};
 use super::state::KnownState;
 use crate::criteria::cells::{BENDS, CLOSELY, LEVELS, SEPARATED, STICKS};
@@ -92,12 +93,20 @@ impl CauseTable<'_, '_> {
         state: &KnownState,
     ) -> Option<Refined> {
         let best = self.as_found(cell, found);
+        // All of these are of one motion: what its directions have in common with the state is computed once.
+        let columns = self.frame.multiplied(state.columns(self.frame));
         let value = |forms: &[Form]| {
-            let other = self.with_forms(&best, forms.to_vec());
+            let group = ShapeGroup {
+                forms: forms.to_vec(),
+                shapes: vec![best.shape.clone()],
+                positive: best.positive,
+                largest: best.largest,
+            };
+            let block = CellColumns::of(vec![group], self.frame);
             // With other numbers a variable may have so few values that its curve has fewer columns.
-            let is_alike = other.values.ncols() == best.shape.shares.len();
+            let is_alike = block.count() == best.shape.shares.len();
             is_alike
-                .then(|| self.component_evidence(&other, state))
+                .then(|| self.evidence_once(&block, state, &columns))
                 .flatten()
         };
         let start = self.component_evidence(&best, state)?;

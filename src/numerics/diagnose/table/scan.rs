@@ -4,6 +4,7 @@ use super::cause_table::CauseTable;
 use super::cell::{CellShape, FreeShape};
 use super::component::{CellColumns, Component, shape_keys};
 use super::evidence::{GroupEvidence, log_sum};
+use super::frame::MultipliedColumns;
 use super::state::KnownState;
 use crate::criteria::cells::{BENDS, FAR_BELOW, JOINS, PAIR, PAIRS, SEPARATED, UNLIKELY};
 use crate::effect::Form;
@@ -278,9 +279,11 @@ impl CauseTable<'_, '_> {
 
     /// Those of some products that a state shows, the most probable first.
     pub(crate) fn seen_pairs(&self, pairs: &[FreeShape], state: &KnownState) -> Vec<FreeShape> {
+        let columns = self.frame.multiplied(state.columns(self.frame));
         let log = |free: &FreeShape| {
             let block = CellColumns::of(self.groups(free, false), self.frame);
-            log_of_all(&self.shapes(&block, state))
+            let across = self.across_once(&block, state, &columns);
+            log_of_all(&state.shapes(&block, &across, 0))
         };
         let left = state.left(self.frame);
         let rough = |free: &FreeShape| {
@@ -354,7 +357,7 @@ impl CauseTable<'_, '_> {
             shape,
             positive: seen.group.positive,
             largest: seen.group.largest,
-            values: Arc::new(values),
+            values: Arc::new(values.into()),
             square: Arc::new(columns.iter().map(|k| block.square[*k]).collect()),
             amplitude: found.amplitude,
             part: Arc::default(),
@@ -390,7 +393,19 @@ impl CauseTable<'_, '_> {
         state: &KnownState,
     ) -> Option<(f64, f64)> {
         let block = CellColumns::of_component(component, self.frame);
-        let (.., found) = self.shapes(&block, state).pop()?;
+        let columns = self.frame.multiplied(state.columns(self.frame));
+        self.evidence_once(&block, state, &columns)
+    }
+
+    /// The same of a block of one shape that is asked once.
+    pub(super) fn evidence_once(
+        &self,
+        block: &CellColumns,
+        state: &KnownState,
+        columns: &MultipliedColumns,
+    ) -> Option<(f64, f64)> {
+        let across = self.across_once(block, state, columns);
+        let (.., found) = state.shapes(block, &across, 0).pop()?;
         Some((found.log, found.amplitude))
     }
 }

@@ -204,7 +204,8 @@ impl CauseTable<'_, '_> {
         block: &CellColumns,
         state: &KnownState,
     ) -> Option<(usize, GroupEvidence, DVector<f64>)> {
-        let across = self.across_block(block, state);
+        let columns = self.frame.multiplied(state.columns(self.frame));
+        let across = self.across_once(block, state, &columns);
         let mut best: Option<(usize, GroupEvidence)> = None;
         for (_, shape, found) in state.shapes(block, &across, 0) {
             if found.log > best.map_or(f64::NEG_INFINITY, |best| best.1.log) {

@@ -9,7 +9,7 @@ use super::factored::unit;
 use super::frame::SearchRows;
 use crate::criteria::cells::{NU, UNEXPLAINED};
 use crate::effect::Form;
-use crate::linear::dot;
+use crate::linear::{Columns, dot};
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
 };
@@ -26,6 +26,8 @@ pub struct KnownState {
     pub rows: EvidenceRows,
     /// Which components.
     pub(super) components: Vec<Component>,
+    /// Their columns of unit prior variance, one component after another, once somebody asks.
+    columns: OnceLock<Columns>,
     /// Keys of their forms, once somebody asks.
     keys: OnceLock<BTreeSet<String>>,
     /// Cholesky factor of kappa^2 + Z'Z.
@@ -102,6 +104,7 @@ impl KnownState {
                 freedom: rows.freedom.min(left),
             },
             components: Vec::new(),
+            columns: OnceLock::new(),
             keys: OnceLock::new(),
             lower,
             along: solved_along,
@@ -122,20 +125,24 @@ impl KnownState {
         self.components.iter().map(coefficients).collect()
     }
 
+    /// Its components' columns of unit prior variance, one component after another, residual rows down.
+    pub(super) fn columns(&self, frame: &SearchRows) -> &Columns {
+        self.columns.get_or_init(|| {
+            let mut columns = DMatrix::zeros(frame.residual().len(), self.along.len());
+            let mut first = 0;
+            for Component { part, .. } in &self.components {
+                columns.view_mut((0, first), part.shape()).copy_from(part);
+                first += part.ncols();
+            }
+            columns.into()
+        })
+    }
+
     /// What its components leave of the residual at their likeliest.
     pub(super) fn left(&self, frame: &SearchRows) -> Vec<f64> {
         let residual = DVector::from_column_slice(frame.residual());
         let left = match self.weights() {
-            Some(weights) => {
-                let count = weights.len();
-                let mut parts = DMatrix::zeros(residual.len(), count);
-                let mut first = 0;
-                for Component { part, .. } in &self.components {
-                    parts.view_mut((0, first), part.shape()).copy_from(part);
-                    first += part.ncols();
-                }
-                residual - parts * weights
-            }
+            Some(weights) => residual - &**self.columns(frame) * weights,
             None => residual,
         };
         left.data.into()
