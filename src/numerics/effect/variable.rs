@@ -139,7 +139,10 @@ impl Variable {
     /// The joint without whose motion it says nothing.
     pub fn by_motion_of(self) -> Option<usize> {
         match self {
-            Self::Load { .. } | Self::Push { .. } | Self::Current { .. } | Self::Circumstance { .. } => None,
+            Self::Load { .. }
+            | Self::Push { .. }
+            | Self::Current { .. }
+            | Self::Circumstance { .. } => None,
             _ => self.joint(),
         }
     }

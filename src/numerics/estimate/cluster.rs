@@ -2,7 +2,7 @@
 //!
 //! A' A with one row R^-1 R^-T J' (1 - H)^-1/2 e per pose (Bell and McCaffrey, 2002: unbiased where the stated noise is right).
 
-use super::factor::StackedRows;
+use super::factor::{RowSums, StackedRows};
 use super::model::Model;
 use super::problem::{ObservationTerm, Problem, columns};
 use crate::estimate::factor::Triangle;
@@ -113,6 +113,6 @@ fn triangle(p: usize, lines: impl Iterator<Item = Vec<f64>>) -> Triangle {
         }
         tall.absorb(some.len());
     }
-    let factor = tall.factor();
+    let factor = tall.sum();
     Triangle::from_fn(p, |a, b| factor.entry(p - 1 - b, p - 1 - a))
 }

@@ -3,16 +3,85 @@
 //! Upper triangular matrices, column after column in one piece of memory: factors, their inverses, roots of covariances.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::qr::no_pivoting::factor::{
     qr_in_place, qr_in_place_scratch, recommended_block_size,
 };
-use faer::{Mat, Par};
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Accum, Mat, MatMut, Par, Side};
 
 /// Upper triangular factor R of the rows `[J | r]`: its last column is Q^T r, so R alone states the least-squares problem.
 #[derive(Debug, Clone)]
 pub(crate) struct TriangularFactor {
     /// (p + 1) x (p + 1).
     r: Triangle,
+}
+
+/// What rows `[J | r]` come to, chunk by chunk.
+pub(crate) trait RowSums: Sized {
+    /// What becomes of them.
+    type Sum: Send;
+
+    /// Room for chunks of `chunk` rows with `columns` = p + 1 columns.
+    fn new(columns: usize, chunk: usize) -> Self;
+    /// The columns of the next chunk of `height` rows; all zero.
+    fn chunk(&mut self, height: usize) -> Vec<&mut [f64]>;
+    /// Takes the `height` rows written to [`RowSums::chunk`].
+    fn absorb(&mut self, height: usize);
+    /// Of all chunks.
+    fn sum(self) -> Self::Sum;
+    /// Of two sets of rows together.
+    fn both(a: Self::Sum, b: Self::Sum) -> Self::Sum;
+}
+
+/// Rows `[J | r]` on their way into the sums of their products, the lower triangle.
+pub(crate) struct SummedRows {
+    rows: Mat<f64>,
+    products: Mat<f64>,
+}
+
+impl RowSums for SummedRows {
+    type Sum = Mat<f64>;
+
+    fn new(columns: usize, chunk: usize) -> Self {
+        Self {
+            rows: Mat::zeros(chunk, columns),
+            products: Mat::zeros(columns, columns),
+        }
+    }
+
+    fn chunk(&mut self, height: usize) -> Vec<&mut [f64]> {
+        let columns = self.rows.col_iter_mut().map(|column| {
+            let column = column.try_as_col_major_mut().expect("stored by column");
+            &mut column.as_slice_mut()[..height]
+        });
+        columns.collect()
+    }
+
+    fn absorb(&mut self, height: usize) {
+        let rows = self.rows.as_ref().subrows(0, height);
+        let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+        triangular::matmul(
+            self.products.as_mut(),
+            lower,
+            Accum::Add,
+            rows.transpose(),
+            whole,
+            rows,
+            whole,
+            1.0,
+            Par::Seq,
+        );
+        self.rows.fill(0.0);
+    }
+
+    fn sum(self) -> Mat<f64> {
+        self.products
+    }
+
+    fn both(a: Mat<f64>, b: Mat<f64>) -> Mat<f64> {
+        a + b
+    }
 }
 
 /// Rows `[J | r]` on their way into a factor: chunks are written below the factor of those before them.
@@ -24,9 +93,10 @@ pub(crate) struct StackedRows {
     memory: MemBuffer,
 }
 
-impl StackedRows {
-    /// Room for chunks of `chunk` rows with `columns` = p + 1 columns.
-    pub(crate) fn new(columns: usize, chunk: usize) -> Self {
+impl RowSums for StackedRows {
+    type Sum = TriangularFactor;
+
+    fn new(columns: usize, chunk: usize) -> Self {
         let height = columns + chunk;
         let block = recommended_block_size::<f64>(height, columns);
         let memory = MemBuffer::new(qr_in_place_scratch::<f64>(
@@ -44,8 +114,7 @@ impl StackedRows {
         }
     }
 
-    /// The columns of the next chunk of `height` rows; all zero.
-    pub(crate) fn chunk(&mut self, height: usize) -> Vec<&mut [f64]> {
+    fn chunk(&mut self, height: usize) -> Vec<&mut [f64]> {
         let top = self.top;
         let columns = self.rows.col_iter_mut().map(|column| {
             let column = column.try_as_col_major_mut().expect("stored by column");
@@ -54,8 +123,7 @@ impl StackedRows {
         columns.collect()
     }
 
-    /// Takes the `height` rows written to [`Tall::chunk`] into the factor.
-    pub(crate) fn absorb(&mut self, height: usize) {
+    fn absorb(&mut self, height: usize) {
         let (used, columns) = (self.top + height, self.rows.ncols());
         let reflectors = self.reflectors.as_mut().subcols_mut(0, columns.min(used));
         let rows = self.rows.as_mut().subrows_mut(0, used);
@@ -74,8 +142,7 @@ impl StackedRows {
         }
     }
 
-    /// The factor of all chunks.
-    pub(crate) fn factor(&self) -> TriangularFactor {
+    fn sum(self) -> TriangularFactor {
         TriangularFactor {
             r: Triangle::from_fn(self.rows.ncols(), |i, j| {
                 if i < self.top {
@@ -86,9 +153,47 @@ impl StackedRows {
             }),
         }
     }
+
+    fn both(a: TriangularFactor, b: TriangularFactor) -> TriangularFactor {
+        a.stack(&b)
+    }
 }
 
+/// A column of unit length of which those before it leave less than this is not told from rounding.
+const LEAST_PIVOT: f64 = 1e-6;
+
 impl TriangularFactor {
+    /// The factor of rows `[J | r]` by the lower triangle of the sums of their products; `None` where these do not tell a column of J from
+    /// those before it.
+    pub(crate) fn of_products(products: &Mat<f64>) -> Option<Self> {
+        let p = products.ncols() - 1;
+        let scale: Vec<f64> = (0..p).map(|j| products[(j, j)].sqrt()).collect();
+        if scale.iter().any(|norm| !norm.is_finite() || *norm <= 0.0) {
+            return None;
+        }
+        let scaled = Mat::from_fn(p, p, |i, j| match i >= j {
+            true => products[(i, j)] / (scale[i] * scale[j]),
+            false => 0.0,
+        });
+        let factor = scaled.llt(Side::Lower).ok()?;
+        let lower = factor.L();
+        if (0..p).any(|j| lower[(j, j)].is_nan() || lower[(j, j)] < LEAST_PIVOT) {
+            return None;
+        }
+        let mut right: Vec<f64> = (0..p).map(|j| products[(p, j)] / scale[j]).collect();
+        let out = MatMut::from_column_major_slice_mut(&mut right, p, 1);
+        solve_lower_triangular_in_place(lower, out, Par::Seq);
+        let left = (products[(p, p)] - dot(&right, &right)).max(0.0).sqrt();
+        let entry = |i: usize, j: usize| match (i, j) {
+            (i, j) if j < p => lower[(j, i)] * scale[j],
+            (i, _) if i < p => right[i],
+            _ => left,
+        };
+        Some(Self {
+            r: Triangle::from_fn(p + 1, entry),
+        })
+    }
+
     /// The factor of rows `[J | r]` (m x (p + 1)).
     pub fn of(rows: &Mat<f64>) -> Self {
         let mut tall = StackedRows::new(rows.ncols(), rows.nrows());
@@ -96,7 +201,7 @@ impl TriangularFactor {
             column.copy_from_slice(rows.col_as_slice(j));
         }
         tall.absorb(rows.nrows());
-        tall.factor()
+        tall.sum()
     }
 
     /// The factor of rows made of some of this one's columns above each other's.
@@ -110,7 +215,7 @@ impl TriangularFactor {
             to[height..height + below.len()].copy_from_slice(below);
         }
         tall.absorb(2 * height);
-        tall.factor()
+        tall.sum()
     }
 
     /// The factor of both sets of rows together.

@@ -215,7 +215,7 @@ pub fn fit(
         stop: Stop::NothingFree,
     };
     search.settle(&mut problem, &mut model, candidates, FIRST);
-    search.settle_from_afar(&mut problem, &mut model, candidates);
+    search.settle_from_afar(&mut problem, &mut model, &start.x, candidates);
     for _ in 0..WIDENINGS {
         if !widened(&problem, &mut model, candidates) {
             break;
@@ -337,7 +337,7 @@ fn stated(
         let places: Vec<usize> = free.iter().filter_map(|k| place[*k]).collect();
         all.factor.select(&places)
     };
-    let (factor, _) = model.with_priors(&free, only(&free));
+    let factor = model.with_priors(&free, only(&free));
     let pinned = model.pinned(&free, &factor);
     bounded(model, &free, &pinned, &factor, &mut statuses);
     let free: Vec<usize> = free
@@ -357,7 +357,7 @@ fn stated(
     let weight = if scale > 0.0 { 1.0 / scale } else { 1.0 };
     let poses = Poses::of(problem.data, problem.rows);
     let clusters = clusters(&poses, problem.rows.len(), singular.len());
-    let inverse = |data| model.with_priors(&free, data).0.inverse();
+    let inverse = |data| model.with_priors(&free, data).inverse();
     let root = match clusters {
         Some(poses) => {
             inverse(data.clone()).map(|inverse| clustered(problem, model, &free, &inverse, poses))
@@ -411,10 +411,17 @@ struct Minimisation {
 
 impl Minimisation {
     /// What stays unmodelled may be a number that is far beyond its tolerance, which a noise as large hides: where the rows are fitted far better
-    /// without regard to tolerances, it goes on from there.
-    fn settle_from_afar(&mut self, problem: &mut Problem, model: &mut Model, candidates: &[usize]) {
+    /// without regard to tolerances, it goes on from there. A fit that `began` there has been asked before.
+    fn settle_from_afar(
+        &mut self,
+        problem: &mut Problem,
+        model: &mut Model,
+        began: &[f64],
+        candidates: &[usize],
+    ) {
         let near = problem.excess;
-        let pulled = |k: &usize| model.x[*k].abs() > PULLED * model.tolerances[*k];
+        let is_off = |x: &[f64], k: usize| x[k].abs() > PULLED * model.tolerances[k];
+        let pulled = |k: &usize| is_off(&model.x, *k) && !is_off(began, *k);
         if near == ExcessSigma::default() || !candidates.iter().any(pulled) {
             return;
         }

@@ -298,7 +298,7 @@ impl<'a> NearbyFits<'a> {
         let pull: Vec<f64> = (0..columns.len())
             .map(|j| parts.iter().map(|part| part.pull[j]).sum())
             .collect();
-        let whole = model.with_priors(columns, all).0.pulled(&pull);
+        let whole = model.with_priors(columns, all).pulled(&pull);
         Some(Self {
             data,
             model,

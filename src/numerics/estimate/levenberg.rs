@@ -210,41 +210,51 @@ impl Model {
         self.known.get(&parameter).copied().unwrap_or_default()
     }
 
-    /// The factor with a row for the prior of each of the `free` parameters and for every known length, and what these add to the cost.
-    pub(crate) fn with_priors(
-        &self,
-        free: &[usize],
-        factor: TriangularFactor,
-    ) -> (TriangularFactor, f64) {
-        let prior = |k: &usize| {
+    /// What is known of the `free` parameters beforehand as rows of a least-squares problem, each by its entries that are not zero and its
+    /// error: the prior of each, and every known length.
+    fn prior_rows(&self, free: &[usize]) -> impl Iterator<Item = (Vec<(usize, f64)>, f64)> {
+        let prior = |(j, k): (usize, &usize)| {
             let prior = self.prior(*k);
-            (prior.sigma, (prior.mean - self.x[*k]) / prior.sigma)
+            let error = (prior.mean - self.x[*k]) / prior.sigma;
+            (vec![(j, 1.0 / prior.sigma)], error)
         };
-        let priors: Vec<(f64, f64)> = free.iter().map(prior).collect();
-        let lengths: Vec<LengthTerm> = self.length_terms().collect();
-        if priors.is_empty() && lengths.is_empty() {
-            return (factor, 0.0);
-        }
-        let mut rows = Mat::zeros(priors.len() + lengths.len(), free.len() + 1);
-        for (i, term) in lengths.iter().enumerate() {
-            for (parameter, rate) in &term.rates {
-                free.iter()
-                    .position(|k| k == parameter)
-                    .into_iter()
-                    .for_each(|j| rows[(priors.len() + i, j)] += rate);
+        let length = |term: LengthTerm| {
+            let place = |parameter: usize| free.iter().position(|k| *k == parameter);
+            let rates = term.rates.iter();
+            let entries = rates.filter_map(|(parameter, rate)| Some((place(*parameter)?, *rate)));
+            (entries.collect(), term.error)
+        };
+        let priors: Vec<_> = free.iter().enumerate().map(prior).collect();
+        let lengths: Vec<_> = self.length_terms().map(length).collect();
+        priors.into_iter().chain(lengths)
+    }
+
+    /// Adds what is known of the `free` parameters beforehand to sums of products (the lower triangle); what it adds to the cost.
+    pub(crate) fn add_priors(&self, free: &[usize], products: &mut Mat<f64>) -> f64 {
+        let mut cost = 0.0;
+        for (mut entries, error) in self.prior_rows(free) {
+            cost += 0.5 * error * error;
+            entries.push((free.len(), error));
+            for (i, a) in &entries {
+                let to_the_left = entries.iter().filter(|(j, _)| j <= i);
+                to_the_left.for_each(|(j, b)| products[(*i, *j)] += a * b);
             }
-            rows[(priors.len() + i, free.len())] = term.error;
         }
-        for (i, (sigma, off)) in priors.iter().enumerate() {
-            rows[(i, i)] = 1.0 / sigma;
-            rows[(i, free.len())] = *off;
+        cost
+    }
+
+    /// The factor with a row for everything that is known of the `free` parameters beforehand.
+    pub(crate) fn with_priors(&self, free: &[usize], factor: TriangularFactor) -> TriangularFactor {
+        let known: Vec<_> = self.prior_rows(free).collect();
+        if known.is_empty() {
+            return factor;
         }
-        let squares = priors
-            .iter()
-            .map(|(_, off)| off * off)
-            .chain(lengths.iter().map(|term| term.error * term.error));
-        let cost = squares.map(|square| 0.5 * square).sum();
-        (factor.stack(&TriangularFactor::of(&rows)), cost)
+        let mut rows = Mat::zeros(known.len(), free.len() + 1);
+        for (i, (entries, error)) in known.iter().enumerate() {
+            entries.iter().for_each(|(j, value)| rows[(i, *j)] += value);
+            rows[(i, free.len())] = *error;
+        }
+        factor.stack(&TriangularFactor::of(&rows))
     }
 
     /// The step of [`TriangularFactor::solve`] that stays within the bounds of the `free` parameters. `None` if singular.

@@ -290,7 +290,10 @@ fn is_kept(cell: &CauseCell, view: &RoundView, survey: &Survey) -> bool {
     let groups = cell.groups(survey, &values, false);
     let mut forms = groups.iter().flat_map(|group| &group.forms);
     let stands = |form: &Form| {
-        let mut joints = form.variables().into_iter().filter_map(Variable::by_motion_of);
+        let mut joints = form
+            .variables()
+            .into_iter()
+            .filter_map(Variable::by_motion_of);
         joints.any(|joint| survey.stands(joint))
     };
     // A joint that stands says nothing by its motion: what is left of that is the noise of its encoder.

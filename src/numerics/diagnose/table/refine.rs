@@ -5,7 +5,7 @@ use super::cell::{FreeShape, Over, ShapeGroup, Shapes, fields};
 use super::component::CellColumns;
 use super::scan::{CellEvidence, CellScan, Refined};
 use super::state::KnownState;
-use crate::criteria::cells::{BENDS, CLOSELY, LEVELS, SEPARATED, STICKS};
+use crate::criteria::cells::{BENDS, CLOSELY, FAR_BELOW, LEVELS, SEPARATED, STICKS};
 use crate::effect::{Basis, Form, Term, Variable};
 use rayon::prelude::*;
 
@@ -28,17 +28,33 @@ impl CauseTable<'_, '_> {
         let open = best.is_some_and(|best| !self.cells[best].is_named());
         let is_near =
             |log_odds: f64| open && log_odds > most - (0.2 * most).max(10.0) && log_odds > -5.0;
-        let asked = |cell: &usize| {
-            Some(*cell) == best
-                || self.declared.contains(cell)
-                || is_near(scan.log_odds[*cell])
-                || self.is_over_numbers(*cell)
+        // Of those without a name a few: they are many where a cause is strong.
+        let mut nameless: Vec<usize> = scan.closely.keys().copied().collect();
+        nameless.retain(|cell| !self.cells[*cell].is_named() && is_near(scan.log_odds[*cell]));
+        nameless.sort_by(|a, b| {
+            scan.log_odds[*b]
+                .total_cmp(&scan.log_odds[*a])
+                .then(a.cmp(b))
+        });
+        nameless.truncate(*SEPARATED);
+        let asked = |cell: usize| {
+            Some(cell) == best
+                || self.declared.contains(&cell)
+                || nameless.contains(&cell)
+                || self.cells[cell].is_named() && is_near(scan.log_odds[cell])
         };
-        let listed: Vec<usize> = scan.closely.keys().copied().filter(asked).collect();
         let closer = |cell: usize| {
-            let refined = self.refined(cell, &scan.closely[&cell], state)?;
+            let least = if asked(cell) {
+                f64::NEG_INFINITY
+            } else if self.is_over_numbers(cell) {
+                most - *FAR_BELOW - prior(cell)
+            } else {
+                return None;
+            };
+            let refined = self.refined(cell, &scan.closely[&cell], state, least)?;
             Some((cell, refined))
         };
+        let listed: Vec<usize> = scan.closely.keys().copied().collect();
         let refined: Vec<(usize, Refined)> = listed.into_par_iter().filter_map(closer).collect();
         for (cell, closer) in refined {
             let Some(found) = scan.closely.get_mut(&cell) else {
@@ -86,11 +102,13 @@ impl CauseTable<'_, '_> {
     }
 
     /// The shape of a cell with its numbers where the evidence is largest, with ln of that and its amplitude; none where it has no numbers.
+    /// Where not even those of a component bring ln of its evidence to the `least`, no others are tried.
     pub(crate) fn refined(
         &self,
         cell: usize,
         found: &CellEvidence,
         state: &KnownState,
+        least: f64,
     ) -> Option<Refined> {
         let best = self.as_found(cell, found);
         // All of these are of one motion: what its directions have in common with the state is computed once.
@@ -122,22 +140,31 @@ impl CauseTable<'_, '_> {
                     let groups = self.groups(free, true);
                     forms_of(groups.get(found.shape.0)?, found.shape.1)
                 };
-                let near = |free: &FreeShape, level| {
-                    let is_other = |variable: &&Variable| {
-                        free.variable.is_alike(**variable) && **variable != free.variable
-                    };
-                    let known = self.numbers.iter().filter(|_| level == 0).filter(is_other);
-                    let known = known.map(|variable| FreeShape {
-                        variable: *variable,
-                        ..*free
-                    });
-                    let near = free.near(level).into_iter().chain(known);
-                    near.filter(|free| self.slips(free))
-                        .filter_map(|free| Some((free, forms_of(&free)?)))
+                let with_forms = |some: Vec<FreeShape>| {
+                    let some = some.into_iter().filter(|free| self.slips(free));
+                    some.filter_map(|free| Some((free, forms_of(&free)?)))
                         .filter(|(_, forms)| !state.has_any(forms))
                         .collect::<Vec<_>>()
                 };
-                let (free, evidence) = climb(*free, start, &near, &value, &|_, _| 0.0)?;
+                // The numbers of components first.
+                let (mut first, mut start, mut moved) = (*free, start, false);
+                let known = self.numbers.iter().filter(|variable| {
+                    free.variable.is_alike(**variable) && **variable != free.variable
+                });
+                let known = known.map(|variable| FreeShape {
+                    variable: *variable,
+                    ..*free
+                });
+                for (other, forms) in with_forms(known.collect()) {
+                    if let Some(evidence) = value(&forms).filter(|other| other.0 > start.0) {
+                        (first, start, moved) = (other, evidence, true);
+                    }
+                }
+                let near = |free: &FreeShape, level| with_forms(free.near(level));
+                let climbed = (start.0 >= least)
+                    .then(|| climb(first, start, &near, &value, &|_, _| 0.0))
+                    .flatten();
+                let (free, evidence) = climbed.or(moved.then_some((first, start)))?;
                 Some(found_as(forms_of(&free)?, evidence))
             }
             (Shapes::Listed(_), [form]) if !form.cause().is_nameless() => {

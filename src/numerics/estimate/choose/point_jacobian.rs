@@ -1,6 +1,6 @@
 //! What poses would tell: the seen parameters, rows of their whitened Jacobian, and what would follow for the estimate.
 
-use crate::estimate::factor::{StackedRows, TriangularFactor};
+use crate::estimate::factor::{RowSums, StackedRows, TriangularFactor};
 use crate::estimate::model::Model;
 use crate::estimate::observe::{Visibility, visibility};
 use crate::estimate::problem::{Problem, columns};
@@ -239,7 +239,7 @@ pub(super) fn factor(rows: &Mat<f64>) -> TriangularFactor {
         }
         tall.absorb(height);
     }
-    tall.factor()
+    tall.sum()
 }
 
 /// The product of two matrices.

@@ -160,11 +160,13 @@ pub fn fit_screened(
             break;
         }
         kept = next;
-        // From the very start: which of two redundant parameters is kept must not depend on rows that are gone.
-        (model, fitted) = fit(start, data, &kept, candidates);
+        // From where it is, but under the tolerances of the start: rows that are gone may have widened them.
+        model.tolerances.clone_from(&start.tolerances);
+        (model, fitted) = fit(&model, data, &kept, candidates);
     }
     if kept.len() < asked.len() {
-        (model, fitted) = fit(start, data, asked, candidates);
+        model.tolerances.clone_from(&start.tolerances);
+        (model, fitted) = fit(&model, data, asked, candidates);
     }
     let screening = Screening {
         kept: asked.to_vec(),
