@@ -80,7 +80,7 @@ const REPORTS: [Report; 15] = [
         folder: "path_neighbours",
         commands: RUN,
         code: 0,
-        says: &["after        0.02", "122 held-out points"],
+        says: &["after       0.02", "122 held-out points"],
         says_not: &["found "],
     },
     Report {
