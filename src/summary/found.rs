@@ -141,11 +141,18 @@ impl ShortFinding {
         if nearest.is_some() {
             what += ", roughly";
         }
+        let either = either(found).map(|(rival, own, share)| match share > own {
+            true => format!(
+                ", or {} ({share:.2} / {own:.2})",
+                std::mem::replace(&mut what, rival)
+            ),
+            false => format!(", or {rival} ({own:.2} / {share:.2})"),
+        });
         Self {
             size,
             what,
             number,
-            either: either(found),
+            either,
             instead: instead(found, nearest),
         }
     }
@@ -182,8 +189,8 @@ fn changed_at(forms: &Value) -> Option<f64> {
     }
 }
 
-/// The likeliest rival of a finding that is not clear.
-fn either(found: &Found) -> Option<String> {
+/// The likeliest rival of a finding that is not clear, in words, with the probabilities of the finding's name and of that.
+fn either(found: &Found) -> Option<(String, f64, f64)> {
     let compared = found.delta_bic.is_some();
     let own = found.probability.filter(|own| compared && *own < CLEAR)?;
     let rivals = found.rivals.iter();
@@ -191,8 +198,7 @@ fn either(found: &Found) -> Option<String> {
         .filter_map(|rival| Some((rival.probability?, rival)))
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .filter(|(share, _)| *share >= NOTABLE)?;
-    let words = words(&rival.effect, &rival.place);
-    Some(format!(", or {words} ({own:.2} / {share:.2})"))
+    Some((words(&rival.effect, &rival.place), own, share))
 }
 
 /// What else it might be, where its name is not certain.
