@@ -1,12 +1,15 @@
 //! Least squares on position data: rank as the theory says, truth recovered, uncertainty honest.
 
 use crate::fixture::{self, all_rows, fit_all, largest, misses, rms};
+use crate::recorded::{Example, mean_mm_of};
 use calib::description::RobotDescription;
 use calib::effect::{EffectContext, EffectStack, Load, arm_effect};
 use calib::estimate::{Determined, Fitted, Model, ParameterStatus, Stop, align};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
+use calib::table::Parameters;
 use nalgebra::Vector3;
+use serde_json::json;
 
 pub const SIGMA: f64 = 1e-5;
 pub const GEOMETRY: [&str; 4] = ["base_frame", "tool_offset", "joint_offset", "link_geometry"];
@@ -292,4 +295,14 @@ fn a_point_meant_to_lie_on_the_last_axis_is_predicted_as_well_as_any() {
             description.name
         );
     }
+}
+
+#[test]
+fn a_step_without_effects_says_how_far_the_nominal_robot_is_off() {
+    let blocks = json!([{"usage": "fit", "points": 20}, {"usage": "validate", "points": 6}]);
+    let (recorded, _) =
+        Example::new("sr210d", &[("remainder", "none")]).simulated(json!({"blocks": blocks}));
+    let nominal = recorded.identify(json!({"effects": []}));
+    assert!(nominal.get::<Parameters>().0.is_empty());
+    assert!(mean_mm_of(&nominal.get(), "validate") > 0.1);
 }

@@ -119,7 +119,7 @@ class Bench:
             before, after = data.decode("latin-1"), (self.folder / "out").read_bytes().decode("latin-1")
             return programs.judge(pairs(before, after), self.cell.nominal, self.cell.real, [bases.START], False)
 
-        return f"m.{ending}", data, [*MODEL, f"m.{ending}", "--out", "out"], judge
+        return f"m.{ending}", data, [*MODEL, f"m.{ending}", "--assume-frames", "--out", "out"], judge
 
     def krl(self, r):
         ending, base = r.choice((("src", bases.KRL), ("dat", bases.KRL_DATA)))

@@ -300,7 +300,8 @@ pub fn beyond_tolerance(model: &Model, parameter: usize) -> Option<f64> {
 /// prior that was stated.
 pub fn determined_directions(model: &Model, fitted: &Fitted, parameters: &[usize]) -> usize {
     let covariance = fitted.covariance.as_ref();
-    let Some(covariance) = covariance.and_then(|all| all.block(parameters)) else {
+    let block = covariance.and_then(|all| all.block(parameters));
+    let Some(covariance) = block.filter(|block| !block.is_empty()) else {
         return 0;
     };
     let scale = |i: usize| model.tolerances[parameters[i]];
