@@ -175,6 +175,12 @@ const ROUGH: Effort = Effort {
 };
 /// Effort of the first round, which only finds out how large the residual is and what it lets one see.
 const FIRST: Effort = Effort { limit: 4, ..ROUGH };
+/// Effort of the first round of a search, of those after it, and of the last.
+type Efforts = [Effort; 3];
+const FROM_THE_START: Efforts = [FIRST, ROUGH, FINE];
+const FROM_NEAR: Efforts = [ROUGH, ROUGH, FINE];
+/// Whether much less is left is seen after a few steps; along what no tolerance holds it would go on for ever.
+const LOOK: Efforts = [FIRST; 3];
 /// Parameters of one kind that are farther off than this many of their tolerances, root mean square, are those of an arm that is made worse.
 const WORSE: f64 = 2.0;
 /// Only where a number is farther off than its tolerance may one be far beyond; ...
@@ -214,13 +220,13 @@ pub fn fit(
         course: Vec::new(),
         stop: Stop::NothingFree,
     };
-    search.settle(&mut problem, &mut model, candidates, FIRST);
+    search.settle(&mut problem, &mut model, candidates, FROM_THE_START);
     search.settle_from_afar(&mut problem, &mut model, &start.x, candidates);
     for _ in 0..WIDENINGS {
         if !widened(&problem, &mut model, candidates) {
             break;
         }
-        search.settle(&mut problem, &mut model, candidates, ROUGH);
+        search.settle(&mut problem, &mut model, candidates, FROM_NEAR);
     }
     stand_where_found(&mut model, candidates);
     let all = problem.observe(&model, candidates);
@@ -428,30 +434,30 @@ impl Minimisation {
         }
         let (x, tolerances) = (model.x.clone(), model.tolerances.clone());
         candidates.iter().for_each(|k| model.tolerances[*k] *= AFAR);
-        self.settle(problem, model, candidates, ROUGH);
+        self.settle(problem, model, candidates, LOOK);
         model.tolerances = tolerances;
         let far = problem.excess;
         if far.length < AFAR_WORTH * near.length || far.angle < AFAR_WORTH * near.angle {
-            self.settle(problem, model, candidates, ROUGH);
+            self.settle(problem, model, candidates, FROM_NEAR);
         } else {
             model.x = x;
             problem.excess = near;
         }
     }
 
-    /// Rounds of fitting the candidates and learning how much stays unmodelled; the first with little effort.
+    /// Rounds of fitting the candidates and learning how much stays unmodelled.
     fn settle(
         &mut self,
         problem: &mut Problem,
         model: &mut Model,
         candidates: &[usize],
-        first: Effort,
+        [first, then, last]: Efforts,
     ) {
         for round in 0..ROUNDS {
             let effort = match round {
                 0 => first,
-                round if round + 1 < ROUNDS => ROUGH,
-                _ => FINE,
+                round if round + 1 < ROUNDS => then,
+                _ => last,
             };
             let start = problem.evaluate(model, candidates);
             let (steps, mut stop, mut end) = minimise(problem, model, candidates, start, effort);
@@ -467,9 +473,9 @@ impl Minimisation {
             let same = |one: f64, other: f64| (one - other).abs() <= 0.02 * one.max(other);
             let settled =
                 same(next.length, problem.excess.length) && same(next.angle, problem.excess.angle);
-            if settled && effort.tolerance > FINE.tolerance {
+            if settled && effort.tolerance > last.tolerance {
                 let steps;
-                (steps, stop, end) = minimise(problem, model, candidates, end, FINE);
+                (steps, stop, end) = minimise(problem, model, candidates, end, last);
                 self.course.extend(steps.into_iter().skip(1));
                 next = excess_sigma(problem, &end, used(&end, model));
             }
