@@ -4,7 +4,7 @@ use crate::description::JointDescription;
 use crate::dynamics::{DynamicArm, ExciteRequest, ExcitingMotion, excite};
 use crate::error::{Error, Fault, Result};
 use crate::identified::robot_file;
-use crate::stage::{dynamic_arm, must_be_bodies};
+use crate::stage::{dynamic_arm, must_be_bodies, must_turn};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -55,6 +55,7 @@ pub struct MotionProposal {
 pub fn exciting_motion(asked: &MotionRequest) -> Result<MotionProposal> {
     let robot = robot_file(&asked.robot, asked.urdf.as_deref())?;
     must_be_bodies(&robot)?;
+    must_turn(&robot, "exciting motions")?;
     let (arm, _) = dynamic_arm(&robot)?;
     let n = robot.joints.len();
     let mut faults = Vec::new();

@@ -5,6 +5,7 @@ use crate::dynamics::{JudgedRow, TorqueGate};
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::{IdentifiedModel, IdentifiedTorques};
 use crate::raw;
+use crate::stage::must_turn;
 use crate::targets::Trajectory;
 use std::io::Read;
 use std::path::Path;
@@ -33,6 +34,7 @@ pub(super) fn feed_forward(asked: &FeedForward, identified: &IdentifiedModel) ->
         let message = "the model has no torques: put `- uses: diagnose_torques` after `ingest_torques`, or name such a stage with --step";
         return Err(Error::spec("--torque", message));
     };
+    must_turn(&identified.robot, "feed-forward torques")?;
     let (place, text) = read(asked.motion)?;
     let mut trajectory = Trajectory::read(&place, &text, &identified.robot, asked.force)?;
     let motion = &mut trajectory.motion;

@@ -171,6 +171,7 @@ mod tests {
         misfit: 0.0,
         usual: 0.0,
         sign_width: 0.01,
+        slides: false,
     };
 
     fn held(effect: &str, shape: &[f64], value: f64) -> Option<(f64, String)> {

@@ -5,7 +5,7 @@
 use super::friction::{ARMATURE, DAMPING, FRICTION, of_line, stands_alone};
 use super::{CarriedGeometry, CarriedTorques, Export, Format};
 use crate::description::JointKind;
-use crate::dynamics::{FittedNumber, INERTIAL_NAMES, INERTIAL_NUMBERS, TorqueTerm};
+use crate::dynamics::{FittedNumber, INERTIAL_NAMES, INERTIAL_NUMBERS, TorqueTerm, unit_at};
 use crate::effect::Place;
 use crate::error::{Error, Result};
 use crate::identified::IdentifiedTorques;
@@ -106,11 +106,15 @@ fn dynamics(export: &Export, torques: &IdentifiedTorques) -> Result<Value> {
             let mut numbers = rows(effect).filter(|row| row.place == place && row.form.is_some() && alone(effect));
             numbers.next().map_or(Value::Null, number)
         };
+        let seen = &model.range[index];
+        let [angle, rate, newton, drive] = match seen.slides {
+            true => ["m", "m_s", "n", "force_n"],
+            false => ["rad", "rad_s", "nm", "torque_nm"],
+        };
         let curve = curves
             .iter()
             .find(|curve| curve.joint == index)
-            .map(|curve| json!({ "speed_rad_s": curve.velocity, "torque_nm": curve.torque, "sigma_nm": curve.sigma }));
-        let seen = &model.range[index];
+            .map(|curve| json!({ format!("speed_{rate}"): curve.velocity, drive: curve.torque, format!("sigma_{newton}"): curve.sigma }));
         let (mut viscous, mut coulomb) = (of_effect(DAMPING), of_effect(FRICTION));
         let model_term = |effect: &str| model.terms.iter().find(|term| term.effect == effect && term.place == Place::Joint(index));
         for (effect, unit, number) in [(DAMPING, "Nm s/rad", &mut viscous), (FRICTION, "Nm", &mut coulomb)] {
@@ -118,7 +122,7 @@ fn dynamics(export: &Export, torques: &IdentifiedTorques) -> Result<Value> {
             if let (Some(raw), Some(FittedNumber { value, sigma })) = (number.as_object_mut(), line) {
                 raw.extend(Map::from_iter([
                     ("value".into(), json!(value)),
-                    ("unit".into(), json!(unit)),
+                    ("unit".into(), json!(unit_at(seen.slides, unit))),
                     ("sigma".into(), json!(sigma)),
                 ]));
             }
@@ -126,14 +130,18 @@ fn dynamics(export: &Export, torques: &IdentifiedTorques) -> Result<Value> {
         let power = rows(DAMPING).find(|row| row.place == place && row.form.is_some());
         let exponent = model_term(DAMPING).and_then(|term| term.shape.first()).filter(|exponent| **exponent != 1.0);
         if let (Some(friction), Some(power), Some(exponent)) = (viscous.as_object_mut(), power, exponent) {
-            let law = json!({ "value": power.value, "unit": "Nm (s/rad)^exponent", "sigma": power.sigma, "exponent": exponent });
+            let unit = match seen.slides {
+                true => "N (s/m)^exponent",
+                false => "Nm (s/rad)^exponent",
+            };
+            let law = json!({ "value": power.value, "unit": unit, "sigma": power.sigma, "exponent": exponent });
             friction.insert("law".into(), law);
         }
         json!({
             "name": joint.name, "viscous": viscous, "coulomb": coulomb, "friction": curve,
             "armature": of_effect(ARMATURE), "reduction_ratio": joint.reduction_ratio, "motor_constant_nm_a": joint.motor_constant,
-            "sign_width_rad_s": seen.sign_width,
-            "seen": { "position_rad": seen.position, "speed_rad_s": seen.speed, "acceleration_rad_s2": seen.acceleration },
+            format!("sign_width_{rate}"): seen.sign_width,
+            "seen": { format!("position_{angle}"): seen.position, format!("speed_{rate}"): seen.speed, format!("acceleration_{rate}2"): seen.acceleration },
         })
     });
     Ok(json!({

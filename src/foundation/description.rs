@@ -25,7 +25,7 @@ pub struct JointDescription {
     pub point: [f64; 3],
     /// Travel, rad or m.
     pub limits: Option<[f64; 2]>,
-    /// Motor turns per turn of the joint.
+    /// Motor turns per turn of the joint; of one that slides, rad of the motor per m.
     pub reduction_ratio: Option<f64>,
     /// Torque at the motor per ampere, Nm/A.
     pub motor_constant: Option<f64>,
@@ -33,7 +33,7 @@ pub struct JointDescription {
     pub mass: Option<f64>,
     /// Centre of mass of its link, m, base frame at the zero pose.
     pub centre: Option<[f64; 3]>,
-    /// Friction that turns with the direction of motion, Nm at the joint, where torques of the arm have shown it.
+    /// Friction that turns with the direction of motion, Nm at the joint (N of one that slides), where torques of the arm have shown it.
     pub coulomb: Option<f64>,
 }
 

@@ -36,7 +36,7 @@ pub struct IdentifiedTorques {
 const OF_THE_RECORDING: [&str; 2] = ["current_latency", "contact"];
 
 impl IdentifiedTorques {
-    /// The model in a table, for a robot. Fails where the table is no model of torques or the arm has joints that slide.
+    /// The model in a table, for a robot. Fails where the table is no model of torques.
     pub(super) fn of(
         robot: &RobotDescription,
         parameters: TorqueParameters,

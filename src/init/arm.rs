@@ -161,13 +161,18 @@ impl ExaminedFile {
             return Vec::new();
         };
         let others = [TORQUES, CURRENTS, VELOCITIES];
+        let joint = self.get("q").map(|joints| joints.choices[0].columns[0]);
+        let own = joint.and_then(|column| Some(self.stated[column].joint()?.1));
         let part = |column: usize| {
             let (name, joints) = (&self.stated[column], NAMED_JOINTS[2]);
             let stem = name.stem();
             match joints.iter().position(|joint| stem.contains(joint)) {
                 Some(joint) => Some((stem.replace(joints[joint], "#"), joint)),
-                // One joint has no number.
-                None if count == 1 => Some(name.joint().unwrap_or((stem, 0))),
+                // One joint has no number, or that of its motor on a bus.
+                None if count == 1 => match name.joint() {
+                    Some((key, number)) if own == Some(number) => Some((key, 0)),
+                    numbered => Some(numbered.unwrap_or((stem, 0))),
+                },
                 None => name.joint(),
             }
         };

@@ -143,6 +143,21 @@ pub(super) fn joints(
         found.extend((0..names.len()).filter(alone).map(|column| vec![column]));
         found.truncate(1);
     }
+    // Or that of the motor on a bus, where no other is logged: `pos (5)`.
+    if found.is_empty() && count == 1 {
+        let is_joint = |key: &str| {
+            key.strip_suffix('#')
+                .is_some_and(|key| lists(ONE_JOINT, key))
+        };
+        let numbered = |column: &usize| {
+            names[*column]
+                .joint()
+                .is_some_and(|(key, _)| is_joint(&key))
+                && angle(*column)
+        };
+        let all: Vec<usize> = (0..names.len()).filter(numbered).collect();
+        found.extend((all.len() == 1).then_some(all));
+    }
     let longest = found.first().map_or(0, Vec::len);
     found.retain(|columns| columns.len() == longest);
     found
@@ -359,6 +374,9 @@ mod tests {
             joints(&names(&["dq1", "dq2", "q0", "q1"]), 6, |_| true),
             [[2, 3]]
         );
+        let bus = ["pos (5)", "target pos (5)", "current (5)", "pos (3)"];
+        assert_eq!(joints(&names(&bus[..3]), 1, |_| true), [[0]]);
+        assert!(joints(&names(&bus), 1, |_| true).is_empty());
         let robot = [
             "ur_shoulder_pan_joint",
             "ur_shoulder_lift_joint",

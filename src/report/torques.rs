@@ -5,6 +5,7 @@ use super::language::Locale;
 use super::number::render;
 use super::result;
 use super::svg::{Area, Scale, Svg, baseline, name_x, name_y};
+use crate::dynamics::unit_at;
 use crate::error::{Error, Result};
 use crate::table::{
     BodyConsistencies, Contacts, FrictionCurveRow, FrictionCurves, Inertials, JointTorques,
@@ -51,6 +52,7 @@ pub fn torque_page(
         "title": title.map_or_else(|| format!("Torques of {robot}"), str::to_owned),
         "robot": robot,
         "joints": tables.course.joints,
+        "slides": &tables.course.prismatic,
         "verdict": verdict,
         "findings": result::findings(&tables.findings.0, &tables.numbers.0, &tables.rivals.0),
         "errors": &tables.joints.0,
@@ -81,6 +83,7 @@ fn pictures(locale: &Locale, tables: &ReportTorquesReads, joint: usize) -> Value
             .collect::<Vec<f64>>()
     };
     let (before, after) = (less(&simulated), less(&corrected));
+    let slides = course.prismatic[joint];
     let name = format!("joint {}", joint + 1);
     let torque = [
         ("s1", simulated.as_slice()),
@@ -94,9 +97,9 @@ fn pictures(locale: &Locale, tables: &ReportTorquesReads, joint: usize) -> Value
         .filter(|row| row.joint == joint as i64 + 1)
         .collect();
     json!({
-        "torque": over_time(locale, course, &torque, &format!("torque of {name}: measured, simulated, corrected")),
-        "error": over_time(locale, course, &[("s1", &before), ("s-last", &after)], &format!("error of {name} before and after")),
-        "friction": (!curve.is_empty()).then(|| friction(locale, &curve, &format!("friction of {name}"))),
+        "torque": over_time(locale, course, &torque, slides, &format!("torque of {name}: measured, simulated, corrected")),
+        "error": over_time(locale, course, &[("s1", &before), ("s-last", &after)], slides, &format!("error of {name} before and after")),
+        "friction": (!curve.is_empty()).then(|| friction(locale, &curve, slides, &format!("friction of {name}"))),
         "name": name,
     })
 }
@@ -112,6 +115,7 @@ fn over_time(
     locale: &Locale,
     course: &TorqueCourse,
     lines: &[(&str, &[f64])],
+    slides: bool,
     title: &str,
 ) -> String {
     let area = Area::new([52.0, 26.0, WIDTH - 14.0, 200.0]);
@@ -162,7 +166,7 @@ fn over_time(
     }
     baseline(&mut svg, area);
     name_x(&mut svg, area, "time, s");
-    name_y(&mut svg, area, "Nm");
+    name_y(&mut svg, area, unit_at(slides, "Nm"));
     svg.finish(title)
 }
 
@@ -184,7 +188,7 @@ fn stretches(time: &[f64]) -> Vec<std::ops::Range<usize>> {
 }
 
 /// Friction over velocity with a band of two standard deviations.
-fn friction(locale: &Locale, curve: &[&FrictionCurveRow], title: &str) -> String {
+fn friction(locale: &Locale, curve: &[&FrictionCurveRow], slides: bool, title: &str) -> String {
     let area = Area::new([52.0, 26.0, 406.0, 200.0]);
     let ends = |sign: f64| {
         curve
@@ -219,7 +223,11 @@ fn friction(locale: &Locale, curve: &[&FrictionCurveRow], title: &str) -> String
         &curve.iter().map(|row| point(row, 0.0)).collect::<Vec<_>>(),
     );
     baseline(&mut svg, area);
-    name_x(&mut svg, area, "velocity, rad/s");
-    name_y(&mut svg, area, "friction, Nm");
+    let [x, y] = match slides {
+        true => ["velocity, m/s", "friction, N"],
+        false => ["velocity, rad/s", "friction, Nm"],
+    };
+    name_x(&mut svg, area, x);
+    name_y(&mut svg, area, y);
     svg.finish(title)
 }

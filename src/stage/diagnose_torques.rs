@@ -1,6 +1,6 @@
 //! `diagnose_torques`: which physics the rigid inverse dynamics of the robot file lacks while the arm moves.
 
-use crate::dynamics::{DynamicArm, TorqueQuestion, TorqueSource, diagnose};
+use crate::dynamics::{DynamicArm, TorqueQuestion, diagnose};
 use crate::error::{Error, Place, Result, counted};
 use crate::stage::dynamic_arm::{HeldOut, RecordedTorques, dynamic_arm, must_be_bodies};
 use crate::stage::{Chunks, Context, Stage};
@@ -77,7 +77,7 @@ pub enum ConsistencySetting {
 const LAST: f64 = 0.3;
 
 crate::stage::stage! {
-    DiagnoseTorques, "diagnose_torques", 18, "names the physics that the simulated torques of a moving arm lack",
+    DiagnoseTorques, "diagnose_torques", 19, "names the physics that the simulated torques of a moving arm lack",
         DiagnoseTorquesReads {
             robot: Robot,
             motion: Chunks<ArmMotion>,
@@ -138,7 +138,7 @@ impl Stage for DiagnoseTorques {
             numbers: TorqueNumbers::of(&diagnosis),
             rivals: TorqueRivals::of(&diagnosis),
             joints: JointTorques::of(&diagnosis),
-            course: TorqueCourse::of(&diagnosis, recording.joints(), &sequence),
+            course: TorqueCourse::of(&diagnosis, &arm.prismatic, &sequence),
             friction: FrictionCurves::of(&diagnosis),
             inertials: Inertials::of(&diagnosis),
             contacts: Contacts::of(&diagnosis),

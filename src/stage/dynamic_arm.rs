@@ -15,16 +15,24 @@ const ASSUMED: InertialTolerance = InertialTolerance {
     inertia_relative: 0.2,
 };
 
-/// The arm, and what a person should know of what the robot file leaves open. Fails with a joint that slides.
-pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<String>)> {
-    let slides = |joint: &JointDescription| joint.kind == JointKind::Prismatic;
-    if let Some(joint) = robot.joints.iter().position(slides) {
-        let message = format!(
-            "joint {} slides; torques are diagnosed of revolute joints alone",
-            joint + 1
-        );
-        return Err(Error::data("table robot", message));
+fn slides(joint: &JointDescription) -> bool {
+    joint.kind == JointKind::Prismatic
+}
+
+/// Fails with a joint that slides, where `what` is of joints that turn alone.
+pub(crate) fn must_turn(robot: &RobotDescription, what: &str) -> Result<()> {
+    match robot.joints.iter().position(slides) {
+        None => Ok(()),
+        Some(joint) => {
+            let joint = joint + 1;
+            let message = format!("joint {joint} slides; {what} are of revolute joints alone");
+            Err(Error::data("table robot", message))
+        }
     }
+}
+
+/// The arm, and what a person should know of what the robot file leaves open.
+pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<String>)> {
     let mut notes = Vec::new();
     let declared = |(index, joint): (usize, &JointDescription)| {
         let moments = robot.inertias.links.get(index).copied().flatten();
@@ -71,7 +79,7 @@ pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<S
     let arm = DynamicArm {
         axes: joints().map(|joint| Vector3::from(joint.axis)).collect(),
         points: joints().map(|joint| Point3::from(joint.point)).collect(),
-        prismatic: vec![false; robot.joints.len()],
+        prismatic: joints().map(slides).collect(),
         tool: Point3::from(robot.tool),
         links,
         payload,
@@ -114,7 +122,7 @@ fn inertial(mass: f64, centre: [f64; 3], [xx, xy, xz, yy, yz, zz]: &InertiaMomen
     }
 }
 
-/// Nm at the joint per ampere of its motor, joint by joint. Fails with the joints whose numbers are missing.
+/// Nm at the joint (N of one that slides) per ampere of its motor, joint by joint. Fails with the joints whose numbers are missing.
 pub(crate) fn torque_per_ampere(robot: &RobotDescription) -> Result<Vec<f64>> {
     let factor = |joint: &JointDescription| Some(joint.reduction_ratio? * joint.motor_constant?);
     let all: Vec<Option<f64>> = robot.joints.iter().map(factor).collect();

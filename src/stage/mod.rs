@@ -49,7 +49,7 @@ pub use diagnose_torques::{
     ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut,
     InertialSetting,
 };
-pub(crate) use dynamic_arm::{dynamic_arm, must_be_bodies, torque_per_ampere};
+pub(crate) use dynamic_arm::{dynamic_arm, must_be_bodies, must_turn, torque_per_ampere};
 pub use identify::{Identify, IdentifyReads};
 pub use identify::{Stiffness, StiffnessReads};
 pub use learn::{Learn, LearnReads, LearnWrites};

@@ -62,7 +62,18 @@ impl Found {
         let torque = self.effect_rms_nm.filter(|nm| *nm > 0.0);
         by_length
             .or(by_angle)
-            .or_else(|| torque.map(|nm| (nm, format!("{} Nm", figure(nm, 1)))))
+            .or_else(|| torque.map(|nm| (nm, format!("{} {}", figure(nm, 1), self.drive()))))
+    }
+}
+
+impl Found {
+    /// The unit of what a joint is driven by: N where the numbers say that it slides.
+    fn drive(&self) -> &'static str {
+        let slides = |number: &FoundNumber| ["N", "N s/m", "N/m"].contains(&number.unit.as_str());
+        match self.place.starts_with("joint") && self.numbers.iter().any(slides) {
+            true => "N",
+            false => "Nm",
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::store::frame::{Cell, Frame, FrameBuilder};
 use crate::table::Table;
 use crate::table::recording::{declared, interleaved, numbers, prismatic, push_numbers};
+use crate::units::Unit;
 use std::collections::BTreeMap;
 
 /// Rows in the order of time; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
@@ -104,10 +105,37 @@ impl Table for ArmMotion {
     }
 }
 
+/// Columns of a joint's course and their units, where it turns and where it slides: velocity, measured, simulated, corrected.
+const COURSES: [[(&str, Unit); 2]; 4] = [
+    [
+        ("dq{j}_rad_s", Unit::RadianPerSecond),
+        ("dq{j}_mm_s", Unit::MillimetrePerSecond),
+    ],
+    [
+        ("measured{j}_nm", Unit::NewtonMetre),
+        ("measured{j}_n", Unit::Newton),
+    ],
+    [
+        ("simulated{j}_nm", Unit::NewtonMetre),
+        ("simulated{j}_n", Unit::Newton),
+    ],
+    [
+        ("corrected{j}_nm", Unit::NewtonMetre),
+        ("corrected{j}_n", Unit::Newton),
+    ],
+];
+
+/// A column of a joint, from 0.
+fn at_joint(name: &str, joint: usize) -> String {
+    name.replace("{j}", &(joint + 1).to_string())
+}
+
 /// The judged rows; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TorqueCourse {
     pub(crate) joints: usize,
+    /// Which joints slide: m and N in the place of rad and Nm.
+    pub(crate) prismatic: Vec<bool>,
     pub(crate) sequence: Vec<i64>,
     /// s.
     pub(crate) time: Vec<f64>,
@@ -127,15 +155,16 @@ pub struct TorqueCourse {
 }
 
 impl TorqueCourse {
-    /// The courses of a diagnosis; `sequence` numbers its rows. Of rows of one number the first stands: the others were made up where rows of
-    /// the recording are missing.
-    pub fn of(diagnosis: &TorqueDiagnosis, joints: usize, sequence: &[i64]) -> Self {
-        let courses = &diagnosis.courses;
+    /// The courses of a diagnosis; `sequence` numbers its rows, `prismatic` says which joints slide. Of rows of one number the first stands: the
+    /// others were made up where rows of the recording are missing.
+    pub fn of(diagnosis: &TorqueDiagnosis, prismatic: &[bool], sequence: &[i64]) -> Self {
+        let (courses, joints) = (&diagnosis.courses, prismatic.len());
         let rows: Vec<usize> = (0..sequence.len())
             .filter(|row| *row == 0 || sequence[row - 1] != sequence[*row])
             .collect();
         Self {
             joints,
+            prismatic: prismatic.to_vec(),
             sequence: kept(sequence, 1, &rows),
             time: kept(&courses.time, 1, &rows),
             held_out: kept(&courses.held_out, 1, &rows),
@@ -173,15 +202,17 @@ impl Table for TorqueCourse {
                 Cell::to_array(self.of_joint(&self.rest, joint).collect()),
             );
         }
-        for (name, all) in [
-            ("dq{j}_rad_s", &self.velocity),
-            ("measured{j}_nm", &self.measured),
-            ("simulated{j}_nm", &self.simulated),
-            ("corrected{j}_nm", &self.corrected),
-        ] {
+        let all = [
+            &self.velocity,
+            &self.measured,
+            &self.simulated,
+            &self.corrected,
+        ];
+        for (names, all) in COURSES.iter().zip(all) {
             for joint in 0..self.joints {
-                let name = name.replace("{j}", &(joint + 1).to_string());
-                frame.push(name, Cell::to_array(self.of_joint(all, joint).collect()));
+                let (name, unit) = names[usize::from(self.prismatic[joint])];
+                let values = self.of_joint(all, joint).map(|value| unit.from_si(value));
+                frame.push(at_joint(name, joint), Cell::to_array(values.collect()));
             }
         }
         frame.finish()
@@ -191,7 +222,18 @@ impl Table for TorqueCourse {
         let joints = (1..)
             .take_while(|joint| frame.column(&format!("rest{joint}")).is_some())
             .count();
-        let all = |name: &str| of_joints::<f64>(frame, name, joints);
+        let slides = |joint: usize| frame.column(&at_joint(COURSES[0][1].0, joint)).is_some();
+        let prismatic: Vec<bool> = (0..joints).map(slides).collect();
+        let all = |course: usize| -> Result<Vec<f64>> {
+            let read = |joint: usize| -> Result<Vec<f64>> {
+                let (name, unit) = COURSES[course][usize::from(prismatic[joint])];
+                let values = frame.read::<f64>(&at_joint(name, joint))?.into_iter();
+                Ok(values.map(|value| unit.to_si(value)).collect())
+            };
+            Ok(interleaved(
+                &(0..joints).map(read).collect::<Result<Vec<_>>>()?,
+            ))
+        };
         Ok(Self {
             joints,
             sequence: frame.read("sequence")?,
@@ -199,10 +241,11 @@ impl Table for TorqueCourse {
             held_out: frame.read("held_out")?,
             in_event: frame.read("in_event")?,
             rest: of_joints(frame, "rest{j}", joints)?,
-            velocity: all("dq{j}_rad_s")?,
-            measured: all("measured{j}_nm")?,
-            simulated: all("simulated{j}_nm")?,
-            corrected: all("corrected{j}_nm")?,
+            velocity: all(0)?,
+            measured: all(1)?,
+            simulated: all(2)?,
+            corrected: all(3)?,
+            prismatic,
         })
     }
 }
@@ -217,8 +260,8 @@ fn kept<T: Copy>(values: &[T], width: usize, rows: &[usize]) -> Vec<T> {
 
 /// The columns of all joints, row-major.
 fn of_joints<C: Cell + Copy>(frame: &Frame, name: &str, joints: usize) -> Result<Vec<C>> {
-    let read = |joint: usize| frame.read::<C>(&name.replace("{j}", &joint.to_string()));
+    let read = |joint: usize| frame.read::<C>(&at_joint(name, joint));
     Ok(interleaved(
-        &(1..=joints).map(read).collect::<Result<Vec<_>>>()?,
+        &(0..joints).map(read).collect::<Result<Vec<_>>>()?,
     ))
 }

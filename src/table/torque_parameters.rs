@@ -2,7 +2,7 @@
 
 use super::{TorqueCovariance, TorqueCovarianceRow, TorqueParameterRow, TorqueParameters};
 use crate::dynamics::{
-    COULOMB, INERTIAL_NAMES, INERTIAL_NUMBERS, JointRange, TorqueModel, TorqueTerm,
+    COULOMB, INERTIAL_NAMES, INERTIAL_NUMBERS, JointRange, TorqueModel, TorqueTerm, unit_at,
 };
 use crate::effect::Place;
 use crate::error::{Error, Result};
@@ -31,6 +31,8 @@ const RANGE: [(&str, &str); 8] = [
     ("u95_usual", "Nm"),
     ("sign_width", "rad/s"),
 ];
+/// Unit of the position of a joint that slides.
+const SLIDES: &str = "m";
 /// Numbers of the recording as a whole: width of a sign, latency, cut-off, by how much friction turns before the velocity.
 const WHOLE: [(&str, &str); 4] = [
     ("sign_width", "rad/s"),
@@ -215,6 +217,7 @@ impl TorqueParameters {
 
     fn range(&self, joint: usize) -> Result<JointRange> {
         let of_quantity = |quantity: &str| self.value(&format!("{SEEN}.j{joint}.{quantity}"));
+        let position_name = format!("{SEEN}.j{joint}.{}", RANGE[0].0);
         let [least, greatest, speed, acceleration] =
             [RANGE[0].0, RANGE[1].0, RANGE[2].0, RANGE[3].0].map(of_quantity);
         // Tables of before these were written say nothing of them.
@@ -235,6 +238,10 @@ impl TorqueParameters {
             misfit,
             usual,
             sign_width,
+            slides: self
+                .0
+                .iter()
+                .any(|row| row.name == position_name && row.unit == SLIDES),
         })
     }
 
@@ -273,11 +280,11 @@ fn seen(model: &TorqueModel) -> Vec<TorqueParameterRow> {
         )
     });
     let ranges = model.range.iter().enumerate().flat_map(|(joint, range)| {
-        let of_named = move |(named, value): (&(&'static str, &'static str), f64)| {
+        let of_named = move |(&(name, unit), value): (&(&'static str, &'static str), f64)| {
             row(
-                format!("{SEEN}.j{}.{}", joint + 1, named.0),
+                format!("{SEEN}.j{}.{name}", joint + 1),
                 Place::Joint(joint),
-                *named,
+                (name, unit_at(range.slides, unit)),
                 value,
             )
         };

@@ -11,6 +11,8 @@ mod nulls;
 mod recordings;
 mod results;
 mod rigid;
+mod servo;
+mod sliding;
 
 use crate::answer::{Answer, calib, put, read, root};
 use crate::bags::ARM;

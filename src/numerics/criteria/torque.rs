@@ -50,6 +50,11 @@ criteria! {
     PUSH_AVERAGED: f64 = 0.8, "s", "physics: arms are pushed for about a second", "";
     /// Pushes of a recording, at most.
     PUSHES: usize = 4, "pushes", "judgement: bounds time", "";
+    /// Power of the torque that the positions of declared masses ask for over that of the recorded one, at a frequency, from which on the positions
+    /// are counts of an encoder.
+    BEYOND: f64 = 2.0, "ratio", "judgement: declared inertias are not 1.4 times the true ones", "";
+    /// Power of a torque over what it is where the positions are counts of an encoder, up to which it is the arm's.
+    STANDS: f64 = 4.0, "ratio", "judgement: twice the size", "";
     /// Median absolute deviations above the median at which a time is looked at.
     PUSH_DEVIATIONS: f64 = 6.0, "deviations", "judgement: four standard deviations", "";
     /// The same, times the median.

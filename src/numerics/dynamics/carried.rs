@@ -178,7 +178,11 @@ fn on_tool(arm: &DynamicArm, fitted: &Fitted) -> Vec<SeenNumber> {
                 let mut slope = unit(1 + axis) / mass;
                 slope[0] = -moment / (mass * mass);
                 let centre = point[axis] + moment / mass;
-                all.push(fitted.number(name, "m", centre, &slope));
+                let centre = fitted.number(name, "m", centre, &slope);
+                // A coordinate that is not seen is no number.
+                if centre.sigma < f64::max(SHORTEST, SEEN * (moment / mass).abs()) {
+                    all.push(centre);
+                }
             }
         }
         return if all[0].sigma < HEAVIEST * SEEN {

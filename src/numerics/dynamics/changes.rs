@@ -10,6 +10,7 @@ use super::columns::{TorqueColumn, TorqueColumns};
 use super::model::TorqueModel;
 use super::problem::{TorqueProblem, noise_of_fit};
 use super::recording::TorqueSource;
+use super::sliding::unit_at;
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueQuestion};
 use super::used::UsedRecording;
@@ -260,6 +261,7 @@ fn change(
     names
         .map(|(k, (quantity, unit))| {
             let effect = form.cause.name;
+            let unit = unit_at(form.slides(&problem.scene.arm.prismatic), unit);
             let name = format!("{effect}.{}.{quantity}", form.place.tag());
             let sigma = covariance[k * (count + 1)].max(0.0).sqrt();
             number(effect, name, unit, values[k], sigma)

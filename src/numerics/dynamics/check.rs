@@ -116,12 +116,16 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     let moving = moving.count();
     let widest = ranges.iter().copied().fold(0.0, f64::max);
     if widest < LEAST_RANGE || 2 * moving < n {
+        let unit = match arm.prismatic.contains(&true) {
+            true => "rad (m)",
+            false => "rad",
+        };
         let radians = match widest > LEAST_RANGE * DEGREE {
             true => "; or radians were read as degrees",
             false => "",
         };
         let message = format!(
-            "the arm hardly moves (its widest joint over {widest:.3} rad, {moving} of {n} joints at all): masses and friction cannot be seen; at least half of the joints must move, one over {LEAST_RANGE} rad{radians}"
+            "the arm hardly moves (its widest joint over {widest:.3} {unit}, {moving} of {n} joints at all): masses and friction cannot be seen; at least half of the joints must move, one over {LEAST_RANGE} {unit}{radians}"
         );
         faults.push(Fault::new("position", message));
     }
@@ -324,7 +328,7 @@ impl TorqueExtremes {
         };
         self.joints[joint].into_iter().filter(shared).map(move |(extreme, rows)| {
             let message =
-                format!("{rows} of {all} torques are exactly {extreme:.4} Nm, the largest: the current is cut off there");
+                format!("{rows} of {all} torques are exactly {extreme:.4}, the largest: the current is cut off there");
             Fault::new(name(joint), message)
         })
     }

@@ -37,7 +37,9 @@ mod recording;
 mod refine;
 mod scene;
 mod seen_gravity;
+mod sliding;
 mod solve;
+mod spectrum;
 mod sweep;
 mod thin;
 mod types;
@@ -53,6 +55,7 @@ pub use masses::{BodyConsistency, LinkFromTorques, inertial_numbers};
 pub use model::{FrictionCurve, JointRange, TorqueModel, TorqueTerm};
 pub use newton_euler::{InverseDynamics, MotionRow};
 pub use recording::{TorqueRecording, TorqueSource};
+pub use sliding::unit_at;
 pub use types::{
     ContactEvent, EnforcedBodies, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis,
     TorqueErrors, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueQuestion,
@@ -100,7 +103,7 @@ pub fn cell_evidence(
     tell: &mut dyn FnMut(String),
 ) -> Result<Vec<CellAnswer>> {
     let used = UsedRecording::of(arm, recording, question.cutoff)?;
-    let mut solved = solved(arm, used.recording, &used.clock, question, tell)?;
+    let (mut solved, _) = solved(arm, used.recording, &used.clock, question, tell)?;
     Ok(given::answers(&mut solved, given))
 }
 
@@ -110,21 +113,23 @@ fn diagnose_used(
     question: &TorqueQuestion,
     tell: &mut dyn FnMut(String),
 ) -> Result<TorqueDiagnosis> {
-    let solved = solved(arm, used.recording, &used.clock, question, tell)?;
-    let mut diagnosis = outcome::outcome(&solved, question, used.remarks);
+    let (solved, remark) = solved(arm, used.recording, &used.clock, question, tell)?;
+    let remarks = used.remarks.into_iter().chain(remark);
+    let mut diagnosis = outcome::outcome(&solved, question, remarks.collect());
     for row in &mut diagnosis.courses.row {
         *row = used.origin[*row];
     }
     Ok(diagnosis)
 }
 
+/// The answer to a recording, and what is to be said of its cut-off.
 fn solved<'a>(
     arm: &'a DynamicArm,
     recording: TorqueRecording,
     clock: &RecordingClock,
     question: &TorqueQuestion,
     tell: &mut dyn FnMut(String),
-) -> Result<solve::SolvedTorques<'a>> {
+) -> Result<(solve::SolvedTorques<'a>, Option<String>)> {
     let mut stretches = clock.stretches.iter();
     if stretches.all(|stretch| stretch.len() < LEAST_STRETCH) {
         let message = format!(
@@ -132,8 +137,18 @@ fn solved<'a>(
         );
         return Err(Error::data("time", message));
     }
-    let by_pace = || recording::cutoff(&recording, clock);
-    let cutoff = question.cutoff.unwrap_or_else(by_pace);
-    let cutoff = cutoff.min(HIGHEST_CUTOFF * clock.rate);
-    Ok(solve::solve(arm, recording, question, clock, cutoff, tell))
+    let most = HIGHEST_CUTOFF * clock.rate;
+    let (cutoff, remark) = match question.cutoff {
+        Some(asked) => (asked.min(most), None),
+        None => {
+            let usual = recording::cutoff(&recording, clock).min(most);
+            let common = (!question.free_inertials)
+                .then(|| spectrum::common(arm, &recording, clock, usual))
+                .flatten();
+            let remark = common.map(|common| spectrum::remark(common, usual));
+            (common.unwrap_or(usual), remark)
+        }
+    };
+    let solved = solve::solve(arm, recording, question, clock, cutoff, tell);
+    Ok((solved, remark))
 }

@@ -6,6 +6,7 @@ use super::arm::{INERTIAL_NUMBERS, inertial_name, inertial_unit};
 use super::cause::{
     COULOMB, FittedNumber, TORQUE_CAUSES, TorqueForm, VISCOUS, line_of_power, slope,
 };
+use super::sliding::unit_at;
 use crate::effect::Place;
 use crate::error::{Error, Result};
 
@@ -43,6 +44,8 @@ pub struct JointRange {
     pub usual: f64,
     /// rad/s over which the sign of its velocity turns: the model's, but where friction leads.
     pub sign_width: f64,
+    /// Whether it slides: m and N in the place of rad and Nm.
+    pub slides: bool,
 }
 
 /// The identified model of an arm's torques.
@@ -145,12 +148,17 @@ impl TorqueModel {
         let inertials = inertials.map(|number| (inertial_name(number), inertial_unit(number)));
         let mut names: Vec<(String, &'static str)> = inertials.collect();
         let mut shapes = Vec::new();
+        let prismatic: Vec<bool> = self.range.iter().map(|range| range.slides).collect();
         for (place, term) in self.terms.iter().enumerate() {
             let (prefix, form) = (self.prefix(place), term.form()?);
+            let slides = form.slides(&prismatic);
+            let named = |name: &str, unit: &'static str| {
+                (format!("{prefix}.{name}"), unit_at(slides, unit))
+            };
             let coefficients = form.coefficient_names().into_iter();
-            names.extend(coefficients.map(|(name, unit)| (format!("{prefix}.{name}"), unit)));
+            names.extend(coefficients.map(|(name, unit)| named(&name, unit)));
             let spans = form.shape_numbers().into_iter();
-            shapes.extend(spans.map(|span| (format!("{prefix}.{}", span.name), span.unit)));
+            shapes.extend(spans.map(|span| named(span.name, span.unit)));
         }
         names.extend(shapes);
         names.push((SIGN_WIDTH.into(), "rad/s"));

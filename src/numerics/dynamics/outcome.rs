@@ -8,6 +8,7 @@ use super::findings::{FittedSet, contact, plain_finding, sigma_of};
 use super::latency::Latency;
 use super::problem::TorqueProblem;
 use super::recording::{ends, largest};
+use super::sliding::unit_at;
 use super::solve::SolvedTorques;
 use super::types::{
     EnforcedBodies, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors,
@@ -317,8 +318,9 @@ fn not_observable(fit: &FittedSet) -> Vec<String> {
         let name = joint + 1;
         if most - least < SMALL_RANGE {
             sentences.push(format!(
-                "joint {name}: it moves over {:.3} rad only; an offset, a cable or spring and gravity are one there",
-                most - least
+                "joint {name}: it moves over {:.3} {} only; an offset, a cable or spring and gravity are one there",
+                most - least,
+                unit_at(scene.arm.prismatic[joint], "rad")
             ));
         }
         let (slowest, fastest) = speeds(&scene.velocity[joint], scene.sign_width);

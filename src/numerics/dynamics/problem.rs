@@ -118,7 +118,9 @@ impl<'a> TorqueProblem<'a> {
         self.form_base();
         for cause in TORQUE_CAUSES {
             for form in (cause.forms)(cause, &self.scene) {
-                self.push(form);
+                if !form.needs_turn(&self.scene.arm.prismatic) {
+                    self.push(form);
+                }
             }
         }
         self.all.listed = self.all.forms.len();

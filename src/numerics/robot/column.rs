@@ -5,7 +5,7 @@
 //! A line with `.in_laws()` is all that a new circumstance takes: it is read, stored, carried to the numerics, and known to declared effects.
 
 use crate::units::Quantity::{
-    Angle, AngularRate, Current, Length, LinearRate, Mass, Number, Temperature, Time, Torque,
+    Angle, AngularRate, Current, Force, Length, LinearRate, Mass, Number, Temperature, Time, Torque,
 };
 use crate::units::{Quantity, Unit};
 use serde::de::Error;
@@ -346,13 +346,15 @@ pub static CIRCUMSTANCES: &[DeclaredColumn] = &[
         )
     },
     DeclaredColumn {
-        shape: ColumnShape::Joints { prismatic: None },
+        shape: ColumnShape::Joints {
+            prismatic: Some((Force, [-1e7, 1e7])),
+        },
         ..DeclaredColumn::number(
             "torque",
             &["tau{j}"],
             Torque,
             [-1e7, 1e7],
-            "Joint torques, by a sensor or as the drive states them.",
+            "Joint torques, forces of prismatic joints, by a sensor or as the drive states them.",
         )
     },
     DeclaredColumn {

@@ -158,7 +158,7 @@ pub struct JointColumns {
     /// Unit of the file's numbers; for positions and velocities that of the revolute joints, e.g. `deg`.
     #[serde(default)]
     pub(crate) unit: Option<String>,
-    /// Unit of the positions or velocities of prismatic joints, e.g. `mm`.
+    /// Unit of the positions, velocities or forces of prismatic joints, e.g. `mm`, `mm/s`, `N`.
     #[serde(default)]
     pub(crate) linear_unit: Option<String>,
     /// 1 or -1 for each joint: -1 where the file counts the other way than the robot file, e.g. `[1, 1, -1, 1, 1, 1]`.

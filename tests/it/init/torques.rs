@@ -343,3 +343,23 @@ fn a_joint_that_turns_more_than_once_makes_no_degrees_of_the_others() {
     ]);
     made.says(&["several turns in radians"]);
 }
+
+#[test]
+fn the_only_joint_may_have_the_number_of_its_motor_on_a_bus() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = "calib_robot: 1\nname: one\nunits: {length: mm, angle: deg}\nkinematics:\n  screws:\n    - {axis: [0, 1, 0], point: [0, 0, 0]}\n\
+                 tool: {point: [0, 0, -100]}\n";
+    put(&folder, "robot.yaml", robot);
+    let log = log("pos (5),target pos (5),current (5) [mA]", 3, wave);
+    put(&folder, "log.csv", log);
+    let printed = calib(folder.path(), "init . --data log.csv");
+    assert_eq!(printed.code, Some(0), "{}", printed.both());
+    let made = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
+    for part in [
+        "uses: ingest_torques",
+        "q: {columns: [\"pos (5)\"]",
+        "current: {columns: [\"current (5) [mA]\"], unit: mA}",
+    ] {
+        assert!(made.contains(part), "{part} in\n{made}");
+    }
+}

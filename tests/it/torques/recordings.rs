@@ -19,12 +19,12 @@ fn chance(seed: u64) -> f64 {
     ((x ^ (x >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-fn noise(seed: u64) -> f64 {
+pub(super) fn noise(seed: u64) -> f64 {
     (0..12).map(|k| chance(seed * 12 + k)).sum::<f64>() - 6.0
 }
 
 /// Angle, velocity and acceleration of a joint, rad and s.
-fn moved(time: f64, seed: u64) -> [f64; 3] {
+pub(super) fn moved(time: f64, seed: u64) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for k in 1..6u64 {
         let size = 0.1 + 0.4 * chance(seed * 100 + k);

@@ -163,6 +163,7 @@ fn waves(q: f64) -> [f64; 5] {
 /// is the same torque: there it is a balancer, with the ripple as its rival. Shape: least and greatest angle of the joint, rad.
 pub(super) static BALANCER: TorqueCause = TorqueCause {
     name: SPRING_BALANCE_NAME,
+    of_turn: true,
     coefficients: &[
         ("cosine", "Nm"),
         ("sine", "Nm"),
@@ -218,6 +219,7 @@ const WITH_OVERTONE: usize = 4;
 /// plain wave those of twice the order; `with` holds the order and whether it is of the motor. Shape: turns of the motor in one of the joint.
 pub(super) static RIPPLE: TorqueCause = TorqueCause {
     name: "torque_ripple",
+    of_turn: true,
     coefficients: &[
         ("cosine", "Nm"),
         ("sine", "Nm"),

@@ -251,6 +251,7 @@ const WRIST: usize = 3;
 /// likely to share a gear.
 pub(super) static WRIST_COUPLING: TorqueCause = TorqueCause {
     name: "wrist_coupling",
+    of_turn: true,
     coefficients: &[("viscous", "Nm s/rad"), ("coulomb", "Nm")],
     price: |form| if form.with[1] == 1 { 6.0 } else { 30.0 },
     of_sign: true,
@@ -405,6 +406,7 @@ const ORDERS: usize = 4;
 /// the sign of the velocity; shape: least and greatest angle of the joint, rad.
 pub(super) static BY_ANGLE: TorqueCause = TorqueCause {
     name: UNKNOWN,
+    of_turn: true,
     coefficients: &[("drag_cosine", "Nm"), ("drag_sine", "Nm")],
     price: |_| 30.0,
     of_sign: true,

@@ -98,16 +98,23 @@ pub(crate) static PAYLOAD: TorqueCause = TorqueCause {
         }
         let mut all = vec![plain("mass", fitted[0], "kg")];
         let others = &fitted[1..];
+        // What a payload without its mass would be at: the moment that is found, of all the mass that is there.
+        let whole = (form.shape[0] + fitted[0].value).abs().max(LIGHTEST);
         if form.width == INERTIAL_NUMBERS {
-            let numbers = (1..).zip(others);
-            all.extend(
-                numbers.map(|(k, value)| plain(INERTIAL_NAMES[k], *value, inertial_unit(k))),
-            );
-        } else {
-            // What a payload without its mass would be at: the moment that is found, of all the mass that is there.
-            let whole = (form.shape[0] + fitted[0].value).abs().max(LIGHTEST);
-            let centre = CENTRE.iter().zip(others);
-            all.extend(centre.map(|(name, number)| plain(name, scaled(number, 1e3 / whole), "mm")));
+            for (numbers, loose) in [
+                (1..4, whole * SHORT_ARM),
+                (4..INERTIAL_NUMBERS, whole * SHORT_ARM * SHORT_ARM),
+            ] {
+                let unit = inertial_unit(numbers.start);
+                let named = numbers.map(|number| (INERTIAL_NAMES[number], fitted[number]));
+                let told = told(named, loose).into_iter();
+                all.extend(told.map(|(name, value)| plain(name, value, unit)));
+            }
+        } else if !others.is_empty() {
+            let centre = CENTRE.into_iter().zip(others);
+            let in_mm = centre.map(|(name, number)| (name, scaled(number, 1e3 / whole)));
+            let told = told(in_mm, 1e3 * SHORT_ARM).into_iter();
+            all.extend(told.map(|(name, value)| plain(name, value, "mm")));
         }
         all
     },
@@ -164,6 +171,23 @@ fn part(form: &TorqueForm, first: usize) -> Vector3<f64> {
 
 fn is_seen(number: &FittedNumber) -> bool {
     number.sigma > 0.0 && number.sigma < SEEN * number.value.abs()
+}
+
+/// Numbers that are told: those that the data see and those that are known to within `loose`; the best known where there are none. What is
+/// not seen is no number.
+fn told<'n>(
+    named: impl Iterator<Item = (&'n str, FittedNumber)>,
+    loose: f64,
+) -> Vec<(&'n str, FittedNumber)> {
+    let (told, unseen): (Vec<_>, Vec<_>) =
+        named.partition(|(_, number)| is_seen(number) || number.sigma < loose);
+    if !told.is_empty() {
+        return told;
+    }
+    let share = |number: &FittedNumber| number.sigma / number.value.abs().max(f64::MIN_POSITIVE);
+    let best = unseen.into_iter();
+    let best = best.min_by(|a, b| share(&a.1).total_cmp(&share(&b.1)));
+    best.into_iter().collect()
 }
 
 /// The moment about the last joint's point, kg m, of a payload whose mass the data do not see beside it.
@@ -364,6 +388,22 @@ pub(super) static LINK_MASS: TorqueCause = TorqueCause {
 /// m: farther off is no error of a declaration.
 const FARTHEST: f64 = 0.2;
 
+/// m: as far as declared centres are off without being a finding, as a rule.
+const LOOSE: f64 = 0.01;
+
+/// Coordinates, mm, by which a centre is seen to be elsewhere.
+fn shifts_in_mm(fitted: &[FittedNumber]) -> Vec<(&'static str, FittedNumber)> {
+    let centre = CENTRE.into_iter().zip(fitted);
+    let in_mm = centre.map(|(name, number)| (name, scaled(number, 1e3)));
+    told(in_mm, 1e3 * LOOSE)
+}
+
+/// Numbers about the joint's point by which an inertia is seen to be off, kg m2.
+fn seen_inertias(fitted: &[FittedNumber]) -> Vec<(&'static str, FittedNumber)> {
+    let names = INERTIAL_NAMES[4..].iter().copied();
+    told(names.zip(fitted.iter().copied()), 0.0)
+}
+
 /// A link whose centre of mass is elsewhere, by three coordinates.
 pub(super) static LINK_CENTRE: TorqueCause = TorqueCause {
     name: "link_com",
@@ -376,15 +416,26 @@ pub(super) static LINK_CENTRE: TorqueCause = TorqueCause {
         shifts.map(|ten| (form.link(), *ten)).collect()
     }),
     parameters: |_, fitted| {
-        let centre = CENTRE.iter().zip(fitted);
-        let in_mm = centre.map(|(name, number)| plain(name, scaled(number, 1e3), "mm"));
-        in_mm.collect()
+        let told = shifts_in_mm(fitted).into_iter();
+        told.map(|(name, value)| plain(name, value, "mm")).collect()
     },
     statement: |form, fitted| {
-        let [x, y, z] = [0, 1, 2].map(|axis| 1e3 * fitted[axis].value);
+        let told = shifts_in_mm(fitted);
+        if told.len() == CENTRE.len() {
+            let [x, y, z] = [0, 1, 2].map(|axis| told[axis].1.value);
+            return format!(
+                "the centre of mass of {} is ({x:.1}, {y:.1}, {z:.1}) mm from where it is declared",
+                form.place
+            );
+        }
+        let parts = told.iter().map(|(name, value)| {
+            let axis = name.rsplit('_').next().unwrap_or_default();
+            format!("{:.1} mm along {axis}", value.value)
+        });
         format!(
-            "the centre of mass of {} is ({x:.1}, {y:.1}, {z:.1}) mm from where it is declared",
-            form.place
+            "the centre of mass of {} is {} from where it is declared; how far it is off elsewhere is not seen",
+            form.place,
+            parts.collect::<Vec<_>>().join(" and ")
         )
     },
     ..PLAIN
@@ -403,13 +454,13 @@ pub(super) static LINK_INERTIA: TorqueCause = TorqueCause {
             .collect()
     }),
     parameters: |_, fitted| {
-        let numbers = INERTIAL_NAMES[4..].iter().zip(fitted);
-        numbers
-            .map(|(name, value)| plain(name, *value, "kg m2"))
+        let told = seen_inertias(fitted).into_iter();
+        told.map(|(name, value)| plain(name, value, "kg m2"))
             .collect()
     },
     statement: |form, fitted| {
-        let values = fitted.iter().map(|number| number.value);
+        let told = seen_inertias(fitted);
+        let values = told.iter().map(|(_, number)| number.value);
         let largest = values.max_by(|a, b| a.abs().total_cmp(&b.abs()));
         format!(
             "the inertia of {} is off, by up to {:.3} kg m2",
@@ -551,3 +602,43 @@ pub(super) static WRONG_CONSTANT: TorqueCause = TorqueCause {
     },
     ..PLAIN
 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn number(value: f64, sigma: f64) -> FittedNumber {
+        FittedNumber { value, sigma }
+    }
+
+    #[test]
+    fn a_centre_is_told_along_the_axes_that_the_torques_see_and_nowhere_else() {
+        let form = TorqueForm::at_joint(&LINK_CENTRE, 1, 3);
+        let fitted = [number(0.021, 0.001), number(0.4, 3.0), number(0.001, 0.002)];
+        let told = (LINK_CENTRE.parameters)(&form, &fitted);
+        let names: Vec<&str> = told.iter().map(|one| one.name.as_str()).collect();
+        assert_eq!(names, ["centre_x", "centre_z"]);
+        let said = (LINK_CENTRE.statement)(&form, &fitted);
+        assert!(
+            said.contains("21.0 mm along x and 1.0 mm along z") && said.ends_with("is not seen"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn of_numbers_that_are_not_seen_the_best_known_is_told() {
+        let named = [("a", number(1.0, 5.0)), ("b", number(2.0, 3.0))];
+        let told = told(named.into_iter(), 0.1);
+        assert_eq!(told, [("b", number(2.0, 3.0))]);
+    }
+
+    #[test]
+    fn an_inertia_is_told_by_the_numbers_that_are_seen() {
+        let form = TorqueForm::at_joint(&LINK_INERTIA, 1, 6);
+        let mut fitted = [number(7.0, 40.0); 6];
+        fitted[3] = number(0.3, 0.02);
+        let told = (LINK_INERTIA.parameters)(&form, &fitted);
+        assert_eq!((told.len(), told[0].name.as_str()), (1, "inertia_yy"));
+        assert!((LINK_INERTIA.statement)(&form, &fitted).contains("by up to 0.300 kg m2"));
+    }
+}

@@ -114,6 +114,8 @@ pub(super) struct TorqueCause {
     pub(crate) of_angle: bool,
     /// Whether it is, like others of its kind, a wrong mass, drive or mounting: one such error looks like several of others.
     pub(crate) inertial: bool,
+    /// Whether it is made by turning: no joint that slides has it.
+    pub(crate) of_turn: bool,
     /// Whether its columns are the same at whatever joint it acts.
     pub(crate) alike_at_joints: bool,
     /// Whether its columns are made of the rigid torque.
@@ -204,6 +206,7 @@ const PLAIN: TorqueCause = TorqueCause {
     brakes: false,
     of_angle: false,
     inertial: false,
+    of_turn: false,
     alike_at_joints: false,
     of_rigid: false,
     of_sign: false,
@@ -305,6 +308,18 @@ impl TorqueForm {
             Place::Links(link, _) => (0..=link).collect(),
             _ => (0..joints).collect(),
         }
+    }
+
+    /// Whether it needs a joint to turn that slides.
+    pub(crate) fn needs_turn(&self, prismatic: &[bool]) -> bool {
+        let slides = |joint: usize| prismatic.get(joint) == Some(&true);
+        let also = || (self.cause.and_on)(self);
+        self.cause.of_turn && (slides(self.joint()) || also().is_some_and(slides))
+    }
+
+    /// Whether it acts at a joint that slides.
+    pub(crate) fn slides(&self, prismatic: &[bool]) -> bool {
+        matches!(self.place, Place::Joint(joint) if prismatic.get(joint) == Some(&true))
     }
 
     /// Links and changes of their numbers per coefficient; none of what is no wrong mass, or where no masses are declared.

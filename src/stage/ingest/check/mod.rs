@@ -398,7 +398,7 @@ fn joints(declared: &DeclaredColumn, joints: &JointColumns, file: &FileLayout, a
     } else if turning.is_some() {
         at.at("unit").fault("a direction (1, -1, 0) has no unit");
     }
-    let message = "for the positions and velocities of prismatic joints only";
+    let message = "for positions, velocities and forces of prismatic joints only";
     at.at("linear_unit").must(sliding.is_none(), message);
 }
 
