@@ -5,7 +5,6 @@ use super::language::Locale;
 use super::number::render;
 use super::result;
 use super::svg::{Area, Scale, Svg, baseline, name_x, name_y};
-use crate::dynamics::unit_at;
 use crate::error::{Error, Result};
 use crate::table::{
     BodyConsistencies, Contacts, FrictionCurveRow, FrictionCurves, Inertials, JointTorques,
@@ -166,7 +165,7 @@ fn over_time(
     }
     baseline(&mut svg, area);
     name_x(&mut svg, area, "time, s");
-    name_y(&mut svg, area, unit_at(slides, "Nm"));
+    name_y(&mut svg, area, if slides { "N" } else { "Nm" });
     svg.finish(title)
 }
 
