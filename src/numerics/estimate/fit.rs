@@ -433,6 +433,7 @@ impl Minimisation {
             return;
         }
         let (x, tolerances) = (model.x.clone(), model.tolerances.clone());
+        let (stop, steps) = (self.stop, self.course.len());
         candidates.iter().for_each(|k| model.tolerances[*k] *= AFAR);
         self.settle(problem, model, candidates, LOOK);
         model.tolerances = tolerances;
@@ -442,6 +443,8 @@ impl Minimisation {
         } else {
             model.x = x;
             problem.excess = near;
+            self.stop = stop;
+            self.course.truncate(steps);
         }
     }
 
