@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 
 const SEED: u64 = 20_261_122;
 const PROGRAMS: usize = 150;
-const CHANGES: usize = 120;
+const CHANGES: usize = 12;
 
 struct Writer {
     rng: ChaCha8Rng,
