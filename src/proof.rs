@@ -1,6 +1,4 @@
 //! The proof of a diagnosis: sets of concealed recordings written and sealed, and diagnoses held against the truth once it is opened.
-//!
-//! A set is a folder: what a user has, and the truth of each recording apart.
 
 use crate::description::RobotDescription;
 use crate::error::{Error, Fault, Result};

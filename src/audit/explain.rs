@@ -1,6 +1,4 @@
 //! Why a stage ran, or did not: its key in a run against its key in the run before.
-//!
-//! Where a table comes from: the action that made it, its input tables, theirs, down to raw files.
 
 use crate::error::{Error, Result, suggestion};
 use crate::pipeline::{KeyChange, Manifest, StageReport, StageStatus, changes_of, find_run};

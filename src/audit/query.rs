@@ -2,14 +2,6 @@
 //!
 //! Tables go by `stage_port`, `stage.port` or, where one stage alone writes such a table, by their kind. Rows come in the order of
 //! their tables unless `ORDER BY` says otherwise.
-//!
-//! The order of a table's rows kept through a query: groups in the order of their first rows, pairs in that of the left table.
-//!
-//! Left to itself, polars gives groups and pairs in whatever order its threads finish.
-//!
-//! What a query gave: columns of values.
-//!
-//! A SELECT as it was written, its tables looked up among those of the run.
 
 use crate::audit::runs::{QueryTable, QueryTables};
 use crate::error::{Error, Result, suggestion};

@@ -1,6 +1,4 @@
 //! Two runs compared: settings, files and seeds that differ, then every table that both have.
-//!
-//! The tables of a run, by the names that SQL knows them by, with their columns.
 
 use crate::diff::{DiffOptions, TableDiff, compare};
 use crate::error::{Error, Result, did_you_mean, suggestion};

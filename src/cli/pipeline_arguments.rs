@@ -1,6 +1,4 @@
 //! Options of every verb that runs a pipeline or takes its result: overrides, the store, worker threads.
-//!
-//! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
 
 use super::surroundings::{cores, open_store, surroundings};
 use super::{emit_json, warn};

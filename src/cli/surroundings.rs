@@ -1,10 +1,4 @@
 //! Who runs calib, where and when: the only file that reads the environment and the clock.
-//!
-//! A panic is a bug in calib: one line that says where, and exit code 70.
-//!
-//! Panics that somebody catches, as of a decoder at a damaged file, are reported by whoever catches them, and by nobody else.
-//!
-//! Colours of a result on a terminal: labels stand out, a verdict has the colour of what it means.
 
 use crate::error::{Error, Result};
 use crate::pipeline::{Host, Surroundings, Tool};

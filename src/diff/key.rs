@@ -1,6 +1,4 @@
 //! Rows by their key: which row of B is the row of A, and which have no partner or several.
-//!
-//! Keys are in arrow's row format, whose bytes compare as the cells do. Rows that ascend already are merged as they are, others are sorted.
 
 use arrow::array::{Array, ArrayRef, AsArray, UInt32Array};
 use arrow::compute::{cast, take};

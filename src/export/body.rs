@@ -1,8 +1,4 @@
 //! Mass, centre and inertia of a link as formats of rigid bodies write them: identified where torques show them, else as declared.
-//!
-//! Frames of links as others chose them, moved as little as the corrected axes demand: meshes and origins stay where they were.
-//!
-//! XML as exports write it: a template, and at the head, as comments, what the reader must know of the model.
 
 use super::Export;
 use crate::description::{JointDescription, JointKind};

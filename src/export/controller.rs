@@ -1,6 +1,4 @@
 //! What most controllers let one enter, as a list: zeros, ratios, couplings, the tool.
-//!
-//! By how much joints stand elsewhere than commanded, as an affine map of the commanded positions, and that map as a controller counts.
 
 use super::entered::{self, EnteredNumbers, PointError, WantedPoints};
 use super::{CarriedGeometry, CarriedTorques, Export, Format};

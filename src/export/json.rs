@@ -1,6 +1,4 @@
 //! The whole model as one JSON document: description, parameters with sigma, what rigid geometry leaves out.
-//!
-//! Friction, inertials and all other causes of the torques as one plain JSON document, with sigma.
 
 use super::friction::{ARMATURE, DAMPING, FRICTION, of_line, stands_alone};
 use super::{CarriedGeometry, CarriedTorques, Export, Format};

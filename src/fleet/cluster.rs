@@ -1,8 +1,4 @@
 //! Job files for clusters: arrays of tasks that each call `calib fleet exec`, which is all that a cluster ever runs.
-//!
-//! They hold the run's id and the task's number, never the name of a robot; what is done, the store says, not the scheduler.
-//!
-//! The Slurm engine: submits arrays, looks at the store until every robot is recorded, and submits the missing again.
 
 use super::ledger::{Ledger, RunNote};
 use crate::error::{Error, Fault, Result};

@@ -1,7 +1,5 @@
 //! One campaign after another: limits for changes over all robots and parameters, and why a person should look at a robot.
 //!
-//! What an earlier fleet says of parameters: a robot's own values, or mean and spread over the robots of its model.
-//!
 //! Random effects by moments (DerSimonian and Laird, 1986): values x_i with errors s_i scatter by tau about a mean. A robot's own
 //! value is left out of the prior that it gets, so that nothing is counted twice.
 

@@ -1,6 +1,4 @@
 //! FLEET.yaml, typed: which robots go through which pipeline, with what settings of their own.
-//!
-//! One robot of a fleet: its name, its groups and what it sets in the pipeline.
 
 use crate::error::{Error, Fault, Result};
 use crate::pipeline::{Override, misnamed, sort_by_place, trouble_at, unreadable_text};

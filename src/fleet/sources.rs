@@ -1,6 +1,4 @@
 //! Robots from a list: a table of any kind, one row a robot.
-//!
-//! One big recording table, parted by robot into files below the store; a table that was parted before is not parted again.
 
 use super::file::FleetRobot;
 use crate::error::{Error, Fault, Result, instead};

@@ -1,6 +1,4 @@
 //! One robot: its plan, its key, its run and its record.
-//!
-//! The local engine: threads of this process, each with one robot in hand, so that memory is bounded by their number.
 
 use super::Fleet;
 use super::file::FleetRobot;

@@ -1,6 +1,4 @@
 //! Units at the edges: SI inside, one stored unit per quantity, people's units in files and reports.
-//!
-//! Units as people write them in headers: English, German, French, Spanish; in brackets or behind the name.
 
 use std::fmt;
 

@@ -1,7 +1,5 @@
 //! What is read of a run next to its model: which step stands for it, how its controller counts its joints, how the arm scatters about the
 //! model; and a robot file by its path.
-//!
-//! What compensation achieved: points that were measured at corrected targets, compared with the model's predictions.
 
 use crate::compensate::{Corrector, IdentifiedArm, Scatter};
 use crate::description::RobotDescription;

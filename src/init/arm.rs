@@ -1,8 +1,4 @@
 //! The arm that a recording is of: a file that is there already, a URDF, or a kind to start from.
-//!
-//! What drives say of joints while the arm moves: torques or motor currents, velocities; and whether recordings are of them.
-//!
-//! Robot files to start from: typical arms, every number of which the user replaces.
 
 use crate::description::JointKind;
 use crate::error::{Error, Result, counted};

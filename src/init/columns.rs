@@ -1,6 +1,4 @@
 //! A file of a recording with what its columns are taken to hold, as lines of a pipeline.
-//!
-//! Which columns are the measured point: of a target, its difference, a nominal point and a measured one only the last is.
 
 use crate::error::first_of;
 use crate::init::names;

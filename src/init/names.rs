@@ -1,6 +1,4 @@
 //! What the name of a column says: words, a unit, the number of a joint, an axis of a point.
-//!
-//! The words that people use in headers, in small letters, with blanks between them: English, German, French, Spanish, Italian.
 
 use crate::units::{Header, Unit};
 use std::collections::BTreeMap;

@@ -1,6 +1,4 @@
 //! The text of the pipeline that `init` writes.
-//!
-//! Lines of a robot file or a pipeline that are still marked as a proposal.
 
 use super::InitRequest;
 use super::arm::StartingArm;

@@ -1,6 +1,4 @@
 //! A delimited text as a table of cells, as far as it can be understood without being told.
-//!
-//! A file of any kind as the tables that are in it.
 
 use crate::error::{Error, Result, listed};
 use crate::raw::{

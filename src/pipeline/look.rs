@@ -1,8 +1,4 @@
 //! What can be seen of a plan's input files without running it: the robot, the headers of the data. All faults at once.
-//!
-//! What a run would do, without doing it.
-//!
-//! Why a stage runs: the components of its key against those of its last run, in words.
 
 use super::plan::{InputFile, PlannedStage, Selection};
 use super::run_state::{KeyState, RunState};

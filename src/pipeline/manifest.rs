@@ -1,8 +1,6 @@
 //! The audit record of one run, written when it starts, between stages where a second of work went into them, and at the end.
 //!
 //! Runs by the names that people give them. `HEAD` is the last complete run: the tables of every stage, for the sake of the run itself.
-//!
-//! How a plan is run, and what for.
 
 use super::overrides::Override;
 use super::plan::Selection;

@@ -1,8 +1,5 @@
 //! `--set` and `${variable}`: what is put into the YAML's tree before it is typed.
 //!
-//! Files by a pattern, and names that stand in the paths of files: both are filled in before settings are typed, so that a table's key
-//! knows every file and every name.
-//!
 //! An entry of `files` with `file: data/*/hole_?.csv` stands for one entry for each file that matches, in the order of their paths; `*` is
 //! any text within a folder's or file's name, `?` one letter. A column with `path: "{position}/hole_{n}.csv"` has as its value what stands
 //! for the braces at the end of its file's path, joined by `/`: `front/0`.

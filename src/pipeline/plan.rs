@@ -1,10 +1,6 @@
 //! The plan: a pipeline whose YAML is sound, whose settings are typed and whose tables are wired.
 //!
-//! Which stages of a plan a run may execute, and which it must even if they are cached.
-//!
 //! Which earlier table each input port is fed from: by kind, or as `reads` options.
-//!
-//! Sets that a stage names and no split deals rows to, as far as the settings alone say it.
 
 use crate::error::{Error, Fault, Result, instead, listed, suggestion};
 use crate::pipeline::overrides::Override;

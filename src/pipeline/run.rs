@@ -1,10 +1,4 @@
 //! The run: every stage in order; what is already done is taken as it is, the rest is executed and published.
-//!
-//! One stage executed: its tables loaded, its body run on the worker threads, its products handed back.
-//!
-//! Where in the YAML the setting stands of which a running stage complains.
-//!
-//! What a plan computes, as one hash: stages, settings, wiring and the content of the files; no paths, no dates.
 
 use super::manifest::{
     FileRecord, InputRecord, Manifest, OutputRecord, Purpose, RunOptions, RunStatus, StageStatus,

@@ -1,6 +1,4 @@
 //! How far a plan is: which tables every stage has, and from them the key of the next.
-//!
-//! One advisory lock per action, so that two runs share work instead of doing it twice. Correctness does not depend on it.
 
 use super::plan::{Plan, PlannedStage};
 use super::services::{label, seed};

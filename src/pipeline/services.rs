@@ -1,6 +1,4 @@
 //! What the engine does for a running stage: files, sinks, progress and lines that are kept.
-//!
-//! A stage on tables in memory: as in a pipeline, without a store and without a file.
 
 use crate::error::{Error, Fault, Result, nearest};
 use crate::pipeline::spec::InputFile;

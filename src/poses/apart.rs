@@ -1,6 +1,4 @@
 //! `calib poses --run`: poses that tell a finding of a diagnosis from a rival, at the sizes that the run found.
-//!
-//! What the poses promise of a finding against its rival, as text and as JSON.
 
 use super::site::site;
 use super::{Drive, PoseAnswer, PoseRequest, closing, drive, wish};

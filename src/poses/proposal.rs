@@ -1,6 +1,4 @@
 //! Poses for a robot file: the best for all parameters together, or for telling two effects apart whatever their sizes.
-//!
-//! What the proposed poses promise, as a short table and as JSON.
 
 use super::site::{self, site};
 use super::{Drive, PoseAnswer, PoseRequest, closing, drive, wish};

@@ -1,6 +1,4 @@
 //! Where the arm may go, by what was asked and what the robot file says.
-//!
-//! Recordings that proposed poses are compared with.
 
 use super::PoseRequest;
 use super::drive::joint_unit;

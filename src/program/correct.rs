@@ -1,7 +1,5 @@
 //! A program read, corrected and written again, whole: targets that cannot be reached are refused, since a program has no place for a remark.
 //!
-//! The mark of a corrected program: a comment line with a hash of the program that was corrected, by which it is known again.
-//!
 //! It stands behind what must come first: the line of DEF or DEFDAT in KRL, of MODULE in RAPID, of /MN in a listing of FANUC's (as a remark
 //! of the program, 32 letters at most), else the `&` lines of KRL's head.
 

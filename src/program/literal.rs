@@ -1,7 +1,4 @@
 //! A target as a program states it: its numbers, where they stand, and how corrected ones are written there.
-//!
-//! What is in force where a target is reached: the frame in which it stands, the tool that goes there, the load that is carried. It is gathered
-//! from all motions of a program and given to the literals.
 
 use super::flow::JoinedState;
 use super::stated::{self, PostureStatement};

@@ -1,8 +1,4 @@
 //! Which tool of a program the robot file's is, and where the others are.
-//!
-//! The robot file places its tool in the robot's base and knows no flange. Where a person says which of the program's tools it is, or gives its
-//! frame at the flange, every other tool follows from its own frame. A program with one tool is taken to have that of the robot file, and
-//! says so; axis 6 tells some that are not: a tool keeps its distance from it.
 
 use super::literal::ToolInForce;
 use super::{Gathered, Literal};

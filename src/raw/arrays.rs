@@ -1,6 +1,4 @@
 //! Arrays of NumPy (.npz) as columns: those of as many rows as the longest has, an array of two dimensions as a column for each number of a row.
-//!
-//! An entry of the archive is an array (.npy) with its type and shape in a head of text; pickled objects are not read.
 
 use super::decoded;
 use crate::error::listed;

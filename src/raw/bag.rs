@@ -1,7 +1,4 @@
 //! Recordings of ROS 2 (MCAP, SQLite) as the same records that text gives: one topic is a table, a message a row.
-//!
-//! Every message is read where it lies, from the first byte to the last whole one, so that a bag without an index, or one that was cut, gives
-//! what is there. A folder of parts is one recording.
 
 mod content;
 mod mcap;

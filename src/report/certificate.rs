@@ -1,8 +1,4 @@
 //! The first page: what was calibrated with what, how accurate it is, whether that is accepted, under which conditions, and what was not seen.
-//!
-//! The verdict against the user's limits: figures of the held-out points of the model that stands, each next to its limit.
-//!
-//! The page of a verification: errors before, predicted and achieved, and the poses that were repeated often enough for ISO 9283.
 
 use crate::error::Result;
 use crate::report::errors::{Steps, before};

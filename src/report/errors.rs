@@ -1,6 +1,4 @@
 //! The verdict, the table of errors after every step, and their pictures; held-out and training points never together.
-//!
-//! How well the ball comes back to every socket, plane and sphere, before and after: a picture and a table.
 
 use crate::error::{Error, Result};
 use crate::report::Tables;

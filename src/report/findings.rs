@@ -1,6 +1,4 @@
 //! What was left out of the simulation: the diagnosis' verdict, its findings with their curves, what it could not see.
-//!
-//! The picture of the table of causes: findings and residual, by place and kind of variable.
 
 use crate::error::Result;
 use crate::report::Tables;

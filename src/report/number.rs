@@ -1,6 +1,4 @@
 //! Numbers as a person reads them: fixed decimals, no negative zero, people's units.
-//!
-//! Templates to HTML: one head for every page, and no name that does not exist.
 
 use super::language::Locale;
 use crate::error::{Error, Result};

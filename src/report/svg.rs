@@ -1,6 +1,4 @@
 //! A minimal SVG writer: elements with a class, coordinates to a tenth of a unit, text escaped. Colours are the style sheet's.
-//!
-//! Axes: data to user units, round ticks (1-2-5), grid and labels.
 
 use super::language::{Locale, say};
 use super::number::fixed;

@@ -1,6 +1,4 @@
 //! Where in the workspace the error is: points from above and from the side, coloured by error, with residual vectors.
-//!
-//! How the error is distributed after each step: histograms above each other on one axis, and cumulative curves.
 
 use super::language::{Locale, say};
 use super::svg::{Area, Scale, Svg, baseline, label, name_x, name_y, round_down};

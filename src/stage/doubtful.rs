@@ -1,7 +1,5 @@
 //! Where a model is not to be believed without a word: uncertain corrections, residuals below the noise; and what to measure so that data show
 //! more.
-//!
-//! What identifications do about rows that no smooth model can follow, and what they tell the person about them.
 
 use crate::compensate::{IdentifiedArm, Scatter, Uncertainty, doubts};
 use crate::error::{counted, first_of};

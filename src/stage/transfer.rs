@@ -1,6 +1,4 @@
 //! `transfer`: an identified model on another recording of the same robot. The arm is held; only where its base stands is found anew.
-//!
-//! A carried model compared with its geometry alone, carried likewise: everywhere, and where the joints had been and had not.
 
 use crate::diagnose::BASE;
 use crate::effect::{Load, names};

@@ -3,9 +3,6 @@
 //!
 //! Group commit: what is moved into place can be seen at once and is owed to the disk; `sync` pays everything, many at a time.
 //!
-//! One after another, syncs cost a round trip to the disk each; together they cost about one. A crash of the process loses nothing;
-//! a power cut may tear what was still owed, which its hash or seal shows: as good as absent.
-//!
 //! The folder of one process below `tmp/`, locked while the process lives, swept by others when it is dead.
 
 use super::Store;

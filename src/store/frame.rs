@@ -2,8 +2,6 @@
 //!
 //! [`FrameBuilder::finish`] is the border: behind it nothing is checked again. Columns come out in the order of the schema and
 //! rows in the order of the key, so that neither the order of pushing nor that of computing shows in the content.
-//!
-//! Rust types that are one cell of a column.
 
 use super::check;
 use super::schema::{self, TableSchema};

@@ -2,8 +2,6 @@
 //!
 //! Content only: never a path, a date, a host, a thread count or calib's own version.
 //!
-//! What a record says of a published table: enough to find its file and to know whether it is whole.
-//!
 //! The identity of a table: a hash of its logical content, whatever the chunks and whoever wrote the Parquet file. One blake3 stream per
 //! column over its cells (a presence byte, then 8 little-endian bytes, 1 byte, or length and text), then one hash over kind, major version,
 //! row count and every column's name, type, unit and stream.

@@ -1,8 +1,4 @@
 //! Notes below the store that are no tables: small sealed JSON files, and parts of inputs, put in place whole.
-//!
-//! JSON texts that carry the hash of their own bytes as their last member, so that one flipped bit anywhere shows.
-//!
-//! The stable human paths: the latest table of every port, and the latest documents, under names that people can open.
 
 use super::Store;
 use super::disk::{component, place, refused, remove};

@@ -1,6 +1,4 @@
 //! Parquet files back to frames: the file's hash first, then schema and version, then the columns and the hash of what they hold.
-//!
-//! A table's Parquet file decoded: what it says of itself, its columns, and the hash of what they hold.
 
 use super::disk::refused;
 use super::frame::{Frame, FrameBuilder};

@@ -1,7 +1,5 @@
 //! The audit record of runs: `runs/<id>/manifest.json` and `events.jsonl`. Ids (ULIDs) and times are made by the caller.
 //!
-//! A manifest is sealed and names the seal of the run before it; every event carries the hash of all events up to it.
-//!
 //! Names for runs, `tags/<name>.json`: what is tagged is kept.
 
 use super::disk::{component, entries, make_dir, place, refused};

@@ -1,6 +1,4 @@
 //! Everything in a store read and rehashed: objects by their names, records and manifests by their seals, the copies for people.
-//!
-//! Taking away what nothing keeps: action records first, then objects that no record names. Never by itself, never anything young.
 
 use crate::error::{Error, Fault, Result};
 use crate::store::actions::ActionRecord;

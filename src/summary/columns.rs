@@ -1,6 +1,4 @@
 //! The tables of a run with their columns: those of one kind together, since they have the same.
-//!
-//! The library of effects for other programs.
 
 use crate::audit::{QueryColumn, QueryTable};
 use crate::effect::Cause;

@@ -1,6 +1,4 @@
 //! An answer for a person: columns below each other, numbers with the digits that tell something, as wide as the terminal.
-//!
-//! An answer for other programs: CSV and JSON, numbers to the last digit, every row.
 
 use super::screen::cut;
 use crate::audit::{QueryResult, QueryValue};

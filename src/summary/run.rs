@@ -1,13 +1,4 @@
 //! A run as its manifest has it, and a stage of it.
-//!
-//! Why a stage ran, or did not.
-//!
-//! A pipeline as it was understood: its stages, what they read and write.
-//!
-//! What a fit of base and geometry says of a recording before anything is run in earnest: rows that are used and not, ranges, what is warned
-//! of, what will be observable.
-//!
-//! What the reports of a run say of the limits that the user set: a line each, and whether all are kept.
 
 use crate::audit::Explanation;
 use crate::error::{Error, Result};

@@ -1,6 +1,4 @@
 //! The difference of two runs as a short text: what was put in differently, and what came out of it, table by table.
-//!
-//! What two runs say about the rivals of their findings: which of them later measurements decided, and how.
 
 use crate::audit::{RunAddress, RunDiff, TableChange};
 use crate::diff::{ColumnDiff, TableDiff, headline, short};

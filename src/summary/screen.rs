@@ -1,8 +1,4 @@
 //! The lines of a result, as `run` and `diagnose` print them: 100 columns at most.
-//!
-//! A formula that a diagnosis proposes, as a file of an effect of one's own.
-//!
-//! Lines of a result: a label, then text; on a terminal long ones are broken at spaces and indented.
 
 use super::found::ShortFinding;
 use crate::effect::{EffectDeclaration, ShapeRange};

@@ -1,6 +1,4 @@
 //! The verdict of a diagnosis of commands and responses, with errors before and after.
-//!
-//! Noise and errors of the simulated angle of each joint. Its findings, numbers and rivals are tables that other diagnoses have, too.
 
 use super::findings::{beside_findings, ranked};
 use super::{

@@ -1,12 +1,4 @@
 //! What a diagnosis found, its numbers, and what would explain the data as well: three tables linked by the finding's rank.
-//!
-//! Where the residual sits and what it depends on, before and after the findings: three tables.
-//!
-//! Formulas for findings without a name, with their numbers.
-//!
-//! The verdict of a diagnosis, with errors before and after.
-//!
-//! What a diagnosis says in addition to its verdict.
 
 use crate::diagnose::{Diagnosis, ErrorLengths, Located, VerdictKind};
 use crate::dynamics::TorqueDiagnosis;

@@ -1,6 +1,4 @@
 //! An arm that moves: joints and their torques or motor currents, in the order of time. SI in Rust, mm and rad in the table.
-//!
-//! Measured and predicted torques over time.
 
 use crate::dynamics::TorqueDiagnosis;
 use crate::error::Result;

@@ -1,6 +1,4 @@
 //! What the data of a fit could see: rank, singular values, condition, observability indices O1-O5.
-//!
-//! The course of a least-squares fit: convergence as data.
 
 use super::{Fit, FitRow, Observability, ObservabilityRow};
 use crate::estimate::{Fitted, Repeated};

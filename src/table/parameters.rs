@@ -1,6 +1,4 @@
 //! The identified model: every parameter by name, with its status.
-//!
-//! The covariance of the estimated parameters, from the rows that they were fitted to.
 
 use super::prediction::joined;
 use super::{CovarianceRow, CovarianceTable, ParameterRow, Parameters};

@@ -1,10 +1,4 @@
 //! Where a model puts every measured point, and what is left.
-//!
-//! Rows that no smooth model can follow, by name and kind: set aside, and never silently dropped.
-//!
-//! Position error by step and set; held-out and training rows apart.
-//!
-//! The rivals of a learned correction, as cross-validation within the training rows judged them.
 
 use crate::error::counted;
 use crate::estimate::{Covariance, Fitted, Model, Screening, Suspect, SuspectKind};

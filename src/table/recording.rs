@@ -1,8 +1,4 @@
 //! The recording: joints as commanded or logged, and what was measured of the tool. SI in Rust, mm and rad in the table.
-//!
-//! Which row serves what.
-//!
-//! Points of a recording as the numerics see them.
 
 use super::Split;
 use crate::error::{Error, Result, instead};

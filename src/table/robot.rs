@@ -1,8 +1,4 @@
 //! The robot as a table: base, joints, tool; at the zero pose in the base frame.
-//!
-//! How the controller counts its joints, as a table.
-//!
-//! Whose model a table is: the robot's name, and a hash of its kinematics, without which numbers of one arm would move another.
 
 use super::{JointConventionRow, JointConventions, Parameters, Robot, RobotRow, TorqueParameters};
 use crate::description::{

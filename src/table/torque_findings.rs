@@ -1,18 +1,4 @@
 //! What a diagnosis of torques found, its numbers, and what would explain the data as well: three tables linked by the finding's rank.
-//!
-//! Noise and errors of the torque of each joint.
-//!
-//! The verdict of a diagnosis of torques, with errors before and after.
-//!
-//! Torque of friction over velocity, joint by joint.
-//!
-//! Masses, first moments and inertias of the links, as the torques show them.
-//!
-//! Times in which something pushed on the arm.
-//!
-//! Whether identified inertial numbers are those of bodies.
-//!
-//! What changed between two recordings of an arm's torques.
 
 use super::findings::{beside_findings, ranked};
 use super::{

@@ -1,6 +1,4 @@
 //! Which column of the targets holds what, by its name: `q1_deg`, `A1_deg`, `x_mm`, `qw`, `a_deg`, `payload_kg`, `temp_c`, `dir1`, ...
-//!
-//! One row of targets as numbers, and what holds of the rows of a whole table.
 
 use super::Layout;
 use crate::compensate::{CommandTarget, Stated, turns, unstated_payload};

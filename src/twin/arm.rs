@@ -2,10 +2,6 @@
 //!
 //! Frame j sits on body j with its origin on the axis of joint j; at the zero pose of the nominal arm it is parallel to the base.
 //! `T_j = T_(j-1) * (span and elastic motion of link j-1) * (motion of joint j)`.
-//!
-//! What effects add to the arm in one row.
-//!
-//! Statics: forces and moments summed over bodies.
 
 use crate::matrix;
 use crate::matrix::{IDENTITY, Matrix, Vector};

@@ -1,7 +1,4 @@
 //! Rigid motions as plain 4x4 arrays, and the few vector operations that statics needs.
-//!
-//! What remains of an effect in data when other causes have absorbed what they can: columns less their shadow on the space of the others
-//! (modified Gram-Schmidt, twice).
 
 /// A homogeneous transform, rows first.
 pub(crate) type Matrix = [[f64; 4]; 4];

@@ -1,6 +1,4 @@
 //! What an arm lived through before a row, for effects with memory: straight ways in joint space, time and temperature.
-//!
-//! A row that repeats the one before was reached as that one was: the arm went back to where it came from, and came again.
 
 use super::plan::Point;
 

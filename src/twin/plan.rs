@@ -2,8 +2,6 @@
 //!
 //! Each pose is the best of several random ones: the one whose tool point lies farthest from the block's earlier points
 //! (Mitchell's best candidate), so that points spread over the workspace instead of crowding where many postures reach.
-//!
-//! Poses that are given instead of drawn, as somebody proposed them: joints, the side from which each joint comes, the load.
 
 use crate::arm::{Arm, Motion, Row};
 use crate::matrix;

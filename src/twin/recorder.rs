@@ -1,7 +1,5 @@
 //! The experiment: every planned point settled, seen by the tracker, with the currents that the controller would log; or a way of
 //! the moving arm, on which statics hold all the same: it is slow against its own vibrations.
-//!
-//! The posture in which the deflected arm carries its loads.
 
 use super::arm::{Arm, Link, Loads, Motion, Posture, Row};
 use super::effect::{self, JointCompliance, Physical, State};

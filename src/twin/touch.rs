@@ -1,7 +1,5 @@
 //! Recordings without an instrument: the ball on the tool is brought to sockets, planes and spheres that stand about the robot, and
 //! nothing but the joints is written down.
-//!
-//! A posture is found by Newton's steps on the settled arm, by differences of its own tool point, from a random one.
 
 use super::matrix::{self, Vector};
 use super::noise::{Noise, Purpose};

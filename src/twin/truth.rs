@@ -2,8 +2,6 @@
 //!
 //! Joint i stands at `offset_i + k_i (q_i - sum c_ij q_j) + sum k_j (c_ij + e_ij) q_j`, where c_ij is the nominal coupling (the
 //! motion of joint i caused by joint j, which the controller takes out) and e_ij its error.
-//!
-//! What is true of a recording, number by number.
 
 use super::matrix::Vector;
 use calib_foundation::description::{JointKind, RobotDescription};

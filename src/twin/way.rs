@@ -1,6 +1,4 @@
 //! A way through joint space, smooth and at random: waves that never stop, or moves from pose to pose by polynomials of fifth degree.
-//!
-//! How joints move while torques are recorded: sums of sines that begin and end at rest, and moves from point to point with pauses.
 
 use super::arm::Arm;
 use super::noise::{Noise, Purpose};

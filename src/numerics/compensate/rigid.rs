@@ -1,6 +1,4 @@
 //! The rigid part of an identified model as a robot description of its own: what other programs can take over.
-//!
-//! Lengths, twists, zeros and the tool are constants on the chain, so that the screws at the corrected zero pose hold them exactly.
 
 use super::arm::IdentifiedArm;
 use super::solve::{Chain, parts};

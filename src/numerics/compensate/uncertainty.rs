@@ -1,6 +1,4 @@
 //! How certain a compensated position is: the covariance of the parameters, carried to the point.
-//!
-//! How certain a correction is, and which finding leaves it open.
 
 use crate::compensate::arm::{BeyondFitted, IdentifiedArm, Reach};
 use crate::effect::{Place, names};

@@ -1,7 +1,4 @@
 //! How rare causes are, and how many forms of a kind are tried, where that is no count of what is listed beside it.
-//!
-//! A form's price is twice the logarithm of how many like it are tried at its place, and a class of rarity, -2 ln of its odds beside
-//! the commonest causes. Classes are by a rule of thumb: one in 3, 7, 20 and 150.
 
 use super::criterion::{CriterionValue, criteria};
 

@@ -1,7 +1,4 @@
 //! Folds of the rows to fit: how well poses are predicted by a fit that did not see them. Rows that are held out for validation take no part.
-//!
-//! Models with causes left out or with another one, judged by folds of the rows in a linear picture: an effect is small, so that its
-//! coefficients change the points in proportion. What is to change the model is fitted afterwards.
 
 use crate::criteria::judge::FOLDS;
 use crate::estimate::{FoldKind, NearbyFits, Session, dealt, gather};

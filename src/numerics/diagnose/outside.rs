@@ -1,7 +1,4 @@
 //! A recording beside another simulation: the mismatch is measured minus simulated, whatever the simulation knows.
-//!
-//! Points are moved by what the simulation differs from the rigid arm of the robot file, whose Jacobians then serve: what is left of a
-//! moved point is what the simulation leaves of the measured one.
 
 use crate::estimate::{align, align_points};
 use crate::robot::{Measurements, RobotModel};

@@ -1,7 +1,4 @@
 //! Torques that a planned motion needs, by the identified model: differentiated and composed as the recording was.
-//!
-//! What is refused though it can be computed: torques of which the model is less certain than they differ from those of the declared arm.
-//! One who insists gets them all the same, with a remark that says so.
 
 use super::arm::{DynamicArm, INERTIAL_NUMBERS};
 use super::cause::{TorqueForm, friction_of};

@@ -1,6 +1,4 @@
 //! What every cell of torques says of one robot given cells that its fleet has accepted: the numbers that a fleet sums.
-//!
-//! Causes that a robot shows by itself stay in its model; what they are worth is the evidence of each given all others.
 
 use super::cause::{TorqueForm, UNKNOWN};
 use super::cells::{CauseChoice, TorqueCell, TorqueComponent, TorqueState, TorqueTable, without};

@@ -1,6 +1,4 @@
 //! The identified model of an arm's torques as data: inertial numbers of the links, and the causes that add torque at joints.
-//!
-//! Friction of a joint over its velocity, with its band, is the sum of all laws of speed, which single ones may stand for in part alone.
 
 use super::arm::{INERTIAL_NUMBERS, inertial_name, inertial_unit};
 use super::cause::{

@@ -1,7 +1,4 @@
 //! A recording prepared for least squares: measured and rigid torque, base and forms in judged rows, and which of these count.
-//!
-//! Noise and its autocorrelation are taken from what a rich model leaves: the base and every smooth named form once, whether it acts or not.
-//! Taken from the present model it would be full of the very torque that is looked for.
 
 use super::arm::{DynamicArm, INERTIAL_NUMBERS};
 use super::cause::{

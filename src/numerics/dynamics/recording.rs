@@ -1,7 +1,5 @@
 //! Rows of torques as they were recorded: arrays in SI on the joint side, in the order of time; of those that may be longer than memory, rows
 //! come in blocks, as often as they are asked for. With their clock: its rate, and the runs of rows over which a filter may work.
-//!
-//! Rows that were lost one or a few at a time are made up between their neighbours, so that filters go on over them.
 
 use crate::error::{Result, counted};
 use crate::statistics::nearest;

@@ -1,10 +1,5 @@
 //! Shape numbers of what was found (speeds, times, travels): finer and finer grids about each, then all at once with the coefficients and the
 //! width over which the sign of friction turns, by steps of Gauss and Newton: one number after the other stays where two go together.
-//!
-//! They enter nonlinearly. Near the best ones the torque is linear in them: as further columns of the least squares they have a covariance
-//! with all coefficients, and what is not known of a shape is in the uncertainty of everything.
-//!
-//! The width is at first that under which base, viscous, Coulomb friction and offset leave least.
 
 use super::cause::{SHARE, ShapeSpan, TorqueForm};
 use super::columns::TorqueColumn;

@@ -1,7 +1,4 @@
 //! Which gravity the torques of slow rows show: the declared one, one from another side, or none, before any other cause is asked.
-//!
-//! At rest torques are linear in gravity: three numbers, and the friction of each joint beside them, are solved for by least squares, each joint
-//! in units of what a gravity from any side would load it with.
 
 use super::arm::DynamicArm;
 use super::newton_euler::at_rest_under;

@@ -1,7 +1,4 @@
 //! The steps of a diagnosis of torques, one after the other.
-//!
-//! Rows are left out, a block in time after the other: an angle, a product of angles or a time follows whatever is slow in a recording, and
-//! what has no name is kept only where it predicts rows that it was not fitted to. Held-out rows choose nothing.
 
 use super::arm::DynamicArm;
 use super::cause::UNKNOWN;

@@ -1,6 +1,4 @@
 //! Whitened rows of all columns and their inner products, formed once for one noise and one choice of rows.
-//!
-//! Noise of filtered torques: of each joint an autoregressive course, by which rows are whitened before least squares.
 
 use super::columns::{TorqueColumn, TorqueColumns};
 use super::recording::{add, dot};

@@ -1,7 +1,4 @@
 //! The names of causes that others refer to: as in tables and YAML, each written down once.
-//!
-//! A cause says in its file which others are parts of it, look like it or do the same. By these constants it does so without using their
-//! files, so that no two causes use each other.
 
 #![expect(missing_docs, reason = "a constant is named as what it holds")]
 

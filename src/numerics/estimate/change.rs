@@ -3,8 +3,6 @@
 //!
 //! All is linear about the robust fits. With what both recordings share eliminated by QR, the steps are judged one by one and
 //! taken in as long as they explain more than chance; sigmas include what the earlier recording did not know.
-//!
-//! Parameters as people know them: where base, targets and anchors stand, and of all others the change from nominal.
 
 use crate::effect::names;
 use crate::estimate::factor::{TriangularFactor, axpy};

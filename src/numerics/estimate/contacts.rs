@@ -1,8 +1,5 @@
 //! Rows of contacts: joints at which everything closes, at which what such data show is counted; places that no fitted row has, put where the
 //! left-out rows say; a ball that was put back elsewhere on the tool.
-//!
-//! With the residuals left in, the scale of the arm and rotations of the cell look seen, by as much as the points scatter: the scatter
-//! of an arm that is a little smaller is a little smaller.
 
 use super::factor::TriangularFactor;
 use super::fit::{Session, fit};

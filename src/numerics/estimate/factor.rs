@@ -1,6 +1,4 @@
 //! The triangular factor of a tall least-squares problem, built chunk by chunk: bounded memory, no squared condition number.
-//!
-//! Upper triangular matrices, column after column in one piece of memory: factors, their inverses, roots of covariances.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::matmul::triangular::{self, BlockStructure};

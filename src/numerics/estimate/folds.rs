@@ -5,8 +5,6 @@
 //! A fold's fit is the whole one less the fold's rows, one step away ([`NearbyFits`]). Where that step is not small, the fit is repeated
 //! instead.
 //!
-//! Fits next to a fit, one Gauss-Newton step away: without some rows, and with parameters put to other values or left out.
-//!
 //! Without the rows of a part it is, of G = J R^-1 of these rows (R'R = J'J of all) and their errors e, the step R^-1 (1 - G'G)^-1
 //! (Q'r - G'e). Of a part only its own triangular factor is kept, which has the same G'G and G'e.
 

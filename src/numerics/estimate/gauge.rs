@@ -1,8 +1,4 @@
 //! Where targets and anchors are, as a start: targets by the median of the rows, or as stated; anchors as kinds place them.
-//!
-//! The base pose that puts the nominal robot on the measured points: Kabsch's solution, with far points trimmed.
-//!
-//! It starts from the three points that leave the smallest median error, so that nearly half of the points may be wrong.
 
 use crate::observation::{KINDS, kinds};
 use crate::robot::{Anchor, MeasurementSetup, Measurements, RobotModel, Target};

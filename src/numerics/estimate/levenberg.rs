@@ -1,6 +1,4 @@
 //! Levenberg-Marquardt on triangular factors: every way to stop is named, not converging is data.
-//!
-//! A model's step with what is known beforehand: priors as rows of the factor, bounds by an active set.
 
 use crate::estimate::factor::{TriangularFactor, axpy, norm};
 use crate::estimate::length::LengthTerm;

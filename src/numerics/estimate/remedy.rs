@@ -1,7 +1,4 @@
 //! What would show a parameter that the data do not determine: each possible measurement is tried on the model, no rule is written down.
-//!
-//! To the factor of recording and priors come poses all over the joints' ranges, the same with another payload, or with a second target
-//! off the last axis whose place on the tool is unknown too.
 
 use super::choose::even;
 use super::factor::TriangularFactor;

@@ -1,7 +1,4 @@
 //! How well the scale of an arm is known: by how much all lengths of what it measures may be larger together.
-//!
-//! In what errors of rows are compared: lengths where whole points alone were measured, else standard deviations, since lengths and angles
-//! have no common size.
 
 use crate::effect::{PlacedRow, PlacementBuffers, names};
 use crate::estimate::covariance::Covariance;

@@ -1,6 +1,4 @@
 //! What a row remembers of the rows before it: states that follow the order of measurement. Ways between stops are straight.
-//!
-//! Where a model was measured: ranges of joints, payload and temperature, and gaps inside the ranges that no row visited.
 
 use crate::robot::measurements::{Key, Measurements};
 use std::fmt;

@@ -1,6 +1,4 @@
 //! The robot as a product of exponentials: screws at the zero pose, forward kinematics (Eqs. 1-2 of the paper).
-//!
-//! How large a number of a robot, or of a target, may be: what is beyond is in another unit, damaged, or no robot's.
 
 use crate::description::{JointKind, RobotDescription};
 use crate::robot::measurements::Measurements;

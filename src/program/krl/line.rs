@@ -1,6 +1,4 @@
 //! Parts of a line of KRL: what it declares, what it sets, which braces belong together.
-//!
-//! Lines of KRL as steps of the order of execution.
 
 use super::super::flow::{FlowLine, FlowStep};
 use super::super::token::{Token, TokenKind};

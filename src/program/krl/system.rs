@@ -3,8 +3,6 @@
 //! `$BASE`, `$TOOL`, `$LOAD` are set by aggregates, by entries of `BASE_DATA`, `TOOL_DATA`, `LOAD_DATA`, by frames that are declared with their
 //! numbers, by `BAS(#BASE, n)` and `BAS(#TOOL, n)` (which takes the load of the same number), and by the data of a point (`FDAT`) that an inline
 //! form names: `FDAT_ACT=FP1` with `BAS(#PTP_PARAMS, ..)`, or `WITH $BASE=SBASE(FP1.BASE_NO), $TOOL=STOOL2(FP1)` for one motion.
-//!
-//! What is in force where a file of KRL moves to its targets.
 
 use super::super::flow::{Flow, FlowStep, JoinedState};
 use super::super::literal::{InForce, Reached, Setting, ToolInForce};

@@ -4,8 +4,6 @@
 //! `tooldata`: [robhold, tframe, tload]; `wobjdata`: [robhold, ufprog, ufmec, uframe, oframe]; `loaddata`: [mass, ...] (ABB, Technical
 //! reference manual RAPID). A work object is applied where it stands still and the program alone says where; the world frame is taken as
 //! the robot's base.
-//!
-//! What is in force where the files of a program in RAPID move to its targets.
 
 use super::super::literal::{InForce, Reached, Setting, ToolInForce, Words, settle};
 use super::super::token::{Token, TokenKind, arguments, over, quoted};

@@ -1,6 +1,4 @@
 //! Messages of ROS 2 as cells: which types are read, a row of a table each, and CDR (both orders of bytes, as DDS writes it).
-//!
-//! CDR is read here by hand: a dozen lines for each kind of value, without a description of types that must be compiled first.
 
 mod json;
 

@@ -1,7 +1,5 @@
 //! Which column of a file holds which quantity: the block `columns`, by the columns that a recording declares.
 //!
-//! What a person says about a raw file: how it is written, and which column holds which quantity in which unit.
-//!
 //! Nothing is guessed: an unmapped column is ignored, a mapped one that is not there is an error unless it is `optional`.
 
 use crate::observation::{ColumnShape, Convention, Conventions, DeclaredColumn};

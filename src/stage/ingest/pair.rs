@@ -1,6 +1,4 @@
 //! Duplicates within a file, and partners across several: every other file is joined to the first.
-//!
-//! A measurement: its files, and which rows of them are one row of the recording.
 
 use crate::observation::{KINDS, Part};
 use crate::stage::ingest::Ingest;

@@ -1,6 +1,4 @@
 //! The rows of the files of a measurement, each read once: what every row holds, in columns, and why some are not used.
-//!
-//! Memory: 8 bytes a number and row, the texts, and the beginning of each line where another row may still be a reason not to use it.
 
 use super::Ingest;
 use super::arm::{RobotJoints, Slots};

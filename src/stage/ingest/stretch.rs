@@ -1,6 +1,4 @@
 //! The clock of an arm that moves: stretches without a gap, and faults of the clock.
-//!
-//! ClockColumn times as text: a time of day, or a date with a time (ISO 8601, a blank for its T too).
 
 use jiff::Timestamp;
 use jiff::civil::{Date, DateTime, Time};

@@ -1,8 +1,6 @@
 //! `ingest_torques`: from raw files of an arm that moves to one table of motion, in one reading and in chunks.
 //!
 //! Rows keep their order. A stretch of the table is a trajectory without a gap of the clock; per file, accepted + rejected = read.
-//!
-//! What is odd about a column of torques or currents as a whole: it never changes, or stands at its largest value.
 
 use crate::error::{Error, Fault, Place, Result, counted};
 use crate::stage::ingest::arm::RobotJoints;

@@ -1,6 +1,4 @@
 //! One concealed recording: a drawn robot, its errors, its effects sized to be as visible as drawn, and what was measured.
-//!
-//! A case as text: what the user has (robot.json, controller.csv, tracker.csv), and the truth that is sealed apart.
 
 use super::design::{Content, Design};
 use super::family::{Bench, Collection, Column, Draft};

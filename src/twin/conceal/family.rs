@@ -1,7 +1,4 @@
 //! The families of effects that may be concealed, each in the form that a library expects and in others.
-//!
-//! A family draws effects of a natural size for the robot and the plan at hand; how large they end up is decided by how visible
-//! they are. Names and places are the canonical ones.
 
 pub(super) mod foreign;
 mod table;

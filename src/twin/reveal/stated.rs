@@ -1,8 +1,5 @@
 //! Counts as shares with their uncertainty, and stated probabilities against what was true: how often what is stated with a probability is
 //! right, and the mean squared error of it.
-//!
-//! Stated 95 % intervals against true numbers: the twin's numbers in the words and units of a diagnosis. Only numbers that mean the same in both
-//! are compared; a curve of another form has no true slope.
 
 use super::paper::{Atoms, Cause, Finding, Number};
 use calib_foundation::units::Unit;

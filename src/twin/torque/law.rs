@@ -1,7 +1,4 @@
 //! What rigid bodies leave out, by its physical definition: a row of [`laws`] each. Numbers are SI; joints count from 0.
-//!
-//! Rigid bodies on moving joints: accelerations from the base outwards, and for each joint the sum over the bodies beyond it of what
-//! moves them (d'Alembert), about the joint's axis. Base frame throughout; no recursion of forces, no regressor.
 
 use crate::matrix;
 use crate::matrix::{Matrix, Vector, add, cross, dot, minus, scale};

@@ -1,8 +1,4 @@
 //! A case measured: joints by encoders, torques by currents or sensors, with noise that lasts from row to row.
-//!
-//! A case as text: what the user has (robot.json, recording.csv), and the truth.
-//!
-//! A case once more: the same arm with further physics, on other paths or on a motion that is given, and its truth in numbers.
 
 use super::draw::{FITTED, TorqueCase, paths};
 use super::law::{Body, Fall, Law, Machine, Moment};

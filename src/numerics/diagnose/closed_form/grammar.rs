@@ -1,6 +1,4 @@
 //! The formulas that are tried for an error without a name: of one variable, or products of functions of two.
-//!
-//! Ranges are those of the kind of variable, not of the recording: a formula of one recording is one of another.
 
 use crate::criteria::closed_form::{ORDER, SPACING, TURNS};
 use crate::effect::{EffectDeclaration, Laws, ShapeRange, Starts, Variable};

@@ -1,6 +1,4 @@
 //! Every set-up error of the list tried: the recording without it, base and tool aligned anew, and what is left compared.
-//!
-//! Numbers that leave the robot file by more than manufacture errs: lengths by 2 %, angles by 2 deg, ratios by 1 %.
 
 use crate::criteria::setup::{
     ALIKE, BETTER, CLEARLY, CLOUD, GOOD, LENGTH, NOMINAL, OWN_NUMBERS, RATIO, SAME, SECOND, SHORT,

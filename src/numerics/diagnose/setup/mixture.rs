@@ -1,6 +1,4 @@
 //! Two set-ups in one recording: rows of two robots, or of one whose base, tool or tracker was changed on the way, read as one.
-//!
-//! Rows are dealt to two placements of the nominal robot, from several starts, until each row is with the placement that has it nearest.
 
 use super::placement::{Placement, place};
 use super::words::mm;

@@ -1,9 +1,5 @@
 //! The nominal robot placed on measured points: its base and where each target sits on the tool, and one number of the robot file where
 //! that is asked. Gauss-Newton from Kabsch's solution, with far points trimmed.
-//!
-//! Commanded joints with measured points, as the files say or as they would be with a set-up error mended.
-//!
-//! One number of the robot file that may be wrong: a length between two axes, the place of one axis, or the zero of a joint.
 
 use crate::criteria::setup::{SAMPLE, TRIM};
 use crate::estimate::align_points;

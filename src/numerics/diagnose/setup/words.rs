@@ -1,6 +1,4 @@
 //! Set-up errors in the words of an engineer, each with what mends it.
-//!
-//! What a diagnosis says of a wrong set-up: the nominal robot where its base fits best, the set-up error, and no physics.
 
 use crate::criteria::setup::{ARMS, FAR, NAMED, QUARTERLY, SMALL};
 use crate::effect::{ParameterEstimate, figure};

@@ -1,11 +1,7 @@
 //! The closed list of set-up errors, and what a recording is without one.
 //!
-//! Joints that a controller counts the other way together: makers reverse joints by the role of their axes, not one by one.
-//!
 //! Of an upright arm the axes of pitch are parallel to that of the first pitch joint, the others (swivel and roll) lie in the arm's
 //! plane: joints 1, 4 and 6 of the usual six, which are tried whatever the wrist. Then come all joints, and every two.
-//!
-//! Orders in which points and joints of two files are joined wrongly: shifted, reversed, or one of them sorted by name as text.
 
 use crate::criteria::setup::{FARTHEST, LONG, SHIFTS, SORTED};
 use crate::robot::RobotModel;

@@ -1,6 +1,4 @@
 //! What a recording cannot show whatever the truth, and what to measure so that it does.
-//!
-//! Findings that are no physics of the arm: rows that no model can follow, logs that are apart.
 
 use crate::criteria::screen::{BULK, MISTAKES};
 use crate::criteria::words::{FAULT, STILL};

@@ -1,7 +1,4 @@
 //! Motor currents as a second witness of the torque model: holding torque minus what the model says hangs there.
-//!
-//! Only parameters of the torque model (payload, link moments, balancers) can explain it. Bias and friction by direction of
-//! approach are each motor's own; a motor whose current does not follow the model at all is not usable.
 
 use crate::criteria::noise::CURRENTS;
 use crate::effect::PointMotion;

@@ -1,8 +1,4 @@
 //! Friction of one joint by its velocity: viscous, Coulomb, and what modifies them.
-//!
-//! Gears of a wrist that turn with two joints: friction of the sum of two velocities, felt by both.
-//!
-//! Friction without a name: curves of speed, and friction that is greater at some angles.
 
 use super::angle::{UNKNOWN, ends};
 use super::{

@@ -1,7 +1,4 @@
 //! Postures in which sockets are to hold a ball, so that joints alone determine the arm: D-optimal, given the priors.
-//!
-//! Candidates are random postures whose joints were moved until the ball lies in the socket: turns of the wrist about the ball, flips, and the
-//! motions of a redundant arm that leave the ball where it is.
 
 use super::exchange::{Criterion, DesignTerm};
 use super::point_jacobian::{PointJacobian, factor, gather};

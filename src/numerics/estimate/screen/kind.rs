@@ -1,7 +1,5 @@
 //! What a row that stands out is: exchanged, mislabelled, shifted, in another unit, a zero, part of an event, or none of these.
 //!
-//! How far every row stands from what the other rows say: the leave-one-out residual against its own covariance.
-//!
 //! Whitened residual e, leverage H = J (J'WJ)^-1 J', Huber weight w: left out, e becomes (1 - wH)^-1 e, of covariance
 //! 1 + H (1 - wH)^-1. Rows that were not fitted have w = 0.
 

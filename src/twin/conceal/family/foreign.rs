@@ -1,6 +1,4 @@
 //! Effects drawn at random, so that no list holds them: any shape over any variable in any direction of motion.
-//!
-//! Effects that are in no list: a diagnosis should say where they sit and what they look like, and give them no name.
 
 use super::{Bench, Column, Draft, joint, link};
 use crate::effect::{
