@@ -23,12 +23,7 @@ pub(super) fn section(locale: &Locale, tables: &Tables, steps: &Steps) -> Value 
                 .collect(),
         })
         .collect();
-    // The networks of an ensemble differ by chance alone: the swarm and the first of them tell how training went.
-    let courses = tables
-        .training
-        .iter()
-        .flat_map(|t| &t.0)
-        .filter(|row| row.member <= 1);
+    let courses = tables.training.iter().flat_map(|t| &t.0);
     let trainings = groups(courses, |row: &TrainingRow| {
         (row.step.clone(), row.phase.clone())
     });

@@ -3,23 +3,19 @@
 //! Cross-validation within the training rows compares the rivals, "no correction" among them; the best is kept if its gain is clear,
 //! else the table `network` stays empty and the prediction is what it was. The table `corrections` says how all of them did.
 //! Outside the region of its training rows a correction fades to zero.
-//!
-//! The tables of `learn`: how the rivals compare, the course of a network's training, and predictions with the correction on top.
 
 use crate::error::{Error, Place, Result, counted};
 use crate::estimate::network::correction::features;
 use crate::estimate::network::rivals::{RivalComparison, RivalContest, fits, learn};
 use crate::estimate::network::{
-    Activation, JudgedRival, OUTPUTS, Phase, Recipe, Rival, ScrewArm, TrainingSamples,
-    TrainingStart, TrainingStep, compare,
+    Activation, JudgedRival, OUTPUTS, Phase, Recipe, Rival, TrainingSamples, TrainingStart,
+    TrainingStep, compare,
 };
-use crate::estimate::swarm::Algorithm;
-use crate::robot::RobotModel;
 use crate::stage::{Context, Stage};
 use crate::statistics::nearest;
 use crate::table::{
-    Corrections, CorrectionsRow, Network, Parameters, Prediction, PredictionRow, Recording, Robot,
-    Split, Training, TrainingRow,
+    Corrections, CorrectionsRow, Network, Prediction, PredictionRow, Recording, Split, Training,
+    TrainingRow,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,14 +24,12 @@ use serde::{Deserialize, Serialize};
 const FEWEST: usize = 30;
 /// Rows whose residual is so many times the median are mistakes in the recording, not what a smooth correction is for.
 const FAR: f64 = 6.0;
-/// Decays, and sizes of the hidden layer, to choose from.
+/// Decays to choose from.
 const DECAYS: [f64; 5] = [0.1, 0.3, 1.0, 3.0, 10.0];
-const HIDDEN: [usize; 3] = [6, 12, 24];
 /// Generations of the swarm in each fold of the cross-validation: the start matters less there than the time.
 const FOLD_GENERATIONS: usize = 40;
-/// Rows times iterations times networks that the cross-validation may cost: about 20 s on one core in the dev profile. Long
-/// recordings have fewer networks per fold, then fewer iterations, but not below [`FOLD_ITERATIONS`].
-const FOLD_WORK: usize = 20_000_000;
+/// Rows times iterations that the networks of a fold may cost: long recordings have fewer iterations, but not below [`FOLD_ITERATIONS`].
+const FOLD_WORK: usize = 1_000_000;
 const FOLD_ITERATIONS: usize = 60;
 
 /// Settings of `learn`.
@@ -52,13 +46,11 @@ pub struct Learn {
     pub(crate) inputs: Inputs,
     /// Whether they also see the payload; the recording must have it in every row to train on.
     pub(crate) payload: bool,
-    /// Neurons of the hidden layer; chosen by cross-validation if not given.
-    pub(crate) hidden: Option<usize>,
+    /// Neurons of the hidden layer.
+    pub(crate) hidden: usize,
     /// Activation of the hidden layer.
     pub(crate) activation: Activation,
-    /// Networks whose mean is the correction.
-    pub(crate) ensemble: usize,
-    /// Beetles of the swarm that finds where the gradient training starts; other swarms may spend as much.
+    /// Beetles of the swarm that finds where the gradient training starts.
     pub(crate) beetles: usize,
     /// Generations of the swarm.
     pub(crate) generations: usize,
@@ -67,7 +59,7 @@ pub struct Learn {
     /// Weight decay: half of it times the squared weights stands beside half the squared standardised errors of all rows. Chosen by
     /// cross-validation if not given.
     pub(crate) decay: Option<f64>,
-    /// Share of the training rows that each network keeps back to stop in time, below 0.5. With the decay chosen by cross-validation the
+    /// Share of the training rows that a network keeps back to stop in time, below 0.5. With the decay chosen by cross-validation the
     /// rows are worth more in training than kept back, hence 0.
     pub(crate) keep_back: f64,
     /// Folds of the cross-validation.
@@ -81,15 +73,13 @@ impl Default for Learn {
             rivals: vec![
                 RivalSetting::Ridge,
                 RivalSetting::GaussianProcess,
-                RivalSetting::Curves,
                 RivalSetting::Mlp,
             ],
             starts: vec![StartSetting::Random, StartSetting::Bso],
             inputs: Inputs::Joints,
             payload: false,
-            hidden: None,
+            hidden: 12,
             activation: Activation::Sigmoid,
-            ensemble: 8,
             beetles: 50,
             generations: 200,
             iterations: 200,
@@ -108,12 +98,8 @@ pub(crate) enum RivalSetting {
     Ridge,
     /// A smooth function of the inputs with a length for each.
     GaussianProcess,
-    /// A curve for each joint, small motions of links and wind-up by weight, through the Jacobian.
-    Curves,
-    /// Networks with one hidden layer, a displacement of the point as their output.
+    /// A network with one hidden layer, a displacement of the point as its output.
     Mlp,
-    /// The same with joint motions as their outputs, through the Jacobian.
-    MlpJoints,
 }
 
 /// Where the training of networks starts.
@@ -122,28 +108,16 @@ pub(crate) enum RivalSetting {
 pub(crate) enum StartSetting {
     /// Anywhere.
     Random,
-    /// At what beetle antennae search found.
-    Bas,
     /// At what a beetle swarm found, as in the paper.
     Bso,
-    /// At what a particle swarm found.
-    Pso,
-    /// At what a genetic algorithm found.
-    Ga,
-    /// At what a bee colony found.
-    Abc,
 }
 
 impl From<StartSetting> for TrainingStart {
     fn from(setting: StartSetting) -> Self {
-        Self::Swarm(match setting {
-            StartSetting::Random => return Self::Random,
-            StartSetting::Bas => Algorithm::Bas,
-            StartSetting::Bso => Algorithm::Bso,
-            StartSetting::Pso => Algorithm::Pso,
-            StartSetting::Ga => Algorithm::Ga,
-            StartSetting::Abc => Algorithm::Abc,
-        })
+        match setting {
+            StartSetting::Random => Self::Random,
+            StartSetting::Bso => Self::Swarm,
+        }
     }
 }
 
@@ -158,12 +132,10 @@ pub(crate) enum Inputs {
 }
 
 crate::stage::stage! {
-    Learn, "learn", 8, "learns the residual of the model: compares several corrections, and keeps the best only where it helps",
+    Learn, "learn", 9, "learns the residual of the model: compares several corrections, and keeps the best only where it helps",
         LearnReads {
-            robot: Option<Robot>,
             recording: Recording,
             split: Split,
-            parameters: Option<Parameters>,
             prediction: Prediction,
         } -> LearnWrites {
             network: Network,
@@ -176,22 +148,19 @@ crate::stage::stage! {
 impl Stage for Learn {
     fn faults(&self, at: &mut Place) {
         crate::stage::must_name_sets(&self.on, "learn", at);
-        at.at("hidden").whole(self.hidden.unwrap_or(1), 1..=200);
-        at.at("ensemble").whole(self.ensemble, 1..=100);
+        at.at("hidden").whole(self.hidden, 1..=200);
         at.at("beetles").whole(self.beetles, 1..=1000);
         at.at("generations").whole(self.generations, 0..=10_000);
         at.at("iterations").whole(self.iterations, 1..=10_000);
         at.at("folds").whole(self.folds, 2..=20);
         at.at("rivals").must(
             !self.rivals.is_empty(),
-            "expected at least one of ridge, gaussian_process, curves, mlp, mlp_joints",
+            "expected at least one of ridge, gaussian_process, mlp",
         );
-        let mut rivals = self.rivals.iter();
-        let trains =
-            rivals.any(|rival| matches!(rival, RivalSetting::Mlp | RivalSetting::MlpJoints));
+        let trains = self.rivals.contains(&RivalSetting::Mlp);
         at.at("starts").must(
             !(self.starts.is_empty() && trains),
-            "expected at least one of random, bas, bso, pso, ga, abc",
+            "expected at least one of random, bso",
         );
         let (share, decay) = (self.keep_back, self.decay.unwrap_or_default());
         at.at("keep_back").must(
@@ -210,10 +179,8 @@ impl Stage for Learn {
 
     fn run(&self, reads: LearnReads, context: &Context) -> Result<LearnWrites> {
         let LearnReads {
-            robot,
             recording,
             split,
-            parameters,
             prediction,
         } = reads;
         let sequence = prediction.0.iter().map(|row| row.sequence);
@@ -221,14 +188,6 @@ impl Stage for Learn {
             let message = "does not belong to this recording: their sequence numbers differ";
             return Err(Error::data("table prediction", message));
         }
-        let arm = match robot.zip(parameters) {
-            Some((robot, parameters)) => {
-                let robot = RobotModel::new(robot.to_description()?);
-                Some(ScrewArm::of(&robot, &parameters.base_pose()))
-            }
-            None => None,
-        };
-        let arm = arm.filter(|arm| arm.hinges.len() == recording.joints);
         let mut rows = split.rows(&recording, &self.on)?;
         // What is learnt are displacements of points: rows of fewer axes or of distances have none.
         let asked = rows.len();
@@ -248,8 +207,7 @@ impl Stage for Learn {
                 .map(|row| residual(&prediction.0[*row]))
                 .collect(),
         };
-        let (network, corrections, training) =
-            self.learn(&samples, arm.as_ref(), &recording.prismatic, context);
+        let (network, corrections, training) = self.learn(&samples, &recording.prismatic, context);
         let prediction = corrected(&prediction, &network, &recording, &sources, &rows, context)?;
         Ok(LearnWrites {
             prediction,
@@ -281,15 +239,13 @@ impl Learn {
         Recipe {
             joints: prismatic.len(),
             features: features(prismatic, self.inputs == Inputs::SinCos, self.payload),
-            through: None,
-            hidden: self.hidden.unwrap_or(HIDDEN[1]),
+            hidden: self.hidden,
             activation: self.activation,
             start: TrainingStart::Random,
             beetles: self.beetles,
             generations: self.generations,
             iterations: self.iterations,
             decay: 1.0,
-            members: self.ensemble,
             keep_back: self.keep_back,
             seed: context.seed,
             jobs: context.jobs,
@@ -300,7 +256,6 @@ impl Learn {
     fn learn(
         &self,
         samples: &TrainingSamples,
-        arm: Option<&ScrewArm>,
         prismatic: &[bool],
         context: &Context,
     ) -> (Network, Corrections, Training) {
@@ -312,7 +267,7 @@ impl Learn {
             ));
             return Default::default();
         }
-        let contest = self.contest(rows, arm, prismatic, context);
+        let contest = self.contest(rows, prismatic, context);
         context
             .services
             .begin("comparing corrections", Some(fits(&contest) as u64), "fits");
@@ -344,46 +299,35 @@ impl Learn {
     fn contest<'a>(
         &self,
         rows: usize,
-        arm: Option<&'a ScrewArm>,
         prismatic: &'a [bool],
         context: &Context,
     ) -> RivalContest<'a> {
         let recipe = self.recipe(prismatic, context);
-        let decays = self.decay.map_or(DECAYS.to_vec(), |decay| vec![decay]);
-        let hidden = self.hidden.map_or(HIDDEN.to_vec(), |hidden| vec![hidden]);
-        let affordable = FOLD_WORK / (rows * decays.len() * hidden.len() * self.folds);
-        let members = (affordable / self.iterations).clamp(1, 3.min(self.ensemble));
-        let iterations = affordable.max(FOLD_ITERATIONS).min(self.iterations);
         let trial = Recipe {
             generations: self.generations.min(FOLD_GENERATIONS),
-            members,
-            iterations,
+            iterations: (FOLD_WORK / rows).max(FOLD_ITERATIONS).min(self.iterations),
             ..recipe.clone()
         };
-        let started = |rival: fn(TrainingStart) -> Rival| -> Vec<Rival> {
-            self.starts
-                .iter()
-                .map(|start| rival((*start).into()))
-                .collect()
-        };
-        let of_setting = |rival: &RivalSetting| match rival {
-            RivalSetting::Ridge => vec![Rival::Ridge],
-            RivalSetting::GaussianProcess => vec![Rival::Process],
-            RivalSetting::Curves => vec![Rival::Curves],
-            RivalSetting::Mlp => started(Rival::Network),
-            RivalSetting::MlpJoints => started(Rival::JointNetwork),
-        };
-        let rivals: Vec<Rival> = self.rivals.iter().flat_map(of_setting).collect();
-        let first = |k: &usize| !rivals[..*k].contains(&rivals[*k]);
-        let once = (0..rivals.len()).filter(first).map(|k| rivals[k]).collect();
+        let mut rivals: Vec<Rival> = Vec::new();
+        for rival in &self.rivals {
+            let starts = self.starts.iter().map(|start| (*start).into());
+            let these = match rival {
+                RivalSetting::Ridge => vec![Rival::Ridge],
+                RivalSetting::GaussianProcess => vec![Rival::Process],
+                RivalSetting::Mlp => starts.map(Rival::Network).collect(),
+            };
+            for rival in these {
+                if !rivals.contains(&rival) {
+                    rivals.push(rival);
+                }
+            }
+        }
         RivalContest {
-            rivals: once,
-            arm,
+            rivals,
             prismatic,
             recipe,
             trial,
-            decays,
-            hidden,
+            decays: self.decay.map_or(DECAYS.to_vec(), |decay| vec![decay]),
             folds: self.folds,
         }
     }
@@ -468,8 +412,8 @@ pub(crate) fn comparison_table(
             gain_sigma_mm: Some(sigma),
             numbers: judged.numbers as i64,
             evaluations: judged.evaluations as i64,
-            hidden: judged.settings.map(|settings| settings.0 as i64),
-            decay: judged.settings.map(|settings| settings.1),
+            hidden: judged.decay.map(|_| contest.recipe.hidden as i64),
+            decay: judged.decay,
         }
     };
     let mut rows: Vec<CorrectionsRow> = comparison.judged.iter().enumerate().map(row).collect();
@@ -481,19 +425,14 @@ pub(crate) fn comparison_table(
         step: step.into(),
         rival: rival.name().into(),
         chosen: false,
-        reason: match rival {
-            rival if rival.goes_through_the_jacobian() && contest.arm.is_none() => {
-                "the stage has no robot with these joints, or no parameters".into()
-            }
-            _ => "it could not be fitted to these rows".into(),
-        },
+        reason: "it could not be fitted to these rows".into(),
         before_mm: before,
         ..CorrectionsRow::default()
     }));
     Corrections(rows)
 }
 
-/// The course of a training as a comparison_table.
+/// The course of a training as a table.
 pub(crate) fn history(step: &str, course: Vec<TrainingStep>) -> Training {
     let rows = course.into_iter().map(|record| TrainingRow {
         step: step.into(),
@@ -501,7 +440,7 @@ pub(crate) fn history(step: &str, course: Vec<TrainingStep>) -> Training {
             Phase::Swarm => "swarm".into(),
             Phase::Gradient => "gradient".into(),
         },
-        member: record.member as i64,
+        member: i64::from(record.phase == Phase::Gradient),
         generation: record.index as i64,
         best: record.best,
         train_rms_mm: record.train_rms * 1e3,

@@ -1,18 +1,16 @@
-//! A learned correction of any kind (networks, a Gaussian process, or linear terms), its scaling, inputs and valid region.
+//! A learned correction of any kind (a network, a Gaussian process, or ridge on harmonics), its scaling, inputs and valid region.
 //!
 //! What a correction consists of stands in the rows of [`marks`] and is found again by [`shaped`]; [`visit`] names every number of it
 //! once, for writing and for reading. A number that is missing or stands twice refuses the table.
 
 use super::{Network, NetworkRow};
-use crate::error::{Error, Result, counted};
-use crate::estimate::network::arm::{Hinge, ScrewArm};
-use crate::estimate::network::basis::{BasisTerm, OutputMotion, Wave};
+use crate::error::{Error, Result};
 use crate::estimate::network::correction::{
-    Body, Correction, Feature, JointMotion, Map, NetworkScaling, Networks, Scaling,
+    Body, Correction, Feature, Map, NetworkScaling, Scaling,
 };
-use crate::estimate::network::linear::Linear;
 use crate::estimate::network::process::Process;
 use crate::estimate::network::region::{Jointly, Region, Valid};
+use crate::estimate::network::ridge::{Ridge, Term, Wave};
 use crate::estimate::network::{Activation, LayerSizes, OUTPUTS};
 use std::collections::BTreeMap;
 
@@ -67,7 +65,7 @@ impl Network {
             return Ok(None);
         }
         let numbers = Numbers::new(&self.0)?;
-        let mut correction = shaped(&numbers, prismatic)?;
+        let mut correction = shaped(&numbers)?;
         let mut read = |key: Key, unit: f64, value: &mut f64| {
             *value = numbers.of(key)? / unit;
             Ok(())
@@ -114,23 +112,11 @@ fn visit(correction: &mut Correction, prismatic: &[bool], each: &mut Each) -> Re
         }
     }
     match &mut correction.body {
-        Body::Networks(scaling, networks) => {
+        Body::Network(scaling, shape, parameters) => {
             visit_scaling(scaling, source_unit, each)?;
-            if let Some(motion) = &mut networks.joints {
-                visit_arm(&mut motion.arm, each)?;
-                for (joint, scale) in motion.scales.iter_mut().enumerate() {
-                    each(
-                        (0, "joint_scale", [0, joint + 1, 0]),
-                        source_unit(joint),
-                        scale,
-                    )?;
-                }
-            }
-            for (m, parameters) in networks.members.iter_mut().enumerate() {
-                for (index, value) in parameters.iter_mut().enumerate() {
-                    let (part, place) = place(networks.shape, index);
-                    each((m + 1, part, place), 1.0, value)?;
-                }
+            for (index, value) in parameters.iter_mut().enumerate() {
+                let (part, place) = place(*shape, index);
+                each((1, part, place), 1.0, value)?;
             }
         }
         Body::Process(scaling, process) => {
@@ -143,19 +129,11 @@ fn visit(correction: &mut Correction, prismatic: &[bool], each: &mut Each) -> Re
                 visit_row("alpha", r + 1, 1.0, alpha, each)?;
             }
         }
-        Body::Linear(linear) => {
-            each((0, "terms_noise", [0, 0, 0]), MILLI, &mut linear.noise)?;
-            if let Some(arm) = &mut linear.arm {
-                visit_arm(arm, each)?;
-            }
-            for (m, member) in linear.members.iter_mut().enumerate() {
-                for (t, (value, term)) in member.iter_mut().zip(&linear.terms).enumerate() {
-                    // Shifts in mm, turns in rad; per m of torque or travel where a wave is one.
-                    let unit = match term.way {
-                        OutputMotion::Along(_) | OutputMotion::Shift(..) => MILLI,
-                        OutputMotion::Turn(_) | OutputMotion::Tilt(..) => 1.0,
-                    };
-                    each((m + 1, "coefficient", [0, t + 1, 0]), unit, value)?;
+        Body::Ridge(ridge) => {
+            each((0, "terms_noise", [0, 0, 0]), MILLI, &mut ridge.noise)?;
+            for (m, member) in ridge.members.iter_mut().enumerate() {
+                for (t, value) in member.iter_mut().flatten().enumerate() {
+                    each((m + 1, "coefficient", [0, t + 1, 0]), MILLI, value)?;
                 }
             }
         }
@@ -195,18 +173,6 @@ fn visit_scaling(
     Ok(())
 }
 
-fn visit_arm(arm: &mut ScrewArm, each: &mut Each) -> Result<()> {
-    for (j, hinge) in arm.hinges.iter_mut().enumerate() {
-        visit_row("axis", j + 1, 1.0, &mut hinge.axis, each)?;
-        visit_row("point", j + 1, MILLI, &mut hinge.point, each)?;
-        let mut slides = if hinge.slides { 1.0 } else { 0.0 };
-        each((0, "slides", [0, j + 1, 0]), 1.0, &mut slides)?;
-        hinge.slides = slides != 0.0;
-    }
-    visit_row("tool", 0, MILLI, &mut arm.tool, each)?;
-    visit_row("down", 0, 1.0, &mut arm.down, each)
-}
-
 /// Where parameter `index` of a network stands in the table: part, and layer, to, from.
 fn place(shape: LayerSizes, index: usize) -> (&'static str, [usize; 3]) {
     let weight = |layer, index: usize, width| {
@@ -227,34 +193,30 @@ fn place(shape: LayerSizes, index: usize) -> (&'static str, [usize; 3]) {
 /// What a correction consists of, apart from its numbers: part, and layer, to, from.
 fn marks(body: &Body, mut mark: impl FnMut(&'static str, [usize; 3])) {
     match body {
-        Body::Networks(scaling, _) | Body::Process(scaling, _) => {
+        Body::Network(scaling, ..) | Body::Process(scaling, _) => {
             for (i, feature) in scaling.features.iter().enumerate() {
                 mark(name(&MAPS, feature.map), [0, i + 1, feature.source + 1]);
             }
         }
-        Body::Linear(linear) => {
-            for (t, term) in linear.terms.iter().enumerate() {
-                let (part, layer, from) = match term.way {
-                    OutputMotion::Along(axis) => ("along", 0, axis),
-                    OutputMotion::Turn(joint) => ("turn", 0, joint),
-                    OutputMotion::Shift(station, axis) => ("shift", station, axis),
-                    OutputMotion::Tilt(station, axis) => ("tilt", station, axis),
-                };
-                mark(part, [layer, t + 1, from + 1]);
-                for wave in &term.waves {
-                    let (part, layer, joint) = match *wave {
-                        Wave::Sin(joint, order) => ("sin", order, joint),
-                        Wave::Cos(joint, order) => ("cos", order, joint),
-                        Wave::Value(joint) => ("value", 0, joint),
-                        Wave::Torque(joint, body) => ("torque", body + 1, joint),
-                    };
-                    mark(part, [layer, t + 1, joint + 1]);
+        Body::Ridge(ridge) => {
+            for (t, term) in ridge.terms.iter().enumerate() {
+                for axis in 0..OUTPUTS {
+                    let to = OUTPUTS * t + axis + 1;
+                    mark("along", [0, to, axis + 1]);
+                    for wave in term {
+                        let (part, layer, joint) = match *wave {
+                            Wave::Sin(joint, order) => ("sin", order, joint),
+                            Wave::Cos(joint, order) => ("cos", order, joint),
+                            Wave::Value(joint) => ("value", 0, joint),
+                        };
+                        mark(part, [layer, to, joint + 1]);
+                    }
                 }
             }
         }
     }
-    if let Body::Networks(_, networks) = body {
-        mark(name(&ACTIVATIONS, networks.shape.activation), [0, 0, 0]);
+    if let Body::Network(_, shape, _) = body {
+        mark(name(&ACTIVATIONS, shape.activation), [0, 0, 0]);
     }
 }
 
@@ -264,7 +226,7 @@ fn name<T: PartialEq>(names: &[(T, &'static str)], value: T) -> &'static str {
 }
 
 /// A correction of the shape that the rows have, its numbers still zero.
-fn shaped(numbers: &Numbers, prismatic: &[bool]) -> Result<Correction> {
+fn shaped(numbers: &Numbers) -> Result<Correction> {
     let nothing = Valid {
         lower: 0.0,
         upper: 0.0,
@@ -282,7 +244,7 @@ fn shaped(numbers: &Numbers, prismatic: &[bool]) -> Result<Correction> {
         margin: 0.0,
     });
     let body = if numbers.has("coefficient") {
-        Body::Linear(linear(numbers, sources)?)
+        Body::Ridge(ridge(numbers, sources)?)
     } else {
         let scaling = scaling(numbers, sources)?;
         let inputs = scaling.features.len();
@@ -295,7 +257,7 @@ fn shaped(numbers: &Numbers, prismatic: &[bool]) -> Result<Correction> {
                 process.expect("a matrix of noise alone is not singular"),
             )
         } else {
-            Body::Networks(scaling, networks(numbers, inputs, prismatic)?)
+            network(scaling, numbers)?
         }
     };
     Ok(Correction {
@@ -331,102 +293,62 @@ fn scaling(numbers: &Numbers, sources: usize) -> Result<NetworkScaling> {
     })
 }
 
-fn networks(numbers: &Numbers, inputs: usize, prismatic: &[bool]) -> Result<Networks> {
+fn network(scaling: NetworkScaling, numbers: &Numbers) -> Result<Body> {
     let activation = ACTIVATIONS.iter().find(|(_, name)| numbers.has(name));
     let (activation, _) = activation.ok_or_else(|| fault("neither `sigmoid` nor `tanh`"))?;
-    let joints = numbers.has("joint_scale").then(|| JointMotion {
-        arm: arm(numbers),
-        scales: vec![0.0; numbers.count("slides")],
-    });
-    let outputs = joints
-        .as_ref()
-        .map_or(OUTPUTS, |motion| motion.scales.len());
-    if joints.is_some() && outputs != prismatic.len() {
+    let count = numbers.members("bias");
+    if count != 1 {
         return Err(fault(format!(
-            "motions of {}, of a robot that has {}",
-            counted(outputs, "joint"),
-            prismatic.len()
+            "{count} networks where one is read: learn anew"
         )));
     }
     let shape = LayerSizes {
-        inputs,
-        // The first member's biases are those of the hidden layer and of the outputs.
-        hidden: numbers.of_member(1, "bias").saturating_sub(outputs),
-        outputs,
+        inputs: scaling.features.len(),
+        // The biases are those of the hidden layer and of the outputs.
+        hidden: numbers.of_member(1, "bias").saturating_sub(OUTPUTS),
         activation: *activation,
     };
-    let members = numbers.members("bias");
-    numbers.hold(members.saturating_mul(shape.parameters()))?;
-    Ok(Networks {
-        shape,
-        joints,
-        members: vec![vec![0.0; shape.parameters()]; members],
-    })
+    numbers.hold(shape.parameters())?;
+    Ok(Body::Network(scaling, shape, vec![0.0; shape.parameters()]))
 }
 
-fn linear(numbers: &Numbers, sources: usize) -> Result<Linear> {
-    let arm = numbers.has("tool").then(|| arm(numbers));
-    let joints = arm
-        .as_ref()
-        .map_or(sources, |arm| arm.hinges.len().min(sources));
-    let within = |value: i64, count: usize| {
-        let found = index(value, 1)?;
-        let known = (found < count).then_some(found);
-        known.ok_or_else(|| fault(format!("no joint, body or axis {value}")))
+/// Terms stand one an axis: `to` counts the axes of each in turn.
+fn ridge(numbers: &Numbers, joints: usize) -> Result<Ridge> {
+    let within = |value: i64| {
+        let joint = index(value, 1)?;
+        let known = (joint < joints).then_some(joint);
+        known.ok_or_else(|| fault(format!("no joint {value}")))
     };
-    let mut terms: BTreeMap<i64, BasisTerm> = BTreeMap::new();
-    for part in ["along", "turn", "shift", "tilt"] {
-        for (layer, to, from) in numbers.shared(part) {
-            let station = index(layer, 0)?;
-            if station > joints {
-                return Err(fault(format!("no station {station}")));
-            }
-            let way = match part {
-                "along" => OutputMotion::Along(within(from, 3)?),
-                "turn" => OutputMotion::Turn(within(from, joints)?),
-                "shift" => OutputMotion::Shift(station, within(from, 3)?),
-                _ => OutputMotion::Tilt(station, within(from, 3)?),
-            };
-            let waves = Vec::new();
-            terms.insert(to, BasisTerm { way, waves });
-        }
+    let axes = numbers.shared("along");
+    let axis = |t: i64| (0, t + 1, t % OUTPUTS as i64 + 1);
+    let in_turn = axes.iter().zip(0..).all(|(at, t)| *at == axis(t));
+    if axes.len() % OUTPUTS != 0 || !in_turn {
+        return Err(fault("`along` is not three axes for each term"));
     }
-    for part in ["sin", "cos", "value", "torque"] {
+    let mut terms: Vec<Term> = vec![Vec::new(); axes.len() / OUTPUTS];
+    for part in ["sin", "cos", "value"] {
         for (layer, to, from) in numbers.shared(part) {
-            let joint = within(from, joints)?;
+            let (joint, order) = (within(from)?, index(layer, 0)?);
             let wave = match part {
-                "sin" => Wave::Sin(joint, index(layer, 0)?),
-                "cos" => Wave::Cos(joint, index(layer, 0)?),
-                "value" => Wave::Value(joint),
-                _ => Wave::Torque(joint, within(layer, joints)?),
+                "sin" => Wave::Sin(joint, order),
+                "cos" => Wave::Cos(joint, order),
+                _ => Wave::Value(joint),
             };
-            let term = terms.get_mut(&to);
+            let at = index(to, 1)?;
+            let term = terms.get_mut(at / OUTPUTS);
             let term = term.ok_or_else(|| fault(format!("a wave of term {to}, which is none")))?;
-            term.waves.push(wave);
+            if at % OUTPUTS == 0 {
+                term.push(wave);
+            }
         }
     }
-    let terms: Vec<BasisTerm> = terms.into_values().collect();
     let members = numbers.members("coefficient");
-    numbers.hold(members.saturating_mul(terms.len()))?;
-    Ok(Linear {
-        arm,
-        members: vec![vec![0.0; terms.len()]; members],
+    numbers.hold(members.saturating_mul(axes.len()))?;
+    Ok(Ridge {
+        members: vec![vec![[0.0; OUTPUTS]; terms.len()]; members],
         noise: 0.0,
         terms,
     })
-}
-
-fn arm(numbers: &Numbers) -> ScrewArm {
-    let nothing = Hinge {
-        axis: [0.0; 3],
-        point: [0.0; 3],
-        slides: false,
-    };
-    ScrewArm {
-        hinges: vec![nothing; numbers.count("slides")],
-        tool: [0.0; 3],
-        down: [0.0; 3],
-    }
 }
 
 /// Layer, to, from.

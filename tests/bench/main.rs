@@ -3,7 +3,6 @@
 //! - `cargo bench -- solve FILE` fits a problem that `compare.py` wrote and prints its time and held-out error as JSON;
 //! - `cargo bench -- curve [ROWS ...]` prints time and peak memory over the number of points;
 //! - `cargo bench -- fleet [ROBOTS]` prints CPU time of many robots, Parquet in and out, against that of their fits;
-//! - `cargo bench -- train FILE` trains the network on rows that `tests/reference/training_speed.py` wrote and prints times as JSON;
 //! - `cargo bench -- bare FILE ...` reads delimited files by the csv crate and nothing else (`tests/reference/ingest_speed.py`);
 //! - `cargo bench -- swarm` prints how often and how fast each swarm optimiser finds a known minimum.
 
@@ -23,7 +22,6 @@ mod fleet;
 mod problem;
 mod solve;
 mod swarm;
-mod train;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use nalgebra::Vector3;
@@ -44,7 +42,6 @@ fn main() {
                 .unwrap_or(1_000);
             fleet::fleet(robots).unwrap_or_else(|error| panic!("{error}"));
         }
-        Some((verb, files)) if verb == "train" => files.iter().for_each(|file| train::train(file)),
         Some((verb, files)) if verb == "bare" => bare::read(files),
         Some((verb, _)) if verb == "swarm" => swarm::table(),
         _ => criterion(),

@@ -86,7 +86,7 @@ const TRIALS: &[(&str, &str, &str)] = &[
     (
         "learn",
         "points",
-        "{rivals: [ridge, curves, mlp], starts: [bso], ensemble: 1, generations: 10, iterations: 20, folds: 2}",
+        "{rivals: [ridge, mlp], starts: [bso], generations: 10, iterations: 20, folds: 2}",
     ),
     ("optimise", "points", "{seeds: 2, evaluations: 1000}"),
     ("validate", "points", "{}"),

@@ -71,7 +71,6 @@ fn learn(
     desk: &Desk,
 ) -> Result<LearnWrites> {
     let (recording, split, prediction) = arm.clone();
-    let (robot, parameters) = (None, None);
     let context = Context {
         id: "network",
         seed: 11,
@@ -80,10 +79,8 @@ fn learn(
     };
     settings::<Learn>(settings_).run(
         LearnReads {
-            robot,
             recording,
             split,
-            parameters,
             prediction,
         },
         &context,
@@ -92,7 +89,7 @@ fn learn(
 
 /// Settings that train in a moment.
 fn quick() -> Value {
-    json!({"rivals": ["mlp"], "starts": ["bso"], "hidden": 12, "beetles": 10, "generations": 10, "ensemble": 2, "iterations": 80})
+    json!({"rivals": ["mlp"], "starts": ["bso"], "beetles": 10, "generations": 10, "iterations": 80})
 }
 
 #[test]
@@ -103,7 +100,7 @@ fn on_the_twin_the_network_leaves_about_what_the_paper_s_leaves() {
             let (_, prediction) = papers_sequence(&recorded);
             let before = (recorded.recording, recorded.split, prediction);
             let after = learn(
-                json!({"on": ["learn"], "rivals": ["mlp"], "starts": ["bso"], "hidden": 12, "generations": 20, "ensemble": 3}),
+                json!({"on": ["learn"], "rivals": ["mlp"], "starts": ["bso"], "generations": 20}),
                 &before,
                 2,
                 &Desk::default(),
@@ -111,7 +108,11 @@ fn on_the_twin_the_network_leaves_about_what_the_paper_s_leaves() {
             .unwrap()
             .prediction;
             let ratio = |set| mean_mm_of(&after, set) / mean_mm_of(&before.2, set);
-            println!("seed {seed}: training {:.3}, held out {:.3}", ratio("learn"), ratio("check"));
+            println!(
+                "seed {seed}: training {:.3}, held out {:.3}",
+                ratio("learn"),
+                ratio("check")
+            );
             assert!(ratio("learn") < ratio("check"), "training rows flatter");
             ratio("check")
         })

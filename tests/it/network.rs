@@ -1,19 +1,14 @@
 //! The perceptron, its gradient, its training, its valid range and the judge of whether it helps.
 
-use crate::answer::{has, read, root};
-use crate::fixture::robot_of;
-use calib::estimate::network::arm::ScrewArm;
-use calib::estimate::network::correction::{Body, NetworkScaling, Networks, Scaling, features};
-use calib::estimate::network::loss::{Batch, Loss, LossBuffers};
+use crate::answer::has;
+use calib::estimate::network::correction::{Body, NetworkScaling, Scaling, features};
+use calib::estimate::network::perceptron::Loss;
 use calib::estimate::network::region::Region;
 use calib::estimate::network::rivals::{RivalComparison, RivalContest, learn};
 use calib::estimate::network::{
     Activation, Correction, LayerSizes, Recipe, Rival, TrainingSamples, TrainingStart, compare,
     train,
 };
-use calib::estimate::swarm::Algorithm;
-use calib::robot::RobotModel;
-use calib::spatial::Pose;
 use calib::table::{Network, Table};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -22,15 +17,13 @@ fn recipe(joints: usize) -> Recipe {
     Recipe {
         joints,
         features: features(&vec![false; joints], false, false),
-        through: None,
         hidden: 12,
         activation: Activation::Sigmoid,
-        start: TrainingStart::Swarm(Algorithm::Bso),
+        start: TrainingStart::Swarm,
         beetles: 20,
         generations: 30,
         iterations: 200,
         decay: 1.0,
-        members: 4,
         keep_back: 0.1,
         seed: 7,
         jobs: 2,
@@ -38,11 +31,10 @@ fn recipe(joints: usize) -> Recipe {
 }
 
 /// Training that takes a moment.
-fn cheap(iterations: usize, members: usize) -> Recipe {
+fn cheap(iterations: usize) -> Recipe {
     Recipe {
         generations: 5,
         iterations,
-        members,
         ..recipe(6)
     }
 }
@@ -80,92 +72,41 @@ fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
-fn mean_error(samples: &TrainingSamples, correction: Option<&Correction>) -> f64 {
-    let left = samples.sources.iter().zip(&samples.residual).map(|(q, r)| {
-        let delta = correction.map_or([0.0; 3], |correction| correction.at(q).delta);
-        length(std::array::from_fn(|k| r[k] - delta[k]))
-    });
-    left.sum::<f64>() / samples.rows() as f64
-}
-
-#[test]
-fn activations_are_those_of_the_textbook_for_any_number() {
-    for k in -4000..=4000 {
-        let z = f64::from(k) * 0.01 + 1e-5;
-        let (sigmoid, tanh) = (1.0 / (1.0 + (-z).exp()), z.tanh());
-        assert!(
-            (Activation::Sigmoid.value(z) / sigmoid - 1.0).abs() < 5e-15 * z.abs().max(1.0),
-            "{z}"
-        );
-        assert!((Activation::Tanh.value(z) - tanh).abs() < 2e-15, "{z}");
-    }
-    for (z, limit) in [
-        (700.0, 1.0),
-        (1e300, 1.0),
-        (f64::INFINITY, 1.0),
-        (-1e300, 0.0),
-        (f64::NEG_INFINITY, 0.0),
-    ] {
-        assert!((Activation::Sigmoid.value(z) - limit).abs() < 1e-300, "{z}");
-    }
-    assert!(Activation::Sigmoid.value(f64::NAN).is_nan());
-}
-
 #[test]
 fn the_gradient_is_that_of_central_differences() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    for (activation, outputs) in [
-        (Activation::Sigmoid, 3),
-        (Activation::Tanh, 3),
-        (Activation::Sigmoid, 6),
-    ] {
-        // 150 rows: a full block, and another that is not full.
+    for activation in [Activation::Sigmoid, Activation::Tanh] {
         let x: Vec<Vec<f64>> = (0..150)
             .map(|_| (0..7).map(|_| rng.random_range(-2.0..2.0)).collect())
             .collect();
         let y: Vec<[f64; 3]> = (0..150)
             .map(|_| std::array::from_fn(|_| rng.random_range(-2.0..2.0)))
             .collect();
-        let mut way = || std::array::from_fn(|_| rng.random_range(-1.0..1.0));
-        let ways: Vec<Vec<[f64; 3]>> = (0..150)
-            .map(|_| (0..outputs).map(|_| way()).collect())
-            .collect();
-        let batch = Batch::new(&x, &y);
-        let batch = if outputs == 3 {
-            batch
-        } else {
-            batch.through(&ways)
-        };
         let shape = LayerSizes {
             inputs: 7,
             hidden: 5,
-            outputs,
             activation,
         };
         let loss = Loss {
             shape,
-            batch: &batch,
+            x: &x,
+            y: &y,
             decay: 0.7,
         };
-        let mut scratch = LossBuffers::new(shape);
         let mut w: Vec<f64> = (0..shape.parameters())
             .map(|_| rng.random_range(-1.0..1.0))
             .collect();
         let mut gradient = vec![0.0; w.len()];
-        let (value, squares) = loss.gradient(&w, &mut gradient, &mut scratch);
-        assert_eq!(
-            squares.map(|s| (s * 1e9).round()),
-            loss.mean_squares(&w, &mut scratch)
-                .map(|s| (s * 1e9).round())
-        );
-        assert!((value - loss.value(&w, &mut scratch)).abs() < 1e-14);
+        let (value, squares) = loss.gradient(&w, &mut gradient);
+        assert_eq!(squares, loss.mean_squares(&w));
+        assert!((value - loss.value(&w)).abs() < 1e-14);
         for i in 0..w.len() {
             let step = 1e-5;
             let at = w[i];
             w[i] = at + step;
-            let up = loss.value(&w, &mut scratch);
+            let up = loss.value(&w);
             w[i] = at - step;
-            let down = loss.value(&w, &mut scratch);
+            let down = loss.value(&w);
             w[i] = at;
             let difference = (up - down) / (2.0 * step);
             assert!(
@@ -174,81 +115,43 @@ fn the_gradient_is_that_of_central_differences() {
                 gradient[i]
             );
         }
-        // The single-row function and the batched one are the same network.
-        let mut squares = 0.0;
-        for ((x, y), ways) in x.iter().zip(&y).zip(&ways) {
-            let out = shape.at(&w, x);
-            for k in 0..3 {
-                let at = if outputs == 3 {
-                    out[k]
-                } else {
-                    out.iter().zip(ways).map(|(o, way)| o * way[k]).sum()
-                };
-                squares += (at - y[k]).powi(2);
-            }
-        }
-        assert!(
-            (squares / 150.0 - loss.mean_squares(&w, &mut scratch).iter().sum::<f64>()).abs()
-                < 1e-12
-        );
     }
 }
 
-/// The SR210D, its base turned and shifted in the tracker's frame.
-fn sr210d() -> ScrewArm {
-    let text = read(root("pipelines/sr210d/robot.yaml"));
-    let robot = RobotModel::new(robot_of(&text));
-    ScrewArm::of(
-        &robot,
-        &Pose::from_rotation_vector([0.02, -0.03, 2.0].into(), [4.5, -1.8, 0.9].into()),
-    )
-}
-
-/// Poses of that arm whose joints 1 and 2 have encoders with waves of 90 and 60 urad, plus `noise` m per axis.
-fn waves(rows: usize, arm: &ScrewArm, noise: f64, seed: u64) -> TrainingSamples {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut samples = TrainingSamples::default();
-    for _ in 0..rows {
-        let q: Vec<f64> = (0..6).map(|_| rng.random_range(-1.2..1.2)).collect();
-        let stance = arm.stance(&q);
-        let moved = stance.turn(0) * (90e-6 * (11.0 * q[0] + 0.4).sin())
-            + stance.turn(1) * (60e-6 * (5.0 * q[1]).cos());
-        samples
-            .residual
-            .push(std::array::from_fn(|k| moved[k] + noise * normal(&mut rng)));
-        samples.sources.push(q);
+/// Eqs. 41 and 42 of Wang et al. (2020) by hand: one input, one neuron.
+#[test]
+fn a_network_is_the_papers_formula() {
+    let shape = LayerSizes {
+        inputs: 1,
+        hidden: 1,
+        activation: Activation::Sigmoid,
+    };
+    // sigmoid(0.5 * ln(3) * 2) = 3/4.
+    let outputs = shape.at(
+        &[2.0, 0.0, 4.0, 8.0, -4.0, 1.0, 0.0, 0.5],
+        &[0.5 * 3f64.ln()],
+    );
+    for (output, expected) in outputs.into_iter().zip([4.0, 6.0, -2.5]) {
+        assert!((output - expected).abs() < 1e-14, "{outputs:?}");
     }
-    samples
 }
 
-fn contest<'a>(
-    arm: Option<&'a ScrewArm>,
-    rivals: &[Rival],
-    cheap: &Recipe,
-    folds: usize,
-) -> RivalContest<'a> {
+fn contest(rivals: &[Rival], cheap: &Recipe, folds: usize) -> RivalContest<'static> {
     RivalContest {
         rivals: rivals.to_vec(),
-        arm,
         prismatic: &[false; 6],
         recipe: cheap.clone(),
-        trial: Recipe {
-            members: 2,
-            ..cheap.clone()
-        },
+        trial: cheap.clone(),
         decays: vec![0.5, 5.0],
-        hidden: vec![8],
         folds,
     }
 }
 
-const ALL: [Rival; 6] = [
+const ALL: [Rival; 4] = [
     Rival::Ridge,
     Rival::Process,
-    Rival::Curves,
     Rival::Network(TrainingStart::Random),
-    Rival::Network(TrainingStart::Swarm(Algorithm::Bso)),
-    Rival::JointNetwork(TrainingStart::Random),
+    Rival::Network(TrainingStart::Swarm),
 ];
 
 fn error(comparison: &RivalComparison, rival: Rival) -> f64 {
@@ -263,12 +166,7 @@ fn error(comparison: &RivalComparison, rival: Rival) -> f64 {
 #[test]
 fn training_is_the_same_on_one_thread_and_on_three() {
     let samples = arm(90, 1.0, 0.2e-3, 3);
-    for start in [
-        TrainingStart::Random,
-        TrainingStart::Swarm(Algorithm::Bas),
-        TrainingStart::Swarm(Algorithm::Bso),
-        TrainingStart::Swarm(Algorithm::Abc),
-    ] {
+    for start in [TrainingStart::Random, TrainingStart::Swarm] {
         let on = |jobs| {
             train(
                 &samples,
@@ -282,17 +180,9 @@ fn training_is_the_same_on_one_thread_and_on_three() {
         };
         assert_eq!(on(1), on(3), "{start:?}");
     }
-    let tool = sr210d();
     let judged = |jobs| {
-        let contest = contest(
-            Some(&tool),
-            &ALL,
-            &Recipe {
-                jobs,
-                ..cheap(40, 4)
-            },
-            3,
-        );
+        let recipe = Recipe { jobs, ..cheap(40) };
+        let contest = contest(&ALL, &recipe, 3);
         let comparison = compare(&samples, &contest, &|_, _| {});
         let learnt: Vec<_> = comparison
             .judged
@@ -305,107 +195,10 @@ fn training_is_the_same_on_one_thread_and_on_three() {
 }
 
 #[test]
-fn joint_curves_find_waves_that_no_other_rival_can_see() {
-    let tool = sr210d();
-    let (training, unseen) = (waves(300, &tool, 20e-6, 1), waves(300, &tool, 20e-6, 2));
-    let contest = contest(Some(&tool), &ALL, &cheap(60, 4), 4);
-    let comparison = compare(&training, &contest, &|_, _| {});
-    let before = mean_error(&unseen, None);
-    let best = &comparison.judged[comparison.chosen];
-    assert_eq!(best.rival, Some(Rival::Curves));
-    assert!(
-        ALL.iter()
-            .all(|rival| *rival == Rival::Curves || error(&comparison, *rival) > 1.2 * best.mean())
-    );
-    let (correction, _) = learn(&training, &contest, best, &mut |_| {}).unwrap();
-    let after = mean_error(&unseen, Some(&correction));
-    // Noise alone is 1.596 * 20 um.
-    assert!(
-        after > 30e-6 && after < 45e-6 && after < 0.3 * before,
-        "{before} {after}"
-    );
-    // What is stated of it is what is left.
-    let spread = correction.at(&unseen.sources[0]).spread.unwrap();
-    assert!((15e-6..35e-6).contains(&spread), "{spread}");
-}
-
-/// 40 deg of joint 1 that no row visited: what was learnt there is as small as beside it, and known to be in doubt.
-#[test]
-fn a_joint_curve_does_not_swing_where_no_row_was_and_says_its_doubt() {
-    let tool = sr210d();
-    let in_gap = |q: &[f64]| q[0].abs() < 0.35;
-    let (all, unseen) = (waves(900, &tool, 20e-6, 3), waves(600, &tool, 20e-6, 4));
-    let visited: Vec<usize> = (0..all.rows())
-        .filter(|row| !in_gap(&all.sources[*row]))
-        .collect();
-    let training = all.pick(&visited);
-    let contest = contest(Some(&tool), &[Rival::Curves], &recipe(6), 4);
-    let comparison = compare(&training, &contest, &|_, _| {});
-    let (correction, _) = learn(
-        &training,
-        &contest,
-        &comparison.judged[comparison.chosen],
-        &mut |_| {},
-    )
-    .unwrap();
-    let (mut largest, mut spread, mut covered, mut rows) =
-        ([0.0f64; 2], [0.0; 2], [0.0; 2], [0.0; 2]);
-    for (q, residual) in unseen.sources.iter().zip(&unseen.residual) {
-        let (applied, at) = (correction.at(q), usize::from(in_gap(q)));
-        let Some(doubt) = applied.spread else {
-            continue;
-        };
-        let left = std::array::from_fn(|k| residual[k] - applied.delta[k]);
-        largest[at] = largest[at].max(length(applied.delta));
-        spread[at] += doubt;
-        // Three axes of one sigma: 2.8 of them hold 95 %.
-        covered[at] += f64::from(u8::from(length(left) < 2.8 * doubt));
-        rows[at] += 1.0;
-    }
-    let mean = |sums: [f64; 2]| [sums[0] / rows[0], sums[1] / rows[1]];
-    let (spread, covered) = (mean(spread), mean(covered));
-    assert!(rows[0] > 200.0 && rows[1] > 50.0, "{rows:?}");
-    assert!(largest[1] < 1.2 * largest[0], "{largest:?}");
-    assert!(spread[1] > spread[0], "{spread:?}");
-    assert!(covered[0] > 0.9 && covered[1] > 0.85, "{covered:?}");
-}
-
-/// The paper's Fig. 2: errors that are made in the joints are learnt from fewer numbers where the Jacobian is known.
-#[test]
-fn a_network_of_joint_motions_learns_what_joints_do_better_than_one_of_displacements() {
-    let tool = sr210d();
-    let slow = |rows: usize, seed: u64| {
-        let mut samples = waves(rows, &tool, 20e-6, seed);
-        for (q, r) in samples.sources.iter().zip(&mut samples.residual) {
-            let stance = tool.stance(q);
-            let moved = stance.turn(1) * (0.4e-3 * (q[1] + q[2]).cos())
-                + stance.turn(4) * (1e-3 * q[4].sin() * q[3].cos());
-            *r = std::array::from_fn(|k| r[k] + moved[k]);
-        }
-        samples
-    };
-    let (training, unseen) = (slow(200, 11), slow(300, 12));
-    let left = |through: Option<ScrewArm>| {
-        let (correction, _) = train(
-            &training,
-            &Recipe {
-                through,
-                ..cheap(100, 4)
-            },
-            &mut |_| {},
-        );
-        mean_error(&unseen, Some(&correction)) / mean_error(&unseen, None)
-    };
-    let (point, joints) = (left(None), left(Some(tool.clone())));
-    assert!(joints < 0.8 * point && joints > 0.02, "{joints} {point}");
-}
-
-#[test]
 fn the_judge_keeps_what_helps_and_refuses_what_was_learnt_from_noise() {
-    let tool = sr210d();
     let smooth = compare(
         &arm(150, 1.0, 0.2e-3, 4),
-        &contest(Some(&tool), &ALL, &cheap(60, 2), 5),
+        &contest(&ALL, &cheap(60), 5),
         &|_, _| {},
     );
     let best = &smooth.judged[smooth.chosen];
@@ -416,7 +209,7 @@ fn the_judge_keeps_what_helps_and_refuses_what_was_learnt_from_noise() {
     let refused = (0..20).filter(|seed| {
         let recipe = Recipe {
             seed: *seed,
-            ..cheap(60, 2)
+            ..cheap(60)
         };
         let rivals = [
             Rival::Ridge,
@@ -425,7 +218,7 @@ fn the_judge_keeps_what_helps_and_refuses_what_was_learnt_from_noise() {
         ];
         compare(
             &arm(120, 0.0, 0.5e-3, 200 + seed),
-            &contest(None, &rivals, &recipe, 4),
+            &contest(&rivals, &recipe, 4),
             &|_, _| {},
         )
         .chosen
@@ -458,7 +251,7 @@ fn targets_of_one_pose_do_not_vouch_for_each_other() {
     );
     let comparison = compare(
         &thrice,
-        &contest(None, &[Rival::Ridge, Rival::Process], &cheap(60, 2), 5),
+        &contest(&[Rival::Ridge, Rival::Process], &cheap(60), 5),
         &|_, _| {},
     );
     assert_eq!(comparison.chosen, 0, "nothing carries over to another pose");
@@ -530,7 +323,6 @@ fn a_correction_comes_back_from_its_table() {
     let shape = LayerSizes {
         inputs: features.len(),
         hidden: 4,
-        outputs: 3,
         activation: Activation::Tanh,
     };
     let mut number = |from: f64, to: f64| rng.random_range(from..to);
@@ -544,22 +336,13 @@ fn a_correction_comes_back_from_its_table() {
         features,
     };
     assert_eq!(dress.features.len(), 6);
-    let members = (0..3)
-        .map(|_| (0..shape.parameters()).map(|_| number(-3.0, 3.0)).collect())
-        .collect();
+    let parameters = (0..shape.parameters()).map(|_| number(-3.0, 3.0)).collect();
     let sources: Vec<Vec<f64>> = (0..40)
         .map(|_| (0..4).map(|_| number(-1.5, 1.5)).collect())
         .collect();
     let region = Region::of(&sources, 3);
     let correction = Correction {
-        body: Body::Networks(
-            dress,
-            Networks {
-                shape,
-                joints: None,
-                members,
-            },
-        ),
+        body: Body::Network(dress, shape, parameters),
         region,
         left: 1e-4,
     };
@@ -572,7 +355,7 @@ fn a_correction_comes_back_from_its_table() {
     };
     let valid = correction.region.ranges[0].upper;
     let factor = &correction.region.jointly.as_ref().unwrap().factor[1];
-    let Body::Networks(scaling, _) = &correction.body else {
+    let Body::Network(scaling, ..) = &correction.body else {
         unreachable!()
     };
     let (input, output) = (scaling.inputs[0].scale, scaling.outputs[2].mean);
@@ -592,7 +375,7 @@ fn a_correction_comes_back_from_its_table() {
     }
     let empty = Network::from_frame(&Network(Vec::new()).to_frame().unwrap()).unwrap();
     assert!(empty.correction(&prismatic).unwrap().is_none());
-    let hole = (2, "bias", 1, 3);
+    let hole = (1, "bias", 1, 3);
     table
         .0
         .retain(|row| (row.member, &*row.part, row.layer, row.to) != hole);
@@ -602,9 +385,8 @@ fn a_correction_comes_back_from_its_table() {
 
 #[test]
 fn every_kind_of_correction_comes_back_from_its_table() {
-    let tool = sr210d();
-    let samples = waves(120, &tool, 50e-6, 7);
-    let contest = contest(Some(&tool), &ALL, &cheap(20, 4), 2);
+    let samples = arm(120, 1.0, 50e-6, 7);
+    let contest = contest(&ALL, &cheap(20), 2);
     let comparison = compare(&samples, &contest, &|_, _| {});
     for judged in &comparison.judged[1..] {
         let (correction, _) = learn(&samples, &contest, judged, &mut |_| {}).unwrap();

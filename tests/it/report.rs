@@ -366,7 +366,7 @@ fn rivals_of_a_correction_stand_with_their_errors_and_why_they_were_not_kept() {
         "{section}"
     );
     assert!(
-        section.contains("joint curves</th><td></td><td></td><td></td><td></td>"),
+        section.contains("network, started at random</th><td></td><td></td><td></td><td></td>"),
         "{section}"
     );
     let mut reads = tables("Heavy 6R, cell 4");

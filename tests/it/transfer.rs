@@ -44,19 +44,14 @@ fn series(file: &str, every: usize) -> Result<Series> {
         "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry"], "folds": 0,
     }));
     let geometry: Parameters = found.get();
-    let learn: Learn = settings(
-        json!({"on": ["fit"], "rivals": ["ridge", "gaussian_process", "curves"], "folds": 2}),
-    );
+    let learn: Learn =
+        settings(json!({"on": ["fit"], "rivals": ["ridge", "gaussian_process"], "folds": 2}));
     let Recorded {
-        robot,
-        recording,
-        split,
+        recording, split, ..
     } = recorded.clone();
     let reads = LearnReads {
-        robot: Some(robot),
         recording,
         split,
-        parameters: Some(geometry.clone()),
         prediction: found.get(),
     };
     let mut desk = Desk::default();

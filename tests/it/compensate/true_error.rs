@@ -150,17 +150,15 @@ impl Cell {
         (model(&self.robot, &made.get()), made.get(), floor)
     }
 
-    /// The rigid model, and the joint curves that are learned on top of it.
+    /// The rigid model, and what is learned on top of it.
     fn learned(&self, recorded: Recorded) -> (Model, Option<Correction>) {
-        let (model, parameters, prediction) = self.rigid(&recorded);
-        let learn = json!({"rivals": ["curves"], "folds": 2});
+        let (model, _, prediction) = self.rigid(&recorded);
+        let learn = json!({"rivals": ["ridge"], "folds": 2});
         let learn: Learn = settings(learn);
         let prismatic = recorded.recording.prismatic.clone();
         let reads = LearnReads {
-            robot: Some(recorded.robot),
             recording: recorded.recording,
             split: recorded.split,
-            parameters: Some(parameters),
             prediction,
         };
         let network: Network = made(&learn, reads).get();

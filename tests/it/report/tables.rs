@@ -480,7 +480,7 @@ fn corrections() -> Vec<Labelled<Corrections>> {
             "smallest error of those that help: gains 0.260 +- 0.021 mm",
         ),
         row(
-            "curves",
+            "mlp_random",
             None,
             false,
             "it could not be fitted to these rows",

@@ -3,11 +3,10 @@
 //! Inside the region that the training saw it is what was learnt; outside, sources are held at its edge and it fades to nothing
 //! (see [`Region`]).
 
-use super::arm::ScrewArm;
-use super::linear::Linear;
-use super::perceptron::{LayerSizes, OUTPUTS, scatter};
+use super::perceptron::{LayerSizes, OUTPUTS};
 use super::process::Process;
 use super::region::Region;
+use super::ridge::Ridge;
 
 /// How an input comes from a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,47 +118,15 @@ impl NetworkScaling {
     }
 }
 
-/// Outputs that are motions of the joints, which move the point through the arm's Jacobian.
-#[derive(Debug, Clone, PartialEq)]
-pub struct JointMotion {
-    /// Whose joints the outputs move.
-    pub arm: ScrewArm,
-    /// Motion of each joint per unit of output, rad or m.
-    pub scales: Vec<f64>,
-}
-
-impl JointMotion {
-    /// What each output does to the measured point at joint positions `q`, m per unit.
-    pub(crate) fn ways(&self, q: &[f64]) -> Vec<[f64; OUTPUTS]> {
-        let stance = self.arm.stance(q);
-        self.scales
-            .iter()
-            .enumerate()
-            .map(|(joint, scale)| (stance.turn(joint) * *scale).into())
-            .collect()
-    }
-}
-
-/// Equal networks whose mean is the correction.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Networks {
-    /// Inputs, neurons, outputs.
-    pub shape: LayerSizes,
-    /// `None`: outputs are the axes.
-    pub joints: Option<JointMotion>,
-    /// Parameters of each network.
-    pub members: Vec<Vec<f64>>,
-}
-
 /// What was learnt.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Body {
-    /// Networks with one hidden layer, averaged.
-    Networks(NetworkScaling, Networks),
+    /// A network with one hidden layer and its parameters.
+    Network(NetworkScaling, LayerSizes, Vec<f64>),
     /// A Gaussian process.
     Process(NetworkScaling, Process),
     /// A sum of terms.
-    Linear(Linear),
+    Ridge(Ridge),
 }
 
 /// A learned correction with everything that is needed to apply it. Positions in m, tracker frame.
@@ -209,40 +176,24 @@ impl Correction {
     /// The correction within the region, and how far it is in doubt per axis, m.
     fn inside(&self, sources: &[f64]) -> ([f64; 3], f64) {
         match &self.body {
-            Body::Linear(linear) => linear.at(sources),
+            Body::Ridge(ridge) => ridge.at(sources),
             Body::Process(dress, process) => {
                 let (y, doubt) = process.at(&dress.scaled(sources));
                 (dress.worn(y), doubt * dress.size())
             }
-            Body::Networks(dress, networks) => {
-                let x = dress.scaled(sources);
-                let ways = networks.joints.as_ref().map(|motion| motion.ways(sources));
-                let along = |y: &[f64], k: usize| match &ways {
-                    None => y[k],
-                    Some(ways) => {
-                        let moved = y.iter().zip(ways).map(|(y, way)| y * way[k]);
-                        moved.sum::<f64>() / dress.outputs[k].scale
-                    }
-                };
-                let members = networks.members.iter();
-                let each: Vec<[f64; OUTPUTS]> = members
-                    .map(|member| networks.shape.at(member, &x))
-                    .map(|y| std::array::from_fn(|k| along(&y, k)))
-                    .collect();
-                let count = each.len().max(1) as f64;
-                let mean: [f64; OUTPUTS] =
-                    std::array::from_fn(|k| each.iter().map(|y| y[k]).sum::<f64>() / count);
-                (dress.worn(mean), scatter(&each, &mean) * dress.size())
-            }
+            Body::Network(dress, shape, parameters) => (
+                dress.worn(shape.at(parameters, &dress.scaled(sources))),
+                0.0,
+            ),
         }
     }
 
     /// Numbers that were learnt.
     pub(crate) fn numbers(&self) -> usize {
         match &self.body {
-            Body::Linear(linear) => linear.terms.len(),
+            Body::Ridge(ridge) => OUTPUTS * ridge.terms.len(),
             Body::Process(_, process) => process.lengths.len() + 2 + OUTPUTS * process.rows.len(),
-            Body::Networks(_, networks) => networks.members.iter().map(Vec::len).sum(),
+            Body::Network(_, _, parameters) => parameters.len(),
         }
     }
 }

@@ -3,14 +3,12 @@
 //! Rows are judged by corrections that did not see their pose. Folds are made of runs of neighbouring poses, each with all its targets,
 //! since a recording's neighbours are alike and a row must not be predicted from its twin. "No correction" is a rival: it stays unless the gain is clear.
 
-use super::arm::ScrewArm;
-use super::basis::{BasisTerm, curves, harmonics};
 use super::correction::{Body, Correction};
-use super::linear::Linear;
 use super::process::Process;
 use super::region::{Region, TrainingSamples};
-use super::training::{Recipe, TrainingStart, TrainingStep, dressed, train};
-use crate::estimate::swarm::{Algorithm, Generation};
+use super::ridge::Ridge;
+use super::training::{Phase, Recipe, TrainingStart, TrainingStep, dressed, train};
+use crate::estimate::swarm::Generation;
 use crate::estimate::threads::in_order;
 use std::sync::Mutex;
 
@@ -26,16 +24,9 @@ pub enum Rival {
     Ridge,
     /// A Gaussian process of the networks' inputs.
     Process,
-    /// Joint curves, small motions of links and wind-up by weight, through the Jacobian.
-    Curves,
-    /// Multilayer perceptrons whose outputs move the point along the axes, by where their training starts.
+    /// A multilayer perceptron whose outputs move the point along the axes, by where its training starts.
     Network(TrainingStart),
-    /// Multilayer perceptrons whose outputs are joint motions, through the Jacobian.
-    JointNetwork(TrainingStart),
 }
-
-/// Kinds of networks: each has its decay and size of hidden layer chosen for itself, with random starts.
-const KINDS: [fn(TrainingStart) -> Rival; 2] = [Rival::Network, Rival::JointNetwork];
 
 impl Rival {
     /// As tables hold it.
@@ -43,40 +34,13 @@ impl Rival {
         match self {
             Self::Ridge => "ridge",
             Self::Process => "gaussian_process",
-            Self::Curves => "curves",
             Self::Network(TrainingStart::Random) => "mlp_random",
-            Self::Network(TrainingStart::Swarm(algorithm)) => match algorithm {
-                Algorithm::Bas => "mlp_bas",
-                Algorithm::Bso => "mlp_bso",
-                Algorithm::Pso => "mlp_pso",
-                Algorithm::Ga => "mlp_ga",
-                Algorithm::Abc => "mlp_abc",
-            },
-            Self::JointNetwork(TrainingStart::Random) => "mlp_joints_random",
-            Self::JointNetwork(TrainingStart::Swarm(algorithm)) => match algorithm {
-                Algorithm::Bas => "mlp_joints_bas",
-                Algorithm::Bso => "mlp_joints_bso",
-                Algorithm::Pso => "mlp_joints_pso",
-                Algorithm::Ga => "mlp_joints_ga",
-                Algorithm::Abc => "mlp_joints_abc",
-            },
+            Self::Network(TrainingStart::Swarm) => "mlp_bso",
         }
     }
 
-    /// Whether it needs the arm.
-    pub fn goes_through_the_jacobian(self) -> bool {
-        matches!(self, Self::Curves | Self::JointNetwork(_))
-    }
-
-    fn start(self) -> Option<TrainingStart> {
-        match self {
-            Self::Network(start) | Self::JointNetwork(start) => Some(start),
-            _ => None,
-        }
-    }
-
-    fn is_of(self, kind: fn(TrainingStart) -> Self) -> bool {
-        self.start().is_some_and(|start| kind(start) == self)
+    fn is_network(self) -> bool {
+        matches!(self, Self::Network(_))
     }
 }
 
@@ -85,18 +49,14 @@ impl Rival {
 pub struct RivalContest<'a> {
     /// What is compared.
     pub rivals: Vec<Rival>,
-    /// What joint curves and joint networks go through; without it they are no rivals.
-    pub arm: Option<&'a ScrewArm>,
     /// Whether each joint slides.
     pub prismatic: &'a [bool],
     /// How the kept correction is trained.
     pub recipe: Recipe,
     /// How networks are trained in each fold.
     pub trial: Recipe,
-    /// Decays and sizes of the hidden layer to choose from, with random starts.
+    /// Decays of networks to choose from, with random starts.
     pub decays: Vec<f64>,
-    /// Numbers of neurons to compare.
-    pub hidden: Vec<usize>,
     /// Parts of the cross-validation.
     pub folds: usize,
 }
@@ -116,8 +76,8 @@ pub struct JudgedRival {
     pub numbers: usize,
     /// Evaluations of the loss in training.
     pub evaluations: u64,
-    /// Hidden neurons and decay of networks.
-    pub settings: Option<(usize, f64)>,
+    /// Decay of a network.
+    pub decay: Option<f64>,
 }
 
 impl JudgedRival {
@@ -155,17 +115,27 @@ struct Done {
     evaluations: u64,
 }
 
-/// How many fits [`compare`] makes.
-pub fn fits(contest: &RivalContest) -> usize {
-    let grids = KINDS.iter().filter(|kind| contest.has(**kind)).count();
-    (contest.rivals.len() + grids * contest.decays.len() * contest.hidden.len()) * contest.folds
+impl RivalContest<'_> {
+    /// Everything that is fitted in each fold at first: rivals without a choice, and networks from a random start by decay.
+    fn first(&self) -> Vec<(Rival, f64)> {
+        let plain = self.rivals.iter().filter(|rival| !rival.is_network());
+        let mut entered: Vec<(Rival, f64)> = plain.map(|rival| (*rival, 0.0)).collect();
+        if self.rivals.iter().any(|rival| rival.is_network()) {
+            let network = Rival::Network(TrainingStart::Random);
+            entered.extend(self.decays.iter().map(|decay| (network, *decay)));
+        }
+        entered
+    }
+
+    /// Whether a network that a swarm starts is a rival.
+    fn swarms(&self) -> bool {
+        self.rivals.contains(&Rival::Network(TrainingStart::Swarm))
+    }
 }
 
-impl RivalContest<'_> {
-    /// Whether networks of a kind take part, from whatever start.
-    fn has(&self, kind: fn(TrainingStart) -> Rival) -> bool {
-        self.rivals.iter().any(|rival| rival.is_of(kind))
-    }
+/// How many fits [`compare`] makes.
+pub fn fits(contest: &RivalContest) -> usize {
+    (contest.first().len() + usize::from(contest.swarms())) * contest.folds
 }
 
 /// Judges all rivals in the contest's folds; `observe` sees how many fits are done, and of which rival the last was.
@@ -185,10 +155,10 @@ pub fn compare(
     let poses = samples.poses();
     let before: Vec<f64> = samples.residual.iter().map(|r| length(*r)).collect();
     // Every entry in all folds; none where it cannot be fitted to one of them.
-    let judged = |entered: &[(Rival, Recipe)]| -> Vec<Option<JudgedRival>> {
+    let judged = |entered: &[(Rival, f64)]| -> Vec<Option<JudgedRival>> {
         let fitted = in_order(contest.recipe.jobs, entered.len() * folds, |t| {
-            let ((rival, recipe), fold) = (&entered[t / folds], t % folds);
-            let result = tried(*rival, recipe, fold, samples, &poses, contest);
+            let ((rival, decay), fold) = (entered[t / folds], t % folds);
+            let result = tried(rival, decay, fold, samples, &poses, contest);
             let mut done = done.lock().expect("no fit panics");
             *done += 1;
             let mean = result.as_ref().map_or(f64::NAN, |r| {
@@ -203,34 +173,30 @@ pub fn compare(
         });
         let entered = entered.iter().zip(fitted.chunks(folds));
         entered
-            .map(|((rival, recipe), fitted)| {
-                let settings = (recipe.hidden, recipe.decay);
-                let settings = rival.start().is_some().then_some(settings);
-                together(*rival, settings, fitted, &before, &poses)
+            .map(|((rival, decay), fitted)| {
+                let decay = rival.is_network().then_some(*decay);
+                together(*rival, decay, fitted, &before, &poses)
             })
             .collect()
     };
-    let trial = Recipe {
-        jobs: 1,
-        ..contest.trial.clone()
-    };
-    let rivals = contest.rivals.iter();
-    let mut entered: Vec<(Rival, Recipe)> = rivals.map(|rival| (*rival, trial.clone())).collect();
-    for kind in KINDS.into_iter().filter(|kind| contest.has(*kind)) {
-        let settings = contest
-            .hidden
-            .iter()
-            .flat_map(|hidden| contest.decays.iter().map(move |decay| (*hidden, *decay)));
-        let grid: Vec<(Rival, Recipe)> = settings
-            .map(|(hidden, decay)| (kind(TrainingStart::Random), trial.sized(hidden, decay)))
-            .collect();
-        let errors: Vec<f64> = judged(&grid)
-            .iter()
-            .map(|row| row.as_ref().map_or(f64::NAN, JudgedRival::mean))
-            .collect();
-        if let Some(best) = (0..grid.len()).min_by(|a, b| errors[*a].total_cmp(&errors[*b])) {
-            let of_kind = entered.iter_mut().filter(|(rival, _)| rival.is_of(kind));
-            of_kind.for_each(|(_, recipe)| *recipe = grid[best].1.clone());
+    let mut others: Vec<JudgedRival> = judged(&contest.first()).into_iter().flatten().collect();
+    let is_network = |judged: &&JudgedRival| judged.rival.is_some_and(Rival::is_network);
+    let networks = others.iter().filter(is_network);
+    let best = networks
+        .min_by(|a, b| a.mean().total_cmp(&b.mean()))
+        .cloned();
+    others.retain(|judged| !is_network(&judged));
+    if let Some(best) = best {
+        let decay = best.decay.unwrap_or_default();
+        others.extend(
+            contest
+                .rivals
+                .contains(&Rival::Network(TrainingStart::Random))
+                .then_some(best),
+        );
+        if contest.swarms() {
+            let swarm = (Rival::Network(TrainingStart::Swarm), decay);
+            others.extend(judged(&[swarm]).into_iter().flatten());
         }
     }
     let nothing = JudgedRival {
@@ -240,9 +206,8 @@ pub fn compare(
         sigma: 0.0,
         numbers: 0,
         evaluations: 0,
-        settings: None,
+        decay: None,
     };
-    let others = judged(&entered).into_iter().flatten();
     let judged: Vec<JudgedRival> = std::iter::once(nothing).chain(others).collect();
     let helping = (0..judged.len()).filter(|j| judged[*j].helps());
     let chosen = helping
@@ -258,9 +223,9 @@ pub fn learn(
     judged: &JudgedRival,
     observe: &mut dyn FnMut(&Generation),
 ) -> Option<(Correction, Vec<TrainingStep>)> {
-    let recipe = match judged.settings {
-        Some((hidden, decay)) => contest.recipe.sized(hidden, decay),
-        None => contest.recipe.clone(),
+    let recipe = Recipe {
+        decay: judged.decay.unwrap_or_default(),
+        ..contest.recipe.clone()
     };
     let (mut correction, course) = fit(judged.rival?, samples, contest, recipe, observe)?;
     correction.left = judged.rms() / 3.0_f64.sqrt();
@@ -274,29 +239,12 @@ fn fit(
     recipe: Recipe,
     observe: &mut dyn FnMut(&Generation),
 ) -> Option<(Correction, Vec<TrainingStep>)> {
-    let linear = |arm, groups: Vec<Vec<BasisTerm>>| {
-        Some(Body::Linear(Linear::fit(
-            samples,
-            arm,
-            &groups,
-            recipe.seed,
-        )?))
-    };
     let body = match rival {
-        Rival::Network(start) | Rival::JointNetwork(start) => {
-            let through = match rival {
-                Rival::JointNetwork(_) => Some(contest.arm?.clone()),
-                _ => None,
-            };
-            let recipe = Recipe {
-                start,
-                through,
-                ..recipe
-            };
+        Rival::Network(start) => {
+            let recipe = Recipe { start, ..recipe };
             return Some(train(samples, &recipe, observe));
         }
-        Rival::Ridge => linear(None, harmonics(contest.prismatic))?,
-        Rival::Curves => linear(contest.arm, curves(contest.arm?, samples.rows()))?,
+        Rival::Ridge => Body::Ridge(Ridge::fit(samples, contest.prismatic, recipe.seed)?),
         Rival::Process => {
             let (dress, x, y) = dressed(samples, &recipe.features);
             Body::Process(dress, Process::fit(&x, &y)?)
@@ -313,7 +261,7 @@ fn fit(
 /// A rival learnt without a fold, and what it leaves there; `poses`: that of each row.
 fn tried(
     rival: Rival,
-    recipe: &Recipe,
+    decay: f64,
     fold: usize,
     samples: &TrainingSamples,
     poses: &[usize],
@@ -323,8 +271,10 @@ fn tried(
     let (inside, outside): (Vec<usize>, Vec<usize>) = (0..samples.rows())
         .partition(|row| poses[*row] * contest.folds * RUNS / count % contest.folds != fold);
     let recipe = Recipe {
-        seed: recipe.seed ^ (fold as u64 + 1),
-        ..recipe.clone()
+        seed: contest.trial.seed ^ (fold as u64 + 1),
+        decay,
+        jobs: 1,
+        ..contest.trial.clone()
     };
     let training = samples.pick(&inside);
     let (correction, course) = fit(rival, &training, contest, recipe, &mut |_| {})?;
@@ -336,19 +286,22 @@ fn tried(
         let off = std::array::from_fn(|k| residual[k] - delta[k]);
         (*row, length(off))
     };
-    // A course counts up within each member, and the swarm's is member 0.
-    let members = course.chunk_by(|a, b| a.member == b.member);
+    let last_of = |phase| course.iter().rfind(|step| step.phase == phase);
+    let phases = [Phase::Swarm, Phase::Gradient].into_iter();
     Some(Done {
         left: outside.iter().map(left).collect(),
         numbers: correction.numbers(),
-        evaluations: members.map(|one| one[one.len() - 1].evaluations).sum(),
+        evaluations: phases
+            .filter_map(last_of)
+            .map(|step| step.evaluations)
+            .sum(),
     })
 }
 
 /// All folds of one rival; `None` where one could not be fitted.
 fn together(
     rival: Rival,
-    settings: Option<(usize, f64)>,
+    decay: Option<f64>,
     folds: &[Option<Done>],
     before: &[f64],
     poses: &[usize],
@@ -376,7 +329,7 @@ fn together(
         sigma: (squares * count / (count - 1.0).max(1.0)).sqrt() / rows,
         numbers: first.numbers,
         evaluations: first.evaluations,
-        settings,
+        decay,
     })
 }
 

@@ -1,32 +1,25 @@
-//! From samples to networks: a swarm (Fig. 3) or chance finds the starts, gradient descent finishes them, their mean is used.
-//!
-//! All swarms may spend what a beetle swarm of the recipe's size does. Work is capped: the swarm judges beetles on at most [`SWARM_ROWS`] rows, so its cost does not grow with the recording.
+//! From samples to a network: a beetle swarm (Fig. 3 of Wang et al. 2020) or chance finds the start, gradient descent finishes it.
 
-use super::arm::ScrewArm;
-use super::correction::{
-    Body, Correction, Feature, JointMotion, NetworkScaling, Networks, Scaling,
-};
+use super::correction::{Body, Correction, Feature, NetworkScaling, Scaling};
 use super::descent::{DescentIteration, descend};
-use super::loss::{Batch, Loss, LossBuffers};
-use super::perceptron::{Activation, LayerSizes, OUTPUTS};
+use super::perceptron::{Activation, LayerSizes, Loss, OUTPUTS};
 use super::region::{Region, TrainingSamples};
 use crate::estimate::swarm::{Algorithm, Budget, Generation, SearchBox};
-use crate::estimate::threads::in_order;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
-/// Rows on which the swarm judges: drawn once, enough for a start.
-pub(crate) const SWARM_ROWS: usize = 256;
+/// Rows on which the swarm judges at most, so that its cost does not grow with the recording: enough for a start.
+const SWARM_ROWS: usize = 256;
 /// Beetles search weights in -1..1: with standardised inputs no neuron is saturated there.
 const SWARM_BOUND: f64 = 1.0;
 
 /// Where the gradient training starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TrainingStart {
-    /// Weights drawn evenly from the box that swarms search.
+    /// Weights drawn evenly from the box that the swarm searches.
     Random,
-    /// By a swarm of networks.
-    Swarm(Algorithm),
+    /// The best of a beetle swarm.
+    Swarm,
 }
 
 /// How to train.
@@ -36,8 +29,6 @@ pub struct Recipe {
     pub joints: usize,
     /// Inputs, in order.
     pub features: Vec<Feature>,
-    /// Outputs are motions of this arm's joints (Fig. 2 of the paper); without it, of the point.
-    pub through: Option<ScrewArm>,
     /// Neurons.
     pub hidden: usize,
     /// Activation of the hidden layer.
@@ -52,25 +43,12 @@ pub struct Recipe {
     pub iterations: usize,
     /// Weight decay.
     pub decay: f64,
-    /// Networks whose mean is the correction.
-    pub members: usize,
-    /// Share of the rows kept back from each member's training to stop it early.
+    /// Share of the rows kept back from the training to stop it early.
     pub keep_back: f64,
     /// Seed of start and swarm.
     pub seed: u64,
     /// Threads; the result does not depend on them.
     pub jobs: usize,
-}
-
-impl Recipe {
-    /// The same with so many neurons and this decay.
-    pub(super) fn sized(&self, hidden: usize, decay: f64) -> Self {
-        Self {
-            hidden,
-            decay,
-            ..self.clone()
-        }
-    }
 }
 
 /// Which part of the training a record is from.
@@ -87,8 +65,6 @@ pub enum Phase {
 pub struct TrainingStep {
     /// Which part of the training.
     pub phase: Phase,
-    /// From 1; the swarm serves all members and has 0.
-    pub member: usize,
     /// Generation or iteration, from 0.
     pub index: usize,
     /// Lowest loss so far.
@@ -111,40 +87,91 @@ pub fn train(
         samples.rows() > 0 && !recipe.features.is_empty(),
         "something to learn from"
     );
-    let prepared = Prepared::new(samples, recipe);
-    let (starts, mut course) = prepared.starts(observe);
-    let trained = in_order(recipe.jobs, recipe.members, |m| {
-        prepared.member(m, starts[m % starts.len()].clone())
-    });
-    let mut members = Vec::with_capacity(recipe.members);
-    for (parameters, history) in trained {
-        members.push(parameters);
-        course.extend(history);
-    }
-    let networks = Networks {
-        shape: prepared.shape,
-        joints: prepared.joints,
-        members,
+    let (dress, x, y) = dressed(samples, &recipe.features);
+    let shape = LayerSizes {
+        inputs: recipe.features.len(),
+        hidden: recipe.hidden,
+        activation: recipe.activation,
     };
+    let mut rng = ChaCha8Rng::seed_from_u64(recipe.seed);
+    let bounds = SearchBox::cube(shape.parameters(), -SWARM_BOUND, SWARM_BOUND);
+    // Root of the mean squared length, m, from mean squares of the scaled outputs.
+    let rms = |squares: [f64; OUTPUTS]| {
+        let axes = squares.iter().zip(&dress.outputs);
+        axes.map(|(s, o)| s * o.scale * o.scale).sum::<f64>().sqrt()
+    };
+    let mut course: Vec<TrainingStep> = Vec::new();
+    let start = match recipe.start {
+        TrainingStart::Random => bounds.random(&mut rng),
+        TrainingStart::Swarm => {
+            let (drawn, _) = draw(&mut rng, y.len(), SWARM_ROWS.min(y.len()));
+            let (x, few) = picked(&x, &y, &drawn);
+            let loss = Loss {
+                shape,
+                x: &x,
+                y: &few,
+                decay: recipe.decay * few.len() as f64 / y.len() as f64,
+            };
+            let budget = Budget {
+                generations: recipe.generations,
+                evaluations: None,
+                target: None,
+                seed: rng.random(),
+                jobs: recipe.jobs,
+            };
+            let judge = |x: &[f64]| loss.value(x);
+            let each = |generation: &Generation, best: &[f64]| {
+                observe(generation);
+                course.push(TrainingStep {
+                    phase: Phase::Swarm,
+                    index: generation.index,
+                    best: generation.best,
+                    train_rms: rms(loss.mean_squares(best)),
+                    check_rms: None,
+                    evaluations: generation.evaluations,
+                });
+            };
+            let found = Algorithm::Bso.minimise(recipe.beetles, &judge, &bounds, &budget, each);
+            found.position
+        }
+    };
+    // A stream of its own, so that it does not depend on how much the start drew.
+    let mut rng = ChaCha8Rng::seed_from_u64(recipe.seed);
+    rng.set_stream(1);
+    let back = (recipe.keep_back * y.len() as f64).round() as usize;
+    let (kept_back, trained) = draw(&mut rng, y.len(), back.min(y.len() - 1));
+    let (kept_back, trained) = (picked(&x, &y, &kept_back), picked(&x, &y, &trained));
+    let [check, train] = [&kept_back, &trained].map(|(x, y)| Loss {
+        shape,
+        x,
+        y,
+        decay: recipe.decay,
+    });
+    let descent = descend(
+        |x, gradient| train.gradient(x, gradient),
+        |x| (!check.y.is_empty()).then(|| check.mean_squares(x)),
+        start,
+        recipe.iterations,
+    );
+    course.extend(
+        descent
+            .history
+            .into_iter()
+            .map(|i: DescentIteration| TrainingStep {
+                phase: Phase::Gradient,
+                index: i.index,
+                best: i.loss,
+                train_rms: rms(i.train),
+                check_rms: i.check.map(rms),
+                evaluations: i.evaluations,
+            }),
+    );
     let correction = Correction {
-        body: Body::Networks(prepared.dress, networks),
-        region: prepared.region,
+        body: Body::Network(dress, shape, descent.parameters),
+        region: Region::of(&samples.sources, recipe.joints),
         left: 0.0,
     };
     (correction, course)
-}
-
-/// Rows scaled and ready to be learnt.
-struct Prepared<'a> {
-    recipe: &'a Recipe,
-    shape: LayerSizes,
-    x: Vec<Vec<f64>>,
-    y: Vec<[f64; OUTPUTS]>,
-    joints: Option<JointMotion>,
-    /// What each output does to the point at each row, in units of the scaled targets; empty without joints.
-    ways: Vec<Vec<[f64; OUTPUTS]>>,
-    dress: NetworkScaling,
-    region: Region,
 }
 
 /// Standardised inputs and outputs with their scaling.
@@ -163,244 +190,21 @@ pub(super) fn dressed(
         inputs,
         outputs,
     };
-    let x = samples
-        .sources
-        .iter()
-        .map(|row| dress.scaled(row))
-        .collect();
-    let y = samples
-        .residual
-        .iter()
-        .map(|r| std::array::from_fn(|k| outputs[k].scaled(r[k])))
-        .collect();
+    let x = samples.sources.iter().map(|row| dress.scaled(row));
+    let scaled = |r: &[f64; OUTPUTS]| std::array::from_fn(|k| outputs[k].scaled(r[k]));
+    let (x, y) = (x.collect(), samples.residual.iter().map(scaled).collect());
     (dress, x, y)
 }
 
-/// Joint motions of such sizes that each alone would make the residual's root mean square, which is given too, m.
-fn motion(samples: &TrainingSamples, arm: &ScrewArm) -> (JointMotion, f64) {
-    let count = (OUTPUTS * samples.rows()) as f64;
-    let squares = |values: &[[f64; OUTPUTS]]| {
-        values
-            .iter()
-            .flatten()
-            .map(|value| value * value)
-            .sum::<f64>()
-    };
-    let size = (squares(&samples.residual) / count).sqrt();
-    let size = if size > 1e-12 { size } else { 1.0 };
-    let mut motion = JointMotion {
-        arm: arm.clone(),
-        scales: vec![1.0; arm.hinges.len()],
-    };
-    let mut levers = vec![0.0; motion.scales.len()];
-    for q in &samples.sources {
-        for (lever, way) in levers.iter_mut().zip(motion.ways(q)) {
-            *lever += squares(&[way]);
-        }
-    }
-    // A joint whose axis goes through the point moves nothing, whatever its scale.
-    let scale = |lever: f64| {
-        if lever > 1e-18 {
-            size / (lever / count).sqrt()
-        } else {
-            0.0
-        }
-    };
-    motion.scales = levers.into_iter().map(scale).collect();
-    (motion, size)
-}
-
-impl<'a> Prepared<'a> {
-    fn new(samples: &TrainingSamples, recipe: &'a Recipe) -> Self {
-        let (mut dress, x, mut y) = dressed(samples, &recipe.features);
-        let joints = recipe.through.as_ref().map(|arm| motion(samples, arm));
-        let mut ways = Vec::new();
-        if let Some((motion, size)) = &joints {
-            // Lengths are compared, so all axes have one scale.
-            dress.outputs = [Scaling {
-                mean: 0.0,
-                scale: *size,
-            }; OUTPUTS];
-            y = samples
-                .residual
-                .iter()
-                .map(|r| r.map(|value| value / size))
-                .collect();
-            let scaled = |way: [f64; OUTPUTS]| way.map(|value| value / size);
-            ways = samples
-                .sources
-                .iter()
-                .map(|q| motion.ways(q).into_iter().map(scaled).collect())
-                .collect();
-        }
-        let outputs = joints
-            .as_ref()
-            .map_or(OUTPUTS, |(motion, _)| motion.scales.len());
-        let shape = LayerSizes {
-            inputs: recipe.features.len(),
-            hidden: recipe.hidden,
-            outputs,
-            activation: recipe.activation,
-        };
-        let joints = joints.map(|(motion, _)| motion);
-        Self {
-            recipe,
-            shape,
-            x,
-            y,
-            joints,
-            ways,
-            dress,
-            region: Region::of(&samples.sources, recipe.joints),
-        }
-    }
-
-    /// Where members start, best first, and the course of the swarm; chance has none.
-    fn starts(&self, observe: &mut dyn FnMut(&Generation)) -> (Vec<Vec<f64>>, Vec<TrainingStep>) {
-        let mut rng = self.rng(0);
-        let bounds = SearchBox::cube(self.shape.parameters(), -SWARM_BOUND, SWARM_BOUND);
-        match self.recipe.start {
-            TrainingStart::Random => (
-                (0..self.recipe.members)
-                    .map(|_| bounds.random(&mut rng))
-                    .collect(),
-                Vec::new(),
-            ),
-            TrainingStart::Swarm(algorithm) => self.swarm(algorithm, &bounds, &mut rng, observe),
-        }
-    }
-
-    fn swarm(
-        &self,
-        algorithm: Algorithm,
-        bounds: &SearchBox,
-        rng: &mut ChaCha8Rng,
-        observe: &mut dyn FnMut(&Generation),
-    ) -> (Vec<Vec<f64>>, Vec<TrainingStep>) {
-        let rows = if self.y.len() > SWARM_ROWS {
-            draw(rng, self.y.len(), SWARM_ROWS).0
-        } else {
-            (0..self.y.len()).collect()
-        };
-        let batch = self.batch(&rows);
-        let loss = Loss {
-            shape: self.shape,
-            batch: &batch,
-            decay: self.recipe.decay * rows.len() as f64 / self.y.len() as f64,
-        };
-        let mut scratch = LossBuffers::new(self.shape);
-        let mut course: Vec<TrainingStep> = Vec::new();
-        // A lone beetle knows one place: each member has a search of its own, at a share of the cost.
-        let searches = if algorithm == Algorithm::Bas {
-            self.recipe.members
-        } else {
-            1
-        };
-        let spent = Algorithm::Bso.evaluations(self.recipe.beetles, self.recipe.generations)
-            / searches as u64;
-        let mut starts = Vec::new();
-        for search in 0..searches {
-            let budget = Budget {
-                generations: algorithm.generations(self.recipe.beetles, spent),
-                evaluations: Some(spent),
-                target: None,
-                seed: rng.random(),
-                jobs: self.recipe.jobs,
-            };
-            let outcome = algorithm.minimise(
-                self.recipe.beetles,
-                &loss,
-                bounds,
-                &budget,
-                |generation, best| {
-                    if search > 0 {
-                        return;
-                    }
-                    observe(generation);
-                    let train_rms = match course.last() {
-                        Some(last) if last.best == generation.best => last.train_rms,
-                        _ => self.rms(loss.mean_squares(best, &mut scratch)),
-                    };
-                    course.push(TrainingStep {
-                        phase: Phase::Swarm,
-                        member: 0,
-                        index: generation.index,
-                        best: generation.best,
-                        train_rms,
-                        check_rms: None,
-                        evaluations: generation.evaluations,
-                    });
-                },
-            );
-            starts.extend(outcome.elite.into_iter().map(|(_, position)| position));
-        }
-        (starts, course)
-    }
-
-    /// Trains member `m` (from 0) from `start`.
-    fn member(&self, m: usize, start: Vec<f64>) -> (Vec<f64>, Vec<TrainingStep>) {
-        let mut rng = self.rng(1 + m as u64);
-        let back = (self.recipe.keep_back * self.y.len() as f64).round() as usize;
-        let (kept_back, trained) = draw(&mut rng, self.y.len(), back.min(self.y.len() - 1));
-        let batch = self.batch(&trained);
-        let check = self.batch(&kept_back);
-        let loss = |batch| Loss {
-            shape: self.shape,
-            batch,
-            decay: self.recipe.decay,
-        };
-        let train = loss(&batch);
-        let check = (check.rows() > 0).then(|| loss(&check));
-        let (mut scratch, mut check_scratch) =
-            (LossBuffers::new(self.shape), LossBuffers::new(self.shape));
-        let descent = descend(
-            |x, gradient| train.gradient(x, gradient, &mut scratch),
-            |x| check.map(|check| check.mean_squares(x, &mut check_scratch)),
-            start,
-            self.recipe.iterations,
-        );
-        let course = |i: DescentIteration| TrainingStep {
-            phase: Phase::Gradient,
-            member: m + 1,
-            index: i.index,
-            best: i.loss,
-            train_rms: self.rms(i.train),
-            check_rms: i.check.map(|squares| self.rms(squares)),
-            evaluations: i.evaluations,
-        };
-        (
-            descent.parameters,
-            descent.history.into_iter().map(course).collect(),
-        )
-    }
-
-    /// A stream of its own for each purpose, so that none depends on how much another drew.
-    fn rng(&self, stream: u64) -> ChaCha8Rng {
-        let mut rng = ChaCha8Rng::seed_from_u64(self.recipe.seed);
-        rng.set_stream(stream);
-        rng
-    }
-
-    fn batch(&self, rows: &[usize]) -> Batch {
-        let x: Vec<Vec<f64>> = rows.iter().map(|r| self.x[*r].clone()).collect();
-        let y: Vec<[f64; OUTPUTS]> = rows.iter().map(|r| self.y[*r]).collect();
-        let batch = Batch::new(&x, &y);
-        if self.ways.is_empty() {
-            return batch;
-        }
-        let ways: Vec<_> = rows.iter().map(|r| self.ways[*r].clone()).collect();
-        batch.through(&ways)
-    }
-
-    /// Root of the mean squared length, m, from mean squares of the scaled outputs.
-    fn rms(&self, squares: [f64; OUTPUTS]) -> f64 {
-        squares
-            .iter()
-            .zip(&self.dress.outputs)
-            .map(|(s, o)| s * o.scale * o.scale)
-            .sum::<f64>()
-            .sqrt()
-    }
+fn picked(
+    x: &[Vec<f64>],
+    y: &[[f64; OUTPUTS]],
+    rows: &[usize],
+) -> (Vec<Vec<f64>>, Vec<[f64; OUTPUTS]>) {
+    (
+        rows.iter().map(|row| x[*row].clone()).collect(),
+        rows.iter().map(|row| y[*row]).collect(),
+    )
 }
 
 /// Draws `count` of `rows` rows without putting back: those drawn and the others, each in ascending order.

@@ -17,26 +17,12 @@ use std::f64::consts::{E, PI};
 
 mod steps;
 
-pub use steps::Found;
-use steps::{ELITE, Swarm, ranked};
+use steps::{ELITE, Found, Swarm};
 
 /// A function to be made small. Values that are no number count as infinitely bad.
-pub trait Objective: Sync {
-    /// Memory that one thread reuses between evaluations.
-    type Scratch;
-    /// Buffers, one a thread.
-    fn scratch(&self) -> Self::Scratch;
-    /// What is minimised, at a point within the bounds.
-    fn value(&self, x: &[f64], scratch: &mut Self::Scratch) -> f64;
-}
+pub trait Objective: Fn(&[f64]) -> f64 + Sync {}
 
-impl<F: Fn(&[f64]) -> f64 + Sync> Objective for F {
-    type Scratch = ();
-    fn scratch(&self) {}
-    fn value(&self, x: &[f64], _: &mut ()) -> f64 {
-        self(x)
-    }
-}
+impl<F: Fn(&[f64]) -> f64 + Sync> Objective for F {}
 
 /// A box: every coordinate stays within `lower..=upper`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -138,8 +124,6 @@ pub struct SwarmResult {
     pub position: Vec<f64>,
     /// The value there.
     pub value: f64,
-    /// The best position of each individual with its value, best first.
-    pub elite: Vec<Found>,
     /// Generation by generation.
     pub history: Vec<Generation>,
     /// How often the function was asked.
@@ -154,8 +138,6 @@ struct Search<'a, O: Objective> {
     bounds: &'a SearchBox,
     rng: ChaCha8Rng,
     jobs: usize,
-    /// Buffers of the one thread that evaluates where there are no others.
-    scratch: O::Scratch,
     /// Number of the generation being made, from 1, and how many there may be.
     generation: usize,
     generations: usize,
@@ -169,24 +151,9 @@ impl<O: Objective> Search<'_, O> {
     fn probe(&mut self, positions: &[Vec<f64>]) -> Vec<f64> {
         self.evaluations += positions.len() as u64;
         let number = |value: f64| if value.is_nan() { f64::INFINITY } else { value };
-        if self.jobs <= 1 {
-            let (objective, scratch) = (self.objective, &mut self.scratch);
-            return positions
-                .iter()
-                .map(|x| number(objective.value(x, scratch)))
-                .collect();
-        }
-        // A chunk is all that a thread evaluates, so that scratch memory is made once per chunk.
-        let size = positions.len().div_ceil(self.jobs).max(1);
-        let chunks: Vec<&[Vec<f64>]> = positions.chunks(size).collect();
-        let values = in_order(self.jobs, chunks.len(), |c| {
-            let mut scratch = self.objective.scratch();
-            chunks[c]
-                .iter()
-                .map(|x| self.objective.value(x, &mut scratch))
-                .collect::<Vec<f64>>()
-        });
-        values.into_iter().flatten().map(number).collect()
+        let objective = self.objective;
+        let values = in_order(self.jobs, positions.len(), |p| objective(&positions[p]));
+        values.into_iter().map(number).collect()
     }
     /// Values at the positions of a generation; the best ever is remembered.
     fn visit(&mut self, positions: &[Vec<f64>]) -> Vec<f64> {
@@ -285,7 +252,6 @@ impl Algorithm {
             bounds,
             rng: ChaCha8Rng::seed_from_u64(budget.seed),
             jobs: budget.jobs,
-            scratch: objective.scratch(),
             generation: 0,
             generations: budget.generations,
             evaluations: 0,
@@ -325,13 +291,10 @@ impl Algorithm {
                 Self::Abc => swarm.bee_colony(&mut search),
             }
         };
-        let mut elite = swarm.best;
-        ranked(&mut elite);
         let (value, position) = search.best;
         SwarmResult {
             position,
             value,
-            elite,
             history,
             evaluations: search.evaluations,
             stop,

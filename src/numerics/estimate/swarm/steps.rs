@@ -48,7 +48,7 @@ const MUTATIONS: f64 = 1.0;
 const LIMIT: f64 = 1.0;
 
 /// A value and where it was found.
-pub type Found = (f64, Vec<f64>);
+pub(super) type Found = (f64, Vec<f64>);
 
 /// The individuals: where each is, how fast, and what it remembers.
 pub(super) struct Swarm {
@@ -304,6 +304,6 @@ fn mutate<O: Objective>(child: &mut [f64], search: &mut Search<O>) {
 }
 
 /// Best first.
-pub(super) fn ranked(found: &mut [Found]) {
+fn ranked(found: &mut [Found]) {
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
 }
