@@ -21,7 +21,7 @@
 //! | [`robot`] | import of robots, their screws, their gravity torques; rows as measured | description, spatial, yaml |
 //! | [`effect`] | the library of physical effects, a row of the table of causes each, and their composition | criteria, robot, spatial |
 //! | [`observation`] | the kinds of measurement: columns, residual, noise, derivatives, rank | effect, robot, spatial |
-//! | [`estimate`] | least squares, observability, swarm, network | criteria, effect, observation, robot, spatial |
+//! | [`estimate`] | least squares, observability, swarm, learned corrections | criteria, effect, observation, robot, spatial |
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
 //! | [`program`] | programs of controllers (KRL, RAPID), read strictly: rewritten in the numbers of their targets, or as lists of joints | compensate, robot, spatial |
 //! | [`targets`] | tables of targets (text, Parquet) with their joints replaced, planned motions with their torques | compensate, dynamics, raw, robot |
@@ -71,7 +71,7 @@
 //! 4. Randomness enters only as a seed.
 //! 5. SI inside; a stored column's name ends in its unit, one unit per quantity (lengths mm, angles rad).
 //! 6. A table once committed is never changed.
-//! 7. No file uses, by whatever detour, a file that uses it, but for a room's own file and its members (tests/it/circles.rs).
+//! 7. No file uses, by whatever detour, a file that uses it, but for a room's own file and its members.
 //!
 //! # Adding things
 //! | add | new | touch |
