@@ -104,8 +104,19 @@ fn phrase(effect: &str) -> Option<(&'static str, &'static str)> {
 pub(super) fn words(effect: &str, place: &str) -> String {
     match phrase(effect) {
         Some((words, _)) => words.replace("{}", place),
-        None if effect == names::UNKNOWN => format!("unknown cause at {place}"),
+        None if effect == names::UNKNOWN => format!("{place} errs, unnamed"),
         None => format!("{} at {place}", effect.replace('_', " ")),
+    }
+}
+
+/// How the statement of a finding without a name ends, before its size.
+const UNNAMED: &str = ", unnamed";
+
+/// Place, motion and variable of a finding without a name, as its statement has them.
+fn unnamed(found: &Found) -> String {
+    match found.statement.split_once(UNNAMED) {
+        Some((what, _)) => format!("{what}{UNNAMED}"),
+        None => words(&found.effect, &found.place),
     }
 }
 
@@ -139,6 +150,8 @@ impl ShortFinding {
         let of_rows = number.is_none() && size.is_none();
         let mut what = if of_rows {
             found.statement.trim_end_matches('.').to_string()
+        } else if effect == names::UNKNOWN {
+            unnamed(found)
         } else {
             words(effect, &found.place)
         };
@@ -452,7 +465,17 @@ mod tests {
             rivals: rivals(),
             ..found("unknown", numbers())
         };
-        assert_eq!(lines_of(far), ["unknown cause at joint 3", "", ""]);
+        let stated = Found {
+            statement: "joint 3 tilts with the angle of joint 5, unnamed (31 um rms at the tool)."
+                .into(),
+            ..far.clone()
+        };
+        assert_eq!(lines_of(far), ["joint 3 errs, unnamed", "", ""]);
+        let stated = lines_of(stated);
+        assert_eq!(
+            stated,
+            ["joint 3 tilts with the angle of joint 5, unnamed", "", ""]
+        );
     }
 
     #[test]

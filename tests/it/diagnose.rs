@@ -4,6 +4,7 @@ mod flanks;
 mod foreign;
 mod kinds;
 mod left_out;
+mod own_curve;
 mod possible;
 mod scrambled;
 mod sentences;

@@ -58,7 +58,7 @@ pub(super) fn outcome(
     found
         .iter_mut()
         .for_each(|one| nameless(one, &question.without));
-    found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
+    found.sort_by(|a, b| b.evidence.effect_rms.total_cmp(&a.evidence.effect_rms));
     let leftover = leftover(problem, &last);
     let over = after.rms.iter().zip(&problem.noise);
     let over = over

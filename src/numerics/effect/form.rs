@@ -459,7 +459,7 @@ impl Term {
     }
 
     /// Whether a joint follows a free curve of its own angle: nearly geometry, or another law of that angle, in its slow part.
-    pub(crate) fn is_own_curve(&self) -> bool {
+    pub fn is_own_curve(&self) -> bool {
         let is_own_angle = |(joint, variable)| variable == Variable::Angle { joint };
         self.basis().is_curve() && self.of_one().is_some_and(is_own_angle)
     }

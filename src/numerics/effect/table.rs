@@ -260,11 +260,11 @@ pub static CAUSES: &[&Cause] = &[
     &Cause {
         name: names::JOINT_TABLE,
         place: "joint",
-        formula: "d = a smooth curve of q over the measured range",
+        formula: "d = a curve of q that is no wave, over the measured range",
         size: "5 to 200 arcsec",
         confounded: "gear_cyclic",
         needs: "many points",
-        sentence: "{place} has a repeatable error of no simple form, kept as a table",
+        sentence: "the transmission or encoder of {place} errs over its angle by a curve that is no wave",
         ..Cause::PLAIN
     },
     &Cause {

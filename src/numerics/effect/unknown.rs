@@ -21,7 +21,7 @@ pub(super) static CAUSE: Cause = Cause {
     place: "joint, link, base, tool or tracker",
     formula: "a form-free function of joints, time, payload or sight",
     confounded: "whatever is in no list",
-    sentence: "{place} has an error that no entry of the library explains: {law}",
+    sentence: "{place} {law}, unnamed",
     ..Cause::PLAIN
 };
 
@@ -166,7 +166,7 @@ fn the_same_motion(motion: Motion) -> Option<Place> {
     }
 }
 
-/// What a finding's law without a name is a function of and how, in words; none where it has no such law.
+/// What moves and what it follows, as a place does it: `tilts with the angle of joint 5`; none where a finding has no such law.
 pub(super) fn described(summary: &Summary) -> Option<String> {
     summary
         .terms(names::UNKNOWN)
@@ -174,39 +174,44 @@ pub(super) fn described(summary: &Summary) -> Option<String> {
         .map(|term| in_words(term, summary.clock))
 }
 
-/// A law as a function of what and how.
-fn in_words(term: &Term, clock: Clock) -> String {
-    let variables: Vec<String> = term
-        .law()
-        .variables()
-        .into_iter()
-        .map(|variable| clock.named(variable))
-        .collect();
-    let subject = variables.join(" and ");
-    if let Motion::Instrument { reading: read } = term.motion() {
-        let read = match read {
-            Polar::Azimuth => "azimuths",
-            Polar::Elevation => "elevations",
-            Polar::Range => "ranges",
-        };
-        return format!("its {read} err with the {subject}");
-    }
-    match (term.basis(), term.law().first.variable) {
-        (Basis::Wave { .. }, _) if term.law().times.is_some() => {
-            format!("product of functions of {subject}")
-        }
-        (Basis::Wave { order, .. }, _) => format!("periodic in {subject}, {order} a turn"),
-        (_, Variable::Gravity { .. }) => {
-            "depends on the direction of gravity, as when a mounting yields".into()
-        }
-        (_, Variable::Temperature) => match term.law().times {
-            Some(times) => format!(
-                "depends on the warm-up and on {}",
-                clock.named(times.variable)
-            ),
-            None => "depends on the warm-up".into(),
+/// What a place does by its motion.
+fn verb(motion: Motion) -> &'static str {
+    match motion {
+        Motion::Joint { .. } => "errs",
+        Motion::Coupled { .. } => "moves along",
+        Motion::Axis { .. } => "tilts",
+        Motion::Bend { .. } => "bends",
+        Motion::Links { .. } => "grows",
+        Motion::Slide { .. } => "shifts",
+        Motion::Base { axes } | Motion::Tracker { axes } | Motion::Tool { axes } => match axes {
+            Axes::Place => "shifts",
+            Axes::Rotation => "turns",
+            _ => "moves",
         },
-        (_, Variable::Payload) => "differs with the payload".into(),
-        _ => format!("function of {subject}"),
+        Motion::Instrument { reading } => match reading {
+            Polar::Azimuth => "errs in azimuth",
+            Polar::Elevation => "errs in elevation",
+            Polar::Range => "errs in range",
+        },
+    }
+}
+
+/// A motion with what it follows.
+fn in_words(term: &Term, clock: Clock) -> String {
+    let named = |variable: Variable| match variable {
+        Variable::Angle { joint } => format!("the angle of joint {}", joint + 1),
+        Variable::Temperature => "the warm-up".into(),
+        Variable::Payload | Variable::Time | Variable::ArmLoad => {
+            format!("the {}", clock.named(variable))
+        }
+        variable => clock.named(variable),
+    };
+    let variables: Vec<String> = term.law().variables().into_iter().map(named).collect();
+    let (verb, subject) = (verb(term.motion()), variables.join(" and "));
+    match term.basis() {
+        Basis::Wave { order, .. } if term.law().times.is_none() => {
+            format!("{verb} with {subject}, {order} times a turn")
+        }
+        _ => format!("{verb} with {subject}"),
     }
 }

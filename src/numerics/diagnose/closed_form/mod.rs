@@ -52,7 +52,7 @@ impl FormulaSearch<'_, '_> {
         // What it has elsewhere are details of the model.
         let forms = finding.forms.iter();
         let forms: Vec<&Form> = forms.filter(|form| form.place() == finding.place).collect();
-        let is_named = finding.effect != names::UNKNOWN;
+        let is_named = ![names::UNKNOWN, names::JOINT_TABLE].contains(&finding.effect);
         if is_named || forms.is_empty() || !forms.iter().all(|form| nameless(form)) {
             return None;
         }

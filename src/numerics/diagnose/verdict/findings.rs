@@ -5,7 +5,7 @@ use crate::criteria::words::FIRM;
 use crate::diagnose::table::{Answer, FoundCell, places};
 use crate::effect::{
     Cause, Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Survey,
-    Variable, cause, figure, moved_with_the_payload, names, people, turned_holder,
+    Term, Variable, cause, figure, moved_with_the_payload, names, people, turned_holder,
 };
 use crate::estimate::{Model, ParameterStatus, tail};
 use crate::observation::Dimension;
@@ -16,7 +16,7 @@ use crate::verdict::windup::turns_back;
 use crate::whitened::add_columns;
 use crate::words::{left_out, not_so, sentence, small, with_size};
 
-/// The causes of the last round as findings, strongest first; whether they leave more than noise `at_fitted_rows` or anywhere.
+/// The causes of the last round as findings, largest at the tool first; whether they leave more than noise `at_fitted_rows` or anywhere.
 pub(super) fn findings(
     last: &LastRound,
     at_fitted_rows: bool,
@@ -43,8 +43,8 @@ pub(super) fn findings(
         .any(|cause| by_the_way_there(&cause.form))
         .then_some(0);
     out.extend(faults(last, unknown, at_fitted_rows));
-    let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
-    out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
+    let size = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.effect_rms);
+    out.sort_by(|a, b| size(b).total_cmp(&size(a)));
     out
 }
 
@@ -185,6 +185,10 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
         _ if !named && excluded => (names::UNKNOWN, left_out(&summary, &rms)),
         (Some(why), _) if named => (names::UNKNOWN, not_so(effect, &summary, &why, &rms)),
         (_, Some(modelled)) => (effect, with_size(&modelled.sentence, &rms)),
+        _ if !named && is_table(last, &forms) => (
+            names::JOINT_TABLE,
+            sentence(names::JOINT_TABLE, &summary, &rms),
+        ),
         _ => (effect, sentence(effect, &summary, &rms)),
     };
     rivals.retain(|rival| {
@@ -203,6 +207,14 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
         valid,
         forms,
     }
+}
+
+/// Whether forms without a name are curves of a turning joint over its own angle: transmission or encoder, which nothing else of an arm follows.
+fn is_table(last: &LastRound, forms: &[Form]) -> bool {
+    let robot = last.survey.robot;
+    let turns = |place| matches!(place, Place::Joint(joint) if robot.is_revolute(joint));
+    let is_curve = |form: &Form| form.term().is_some_and(Term::is_own_curve) && turns(form.place());
+    !forms.is_empty() && forms.iter().all(is_curve) && !last.excludes(names::JOINT_TABLE)
 }
 
 /// What a finding is in the fitted model as a whole, unless the user excludes what would do the same.
