@@ -1,15 +1,17 @@
 //! The first page: what was calibrated with what, how accurate it is, whether that is accepted, under which conditions, and what was not seen.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::report::errors::{Steps, before};
 use crate::report::findings::wrong_setup;
 use crate::report::language::{Locale, say};
 use crate::report::number::{count, render};
 use crate::report::workspace::{StepErrors, histogram};
 use crate::report::{Accepted, Tables};
-use crate::table::{AcceptanceRow, StatisticsRow, VerdictRow, VerdictTopic};
+use crate::table::{AcceptanceRow, StatisticsRow, VerdictRow, VerdictTopic, inert};
 use crate::units::Unit;
+use serde::Serialize;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 /// Standard deviations of an expanded uncertainty (VIM: coverage factor).
 const COVERAGE: f64 = 2.0;
@@ -49,6 +51,159 @@ pub(super) fn certificate(
         "slides": recording.prismatic.contains(&true),
         "not_observable": diagnosis.map(|row| tables.statements(&row.step, VerdictTopic::NotObservable)).unwrap_or_default(),
     })
+}
+
+/// What a certificate states: the keys of `identity` by which each is given.
+const STATED: [&[&str]; 8] = [
+    &["certificate number", "number", "certificate"],
+    &["date", "date of measurement"],
+    &["operator"],
+    &["instrument", "tracker"],
+    &[
+        "instrument serial",
+        "tracker serial",
+        "serial number of the instrument",
+    ],
+    &["instrument calibrated", "tracker calibrated", "calibrated"],
+    &["standard", "traceability"],
+    &["robot serial", "serial"],
+];
+
+/// Names with what is stated; none is a line to fill in. What else `identity` has follows as given.
+pub(super) fn identity(
+    locale: &Locale,
+    tables: &Tables,
+    given: &BTreeMap<String, String>,
+) -> Vec<(String, Option<String>)> {
+    let names = [
+        say!(locale, "certificate number"),
+        say!(locale, "date of the measurement"),
+        say!(locale, "operator"),
+        say!(locale, "instrument"),
+        say!(locale, "serial number of the instrument"),
+        say!(locale, "instrument calibrated on"),
+        say!(locale, "standard, traceability"),
+        say!(locale, "serial number of the robot"),
+    ];
+    let plain = |key: &str| key.trim().to_lowercase().replace('_', " ");
+    let stated = |keys: &[&str]| {
+        let mut all = given.iter();
+        let (_, value) = all.find(|(key, _)| keys.contains(&plain(key).as_str()))?;
+        Some(value.clone())
+    };
+    let dated = |k: usize| if k == 1 { dates(locale, tables) } else { None };
+    let fields = STATED.iter().enumerate().zip(names);
+    let fields = fields.map(|((k, keys), name)| (name, stated(keys).or_else(|| dated(k))));
+    let is_other = |key: &String| {
+        !STATED
+            .iter()
+            .any(|keys| keys.contains(&plain(key).as_str()))
+    };
+    let others = given.iter().filter(|(key, _)| is_other(key));
+    let others = others.map(|(key, value)| (key.clone(), Some(value.clone())));
+    fields.chain(others).collect()
+}
+
+/// A clock that shows more than this (s, a year) counts since 1970.
+const EPOCH: f64 = 3e7;
+
+/// The days of a recording whose clock counts since 1970.
+fn dates(locale: &Locale, tables: &Tables) -> Option<String> {
+    let [first, last] = extent(tables.recording.time.iter().flatten().copied())?;
+    let day = |seconds: f64| {
+        let moment = jiff::Timestamp::from_second(seconds as i64).ok()?;
+        Some(moment.to_string().get(..10)?.to_string())
+    };
+    let [from, to] = [day(first).filter(|_| first > EPOCH)?, day(last)?];
+    Some(match from == to {
+        true => from,
+        false => say!(locale, "{from} to {to}", from, to),
+    })
+}
+
+/// Points of the certificate that are listed first, and the worst of them.
+const LISTED: usize = 50;
+const WORST: usize = 10;
+
+/// A held-out point as the certificate lists it, mm.
+#[derive(Serialize)]
+struct HeldOutPoint<'a> {
+    point_id: &'a str,
+    measured: [f64; 3],
+    before_mm: Option<f64>,
+    error: [f64; 3],
+    error_mm: f64,
+    suspect: bool,
+}
+
+/// Points of the set that is judged, in the order of the recording.
+fn judged_points<'a>(tables: &'a Tables, set: Option<&str>) -> Vec<HeldOutPoint<'a>> {
+    let Some(judged) = judged(tables, set) else {
+        return Vec::new();
+    };
+    let of_step = |step: &str| {
+        let mut all = tables.prediction.iter();
+        all.find(|table| table.0.first().is_some_and(|row| row.step == step))
+    };
+    let earlier = before(&tables.statistics.0, judged).and_then(|row| of_step(&row.step));
+    let earlier: BTreeMap<i64, f64> = earlier
+        .iter()
+        .flat_map(|table| &table.0)
+        .map(|row| (row.sequence, row.error_mm))
+        .collect();
+    let rows = of_step(&judged.step).into_iter().flat_map(|table| &table.0);
+    rows.filter(|row| row.held_out && row.set == judged.set)
+        .map(|row| HeldOutPoint {
+            point_id: &row.point_id,
+            measured: [
+                row.x_mm + row.dx_mm,
+                row.y_mm + row.dy_mm,
+                row.z_mm + row.dz_mm,
+            ],
+            before_mm: earlier.get(&row.sequence).copied(),
+            error: [row.dx_mm, row.dy_mm, row.dz_mm],
+            error_mm: row.error_mm,
+            suspect: row.suspect,
+        })
+        .collect()
+}
+
+/// What the certificate lists: the first points, and the worst of all where that are more.
+pub(super) fn held_out(tables: &Tables, set: Option<&str>) -> Value {
+    let points = judged_points(tables, set);
+    let mut worst: Vec<&HeldOutPoint> = points.iter().collect();
+    worst.sort_by(|a, b| b.error_mm.total_cmp(&a.error_mm));
+    worst.truncate(if points.len() > LISTED { WORST } else { 0 });
+    json!({
+        "points": points.len(),
+        "listed": points.iter().take(LISTED).collect::<Vec<_>>(),
+        "worst": worst,
+        "suspects": tables.suspects.iter().flat_map(|table| &table.0).filter(|row| !row.used).collect::<Vec<_>>(),
+    })
+}
+
+/// All of them as text for a spreadsheet, mm.
+pub(super) fn points(tables: &Tables, set: Option<&str>) -> Result<String> {
+    let bug = |error: csv::Error| Error::Bug(format!("points.csv: {error}"));
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let header = "point_id,x_mm,y_mm,z_mm,error_before_mm,dx_mm,dy_mm,dz_mm,error_mm,suspect";
+    writer.write_record(header.split(',')).map_err(bug)?;
+    for point in judged_points(tables, set) {
+        let mut record = vec![inert(point.point_id.into())];
+        record.extend(point.measured.map(|mm| format!("{mm:.4}")));
+        record.push(
+            point
+                .before_mm
+                .map_or_else(String::new, |mm| format!("{mm:.4}")),
+        );
+        record.extend(point.error.map(|mm| format!("{mm:.4}")));
+        record.extend([format!("{:.4}", point.error_mm), point.suspect.to_string()]);
+        writer.write_record(record).map_err(bug)?;
+    }
+    let bytes = writer
+        .into_inner()
+        .map_err(|error| Error::Bug(error.to_string()))?;
+    String::from_utf8(bytes).map_err(|error| Error::Bug(error.to_string()))
 }
 
 /// The least and the largest; none where there is no number.

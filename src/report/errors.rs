@@ -273,7 +273,7 @@ pub(super) fn closure_section(locale: &Locale, tables: &Tables) -> Option<Value>
     }))
 }
 
-fn standing_prediction(tables: &Tables) -> Option<&Labelled<Prediction>> {
+pub(super) fn standing_prediction(tables: &Tables) -> Option<&Labelled<Prediction>> {
     let named = |table: &&Labelled<Prediction>| {
         table.0.first().map(|row| row.step.as_str()) == tables.standing.as_deref()
     };

@@ -126,33 +126,23 @@ fn pictures(locale: &Locale, finding: &FindingRow, curve: &[&CurveRow]) -> Vec<(
         let mut svg = Svg::new(locale, 420.0, area.bottom + 38.0);
         x.grid_x(&mut svg, area, 6);
         y.grid_y(&mut svg, area, 6);
+        let at = |row: &CurveRow, value: f64| [x.at(row.x * x_scale), y.at(value * y_scale)];
         if before {
-            for row in &rows {
-                if let Some(band) = row.band {
-                    let at = x.at(row.x * x_scale);
-                    let ends = [row.fitted - 2.0 * band, row.fitted + 2.0 * band]
-                        .map(|value| y.at(value * y_scale));
-                    svg.line("whisker", [at, ends[0]], [at, ends[1]]);
-                }
-            }
-        }
-        for row in &rows {
-            let value = if before { row.without } else { row.with };
-            let class = if row.held_out {
-                "dot s0"
-            } else {
-                "dot s0 fitted"
+            let band = |row: &&CurveRow| {
+                let two = 2.0 * row.band?;
+                Some([-two, two].map(|off| at(row, row.fitted + off)))
             };
-            svg.circle(class, [x.at(row.x * x_scale), y.at(value * y_scale)], 1.9);
+            svg.lines("whisker", &rows.iter().filter_map(band).collect::<Vec<_>>());
+        }
+        for (held_out, class) in [(false, "dots s0 fitted"), (true, "dots s0")] {
+            let of_kind = rows.iter().filter(|row| row.held_out == held_out);
+            let value = |row: &CurveRow| if before { row.without } else { row.with };
+            let dots: Vec<_> = of_kind.map(|row| at(row, value(row))).collect();
+            svg.dots(class, 3.8, &dots);
         }
         if before {
-            for row in &rows {
-                svg.circle(
-                    "dot s-last",
-                    [x.at(row.x * x_scale), y.at(row.fitted * y_scale)],
-                    1.3,
-                );
-            }
+            let dots: Vec<_> = rows.iter().map(|row| at(row, row.fitted)).collect();
+            svg.dots("dots s-last", 2.6, &dots);
         }
         svg.line("zero", [area.left, y.at(0.0)], [area.right, y.at(0.0)]);
         baseline(&mut svg, area);

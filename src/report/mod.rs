@@ -1,7 +1,8 @@
-//! Tables to one self-contained HTML file: no script, no network, inline SVG, light and dark, fit to print.
+//! Tables to one self-contained HTML file: no network, inline SVG, one script that turns the picture of the arm, light and dark, fit to print.
 //!
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
 
+mod arm;
 mod certificate;
 mod data;
 mod errors;
@@ -17,6 +18,7 @@ mod svg;
 mod torques;
 mod workspace;
 
+pub(crate) use arm::{PlacedArm, shown_row};
 pub use certificate::{AchievedTables, achieved_page};
 pub(crate) use findings::diagnosed_page;
 pub use language::PageLanguage;
@@ -49,8 +51,23 @@ pub struct Report {
     /// What is accepted: of the held-out points of the diagnosed model, without a diagnosis after the last step. Beyond it `calib run` says
     /// so and ends with code 1.
     pub limits: Accepted,
-    /// Who, with what, where and when, e.g. {operator: A. Meier, tracker: AT960 no. 123, date: 2026-11-21}; shown as given.
+    /// Who, with what, where and when, e.g. {certificate number: K-17, operator: A. Meier, tracker: AT960, tracker serial: 123, tracker
+    /// calibrated: 2026-03-02, standard: .., robot serial: .., date: 2026-11-21}; shown as given. What is not stated is a line to fill in; the
+    /// date is that of the recording where its clock has one.
     pub identity: BTreeMap<String, String>,
+    /// All of the report, or the certificate, what was found and the pictures on at most four pages.
+    pub pages: ReportPages,
+}
+
+/// How much of the report is written.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ReportPages {
+    /// Everything.
+    #[default]
+    Full,
+    /// The certificate, what was found and the pictures.
+    Short,
 }
 
 /// Largest errors that are accepted, mm; each may be left out.
@@ -105,6 +122,8 @@ pub(crate) struct Tables {
     pub(crate) standing: Option<String>,
     /// Later steps that are worse on the same held-out points.
     pub(crate) withdrawn: Vec<Withdrawn>,
+    /// The arm where it stands; none where too few points tell.
+    pub(crate) arm: Option<PlacedArm>,
     /// Content hashes of the tables that the report rests on.
     pub(crate) hashes: Vec<(String, String)>,
 }
@@ -146,6 +165,8 @@ pub(crate) struct Pages {
     /// One file that needs no other.
     pub(crate) html: String,
     pub(crate) json: String,
+    /// The held-out points of the certificate, as text for spreadsheets.
+    pub(crate) points: String,
     /// The user's limits and what was found.
     pub(crate) acceptance: Acceptance,
     /// What the page says in English since its language lacks it.
@@ -170,7 +191,11 @@ pub(crate) fn pages(tables: &Tables, asked: &Report) -> Result<Pages> {
     let page = json!({
         "title": title,
         "certificate": certificate::certificate(locale, tables, judgement.as_ref(), set),
-        "identity": &asked.identity,
+        "identity": certificate::identity(locale, tables, &asked.identity),
+        "held_out": certificate::held_out(tables, set),
+        "arm": arm::section(locale, tables),
+        "is_short": asked.pages == ReportPages::Short,
+        "policy": "; script-src 'unsafe-inline'",
         "hashes": &tables.hashes,
         "diagnosis": findings::section(locale, tables),
         "errors": errors::errors_section(locale, tables, &steps, set)?,
@@ -190,6 +215,7 @@ pub(crate) fn pages(tables: &Tables, asked: &Report) -> Result<Pages> {
     Ok(Pages {
         html,
         json,
+        points: certificate::points(tables, set)?,
         acceptance: Acceptance(limits.unwrap_or_default()),
         missing: locale.missing(),
     })

@@ -45,6 +45,27 @@ pub(super) fn significant(value: f64, digits: usize) -> String {
     }
 }
 
+/// With the digits that a standard deviation tells, two of that where it begins with 1; four significant ones without.
+pub(super) fn measured(value: f64, sigma: Option<f64>) -> String {
+    let Some(sigma) = sigma.filter(|sigma| *sigma > 0.0 && sigma.is_finite()) else {
+        return significant(value, 4);
+    };
+    let first = sigma.log10().floor();
+    let digits = if sigma / 10f64.powf(first) < 2.0 {
+        2.0
+    } else {
+        1.0
+    };
+    let place = first - digits + 1.0;
+    let size = value.abs().max(sigma);
+    if size.log10().floor() < -3.0 || size >= 1e7 {
+        let kept = (value.abs().max(f64::MIN_POSITIVE).log10().floor() - place).max(0.0);
+        return significant(value, kept as usize + 1);
+    }
+    let unit = 10f64.powf(place);
+    fixed((value / unit).round() * unit, (-place).max(0.0) as usize)
+}
+
 /// The same without trailing zeros, for a number that is to be copied.
 pub(super) fn exact(value: f64, digits: usize) -> String {
     let text = significant(value, digits);
@@ -174,6 +195,12 @@ pub(super) fn render(
     // Figures of rows; of none an empty cell.
     let (of_fixed, of_significant) = (locale.clone(), locale.clone());
     let (of_signed, of_decimal) = (locale.clone(), locale.clone());
+    let of_measured = locale.clone();
+    environment.add_filter("measured", move |value: Option<f64>, sigma: Option<f64>| {
+        value.map_or_else(String::new, |value| {
+            of_measured.decimal(measured(value, sigma))
+        })
+    });
     let fixed = move |value: Option<f64>, decimals: usize| {
         value.map_or_else(String::new, |value| of_fixed.fixed(value, decimals))
     };
@@ -215,6 +242,18 @@ mod tests {
             [12.5, 0.0, 120.0, 8.2e-7].map(|v| exact(v, 9)),
             ["12.5", "0", "120", "8.2e-7"]
         );
+        assert_eq!(
+            [
+                (179.6004, 0.93),
+                (179.6, 12.0),
+                (0.03312, 0.0014),
+                (4.17e-7, 2e-9),
+                (1834.2, 310.0)
+            ]
+            .map(|(value, sigma)| measured(value, Some(sigma))),
+            ["179.6", "180", "0.0331", "4.17e-7", "1800"]
+        );
+        assert_eq!(measured(12.3456, None), "12.35");
         assert_eq!(
             [7, -1234, 10_000_000].map(count),
             ["7", "-1\u{202f}234", "10\u{202f}000\u{202f}000"]

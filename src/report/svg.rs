@@ -40,6 +40,30 @@ impl<'a> Svg<'a> {
         }
         self.body.push_str("\"/>\n");
     }
+    /// Many lines as one element.
+    pub(crate) fn lines(&mut self, class: &str, lines: &[[SvgPoint; 2]]) {
+        let each = lines.iter().map(|[from, to]| {
+            let [x, y, to_x, to_y] = [from[0], from[1], to[0], to[1]].map(tenth);
+            format!("M{x} {y}L{to_x} {to_y}")
+        });
+        self.many(class, "", each.collect());
+    }
+    /// Many dots as one element: thousands of circles make a page slow and its print large.
+    pub(crate) fn dots(&mut self, class: &str, width: f64, centres: &[SvgPoint]) {
+        let each = centres
+            .iter()
+            .map(|[x, y]| format!("M{} {}h0", tenth(*x), tenth(*y)));
+        self.many(
+            class,
+            &format!(" stroke-width=\"{}\"", tenth(width)),
+            each.collect(),
+        );
+    }
+    fn many(&mut self, class: &str, more: &str, d: String) {
+        if !d.is_empty() {
+            let _ = writeln!(self.body, "<path class=\"{class}\"{more} d=\"{d}\"/>");
+        }
+    }
     pub(crate) fn rect(&mut self, class: &str, corner: SvgPoint, size: SvgPoint) {
         let _ = writeln!(
             self.body,

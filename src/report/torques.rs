@@ -8,8 +8,8 @@ use super::svg::{Area, Scale, Svg, baseline, name_x, name_y};
 use crate::error::{Error, Result};
 use crate::table::{
     BodyConsistencies, Contacts, FrictionCurveRow, FrictionCurves, Inertials, JointTorques,
-    Labelled, Robot, TorqueCourse, TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict,
-    VerdictSentences, VerdictTopic,
+    Labelled, Robot, TorqueCourse, TorqueFindingRow, TorqueFindings, TorqueNumbers, TorqueRivals,
+    TorqueVerdict, VerdictSentences, VerdictTopic,
 };
 use serde_json::{Value, json};
 
@@ -53,6 +53,7 @@ pub fn torque_page(
         "joints": tables.course.joints,
         "slides": &tables.course.prismatic,
         "verdict": verdict,
+        "grid": grid(&tables.findings.0),
         "findings": result::findings(&tables.findings.0, &tables.numbers.0, &tables.rivals.0),
         "errors": &tables.joints.0,
         "pictures": (0..tables.course.joints).map(|joint| pictures(&locale, tables, joint)).collect::<Vec<_>>(),
@@ -64,6 +65,101 @@ pub fn torque_page(
         "hashes": hashes,
     });
     render(&locale, "torques.html", include_str!("torques.html"), page)
+}
+
+/// What torques follow, as columns of the table of causes, each with the causes that do.
+const FOLLOWED: [(&str, &[&str]); 6] = [
+    (
+        "own speed",
+        &[
+            "viscous_friction",
+            "coulomb_friction",
+            "asymmetric_friction",
+            "stribeck_friction",
+            "presliding_friction",
+            "backlash_spikes",
+        ],
+    ),
+    ("load", &["load_friction", "torque_constant"]),
+    (
+        "own angle",
+        &[
+            "torque_ripple",
+            "spring_balance",
+            "cable_stiffness",
+            "link_mass",
+            "link_com",
+            "payload_error",
+            "gravity_direction",
+        ],
+    ),
+    (
+        "acceleration",
+        &["rotor_inertia", "link_inertia", "joint_elasticity"],
+    ),
+    ("time", &["warmup_friction", "contact", "current_latency"]),
+    ("constant", &["current_offset"]),
+];
+/// What a cause without a name follows is the end of its statement.
+const DEPENDS: [(&str, &str); 3] = [
+    ("the angle of the joint", "own angle"),
+    ("the velocity of the joint", "own speed"),
+    ("the load of the joint", "load"),
+];
+const OTHER: &str = "other";
+
+/// What a finding's torque follows.
+fn followed(finding: &TorqueFindingRow) -> &'static str {
+    let of_name = |(_, names): &&(&str, &[&str])| names.contains(&&*finding.effect);
+    let statement = finding.statement.trim_end_matches('.');
+    let depends = DEPENDS.iter().find(|(end, _)| statement.ends_with(end));
+    let named = FOLLOWED.iter().find(of_name).map(|(column, _)| *column);
+    named
+        .or(depends.map(|(_, column)| *column))
+        .unwrap_or(OTHER)
+}
+
+/// The table of causes: places down the chain, what is followed across; size in Nm and the names.
+fn grid(findings: &[TorqueFindingRow]) -> Value {
+    let columns = FOLLOWED.iter().map(|(column, _)| *column).chain([OTHER]);
+    let columns: Vec<&str> = columns
+        .filter(|column| findings.iter().any(|finding| followed(finding) == *column))
+        .collect();
+    let mut places: Vec<&str> = findings.iter().map(|finding| &*finding.place).collect();
+    places.sort_by_key(|place| place_order(place));
+    places.dedup();
+    let largest = findings
+        .iter()
+        .map(|finding| finding.effect_rms_nm)
+        .fold(0.0, f64::max);
+    let cell = |place: &str, column: &str| {
+        let here: Vec<&TorqueFindingRow> = findings
+            .iter()
+            .filter(|finding| finding.place == place && followed(finding) == column)
+            .collect();
+        let nm = here
+            .iter()
+            .map(|finding| finding.effect_rms_nm)
+            .reduce(f64::max)?;
+        let names: Vec<&str> = here.iter().map(|finding| &*finding.effect).collect();
+        let share = nm / largest.max(f64::MIN_POSITIVE);
+        let shade = [0.01, 0.03, 0.1, 0.3, 0.6, 0.9]
+            .iter()
+            .filter(|edge| share >= **edge)
+            .count();
+        Some(json!({ "nm": nm, "names": names, "shade": shade, "open": names == ["unknown"] }))
+    };
+    let row = |place: &&str| {
+        let cells: Vec<_> = columns.iter().map(|column| cell(place, column)).collect();
+        json!({ "place": place, "cells": cells })
+    };
+    json!({ "columns": columns, "rows": places.iter().map(row).collect::<Vec<_>>() })
+}
+
+/// Down the chain; what is no joint or link stands below.
+fn place_order(place: &str) -> (i64, String) {
+    let number = place.split([' ', '-']).find_map(|word| word.parse().ok());
+    (number.unwrap_or(i64::MAX), place.into())
 }
 
 fn pictures(locale: &Locale, tables: &ReportTorquesReads, joint: usize) -> Value {

@@ -62,7 +62,8 @@ impl Colours {
         edges.reverse();
         Self { edges }
     }
-    fn class(&self, error: f64) -> usize {
+    /// Its class, from 0.
+    pub(super) fn class(&self, error: f64) -> usize {
         self.edges.iter().take_while(|edge| error > **edge).count()
     }
     /// What each class means, e.g. `0.1 - 0.2`.
@@ -154,23 +155,28 @@ pub(super) fn scatter(
     x.grid_x(&mut svg, area, 5);
     y.grid_y(&mut svg, area, 5);
     let every = rows.0.len().div_ceil(DRAWN).max(1);
-    for row in rows.0.iter().step_by(every) {
-        let [at, residual] = [
-            [0, 1].map(|a| view.axes[a].1(row)),
-            [0, 1].map(|a| view.axes[a].2(row)),
-        ];
-        let class = colours.class(row.error_mm);
-        let from = [x.at(at[0]), y.at(at[1])];
-        let to = [
-            x.at(at[0] + residual[0] * magnified),
-            y.at(at[1] + residual[1] * magnified),
-        ];
-        svg.line(&format!("vector e{class}"), from, to);
-        svg.circle(
-            &format!("dot e{class}{}", if row.held_out { "" } else { " fitted" }),
-            from,
-            if row.held_out { 2.3 } else { 1.7 },
-        );
+    let drawn: Vec<&PredictionRow> = rows.0.iter().step_by(every).collect();
+    let place = |row: &PredictionRow, factor: f64| {
+        let at = |a: usize| view.axes[a].1(row) + factor * view.axes[a].2(row);
+        [x.at(at(0)), y.at(at(1))]
+    };
+    for class in 0..CLASSES {
+        let of_class = |row: &&&PredictionRow| colours.class(row.error_mm) == class;
+        let lines: Vec<_> = drawn
+            .iter()
+            .filter(of_class)
+            .map(|row| [place(row, 0.0), place(row, magnified)])
+            .collect();
+        svg.lines(&format!("vector e{class}"), &lines);
+        for (held_out, fitted, width) in [(true, "", 4.6), (false, " fitted", 3.4)] {
+            let dots: Vec<_> = drawn
+                .iter()
+                .filter(of_class)
+                .filter(|row| row.held_out == held_out)
+                .map(|row| place(row, 0.0))
+                .collect();
+            svg.dots(&format!("dots e{class}{fitted}"), width, &dots);
+        }
     }
     baseline(&mut svg, area);
     name_x(&mut svg, area, &format!("{}, mm", view.axes[0].0));

@@ -38,7 +38,7 @@ pub mod split;
 mod transfer;
 mod validate;
 
-pub use crate::report::{Accepted, Report, ReportReads, ReportTorquesReads};
+pub use crate::report::{Accepted, Report, ReportPages, ReportReads, ReportTorquesReads};
 pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given, TorqueEvidence};
 pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};

@@ -2,18 +2,23 @@
 
 use crate::effect::Load;
 use crate::error::{Error, Fault, Place, Result};
-use crate::report::{Report, ReportReads, ReportTorquesReads, Tables, pages, torque_page};
+use crate::estimate::align_points;
+use crate::report::{
+    PlacedArm, Report, ReportReads, ReportTorquesReads, Tables, pages, shown_row, torque_page,
+};
 use crate::robot::RobotModel;
+use crate::spatial::{Pose, Twist};
 use crate::stage::{Context, Labelled, Stage, curves};
 use crate::table::{
     Acceptance, Curves, Document, DocumentRow, Frame, Prediction, Recording, Standing, Step, Table,
     Unseen, standing,
 };
+use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 crate::stage::stage! {
-    Report, "report", 26, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
+    Report, "report", 27, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
         ReportReads -> ReportWrites {
             document: Document,
             acceptance: Acceptance,
@@ -67,7 +72,10 @@ impl Stage for Report {
         if let Some(model) = standing.as_ref().and_then(|[_, stage]| model(stage)) {
             reads.parameters = model;
         }
+        let step = standing.as_ref().map(|[step, _]| step);
+        let arm = reads.placed_arm(step)?;
         let tables = Tables {
+            arm,
             counting,
             reads,
             curves,
@@ -90,7 +98,11 @@ impl Stage for Report {
         let html = document("report.html", "text/html", pages.html);
         let json = document("report.json", "application/json", pages.json);
         Ok(ReportWrites {
-            document: Document(vec![html, json]),
+            document: Document(vec![
+                html,
+                json,
+                document("points.csv", "text/csv", pages.points),
+            ]),
             acceptance: pages.acceptance,
             curves: tables.curves,
         })
@@ -144,6 +156,74 @@ impl ReportReads {
         let model = parameters.model(RobotModel::new(robot), &[], Load::GravityTorque)?;
         let data = recording.measurements();
         curves::curves(findings, parameters, &model, recording, &data, prediction)
+    }
+
+    /// The nominal arm where it stands in the instrument's frame, by the points themselves, in the pose of the largest error before anything.
+    fn placed_arm(&self, standing: Option<&String>) -> Result<Option<PlacedArm>> {
+        const FEWEST: usize = 4;
+        let named = |table: &&Labelled<Prediction>| {
+            table.0.first().map(|row| &row.step) == standing && table.is_of(&self.recording)
+        };
+        let last = self.prediction.iter().rfind(named);
+        let (Some(first), Some(last)) = (self.prediction.first(), last.or(self.prediction.last()))
+        else {
+            return Ok(None);
+        };
+        let rows = last.0.len().min(first.0.len()).min(self.recording.rows());
+        let robot = RobotModel::new(self.robot.to_description()?);
+        if robot.joints() != self.recording.joints {
+            return Ok(None);
+        }
+        let is_usable = |row: &usize| {
+            let predicted = &last.0[*row];
+            let place = [predicted.x_mm, predicted.y_mm, predicted.z_mm];
+            !predicted.suspect && place.iter().all(|mm| mm.is_finite())
+        };
+        let used: Vec<usize> = (0..rows).filter(is_usable).collect();
+        let Some(row) = shown_row(&first.0[..rows]).filter(|_| used.len() >= FEWEST) else {
+            return Ok(None);
+        };
+        let metres = |at: &usize| {
+            let row = &last.0[*at];
+            Vector3::new(row.x_mm, row.y_mm, row.z_mm) * 1e-3
+        };
+        let commanded = |at: &usize| robot.forward(self.recording.q(*at)).translation;
+        let model: Vec<Vector3<f64>> = used.iter().map(commanded).collect();
+        let seen: Vec<Vector3<f64>> = used.iter().map(metres).collect();
+        let base = align_points(&model, &seen);
+        let mm = |point: &Vector3<f64>| [0, 1, 2].map(|axis| 1e3 * point[axis]);
+        let mut rows = [0.0; 12];
+        for (place, number) in rows.iter_mut().enumerate() {
+            let (row, column) = (place / 4, place % 4);
+            *number = match column {
+                3 => 1e3 * base.translation[row],
+                _ => base.rotation[(row, column)],
+            };
+        }
+        let (mut body, mut chain) = (base, vec![mm(&base.translation)]);
+        let mut joints = Vec::new();
+        for (joint, travel) in self.recording.q(row).iter().enumerate() {
+            let (axis, point) = (robot.axis(joint), robot.point(joint));
+            chain.push(mm(&body.point(point)));
+            let twist = match robot.is_revolute(joint) {
+                true => {
+                    let about = point.cross(axis);
+                    Twist::new(about.x, about.y, about.z, axis.x, axis.y, axis.z)
+                }
+                false => Twist::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0),
+            };
+            body = body * Pose::exp(&(twist * *travel));
+            joints.push(((*axis).into(), mm(point), !robot.is_revolute(joint)));
+        }
+        let tool = robot.home().translation;
+        chain.push(mm(&body.point(&tool)));
+        Ok(Some(PlacedArm {
+            base: rows,
+            joints,
+            tool: mm(&tool),
+            chain,
+            row,
+        }))
     }
 
     /// What the controller counts otherwise than the robot file, where it does.

@@ -3,6 +3,7 @@
 use super::screen::cut;
 use crate::audit::{QueryResult, QueryValue};
 use crate::error::{Error, Result, counted, one_line};
+use crate::table::inert;
 use std::borrow::Cow;
 use std::fmt::Display;
 use unicode_width::UnicodeWidthStr;
@@ -202,16 +203,6 @@ pub fn csv(answer: &QueryResult) -> Result<String> {
         writer.write_record(cells).map_err(bug)?;
     }
     String::from_utf8(writer.into_inner().map_err(bug)?).map_err(bug)
-}
-
-/// A text that a spreadsheet would run as a formula gets a quote in front, as spreadsheets mark a text.
-fn inert(text: Cow<str>) -> String {
-    let runs = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
-    if runs {
-        format!("'{text}")
-    } else {
-        text.into_owned()
-    }
 }
 
 /// One array of objects, a row a line, columns in their order; what is no number is null.

@@ -48,6 +48,16 @@ fn typed<T: Table>(loose: Loose<Frame>) -> Result<Loose<T>> {
     })
 }
 
+/// A text that a spreadsheet would run as a formula gets a quote in front, as spreadsheets mark a text.
+pub(crate) fn inert(text: std::borrow::Cow<str>) -> String {
+    let runs = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
+    if runs {
+        format!("'{text}")
+    } else {
+        text.into_owned()
+    }
+}
+
 /// Tables of one stage by their kind, none of what it did not write.
 pub(crate) type TablesByKind<'a> = dyn Fn(&str) -> Result<Option<Frame>> + 'a;
 

@@ -166,7 +166,7 @@ fn nothing_to_validate_is_an_error_of_the_pipeline() {
 
 fn html(settings: Report, reads: ReportReads) -> String {
     let document = settings.run(reads, &context()).expect("a report").document;
-    assert_eq!(document.0.len(), 2);
+    assert_eq!(document.0.len(), 3);
     assert_eq!(document.0[0].name, "report.html");
     assert_eq!(document.0[0].media_type, "text/html");
     document.0[0].content.clone()
@@ -195,7 +195,7 @@ fn pictures(html: &str) -> usize {
 fn a_report_stands_alone_and_its_pictures_are_sound() {
     let page = html(Report::default(), tables("Heavy 6R, cell 4"));
     for foreign in [
-        "http://", "https://", "src=", "href=", "<script", "@import", "url(",
+        "http://", "https://", "src=", "href=", "<script ", "@import", "url(",
     ] {
         assert!(
             !page.contains(foreign),
@@ -212,8 +212,9 @@ fn a_report_stands_alone_and_its_pictures_are_sound() {
             "the report names `calib {command}`, which does not exist"
         );
     }
-    // Two held-out sets with two pictures each, four views, one spectrum, one convergence, two trainings.
-    assert_eq!(pictures(&page), 12);
+    // The arm, two held-out sets with two pictures each, four views, one spectrum, one convergence, two trainings.
+    assert_eq!(pictures(&page), 13);
+    assert_eq!(page.matches("<script>").count(), 1);
     let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("report.html");
     std::fs::write(&path, &page).expect("a copy to look at");
 }
@@ -303,7 +304,11 @@ fn hostile_names_are_shown_and_not_run() {
         },
         reads,
     );
-    assert!(!page.contains("<script"), "markup from a name came through");
+    assert_eq!(
+        page.matches("<script").count(),
+        1,
+        "markup from a name came through"
+    );
     assert!(
         !page.contains("\" onmouseover=\""),
         "an attribute from a name came through"
@@ -479,7 +484,7 @@ fn the_certificate_is_green_only_where_the_error_is_explained_and_within_the_lim
             .and_then(|head| head.rsplit("<section class=\"verdict ").next())
             .expect("a card");
         assert!(
-            page.contains("<dt>robot serial</dt><dd translate=\"no\">4711</dd>")
+            page.contains("<dt>serial number of the robot</dt><dd translate=\"no\">4711</dd>")
                 && page.matches("signature</span>").count() == 1
         );
         assert!(page.contains("expanded uncertainty of the corrected robot"));
@@ -537,4 +542,101 @@ fn the_table_of_causes_shows_what_was_found_and_what_is_left() {
         grid.text(),
         "found        own angle\njoint 2         280 um\n"
     );
+}
+
+fn between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
+    let tail = text.split_once(from).map_or("", |(_, tail)| tail);
+    tail.split(to).next().unwrap_or_default()
+}
+
+#[test]
+fn what_nobody_stated_is_a_line_to_fill_in_and_the_date_is_that_of_the_recording() {
+    let blank = |page: &str| page.matches("<dd class=\"blank\"></dd>").count();
+    let nothing = html(Report::default(), tables("Heavy 6R, cell 4"));
+    assert_eq!(blank(&nothing), 8);
+    let mut reads = tables("Heavy 6R, cell 4");
+    // 20 November 2026, 08:12:09 UTC and on.
+    let time = (0..reads.recording.rows()).map(|row| 1_795_162_329.0 + row as f64);
+    reads.recording.time = Some(time.collect());
+    let identity = [
+        ("operator", "A. Meier"),
+        ("Tracker", "AT960 <b>"),
+        ("tracker_serial", "123"),
+        ("cell", "7"),
+    ];
+    let identity = identity.map(|(name, value)| (name.to_string(), value.to_string()));
+    let stated = Report {
+        identity: identity.into(),
+        ..Report::default()
+    };
+    let page = html(stated, reads);
+    assert_eq!(blank(&page), 4);
+    for line in [
+        "date of the measurement</dt><dd translate=\"no\">2026-11-20</dd>",
+        "instrument</dt><dd translate=\"no\">AT960 &lt;b&gt;</dd>",
+        "serial number of the instrument</dt><dd translate=\"no\">123</dd>",
+        "<dt>cell</dt><dd translate=\"no\">7</dd>",
+    ] {
+        assert!(page.contains(line), "{line}");
+    }
+}
+
+#[test]
+fn the_certificate_lists_held_out_points_and_all_are_in_a_file_for_spreadsheets() {
+    let reads = || {
+        let mut reads = tables("Heavy 6R, cell 4");
+        for table in &mut reads.prediction {
+            for row in &mut table.table.0 {
+                row.point_id = format!("=1+{}", row.sequence);
+            }
+        }
+        reads
+    };
+    let page = html(Report::default(), reads());
+    let listed = between(&page, "id=\"held-out\"", "</section>");
+    let written = Report::default().run(reads(), &context());
+    let written = written.expect("a report").document;
+    let (name, text) = (&written.0[2].name, &written.0[2].content);
+    assert_eq!(
+        (name.as_str(), &*written.0[2].media_type),
+        ("points.csv", "text/csv")
+    );
+    let lines = text.lines().count() - 1;
+    let rows = reads().statistics.0;
+    let after = rows
+        .iter()
+        .filter(|row| row.held_out && row.step == "network");
+    assert_eq!(after.map(|row| row.points).max(), Some(lines as i64));
+    assert!(
+        lines > 60 && listed.contains(&format!("all {lines} are in points.csv")),
+        "{lines}"
+    );
+    assert_eq!(listed.matches("<tr><th").count(), 50 + 10 + 2);
+    assert!(
+        text.lines().skip(1).all(|line| line.starts_with("'=1+")),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_short_report_has_the_certificate_the_causes_and_the_arm_alone() {
+    let settings = Report {
+        pages: calib::stage::ReportPages::Short,
+        ..Report::default()
+    };
+    let page = html(settings, tables("Heavy 6R, cell 4"));
+    for kept in ["verdict", "arm-and-errors", "findings", "reproduce"] {
+        assert!(page.contains(&format!("id=\"{kept}\"")), "{kept}");
+    }
+    for gone in [
+        "held-out",
+        "errors",
+        "workspace",
+        "parameters",
+        "convergence",
+        "data",
+    ] {
+        assert!(!page.contains(&format!("id=\"{gone}\"")), "{gone}");
+    }
+    assert_eq!(pictures(&page), 1);
 }

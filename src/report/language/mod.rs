@@ -167,6 +167,12 @@ impl Locale {
             Ok(Value::from_safe_string(filled))
         });
         environment.add_filter("stored", move |english: &str| tables.stored(english));
+        let language = self.language;
+        // Names of causes that a user declares stay.
+        environment.add_filter("cause", move |effect: &str| {
+            let name = effect.replace('_', " ");
+            language.stored(&name).unwrap_or(name)
+        });
         environment.add_filter("sentence", move |english: &str| {
             statements.sentence(english)
         });

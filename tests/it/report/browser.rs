@@ -2,7 +2,7 @@
 
 use super::{html, tables::tables};
 use crate::desk::skipped;
-use calib::stage::Report;
+use calib::stage::{Report, ReportPages};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
@@ -205,4 +205,75 @@ fn the_report_prints() {
         printed.starts_with(b"%PDF") && (4..20).contains(&pages),
         "{pages} pages"
     );
+    assert!(printed.len() < 2_000_000, "{} bytes", printed.len());
+}
+
+#[test]
+fn the_short_report_prints_on_at_most_four_pages() {
+    let Some(chromium) = chromium() else {
+        return skipped("no chromium on PATH");
+    };
+    let settings = Report {
+        pages: ReportPages::Short,
+        ..Report::default()
+    };
+    let folder = folder(&html(settings, tables("Heavy 6R, cell 4")));
+    let file = folder.path().join("report.pdf");
+    browser(
+        &chromium,
+        folder.path(),
+        &[&format!("--print-to-pdf={}", file.display())],
+        &folder.path().join("report.html"),
+    );
+    let printed = std::fs::read(&file).expect("a PDF");
+    let pages = printed
+        .windows(12)
+        .filter(|bytes| bytes == b"/Type /Page\n");
+    let pages = pages.count();
+    assert!((1..=4).contains(&pages), "{pages} pages");
+}
+
+/// What somebody does with the picture of the arm: turns it, looks at the errors after, and clicks on a point.
+const HAND: &str = r##"<pre id="done"></pre><script>{
+  const svg = document.querySelector("#arm svg"), output = document.querySelector("#arm output");
+  const buttons = document.querySelectorAll("#arm button"), seen = () => [svg.querySelector(".arm").getAttribute("d"), output.textContent];
+  const point = (kind, x, y) => svg.dispatchEvent(new PointerEvent(kind, { clientX: x, clientY: y, bubbles: true }));
+  const frame = svg.getBoundingClientRect(), steps = [seen()], lines = [svg.querySelectorAll(".vector").length];
+  point("pointerdown", 100, 100); point("pointermove", 180, 120); point("pointerup", 180, 120); steps.push(seen());
+  buttons[1].click(); lines.push(svg.querySelector(".vector").getAttribute("d").length);
+  point("pointerdown", frame.left + 9, frame.top + 9); point("pointerup", frame.left + 9, frame.top + 9); steps.push(seen());
+  document.getElementById("done").textContent = JSON.stringify({ steps, lines, pressed: buttons[1].getAttribute("aria-pressed") });
+}</script></main>"##;
+
+#[test]
+fn the_picture_of_the_arm_turns_and_a_click_shows_the_pose_of_a_point() {
+    let Some(chromium) = chromium() else {
+        return skipped("no chromium on PATH");
+    };
+    let page = html(Report::default(), tables("Heavy 6R, cell 4"));
+    let (dom, console) = open(&chromium, &page.replace("</main>", HAND), 4_000);
+    assert_eq!(console, Vec::<String>::new());
+    let done = dom
+        .split("<pre id=\"done\">")
+        .nth(1)
+        .and_then(|tail| tail.split("</pre>").next());
+    let done: serde_json::Value = serde_json::from_str(done.expect("done")).expect("what was seen");
+    let step = |k: usize, of: usize| {
+        done["steps"][k][of]
+            .as_str()
+            .unwrap_or_default()
+            .to_string()
+    };
+    assert_ne!(step(0, 0), step(1, 0), "it does not turn: {done}");
+    assert_eq!(step(0, 1), step(1, 1), "turning chooses no point");
+    assert_ne!(
+        step(1, 1),
+        step(2, 1),
+        "a click chooses another point: {done}"
+    );
+    assert!(
+        step(2, 1).contains(" mm \u{2192} ") && step(2, 1).contains("J3 "),
+        "{done}"
+    );
+    assert_eq!(done["pressed"], "true");
 }
