@@ -358,9 +358,11 @@ impl TagArguments {
 
 /// Verify a store: read and rehash every table, record, manifest, event and tag; find what was damaged or edited.
 #[derive(Args)]
-#[command(
-    after_help = "Exit codes: 0 all is as it was written; 1 something is not; 2 wrong usage; 75 the disk refuses."
-)]
+#[command(after_help = "Examples:
+  calib verify
+  calib verify --store /srv/cell7/.calib --json
+
+Exit codes: 0 all is as it was written; 1 something is not; 2 wrong usage; 75 the disk refuses.")]
 pub(super) struct VerifyArguments {
     /// The store [default: .calib in the working directory]
     #[arg(long, value_name = "DIR")]

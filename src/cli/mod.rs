@@ -9,6 +9,7 @@ mod feed_forward;
 mod fleet;
 mod help;
 mod init;
+mod interrupted;
 mod log;
 mod pipeline_arguments;
 mod poses;

@@ -1,5 +1,6 @@
 //! Options of every verb that runs a pipeline or takes its result: overrides, the store, worker threads.
 
+use super::interrupted::says_how_to_go_on;
 use super::surroundings::{cores, open_store, surroundings};
 use super::{emit_json, warn};
 use crate::compensate::GateLimits;
@@ -115,6 +116,7 @@ impl ExecutionArguments {
         task: CommandTask,
         command_line: &[OsString],
     ) -> Result<CompletedRun> {
+        says_how_to_go_on();
         let progress = Progress::new(task.shown, plan.width_of_ids());
         let options = RunOptions {
             selection: task.selection,

@@ -12,7 +12,7 @@ use crate::fleet::work::{self, FleetResults};
 use crate::fleet::{Ending, Fleet, Ledger, RobotRecord, Workshop, tables};
 use crate::progress::{FleetProgress, Verbosity};
 use crate::store::Store;
-use crate::table::picked;
+use crate::table::{FleetRow, picked};
 use clap::Args;
 use serde_json::json;
 use std::ffi::OsString;
@@ -221,7 +221,60 @@ fn text(
     let all = format!(
         "{done} of {robots} done, {rejected} rejected, {failed} failed; {computed} computed now ({seconds:.1} s{rate})\n"
     );
-    flagged.chain(tables).chain([page, all]).collect()
+    let good = quality(&shown.fleet.0);
+    flagged
+        .chain(good)
+        .chain(tables)
+        .chain([page, all])
+        .collect()
+}
+
+/// Robots that are named of those to visit first.
+const VISITED: usize = 3;
+
+/// How good the robots are, and which to visit first: those that changed, then those that are not done, then the least accurate.
+fn quality(rows: &[FleetRow]) -> Vec<String> {
+    let name = |row: &FleetRow| visible(&row.robot).to_string();
+    let mut rated: Vec<(f64, &FleetRow)> = rows
+        .iter()
+        .filter_map(|row| Some((row.after_rms_mm?, row)))
+        .collect();
+    rated.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut lines = Vec::new();
+    if let Some((worst, row)) = rated.first() {
+        let median = rated[rated.len() / 2].0;
+        let before = rows.iter().filter_map(|row| row.before_rms_mm);
+        let before = before.fold(0.0, f64::max);
+        lines.push(format!(
+            "error: worst {worst:.3} mm rms ({}), median {median:.3} mm; worst before {before:.3} mm\n",
+            name(row)
+        ));
+    }
+    let changes = |row: &FleetRow| row.changes.unwrap_or(0);
+    let mut changed: Vec<&FleetRow> = rows.iter().filter(|row| changes(row) > 0).collect();
+    changed.sort_by_key(|row| -changes(row));
+    if let Some(row) = changed.first() {
+        let what = row.flags.as_deref().unwrap_or_default();
+        lines.push(format!("worst change: {} ({})\n", name(row), visible(what)));
+    }
+    let mut visit: Vec<String> = Vec::new();
+    let why = |row: &FleetRow| match (row.after_rms_mm, changes(row)) {
+        (_, changes @ 1..) => format!("{}: {}", name(row), counted(changes as usize, "change")),
+        (Some(mm), _) => format!("{}: {mm:.3} mm", name(row)),
+        (None, _) => format!("{}: {}", name(row), row.status),
+    };
+    let open = rows.iter().filter(|row| row.after_rms_mm.is_none());
+    let rated = rated.iter().map(|(_, row)| *row);
+    for row in changed.into_iter().chain(open).chain(rated) {
+        let line = why(row);
+        if visit.len() < VISITED && !visit.contains(&line) {
+            visit.push(line);
+        }
+    }
+    if rows.len() > 1 && !visit.is_empty() {
+        lines.push(format!("visit first: {}\n", visit.join(", ")));
+    }
+    lines
 }
 
 fn document(
