@@ -17,12 +17,11 @@
     const arm = point.map((v, i) => v - on[i]), side = cross(axis, arm), along = dot(axis, arm), s = Math.sin(by), c = Math.cos(by);
     return arm.map((v, i) => on[i] + v * c + side[i] * s + axis[i] * along * (1 - c));
   };
-  const inTracker = (p) => [0, 1, 2].map((r) => dot(data.base.slice(4 * r, 4 * r + 3), p) + data.base[4 * r + 3]);
   const chain = (q) => {
     const links = [[0, 0, 0], ...data.joints.map((joint) => joint[1]), data.tool];
     return links.map((point, k) => {
       for (let j = Math.min(k - 1, q.length) - 1; j >= 0; j--) point = moved(data.joints[j], q[j], point);
-      return inTracker(point);
+      return point;
     });
   };
   const number = (value, digits) => value.toFixed(digits).replace(".", data.decimal);

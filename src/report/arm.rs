@@ -1,4 +1,4 @@
-//! The arm with the error at every measured point, before and after: a still picture, and what the page's script turns it by.
+//! The arm in its base frame with the error at every measured point, before and after: a still picture, and what the page's script turns it by.
 
 use super::Tables;
 use super::errors::standing_prediction;
@@ -9,15 +9,15 @@ use super::workspace::Colours;
 use crate::table::PredictionRow;
 use serde_json::{Value, json};
 
-/// An arm where it stands, in the instrument's frame.
+/// An arm, and where it stands.
 pub(crate) struct PlacedArm {
-    /// Rotation and place (mm) of the base, row-major 3 x 4.
+    /// Rotation and place (mm) of the base in the instrument's frame, row-major 3 x 4.
     pub(crate) base: [f64; 12],
     /// Axis, a point on it (mm), both in the base at the zero pose, and whether the joint slides.
     pub(crate) joints: Vec<([f64; 3], [f64; 3], bool)>,
     /// The measured point in the base at the zero pose, mm.
     pub(crate) tool: [f64; 3],
-    /// Base, joints and measured point in the pose of `row`, mm in the instrument's frame.
+    /// Base, joints and measured point in the pose of `row`, mm in the base.
     pub(crate) chain: Vec<[f64; 3]>,
     /// Row of the recording whose pose is shown.
     pub(crate) row: usize,
@@ -28,6 +28,8 @@ const DRAWN: usize = 600;
 const SIZE: [f64; 2] = [720.0, 460.0];
 /// Azimuth and elevation from which the still picture is seen, rad.
 const VIEW: [f64; 2] = [0.6, 0.45];
+/// Of the height: from whatever side one looks at it, the longest way through the scene is rarely upright.
+const FILLED: f64 = 1.25;
 /// A large error is drawn so long, as a share of the measured region.
 const LONG: f64 = 0.12;
 
@@ -59,12 +61,21 @@ pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
     if !drawn.contains(&arm.row) && arm.row < rows {
         drawn.push(arm.row);
     }
+    // Seen from the arm's base, which stands upright as instruments need not.
+    let turned = |v: [f64; 3]| {
+        [0, 1, 2].map(|column| {
+            (0..3)
+                .map(|row| arm.base[4 * row + column] * v[row])
+                .sum::<f64>()
+        })
+    };
     let measured = |row: &PredictionRow| {
-        [
+        let seen = [
             row.x_mm + row.dx_mm,
             row.y_mm + row.dy_mm,
             row.z_mm + row.dz_mm,
-        ]
+        ];
+        turned([0, 1, 2].map(|axis| seen[axis] - arm.base[4 * axis + 3]))
     };
     let points: Vec<[f64; 3]> = drawn.iter().map(|at| measured(&before.0[*at])).collect();
     let ends = |axis: usize| {
@@ -75,20 +86,19 @@ pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
     };
     let extents = [0, 1, 2].map(ends);
     let centre = extents.map(|[low, high]| (low + high) / 2.0);
-    let radius = extents
-        .iter()
-        .map(|[low, high]| (high - low).powi(2))
-        .sum::<f64>()
-        .sqrt()
-        / 2.0;
+    let off = |point: &[f64; 3]| {
+        let squares = (0..3).map(|axis| (point[axis] - centre[axis]).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    let radius = points.iter().chain(&arm.chain).map(off).fold(1.0, f64::max);
     let large = errors[(errors.len() * 9 / 10).min(errors.len() - 1)].max(1e-6);
     let magnified = round_down((LONG * 2.0 * radius / large).max(1.0));
-    let scale = SIZE[1] / (2.0 * radius.max(1.0));
+    let scale = FILLED * SIZE[1] / (2.0 * radius);
     let view = View { centre, scale };
     let [residual_before, residual_after] = [before, after].map(|table| {
         let of_row = |at: &usize| {
             let row = &table.0[*at];
-            [row.dx_mm, row.dy_mm, row.dz_mm]
+            turned([row.dx_mm, row.dy_mm, row.dz_mm])
         };
         drawn.iter().map(of_row).collect::<Vec<_>>()
     });
@@ -138,7 +148,7 @@ pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
         .collect();
     let data = json!({
         "size": SIZE, "view": VIEW, "centre": centre.map(|mm| round(mm, 1)), "scale": scale, "magnified": magnified,
-        "base": arm.base.map(|value| round(value, 6)), "tool": arm.tool,
+        "tool": arm.tool,
         "joints": arm.joints.iter().map(|(axis, point, slides)| json!([axis, point, i32::from(*slides)])).collect::<Vec<_>>(),
         "points": rows, "chosen": drawn.iter().position(|at| *at == arm.row), "decimal": locale.decimal(".".into()),
     });
@@ -152,7 +162,7 @@ pub(super) fn section(locale: &Locale, tables: &Tables) -> Option<Value> {
     }))
 }
 
-/// From where one looks: a point of the instrument's frame (mm) on the picture.
+/// From where one looks: a point of the base frame (mm) on the picture.
 struct View {
     centre: [f64; 3],
     scale: f64,

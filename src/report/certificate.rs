@@ -7,7 +7,7 @@ use crate::report::language::{Locale, say};
 use crate::report::number::{count, render};
 use crate::report::workspace::{StepErrors, histogram};
 use crate::report::{Accepted, Tables};
-use crate::table::{AcceptanceRow, StatisticsRow, VerdictRow, VerdictTopic, inert};
+use crate::table::{AcceptanceRow, StatisticsRow, SuspectsRow, VerdictRow, VerdictTopic, inert};
 use crate::units::Unit;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -173,12 +173,17 @@ pub(super) fn held_out(tables: &Tables, set: Option<&str>) -> Value {
     let points = judged_points(tables, set);
     let mut worst: Vec<&HeldOutPoint> = points.iter().collect();
     worst.sort_by(|a, b| b.error_mm.total_cmp(&a.error_mm));
+    let diagnosed = tables.verdict.iter().flat_map(|table| &table.0).next_back();
+    let diagnosed = diagnosed.map(|verdict| verdict.step.as_str());
+    let standing = tables.standing.as_deref();
+    let is_gone =
+        |row: &&SuspectsRow| !row.used && [diagnosed, standing].contains(&Some(row.step.as_str()));
     worst.truncate(if points.len() > LISTED { WORST } else { 0 });
     json!({
         "points": points.len(),
         "listed": points.iter().take(LISTED).collect::<Vec<_>>(),
         "worst": worst,
-        "suspects": tables.suspects.iter().flat_map(|table| &table.0).filter(|row| !row.used).collect::<Vec<_>>(),
+        "suspects": tables.suspects.iter().flat_map(|table| &table.0).filter(is_gone).collect::<Vec<_>>(),
     })
 }
 

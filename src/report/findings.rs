@@ -10,7 +10,7 @@ use crate::units::Unit;
 use serde_json::{Value, json};
 
 /// Points drawn in one picture: more would hide each other.
-const DRAWN: usize = 700;
+const DRAWN: usize = 350;
 
 /// The columns that speak for a finding.
 const EVIDENCE: [&str; 8] = [

@@ -200,7 +200,7 @@ impl ReportReads {
                 _ => base.rotation[(row, column)],
             };
         }
-        let (mut body, mut chain) = (base, vec![mm(&base.translation)]);
+        let (mut body, mut chain) = (Pose::identity(), vec![[0.0; 3]]);
         let mut joints = Vec::new();
         for (joint, travel) in self.recording.q(row).iter().enumerate() {
             let (axis, point) = (robot.axis(joint), robot.point(joint));
