@@ -268,7 +268,7 @@ pub struct ReportTorques {
 }
 
 crate::stage::stage! {
-    ReportTorques, "report_torques", 6, "writes one self-contained HTML file: torques before and after, friction, what was found",
+    ReportTorques, "report_torques", 7, "writes one self-contained HTML file: torques before and after, friction, what was found",
         ReportTorquesReads -> ReportTorquesWrites {
             document: Document,
         }

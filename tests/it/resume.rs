@@ -216,6 +216,26 @@ fn the_manifest_of_a_killed_run_says_that_it_did_not_end() {
 }
 
 #[test]
+fn ctrl_c_says_that_the_same_command_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let held = held_locks::action(folder.path(), &UNDISTURBED.actions[1]);
+    let mut child = calib(folder.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    held_locks::until(&mut child, || !actions(folder.path()).is_empty());
+    let process = child.id().to_string();
+    let sent = Command::new("kill").args(["-INT", &process]).status();
+    assert!(sent.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    has(&text(&output.stderr), "the same command goes on from there");
+    drop(held);
+    assert_eq!(hashes(&run(&mut calib(folder.path()))), UNDISTURBED.hashes);
+}
+
+#[test]
 fn the_log_counts_the_stages_that_a_killed_run_finished() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();

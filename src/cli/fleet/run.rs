@@ -381,3 +381,36 @@ impl ExecArguments {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fleet_says_how_good_its_robots_are_and_which_to_visit_first() {
+        let row = |robot: &str, after_rms_mm: Option<f64>, changes: i64| FleetRow {
+            robot: robot.into(),
+            status: "rejected".into(),
+            before_rms_mm: after_rms_mm.map(|mm| 10.0 * mm),
+            after_rms_mm,
+            changes: Some(changes),
+            flags: (changes > 0).then(|| "zero of joint 2 moved".into()),
+            ..FleetRow::default()
+        };
+        let rows = [
+            row("a", Some(0.03), 0),
+            row("b", Some(0.2), 0),
+            row("c", Some(0.05), 2),
+            row("d", None, 0),
+        ];
+        assert_eq!(
+            quality(&rows),
+            [
+                "error: worst 0.200 mm rms (b), median 0.050 mm; worst before 2.000 mm\n",
+                "worst change: c (zero of joint 2 moved)\n",
+                "visit first: c: 2 changes, d: rejected, b: 0.200 mm\n",
+            ]
+        );
+        assert!(quality(&[row("d", None, 0)]).is_empty());
+    }
+}
