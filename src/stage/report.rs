@@ -73,7 +73,7 @@ impl Stage for Report {
             reads.parameters = model;
         }
         let step = standing.as_ref().map(|[step, _]| step);
-        let arm = reads.placed_arm(step)?;
+        let arm = reads.placed_arm(step);
         let tables = Tables {
             arm,
             counting,
@@ -159,7 +159,7 @@ impl ReportReads {
     }
 
     /// The nominal arm where it stands in the instrument's frame, by the points themselves, in the pose of the largest error before anything.
-    fn placed_arm(&self, standing: Option<&String>) -> Result<Option<PlacedArm>> {
+    fn placed_arm(&self, standing: Option<&String>) -> Option<PlacedArm> {
         const FEWEST: usize = 4;
         let named = |table: &&Labelled<Prediction>| {
             table.0.first().map(|row| &row.step) == standing && table.is_of(&self.recording)
@@ -167,13 +167,17 @@ impl ReportReads {
         let last = self.prediction.iter().rfind(named);
         let (Some(first), Some(last)) = (self.prediction.first(), last.or(self.prediction.last()))
         else {
-            return Ok(None);
+            return None;
         };
         let rows = last.0.len().min(first.0.len()).min(self.recording.rows());
-        let robot = RobotModel::new(self.robot.to_description()?);
-        if robot.joints() != self.recording.joints {
-            return Ok(None);
-        }
+        // A picture is no reason to fail: a table that is no whole robot has none.
+        let robot = self.robot.to_description().map(RobotModel::new);
+        let Some(robot) = robot
+            .ok()
+            .filter(|robot| robot.joints() == self.recording.joints)
+        else {
+            return None;
+        };
         let is_usable = |row: &usize| {
             let predicted = &last.0[*row];
             let place = [predicted.x_mm, predicted.y_mm, predicted.z_mm];
@@ -181,7 +185,7 @@ impl ReportReads {
         };
         let used: Vec<usize> = (0..rows).filter(is_usable).collect();
         let Some(row) = shown_row(&first.0[..rows]).filter(|_| used.len() >= FEWEST) else {
-            return Ok(None);
+            return None;
         };
         let metres = |at: &usize| {
             let row = &last.0[*at];
@@ -217,13 +221,13 @@ impl ReportReads {
         }
         let tool = robot.home().translation;
         chain.push(mm(&body.point(&tool)));
-        Ok(Some(PlacedArm {
+        Some(PlacedArm {
             base: rows,
             joints,
             tool: mm(&tool),
             chain,
             row,
-        }))
+        })
     }
 
     /// What the controller counts otherwise than the robot file, where it does.

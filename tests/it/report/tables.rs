@@ -347,6 +347,11 @@ fn robot(name: &str) -> Robot {
         lower_rad: (kind == "revolute").then_some(-2.5),
         upper_rad: (kind == "revolute").then_some(2.5),
         mass_kg: (kind == "tool").then_some(210.0),
+        gravity_m_s2: (kind == "base").then_some(9.81),
+        orientation_w: (kind == "tool").then_some(1.0),
+        orientation_x: (kind == "tool").then_some(0.0),
+        orientation_y: (kind == "tool").then_some(0.0),
+        orientation_z: (kind == "tool").then_some(0.0),
         ..Default::default()
     };
     let axes = [
