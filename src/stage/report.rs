@@ -205,9 +205,17 @@ impl ReportReads {
             };
         }
         let (mut body, mut chain) = (Pose::identity(), vec![[0.0; 3]]);
+        // Of each axis the point nearest to what it carries: a file may name any.
+        let tool = robot.home().translation;
+        let (mut points, mut carried) = (vec![tool; robot.joints()], tool);
+        for joint in (0..robot.joints()).rev() {
+            let (axis, point) = (robot.axis(joint), robot.point(joint));
+            carried = point + axis * axis.dot(&(carried - point));
+            points[joint] = carried;
+        }
         let mut joints = Vec::new();
         for (joint, travel) in self.recording.q(row).iter().enumerate() {
-            let (axis, point) = (robot.axis(joint), robot.point(joint));
+            let (axis, point) = (robot.axis(joint), &points[joint]);
             chain.push(mm(&body.point(point)));
             let twist = match robot.is_revolute(joint) {
                 true => {
@@ -219,7 +227,6 @@ impl ReportReads {
             body = body * Pose::exp(&(twist * *travel));
             joints.push(((*axis).into(), mm(point), !robot.is_revolute(joint)));
         }
-        let tool = robot.home().translation;
         chain.push(mm(&body.point(&tool)));
         Some(PlacedArm {
             base: rows,
