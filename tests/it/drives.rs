@@ -1,9 +1,11 @@
 //! Commands and responses through the real command: practice recordings beside the repository, and bad input.
 
-use crate::answer::{Answer, calib, put, root};
+use crate::answer::{Answer, calib, put, read, root};
 use crate::desk::shared;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use tempfile::TempDir;
 
 fn diagnose(case: &Path, store: &Path) -> Answer {
     let pipeline = root("pipelines/drives/pipeline.yaml");
@@ -49,6 +51,41 @@ fn friction_that_grows_with_the_load_is_named_at_its_joint() {
     };
     let expected = ("load_friction".to_string(), "joint 3".to_string());
     assert_eq!(named(&document), [expected]);
+}
+
+/// The store in which the example is diagnosed, and its pipeline.
+fn example() -> &'static (TempDir, String) {
+    static DONE: OnceLock<(TempDir, String)> = OnceLock::new();
+    DONE.get_or_init(|| {
+        let store = tempfile::tempdir().unwrap();
+        let pipeline = root("pipelines/drives/pipeline.yaml");
+        (store, pipeline.display().to_string())
+    })
+}
+
+/// What a verb says of the example.
+fn of_the_example(verb: &str) -> Answer {
+    let (store, pipeline) = example();
+    let store = store.path().display();
+    calib(".", &format!("{verb} --store {store} {pipeline}"))
+}
+
+#[test]
+fn the_example_is_diagnosed_as_cloned_and_its_concealed_causes_are_named() {
+    let truth = root("pipelines/drives/example/truth.json");
+    let document = of_the_example("diagnose --quiet --json").json();
+    let truth: Value = serde_json::from_str(&read(truth)).unwrap();
+    let concealed = truth["effects"].as_array().unwrap().iter();
+    let mut concealed: Vec<(String, String)> = concealed
+        .map(|effect| ["effect", "where"].map(|key| effect[key].as_str().unwrap().to_string()))
+        .map(|[effect, place]| (effect, place))
+        .collect();
+    let mut found = named(&document);
+    concealed.sort();
+    found.sort();
+    assert_eq!(found, concealed);
+    let rms = |when: &str| document[when]["validate_rms_mrad"].as_f64().unwrap();
+    assert!(rms("before") > 5.0 && rms("after") < 0.7, "{document}");
 }
 
 /// An arm of one joint with its drive and 2 s of a recording.

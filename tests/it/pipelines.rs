@@ -80,13 +80,6 @@ fn shorter(name: &str, folder: &Path) -> Vec<String> {
             let sets = set("split.sets=[{set: fit, rows: 167}, {set: validate}]");
             [set(&format!("data={}", folder.display())), sets].concat()
         }
-        // Its users bring their own recording.
-        "pipelines/drives/pipeline.yaml" => {
-            let Some(cases) = shared("practice_drives") else {
-                return Vec::new();
-            };
-            set(&format!("case={}", cases.join("p01").display())).to_vec()
-        }
         _ => Vec::new(),
     }
 }
