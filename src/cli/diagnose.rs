@@ -8,7 +8,7 @@ use crate::audit::{diagnosis, the_stage};
 use crate::error::{Error, Result};
 use crate::pipeline::{Purpose, Selection};
 use crate::raw::ending;
-use crate::stage::{DIAGNOSES, DeclaredStage, Diagnose};
+use crate::stage::{DIAGNOSES, DeclaredStage, DiagnoseTorques};
 use crate::summary::{DiagnosisSummary, rejected};
 use clap::Args;
 use std::ffi::OsString;
@@ -86,7 +86,7 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
             ));
         };
         // Before minutes are spent on what cannot be shown.
-        if arguments.html.is_some() && plan.stages[at].entry.name != Diagnose::NAME {
+        if arguments.html.is_some() && plan.stages[at].entry.name == DiagnoseTorques::NAME {
             return Err(DiagnosisSummary::no_page());
         }
         let id = id.to_string();

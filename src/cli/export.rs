@@ -5,7 +5,10 @@
 use super::pipeline_arguments::ModelArguments;
 use super::{emit, note, put};
 use crate::error::{Error, Result};
-use crate::export::{Belonging, CarriedTorques, Export, FORMATS, Format};
+use crate::export::{
+    Belonging, CarriedTorques, DRIVE_FORMATS, DriveExport, DriveFormat, Export, FORMATS, Format,
+};
+use crate::identified::IdentifiedDrives;
 use crate::pipeline::Purpose;
 use crate::raw;
 use clap::Args;
@@ -20,6 +23,8 @@ use std::path::PathBuf;
 ///
 /// Of a diagnosis of torques URDF carries viscous and Coulomb friction and the identified inertials, MJCF rotor inertias and drives too; what
 /// they cannot carry (Stribeck friction, friction of load, ripple) is listed with its size. All of it with sigma is in `dynamics`.
+///
+/// Of a diagnosis of drives MJCF and `isaac` carry gains, damping, armature, friction, limits and delay, JSON all of it.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct ExportArguments {
@@ -33,34 +38,69 @@ pub(super) struct ExportArguments {
     out: Option<PathBuf>,
 }
 
+/// A format of a model of positions or torques, of drives, or of both.
 #[derive(Clone, Copy)]
-struct Chosen(&'static Format);
+struct Chosen {
+    name: &'static str,
+    format: Option<&'static Format>,
+    of_drives: Option<&'static DriveFormat>,
+}
 
 /// The formats as values of an option, each with its line of help.
 fn formats() -> impl TypedValueParser<Value = Chosen> {
-    let values = FORMATS
-        .iter()
-        .map(|format| PossibleValue::new(format.name).help(format.help));
+    let values = all_formats().map(|(chosen, help)| PossibleValue::new(chosen.name).help(help));
     PossibleValuesParser::new(values).try_map(|name| {
-        FORMATS
-            .iter()
-            .find(|format| format.name == name)
-            .map(Chosen)
-            .ok_or("no format")
+        let mut all = all_formats();
+        let chosen = all.find(|(chosen, _)| chosen.name == name);
+        chosen.map(|(chosen, _)| chosen).ok_or("no format")
     })
+}
+
+fn all_formats() -> impl Iterator<Item = (Chosen, &'static str)> {
+    let of_drives = |name: &str| DRIVE_FORMATS.iter().find(|format| format.name == name);
+    let of_both = FORMATS.iter().map(move |format| {
+        let chosen = Chosen {
+            name: format.name,
+            format: Some(format),
+            of_drives: of_drives(format.name),
+        };
+        (chosen, format.help)
+    });
+    let is_alone = |one: &&DriveFormat| FORMATS.iter().all(|format| format.name != one.name);
+    let alone = DRIVE_FORMATS.iter().filter(is_alone).map(|one| {
+        let chosen = Chosen {
+            name: one.name,
+            format: None,
+            of_drives: Some(one),
+        };
+        (chosen, one.help)
+    });
+    of_both.chain(alone)
 }
 
 const EXAMPLES: &str = "Examples:
   calib export pipeline.yaml --format urdf --out corrected.urdf
   calib export latest --format mdh --step geometry
   calib export pipelines/dynamics/pipeline.yaml --format mjcf --out arm.xml
+  calib export pipelines/drives/pipeline.yaml --format isaac
   calib export parameters.parquet --robot robot.yaml --format controller";
 
 impl ExportArguments {
     pub(crate) fn run(&self, command_line: &[OsString]) -> Result<()> {
+        if let Some(drives) = self.model.drives(Purpose::Export, command_line)? {
+            return self.drives(drives);
+        }
+        let Some(format) = self.format.format else {
+            let message = "holds drives alone, which `diagnose_drives` diagnoses; allowed here: ";
+            let names: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
+            return Err(Error::spec(
+                "--format",
+                message.to_string() + &names.join(", "),
+            ));
+        };
         let identified = self.model.load(Purpose::Export, command_line)?;
         identified.spare(self.out.as_deref())?;
-        if identified.is_of_torques_alone() && self.format.0.carries == CarriedTorques::Nothing {
+        if identified.is_of_torques_alone() && format.carries == CarriedTorques::Nothing {
             let carries = |format: &&Format| format.carries != CarriedTorques::Nothing;
             let allowed = FORMATS.iter().filter(carries).map(|format| format.name);
             let allowed: Vec<&str> = allowed.collect();
@@ -71,18 +111,31 @@ impl ExportArguments {
             return Err(Error::spec("--format", message));
         }
         let export = Export::of(identified, self.model.force);
-        let text = (self.format.0.text)(&export)?;
+        let text = (format.text)(&export)?;
+        self.written(text, &export.remarks_in(format))
+    }
+
+    fn written(&self, text: String, remarks: &[String]) -> Result<()> {
         put(self.out.as_deref(), text)?;
         if !self.model.quiet {
-            let remarks = export.remarks_in(self.format.0);
-            note(
-                remarks
-                    .iter()
-                    .map(|line| format!("{line}\n"))
-                    .collect::<String>(),
-            );
+            let lines = remarks.iter().map(|line| format!("{line}\n"));
+            note(lines.collect::<String>());
         }
         Ok(())
+    }
+
+    /// Of a diagnosis of drives.
+    fn drives(&self, drives: IdentifiedDrives) -> Result<()> {
+        let Some(format) = self.format.of_drives else {
+            let names: Vec<&str> = DRIVE_FORMATS.iter().map(|format| format.name).collect();
+            let message = format!(
+                "drives were diagnosed, no geometry and no torques, and it holds none; allowed: {}",
+                names.join(", ")
+            );
+            return Err(Error::spec("--format", message));
+        };
+        let export = DriveExport::of(drives, format);
+        self.written(export.text()?, &export.remarks()?)
     }
 }
 

@@ -5,7 +5,9 @@ use super::surroundings::{cores, open_store, surroundings};
 use super::{emit_json, warn};
 use crate::compensate::GateLimits;
 use crate::error::{Error, Fault, Result};
-use crate::identified::{Files, IdentifiedModel, TargetBase, judges_of, steps_of};
+use crate::identified::{
+    Files, IdentifiedDrives, IdentifiedModel, TargetBase, drive_steps_of, judges_of, steps_of,
+};
 use crate::pipeline::{
     CompletedRun, Manifest, Override, Plan, Purpose, RunOptions, Selection, checked_plan, find_run,
     run,
@@ -235,6 +237,38 @@ impl ModelArguments {
             }
         }
         self.judged(identified)
+    }
+
+    /// The drives that a pipeline or a run diagnosed; none where it identified positions or torques, or nothing of drives.
+    pub(crate) fn drives(
+        &self,
+        purpose: Purpose,
+        command_line: &[OsString],
+    ) -> Result<Option<IdentifiedDrives>> {
+        let step = self.step.as_deref();
+        match &*ending(&self.model) {
+            "parquet" => Ok(None),
+            "yaml" | "yml" => {
+                let plan = self.means.plan(&self.model)?;
+                let wanted = drive_steps_of(&plan);
+                if wanted.is_empty() {
+                    return Ok(None);
+                }
+                let task = CommandTask {
+                    purpose,
+                    selection: Selection::default(),
+                    shown: shown(self.quiet, false),
+                };
+                let (store, plan) = (self.means.store()?, plan.needed_for_all(&wanted));
+                let done = self.means.run(&plan, &store, task, command_line)?;
+                IdentifiedDrives::of_run(&store, &done.manifest, step)
+            }
+            _ => {
+                let store = self.means.store()?;
+                let manifest = Manifest::of(&store, &self.run(&store)?)?;
+                IdentifiedDrives::of_run(&store, &manifest, step)
+            }
+        }
     }
 
     /// A model that no commands are to be made of is refused, or insisted on.

@@ -3,6 +3,7 @@
 mod body;
 mod controller;
 mod dh;
+mod drives;
 mod entered;
 mod flange;
 mod friction;
@@ -13,6 +14,7 @@ mod rigid;
 mod ur_kinematics;
 mod xacro;
 
+pub(crate) use drives::{DRIVE_FORMATS, DriveExport, DriveFormat};
 pub use mark::Belonging;
 
 use crate::compensate::{LeftOut, RIGID, distance, left_out, rigid};

@@ -1,9 +1,11 @@
 //! The identified model of a run, or of tables that were taken out of a store: what commands are corrected with and what is exported.
 
 mod controller_base;
+mod drives;
 mod standing;
 mod torques;
 
+pub(crate) use drives::{IdentifiedDrives, drive_steps_of};
 pub(crate) use standing::placed;
 pub use standing::{
     Achieved, RepeatedPose, achieved, convention_of, counted_otherwise, robot_file, standing_of,

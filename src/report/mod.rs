@@ -5,6 +5,7 @@
 mod arm;
 mod certificate;
 mod data;
+mod drives;
 mod errors;
 mod findings;
 mod fits;
@@ -20,6 +21,7 @@ mod workspace;
 
 pub(crate) use arm::{PlacedArm, shown_row};
 pub use certificate::{AchievedTables, achieved_page};
+pub(crate) use drives::{DrivePage, drive_page};
 pub(crate) use findings::diagnosed_page;
 pub use language::PageLanguage;
 use language::{Locale, say};

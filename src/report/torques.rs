@@ -179,7 +179,9 @@ fn pictures(locale: &Locale, tables: &ReportTorquesReads, joint: usize) -> Value
     };
     let (before, after) = (less(&simulated), less(&corrected));
     let slides = course.prismatic[joint];
+    let unit = if slides { "N" } else { "Nm" };
     let name = format!("joint {}", joint + 1);
+    let clock = (course.time.as_slice(), course.held_out.as_slice());
     let torque = [
         ("s1", simulated.as_slice()),
         ("s0", &measured),
@@ -192,8 +194,8 @@ fn pictures(locale: &Locale, tables: &ReportTorquesReads, joint: usize) -> Value
         .filter(|row| row.joint == joint as i64 + 1)
         .collect();
     json!({
-        "torque": over_time(locale, course, &torque, slides, &format!("torque of {name}: measured, simulated, corrected")),
-        "error": over_time(locale, course, &[("s1", &before), ("s-last", &after)], slides, &format!("error of {name} before and after")),
+        "torque": over_time(locale, clock, &torque, [&format!("torque of {name}: measured, simulated, corrected"), unit]),
+        "error": over_time(locale, clock, &[("s1", &before), ("s-last", &after)], [&format!("error of {name} before and after"), unit]),
         "friction": (!curve.is_empty()).then(|| friction(locale, &curve, slides, &format!("friction of {name}"))),
         "name": name,
     })
@@ -205,18 +207,17 @@ const STEPS: usize = 300;
 /// Steps of the clock without rows that break a line.
 const GAP: f64 = 8.0;
 
-/// Lines over time; what is held out is shaded.
-fn over_time(
+/// Lines over time, of rows with whether they are held out, which is shaded; the title, and what is over time.
+pub(super) fn over_time(
     locale: &Locale,
-    course: &TorqueCourse,
+    (time, held_out): (&[f64], &[bool]),
     lines: &[(&str, &[f64])],
-    slides: bool,
-    title: &str,
+    [title, what]: [&str; 2],
 ) -> String {
     let area = Area::new([52.0, 26.0, WIDTH - 14.0, 200.0]);
     let (first, last) = (
-        course.time.first().copied().unwrap_or(0.0),
-        course.time.last().copied().unwrap_or(1.0),
+        time.first().copied().unwrap_or(0.0),
+        time.last().copied().unwrap_or(1.0),
     );
     let all = || lines.iter().flat_map(|(_, values)| values.iter().copied());
     let (low, high) = (
@@ -226,11 +227,11 @@ fn over_time(
     let x = Scale::linear(first, last).over(area.left, area.right);
     let y = Scale::linear(low.min(0.0), high.max(0.0)).over(area.bottom, area.top);
     let mut svg = Svg::new(locale, WIDTH, area.bottom + 38.0);
-    let stretches = stretches(&course.time);
+    let stretches = stretches(time);
     for rows in &stretches {
-        let held = |row: &usize| course.held_out.get(*row).copied().unwrap_or(false);
+        let held = |row: &usize| held_out.get(*row).copied().unwrap_or(false);
         if let (Some(from), Some(to)) = (rows.clone().find(held), rows.clone().rfind(held)) {
-            let (left, right) = (x.at(course.time[from]), x.at(course.time[to]));
+            let (left, right) = (x.at(time[from]), x.at(time[to]));
             svg.rect(
                 "held",
                 [left, area.top],
@@ -240,7 +241,7 @@ fn over_time(
     }
     x.grid_x(&mut svg, area, 8);
     y.grid_y(&mut svg, area, 5);
-    let every = course.time.len().div_ceil(STEPS).max(1);
+    let every = time.len().div_ceil(STEPS).max(1);
     for (colour, values) in lines {
         for rows in &stretches {
             let mut points = Vec::new();
@@ -252,7 +253,7 @@ fn over_time(
                 points.extend(
                     ends.into_iter()
                         .flatten()
-                        .map(|row| [x.at(course.time[row]), y.at(values[row])]),
+                        .map(|row| [x.at(time[row]), y.at(values[row])]),
                 );
             }
             points.dedup();
@@ -261,7 +262,7 @@ fn over_time(
     }
     baseline(&mut svg, area);
     name_x(&mut svg, area, "time, s");
-    name_y(&mut svg, area, if slides { "N" } else { "Nm" });
+    name_y(&mut svg, area, what);
     svg.finish(title)
 }
 

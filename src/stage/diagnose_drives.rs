@@ -1,5 +1,9 @@
 //! `diagnose_drives`: which physics the simulation of commanded joints lacks, from commands and measured angles alone.
 
+mod reading;
+
+pub(crate) use reading::short;
+
 use crate::drives::chain::{Bodies, Chain};
 use crate::drives::mjcf::{self, MjcfArm, MjcfText};
 use crate::drives::physics::{Joint, Physics};
@@ -8,8 +12,13 @@ use crate::drives::{CAUSES, Drives, diagnose};
 use crate::dynamics::InertialTolerance;
 use crate::engine::Options;
 use crate::error::{Error, Fault, Place, Result, did_you_mean, listed};
+use crate::report::{DrivePage, drive_page};
 use crate::stage::{Context, RawFile, Stage};
-use crate::table::{DriveVerdict, FindingNumbers, Findings, JointDrives, Rivals, VerdictSentences};
+use crate::table::{
+    Document, DocumentRow, DriveCourse, DriveSimulation, DriveVerdict, FindingNumbers, Findings,
+    JointDrives, Rivals, VerdictSentences,
+};
+use reading::{Sheet, held, must_rise, rows};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +39,9 @@ pub struct DiagnoseDrives {
     pub(crate) drives: RawFile,
     /// Commands and measured angles over time, CSV.
     pub(crate) recording: RawFile,
+    /// The commands, where they are in a file of their own on the same clock: each holds until the next.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) commands: Option<RawFile>,
     /// Columns of the recording.
     #[serde(default)]
     pub(crate) columns: DriveColumns,
@@ -41,12 +53,15 @@ pub struct DiagnoseDrives {
     pub(crate) without: Vec<String>,
 }
 
-/// Columns of a recording of drives; `{j}` stands for the joint, from 1.
+/// Columns of a recording of drives; `{j}` stands for the joint, from 1, `{name}` for its name, also without `_joint` at its end. A column
+/// without either holds lists, whose first numbers are those of the joints.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DriveColumns {
-    /// Time, s.
+    /// Time.
     pub(crate) time: String,
+    /// Its unit.
+    pub(crate) time_unit: ClockUnit,
     /// What tells trajectories apart; without such a column all is one.
     pub(crate) trajectory: String,
     /// What rows are for; without such a column all are fitted.
@@ -63,6 +78,7 @@ impl Default for DriveColumns {
     fn default() -> Self {
         Self {
             time: "time_s".into(),
+            time_unit: ClockUnit::S,
             trajectory: "traj".into(),
             usage: "use".into(),
             command: "cmd{j}_rad".into(),
@@ -82,8 +98,33 @@ pub enum AngleUnit {
     Deg,
 }
 
+/// A unit of time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ClockUnit {
+    /// Seconds.
+    S,
+    /// Milliseconds.
+    Ms,
+    /// Microseconds.
+    Us,
+    /// Nanoseconds.
+    Ns,
+}
+
+impl ClockUnit {
+    fn seconds(self) -> f64 {
+        match self {
+            Self::S => 1.0,
+            Self::Ms => 1e-3,
+            Self::Us => 1e-6,
+            Self::Ns => 1e-9,
+        }
+    }
+}
+
 crate::stage::stage! {
-    DiagnoseDrives, "diagnose_drives", 1, "names the physics that the simulation of commanded joints lacks, from commands and angles",
+    DiagnoseDrives, "diagnose_drives", 2, "names the physics that the simulation of commanded joints lacks, from commands and angles",
         DiagnoseDrivesReads {} -> DiagnoseDrivesWrites {
             verdict: DriveVerdict,
             sentences: VerdictSentences,
@@ -91,6 +132,9 @@ crate::stage::stage! {
             numbers: FindingNumbers,
             rivals: Rivals,
             joints: JointDrives,
+            simulation: DriveSimulation,
+            course: DriveCourse,
+            document: Document,
         }
 }
 
@@ -138,15 +182,11 @@ impl Stage for DiagnoseDrives {
             let message = format!("no cause `{name}`{hint} (causes: {})", listed(&names));
             at.at(format!("without[{k}]")).must(known, message);
         }
-        for (key, column) in [
-            ("command", &self.columns.command),
-            ("angle", &self.columns.angle),
-        ] {
-            at.at("columns").at(key).must(
-                column.contains("{j}"),
-                "expected a name with `{j}`, which stands for the joint, from 1",
-            );
-        }
+        let one = self.columns.command == self.columns.angle && self.commands.is_none();
+        at.at("columns").at("angle").must(
+            !one,
+            "is the column of the commands, too; allowed: another column, or `commands`, a file of their own",
+        );
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
@@ -158,26 +198,46 @@ impl Stage for DiagnoseDrives {
         let one = one.map(|(name, file)| (name.to_string(), file.clone()));
         let includes = self.includes.iter().enumerate();
         let includes = includes.map(|(k, file)| (format!("includes[{k}]"), file.clone()));
-        one.into_iter().chain(includes).collect()
+        let commands = self.commands.iter();
+        let commands = commands.map(|file| ("commands".to_string(), file.clone()));
+        one.into_iter().chain(commands).chain(includes).collect()
     }
 
     fn run(&self, _reads: DiagnoseDrivesReads, context: &Context) -> Result<DiagnoseDrivesWrites> {
-        let mut drives = self.problem(context)?;
+        let (arm, mut drives) = self.problem(context)?;
         drives.without.clone_from(&self.without);
         let diagnosis = diagnose(&drives, &Options::default(), |line| context.note(line));
-        Ok(DiagnoseDrivesWrites {
+        let mut writes = DiagnoseDrivesWrites {
             verdict: DriveVerdict::of(context.id, &diagnosis),
             sentences: VerdictSentences::of(context.id, &[]),
             findings: Findings::of_drives(&diagnosis),
             numbers: FindingNumbers::of_drives(&diagnosis),
             rivals: Rivals::of_drives(&diagnosis),
             joints: JointDrives::of(&diagnosis),
-        })
+            simulation: DriveSimulation::of(&arm, &drives, &diagnosis),
+            course: DriveCourse::of(&drives.recording, &diagnosis),
+            document: Document::default(),
+        };
+        let content = drive_page(&DrivePage {
+            verdict: &writes.verdict,
+            findings: &writes.findings,
+            numbers: &writes.numbers,
+            rivals: &writes.rivals,
+            joints: &writes.joints,
+            simulation: &writes.simulation,
+            course: &writes.course,
+        })?;
+        writes.document = Document(vec![DocumentRow {
+            name: "drives.html".into(),
+            media_type: "text/html".into(),
+            content,
+        }]);
+        Ok(writes)
     }
 }
 
 impl DiagnoseDrives {
-    fn problem(&self, context: &Context) -> Result<Drives> {
+    fn problem(&self, context: &Context) -> Result<(MjcfArm, Drives)> {
         let (label, text) =
             context.text(&self.drives, "a JSON of gains and encoders", MOST_BYTES)?;
         let file: DriveFile = serde_json::from_str(&text).map_err(|error| {
@@ -241,114 +301,81 @@ impl DiagnoseDrives {
                 inertia_relative: stated.inertia_rel,
             });
         let recording = self.recorded(&file, context)?;
-        Ok(Drives::new(
-            Chain::new(&arm.arm, &reference),
-            physics,
-            recording,
-            tolerance,
-        ))
+        let chain = Chain::new(&arm.arm, &reference);
+        Ok((arm, Drives::new(chain, physics, recording, tolerance)))
     }
 
     fn recorded(&self, file: &DriveFile, context: &Context) -> Result<Recording> {
-        let (label, text) =
-            context.text(&self.recording, "a CSV of commands and angles", MOST_BYTES)?;
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .from_reader(text.as_bytes());
-        let head = reader
-            .headers()
-            .map_err(|error| Error::data(&label, error.to_string()))?
-            .clone();
-        let find = |name: &str| head.iter().position(|column| column == name);
-        let n = file.joints.len();
-        let mut faults = Vec::new();
-        let mut needed = |name: String| {
-            find(&name).unwrap_or_else(|| {
-                let hint = did_you_mean(&name, head.iter());
-                let all: Vec<&str> = head.iter().collect();
-                faults.push(Fault::new(
-                    &*label,
-                    format!(
-                        "no column `{name}`{hint} (columns: {}); name others in `columns`",
-                        listed(&all)
-                    ),
-                ));
-                0
-            })
+        const WHAT: &str = "a CSV of commands and angles";
+        let (label, text) = context.text(&self.recording, WHAT, MOST_BYTES)?;
+        let names: Vec<String> = file.joints.iter().map(|one| one.joint.clone()).collect();
+        let sheet = Sheet {
+            label: &label,
+            text: &text,
         };
-        let of = |name: &str, joint: usize| name.replace("{j}", &(joint + 1).to_string());
-        let time = needed(self.columns.time.clone());
-        let commands: Vec<usize> = (0..n)
-            .map(|joint| needed(of(&self.columns.command, joint)))
-            .collect();
-        let angles: Vec<usize> = (0..n)
-            .map(|joint| needed(of(&self.columns.angle, joint)))
-            .collect();
-        Error::if_data(faults)?;
-        let (more, most) = (of(&self.columns.angle, n), n + 1);
-        if find(&more).is_some() {
-            return Err(Error::data(
-                &label,
-                format!("has angles of joint {most} (`{more}`), the drives file names {n} joints"),
-            ));
-        }
-        let (trajectory, usage) = (find(&self.columns.trajectory), find(&self.columns.usage));
-        let mut recording = Recording {
-            time: Vec::new(),
-            command: Vec::new(),
-            angle: Vec::new(),
-            trajectories: Vec::new(),
+        let columns = &self.columns;
+        let [command, angle] = [columns.command.as_str(), columns.angle.as_str()];
+        let (mut rows, commands) = match &self.commands {
+            None => {
+                let mut rows = rows(&sheet, columns, &names, &[command, angle])?;
+                let commands = rows.values.remove(0);
+                (rows, commands)
+            }
+            Some(sent) => {
+                let (place, text) = context.text(sent, WHAT, MOST_BYTES)?;
+                let sheet_of_commands = Sheet {
+                    label: &place,
+                    text: &text,
+                };
+                let mut sent = reading::rows(&sheet_of_commands, columns, &names, &[command])?;
+                let mut rows = reading::rows(&sheet, columns, &names, &[angle])?;
+                must_rise(&place, &sent.time)?;
+                let (held, before) = held(&sent.time, &rows.time);
+                let beyond = rows.time.last() > sent.time.last();
+                if before > rows.time.len() / 2 {
+                    let message = format!(
+                        "its first command is sent at {} s, after half of the {} angles of {label}; both clocks are one, in `time_unit`",
+                        sent.time.first().copied().unwrap_or_default(),
+                        rows.time.len()
+                    );
+                    return Err(Error::data(&place, message));
+                }
+                if before > 0 {
+                    context.note(format!(
+                        "{label}: {before} rows before the first command are not used"
+                    ));
+                    rows.skip(before, names.len());
+                }
+                if beyond {
+                    context.note(format!(
+                        "{place}: its last command is held until {label} ends"
+                    ));
+                }
+                let n = names.len();
+                let values = sent.values.remove(0);
+                let of_row = |row: &usize| values[row * n..(row + 1) * n].to_vec();
+                let commands = held[before..].iter().flat_map(of_row).collect();
+                (rows, commands)
+            }
+        };
+        let by = match columns.unit {
+            AngleUnit::Rad => 1.0,
+            AngleUnit::Deg => 1f64.to_radians(),
+        };
+        let scaled = |values: Vec<f64>| values.into_iter().map(|value| by * value).collect();
+        let trajectory = |(rows, usage): &(std::ops::Range<usize>, Option<String>)| Trajectory {
+            rows: rows.clone(),
+            held_out: usage.as_ref().is_some_and(|usage| !self.on.contains(usage)),
+        };
+        let recording = Recording {
+            angle: scaled(rows.values.remove(0)),
+            command: scaled(commands),
+            trajectories: rows.runs.iter().map(trajectory).collect(),
+            time: rows.time,
             period: 1.0 / file.command_rate_hz,
             encoder: file.joints.iter().map(|joint| joint.encoder_rad).collect(),
             noise: file.joints.iter().map(|joint| joint.noise_rad).collect(),
         };
-        let by = match self.columns.unit {
-            AngleUnit::Rad => 1.0,
-            AngleUnit::Deg => 1f64.to_radians(),
-        };
-        let mut last = None;
-        for (row, record) in reader.records().enumerate() {
-            let place = format!("{label}:{}", row + 2);
-            let record = record.map_err(|error| Error::data(&place, error.to_string()))?;
-            let number = |column: usize| -> Result<f64> {
-                let cell = record.get(column).unwrap_or_default();
-                match cell.parse::<f64>() {
-                    Ok(value) if value.is_finite() => Ok(value),
-                    _ => Err(Error::data(
-                        &place,
-                        format!(
-                            "column `{}` holds `{cell}`; expected a finite number",
-                            &head[column]
-                        ),
-                    )),
-                }
-            };
-            recording.time.push(number(time)?);
-            for column in &commands {
-                recording.command.push(by * number(*column)?);
-            }
-            for column in &angles {
-                recording.angle.push(by * number(*column)?);
-            }
-            let here = (
-                trajectory.map(|column| record[column].to_string()),
-                usage.map(|column| record[column].to_string()),
-            );
-            if last.as_ref() != Some(&here) {
-                let held_out = here
-                    .1
-                    .as_ref()
-                    .is_some_and(|usage| !self.on.contains(usage));
-                recording.trajectories.push(Trajectory {
-                    rows: row..row,
-                    held_out,
-                });
-                last = Some(here);
-            }
-            if let Some(trajectory) = recording.trajectories.last_mut() {
-                trajectory.rows.end = row + 1;
-            }
-        }
         if recording
             .trajectories
             .iter()

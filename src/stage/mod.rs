@@ -44,6 +44,7 @@ pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};
 use diagnose::AskedRows;
 pub use diagnose::{CellPrior, Diagnose, DiagnoseReads};
+pub(crate) use diagnose_drives::short;
 pub use diagnose_drives::{DiagnoseDrives, DiagnoseDrivesReads, DiagnoseDrivesWrites};
 pub use diagnose_torques::{
     ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut,

@@ -14,11 +14,11 @@ use crate::shell::typed;
 use crate::stage::{DeclaredStage, Diagnose, DiagnoseDrives, DiagnoseTorques};
 use crate::store::Store;
 use crate::table::{
-    CauseGrid, Cells, ContactRow, Contacts, DriveVerdict, DriveVerdictRow, FindingNumbers,
-    FindingRow, Findings, FormRow, Forms, JointDrives, JointTorqueRow, JointTorques, Rivals,
-    ShareRow, Shares, Suspects, SuspectsRow, Table, TablesByKind, TorqueFindings, TorqueNumbers,
-    TorqueRivals, TorqueVerdict, TorqueVerdictRow, Verdict, VerdictRow, VerdictSentences,
-    VerdictTopic, is_separable_by_poses, of_kind, picked, picked_of,
+    CauseGrid, Cells, ContactRow, Contacts, Document, DriveVerdict, DriveVerdictRow,
+    FindingNumbers, FindingRow, Findings, FormRow, Forms, JointDrives, JointTorqueRow,
+    JointTorques, Rivals, ShareRow, Shares, Suspects, SuspectsRow, Table, TablesByKind,
+    TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict, TorqueVerdictRow, Verdict,
+    VerdictRow, VerdictSentences, VerdictTopic, is_separable_by_poses, of_kind, picked, picked_of,
 };
 use crate::text::filled;
 use crate::units::Unit;
@@ -56,6 +56,8 @@ pub struct DiagnosisSummary {
     forms: Forms,
     not_observable: Vec<String>,
     next: Vec<String>,
+    /// Its page, where the stage wrote one.
+    page: Option<String>,
 }
 
 /// What was diagnosed.
@@ -225,8 +227,11 @@ impl DiagnosisSummary {
         let (Findings(rows), numbers, rivals): (_, FindingNumbers, Rivals) =
             (table(tables)?, table(tables)?, table(tables)?);
         let JointDrives(joints) = table(tables)?;
-        let findings = result::findings(&rows, &numbers.0, &rivals.0);
+        let mut findings = result::findings(&rows, &numbers.0, &rivals.0);
         let mrad = |rad: f64| 1e3 * rad;
+        for (finding, row) in findings.iter_mut().zip(&rows) {
+            finding["effect_rms_mrad"] = row.effect_rms_rad.map(mrad).into();
+        }
         let mut document = picked(&v, "verdict statement rows held_out");
         document["noise_mrad"] = mrad(v.noise_rad).into();
         for (when, rms, fitted) in [
@@ -253,9 +258,14 @@ impl DiagnosisSummary {
             head: head_of_drives(&subject, &v, rows.len()),
             verdict: verdict_of_drives(&v),
             at: " rms",
+            page: table::<Document>(tables)?
+                .0
+                .into_iter()
+                .next()
+                .map(|page| page.content),
             ..Self::default()
         };
-        let evidence = "delta_bic effect_rms_rad";
+        let evidence = "delta_bic effect_rms_mrad";
         let step = (v.step.clone(), table(tables)?);
         let ranges = vec![json!({}); rows.len()];
         summary.with(subject, step, (document, shown), findings, evidence, ranges)
@@ -409,14 +419,17 @@ impl DiagnosisSummary {
         shown
     }
 
-    /// The fault of a page that is asked for of torques or drives.
+    /// The fault of a page that is asked for of torques.
     pub(crate) fn no_page() -> Error {
-        let message = "of torques the page is the pipeline's report, which `calib run` writes (`- uses: report_torques` last); of drives there is none";
+        let message = "of torques the page is the pipeline's report, which `calib run` writes (`- uses: report_torques` last)";
         Error::spec("--html", message)
     }
 
     /// The diagnosis as one HTML file; `store` as in [`Self::document`], of torques it is in the report.
     pub fn page(&self, store: &str) -> Result<String> {
+        if let Some(page) = &self.page {
+            return Ok(page.clone());
+        }
         if self.of_torques {
             return Err(Self::no_page());
         }
@@ -627,7 +640,7 @@ fn head_of_positions(subject: &Subject, v: &VerdictRow, found: usize) -> String 
 }
 
 fn head_of_drives(subject: &Subject, v: &DriveVerdictRow, found: usize) -> String {
-    let noise = angle(v.noise_rad);
+    let noise = format!("{:.3} mrad", 1e3 * v.noise_rad);
     let rows = screen::measured(
         subject.robot.as_deref(),
         &format!("{} rows of commands and angles fitted", v.rows),

@@ -35,6 +35,7 @@ pub(super) struct Found {
     /// Its size, in the unit that all findings of a diagnosis share.
     effect_rms_mm: Option<f64>,
     effect_rms_rad: Option<f64>,
+    effect_rms_mrad: Option<f64>,
     effect_rms_nm: Option<f64>,
 }
 
@@ -60,7 +61,11 @@ impl Found {
         let by_length = self.effect_rms_mm.map(|mm| (mm, length(mm)));
         let by_angle = self.effect_rms_rad.map(|rad| (rad, angle(rad)));
         let torque = self.effect_rms_nm.filter(|nm| *nm > 0.0);
+        let of_drives = self
+            .effect_rms_mrad
+            .map(|mrad| (mrad, format!("{mrad:.2} mrad")));
         by_length
+            .or(of_drives)
             .or(by_angle)
             .or_else(|| torque.map(|nm| (nm, format!("{} {}", figure(nm, 1), self.drive()))))
     }

@@ -8,6 +8,7 @@ pub use crate::store::Loose;
 use crate::store::frame::{Cell, FrameBuilder};
 pub use crate::store::frame::{Frame, TextCells};
 pub use cause_grid::{CauseGrid, CauseGridCell};
+pub use drives::DriveCourse;
 pub use findings::VerdictTopic;
 pub use findings::{formula_in_words, is_separable_by_poses};
 pub use motion::{ArmMotion, TorqueCourse};
@@ -154,6 +155,8 @@ tables! {
     covariance => CovarianceTable of CovarianceRow,
     curves => Curves of CurveRow,
     document => Document of DocumentRow,
+    drive_course => DriveCourse,
+    drive_simulation => DriveSimulation of DriveSimulationRow,
     drive_verdict => DriveVerdict of DriveVerdictRow,
     finding_numbers => FindingNumbers of FindingNumberRow,
     findings => Findings of FindingRow,

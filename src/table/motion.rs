@@ -257,7 +257,11 @@ fn kept<T: Copy>(values: &[T], width: usize, rows: &[usize]) -> Vec<T> {
 }
 
 /// The columns of all joints, row-major.
-fn of_joints<C: Cell + Copy>(frame: &Frame, name: &str, joints: usize) -> Result<Vec<C>> {
+pub(super) fn of_joints<C: Cell + Copy>(
+    frame: &Frame,
+    name: &str,
+    joints: usize,
+) -> Result<Vec<C>> {
     let read = |joint: usize| frame.read::<C>(&at_joint(name, joint));
     Ok(interleaved(
         &(0..joints).map(read).collect::<Result<Vec<_>>>()?,

@@ -86,6 +86,84 @@ fn the_example_is_diagnosed_as_cloned_and_its_concealed_causes_are_named() {
     assert_eq!(found, concealed);
     let rms = |when: &str| document[when]["validate_rms_mrad"].as_f64().unwrap();
     assert!(rms("before") > 5.0 && rms("after") < 0.7, "{document}");
+    assert!(
+        document["findings"][0]["evidence"]["effect_rms_mrad"]
+            .as_f64()
+            .unwrap()
+            > 2.0
+    );
+    let said = of_the_example("diagnose");
+    let lines = [
+        "mrad rms, rolled out",
+        "instrument 0.",
+        "joint 2 Coulomb friction",
+    ];
+    assert!(
+        lines.iter().all(|line| said.out.contains(line)),
+        "{}",
+        said.out
+    );
+    assert!(!said.out.contains("arcsec"), "{}", said.out);
+    let page = tempfile::tempdir().unwrap();
+    let file = page.path().join("drives.html");
+    let written = of_the_example(&format!("diagnose --quiet --html {}", file.display()));
+    assert_eq!(written.code, Some(0), "{}", written.err);
+    let page = read(&file);
+    assert_eq!(
+        page.matches("<svg").count(),
+        4,
+        "two joints, angle and error"
+    );
+    assert!(page.contains("commanded") && page.contains("(lift)"));
+}
+
+#[test]
+fn drives_are_exported_to_mujoco_isaac_and_json_with_what_was_found() {
+    let mjcf = of_the_example("export --quiet --format mjcf").out;
+    let document = roxmltree::Document::parse(&mjcf).unwrap();
+    let of_joint = |tag: &str, key: &str| -> f64 {
+        let mut nodes = document.descendants().filter(|node| node.has_tag_name(tag));
+        let node = nodes
+            .find(|node| node.attribute("name") == Some("lift"))
+            .unwrap();
+        node.attribute(key).unwrap().parse().unwrap()
+    };
+    let (friction, delay) = (
+        of_joint("joint", "frictionloss"),
+        of_joint("general", "delay"),
+    );
+    assert!(
+        (friction - 0.29).abs() < 0.02 && (delay - 0.015).abs() < 0.001,
+        "{friction} {delay}"
+    );
+    assert!(
+        mjcf.contains("mrad rms before") && !mjcf.contains("not carried"),
+        "{mjcf}"
+    );
+    let isaac = of_the_example("export --quiet --format isaac").out;
+    assert!(
+        isaac.contains("\"lift\":\n") && isaac.contains("min_delay: 3  # of 15.0"),
+        "{isaac}"
+    );
+    let json = of_the_example("export --quiet --format json").json();
+    let kp = &json["simulation"]["joint 2"]["kp"];
+    assert_eq!(
+        (&kp["believed"], &kp["unit"]),
+        (&json!(26.0), &json!("Nm/rad"))
+    );
+    let refused = of_the_example("export --quiet --format urdf");
+    assert!(
+        refused.err.contains("allowed: mjcf, isaac, json"),
+        "{}",
+        refused.err
+    );
+    let torques = root("pipelines/dynamics/pipeline.yaml");
+    let refused = calib(".", &format!("export --format isaac {}", torques.display()));
+    assert!(
+        refused.err.contains("holds drives alone"),
+        "{}",
+        refused.err
+    );
 }
 
 /// An arm of one joint with its drive and 2 s of a recording.
@@ -180,4 +258,140 @@ fn bad_input_of_drives_is_refused_with_its_place_and_what_is_allowed() {
         });
     still.recording = lines.collect();
     says(&still, &["joint 1 never moves"]);
+}
+
+#[test]
+fn an_actuator_that_is_not_read_and_lists_of_other_lengths_are_refused_with_their_line() {
+    let mut actuator = folder();
+    actuator.robot = actuator.robot.replace(
+        "</mujoco>",
+        "<actuator><muscle name=\"m\" joint=\"j1\"/></actuator></mujoco>",
+    );
+    let said = actuator.refused();
+    assert!(
+        said.contains("<muscle>") && said.contains("position, velocity, motor, general"),
+        "{said}"
+    );
+    let mut looped = folder();
+    looped.robot = looped.robot.replace(
+        "</mujoco>",
+        "<equality><connect body1=\"link\" anchor=\"0 0 0\"/></equality></mujoco>",
+    );
+    assert!(looped.refused().contains("<connect> closes a loop"));
+}
+
+/// The folder with commands and angles in two files, each a list a row, on a clock of microseconds; `rows` of the commands are left out.
+fn in_lists(folder: &Folder, short: bool) -> TempDir {
+    let case = tempfile::tempdir().unwrap();
+    let (mut control, mut state) = (
+        "timestamp,positions\n".to_string(),
+        "timestamp,positions\n".to_string(),
+    );
+    for (row, line) in folder.recording.lines().skip(1).enumerate() {
+        let cells: Vec<&str> = line.split(',').collect();
+        let micros = 10_000 * row;
+        control += &format!("{micros},\"[{}, 0.5]\"\n", cells[3]);
+        match short && row == 7 {
+            true => state += &format!("{micros},\"[]\"\n"),
+            false => state += &format!("{micros},\"[{}, 0.5]\"\n", cells[4]),
+        }
+    }
+    put(case.path(), "control.csv", control);
+    put(case.path(), "state_motor.csv", state);
+    put(case.path(), "robot.xml", &folder.robot);
+    put(case.path(), "drives.json", folder.drives.to_string());
+    put(
+        case.path(),
+        "pipeline.yaml",
+        "calib: 1\nname: lists\nseed: 1\nstages:\n  - uses: diagnose_drives\n    with:\n      robot: robot.xml\n      drives: drives.json\n      \
+         recording: state_motor.csv\n      commands: control.csv\n      columns: {time: timestamp, time_unit: us, command: positions, angle: positions}\n",
+    );
+    case
+}
+
+#[test]
+fn commands_and_angles_come_as_lists_in_two_files_too() {
+    let plain = folder();
+    let diagnosed =
+        |case: &Path| calib(case, "diagnose --quiet --json pipeline.yaml --store store");
+    let case = in_lists(&plain, false);
+    let lists = diagnosed(case.path());
+    assert_eq!(lists.code, Some(0), "{}", lists.err);
+    let one = tempfile::tempdir().unwrap();
+    put(one.path(), "robot.xml", &plain.robot);
+    put(one.path(), "drives.json", plain.drives.to_string());
+    put(one.path(), "recording.csv", &plain.recording);
+    let store = tempfile::tempdir().unwrap();
+    let columns = diagnose(one.path(), store.path()).json();
+    let rms = |document: &Value| document["before"]["fit_rms_mrad"].as_f64().unwrap();
+    let (lists, columns) = (rms(&lists.json()), rms(&columns));
+    assert!((lists / columns - 1.0).abs() < 1e-6, "{lists} {columns}");
+    let short = diagnosed(in_lists(&plain, true).path());
+    assert!(
+        short.err.contains("state_motor.csv:9") && short.err.contains("at least 1 joints"),
+        "{}",
+        short.err
+    );
+}
+
+#[test]
+fn init_writes_the_pipeline_of_commands_and_angles() {
+    let plain = folder();
+    let case = in_lists(&plain, false);
+    std::fs::remove_file(case.path().join("pipeline.yaml")).unwrap();
+    std::fs::remove_file(case.path().join("drives.json")).unwrap();
+    let answer = calib(case.path(), "init arm --data . --mjcf robot.xml");
+    assert_eq!(answer.code, Some(0), "{}", answer.both());
+    let drives: Value = serde_json::from_str(&read(case.path().join("arm/drives.json"))).unwrap();
+    assert_eq!(drives["command_rate_hz"], json!(100.0));
+    assert_eq!(drives["joints"][0]["joint"], json!("j1"));
+    let pipeline = read(case.path().join("arm/pipeline.yaml"));
+    for line in [
+        "time_unit: us",
+        "commands: ",
+        "state_motor.csv",
+        "state kp of each joint",
+    ] {
+        assert!(pipeline.contains(line), "expected `{line}` in {pipeline}");
+    }
+    // What it could not know is asked for.
+    let check = calib(case.path(), "diagnose arm/pipeline.yaml --store store");
+    assert!(check.err.contains("joints[0].kp"), "{}", check.err);
+    let nothing = calib(case.path(), "init other --data robot.xml --mjcf robot.xml");
+    assert!(nothing.err.contains("allowed: one CSV"), "{}", nothing.err);
+}
+
+#[test]
+fn init_finds_commands_and_angles_of_real_recordings() {
+    let Some(data) = shared("data") else {
+        return;
+    };
+    let desk = tempfile::tempdir().unwrap();
+    let init = |name: &str, recording: &str, mjcf: &str| {
+        let (recording, mjcf) = (data.join(recording), data.join(mjcf));
+        let (recording, mjcf) = (recording.display(), mjcf.display());
+        let answer = calib(
+            desk.path(),
+            &format!("init {name} --data {recording} --mjcf {mjcf}"),
+        );
+        assert_eq!(answer.code, Some(0), "{}", answer.both());
+        let text = |file: &str| read(desk.path().join(name).join(file));
+        let drives: Value = serde_json::from_str(&text("drives.json")).unwrap();
+        (text("pipeline.yaml"), drives)
+    };
+    let (pipeline, drives) = init("desk", "so101_sage/multisine", "so101_sage/so101.xml");
+    assert!(
+        pipeline.contains("time_unit: us") && pipeline.contains("angle: positions"),
+        "{pipeline}"
+    );
+    assert_eq!(drives["joints"].as_array().unwrap().len(), 6);
+    let step = drives["joints"][1]["encoder_rad"].as_f64().unwrap();
+    assert!((step - 1.534e-3).abs() < 1e-4, "{step}");
+    assert!(drives["joints"][1]["kp"].as_f64().unwrap() > 1.0);
+    let (pipeline, drives) = init("legs", "go2_chirp/recording.csv", "go2_chirp/go2.xml");
+    assert!(
+        pipeline.contains("command: \"cmd_{name}\"") || pipeline.contains("cmd_{name}"),
+        "{pipeline}"
+    );
+    assert_eq!(drives["command_rate_hz"], json!(200.0));
 }

@@ -85,6 +85,8 @@ pub struct DriveDiagnosis {
     pub overall: JointError,
     /// The simulation with what was found.
     pub physics: Physics,
+    /// rad, simulated angles before and after, `rows x joints`.
+    pub angles: [Vec<f64>; 2],
     /// Whether noise alone remains.
     pub explained: bool,
     /// Rows that were fitted.
@@ -123,6 +125,7 @@ pub fn diagnose(problem: &Drives, options: &Options, tell: impl FnMut(String)) -
         held_out,
         overall,
         physics,
+        angles: [before, after],
         rows,
     }
 }

@@ -1,0 +1,236 @@
+//! Recordings of drives: CSV with a column for each joint or with a list a row, commands in the same file or in one of their own.
+
+use super::DriveColumns;
+use crate::error::{Error, Fault, Result, did_you_mean, listed};
+use csv::StringRecord;
+use std::ops::Range;
+
+/// A file of a recording.
+pub(super) struct Sheet<'a> {
+    /// For messages.
+    pub(super) label: &'a str,
+    pub(super) text: &'a str,
+}
+
+/// What was read of one.
+pub(super) struct Rows {
+    /// s.
+    pub(super) time: Vec<f64>,
+    /// Of each wanted quantity `rows x joints`, in the columns' unit.
+    pub(super) values: Vec<Vec<f64>>,
+    /// Rows of one trajectory and usage, with what the usage is.
+    pub(super) runs: Vec<(Range<usize>, Option<String>)>,
+}
+
+impl Rows {
+    /// Leaves out the first rows.
+    pub(super) fn skip(&mut self, rows: usize, joints: usize) {
+        self.time.drain(..rows);
+        for values in &mut self.values {
+            values.drain(..rows * joints);
+        }
+        for (range, _) in &mut self.runs {
+            *range = range.start.saturating_sub(rows)..range.end.saturating_sub(rows);
+        }
+        self.runs.retain(|(range, _)| !range.is_empty());
+    }
+}
+
+/// Fails where a clock does not rise.
+pub(super) fn must_rise(label: &str, time: &[f64]) -> Result<()> {
+    match time.windows(2).position(|pair| pair[1] <= pair[0]) {
+        None => Ok(()),
+        Some(row) => {
+            let (before, after) = (time[row], time[row + 1]);
+            let message =
+                format!("time {after} s does not come after {before} s; times of commands rise");
+            Err(Error::data(format!("{label}:{}", row + 3), message))
+        }
+    }
+}
+
+/// Where the joints of a quantity are.
+enum Cells {
+    Each(Vec<usize>),
+    /// In lists, as `[0.1, 0.2]`.
+    List(usize),
+}
+
+/// Whether a column's name stands for one column of each joint.
+fn is_of_each(column: &str) -> bool {
+    column.contains("{j}") || column.contains("{name}")
+}
+
+/// A joint's name without the ending by which robot files tell joints from links.
+pub(crate) fn short(name: &str) -> &str {
+    name.strip_suffix("_joint").unwrap_or(name)
+}
+
+fn of_joint(column: &str, joint: usize, name: &str) -> String {
+    let column = column.replace("{j}", &(joint + 1).to_string());
+    column.replace("{name}", name)
+}
+
+/// The rows of a file with the quantities `wanted`, a column each. Fails with every column that is not there, or with the first cell that is
+/// no number.
+pub(super) fn rows(
+    sheet: &Sheet,
+    columns: &DriveColumns,
+    names: &[String],
+    wanted: &[&str],
+) -> Result<Rows> {
+    let label = sheet.label;
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(sheet.text.as_bytes());
+    let head = reader
+        .headers()
+        .map_err(|error| Error::data(label, error.to_string()))?
+        .clone();
+    let find = |name: &str| head.iter().position(|column| column == name);
+    let mut faults = Vec::new();
+    let mut needed = |name: String| {
+        find(&name).unwrap_or_else(|| {
+            let hint = did_you_mean(&name, head.iter());
+            let all: Vec<&str> = head.iter().collect();
+            let message = format!(
+                "no column `{name}`{hint} (columns: {}); name others in `columns`",
+                listed(&all)
+            );
+            faults.push(Fault::new(label, message));
+            0
+        })
+    };
+    let time = needed(columns.time.clone());
+    let cells: Vec<Cells> = wanted
+        .iter()
+        .map(|column| match is_of_each(column) {
+            true => {
+                let joints = names.iter().enumerate();
+                let of = |(joint, name): (usize, &String)| {
+                    let whole = of_joint(column, joint, name);
+                    let short = of_joint(column, joint, short(name));
+                    needed(if find(&whole).is_none() && find(&short).is_some() {
+                        short
+                    } else {
+                        whole
+                    })
+                };
+                Cells::Each(joints.map(of).collect())
+            }
+            false => Cells::List(needed((*column).to_string())),
+        })
+        .collect();
+    Error::if_data(faults)?;
+    for column in wanted.iter().filter(|column| column.contains("{j}")) {
+        let more = of_joint(column, names.len(), "");
+        if find(&more).is_some() {
+            let (n, most) = (names.len(), names.len() + 1);
+            return Err(Error::data(
+                label,
+                format!(
+                    "has a column of joint {most} (`{more}`), the drives file names {n} joints"
+                ),
+            ));
+        }
+    }
+    let (trajectory, usage) = (find(&columns.trajectory), find(&columns.usage));
+    let mut out = Rows {
+        time: Vec::new(),
+        values: vec![Vec::new(); wanted.len()],
+        runs: Vec::new(),
+    };
+    let (by, mut last) = (columns.time_unit.seconds(), None);
+    for (row, record) in reader.records().enumerate() {
+        let place = format!("{label}:{}", row + 2);
+        let record = record.map_err(|error| Error::data(&place, error.to_string()))?;
+        let number = |column: usize| of_cell(&record, &head, column, &place);
+        out.time.push(by * number(time)?);
+        for (cells, values) in cells.iter().zip(&mut out.values) {
+            match cells {
+                Cells::Each(all) => {
+                    for column in all {
+                        values.push(number(*column)?);
+                    }
+                }
+                Cells::List(column) => {
+                    values.extend(of_list(&record, &head, *column, names.len(), &place)?);
+                }
+            }
+        }
+        let here = (
+            trajectory.map(|column| record[column].to_string()),
+            usage.map(|column| record[column].to_string()),
+        );
+        if last.as_ref() != Some(&here) {
+            out.runs.push((row..row, here.1.clone()));
+            last = Some(here);
+        }
+        if let Some((rows, _)) = out.runs.last_mut() {
+            rows.end = row + 1;
+        }
+    }
+    Ok(out)
+}
+
+fn finite(text: &str) -> Option<f64> {
+    text.trim()
+        .parse()
+        .ok()
+        .filter(|value: &f64| value.is_finite())
+}
+
+fn of_cell(record: &StringRecord, head: &StringRecord, column: usize, place: &str) -> Result<f64> {
+    let cell = record.get(column).unwrap_or_default();
+    finite(cell).ok_or_else(|| {
+        let message = format!(
+            "column `{}` holds `{cell}`; expected a finite number",
+            &head[column]
+        );
+        Error::data(place, message)
+    })
+}
+
+/// The first `joints` numbers of a list; a gripper's may follow.
+fn of_list(
+    record: &StringRecord,
+    head: &StringRecord,
+    column: usize,
+    joints: usize,
+    place: &str,
+) -> Result<Vec<f64>> {
+    let cell = record.get(column).unwrap_or_default();
+    let name = &head[column];
+    let inside = cell
+        .strip_prefix('[')
+        .and_then(|cell| cell.strip_suffix(']'));
+    let inside = inside.ok_or_else(|| {
+        let message = format!(
+            "column `{name}` holds `{cell}`; expected a list as `[0.1, 0.2]`, or in `columns` a name with `{{j}}` (joints from 1) or `{{name}}`"
+        );
+        Error::data(place, message)
+    })?;
+    let numbers: Option<Vec<f64>> = inside
+        .split([',', ' '])
+        .filter(|part| !part.is_empty())
+        .map(finite)
+        .collect();
+    let numbers = numbers.filter(|numbers| numbers.len() >= joints);
+    numbers
+        .map(|numbers| numbers[..joints].to_vec())
+        .ok_or_else(|| {
+            let message = format!(
+                "column `{name}` holds `{cell}`; expected finite numbers of at least {joints} joints, which the drives file names"
+            );
+            Error::data(place, message)
+        })
+}
+
+/// For each time of the angles the row of the command that holds then: the last that was sent by it. Also how many times are before the first.
+pub(super) fn held(sent: &[f64], at: &[f64]) -> (Vec<usize>, usize) {
+    // Stamps of one instant may differ in the last digits.
+    let by = |time: f64| sent.partition_point(|one| *one <= time + 1e-6);
+    let before = at.iter().take_while(|time| by(**time) == 0).count();
+    let rows = at.iter().map(|time| by(*time).saturating_sub(1));
+    (rows.collect(), before)
+}
