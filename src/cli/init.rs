@@ -2,7 +2,7 @@
 
 use super::{emit, note, warn};
 use crate::error::{Error, Result, did_you_mean, visible};
-use crate::init::{InitRequest, StarterFiles, TYPICAL, start, typical};
+use crate::init::{InitRequest, StarterFiles, TYPICAL, start, start_drives, typical};
 use crate::raw::ending;
 use crate::robot::{LIBRARY, LibraryArm};
 use crate::text::filled;
@@ -37,6 +37,9 @@ pub(super) struct InitArguments {
     /// Its last link
     #[arg(long, value_name = "LINK", requires = "urdf", default_value = "tool0")]
     tip: String,
+    /// Of commands and measured angles: the MJCF that is simulated; the recording is one CSV, two, or their folder
+    #[arg(long, value_name = "FILE", requires = "data", conflicts_with_all = ["robot", "urdf"])]
+    mjcf: Option<PathBuf>,
 }
 
 /// Unread files that are named at most.
@@ -46,6 +49,7 @@ const EXAMPLES: &str = "Examples:
   calib init cell7 --data cell7/controller.csv cell7/tracker.csv --robot spherical6
   calib init cell7 --data measurements.csv --urdf arm.urdf --tip flange
   calib init cell7 --data measurements.csv --robot ur10e
+  calib init arm --data recording.csv --mjcf so101.xml
   calib init --robot seven";
 
 /// Typical robots as values of an option, each with its line of help; arms of the library are taken by name and listed by `calib robots`.
@@ -89,6 +93,9 @@ impl TypedValueParser for Arms {
 impl InitArguments {
     /// Gives the exit code: 1 where nothing was understood of the recordings.
     pub(crate) fn run(&self) -> Result<u8> {
+        if let Some(mjcf) = &self.mjcf {
+            return of_drives(self, mjcf);
+        }
         let start = execute(self)?;
         if !start.understood_nothing() {
             return Ok(0);
@@ -107,6 +114,42 @@ impl InitArguments {
     }
 }
 
+/// The fault of a file that cannot be written.
+fn refused(path: &Path) -> impl Fn(std::io::Error) -> Error {
+    let place = path.display().to_string();
+    move |error| Error::store(place.clone(), format!("cannot be written: {error}"))
+}
+
+/// For a recording of commands and angles.
+fn of_drives(arguments: &InitArguments, mjcf: &Path) -> Result<u8> {
+    let folder = &arguments.folder;
+    let [pipeline, drives] = ["pipeline.yaml", "drives.json"].map(|name| folder.join(name));
+    if pipeline.exists() {
+        let place = pipeline.display().to_string();
+        return Err(Error::spec(place, "is already there; nothing was written"));
+    }
+    let start = start_drives(folder, &arguments.data, mjcf)?;
+    std::fs::create_dir_all(folder).map_err(refused(folder))?;
+    let is_new = !drives.exists();
+    if is_new {
+        std::fs::write(&drives, &start.drives).map_err(refused(&drives))?;
+    }
+    std::fs::write(&pipeline, &start.pipeline).map_err(refused(&pipeline))?;
+    warn(&start.notes);
+    let (pipeline, drives) = (pipeline.display(), drives.display());
+    let mut text: String = start
+        .accounts
+        .iter()
+        .map(|line| format!("{line}\n"))
+        .collect();
+    text += &match is_new {
+        true => format!("written: {pipeline}, {drives}; look at the lines marked CHECK\n"),
+        false => format!("written: {pipeline}; {drives} was there and is used as it is\n"),
+    };
+    emit(&format!("{text}then: calib diagnose {pipeline}\n"))?;
+    Ok(0)
+}
+
 fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
     let InitArguments {
         folder,
@@ -114,6 +157,7 @@ fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
         robot,
         urdf,
         tip,
+        mjcf: _,
     } = arguments;
     let files = ["robot.yaml", "pipeline.yaml"].map(|name| folder.join(name));
     if files[1].exists() {
@@ -129,12 +173,6 @@ fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
         urdf: urdf.as_deref(),
         tip,
     })?;
-    let refused = |path: &Path| {
-        let place = path.display().to_string();
-        move |error: std::io::Error| {
-            Error::store(place.clone(), format!("cannot be written: {error}"))
-        }
-    };
     std::fs::create_dir_all(folder).map_err(refused(folder))?;
     let texts = [start.robot.as_ref(), Some(&start.pipeline)];
     for (path, text) in files

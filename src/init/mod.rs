@@ -4,12 +4,14 @@
 mod arm;
 mod columns;
 mod names;
+mod of_drives;
 mod pipeline;
 mod quantities;
 mod sheet;
 mod together;
 
 pub(crate) use arm::{TYPICAL, typical};
+pub(crate) use of_drives::start_drives;
 pub(crate) use pipeline::{MarkedLines, marked};
 
 use crate::error::{Error, Result};

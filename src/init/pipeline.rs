@@ -10,7 +10,7 @@ use crate::yaml::quoted;
 use std::path::Path;
 
 /// How the pipeline's folder names a file.
-fn from_folder(folder: &Path, file: &Path) -> String {
+pub(super) fn from_folder(folder: &Path, file: &Path) -> String {
     let whole = |path: &Path| path.canonicalize().ok();
     let inside = whole(folder)
         .zip(whole(file))

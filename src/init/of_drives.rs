@@ -1,0 +1,458 @@
+//! A recording of commands and measured angles, with the MJCF that is simulated: which columns are which, the rate, the encoder's steps, and
+//! the files that `diagnose_drives` takes.
+
+use super::pipeline::from_folder;
+use crate::drives::mjcf::{self, MjcfArm, MjcfText};
+use crate::error::{Error, Result, listed};
+use crate::raw;
+use crate::stage::short;
+use crate::yaml::quoted;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What `init` writes for drives.
+pub(crate) struct DriveStart {
+    pub(crate) pipeline: String,
+    /// Text of `drives.json`.
+    pub(crate) drives: String,
+    /// What was found, a sentence each.
+    pub(crate) accounts: Vec<String>,
+    /// What a person should know, a sentence each.
+    pub(crate) notes: Vec<String>,
+}
+
+const COMMANDED: [&str; 14] = [
+    "cmd",
+    "command",
+    "commands",
+    "commanded",
+    "target",
+    "targets",
+    "desired",
+    "des",
+    "ref",
+    "goal",
+    "setpoint",
+    "action",
+    "actions",
+    "control",
+];
+const MEASURED: [&str; 12] = [
+    "q",
+    "pos",
+    "position",
+    "positions",
+    "angle",
+    "angles",
+    "measured",
+    "meas",
+    "actual",
+    "state",
+    "observation",
+    "joint",
+];
+/// Words of columns that are neither.
+const OTHERS: [&str; 16] = [
+    "dq",
+    "qd",
+    "vel",
+    "velocity",
+    "velocities",
+    "speed",
+    "torque",
+    "torques",
+    "tau",
+    "effort",
+    "current",
+    "currents",
+    "temp",
+    "temperature",
+    "acc",
+    "voltage",
+];
+const CLOCKS: [&str; 6] = ["time", "timestamp", "t", "stamp", "clock", "timestamps"];
+/// Rows that are looked at.
+const LOOKED_AT: usize = 5_000;
+/// rad beyond which angles are taken to be degrees.
+const DEGREES: f64 = 7.0;
+
+/// A file with its head and some of its rows.
+struct Table {
+    path: PathBuf,
+    label: String,
+    head: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+/// A quantity of all joints: the name in the YAML, and its values row by row.
+struct Found {
+    column: String,
+    values: Vec<Vec<f64>>,
+}
+
+fn words(text: &str) -> Vec<String> {
+    let parts = text.split(|c: char| !c.is_ascii_alphabetic());
+    let parts = parts.filter(|part| !part.is_empty());
+    parts.map(str::to_ascii_lowercase).collect()
+}
+
+fn has(text: &str, list: &[&str]) -> bool {
+    words(text).iter().any(|word| list.contains(&word.as_str()))
+}
+
+impl Table {
+    fn read(path: &Path) -> Result<Self> {
+        let label = path.display().to_string();
+        let text = raw::text(path).map_err(|error| Error::unreadable(&label, &error))?;
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        let fail = |error: csv::Error| Error::data(&label, error.to_string());
+        let head = reader.headers().map_err(fail)?.iter().map(String::from);
+        let head = head.collect();
+        let mut rows = Vec::new();
+        for record in reader.records().take(LOOKED_AT) {
+            rows.push(record.map_err(fail)?.iter().map(String::from).collect());
+        }
+        Ok(Self {
+            path: path.to_path_buf(),
+            label,
+            head,
+            rows,
+        })
+    }
+
+    fn numbers(&self, column: usize) -> Option<Vec<f64>> {
+        let cells = self.rows.iter().map(|row| row[column].parse().ok());
+        cells.collect()
+    }
+
+    /// Columns that are there for every joint of `names`, by their pattern, and lists that are as long.
+    fn quantities(&self, names: &[String]) -> Vec<Found> {
+        let mut found = Vec::new();
+        let mut patterns: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+        for (k, name) in names.iter().enumerate() {
+            for (at, column) in self.head.iter().enumerate() {
+                let mut called = [name.as_str(), short(name)].into_iter();
+                let called = called.find(|name| column.contains(name));
+                let by_name = called.map(|name| column.replacen(name, "{name}", 1));
+                let number = (k + 1).to_string();
+                let by_number = column.match_indices(&number).find(|(from, text)| {
+                    let digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+                    !digit(column[..*from].chars().next_back())
+                        && !digit(column[from + text.len()..].chars().next())
+                });
+                let by_number = by_number.map(|(from, text)| {
+                    format!("{}{{j}}{}", &column[..from], &column[from + text.len()..])
+                });
+                for pattern in by_name.into_iter().chain(by_number) {
+                    let columns = patterns.entry(pattern).or_default();
+                    if columns.len() == k {
+                        columns.push(at);
+                    }
+                }
+            }
+        }
+        for (column, at) in patterns
+            .into_iter()
+            .filter(|(_, at)| at.len() == names.len())
+        {
+            let all: Option<Vec<Vec<f64>>> = at.iter().map(|at| self.numbers(*at)).collect();
+            if let Some(all) = all {
+                let rows = 0..self.rows.len();
+                let values = rows
+                    .map(|row| all.iter().map(|one| one[row]).collect())
+                    .collect();
+                found.push(Found { column, values });
+            }
+        }
+        for (at, column) in self.head.iter().enumerate() {
+            let list = |row: &Vec<String>| -> Option<Vec<f64>> {
+                let cell = row[at].strip_prefix('[')?.strip_suffix(']')?;
+                let parts = cell.split([',', ' ']).filter(|part| !part.is_empty());
+                parts.map(|part| part.parse().ok()).collect()
+            };
+            let values: Option<Vec<Vec<f64>>> = self.rows.iter().map(list).collect();
+            let is_whole = |rows: &Vec<Vec<f64>>| rows.iter().all(|row| row.len() >= names.len());
+            if let Some(values) = values.filter(is_whole).filter(|rows| !rows.is_empty()) {
+                found.push(Found {
+                    column: column.clone(),
+                    values,
+                });
+            }
+        }
+        found
+    }
+
+    /// The column of time, its unit, and s between two rows.
+    fn clock(&self) -> Option<(String, &'static str, f64)> {
+        let is_clock = |column: &&String| has(column, &CLOCKS);
+        let column = self.head.iter().find(is_clock)?;
+        let at = self.head.iter().position(|one| one == column)?;
+        let time = self.numbers(at)?;
+        let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        let step = *steps.get(steps.len() / 2)?;
+        // Joints are commanded at 2 Hz to 10 kHz.
+        let (unit, by) = match words(column).last().map(String::as_str) {
+            Some("s") => ("s", 1.0),
+            Some("ms") => ("ms", 1e-3),
+            Some("us") => ("us", 1e-6),
+            Some("ns") => ("ns", 1e-9),
+            _ if step < 0.5 => ("s", 1.0),
+            _ if step < 500.0 => ("ms", 1e-3),
+            _ if step < 5e5 => ("us", 1e-6),
+            _ => ("ns", 1e-9),
+        };
+        Some((column.clone(), unit, by * step))
+    }
+}
+
+/// The chain of the first joints of an MJCF that are one, in its order, and the names of all.
+fn chain(path: &Path) -> Result<(MjcfArm, Vec<String>, Vec<PathBuf>)> {
+    let label = path.display().to_string();
+    let read = |path: &Path| {
+        let label = path.display().to_string();
+        let text = raw::text(path).map_err(|error| Error::unreadable(&label, &error));
+        text.map(|text| (label, text))
+    };
+    let (_, text) = read(path)?;
+    let beside = |name: String| path.parent().unwrap_or(Path::new("")).join(name);
+    let includes: Vec<PathBuf> = mjcf::included(&text).into_iter().map(beside).collect();
+    let texts: Result<Vec<(String, String)>> = includes.iter().map(|path| read(path)).collect();
+    let texts = texts?;
+    let others: Vec<MjcfText> = texts
+        .iter()
+        .map(|(label, text)| MjcfText { label, text })
+        .collect();
+    let file = MjcfText {
+        label: &label,
+        text: &text,
+    };
+    let mut all = Vec::new();
+    for text in texts.iter().map(|(_, text)| text).chain([&text]) {
+        if let Ok(document) = roxmltree::Document::parse(text) {
+            let joints = document.descendants().filter(|node| {
+                node.has_tag_name("joint")
+                    && !matches!(node.attribute("type"), Some("free" | "ball"))
+                    && node.ancestors().any(|node| node.has_tag_name("worldbody"))
+            });
+            all.extend(joints.filter_map(|node| node.attribute("name").map(String::from)));
+        }
+    }
+    let mut names: Vec<String> = Vec::new();
+    for name in &all {
+        let more = [names.as_slice(), std::slice::from_ref(name)].concat();
+        if mjcf::read(file, &others, &more).is_ok() {
+            names = more;
+        }
+    }
+    // With its own words where nothing is a chain.
+    let arm = mjcf::read(file, &others, &names)?;
+    Ok((arm, all, includes))
+}
+
+/// CSV files of the recording; of a folder those in it.
+fn tables(data: &[PathBuf]) -> Result<Vec<Table>> {
+    let mut files = Vec::new();
+    for path in data {
+        if path.is_dir() {
+            let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
+            let mut inside: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+            inside.retain(|path| raw::ending(path) == "csv");
+            inside.sort();
+            files.extend(inside);
+        } else {
+            files.push(path.clone());
+        }
+    }
+    if files.is_empty() || files.len() > 2 || files.iter().any(|path| raw::ending(path) != "csv") {
+        let names: Vec<String> = files
+            .iter()
+            .map(|path| path.display().to_string())
+            .collect();
+        let message = format!(
+            "{}; with --mjcf allowed: one CSV of commands and angles, or two, the commands' and the angles'",
+            if names.is_empty() {
+                "no CSV".into()
+            } else {
+                names.join(", ")
+            }
+        );
+        return Err(Error::spec("--data", message));
+    }
+    files.iter().map(|path| Table::read(path)).collect()
+}
+
+/// Looks at a recording of commands and angles. Fails where one of them is not found.
+pub(crate) fn start_drives(folder: &Path, data: &[PathBuf], robot: &Path) -> Result<DriveStart> {
+    let (arm, all, includes) = chain(robot)?;
+    let tables = tables(data)?;
+    let recorded = |names: &[String]| -> Option<[(usize, Found); 2]> {
+        let commanded = |table: &Table, column: &str| {
+            let file = table.path.file_stem().unwrap_or_default().to_string_lossy();
+            has(column, &COMMANDED) || (tables.len() == 2 && has(&file, &COMMANDED))
+        };
+        let (mut command, mut angle) = (None, None);
+        for (k, table) in tables.iter().enumerate() {
+            for one in table.quantities(names) {
+                if has(&one.column, &OTHERS) {
+                    continue;
+                }
+                match commanded(table, &one.column) {
+                    true if command.is_none() => command = Some((k, one)),
+                    false if angle.is_none() && has(&one.column.replace("{j}", " "), &MEASURED) => {
+                        angle = Some((k, one));
+                    }
+                    _ => (),
+                }
+            }
+        }
+        Some([command?, angle?])
+    };
+    // The last joints may be none of the recording's: a gripper.
+    let mut names: Vec<String> = arm.joints.iter().map(|joint| joint.name.clone()).collect();
+    let found = loop {
+        if let Some(found) = recorded(&names) {
+            break found;
+        }
+        names.pop();
+        if names.is_empty() {
+            let columns: Vec<String> = tables
+                .iter()
+                .map(|table| {
+                    let head: Vec<&str> = table.head.iter().map(String::as_str).collect();
+                    format!("{} has {}", table.label, listed(&head))
+                })
+                .collect();
+            let message = format!(
+                "no columns of commands and of angles for joints of {} ({}): {}; expected a word as cmd, target, action and q, pos, state in their names",
+                robot.display(),
+                all.join(", "),
+                columns.join("; ")
+            );
+            return Err(Error::data("--data", message));
+        }
+    };
+    let [(of_commands, command), (of_angles, angle)] = found;
+    let table = &tables[of_angles];
+    let clock = table.clock();
+    let (time, time_unit, step) = clock.ok_or_else(|| {
+        let message = "has no column of time (time, timestamp, t), whose values rise";
+        Error::data(&table.label, message)
+    })?;
+    let rate = (1e3 / step).round() / 1e3;
+    let rate = if rate > 20.0 { rate.round() } else { rate };
+    let largest = angle
+        .values
+        .iter()
+        .flatten()
+        .fold(0.0, |most: f64, one| most.max(one.abs()));
+    let unit = if largest > DEGREES { "deg" } else { "rad" };
+    let by = if unit == "deg" {
+        1f64.to_radians()
+    } else {
+        1.0
+    };
+    let joints = names.iter().enumerate().map(|(k, name)| {
+        let servo = arm.joints[k].servo;
+        let step = by * encoder(angle.values.iter().map(|row| row[k]));
+        json!({
+            "joint": name, "kp": servo.map(|servo| servo.kp), "kd": servo.map(|servo| servo.kd), "kd_on": "speed",
+            "torque_limit_nm": servo.map(|servo| servo.limit).filter(|limit| limit.is_finite()),
+            "encoder_rad": step, "noise_rad": 3e-4,
+        })
+    });
+    let drives = json!({
+        "check": "kp (Nm/rad), kd (Nm s/rad; kd_on: speed or error), torque_limit_nm as the simulation has them; command_rate_hz; noise_rad, one sigma",
+        "command_rate_hz": rate,
+        "joints": joints.collect::<Vec<_>>(),
+        "inertia_tolerance": { "mass_rel": 0.05, "com_mm": 3.0, "inertia_rel": 0.2 },
+    });
+    let drives =
+        serde_json::to_string_pretty(&drives).map_err(|error| Error::Bug(error.to_string()))?;
+    let mut lines = vec![
+        "# Commands and angles of simulated joints: what the simulation lacks. `calib check` reports every fault, `calib diagnose` answers.".into(),
+        "calib: 1".into(),
+        "name: drives".into(),
+        "seed: 1".into(),
+        "stages:".into(),
+        "  - uses: diagnose_drives".into(),
+        "    with:".into(),
+        format!("      robot: {}", from_folder(folder, robot)),
+    ];
+    if !includes.is_empty() {
+        let files: Vec<String> = includes
+            .iter()
+            .map(|path| from_folder(folder, path))
+            .collect();
+        lines.push(format!("      includes: [{}]", files.join(", ")));
+    }
+    let gains = match arm.joints[..names.len()]
+        .iter()
+        .all(|joint| joint.servo.is_some())
+    {
+        true => "gains and limits are those of its actuators",
+        false => "state kp of each joint, null there",
+    };
+    lines.push(format!("      drives: drives.json   # CHECK {gains}; {rate} Hz from the stamps; steps of the encoders from the values"));
+    lines.push(format!(
+        "      recording: {}",
+        from_folder(folder, &table.path)
+    ));
+    if of_commands != of_angles {
+        let path = &tables[of_commands].path;
+        lines.push(format!("      commands: {}", from_folder(folder, path)));
+    }
+    lines.extend([
+        "      columns:".into(),
+        format!("        time: {}", quoted(&time)),
+        format!("        time_unit: {time_unit}   # CHECK"),
+        format!("        command: {}   # CHECK", quoted(&command.column)),
+        format!("        angle: {}   # CHECK", quoted(&angle.column)),
+        format!("        unit: {unit}   # CHECK"),
+    ]);
+    if !table.head.iter().any(|column| column == "use") {
+        lines.push("        # usage: use   # CHECK a column that says `fit` or `validate`; without it all rows are fitted, and the errors flatter".into());
+    }
+    let mut notes = arm.notes.clone();
+    let others: Vec<&str> = all
+        .iter()
+        .filter(|name| !names.contains(name))
+        .map(String::as_str)
+        .collect();
+    if !others.is_empty() {
+        notes.push(format!(
+            "held at their reference: {}; another chain is another list of `joints` in drives.json",
+            others.join(", ")
+        ));
+    }
+    Ok(DriveStart {
+        pipeline: lines.join("\n") + "\n",
+        drives: drives + "\n",
+        accounts: vec![
+            format!("joints {}", names.join(", ")),
+            format!(
+                "commands {}, angles {} ({unit}), {rate} Hz",
+                command.column, angle.column
+            ),
+        ],
+        notes,
+    })
+}
+
+/// The steps of an encoder by the least distance of two values; 0 where they are finer than could be told.
+fn encoder(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    let steps = values.windows(2).map(|pair| pair[1] - pair[0]);
+    let least = steps
+        .filter(|step| *step > 1e-9)
+        .fold(f64::INFINITY, f64::min);
+    if least > 1e-4 && least.is_finite() {
+        least
+    } else {
+        0.0
+    }
+}
