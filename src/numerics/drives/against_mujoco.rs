@@ -62,8 +62,8 @@ fn mass_matrix_bias_and_kinematics_are_those_of_mujoco() {
     }
 }
 
-#[test]
-fn a_roll_out_is_that_of_mujoco_to_a_ten_thousandth_of_the_motion() {
+/// The arm with its drives along a motion, as MuJoCo simulates it.
+pub(crate) fn motion() -> (Chain, Physics, Recording) {
     let arm = arm();
     let (chain, bodies) = parts(&arm);
     let all: Value = serde_json::from_str(include_str!("mujoco/motion.json")).unwrap();
@@ -75,13 +75,18 @@ fn a_roll_out_is_that_of_mujoco_to_a_ten_thousandth_of_the_motion() {
             .flat_map(numbers)
             .collect()
     };
-    let (command, angle) = (flat("command"), flat("angle"));
+    let (command, mut angle) = (flat("command"), flat("angle"));
     let period = all["period"].as_f64().unwrap();
     let rows = angle.len() / 4;
+    // MuJoCo begins where it is told, not at the mean of its first rows.
+    let start = angle[..4].to_vec();
+    for row in 0..40 {
+        angle[4 * row..4 * row + 4].copy_from_slice(&start);
+    }
     let recording = Recording {
         time: (0..rows).map(|row| row as f64 * period).collect(),
         command,
-        angle: angle.clone(),
+        angle,
         trajectories: vec![Trajectory {
             rows: 0..rows,
             held_out: false,
@@ -110,13 +115,17 @@ fn a_roll_out_is_that_of_mujoco_to_a_ten_thousandth_of_the_motion() {
         hold: 0.0,
         sag: 0.0,
     };
-    // MuJoCo begins where it is told, not at the mean of its first rows.
+    (chain, physics, recording)
+}
+
+#[test]
+fn a_roll_out_is_that_of_mujoco_to_a_ten_thousandth_of_the_motion() {
+    let (chain, physics, simulated) = motion();
+    let all: Value = serde_json::from_str(include_str!("mujoco/motion.json")).unwrap();
+    let angles = all["angle"].as_array().unwrap().iter();
+    let angle: Vec<f64> = angles.flat_map(numbers).collect();
     let start = angle[..4].to_vec();
     let (mut worst, mut range) = ([0.0_f64; 4], [0.0_f64; 4]);
-    let mut simulated = recording.clone();
-    for row in 0..40 {
-        simulated.angle[4 * row..4 * row + 4].copy_from_slice(&start);
-    }
     roll(&chain, &physics, &simulated, &[], Which::All, |row| {
         for joint in 0..4 {
             let measured = angle[4 * row.row + joint];

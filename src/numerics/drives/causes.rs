@@ -89,7 +89,7 @@ causes! {
     STRIBECK = "stribeck_friction", -5.3, "friction at {} falls as the joint begins to move", ["s" "Nm" false, "speed" "rad/s" true];
     LOAD = "load_friction", -5.3, "friction at {} grows with the torque of the drive", ["driving" "1" false, "driven back" "1" false];
     PRESLIDING = "presliding_friction", -5.3, "friction at {} bends before it slides", ["travel" "rad" true];
-    WARM_UP = "warmup_friction", -6.2, "friction at {} goes as the joint warms up", ["share" "1" false, "time constant" "s" true];
+    WARM_UP = "warmup_friction", -6.2, "friction at {} goes as the joint warms up", ["share of dry friction" "1" false, "share of viscous friction" "1" false, "time constant" "s" true];
     BACKLASH = "backlash", -5.3, "the gear at {} has play", ["play" "rad" true, "stiffness" "Nm/rad" true];
     ELASTICITY = "joint_elasticity", -5.3, "the gear at {} yields", ["stiffness" "Nm/rad" true, "damping" "Nm s/rad" true];
     CABLE = "cable_stiffness", -5.3, "a spring pulls on {}", ["stiffness" "Nm/rad" false, "rest angle" "rad" false];
@@ -350,22 +350,26 @@ pub fn cells(physics: &Physics, usual: &[Usual], duration: f64, period: f64) -> 
                 &PRESLIDING,
                 [2e-3, 8e-3].map(|w: f64| at(&[w.ln()], &[1.0])).to_vec(),
             );
-            add(
-                Key::WarmUp(j),
-                &WARM_UP,
-                [0.15, 0.4, 1.2]
-                    .map(|w| {
-                        let start = vec![0.0, (w * duration).ln()];
-                        Shape {
-                            centre: start.clone(),
-                            columns: vec![vec![0.05, start[1]]],
-                            start,
-                            usual: vec![0.7, 0.7],
-                            log_weight: 0.0,
-                        }
-                    })
-                    .to_vec(),
-            );
+        }
+        // Of what there is: a share of nothing has no size.
+        let shares = [p.friction, p.damping].map(|friction| if friction > 0.0 { 0.7 } else { 0.0 });
+        if shares != [0.0; 2] {
+            let warm_up = [0.15, 0.4, 1.2].map(|w| {
+                let start = vec![0.0, 0.0, (w * duration).ln()];
+                let columns = (0..2).filter(|k| shares[*k] > 0.0).map(|k| {
+                    let mut column = start.clone();
+                    column[k] = 0.05;
+                    column
+                });
+                Shape {
+                    centre: start.clone(),
+                    columns: columns.collect(),
+                    start: start.clone(),
+                    usual: vec![shares[0], shares[1], 0.7],
+                    log_weight: 0.0,
+                }
+            });
+            add(Key::WarmUp(j), &WARM_UP, warm_up.to_vec());
         }
         let gear = 40.0 * p.kp.max(1e-6);
         for link in [false, true] {
@@ -441,7 +445,15 @@ const FEW: usize = 5;
 const TWO: usize = 2;
 
 impl Key {
-    /// Whether what it changes has a memory, so that only a roll-out of its own shows it.
+    /// Whether it is another machine, which only a roll-out of its own shows.
+    pub fn is_rolled(self) -> bool {
+        matches!(
+            self,
+            Self::Presliding(_) | Self::Backlash(..) | Self::Elasticity(_)
+        )
+    }
+
+    /// Whether what it changes has a memory, so that its numbers are fitted by roll-outs of their own.
     pub fn has_memory(self) -> bool {
         matches!(
             self,
@@ -480,7 +492,10 @@ impl Key {
             Self::Stribeck(j) => joints[j].stribeck = [x[0], x[1].exp()],
             Self::Load(j, both) => joints[j].load_friction = [if both { x[0] } else { 0.0 }, x[1]],
             Self::Presliding(j) => joints[j].presliding = x[0].exp(),
-            Self::WarmUp(j) => joints[j].warm_up = [x[0], x[1].exp()],
+            Self::WarmUp(j) => {
+                joints[j].warm_up = [x[0], x[2].exp()];
+                joints[j].warm_up_viscous = x[1];
+            }
             Self::Backlash(j, link) => {
                 let stiffness = x[1].exp();
                 let damping = 0.2 * (stiffness * joints[j].armature).sqrt();

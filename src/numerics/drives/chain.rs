@@ -6,6 +6,8 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 /// Degrees of freedom at most: joints, and rotors that move by themselves.
 pub const MOST: usize = 14;
+/// s of a step at which roll-outs are those of finer ones, whatever the arm.
+pub(crate) const STEP: f64 = 1e-3;
 /// A number a degree of freedom.
 pub type Row = [f64; MOST];
 /// A matrix over them.
@@ -19,6 +21,8 @@ pub struct Chain {
     prismatic: Vec<bool>,
     reference: Vec<f64>,
     tool: Vector3<f64>,
+    /// s of a step of a roll-out at most.
+    pub(crate) step: f64,
 }
 
 /// What it carries, a body a link, in world axes at the reference pose.
@@ -59,6 +63,7 @@ impl Chain {
             prismatic: arm.prismatic.clone(),
             reference: reference.to_vec(),
             tool: arm.tool.coords,
+            step: STEP,
         }
     }
 
@@ -126,6 +131,50 @@ impl Chain {
         }
     }
 
+    /// How gravity's torques change with the positions, Nm/rad: the second derivative of the potential.
+    pub fn gravity_stiffness(&self, posed: &Posed, gravity: &Vector3<f64>, matrix: &mut Square) {
+        let (mut mass, mut moment) = (0.0, Vector3::zeros());
+        for joint in (0..posed.count).rev() {
+            let link = &posed.links[joint];
+            mass += link.mass;
+            moment += link.centre * link.mass;
+            let linear = link.slide * mass + link.turn.cross(&moment);
+            for before in 0..=joint {
+                let entry = -gravity.dot(&posed.links[before].turn.cross(&linear));
+                matrix[before][joint] = entry;
+                matrix[joint][before] = entry;
+            }
+        }
+    }
+
+    /// How the links move, the world accelerated against gravity.
+    pub fn moved(
+        &self,
+        posed: &Posed,
+        gravity: &Vector3<f64>,
+        speed: &[f64],
+        acceleration: Option<&[f64]>,
+        moved: &mut [Moved; MOST],
+    ) {
+        let mut now = Moved {
+            pulled: -*gravity,
+            ..Moved::default()
+        };
+        for joint in 0..posed.count {
+            let link = &posed.links[joint];
+            let (turn, slide) = (link.turn * speed[joint], link.slide * speed[joint]);
+            now.spun += now.spin.cross(&turn);
+            now.pulled += now.spin.cross(&slide) + now.drift.cross(&turn);
+            if let Some(by) = acceleration {
+                now.spun += link.turn * by[joint];
+                now.pulled += link.slide * by[joint];
+            }
+            now.spin += turn;
+            now.drift += slide;
+            moved[joint] = now;
+        }
+    }
+
     /// Torques that a motion asks for, Nm: gravity, centrifugal and Coriolis torques where no acceleration is given.
     pub fn torques(
         &self,
@@ -135,35 +184,64 @@ impl Chain {
         acceleration: Option<&[f64]>,
         torque: &mut Row,
     ) {
-        let (mut spin, mut drift) = (Vector3::zeros(), Vector3::zeros());
-        let (mut spun, mut pulled) = (Vector3::zeros(), -*gravity);
-        let mut wrench = [(Vector3::zeros(), Vector3::zeros()); MOST];
-        for joint in 0..posed.count {
-            let link = &posed.links[joint];
-            let (turn, slide) = (link.turn * speed[joint], link.slide * speed[joint]);
-            spun += spin.cross(&turn);
-            pulled += spin.cross(&slide) + drift.cross(&turn);
-            if let Some(by) = acceleration {
-                spun += link.turn * by[joint];
-                pulled += link.slide * by[joint];
-            }
-            spin += turn;
-            drift += slide;
-            // Of the body's centre; the spatial acceleration of the origin's point lacks the turning of its speed.
-            let velocity = drift + spin.cross(&link.centre);
-            let accelerated = pulled + spun.cross(&link.centre) + spin.cross(&velocity);
-            let force = accelerated * link.mass;
-            let momentum = link.inertia * spin;
-            let moment = link.inertia * spun + spin.cross(&momentum) + link.centre.cross(&force);
-            wrench[joint] = (force, moment);
-        }
+        let mut moved = [Moved::default(); MOST];
+        self.moved(posed, gravity, speed, acceleration, &mut moved);
         let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
         for joint in (0..posed.count).rev() {
-            force += wrench[joint].0;
-            moment += wrench[joint].1;
             let link = &posed.links[joint];
+            let (push, turn) = moved[joint].asks(link.mass, &link.centre, &link.inertia);
+            force += push;
+            moment += turn;
             torque[joint] = link.turn.dot(&moment) + link.slide.dot(&force);
         }
+    }
+
+    /// What a body on a link asks for beyond the one that is there, Nm at each joint before it.
+    pub fn torques_of(
+        &self,
+        posed: &Posed,
+        moved: &Moved,
+        link: usize,
+        body: &Inertial,
+        torque: &mut [f64],
+    ) {
+        let at = &posed.links[link];
+        let (force, moment) = moved.asks(at.mass, &at.centre, &at.inertia);
+        let centre = at.rotation * body.centre.coords + at.shift;
+        let inertia = at.rotation * body.inertia * at.rotation.transpose();
+        let (with, turned) = moved.asks(body.mass, &centre, &inertia);
+        for joint in 0..=link {
+            let before = &posed.links[joint];
+            torque[joint] +=
+                before.turn.dot(&(turned - moment)) + before.slide.dot(&(with - force));
+        }
+    }
+}
+
+/// How a link moves.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Moved {
+    spin: Vector3<f64>,
+    drift: Vector3<f64>,
+    spun: Vector3<f64>,
+    pulled: Vector3<f64>,
+}
+
+impl Moved {
+    /// Force and moment about the origin that a body asks for.
+    fn asks(
+        &self,
+        mass: f64,
+        centre: &Vector3<f64>,
+        inertia: &Matrix3<f64>,
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        // Of the body's centre; the spatial acceleration of the origin's point lacks the turning of its speed.
+        let velocity = self.drift + self.spin.cross(centre);
+        let accelerated = self.pulled + self.spun.cross(centre) + self.spin.cross(&velocity);
+        let force = accelerated * mass;
+        let momentum = inertia * self.spin;
+        let moment = inertia * self.spun + self.spin.cross(&momentum) + centre.cross(&force);
+        (force, moment)
     }
 }
 

@@ -245,12 +245,11 @@ impl Drives {
         let n = self.chain.joints();
         let inertia = before.map_or_else(|| vec![0.0; FREE * n], |fit| fit.inertia.clone());
         let freedom = (self.fitted().count() * n) as f64;
-        let (angles, square) = self.evaluated(&inertia, set);
         let mut fit = DriveFit {
             set: set.to_vec(),
             inertia,
-            angles,
-            square,
+            angles: vec![0.0; self.recording.angle.len()],
+            square: f64::INFINITY,
             freedom,
             independence: before.map_or(1.0, |fit| fit.independence),
             penalty: 0.0,
@@ -262,32 +261,33 @@ impl Drives {
             gram: DMatrix::zeros(0, 0),
             responses: before.map_or_else(Default::default, |fit| fit.responses.clone()),
         };
+        // Columns that are roll-outs of their own are dear: they wait until the step is known to be good.
+        let dear = set.iter().any(|one| one.cell.key.has_memory());
+        if dear {
+            (fit.angles, fit.square) = self.evaluated(&fit.inertia, set);
+        }
+        let (mut columns, mut normal) = self.looked(&mut fit, anew);
         if before.is_none() {
             fit.independence = self.independence_of(&fit.angles);
         }
         let weigh = |fit: &DriveFit| fit.independence / (fit.square / freedom).max(1.0);
-        let mut normal;
-        let mut step = 0;
-        let columns = loop {
-            let columns = self.base_columns(&fit, anew && step < 2);
-            normal = self.normal(&mut fit, &columns);
-            let weight = weigh(&fit);
-            let distance = self.distances(&fit, &columns);
-            let penalty = self.penalty(&fit);
-            if step == patience.steps || !fit.square.is_finite() || columns.count() == 0 {
-                break columns;
+        let mut is_new = anew;
+        for step in 1..=patience.steps {
+            if !fit.square.is_finite() || columns.count() == 0 {
+                break;
             }
-            step += 1;
+            let weight = weigh(&fit);
             let gram = normal.gram_matrix() * weight;
             let precision = DVector::from_column_slice(&columns.precision);
             let gradient = DVector::from_column_slice(&normal.gradient) * weight
-                - distance.component_mul(&precision);
+                - self.distances(&fit, &columns).component_mul(&precision);
             let whole = gram + DMatrix::from_diagonal(&precision);
             let Some(factor) = whole.cholesky() else {
-                break columns;
+                break;
             };
             let change = factor.solve(&gradient);
-            let objective = weight * fit.square + penalty;
+            let objective = weight * fit.square + self.penalty(&fit);
+            let again = anew && step < 2;
             let (mut by, mut moved) = (1.0, None);
             while by > 0.02 {
                 let mut trial = fit.clone();
@@ -300,24 +300,32 @@ impl Drives {
                     // No further than the linear model can be believed.
                     trial.set[*c].numbers[*k] += (by * by_column).clamp(-3.0 * usual, 3.0 * usual);
                 }
-                (trial.angles, trial.square) = self.evaluated(&trial.inertia, &trial.set);
+                let seen = if dear {
+                    (trial.angles, trial.square) = self.evaluated(&trial.inertia, &trial.set);
+                    None
+                } else {
+                    Some(self.looked(&mut trial, again))
+                };
                 let now = weight * trial.square + self.penalty(&trial);
                 if now < objective {
-                    moved = Some((trial, objective - now));
+                    moved = Some((trial, seen, objective - now));
                     break;
                 }
                 by *= 0.4;
             }
-            let Some((next, fall)) = moved else {
-                break columns;
+            let Some((next, seen, fall)) = moved else {
+                break;
             };
             fit = next;
+            (columns, normal) = seen.unwrap_or_else(|| self.looked(&mut fit, again));
+            is_new = again;
             if fall < patience.fall.max(patience.share * objective) {
-                let columns = self.base_columns(&fit, anew);
-                normal = self.normal(&mut fit, &columns);
-                break columns;
+                break;
             }
-        };
+        }
+        if anew && !is_new {
+            (columns, normal) = self.looked(&mut fit, true);
+        }
         fit.independence = self.independence_of(&fit.angles);
         fit.penalty = self.penalty(&fit);
         let roots: Vec<f64> = columns.precision.iter().map(|p| 1.0 / p.sqrt()).collect();
@@ -341,7 +349,15 @@ impl Drives {
         fit
     }
 
-    /// Products of the columns around a fit; responses to the inertials are kept where they were made anew.
+    /// Columns around a fit and their products.
+    fn looked(&self, fit: &mut DriveFit, anew: bool) -> (BaseColumns, Normal) {
+        let columns = self.base_columns(fit, anew);
+        let normal = self.normal(fit, &columns);
+        (columns, normal)
+    }
+
+    /// Products of the columns around a fit; the fit's angles are those of the same roll-out, and responses to the inertials are kept where
+    /// they were made anew.
     fn normal(&self, fit: &mut DriveFit, columns: &BaseColumns) -> Normal {
         let n = self.chain.joints();
         let physics = self.physics(&fit.inertia, &fit.set);
@@ -350,6 +366,7 @@ impl Drives {
         let anew = matches!(columns.sources.first(), Some(Source::Carried(..)))
             .then_some(fit.inertia.len());
         let mut responses = vec![vec![0.0; fit.angles.len()]; anew.unwrap_or(0)];
+        let angles = &mut fit.angles;
         roll(
             &self.chain,
             &physics,
@@ -360,6 +377,7 @@ impl Drives {
                 for joint in 0..n {
                     let at = row.row * n + joint;
                     let sigma = self.sigma[at];
+                    angles[at] = row.angle[joint];
                     columns.at(at, row.change[joint], sigma, &mut x);
                     responses
                         .iter_mut()
@@ -372,6 +390,12 @@ impl Drives {
         if anew.is_some() {
             fit.responses = Arc::new(responses);
         }
+        let square = normal.square;
+        fit.square = if square.is_finite() {
+            square
+        } else {
+            f64::INFINITY
+        };
         normal
     }
 

@@ -14,6 +14,7 @@ mod against_mujoco;
 mod answer;
 mod causes;
 pub mod chain;
+mod columns;
 mod fit;
 pub mod mjcf;
 pub mod physics;

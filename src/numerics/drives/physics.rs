@@ -32,7 +32,8 @@ pub enum Over {
 }
 
 impl Curve {
-    fn at(&self, motion: &Motion) -> f64 {
+    /// Its value in a motion, Nm.
+    pub fn value(&self, motion: &Motion) -> f64 {
         let x = match self.over {
             Over::Angle(joint) => motion.q[joint],
             Over::Speed(joint) => motion.v[joint].abs(),
@@ -95,8 +96,10 @@ pub struct Joint {
     pub load_friction: [f64; 2],
     /// rad until friction is whole.
     pub presliding: f64,
-    /// Share of friction more at the beginning, and s in which it goes.
+    /// Share of dry friction more at the beginning, and s in which it goes.
     pub warm_up: [f64; 2],
+    /// Share of viscous friction more at the beginning; it goes in the same time.
+    pub warm_up_viscous: f64,
     /// kg m^2.
     pub armature: f64,
     /// Nm/rad, and rad where it is at rest.
@@ -195,6 +198,7 @@ impl Default for Joint {
             load_friction: [0.0; 2],
             presliding: 0.0,
             warm_up: [0.0, 1.0],
+            warm_up_viscous: 0.0,
             armature: 0.0,
             spring: [0.0; 2],
             ripple: Vec::new(),
@@ -238,8 +242,13 @@ impl Joint {
             }
         }
         out.drive = drive;
-        out.smooth = drive - self.damping * v - self.spring[0] * (q - self.spring[1]);
-        out.damping += self.damping;
+        let cold = match (self.warm_up[0], self.warm_up_viscous) {
+            (0.0, 0.0) => 0.0,
+            _ => libm::exp(-motion.time / self.warm_up[1]),
+        };
+        let damping = self.damping * (1.0 + self.warm_up_viscous * cold).max(0.0);
+        out.smooth = drive - damping * v - self.spring[0] * (q - self.spring[1]);
+        out.damping += damping;
         out.stiffness += self.spring[0].max(0.0);
         for [waves, cosine, sine] in &self.ripple {
             let (s, c) = libm::sincos(waves * q);
@@ -253,15 +262,13 @@ impl Joint {
             let ratio = v / self.stribeck[1];
             dry += self.stribeck[0] * libm::exp(-ratio * ratio);
         }
-        if self.warm_up[0] != 0.0 {
-            dry *= 1.0 + self.warm_up[0] * libm::exp(-motion.time / self.warm_up[1]);
-        }
+        dry *= 1.0 + self.warm_up[0] * cold;
         if self.load_friction != [0.0; 2] {
             let back = drive * v < 0.0;
             dry += self.load_friction[usize::from(back)] * drive.abs();
         }
         for curve in &self.curves {
-            let value = curve.at(motion);
+            let value = curve.value(motion);
             match curve.dry {
                 true => dry += value,
                 false => out.smooth += value,

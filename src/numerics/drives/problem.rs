@@ -1,7 +1,7 @@
 //! Commands and responses as a problem of the engine: residual is measured minus simulated angle, whitened by encoder and noise.
 
 use crate::causes::{Key, Usual, cells};
-use crate::chain::Chain;
+use crate::chain::{Chain, STEP};
 use crate::fit::{DriveFit, Normal};
 use crate::physics::Physics;
 use crate::recording::Recording;
@@ -17,6 +17,10 @@ pub(crate) const FREE: usize = 5;
 const UNIT: f64 = 10.0;
 /// Standard deviations of what noise alone makes of a joint's squared residual, above which causes with a memory are asked there.
 const ABOVE_NOISE: f64 = 4.0;
+
+/// Longer steps that are tried, s, and the share of the noise, rms, that is the same motion: a drive four times as stiff errs four times as much.
+const LONGER: [f64; 2] = [2.5e-3, 1.7e-3];
+const SAME: f64 = 0.03;
 
 /// A simulated arm and its recording.
 pub struct Drives {
@@ -39,12 +43,13 @@ pub struct Drives {
 impl Drives {
     /// The problem of an arm and its recording.
     pub fn new(
-        chain: Chain,
+        mut chain: Chain,
         base: Physics,
         recording: Recording,
         tolerance: InertialTolerance,
     ) -> Self {
         let sigma = recording.sigma();
+        chain.step = step(&chain, &base, &recording, &sigma);
         let duration = recording.time.last().copied().unwrap_or_default()
             - recording.time.first().copied().unwrap_or_default();
         let usual = usual(&chain, &base, &recording);
@@ -107,6 +112,32 @@ impl Drives {
         }
         squares
     }
+}
+
+/// The longest step, s, at which the simulation as it is goes where finer steps go, to a small share of the noise.
+fn step(chain: &Chain, base: &Physics, recording: &Recording, sigma: &[f64]) -> f64 {
+    let n = chain.joints();
+    let rolled = |step: f64| {
+        let mut chain = chain.clone();
+        chain.step = step;
+        let mut angles = Vec::new();
+        roll(&chain, base, recording, &[], Which::Fitted, |row| {
+            let at = row.row * n;
+            let whitened = row.angle.iter().zip(&sigma[at..at + n]);
+            angles.extend(whitened.map(|(angle, sigma)| angle / sigma));
+        });
+        angles
+    };
+    let fine = rolled(STEP);
+    let near = |step: &f64| {
+        let mut squares = vec![0.0; n];
+        for (k, (a, b)) in rolled(*step).iter().zip(&fine).enumerate() {
+            squares[k % n] += (a - b).powi(2);
+        }
+        let rows = (fine.len() / n) as f64;
+        squares.iter().all(|square| *square < rows * SAME * SAME)
+    };
+    LONGER.into_iter().find(near).unwrap_or(STEP)
 }
 
 /// What the simulation as it is does.
@@ -208,7 +239,7 @@ impl Problem for Drives {
             .map(|(key, x)| {
                 let mut changed = now.clone();
                 key.apply(x, &self.usual, self.duration, &mut changed);
-                match key.has_memory() {
+                match key.is_rolled() {
                     true => {
                         let mut angles = self.angles(&changed, Which::Fitted);
                         for (angle, before) in angles.iter_mut().zip(&fit.angles) {
@@ -225,9 +256,9 @@ impl Problem for Drives {
             })
             .collect();
         let base = self.base_columns(fit, true);
-        let (nb, count) = (base.count(), columns.len());
+        let nb = base.count();
         let mut carried = base.directions.clone();
-        let mut place = Vec::with_capacity(count);
+        let mut place = Vec::with_capacity(columns.len());
         for column in &columns {
             if let Column::Carried(direction) = column {
                 place.push(Some(carried.len()));
@@ -242,12 +273,9 @@ impl Problem for Drives {
             blocks.push((from, shape.columns.len()));
             from += shape.columns.len();
         }
-        let mut grams: Vec<DMatrix<f64>> =
-            blocks.iter().map(|(_, k)| DMatrix::zeros(*k, *k)).collect();
         let mut own = Normal::new(nb);
-        let mut cross = vec![0.0; nb * count];
-        let (mut gradient, mut rms) = (vec![0.0; count], vec![0.0; count]);
-        let (mut x, mut b) = (vec![0.0; count], vec![0.0; nb]);
+        let mut sums = Sums::new(nb, &blocks);
+        let mut b = vec![0.0; nb];
         roll(
             &self.chain,
             &now,
@@ -260,36 +288,18 @@ impl Problem for Drives {
                     let sigma = self.sigma[at];
                     let residual = (self.recording.angle[at] - row.angle[joint]) / sigma;
                     base.at(at, row.change[joint], sigma, &mut b);
-                    for (c, column) in columns.iter().enumerate() {
-                        let change = match (column, place[c]) {
-                            (Column::Rolled(angles), _) => angles[at],
-                            (_, Some(k)) => row.change[joint][k],
-                            _ => 0.0,
-                        };
-                        x[c] = change / sigma;
-                        rms[c] += change * change;
-                        gradient[c] += x[c] * residual;
-                    }
                     own.add(&b, residual);
-                    for (k, b) in b.iter().enumerate() {
-                        if *b != 0.0 {
-                            let line = &mut cross[k * count..(k + 1) * count];
-                            line.iter_mut().zip(&x).for_each(|(sum, x)| *sum += b * x);
-                        }
-                    }
-                    for ((from, k), gram) in blocks.iter().zip(&mut grams) {
-                        let x = &x[*from..from + k];
-                        for i in 0..*k {
-                            if x[i] != 0.0 {
-                                for j in 0..*k {
-                                    gram[(i, j)] += x[i] * x[j];
-                                }
-                            }
-                        }
-                    }
+                    let changes = columns.iter().zip(&place);
+                    let changes = changes.map(|(column, place)| match (column, place) {
+                        (Column::Rolled(angles), _) => angles[at],
+                        (_, Some(k)) => row.change[joint][*k],
+                        _ => 0.0,
+                    });
+                    sums.add(&b, residual, sigma, changes);
                 }
             },
         );
+        sums.close();
         let freedom = rows_a_joint * n as f64;
         let scale = (fit.square / freedom).max(1.0);
         let precision = DVector::from_vec(base.precision.iter().map(|p| p * scale).collect());
@@ -303,21 +313,12 @@ impl Problem for Drives {
         rows.square = rows.square.max(freedom);
         rows.independence = fit.independence;
         rows.unit = UNIT;
-        let block = |(from, k): (usize, usize), gram: &DMatrix<f64>| Block {
-            gram: gram.clone(),
-            gradient: DVector::from_column_slice(&gradient[from..from + k]),
-            cross: DMatrix::from_fn(nb, k, |i, j| cross[i * count + from + j]),
-            rms: rms[from..from + k]
-                .iter()
-                .map(|sum| (sum / freedom).sqrt())
-                .collect(),
-        };
         let mut next = 0;
         let mut scanned = Vec::new();
         for cell in all {
             let mut shapes = Vec::new();
             for shape in &cell.shapes {
-                let (log, size) = rows.evidence(&block(blocks[next], &grams[next]));
+                let (log, size) = rows.evidence(&sums.block(next, freedom));
                 next += 1;
                 shapes.push(begun(shape, log, &size));
             }
@@ -348,6 +349,90 @@ impl Problem for Drives {
 
     fn excludes(&self, one: &Key, other: &Key) -> bool {
         one.excludes(*other)
+    }
+}
+
+/// Rows that are multiplied at once.
+const BATCH: usize = 192;
+
+/// Sums of products of a scan's columns, of their blocks with each other and of all with the base.
+struct Sums<'a> {
+    blocks: &'a [(usize, usize)],
+    grams: Vec<DMatrix<f64>>,
+    /// Of the base, and of the residual in the last line, with every column.
+    cross: DMatrix<f64>,
+    rms: Vec<f64>,
+    /// Rows that are not multiplied yet: base and residual by row, row by column.
+    base: DMatrix<f64>,
+    batch: DMatrix<f64>,
+    filled: usize,
+}
+
+impl<'a> Sums<'a> {
+    fn new(base: usize, blocks: &'a [(usize, usize)]) -> Self {
+        let count = blocks.iter().map(|(_, k)| k).sum();
+        Self {
+            blocks,
+            grams: blocks.iter().map(|(_, k)| DMatrix::zeros(*k, *k)).collect(),
+            cross: DMatrix::zeros(base + 1, count),
+            rms: vec![0.0; count],
+            base: DMatrix::zeros(base + 1, BATCH),
+            batch: DMatrix::zeros(BATCH, count),
+            filled: 0,
+        }
+    }
+
+    /// A row: whitened base and residual; changes of all columns, which `sigma` whitens.
+    fn add(&mut self, base: &[f64], residual: f64, sigma: f64, changes: impl Iterator<Item = f64>) {
+        let at = self.filled;
+        let mut column = self.base.column_mut(at);
+        for (to, from) in column.iter_mut().zip(base.iter().chain([&residual])) {
+            *to = *from;
+        }
+        let batch = self.batch.as_mut_slice();
+        for (c, change) in changes.enumerate() {
+            self.rms[c] += change * change;
+            batch[c * BATCH + at] = change / sigma;
+        }
+        self.filled += 1;
+        if self.filled == BATCH {
+            self.close();
+        }
+    }
+
+    fn close(&mut self) {
+        self.base
+            .columns_mut(self.filled, BATCH - self.filled)
+            .fill(0.0);
+        self.batch
+            .rows_mut(self.filled, BATCH - self.filled)
+            .fill(0.0);
+        self.cross.gemm(1.0, &self.base, &self.batch, 1.0);
+        for ((from, k), gram) in self.blocks.iter().zip(&mut self.grams) {
+            for i in 0..*k {
+                for j in i..*k {
+                    let by = self
+                        .batch
+                        .column(from + i)
+                        .dot(&self.batch.column(from + j));
+                    gram[(i, j)] += by;
+                    gram[(j, i)] = gram[(i, j)];
+                }
+            }
+        }
+        self.filled = 0;
+    }
+
+    fn block(&self, at: usize, rows: f64) -> Block {
+        let (from, k) = self.blocks[at];
+        let base = self.cross.nrows() - 1;
+        let rms = self.rms[from..from + k].iter();
+        Block {
+            gram: self.grams[at].clone(),
+            gradient: DVector::from_fn(k, |j, _| self.cross[(base, from + j)]),
+            cross: self.cross.view((0, from), (base, k)).into_owned(),
+            rms: rms.map(|sum| (sum / rows).sqrt()).collect(),
+        }
     }
 }
 

@@ -1,35 +1,14 @@
 //! The simulation rolled out along the commands, and how its angles change with the physics.
 //!
 //! A step is an implicit midpoint for all that is stiff (second order: implicit Euler adds kd dt / 2 to the inertia); dry friction is set-valued: its
-//! impulses, coupled over the joints by the inverse mass, stop what they can (projected Gauss-Seidel). Derivatives are those of the step:
-//! a change of physics is a change of torques at the same motion, which the linearised step carries on.
+//! impulses, coupled over the joints by the inverse mass, stop what they can (projected Gauss-Seidel). Derivatives are those of the step.
 
-use crate::chain::{Bodies, Chain, MOST, Posed, Row, Square, invert};
-use crate::physics::{Commanded, Joint, Motion, Physics, ROTOR_SHARE, SAG_LAG, Torque};
-use crate::recording::{Commands, Recording};
+use crate::chain::{Chain, MOST, Posed, Row, Square, invert};
+use crate::columns::{Columns, Instant, StepMatrices};
+use crate::physics::{Commanded, Motion, Physics, ROTOR_SHARE, SAG_LAG, Torque};
+use crate::recording::{Commands, Recording, Trajectory};
 
-/// A change of the physics whose response is wanted: joints and bodies as they would be.
-#[derive(Debug, Clone, Default)]
-pub struct Direction {
-    /// Changed joints.
-    pub joints: Vec<(usize, Joint)>,
-    /// Changed bodies.
-    pub bodies: Option<Bodies>,
-}
-
-impl Direction {
-    /// What differs between two simulations; nothing of what they remember.
-    pub fn between(base: &Physics, changed: &Physics) -> Self {
-        let joints = base.joints.iter().zip(&changed.joints).enumerate();
-        Self {
-            joints: joints
-                .filter(|(_, (before, after))| before != after)
-                .map(|(joint, (_, after))| (joint, after.clone()))
-                .collect(),
-            bodies: (base.bodies != changed.bodies).then(|| changed.bodies.clone()),
-        }
-    }
-}
+pub use crate::columns::Direction;
 
 /// A row of the recording as it is simulated.
 pub struct SimulatedRow<'a> {
@@ -54,22 +33,16 @@ pub enum Which {
     All,
 }
 
-/// s of a step at most, and where a gear yields.
-const STEP: f64 = 1e-3;
+/// s of a step at most where a gear yields.
 const GEARED_STEP: f64 = 5e-4;
 /// Sweeps of the impulses of dry friction at most, and rad/s at which they are settled.
 const SWEEPS: usize = 20;
 const SETTLED: f64 = 1e-9;
-/// Steps between two evaluations of what a change of bodies asks for.
-const BODIES_EVERY: usize = 4;
-/// rad by which gravity's stiffness is looked at.
-const TURN: f64 = 1e-4;
 
 /// State of a roll-out.
 struct Roller<'a> {
     chain: &'a Chain,
     physics: &'a Physics,
-    directions: &'a [Direction],
     n: usize,
     /// Degrees of freedom, and the one that each joint's drive turns.
     freedoms: usize,
@@ -86,12 +59,7 @@ struct Roller<'a> {
     posed: Posed,
     /// Nm/rad of gravity.
     gravity: Square,
-    /// By degree of freedom.
-    dq: Vec<Vec<f64>>,
-    dv: Vec<Vec<f64>>,
-    forces: Vec<Vec<f64>>,
-    by_bodies: Vec<Vec<f64>>,
-    step: usize,
+    columns: Columns<'a>,
 }
 
 /// Rolls a simulation out; `see` is handed each row.
@@ -112,11 +80,9 @@ pub fn roll(
             freedoms += 1;
         }
     }
-    let columns = vec![vec![0.0; directions.len()]; freedoms];
     let mut roller = Roller {
         chain,
         physics,
-        directions,
         n,
         freedoms,
         rotor,
@@ -131,14 +97,14 @@ pub fn roll(
         drawn: 0.0,
         posed: Posed::default(),
         gravity: [[0.0; MOST]; MOST],
-        dq: columns.clone(),
-        dv: columns.clone(),
-        forces: columns.clone(),
-        by_bodies: columns,
-        step: 0,
+        columns: Columns::new(physics, directions, freedoms),
     };
     let begin = recording.time.first().copied().unwrap_or_default();
-    let most = if freedoms > n { GEARED_STEP } else { STEP };
+    let most = if freedoms > n {
+        GEARED_STEP
+    } else {
+        chain.step
+    };
     for trajectory in &recording.trajectories {
         if which == Which::Fitted && trajectory.held_out {
             continue;
@@ -148,7 +114,7 @@ pub fn roll(
             &recording.start(trajectory),
             &commands,
             recording,
-            trajectory.rows.start,
+            trajectory,
         );
         let mut guess = 0;
         for row in trajectory.rows.clone() {
@@ -160,12 +126,16 @@ pub fn roll(
             let steps = ((to - from) / most - 1e-6).ceil().max(1.0) as usize;
             let h = (to - from) / steps as f64;
             if !directions.is_empty() {
-                roller.look_at_gravity();
+                let gravity = &physics.bodies.gravity;
+                chain.gravity_stiffness(&roller.posed, gravity, &mut roller.gravity);
             }
             for k in 0..steps {
                 let time = from + h * k as f64;
                 guess = commands.index(time, guess);
                 roller.advance(&commands, guess, time, time - begin, h);
+            }
+            if !directions.is_empty() {
+                roller.columns.carry(&roller.rotor);
             }
         }
     }
@@ -173,8 +143,14 @@ pub fn roll(
 
 impl Roller<'_> {
     /// At rest at the beginning of a trajectory: friction, integral and warmth run on.
-    fn start(&mut self, at: &[f64], commands: &Commands, recording: &Recording, row: usize) {
-        let time = recording.time[row];
+    fn start(
+        &mut self,
+        at: &[f64],
+        commands: &Commands,
+        recording: &Recording,
+        trajectory: &Trajectory,
+    ) {
+        let time = recording.time[trajectory.rows.start];
         self.q[..self.n].copy_from_slice(at);
         self.chain.pose(at, &self.physics.bodies, &mut self.posed);
         let mut weight = [0.0; MOST];
@@ -207,21 +183,22 @@ impl Roller<'_> {
         self.v = [0.0; MOST];
         self.a = [0.0; MOST];
         self.push = [0.0; MOST];
-        for columns in [&mut self.dq, &mut self.dv] {
-            columns.iter_mut().for_each(|column| column.fill(0.0));
-        }
-        self.step = 0;
+        self.columns.start(recording, trajectory, &self.set_point);
     }
 
-    fn show(&self, row: usize, see: &mut impl FnMut(&SimulatedRow)) {
+    fn show(&mut self, row: usize, see: &mut impl FnMut(&SimulatedRow)) {
         let seen = |joint: usize| match &self.physics.joints[joint].gear {
             Some(gear) if gear.encoder_on_link => joint,
             _ => self.rotor[joint],
         };
         let mut angle = [0.0; MOST];
         (0..self.n).for_each(|joint| angle[joint] = self.q[seen(joint)]);
-        let change: [&[f64]; MOST] = std::array::from_fn(|joint| match joint < self.n {
-            true => &self.dq[seen(joint)][..],
+        let at: [usize; MOST] =
+            std::array::from_fn(|joint| if joint < self.n { seen(joint) } else { 0 });
+        let (n, count) = (self.n, self.columns.count());
+        let changes = self.columns.seen(&at[..n]);
+        let change: [&[f64]; MOST] = std::array::from_fn(|joint| match joint < n {
+            true => &changes[joint * count..(joint + 1) * count],
             false => &[],
         });
         see(&SimulatedRow {
@@ -231,26 +208,6 @@ impl Roller<'_> {
             drive: &self.driven[..self.n],
             change: &change[..self.n],
         });
-    }
-
-    /// Gravity's stiffness at the present position.
-    fn look_at_gravity(&mut self) {
-        let (chain, bodies, mut posed) = (self.chain, &self.physics.bodies, self.posed.clone());
-        let mut torque = |q: &Row| {
-            let mut torque = [0.0; MOST];
-            chain.pose(&q[..self.n], bodies, &mut posed);
-            chain.torques(&posed, &bodies.gravity, &[0.0; MOST], None, &mut torque);
-            torque
-        };
-        let here = torque(&self.q);
-        for joint in 0..self.n {
-            let mut moved = self.q;
-            moved[joint] += TURN;
-            let there = torque(&moved);
-            for other in 0..self.n {
-                self.gravity[other][joint] = (there[other] - here[other]) / TURN;
-            }
-        }
     }
 
     fn advance(&mut self, commands: &Commands, guess: usize, time: f64, since: f64, h: f64) {
@@ -346,54 +303,33 @@ impl Roller<'_> {
         {
             new = [f64::NAN; MOST];
         }
-        if !self.directions.is_empty() {
-            let before = self.dv.clone();
-            let mut forces = std::mem::take(&mut self.forces);
-            forces.iter_mut().for_each(|column| column.fill(0.0));
-            let sg: Row = std::array::from_fn(|i| {
-                if limit[i] > 0.0 {
+        if !self.columns.is_empty() {
+            let slides: Row = std::array::from_fn(|i| {
+                let share = if limit[i] > 0.0 {
                     self.push[i] / (h * limit[i])
                 } else {
                     sign(self.v[i])
-                }
+                };
+                if share.abs() > 0.999_999 { share } else { 0.0 }
             });
-            for (d, direction) in self.directions.iter().enumerate() {
-                for (j, changed) in &direction.joints {
-                    let (r, base) = (self.rotor[*j], &physics.joints[*j]);
-                    let mut with = sent[*j];
-                    if changed.delay != base.delay {
-                        let [angle, speed] = commands.mean(
-                            *j,
-                            time - changed.delay,
-                            time + h - changed.delay,
-                            guess,
-                        );
-                        (with.angle, with.speed) = (angle, speed);
-                    }
-                    let t = changed.torque(*j, r, &motion, &with, sag);
-                    let slides = sg[r].abs() > 0.999_999;
-                    let dry = if slides {
-                        sg[r] * (t.limit - torques[*j].limit)
-                    } else {
-                        0.0
-                    };
-                    let rotor = changed.armature - base.armature;
-                    forces[r][d] += t.smooth - torques[*j].smooth - dry - rotor * self.a[r];
-                    if r != *j {
-                        forces[*j][d] += t.link - torques[*j].link;
-                    }
-                }
-            }
-            if self.step.is_multiple_of(BODIES_EVERY) {
-                self.look_at_bodies(&middle, &ahead);
-            }
-            for i in 0..n {
-                for (force, by) in forces[i].iter_mut().zip(&self.by_bodies[i]) {
-                    *force += by;
-                }
-            }
-            self.carry(&before, &forces, (&w, &stiff, &damp), &limit, h);
-            self.forces = forces;
+            let at = Instant {
+                physics,
+                rotor: &self.rotor,
+                commands,
+                guess,
+                time,
+                h,
+                motion: &motion,
+                sent: &sent[..n],
+                torques: &torques[..n],
+                slides: &slides,
+                drawn: self.drawn,
+                sag,
+            };
+            self.columns
+                .ask(&at, self.chain, &self.posed, &a[..m], &ahead[..n]);
+            let step = self.linearised((&w, &stiff, &damp), &limit, h);
+            self.columns.push_step(step);
         }
         let total: f64 = torques[..n].iter().map(|t| t.drive.abs()).sum();
         self.drawn += (total - self.drawn) * (h / SAG_LAG).min(1.0);
@@ -417,7 +353,6 @@ impl Roller<'_> {
             self.a[i] = (new[i] - self.v[i]) / h;
             self.v[i] = new[i];
         }
-        self.step += 1;
     }
 
     /// Speeds after dry friction: impulses within their limits stop what they can.
@@ -454,42 +389,13 @@ impl Roller<'_> {
         new
     }
 
-    /// What changed bodies ask for, with its sign turned.
-    fn look_at_bodies(&mut self, q: &Row, v: &Row) {
-        let n = self.n;
-        let mut here = [0.0; MOST];
-        let gravity = &self.physics.bodies.gravity;
-        self.chain
-            .torques(&self.posed, gravity, &v[..n], Some(&self.a[..n]), &mut here);
-        let mut posed = Posed::default();
-        for (d, direction) in self.directions.iter().enumerate() {
-            let Some(bodies) = &direction.bodies else {
-                continue;
-            };
-            let mut there = [0.0; MOST];
-            self.chain.pose(&q[..n], bodies, &mut posed);
-            self.chain.torques(
-                &posed,
-                &bodies.gravity,
-                &v[..n],
-                Some(&self.a[..n]),
-                &mut there,
-            );
-            for i in 0..n {
-                self.by_bodies[i][d] = here[i] - there[i];
-            }
-        }
-    }
-
-    /// The step's derivative: changes of angles and speeds with every direction.
-    fn carry(
-        &mut self,
-        before: &[Vec<f64>],
-        forces: &[Vec<f64>],
+    /// The step's derivative.
+    fn linearised(
+        &self,
         (w, stiff, damp): (&Square, &Square, &Square),
         limit: &Row,
         h: f64,
-    ) {
+    ) -> StepMatrices {
         let m = self.freedoms;
         // What friction holds keeps its speed of zero.
         let held: Vec<usize> = (0..m)
@@ -537,25 +443,14 @@ impl Roller<'_> {
                 by_speed[i][k] = keep[i][k] + speed;
             }
         }
-        for i in 0..m {
-            let out = &mut self.dv[i];
-            out.fill(0.0);
-            for k in 0..m {
-                let (s, a, f) = (by_speed[i][k], by_angle[i][k], h * through[i][k]);
-                if s == 0.0 && a == 0.0 && f == 0.0 {
-                    continue;
-                }
-                let columns = before[k].iter().zip(&self.dq[k]).zip(&forces[k]);
-                for (out, ((dv, dq), force)) in out.iter_mut().zip(columns) {
-                    *out += s * dv + a * dq + f * force;
-                }
-            }
+        for row in &mut through[..m] {
+            row[..m].iter_mut().for_each(|by| *by *= h);
         }
-        for i in 0..m {
-            let speeds = before[i].iter().zip(&self.dv[i]);
-            for (dq, (old, new)) in self.dq[i].iter_mut().zip(speeds) {
-                *dq += 0.5 * h * (old + new);
-            }
+        StepMatrices {
+            by_speed,
+            by_angle,
+            by_torque: through,
+            h,
         }
     }
 }
