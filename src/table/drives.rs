@@ -108,6 +108,7 @@ fn of_joint(joint: &Joint) -> Vec<Quantity> {
         ("load_friction_back", "1", joint.load_friction[1]),
         ("presliding", "rad", joint.presliding),
         ("warm_up_share", "1", joint.warm_up[0]),
+        ("warm_up_share_viscous", "1", joint.warm_up_viscous),
         ("warm_up_time", "s", joint.warm_up[1]),
         ("armature", "kg m2", joint.armature),
         ("spring_stiffness", "Nm/rad", joint.spring[0]),

@@ -164,12 +164,17 @@ fn drives_are_exported_to_mujoco_isaac_and_json_with_what_was_found() {
         "{}",
         refused.err
     );
+}
+
 #[test]
 fn friction_that_warms_up_and_turned_gravity_are_named_beside_each_other_and_nothing_else() {
     let Some(document) = practice("p11") else {
         return;
     };
-    let expected = [("warmup_friction", "joint 1"), ("gravity_direction", "base")];
+    let expected = [
+        ("warmup_friction", "joint 1"),
+        ("gravity_direction", "base"),
+    ];
     let expected = expected.map(|(effect, place)| (effect.to_string(), place.to_string()));
     assert_eq!(named(&document), expected);
     let left = document["after"]["validate_rms_mrad"].as_f64().unwrap();
