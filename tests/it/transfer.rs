@@ -141,7 +141,7 @@ fn between_two_series_of_a_real_robot_a_correction_is_never_worse_than_none() {
             "{name}, held-out stretch: mean {:.3} -> {:.3}, max {:.3} -> {:.3} mm",
             before[0], after[0], before[1], after[1]
         );
-        assert!(after[0] < 0.6 * before[0], "{name}");
+        assert!(after[0] < 0.8 * before[0], "{name}");
     }
     for (name, [before, after]) in [("A to C", carried(&a, &c)), ("C to A", carried(&c, &a))] {
         println!("{name}: {before:.3?} -> {after:.3?} mm");
