@@ -165,28 +165,21 @@ impl ReportReads {
             table.0.first().map(|row| &row.step) == standing && table.is_of(&self.recording)
         };
         let last = self.prediction.iter().rfind(named);
-        let (Some(first), Some(last)) = (self.prediction.first(), last.or(self.prediction.last()))
-        else {
-            return None;
-        };
+        let first = self.prediction.first()?;
+        let last = last.or(self.prediction.last())?;
         let rows = last.0.len().min(first.0.len()).min(self.recording.rows());
         // A picture is no reason to fail: a table that is no whole robot has none.
         let robot = self.robot.to_description().map(RobotModel::new);
-        let Some(robot) = robot
+        let robot = robot
             .ok()
-            .filter(|robot| robot.joints() == self.recording.joints)
-        else {
-            return None;
-        };
+            .filter(|robot| robot.joints() == self.recording.joints)?;
         let is_usable = |row: &usize| {
             let predicted = &last.0[*row];
             let place = [predicted.x_mm, predicted.y_mm, predicted.z_mm];
             !predicted.suspect && place.iter().all(|mm| mm.is_finite())
         };
         let used: Vec<usize> = (0..rows).filter(is_usable).collect();
-        let Some(row) = shown_row(&first.0[..rows]).filter(|_| used.len() >= FEWEST) else {
-            return None;
-        };
+        let row = shown_row(&first.0[..rows]).filter(|_| used.len() >= FEWEST)?;
         let metres = |at: &usize| {
             let row = &last.0[*at];
             Vector3::new(row.x_mm, row.y_mm, row.z_mm) * 1e-3

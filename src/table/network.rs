@@ -322,7 +322,7 @@ fn ridge(numbers: &Numbers, joints: usize) -> Result<Ridge> {
     let axes = numbers.shared("along");
     let axis = |t: i64| (0, t + 1, t % OUTPUTS as i64 + 1);
     let in_turn = axes.iter().zip(0..).all(|(at, t)| *at == axis(t));
-    if axes.len() % OUTPUTS != 0 || !in_turn {
+    if !axes.len().is_multiple_of(OUTPUTS) || !in_turn {
         return Err(fault("`along` is not three axes for each term"));
     }
     let mut terms: Vec<Term> = vec![Vec::new(); axes.len() / OUTPUTS];
