@@ -179,7 +179,7 @@ fn mjcf(export: &DriveExport) -> Result<String> {
         let point = export.three("joint", number, POINT);
         let centre = export.three("link", number, ["centre_x", "centre_y", "centre_z"]);
         let diagonal = export.three("link", number, ["ixx", "iyy", "izz"]);
-        let beside = export.three("link", number, ["ixy", "ixz", "iyz"]);
+        let products = export.three("link", number, ["ixy", "ixz", "iyz"]);
         let mut attributes = vec![
             ("damping", of("damping")),
             ("frictionloss", of("friction")),
@@ -241,7 +241,7 @@ fn mjcf(export: &DriveExport) -> Result<String> {
             reference => numbers([of("reference")]),
             centre => numbers(minus(centre, point)),
             mass => numbers(export.drives.simulation.value("link", number, "mass")),
-            inertia => numbers([diagonal, beside].concat()),
+            inertia => numbers([diagonal, products].concat()),
             kp => numbers([kp]),
             bias => numbers([kp * of("command_offset"), -kp, speed_on_angle]),
             speed_gain => on_error.then(|| numbers([kd])), delay,

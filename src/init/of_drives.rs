@@ -218,8 +218,11 @@ fn chain(path: &Path) -> Result<(MjcfArm, Vec<String>, Vec<PathBuf>)> {
         text.map(|text| (label, text))
     };
     let (_, text) = read(path)?;
-    let beside = |name: String| path.parent().unwrap_or(Path::new("")).join(name);
-    let includes: Vec<PathBuf> = mjcf::included(&text).into_iter().map(beside).collect();
+    let in_its_folder = |name: String| path.parent().unwrap_or(Path::new("")).join(name);
+    let includes: Vec<PathBuf> = mjcf::included(&text)
+        .into_iter()
+        .map(in_its_folder)
+        .collect();
     let texts: Result<Vec<(String, String)>> = includes.iter().map(|path| read(path)).collect();
     let texts = texts?;
     let others: Vec<MjcfText> = texts

@@ -84,7 +84,10 @@ impl RunResult {
             searches: searches.flat_map(|table| table.0).collect(),
             changes: changes.flat_map(|table| table.0).collect(),
             rejected_rows: rejected_rows(manifest),
-            report: documents.first().cloned(),
+            report: documents
+                .iter()
+                .find(|path| path.ends_with(".html"))
+                .cloned(),
             documents,
         })
     }

@@ -145,13 +145,13 @@ fn a_file_says_whose_it_is_and_whether_it_was_edited() {
     let listed = calib(cell(), "export latest --format none").err;
     let (_, listed) = listed.split_once("[possible values: ").unwrap();
     let formats = listed.split_once(']').unwrap().0.split(", ");
-    let of_others = ["xacro", "ur_kinematics", "dynamics"];
+    let of_others = ["xacro", "ur_kinematics", "dynamics", "isaac"];
     assert_eq!(
         formats
             .clone()
             .filter(|format| of_others.contains(format))
             .count(),
-        3
+        of_others.len()
     );
     for format in formats.filter(|format| !of_others.contains(format)) {
         let text = exported(format);

@@ -1,5 +1,5 @@
-//! Up to which frequency positions and torques are of one motion. Beyond it the counts of an encoder, twice differentiated, ask for more torque
-//! than there is: what a controller then makes of them is in the torque, and what the arm does is in neither.
+//! The frequency up to which positions and torques are of one motion. Above it the quantisation of the encoder, twice differentiated, dominates:
+//! inverse dynamics of the positions gives far more torque than was recorded, and the recorded torque is the controller's response to it.
 
 use super::arm::DynamicArm;
 use super::recording::{RecordingClock, TorqueRecording, column};
@@ -54,8 +54,8 @@ pub(super) fn common(
 /// What is said of a cut-off that is lower for it.
 pub(super) fn remark(common: f64, usual: f64) -> String {
     format!(
-        "below {usual:.1} Hz already the positions ask for far more torque than was recorded: they are an encoder's counts there; the low-pass is \
-         at {common:.1} Hz, up to which the torque stands above what a controller makes of counts (`cutoff_hz`)"
+        "the encoder's quantisation dominates below the usual low-pass of {usual:.1} Hz: the torque that the positions need there is far more than was \
+         recorded; the low-pass is at {common:.1} Hz (`cutoff_hz` sets another)"
     )
 }
 

@@ -131,7 +131,7 @@ pub struct TorqueCourses {
     pub at_rest: Vec<bool>,
     /// rad/s, rows x n.
     pub velocity: Vec<f64>,
-    /// Nm, rows x n: measured, brought onto the clock of the positions.
+    /// Nm, rows x n: measured, interpolated at the times of the positions.
     pub measured: Vec<f64>,
     /// Nm, rows x n: of the arm as declared (of the identified rigid arm where nothing is declared).
     pub simulated: Vec<f64>,

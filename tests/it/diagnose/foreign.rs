@@ -61,10 +61,13 @@ fn what_is_in_no_list_is_diagnosed_and_counted() {
             .collect();
         let first = diagnosed.found.iter().max_by(|a, b| a.3.total_cmp(&b.3));
         let right = first.map(|(_, place, ..)| places.iter().any(|wanted| is_there(place, wanted)));
-        let named = diagnosed
-            .found
-            .iter()
-            .any(|(name, _, probability, _)| name != "unknown" && *probability >= 0.5);
+        let is_accepted = |name: &str, place: &str| {
+            let mut accepted = case.accepted.iter();
+            accepted.any(|(known, there)| *known == name && is_there(place, there))
+        };
+        let named = diagnosed.found.iter().any(|(name, place, probability, _)| {
+            name != "unknown" && *probability >= 0.5 && !is_accepted(name, place)
+        });
         let floor = 3f64.sqrt() * case.noise_mm[1];
         let (within, is_worse, is_harmed) = (
             diagnosed.after < 1.15 * floor,

@@ -89,7 +89,7 @@ fn counts_of_a_servos_encoder_do_not_double_its_friction() {
     assert!((0.029..0.043).contains(&viscous), "{viscous} Nm s/rad");
     let share = findings.iter().find(|one| one["effect"] == "load_friction");
     let share = share.map(|one| one["parameters"][0]["value"].as_f64().unwrap());
-    // The same: 15 to 34 % without Coulomb friction beside it, by how fast its sign turns.
+    // The same: 15 to 34 % without Coulomb friction in the model, by how fast its sign turns.
     assert!(
         share.is_some_and(|share| (0.15..0.34).contains(&share)),
         "{share:?}"

@@ -5,7 +5,7 @@ use super::cell::{FreeShape, Over, ShapeGroup, Shapes, fields};
 use super::component::CellColumns;
 use super::scan::{CellEvidence, CellScan, Refined};
 use super::state::KnownState;
-use crate::criteria::cells::{BENDS, CLOSELY, FAR_BELOW, LEVELS, SEPARATED, STICKS};
+use crate::criteria::cells::{BENDS, CLOSELY, LEVELS, SEPARATED, STICKS};
 use crate::effect::{Basis, Form, Term, Variable};
 use rayon::prelude::*;
 
@@ -37,24 +37,19 @@ impl CauseTable<'_, '_> {
                 .then(a.cmp(b))
         });
         nameless.truncate(*SEPARATED);
-        let asked = |cell: usize| {
-            Some(cell) == best
-                || self.declared.contains(&cell)
-                || nameless.contains(&cell)
-                || self.cells[cell].is_named() && is_near(scan.log_odds[cell])
+        // Over a variable of a component with other numbers a cell may be far below the best until it has its own.
+        let asked = |cell: &usize| {
+            Some(*cell) == best
+                || self.declared.contains(cell)
+                || nameless.contains(cell)
+                || self.cells[*cell].is_named() && is_near(scan.log_odds[*cell])
+                || self.is_over_numbers(*cell)
         };
         let closer = |cell: usize| {
-            let least = if asked(cell) {
-                f64::NEG_INFINITY
-            } else if self.is_over_numbers(cell) {
-                most - *FAR_BELOW - prior(cell)
-            } else {
-                return None;
-            };
-            let refined = self.refined(cell, &scan.closely[&cell], state, least)?;
+            let refined = self.refined(cell, &scan.closely[&cell], state)?;
             Some((cell, refined))
         };
-        let listed: Vec<usize> = scan.closely.keys().copied().collect();
+        let listed: Vec<usize> = scan.closely.keys().copied().filter(asked).collect();
         let refined: Vec<(usize, Refined)> = listed.into_par_iter().filter_map(closer).collect();
         for (cell, closer) in refined {
             let Some(found) = scan.closely.get_mut(&cell) else {
@@ -102,13 +97,11 @@ impl CauseTable<'_, '_> {
     }
 
     /// The shape of a cell with its numbers where the evidence is largest, with ln of that and its amplitude; none where it has no numbers.
-    /// Where not even those of a component bring ln of its evidence to the `least`, no others are tried.
     pub(crate) fn refined(
         &self,
         cell: usize,
         found: &CellEvidence,
         state: &KnownState,
-        least: f64,
     ) -> Option<Refined> {
         let best = self.as_found(cell, found);
         // All of these are of one motion: what its directions have in common with the state is computed once.
@@ -161,9 +154,7 @@ impl CauseTable<'_, '_> {
                     }
                 }
                 let near = |free: &FreeShape, level| with_forms(free.near(level));
-                let climbed = (start.0 >= least)
-                    .then(|| climb(first, start, &near, &value, &|_, _| 0.0))
-                    .flatten();
+                let climbed = climb(first, start, &near, &value, &|_, _| 0.0);
                 let (free, evidence) = climbed.or(moved.then_some((first, start)))?;
                 Some(found_as(forms_of(&free)?, evidence))
             }

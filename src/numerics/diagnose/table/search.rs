@@ -167,8 +167,7 @@ impl CauseTable<'_, '_> {
                     log - if component.shape.is_bent { *BENDS } else { 0.0 }
                 };
                 if paid(other, &found) > paid(alone, &components[i]) + *SWAPS {
-                    grid.refined =
-                        self.refined(components[i].cell, &grid, &state, f64::NEG_INFINITY);
+                    grid.refined = self.refined(components[i].cell, &grid, &state);
                     components[i] = self.component(components[i].cell, &grid);
                     changed = true;
                 }

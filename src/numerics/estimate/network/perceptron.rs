@@ -103,7 +103,7 @@ pub struct Loss<'a> {
     pub x: &'a [Vec<f64>],
     /// Scaled targets of each row.
     pub y: &'a [[f64; OUTPUTS]],
-    /// Weight of half the summed squared weights beside half the summed squared errors.
+    /// Weight of half the summed squared weights relative to half the summed squared errors.
     pub decay: f64,
 }
 

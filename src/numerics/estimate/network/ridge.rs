@@ -152,7 +152,7 @@ impl Ridge {
         })
     }
 
-    /// The correction and its standard deviation per axis beside the noise, m.
+    /// The correction and its standard deviation per axis without the noise, m.
     pub(crate) fn at(&self, q: &[f64]) -> ([f64; OUTPUTS], f64) {
         let mut sums = vec![[0.0; OUTPUTS]; self.members.len()];
         for (t, term) in self.terms.iter().enumerate() {

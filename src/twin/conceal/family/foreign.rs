@@ -52,6 +52,11 @@ pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
         [one] => matches!(one.over, Time | Temperature) && jumps(one),
         _ => false,
     };
+    // A curve of a turning joint over its own angle, whatever its shape, is that of transmission or encoder.
+    let is_table = match &courses[..] {
+        [one] => motion == JointTurn && matches!(one.over, Angle(number) if number == seat),
+        _ => false,
+    };
     let effect = Physical::Foreign(Foreign {
         motion,
         seat,
@@ -63,6 +68,9 @@ pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
     let same = same_places(bench, motion, seat);
     let names = same.iter().map(|place| ("unknown", place.clone()));
     draft.accepted.extend(names);
+    if is_table {
+        draft.accepted.push(("joint_table", motion.place(seat)));
+    }
     if is_step {
         let places = [motion.place(seat)].into_iter().chain(same);
         let names = places.filter_map(|place| Some((step(motion, &place)?, place)));
