@@ -511,7 +511,7 @@ impl DiagnosisSummary {
             let is_of_finding = |(asked, ..): &&(&Found, _, _)| asked.rank == found.rank;
             if let Some((_, rival, command)) = poses.iter().find(is_of_finding) {
                 let rival = words(&rival.effect, &rival.place);
-                let what = format!("measure poses to decide: {}, or {rival}", short.what);
+                let what = format!("measure poses to decide: {}, or {rival}", short.own);
                 return step(what, Some(command.clone()));
             }
         }

@@ -85,8 +85,10 @@ impl Found {
 /// A finding in a few words.
 pub(super) struct ShortFinding {
     pub(crate) size: Option<(f64, String)>,
-    /// What it is, e.g. `joint 3 yields under load`.
+    /// What it is, e.g. `joint 3 yields under load`; the likeliest rival where that is more probable.
     pub(crate) what: String,
+    /// The same by its own name.
+    pub(crate) own: String,
     /// Its number with the standard deviation.
     pub(crate) number: Option<String>,
     /// Its likeliest rival with both probabilities, where its own does not decide: `, or link 3 bends under load (0.32 / 0.37)`.
@@ -109,7 +111,7 @@ fn phrase(effect: &str) -> Option<(&'static str, &'static str)> {
 pub(super) fn words(effect: &str, place: &str) -> String {
     match phrase(effect) {
         Some((words, _)) => words.replace("{}", place),
-        None if effect == names::UNKNOWN => format!("{place} errs, unnamed"),
+        None if effect == names::UNKNOWN => format!("an unnamed error of {place}"),
         None => format!("{} at {place}", effect.replace('_', " ")),
     }
 }
@@ -170,6 +172,7 @@ impl ShortFinding {
         if nearest.is_some() {
             what += ", roughly";
         }
+        let own = what.clone();
         let either = either(found).map(|(rival, own, share)| match share > own {
             true => format!(
                 ", or {} ({share:.2} / {own:.2})",
@@ -180,6 +183,7 @@ impl ShortFinding {
         Self {
             size,
             what,
+            own,
             number,
             either,
             instead: instead(found, nearest),
@@ -475,7 +479,7 @@ mod tests {
                 .into(),
             ..far.clone()
         };
-        assert_eq!(lines_of(far), ["joint 3 errs, unnamed", "", ""]);
+        assert_eq!(lines_of(far), ["an unnamed error of joint 3", "", ""]);
         let stated = lines_of(stated);
         assert_eq!(
             stated,

@@ -10,6 +10,8 @@ use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 const WIDTH: usize = 100;
 /// Findings that are told of many; one more is told rather than counted.
 const FOUND: usize = 5;
+/// Lines of them on a wide terminal.
+const LINES: usize = 3;
 /// Below this (mm) a mean error has four decimals.
 const SMALL: f64 = 0.01;
 
@@ -76,16 +78,26 @@ pub(super) fn sentence(label: &str, text: &str, width: usize) -> String {
     folded(&labelled(label, text), width)
 }
 
-/// The largest findings, two a line where there is room, and how many are smaller.
+/// The largest findings, two a line where there is room, and how many are smaller; on a wide terminal in three lines, so that a result has ten.
 pub(super) fn found(findings: &[ShortFinding], width: usize) -> String {
     let mut findings: Vec<&ShortFinding> = findings.iter().collect();
     findings.sort_by(|a, b| b.magnitude().total_cmp(&a.magnitude()));
-    let shown = if findings.len() > FOUND + 1 {
-        FOUND
-    } else {
-        findings.len()
+    let mut shown = match findings.len() > FOUND + 1 {
+        true => FOUND,
+        false => findings.len(),
     };
-    let smaller = findings.len() - shown;
+    let mut lines = in_lines(&findings, shown, width);
+    while width >= WIDTH && lines.len() > LINES {
+        shown -= 1;
+        lines = in_lines(&findings, shown, width);
+    }
+    let labelled_line =
+        |(number, text): (usize, &String)| labelled(if number == 0 { "found" } else { "" }, text);
+    lines.iter().enumerate().map(labelled_line).collect()
+}
+
+/// Lines of the first findings, and of how many are smaller.
+fn in_lines(findings: &[&ShortFinding], shown: usize, width: usize) -> Vec<String> {
     let sizes: Vec<&str> = findings[..shown]
         .iter()
         .map(|one| one.size.as_ref().map_or("", |(_, size)| size.as_str()))
@@ -95,25 +107,33 @@ pub(super) fn found(findings: &[ShortFinding], width: usize) -> String {
     let half = room / 2 + 1;
     let mut cells: Vec<String> = sizes
         .iter()
-        .zip(&findings)
+        .zip(findings)
         .map(|(size, one)| {
             let either = one.either.as_deref().unwrap_or_default();
             cut(&format!("{size:>right$}  {}{either}", one.what), room)
         })
         .collect();
+    let smaller = findings.len() - shown;
     if smaller > 0 {
         cells.push(format!("{:right$}  and {smaller} smaller", ""));
     }
-    let paired = width >= WIDTH && cells.iter().all(|cell| cell.width() + 2 <= half);
-    let each = if paired { 2 } else { 1 };
-    let line = |(number, cells): (usize, &[String])| {
-        let text = match cells {
-            [left, right] => format!("{left}{}{right}", " ".repeat(half - left.width())),
-            others => others.concat(),
-        };
-        labelled(if number == 0 { "found" } else { "" }, &text)
-    };
-    cells.chunks(each).enumerate().map(line).collect()
+    let mut lines: Vec<String> = Vec::new();
+    let mut open = false;
+    for cell in cells {
+        let fits = width >= WIDTH && cell.width() + 2 <= half;
+        match lines.last_mut().filter(|_| open && fits) {
+            Some(line) => {
+                *line += &" ".repeat(half - line.width());
+                *line += &cell;
+                open = false;
+            }
+            None => {
+                lines.push(cell);
+                open = fits;
+            }
+        }
+    }
+    lines
 }
 
 /// A finding with its number under its rank; what it might be instead stands beside it where there is room, else below.
@@ -278,6 +298,7 @@ mod tests {
         ShortFinding {
             size,
             what: what.into(),
+            own: what.into(),
             number: Some("14.8 +- 0.4 arcsec".into()),
             either: None,
             instead: None,
@@ -299,6 +320,14 @@ mod tests {
              13.00 mm  joint 13 yields under load                    and 12 smaller\n"
         );
         assert_eq!(found(&several(6), 100).lines().count(), 3);
+        let long: Vec<ShortFinding> = (1..=6)
+            .map(|k| finding(k as f64, &"x".repeat(10 * k)))
+            .collect();
+        let text = found(&long, 100);
+        assert!(
+            text.lines().count() == 3 && text.contains("5.00 mm") && text.contains("and 4 smaller"),
+            "{text}"
+        );
         let narrow = found(&several(17), 80);
         assert!(
             narrow.lines().count() == 6 && narrow.lines().all(|line| line.width() <= 80),

@@ -168,10 +168,15 @@ fn the_same_motion(motion: Motion) -> Option<Place> {
 
 /// What moves and what it follows, as a place does it: `tilts with the angle of joint 5`; none where a finding has no such law.
 pub(super) fn described(summary: &Summary) -> Option<String> {
-    summary
-        .terms(names::UNKNOWN)
-        .next()
-        .map(|term| in_words(term, summary.clock))
+    let mut terms = summary.terms(names::UNKNOWN);
+    let first = terms.next()?;
+    let mut variables = first.law().variables();
+    for variable in terms.flat_map(|term| term.law().variables()) {
+        if !variables.contains(&variable) {
+            variables.push(variable);
+        }
+    }
+    Some(in_words(first, &variables, summary.clock))
 }
 
 /// What a place does by its motion.
@@ -196,8 +201,8 @@ fn verb(motion: Motion) -> &'static str {
     }
 }
 
-/// A motion with what it follows.
-fn in_words(term: &Term, clock: Clock) -> String {
+/// A motion with the variables that it follows.
+fn in_words(term: &Term, variables: &[Variable], clock: Clock) -> String {
     let named = |variable: Variable| match variable {
         Variable::Angle { joint } => format!("the angle of joint {}", joint + 1),
         Variable::Temperature => "the warm-up".into(),
@@ -206,10 +211,11 @@ fn in_words(term: &Term, clock: Clock) -> String {
         }
         variable => clock.named(variable),
     };
-    let variables: Vec<String> = term.law().variables().into_iter().map(named).collect();
+    let only = variables.len() == 1;
+    let variables: Vec<String> = variables.iter().copied().map(named).collect();
     let (verb, subject) = (verb(term.motion()), variables.join(" and "));
     match term.basis() {
-        Basis::Wave { order, .. } if term.law().times.is_none() => {
+        Basis::Wave { order, .. } if only => {
             format!("{verb} with {subject}, {order} times a turn")
         }
         _ => format!("{verb} with {subject}"),
