@@ -161,7 +161,10 @@ fn reported_recordings_are_answered_rightly_or_refused_with_the_reason() {
         let mut code = None;
         for command in report.commands {
             let answer = calib(folder.path(), *command);
-            said += &answer.both();
+            // What a search weighs on its way is not what it says.
+            let both = answer.both();
+            let lines = both.lines().filter(|line| !line.contains("looking for what"));
+            said.extend(lines.flat_map(|line| [line, "\n"]));
             code = answer.code;
         }
         for file in ["arm.xml", "arm_out.urdf"] {
