@@ -228,12 +228,11 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             if !self.products.contains_key(&component.id) {
                 let of_motion = |cells: &Vec<usize>| {
                     let columns = self.frame.multiplied(&component.values);
-                    let with = |cell: &usize| {
-                        let block = &self.coarse[*cell];
-                        let product = self.known.of(component, &columns, block, self.frame);
-                        (*cell, component.by_part(&product))
-                    };
-                    cells.iter().map(with).collect::<Vec<_>>()
+                    let blocks: Vec<_> = cells.iter().map(|cell| &self.coarse[*cell]).collect();
+                    let known = &self.known;
+                    let products = known.of_each(component, &columns, &blocks, self.frame);
+                    let products = products.iter().map(|product| component.by_part(product));
+                    cells.iter().copied().zip(products).collect::<Vec<_>>()
                 };
                 let all = self.of_motions.par_iter().flat_map_iter(of_motion);
                 let rows = component.part.ncols();
@@ -367,7 +366,9 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     pub(crate) fn across_block(&self, block: &CellColumns, state: &KnownState) -> DMatrix<f64> {
         let part = |component: &Component| {
             let columns = self.frame.multiplied(&component.values);
-            component.by_part(&self.known.of(component, &columns, block, self.frame))
+            let known = &self.known;
+            let products = known.of_each(component, &columns, &[block], self.frame);
+            component.by_part(&products[0])
         };
         let parts: Vec<DMatrix<f64>> = state.components.iter().map(part).collect();
         let parts: Vec<&DMatrix<f64>> = parts.iter().collect();

@@ -151,9 +151,30 @@ impl CellColumns {
     /// The transpose of columns of which the base is projected off times these.
     pub(crate) fn products(&self, with: &MultipliedColumns, frame: &SearchRows) -> DMatrix<f64> {
         match &self.factored {
-            Some(factored) => frame.with_factored(with, factored),
+            Some(factored) => frame.with_factored(with, &factored.iter().collect::<Vec<_>>()),
             None => product(view(with.columns), view(self.values(frame))),
         }
+    }
+
+    /// The same of several blocks: one product of matrices for all that are factored.
+    fn products_of_each(
+        blocks: &[&Self],
+        with: &MultipliedColumns,
+        frame: &SearchRows,
+    ) -> Vec<DMatrix<f64>> {
+        let factored = blocks.iter().filter_map(|block| block.factored.as_ref());
+        let factored: Vec<&FactoredColumns> = factored.flatten().collect();
+        let together = frame.with_factored(with, &factored);
+        let mut first = 0;
+        let mut products = |block: &&Self| {
+            if block.factored.is_none() {
+                return block.products(with, frame);
+            }
+            let columns = together.columns(first, block.count()).into_owned();
+            first += block.count();
+            columns
+        };
+        blocks.iter().map(&mut products).collect()
     }
 
     /// With the possible amplitudes that other robots show.
@@ -279,37 +300,51 @@ struct KnownProduct {
 }
 
 impl ColumnProducts {
-    /// The transpose of a component's columns, which are multiplied as `with`, times those of a block.
-    pub(crate) fn of(
+    /// The transpose of a component's columns, which are multiplied as `with`, times those of each of some blocks.
+    pub(crate) fn of_each(
         &self,
         component: &Component,
         with: &MultipliedColumns,
-        block: &CellColumns,
+        blocks: &[&CellColumns],
         frame: &SearchRows,
-    ) -> Arc<DMatrix<f64>> {
-        let (a, b) = (&component.values, &block.square);
-        let key = (Arc::as_ptr(a) as usize, Arc::as_ptr(b) as usize);
-        if let Ok(cache) = self.0.read()
-            && let Some(known) = cache.known.get(&key)
-        {
-            return known.product.clone();
-        }
-        let product = Arc::new(block.products(with, frame));
-        if let Ok(mut cache) = self.0.write() {
+    ) -> Vec<Arc<DMatrix<f64>>> {
+        let key = |block: &CellColumns| {
+            let (a, b) = (&component.values, &block.square);
+            (Arc::as_ptr(a) as usize, Arc::as_ptr(b) as usize)
+        };
+        let mut out: Vec<Option<Arc<DMatrix<f64>>>> = match self.0.read() {
+            Ok(cache) => {
+                let known = |block: &&CellColumns| cache.known.get(&key(block));
+                let product = |block| Some(known(block)?.product.clone());
+                blocks.iter().map(product).collect()
+            }
+            Err(_) => vec![None; blocks.len()],
+        };
+        let missing: Vec<usize> = (0..blocks.len()).filter(|k| out[*k].is_none()).collect();
+        let fresh: Vec<&CellColumns> = missing.iter().map(|k| blocks[*k]).collect();
+        let products = CellColumns::products_of_each(&fresh, with, frame);
+        let mut cache = self.0.write().ok();
+        for (k, product) in missing.into_iter().zip(products) {
+            let product = Arc::new(product);
+            out[k] = Some(product.clone());
+            let Some(cache) = cache.as_mut() else {
+                continue;
+            };
             // 128 MB.
             if cache.size > 1 << 24 {
-                *cache = ProductCache::default();
+                **cache = ProductCache::default();
             }
             cache.size += product.len();
+            let of = (&component.values, &blocks[k].square);
             cache.known.insert(
-                key,
+                key(blocks[k]),
                 KnownProduct {
-                    _of: (Arc::downgrade(a), Arc::downgrade(b)),
-                    product: product.clone(),
+                    _of: (Arc::downgrade(of.0), Arc::downgrade(of.1)),
+                    product,
                 },
             );
         }
-        product
+        out.into_iter().flatten().collect()
     }
 }
 

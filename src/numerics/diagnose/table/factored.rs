@@ -3,10 +3,11 @@
 
 use super::cell::alternates;
 use crate::effect::Motion;
-use crate::linear::{dot, view};
+use crate::linear::{dot, product, view};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use nalgebra::{DMatrix, DVector};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// A direction in which a motion moves the rows.
@@ -120,35 +121,41 @@ impl MotionRows {
     }
 
     /// Products of factored columns of this motion with each other and with the residual, the base projected off.
-    pub(super) fn products(&self, factored: &[FactoredColumns]) -> (DMatrix<f64>, DVector<f64>) {
-        let columns: Vec<(usize, &[f64], f64)> = factored
-            .iter()
-            .flat_map(|form| {
-                let column = |(direction, function, scale): &(usize, usize, f64)| {
-                    (*direction, form.functions.at(*function), *scale)
-                };
-                form.columns.iter().map(column)
-            })
-            .collect();
-        let mut shares = Vec::new();
+    pub(super) fn products(&self, factored: &[&FactoredColumns]) -> (DMatrix<f64>, DVector<f64>) {
+        let functions = stacked(factored);
+        let mut first = 0;
+        let mut columns = Vec::new();
         for form in factored {
-            form.sums(&self.by_base, &mut shares);
+            let column = |(direction, function, scale): &(usize, usize, f64)| {
+                (*direction, first + function, *scale)
+            };
+            columns.extend(form.columns.iter().map(column));
+            first += form.functions.count();
         }
+        // Of each two directions once.
+        let count = self.directions.len();
+        let mut of_pairs = vec![DMatrix::zeros(0, 0); count * count];
+        for (k, products) in self.by_each_other.iter().enumerate() {
+            if k / count > k % count {
+                continue;
+            }
+            let mut weighed = (*functions).clone();
+            for mut column in weighed.column_iter_mut() {
+                let entries = column.iter_mut().zip(products);
+                entries.for_each(|(value, by)| *value *= by);
+            }
+            of_pairs[k] = product(view(functions.as_ref()), view(&weighed));
+        }
+        let shares = sums(factored, &self.by_base);
         let base = shares.len() / columns.len().max(1);
-        let share = |k: usize| &shares[base * k..base * (k + 1)];
-        let mut gram = DMatrix::zeros(columns.len(), columns.len());
-        let (mut weighed, mut before) = (Vec::new(), vec![0.0; columns.len()]);
-        for (j, (variable, function, scale)) in columns.iter().enumerate() {
-            let mut by = usize::MAX;
-            for (i, (other, also, also_scale)) in columns[..=j].iter().enumerate() {
-                if *other != by {
-                    by = *other;
-                    let products = &self.by_each_other[other * self.directions.len() + variable];
-                    weighed.clear();
-                    weighed.extend(function.iter().zip(products).map(|(a, b)| a * b));
-                }
-                let whole = dot(also, &weighed) * scale * also_scale;
-                gram[(i, j)] = whole - dot(share(i), share(j));
+        let shares = DMatrix::from_vec(base, columns.len(), shares);
+        let mut gram = product(view(&shares), view(&shares));
+        let mut before = vec![0.0; columns.len()];
+        for (j, (of_j, at_j, scale_j)) in columns.iter().enumerate() {
+            for (i, (of_i, at_i, scale_i)) in columns[..=j].iter().enumerate() {
+                let pair = &of_pairs[of_i.min(of_j) * count + of_i.max(of_j)];
+                let whole = pair[(*at_i, *at_j)] * scale_i * scale_j;
+                gram[(i, j)] = whole - gram[(i, j)];
                 gram[(j, i)] = gram[(i, j)];
                 before[j] = whole;
             }
@@ -164,7 +171,7 @@ impl MotionRows {
             gram[(j, j)] = rounding * rounding * before[j];
         }
         let along = columns.iter().map(|(direction, function, scale)| {
-            scale * dot(function, &self.by_residual[*direction])
+            scale * dot(column(&functions, *function), &self.by_residual[*direction])
         });
         let along = DVector::from_iterator(columns.len(), along);
         (gram, along)
@@ -196,34 +203,53 @@ impl FactoredColumns {
             (*direction, values.map(|value| value * scale).collect())
         })
     }
+}
 
-    /// Appends the products of its columns with others by those of each direction with these, row by row.
-    pub(super) fn sums(&self, by_row: &[DMatrix<f64>], out: &mut Vec<f64>) {
-        let count = by_row.first().map_or(0, DMatrix::nrows);
-        let functions = self.functions.count();
-        let sums: Vec<Mat<f64>> = by_row
-            .iter()
-            .map(|by_row| {
-                let mut sums = Mat::zeros(count, functions);
-                if functions == 1 {
-                    let out = sums.col_as_slice_mut(0);
-                    for (row, value) in self.functions.at(0).iter().enumerate() {
-                        let each = out.iter_mut().zip(column(by_row, row));
-                        each.for_each(|(sum, product)| *sum += value * product);
-                    }
-                    return sums;
-                }
-                let (columns, functions) = (view(by_row), view(&self.functions.values));
-                let out = sums.as_mut();
-                matmul(out, Accum::Replace, columns, functions, 1.0, Par::Seq);
-                sums
-            })
-            .collect();
-        for (direction, function, scale) in &self.columns {
-            let sums = sums[*direction].col_as_slice(*function);
+/// The products of columns of one motion with others by those of each direction with these, row by row; one column after another.
+pub(super) fn sums(factored: &[&FactoredColumns], by_row: &[DMatrix<f64>]) -> Vec<f64> {
+    let count = by_row.first().map_or(0, DMatrix::nrows);
+    let functions = stacked(factored);
+    let total = functions.ncols();
+    let products = |by_row: &DMatrix<f64>| {
+        let mut sums = Mat::zeros(count, total);
+        matmul(
+            sums.as_mut(),
+            Accum::Replace,
+            view(by_row),
+            view(functions.as_ref()),
+            1.0,
+            Par::Seq,
+        );
+        sums
+    };
+    let products: Vec<Mat<f64>> = by_row.iter().map(products).collect();
+    let columns = factored.iter().map(|form| form.columns.len());
+    let mut out = Vec::with_capacity(count * columns.sum::<usize>());
+    let mut first = 0;
+    for form in factored {
+        for (direction, function, scale) in &form.columns {
+            let sums = products[*direction].col_as_slice(first + function);
             out.extend(sums.iter().map(|sum| sum * scale));
         }
+        first += form.functions.count();
     }
+    out
+}
+
+/// The functions of several forms next to each other, rows x functions: one product of matrices reads the rows once for all of them.
+fn stacked<'f>(factored: &[&'f FactoredColumns]) -> Cow<'f, DMatrix<f64>> {
+    if let [one] = factored {
+        return Cow::Borrowed(&one.functions.values);
+    }
+    let rows = factored
+        .first()
+        .map_or(0, |one| one.functions.values.nrows());
+    let values: Vec<f64> = factored
+        .iter()
+        .flat_map(|one| one.functions.values.as_slice())
+        .copied()
+        .collect();
+    Cow::Owned(DMatrix::from_vec(rows, values.len() / rows.max(1), values))
 }
 
 /// Direction and function of each column, in the order of a term's coefficients.

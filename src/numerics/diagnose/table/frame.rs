@@ -2,7 +2,7 @@
 //! geometry projected off.
 
 use super::evidence::EvidenceRows;
-use super::factored::{FactoredColumns, Functions, MotionRows, WeighedDirection, unit};
+use super::factored::{FactoredColumns, Functions, MotionRows, WeighedDirection, sums, unit};
 use super::noise_shape::NoiseShape;
 use crate::diagnose::round::RoundView;
 use crate::effect::{Basis, Factor, Form, Law, Motion, Variable};
@@ -220,14 +220,15 @@ impl<'a> SearchRows<'a> {
     pub(crate) fn with_factored(
         &self,
         with: &MultipliedColumns,
-        factored: &[FactoredColumns],
+        factored: &[&FactoredColumns],
     ) -> DMatrix<f64> {
         let row_of = self.view.problem.rows_of_readings();
         let mut out = Vec::new();
-        for form in factored {
-            let by_row = with.by_row[form.motion]
-                .get_or_init(|| self.motions[form.motion].with(with.columns.by_line(), row_of));
-            form.sums(by_row, &mut out);
+        for forms in factored.chunk_by(|a, b| a.motion == b.motion) {
+            let motion = forms[0].motion;
+            let by_row = with.by_row[motion]
+                .get_or_init(|| self.motions[motion].with(with.columns.by_line(), row_of));
+            out.append(&mut sums(forms, by_row));
         }
         let count = out.len() / with.columns.ncols().max(1);
         DMatrix::from_vec(with.columns.ncols(), count, out)
@@ -240,7 +241,7 @@ impl<'a> SearchRows<'a> {
     ) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let first = factored.first()?.motion;
         let is_one = factored.iter().all(|form| form.motion == first);
-        is_one.then(|| self.motions[first].products(factored))
+        is_one.then(|| self.motions[first].products(&factored.iter().collect::<Vec<_>>()))
     }
 
     /// Columns of some forms, one form after another, and how many each has. They end before the rows of motor currents where no form says
