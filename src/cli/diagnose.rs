@@ -3,10 +3,10 @@
 use super::pipeline_arguments::{CommandTask, ExecutionArguments, reported_as, shown};
 use super::run::WRONG_SETUP;
 use super::surroundings::columns;
-use super::{emit_json, emit_lines};
+use super::{emit_json, emit_lines, note};
 use crate::audit::{diagnosis, the_stage};
 use crate::error::{Error, Result};
-use crate::pipeline::{Purpose, Selection};
+use crate::pipeline::{Purpose, Selection, later_diagnosis};
 use crate::raw::ending;
 use crate::stage::{DIAGNOSES, DeclaredStage, DiagnoseTorques};
 use crate::summary::{DiagnosisSummary, rejected};
@@ -115,7 +115,14 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
             Some((run, step)) => (run, Some(step)),
             None => (&*name, arguments.step.as_deref()),
         };
-        diagnosis(&store, run, step, &DIAGNOSES)?
+        let found = diagnosis(&store, run, step, &DIAGNOSES)?;
+        let head = &found.0.run_id;
+        if let ("HEAD", Some(later)) = (run, later_diagnosis(&store, head)) {
+            note(format!(
+                "HEAD is the last `calib run`, {head}; the last `calib diagnose` is {later}\n"
+            ));
+        }
+        found
     };
     let diagnosis = DiagnosisSummary::read(&manifest.run_id, &stage, &store)?;
     if let Some(file) = &arguments.export_effect {

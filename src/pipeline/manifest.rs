@@ -358,6 +358,18 @@ fn complete(store: &Store, runs: &[String], back: usize) -> Result<Result<String
     Ok(Err(count))
 }
 
+/// The last run of `calib diagnose` after a run, by its id.
+pub fn later_diagnosis(store: &Store, run: &str) -> Option<String> {
+    let runs = store.runs().ok()?.into_iter().rev();
+    let mut later = runs.take_while(|id| id.as_str() > run);
+    later.find(|id| {
+        let is_it = |manifest: Manifest| {
+            manifest.purpose == Purpose::Diagnose && manifest.status == RunStatus::Done
+        };
+        Manifest::of(store, id).is_ok_and(is_it)
+    })
+}
+
 /// What a run was made for. The manifests of older versions do not say; theirs count as runs of their own.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -16,7 +16,7 @@ mod tests;
 pub use look::{Forecast, KeyChange, Prospect, changes_of, checked_plan, look, preview};
 pub use manifest::{
     Host, Manifest, OutputRecord, Purpose, RunOptions, RunStatus, StageReport, StageStatus,
-    Surroundings, Tool, find_run,
+    Surroundings, Tool, find_run, later_diagnosis,
 };
 pub use overrides::Override;
 pub use plan::{Plan, Selection};

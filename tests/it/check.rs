@@ -273,5 +273,8 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
             out.contains("rejected  10 rows, each with its reason in kept/tables/"),
             "{out}{printed}"
         );
+        // HEAD is what `calib run` made, though something was diagnosed since.
+        let is_said = printed.contains("HEAD is the last `calib run`, 01");
+        assert_eq!(is_said, what == "HEAD", "{printed}");
     }
 }

@@ -132,8 +132,8 @@ fn between_two_series_of_a_real_robot_a_correction_is_never_worse_than_none() {
         return;
     };
     let (a, c) = rayon::join(
-        || series("Series_A/measurements_grid.csv", 16).unwrap(),
-        || series("Series_C/measurements_random_poses.csv", 3).unwrap(),
+        || series("Series_A/measurements_grid.csv", 24).unwrap(),
+        || series("Series_C/measurements_random_poses.csv", 5).unwrap(),
     );
     for (name, series) in [("A", &a), ("C", &c)] {
         let [before, after] = series.errors_before;
