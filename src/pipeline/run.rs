@@ -150,9 +150,10 @@ impl Running<'_> {
             false => look::why(self.store, plan, &key, &found, forced)?,
         };
         let id = &plan.stages[index].id;
-        let mut waiting = || {
-            self.observer
-                .note(id, "waiting for another run that does the same")
+        let mut waiting = |holder: Option<u32>| {
+            let holder = holder.map_or_else(String::new, |process| format!(" (process {process})"));
+            let what = format!("waiting for another run that does the same{holder}");
+            self.observer.note(id, &what);
         };
         let claim = run_state::claim(self.store, &key.id(), &mut waiting);
         if let (false, Lookup::Done(record)) = (forced, self.store.action(&key)?) {

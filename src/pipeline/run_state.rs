@@ -188,8 +188,12 @@ pub(super) fn table<'t>(
 const PATIENCE: Duration = Duration::from_secs(600);
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// The claim on an action, after waiting for whoever has it; `waiting` is called once.
-pub(super) fn claim(store: &Store, action: &ActionId, waiting: &mut dyn FnMut()) -> Option<Claim> {
+/// The claim on an action, after waiting for whoever has it; `waiting` is called once, with the process that has it where that is known.
+pub(super) fn claim(
+    store: &Store,
+    action: &ActionId,
+    waiting: &mut dyn FnMut(Option<u32>),
+) -> Option<Claim> {
     let path = store.root().join("locks").join(format!("{action}.lock"));
     let mut waited = Duration::ZERO;
     loop {
@@ -198,7 +202,7 @@ pub(super) fn claim(store: &Store, action: &ActionId, waiting: &mut dyn FnMut())
             return claim;
         }
         if waited.is_zero() {
-            waiting();
+            waiting(Claim::holder(&path));
         }
         std::thread::sleep(PAUSE);
         waited += PAUSE;

@@ -18,7 +18,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 crate::stage::stage! {
-    Report, "report", 27, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
+    Report, "report", 28, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
         ReportReads -> ReportWrites {
             document: Document,
             acceptance: Acceptance,

@@ -379,13 +379,23 @@ impl Claim {
         };
         let file = match open().map(|file| (file.try_lock(), file)) {
             Ok((Err(TryLockError::WouldBlock), _)) => return None,
-            Ok((Ok(()), file)) => Some(file),
+            Ok((Ok(()), mut file)) => {
+                // For whoever waits; where it cannot be written nobody is told.
+                let cleared = file.set_len(0);
+                let _ = cleared.and_then(|()| write!(file, "{}", std::process::id()));
+                Some(file)
+            }
             Ok((Err(TryLockError::Error(_)), _)) | Err(_) => None,
         };
         Some(Self {
             path: path.into(),
             _file: file,
         })
+    }
+
+    /// The process that has it; none where that is not known.
+    pub(crate) fn holder(path: &Path) -> Option<u32> {
+        fs::read_to_string(path).ok()?.parse().ok()
     }
 }
 
@@ -398,6 +408,21 @@ impl Drop for Claim {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn whoever_waits_for_a_claim_reads_which_process_has_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("locks/stage.lock");
+        assert_eq!(Claim::holder(&path), None);
+        // Of a process that was killed.
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, "4194305").unwrap();
+        let claim = Claim::take(&path).unwrap();
+        assert!(Claim::take(&path).is_none());
+        assert_eq!(Claim::holder(&path), Some(std::process::id()));
+        drop(claim);
+        assert!(!path.exists() && Claim::take(&path).is_some());
+    }
 
     #[test]
     fn what_could_not_be_made_durable_is_never_said_to_be() {

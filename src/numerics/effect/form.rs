@@ -464,6 +464,18 @@ impl Term {
         self.basis().is_curve() && self.of_one().is_some_and(is_own_angle)
     }
 
+    /// Whether a joint follows nothing but its own angle and the side from which it came there: a gear's flanks differ.
+    pub fn is_own_table(&self) -> bool {
+        let Motion::Joint { joint } = self.motion else {
+            return false;
+        };
+        let angle = Variable::Angle { joint };
+        let variables = self.law.variables();
+        let is_own = |variable: &Variable| *variable == angle || variable.is_side_of(joint);
+        let is_table = variables.contains(&angle) && variables.iter().all(is_own);
+        self.is_own_curve() || self.law.times.is_some() && is_table
+    }
+
     /// The angles of which it is a function, where they are two.
     pub(crate) fn two_angles(&self) -> Option<[usize; 2]> {
         match (self.law.first.variable, self.law.times?.variable) {

@@ -1,7 +1,8 @@
 //! What a mechanic is told of a finding: words with holes.
 
 use super::{
-    Basis, Cause, Clock, ParameterEstimate, Summary, Term, Variable, figure, law_shapes, unknown,
+    Basis, Cause, Clock, ParameterEstimate, Summary, Term, Variable, figure, law_shapes, names,
+    unknown,
 };
 
 /// The words in the holes of a sentence; `None` for one that is not closed.
@@ -116,6 +117,13 @@ pub(super) fn hole(
                 format!("in the end with a time constant of {}", known(span()))
             }
             _ => "for each kelvin".into(),
+        },
+        "sides" => match summary
+            .terms(names::UNKNOWN)
+            .any(|term| term.law().times.is_some())
+        {
+            true => ", and another one to each side of approach".into(),
+            false => String::new(),
         },
         "law" => known(unknown::described(summary)),
         "rows" if clock == Clock::Rows => " over the recording's rows".into(),

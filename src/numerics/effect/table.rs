@@ -264,7 +264,7 @@ pub static CAUSES: &[&Cause] = &[
         size: "5 to 200 arcsec",
         confounded: "gear_cyclic",
         needs: "many points",
-        sentence: "the transmission or encoder of {place} errs over its angle by a curve that is no wave",
+        sentence: "the transmission or encoder of {place} errs over its angle by a curve that is no wave{sides}",
         ..Cause::PLAIN
     },
     &Cause {

@@ -69,6 +69,17 @@ pub enum Variable {
 }
 
 impl Variable {
+    /// Whether it is the side from which a joint came, or how far it came from there.
+    pub(super) fn is_side_of(self, joint: usize) -> bool {
+        match self {
+            Self::Approach { joint: of }
+            | Self::Move { joint: of }
+            | Self::Slip { joint: of, .. }
+            | Self::Stretch { joint: of, .. } => of == joint,
+            _ => false,
+        }
+    }
+
     /// The column of the table of causes to which it belongs, of something at a place.
     pub(crate) fn kind(self, place: Place) -> &'static str {
         match self {

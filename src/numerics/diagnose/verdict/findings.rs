@@ -209,11 +209,12 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
     }
 }
 
-/// Whether forms without a name are curves of a turning joint over its own angle: transmission or encoder, which nothing else of an arm follows.
+/// Whether forms without a name are curves of a turning joint over its own angle, whether they are the same to both sides of its approach or
+/// not: transmission or encoder, which nothing else of an arm follows.
 fn is_table(last: &LastRound, forms: &[Form]) -> bool {
     let robot = last.survey.robot;
     let turns = |place| matches!(place, Place::Joint(joint) if robot.is_revolute(joint));
-    let is_curve = |form: &Form| form.term().is_some_and(Term::is_own_curve) && turns(form.place());
+    let is_curve = |form: &Form| form.term().is_some_and(Term::is_own_table) && turns(form.place());
     !forms.is_empty() && forms.iter().all(is_curve) && !last.excludes(names::JOINT_TABLE)
 }
 

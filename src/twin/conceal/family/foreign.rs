@@ -52,11 +52,15 @@ pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
         [one] => matches!(one.over, Time | Temperature) && jumps(one),
         _ => false,
     };
-    // A curve of a turning joint over its own angle, whatever its shape, is that of transmission or encoder.
-    let is_table = match &courses[..] {
-        [one] => motion == JointTurn && matches!(one.over, Angle(number) if number == seat),
-        _ => false,
-    };
+    // A curve of a turning joint over its own angle, whatever its shape, is that of transmission or encoder; also where its flanks differ.
+    let is_angle = |one: &ForeignCourse| matches!(one.over, Angle(number) if number == seat);
+    let is_side = |one: &ForeignCourse| matches!(one.over, Approach(number) if number == seat);
+    let is_table = motion == JointTurn
+        && match &courses[..] {
+            [one] => is_angle(one),
+            [a, b] => is_angle(a) && is_side(b) || is_side(a) && is_angle(b),
+            _ => false,
+        };
     let effect = Physical::Foreign(Foreign {
         motion,
         seat,
