@@ -45,8 +45,11 @@ impl CauseTable<'_, '_> {
                 || self.cells[*cell].is_named() && is_near(scan.log_odds[*cell])
                 || self.is_over_numbers(*cell)
         };
+        // What is still far below the best after large steps gains nothing by small ones that would matter.
+        let least = most - (0.2 * most).max(10.0);
         let closer = |cell: usize| {
-            let refined = self.refined(cell, &scan.closely[&cell], state)?;
+            let is_worth = |log: f64| prior(cell) + log > least;
+            let refined = self.refined_while(cell, &scan.closely[&cell], state, &is_worth)?;
             Some((cell, refined))
         };
         let listed: Vec<usize> = scan.closely.keys().copied().filter(asked).collect();
@@ -103,6 +106,17 @@ impl CauseTable<'_, '_> {
         found: &CellEvidence,
         state: &KnownState,
     ) -> Option<Refined> {
+        self.refined_while(cell, found, state, &|_| true)
+    }
+
+    /// The same; steps become smaller while ln of the evidence is worth it.
+    fn refined_while(
+        &self,
+        cell: usize,
+        found: &CellEvidence,
+        state: &KnownState,
+        is_worth: &dyn Fn(f64) -> bool,
+    ) -> Option<Refined> {
         let best = self.as_found(cell, found);
         // All of these are of one motion: what its directions have in common with the state is computed once.
         let columns = self.frame.multiplied(state.columns(self.frame));
@@ -154,7 +168,7 @@ impl CauseTable<'_, '_> {
                     }
                 }
                 let near = |free: &FreeShape, level| with_forms(free.near(level));
-                let climbed = climb(first, start, &near, &value, &|_, _| 0.0);
+                let climbed = climb((first, start), &near, &value, &|_, _| 0.0, is_worth);
                 let (free, evidence) = climbed.or(moved.then_some((first, start)))?;
                 Some(found_as(forms_of(&free)?, evidence))
             }
@@ -172,7 +186,8 @@ impl CauseTable<'_, '_> {
                         0.0
                     }
                 };
-                let (form, evidence) = climb(form.clone(), start, &near, &value, &price)?;
+                let first = (form.clone(), start);
+                let (form, evidence) = climb(first, &near, &value, &price, is_worth)?;
                 Some(found_as(vec![form], evidence))
             }
             _ => None,
@@ -217,16 +232,19 @@ fn forms_of(group: &ShapeGroup, shape: usize) -> Option<Vec<Form>> {
 }
 
 /// Steps from a shape to the best near it, in steps that halve, until none is better: the last with ln of its evidence and its amplitude, none
-/// if that is the first. `price` is what a step costs.
+/// if that is the first. `price` is what a step costs; steps become smaller while ln of the evidence `is_worth` it.
 fn climb<T: Clone>(
-    first: T,
-    start: ShapeEvidence,
+    (first, start): (T, ShapeEvidence),
     near: &dyn Fn(&T, i32) -> Vec<Variant<T>>,
     value: &dyn Fn(&[Form]) -> Option<ShapeEvidence>,
     price: &dyn Fn(&T, &T) -> f64,
+    is_worth: &dyn Fn(f64) -> bool,
 ) -> Option<(T, ShapeEvidence)> {
     let (mut now, mut evidence, mut moved) = (first, start, false);
     for level in 0..*LEVELS {
+        if level > 0 && !is_worth(evidence.0) {
+            break;
+        }
         loop {
             let tried = near(&now, level).into_iter();
             let tried = tried.filter_map(|(other, forms)| Some((value(&forms)?, other)));

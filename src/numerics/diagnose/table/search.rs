@@ -350,9 +350,9 @@ impl CauseTable<'_, '_> {
                     break;
                 };
                 next.push(self.component(best, &scan.closely[&best]));
-                next = self.backfit(next, 1);
+                next = self.with_newest(next);
                 if self.total(&next, kappa) > before {
-                    components = next;
+                    components = self.backfit(next, 1);
                     break;
                 }
             }
