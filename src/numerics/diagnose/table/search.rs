@@ -350,9 +350,9 @@ impl CauseTable<'_, '_> {
                     break;
                 };
                 next.push(self.component(best, &scan.closely[&best]));
-                next = self.with_newest(next);
+                next = self.backfit(next, 1);
                 if self.total(&next, kappa) > before {
-                    components = self.backfit(next, 1);
+                    components = next;
                     break;
                 }
             }
