@@ -272,7 +272,7 @@ pub struct ReportTorques {
 }
 
 crate::stage::stage! {
-    ReportTorques, "report_torques", 7, "writes one self-contained HTML file: torques before and after, friction, what was found",
+    ReportTorques, "report_torques", 8, "writes one self-contained HTML file: torques before and after, friction, what was found",
         ReportTorquesReads -> ReportTorquesWrites {
             document: Document,
         }
