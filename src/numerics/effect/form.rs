@@ -587,3 +587,41 @@ impl Placed for Term {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Unknown;
+
+    #[test]
+    fn a_table_of_a_joint_is_over_its_own_angle_alone_or_with_the_side_of_its_approach() {
+        let curve = Basis::Cosines {
+            low: -1.0,
+            high: 1.0,
+            count: 6,
+        };
+        let turn = Motion::Joint { joint: 1 };
+        let alone = |variable| Term::new(&Unknown, turn, Law::new(variable, curve));
+        let product =
+            |motion, a, b| Term::new(&Unknown, motion, Law::new(a, curve).times(b, curve));
+        let [angle, other] = [1, 2].map(|joint| Variable::Angle { joint });
+        let [side, moved] = [Variable::Approach { joint: 1 }, Variable::Move { joint: 1 }];
+        for table in [
+            alone(angle),
+            product(turn, angle, side),
+            product(turn, moved, angle),
+        ] {
+            assert!(table.is_own_table(), "{:?}", table.law().variables());
+        }
+        for none in [
+            alone(other),
+            alone(side),
+            product(turn, side, moved),
+            product(turn, angle, Variable::Time),
+            product(turn, angle, Variable::Approach { joint: 2 }),
+            product(Motion::Joint { joint: 2 }, angle, side),
+        ] {
+            assert!(!none.is_own_table(), "{:?}", none.law().variables());
+        }
+    }
+}
