@@ -84,7 +84,7 @@ pub(super) fn carried(problem: &TorqueProblem) -> Vec<CarriedForm> {
 }
 
 /// The largest distance of the tool or a joint from another one, m.
-fn reach(arm: &DynamicArm) -> f64 {
+pub(super) fn reach(arm: &DynamicArm) -> f64 {
     let points = || arm.points.iter().chain([&arm.tool]);
     let far = points().flat_map(|a| points().map(move |b| (a - b).norm()));
     far.fold(SHORTEST, f64::max)

@@ -329,7 +329,8 @@ fn what_a_controller_expects_is_no_measurement_where_currents_are() {
         "current: {columns: [\"actual_current_0\"",
         "velocity: {columns: [\"actual_qd_0\"",
     ]);
-    made.says(&["the controller's own model expects"]);
+    made.has(&["simulated: {columns: [\"target_moment_0\""]);
+    made.says(&["what the controller's own model expects"]);
     made.lacks(&["      torque: {columns: [\"target_moment_0\""]);
 }
 

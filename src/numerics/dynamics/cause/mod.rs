@@ -254,6 +254,16 @@ pub struct FittedNumber {
     pub sigma: f64,
 }
 
+/// A number is seen whose standard deviation is below this share of it.
+const SEEN: f64 = 0.5;
+
+impl FittedNumber {
+    /// Whether its rows show it.
+    pub(crate) fn is_seen(&self) -> bool {
+        self.sigma > 0.0 && self.sigma < SEEN * self.value.abs()
+    }
+}
+
 /// A cause at a place with its shape numbers.
 #[derive(Clone)]
 pub(super) struct TorqueForm {
