@@ -8,13 +8,14 @@ use super::cause::{
 };
 use super::columns::{TorqueColumn, TorqueColumns};
 use super::model::TorqueModel;
-use super::problem::{TorqueProblem, noise_of};
+use super::problem::{TorqueBand, TorqueProblem, noise_of};
 use super::recording::TorqueSource;
 use super::sliding::unit_at;
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueQuestion};
 use super::used::UsedRecording;
 use super::weighted::{NoiseMemory, WeightedColumns};
+use crate::criteria::torque::NAMED;
 use crate::effect::Place;
 use crate::error::{Error, Result};
 use crate::estimate::tail;
@@ -100,7 +101,9 @@ pub fn changes(
         take_columns(problem, &base, &candidates, one.model, first.model);
     }
     let both = StackedColumns::new(&problems, shared.len());
-    let mut set = both.search();
+    let forms = first.model.places()?.forms;
+    let moved = problems[1].friction_moved(|scene| first.model.friction(&forms, scene));
+    let mut set = both.clear(both.search(), &problems[1], &moved);
     let fit = both.fit(&set);
     let solution = fit.solution();
     set.sort_by(|a, b| {
@@ -176,7 +179,7 @@ fn prepared<'a>(
         free_inertials: arm.links.is_none(),
         ..TorqueQuestion::default()
     };
-    let mut problem = TorqueProblem::new(arm, recording, &question, &clock, about.cutoff);
+    let mut problem = TorqueProblem::new(arm, recording, &question, &clock, TorqueBand::whole(about.cutoff));
     problem.scene.turn_over(about.sign_width);
     problem
         .scene
@@ -408,6 +411,33 @@ impl StackedColumns {
                 set.remove(place);
             }
         }
+    }
+
+    /// What of a set is more than what the filter of the positions makes of friction in the second recording, Nm.
+    fn clear(
+        &self,
+        set: Vec<usize>,
+        problem: &TorqueProblem,
+        moved: &[Vec<f64>],
+    ) -> Vec<usize> {
+        let runs = problem.runs(false);
+        let unmoved = self.weighted.measured[..self.joints].iter();
+        let unmoved = unmoved.map(|course| vec![0.0; course.len()]);
+        let moved = problem.weighing(&runs).measured(moved);
+        let weighted = (self.weighted).with_measured(unmoved.chain(moved).collect());
+        let made = SweptColumns::base(&self.all, &weighted).with(&set).solution();
+        let solution = self.fit(&set).solution();
+        let square = |form: usize, solution: &[(usize, f64)]| -> f64 {
+            let mut torques = self.measured.iter().map(|course| vec![0.0; course.len()]).collect::<Vec<_>>();
+            for column in self.all.of(form) {
+                self.all.columns[column].add(value_of(solution, column), &mut torques);
+            }
+            torques.iter().flatten().map(|value| value * value).sum()
+        };
+        let is_clear = |form: &usize| {
+            square(*form, &solution) > NAMED.powi(2) * square(*form, &made)
+        };
+        set.into_iter().filter(is_clear).collect()
     }
 
     /// What a form carries, if it does.

@@ -3,6 +3,7 @@
 use super::arm::{DynamicArm, INERTIAL_NUMBERS};
 use super::cause::{
     COULOMB, OFFSET, ROTOR, TORQUE_CAUSES, TorqueCause, TorqueForm, VISCOUS, friction_of,
+    of_greatest_load,
 };
 use super::columns::{ReducedRegressor, Reduction, TorqueColumn, TorqueColumns, columns_of};
 use super::recording::{
@@ -20,6 +21,23 @@ use std::ops::Range;
 
 /// s around an event whose rows do not count either.
 const EVENT_MARGIN: f64 = 0.3;
+
+/// Hz: the low-pass, and up to where positions are those of the motion, not counts of an encoder.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TorqueBand {
+    pub(crate) cutoff: f64,
+    pub(crate) followed: f64,
+}
+
+impl TorqueBand {
+    /// Positions are of the motion in all of it.
+    pub(crate) fn whole(cutoff: f64) -> Self {
+        Self {
+            cutoff,
+            followed: cutoff,
+        }
+    }
+}
 
 /// What all steps work on.
 pub(super) struct TorqueProblem<'a> {
@@ -64,9 +82,10 @@ impl<'a> TorqueProblem<'a> {
         recording: TorqueRecording,
         question: &TorqueQuestion,
         clock: &RecordingClock,
-        cutoff: f64,
+        band: TorqueBand,
     ) -> Self {
-        let scene = DynamicScene::new(arm, &recording, clock, cutoff, question.free_inertials);
+        let (cutoff, free) = (band.cutoff, question.free_inertials);
+        let scene = DynamicScene::new(arm, &recording, clock, band.followed, free);
         let reduction = Reduction::new(clock, cutoff);
         let regressor = ReducedRegressor::of(&scene, &reduction);
         let mut torque = by_joint(&recording.torque, recording.joints);
@@ -78,7 +97,7 @@ impl<'a> TorqueProblem<'a> {
         let temperature = recording.temperature.as_ref();
         let temperature = temperature.map(|all| ends(all.iter().copied()));
         let coarse =
-            DynamicScene::half_band(arm, &recording, clock, cutoff, question.free_inertials);
+            DynamicScene::half_band(arm, &recording, clock, band.followed, free);
         let numerics = numerics_of(&scene, &coarse, &reduction);
         let rows = reduction.rows.iter();
         let mut problem = Self {
@@ -216,6 +235,9 @@ impl<'a> TorqueProblem<'a> {
         {
             self.scene.tilt(theta);
         }
+        for form in &mut self.all.forms {
+            of_greatest_load(form, &self.scene);
+        }
         self.renew(0..self.all.forms.len(), |cause| cause.of_rigid);
     }
 
@@ -298,8 +320,21 @@ impl<'a> TorqueProblem<'a> {
         (squares.sum::<f64>() / (rows.len() * joints.len()).max(1) as f64).sqrt()
     }
 
-    /// Coefficients that a fit of the base and a set has of how far friction moves with the filter of the positions: a joint's turn is not exactly
-    /// at a row.
+    /// Nm, `[joint][judged row]`: how far some friction moves with the filter of the positions. Where a joint turns is not exactly at a row.
+    pub(crate) fn friction_moved(
+        &mut self,
+        friction: impl Fn(&DynamicScene) -> Vec<Vec<f64>>,
+    ) -> Vec<Vec<f64>> {
+        let mut moved = friction(&self.scene);
+        std::mem::swap(&mut self.scene.velocity, &mut self.coarse_velocity);
+        let coarse = friction(&self.scene);
+        std::mem::swap(&mut self.scene.velocity, &mut self.coarse_velocity);
+        let courses = moved.iter_mut().zip(&coarse);
+        courses.for_each(|(fine, coarse)| add(fine, -1.0, coarse));
+        self.reduction.reduce(moved)
+    }
+
+    /// Coefficients that a fit of the base and a set has of how far the friction of a solution moves with the filter of the positions.
     pub(crate) fn moved_by_filter(
         &mut self,
         weighted: &WeightedColumns,
@@ -310,16 +345,10 @@ impl<'a> TorqueProblem<'a> {
         let coefficients: Vec<Vec<f64>> = coefficients.collect();
         let forms = set.iter().map(|number| self.all.forms[*number].clone());
         let forms: Vec<TorqueForm> = forms.collect();
-        let friction = |scene: &DynamicScene| {
-            friction_of(forms.iter().zip(coefficients.iter().map(Vec::as_slice)), scene)
-        };
-        let mut moved = friction(&self.scene);
-        std::mem::swap(&mut self.scene.velocity, &mut self.coarse_velocity);
-        let coarse = friction(&self.scene);
-        std::mem::swap(&mut self.scene.velocity, &mut self.coarse_velocity);
-        let courses = moved.iter_mut().zip(&coarse);
-        courses.for_each(|(fine, coarse)| add(fine, -1.0, coarse));
-        let moved = self.reduction.reduce(moved);
+        let moved = self.friction_moved(|scene| {
+            let coefficients = coefficients.iter().map(Vec::as_slice);
+            friction_of(forms.iter().zip(coefficients), scene)
+        });
         let runs = self.runs(false);
         let weighted = weighted.with_measured(self.weighing(&runs).measured(&moved));
         let fit = SweptColumns::base(&self.all, &weighted).with(set);

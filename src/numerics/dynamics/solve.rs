@@ -6,10 +6,10 @@ use super::cells::{CauseChoice, all_but, faint, from_common, priors, search, set
 use super::contact::contacts;
 use super::latency::{Latency, latency, take_friction_lead};
 use super::problem::{
-    TorqueProblem, basic_forms, noise_apart, noise_left, noise_of, noise_of_fit, rich_forms,
+    TorqueBand, TorqueProblem, basic_forms, noise_apart, noise_left, noise_of, noise_of_fit, rich_forms,
 };
 use super::recording::{RecordingClock, TorqueRecording};
-use super::refine::{ShapeSlopes, polish, refine, sign_width, take_out_ends};
+use super::refine::{ShapeSlopes, polish, refine, take_out_ends, take_sign_widths};
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{NoiseMemory, WeightedColumns};
@@ -43,12 +43,11 @@ pub(super) fn solve<'a>(
     recording: TorqueRecording,
     question: &TorqueQuestion,
     clock: &RecordingClock,
-    cutoff: f64,
+    band: TorqueBand,
     tell: &mut dyn FnMut(String),
 ) -> SolvedTorques<'a> {
-    let mut problem = TorqueProblem::new(arm, recording, question, clock, cutoff);
-    let width = sign_width(&mut problem);
-    problem.scene.turn_over(width);
+    let mut problem = TorqueProblem::new(arm, recording, question, clock, band);
+    take_sign_widths(&mut problem, false);
     problem.form();
     let found = clocked(&mut problem);
     if let Some(latency) = &found {

@@ -175,6 +175,8 @@ const LINEAR: f64 = 1.0;
 const SQUARE: f64 = 2.0;
 /// One share whichever way power goes; one where the motor drives its load and one where the load drives the motor.
 const LOAD_WIDTHS: [usize; 2] = [1, 2];
+/// Numbers of its shape.
+const LOAD_SHAPE: usize = 2;
 
 /// Friction that grows with the torque that a gear transmits; a gear without preload has no other of one size. A gear that drives its load may
 /// lose another share of it than one that its load drives. Shape: the power of the load that friction grows with, and the greatest load, Nm,
@@ -187,16 +189,15 @@ pub(super) static LOAD: TorqueCause = TorqueCause {
     modifies: &[VISCOUS],
     positive: true,
     of_rigid: true,
-    lengths: &[0, 2],
+    lengths: &[0, LOAD_SHAPE],
     forms: |cause, scene| {
-        let powers = [LINEAR, SQUARE].into_iter();
-        let of_power = |power: f64| {
-            let widths = LOAD_WIDTHS.iter().filter(move |width| power == LINEAR || **width == 1);
-            at_joints(cause, 0..scene.joints(), &widths.copied().collect::<Vec<usize>>(), move |joint| {
-                [power, greatest_load(scene, joint)]
-            })
-        };
-        powers.flat_map(of_power).collect()
+        let shape = |power: f64| move |joint: usize| [power, greatest_load(scene, joint)];
+        // Identified masses are as much heavier as a joint that moves loses more where it drives.
+        let is_known = scene.declared.is_some() || scene.beyond.is_some();
+        let widths = &LOAD_WIDTHS[..if is_known { 2 } else { 1 }];
+        let linear = at_joints(cause, 0..scene.joints(), widths, shape(LINEAR));
+        let square = at_joints(cause, 0..scene.joints(), &LOAD_WIDTHS[..1], shape(SQUARE));
+        linear.into_iter().chain(square).collect()
     },
     is_possible: |_, values| values.iter().all(|value| *value >= 0.0),
     spans: |form| {
@@ -204,7 +205,8 @@ pub(super) static LOAD: TorqueCause = TorqueCause {
             usual: Some(LINEAR),
             ..span("exponent", "1", [0.4, 2.6])
         };
-        form.shape.first().map(|_| span).into_iter().collect()
+        let has_power = form.width == 1 && !form.shape.is_empty();
+        has_power.then_some(span).into_iter().collect()
     },
     torque: ColumnTorque::Row(|column, row| {
         let load = column.scene.rigid[column.form.joint()][row];
@@ -260,6 +262,13 @@ pub(super) static LOAD: TorqueCause = TorqueCause {
 /// The power of the load that its friction grows with.
 fn power_of_load(form: &TorqueForm) -> f64 {
     form.shape.first().copied().unwrap_or(LINEAR)
+}
+
+/// Takes shares of load friction from the greatest load as it is believed now.
+pub(in super::super) fn of_greatest_load(form: &mut TorqueForm, scene: &DynamicScene) {
+    if form.cause.name == LOAD.name && form.shape.len() == LOAD_SHAPE {
+        form.shape[1] = greatest_load(scene, form.joint());
+    }
 }
 
 /// Nm, of the rigid arm as it is believed; 1 where no masses are.

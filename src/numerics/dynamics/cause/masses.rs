@@ -234,7 +234,7 @@ fn seen_point(length: f64, fitted: &[FittedNumber]) -> [Option<FittedNumber>; 3]
         value: a.value / b.value,
         sigma: (a.value / b.value).abs() * (a.sigma / a.value).hypot(b.sigma / b.value),
     };
-    if mass.is_seen() {
+    if mass.is_seen() && (mass.sigma < PRECISE * mass.value.abs() || !moment.is_seen()) {
         let place = moment.is_seen().then(|| ratio(moment, mass));
         return [Some(mass), None, place];
     }

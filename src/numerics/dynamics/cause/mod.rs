@@ -15,7 +15,9 @@ use crate::criteria::torque::AT_END;
 use crate::effect::Place;
 pub(super) use angle::{CURRENT_OFFSET, OFFSET, UNKNOWN};
 pub use friction::COULOMB;
-pub(super) use friction::{COULOMB_FRICTION, VISCOUS, VISCOUS_FRICTION, line_of_power};
+pub(super) use friction::{
+    COULOMB_FRICTION, VISCOUS, VISCOUS_FRICTION, line_of_power, of_greatest_load,
+};
 pub(super) use masses::{ADDED_MASS, CENTRE, PAYLOAD, ROTOR, TORQUE_CONSTANT, masses_on_links};
 
 /// A fitted number of a finding.
