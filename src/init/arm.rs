@@ -160,6 +160,19 @@ impl ExaminedFile {
         let others = [TORQUES, CURRENTS, VELOCITIES];
         let joint = self.get("q").map(|joints| joints.choices[0].columns[0]);
         let own = joint.and_then(|column| Some(self.stated[column].joint()?.1));
+        // Numbers of motors on a bus begin anywhere.
+        let joints = self.get("q").into_iter();
+        let joints = joints.flat_map(|joints| &joints.choices[0].columns);
+        let numbers: Vec<usize> = joints
+            .filter_map(|column| Some(self.stated[*column].joint()?.1))
+            .collect();
+        let on_bus = |(key, number): (String, usize)| match own {
+            Some(first) if first > 1 && numbers.len() == count => {
+                let place = numbers.iter().position(|one| *one == number);
+                Some((key, place? + 1))
+            }
+            _ => Some((key, number)),
+        };
         let part = |column: usize| {
             let (name, joints) = (&self.stated[column], NAMED_JOINTS[2]);
             let stem = name.stem();
@@ -170,7 +183,7 @@ impl ExaminedFile {
                     Some((key, number)) if own == Some(number) => Some((key, 0)),
                     numbered => Some(numbered.unwrap_or((stem, 0))),
                 },
-                None => name.joint(),
+                None => name.joint().and_then(on_bus),
             }
         };
         let has = |key: &str, list| key.split(['_', '#']).any(|word| lists(list, word));

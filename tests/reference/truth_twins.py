@@ -357,7 +357,7 @@ def mark_servo(calib, folder, truth):
 
         def friction(one, load=0.4):
             """Nm at a load, whatever its law."""
-            shares = [number(one, name) for name in ("share", "share_driving", "share_driven_back") if number(one, name) is not None]
+            shares = [number(one, name) for name in ("share", "share_driven_back") if number(one, name) is not None]
             most = number(one, "at_load") or load
             return sum(shares) / len(shares) * most * (load / most) ** (number(one, "exponent") or 1)
 

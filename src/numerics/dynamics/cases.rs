@@ -307,7 +307,7 @@ fn load_friction_is_found_by_its_law() {
         let share = if row.5 * row.3 > 0.0 { 0.25 } else { 0.1 };
         share * sign(row.3) * row.5.abs()
     });
-    for (name, truth) in [("share_driving", 0.25), ("share_driven_back", 0.1)] {
+    for (name, truth) in [("share", 0.25), ("share_driven_back", 0.1)] {
         let share = number(&driven_back, "load_friction", name);
         assert!((share - truth).abs() < 0.03, "{name}: {share}");
     }

@@ -120,7 +120,8 @@ pub fn changes(
         }));
     }
     // A mass that is nowhere is not told of each link.
-    let unchanged = |form: &usize| !set.contains(form) && both.carries(*form) != Some(Carried::OnLink);
+    let unchanged =
+        |form: &usize| !set.contains(form) && both.carries(*form) != Some(Carried::OnLink);
     for form in (0..both.all.forms.len()).filter(unchanged) {
         let with = fit.with(&[form]);
         changes.extend(change(&problems[1], &both, &with, form, None));
@@ -179,7 +180,13 @@ fn prepared<'a>(
         free_inertials: arm.links.is_none(),
         ..TorqueQuestion::default()
     };
-    let mut problem = TorqueProblem::new(arm, recording, &question, &clock, TorqueBand::whole(about.cutoff));
+    let mut problem = TorqueProblem::new(
+        arm,
+        recording,
+        &question,
+        &clock,
+        TorqueBand::whole(about.cutoff),
+    );
     problem.scene.turn_over(about.sign_width);
     problem
         .scene
@@ -414,29 +421,29 @@ impl StackedColumns {
     }
 
     /// What of a set is more than what the filter of the positions makes of friction in the second recording, Nm.
-    fn clear(
-        &self,
-        set: Vec<usize>,
-        problem: &TorqueProblem,
-        moved: &[Vec<f64>],
-    ) -> Vec<usize> {
+    fn clear(&self, set: Vec<usize>, problem: &TorqueProblem, moved: &[Vec<f64>]) -> Vec<usize> {
         let runs = problem.runs(false);
         let unmoved = self.weighted.measured[..self.joints].iter();
         let unmoved = unmoved.map(|course| vec![0.0; course.len()]);
         let moved = problem.weighing(&runs).measured(moved);
         let weighted = (self.weighted).with_measured(unmoved.chain(moved).collect());
-        let made = SweptColumns::base(&self.all, &weighted).with(&set).solution();
+        let made = SweptColumns::base(&self.all, &weighted)
+            .with(&set)
+            .solution();
         let solution = self.fit(&set).solution();
         let square = |form: usize, solution: &[(usize, f64)]| -> f64 {
-            let mut torques = self.measured.iter().map(|course| vec![0.0; course.len()]).collect::<Vec<_>>();
+            let mut torques = self
+                .measured
+                .iter()
+                .map(|course| vec![0.0; course.len()])
+                .collect::<Vec<_>>();
             for column in self.all.of(form) {
                 self.all.columns[column].add(value_of(solution, column), &mut torques);
             }
             torques.iter().flatten().map(|value| value * value).sum()
         };
-        let is_clear = |form: &usize| {
-            square(*form, &solution) > NAMED.powi(2) * square(*form, &made)
-        };
+        let is_clear =
+            |form: &usize| square(*form, &solution) > NAMED.powi(2) * square(*form, &made);
         set.into_iter().filter(is_clear).collect()
     }
 
@@ -470,7 +477,9 @@ impl StackedColumns {
             Carried::OnTool => {
                 let most = self.declared + numbers[0].value.abs() + 3.0 * numbers[0].sigma;
                 let moment = |number: &FittedNumber| number.value.abs() - 3.0 * number.sigma;
-                numbers[1..4].iter().all(|one| moment(one) < most * self.reach)
+                numbers[1..4]
+                    .iter()
+                    .all(|one| moment(one) < most * self.reach)
             }
         }
     }

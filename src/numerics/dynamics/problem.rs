@@ -96,8 +96,7 @@ impl<'a> TorqueProblem<'a> {
         );
         let temperature = recording.temperature.as_ref();
         let temperature = temperature.map(|all| ends(all.iter().copied()));
-        let coarse =
-            DynamicScene::half_band(arm, &recording, clock, band.followed, free);
+        let coarse = DynamicScene::half_band(arm, &recording, clock, band.followed, free);
         let numerics = numerics_of(&scene, &coarse, &reduction);
         let rows = reduction.rows.iter();
         let mut problem = Self {
@@ -282,7 +281,10 @@ impl<'a> TorqueProblem<'a> {
             let course = &course[stretch];
             let within = begin >= 0.0 && begin as usize + NODES.len() <= course.len();
             match within {
-                true => dot(&weights, &course[begin as usize..begin as usize + NODES.len()]),
+                true => dot(
+                    &weights,
+                    &course[begin as usize..begin as usize + NODES.len()],
+                ),
                 false => interpolated(course, begin - NODES[0] + share),
             }
         };
@@ -341,7 +343,9 @@ impl<'a> TorqueProblem<'a> {
         set: &[usize],
         solution: &[(usize, f64)],
     ) -> Vec<(usize, f64)> {
-        let coefficients = set.iter().map(|number| self.coefficients(*number, solution));
+        let coefficients = set
+            .iter()
+            .map(|number| self.coefficients(*number, solution));
         let coefficients: Vec<Vec<f64>> = coefficients.collect();
         let forms = set.iter().map(|number| self.all.forms[*number].clone());
         let forms: Vec<TorqueForm> = forms.collect();

@@ -109,7 +109,10 @@ impl<'a> DynamicScene<'a> {
                 );
             }
         }
-        let theta = scene.declared.as_ref().map(|declared| declared.theta.clone());
+        let theta = scene
+            .declared
+            .as_ref()
+            .map(|declared| declared.theta.clone());
         scene.beyond = recording.simulated.as_ref().map(|simulated| {
             let mut beyond = by_joint(simulated, n);
             if let Some(theta) = &theta {

@@ -6,7 +6,8 @@ use super::cells::{CauseChoice, all_but, faint, from_common, priors, search, set
 use super::contact::contacts;
 use super::latency::{Latency, latency, take_friction_lead};
 use super::problem::{
-    TorqueBand, TorqueProblem, basic_forms, noise_apart, noise_left, noise_of, noise_of_fit, rich_forms,
+    TorqueBand, TorqueProblem, basic_forms, noise_apart, noise_left, noise_of, noise_of_fit,
+    rich_forms,
 };
 use super::recording::{RecordingClock, TorqueRecording};
 use super::refine::{ShapeSlopes, polish, refine, take_out_ends, take_sign_widths};

@@ -270,7 +270,10 @@ impl JointNoise {
         let products = |lag: usize| -> f64 {
             let of_run = |run: &Range<usize>| {
                 let run = &course[run.clone()];
-                dot(&run[..run.len().saturating_sub(lag)], run.get(lag..).unwrap_or_default())
+                dot(
+                    &run[..run.len().saturating_sub(lag)],
+                    run.get(lag..).unwrap_or_default(),
+                )
             };
             runs.iter().map(of_run).sum()
         };

@@ -302,7 +302,11 @@ impl<'a> MotionRows<'a> {
                 .filter(|time| time.is_nan())
                 .map(|_| "time is blank".into())
         };
-        match blank(signal).or_else(velocity).or_else(simulated).or_else(time) {
+        match blank(signal)
+            .or_else(velocity)
+            .or_else(simulated)
+            .or_else(time)
+        {
             Some(detail) => refuse(Reason::Blank, detail),
             None => Ok(()),
         }
@@ -315,8 +319,8 @@ impl<'a> MotionRows<'a> {
 
     fn push(&mut self, row: &RecordedRow, label: &str, context: &Context) -> Result<()> {
         let faulty = |message: String| Error::data(format!("{label}:{}", row.line), message);
-        let [q, velocity, simulated, temperature] = ["q", "velocity", "simulated", "temperature"]
-            .map(|setting| self.values(row, setting));
+        let [q, velocity, simulated, temperature] =
+            ["q", "velocity", "simulated", "temperature"].map(|setting| self.values(row, setting));
         let signal = self.values(row, self.signal.unwrap_or("torque"));
         let time = row.values.get(self.arm.slots.time).copied();
         let time = time.unwrap_or(f64::NAN);

@@ -44,9 +44,8 @@ fn rows(payload: f64, seed: u64) -> String {
         let torque = about * turn[2] - moment * cosine * (lift[2] + GRAVITY);
         // m/s and rad/s over which friction turns.
         let turns = [0.002, 0.01];
-        let dry = |joint: usize, v: f64| {
-            VISCOUS[joint] * v + COULOMB[joint] * (v / turns[joint]).tanh()
-        };
+        let dry =
+            |joint: usize, v: f64| VISCOUS[joint] * v + COULOMB[joint] * (v / turns[joint]).tanh();
         write!(
             text,
             "\n{time:.3},{:.5},{:.6},{:.4},{:.5}",

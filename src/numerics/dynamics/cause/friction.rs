@@ -2,8 +2,8 @@
 
 use super::angle::{UNKNOWN, ends};
 use super::{
-    ColumnTorque, FittedNumber, LASTING, PLAIN, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, at_joints,
-    plain, shape, span, warming, wave,
+    ColumnTorque, FittedNumber, LASTING, PLAIN, ShapeSpan, TorqueCause, TorqueForm, at_each_joint,
+    at_joints, plain, shape, span, warming, wave,
 };
 use crate::recording::largest;
 use crate::scene::DynamicScene;
@@ -221,12 +221,8 @@ pub(super) static LOAD: TorqueCause = TorqueCause {
         part * direction * transmitted(column.form, load)
     }),
     parameters: |form, fitted| {
-        let names: &[&str] = match form.width {
-            1 => &["share"],
-            _ => &["share_driving", "share_driven_back"],
-        };
-        let shares = names.iter().zip(fitted);
-        let shares = shares.map(|(name, share)| plain(name, *share, "1"));
+        let shares = form.cause.coefficients.iter().zip(fitted);
+        let shares = shares.map(|((name, unit), share)| plain(name, *share, unit));
         let exponent = power_of_load(form);
         let is_other = exponent != LINEAR;
         let exponent = is_other.then(|| shape("exponent", exponent, "1"));

@@ -2,8 +2,8 @@
 
 use super::InertialChanges;
 use super::{
-    ColumnTorque, FittedNumber, PLAIN, SEEN, TorqueCause, TorqueForm, at_each_joint, at_each_link, plain,
-    shape, size_of_two, span,
+    ColumnTorque, FittedNumber, PLAIN, SEEN, TorqueCause, TorqueForm, at_each_joint, at_each_link,
+    plain, shape, size_of_two, span,
 };
 use crate::arm::{
     DynamicArm, INERTIAL_NAMES, INERTIAL_NUMBERS, Inertial, inertial_unit, numbers, unit_number,
