@@ -364,3 +364,27 @@ fn the_only_joint_may_have_the_number_of_its_motor_on_a_bus() {
         assert!(made.contains(part), "{part} in\n{made}");
     }
 }
+
+#[test]
+fn counts_of_the_motors_on_a_bus_are_joints_with_a_question() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = "calib_robot: 1\nname: one\nunits: {length: mm, angle: deg}\nkinematics:\n  screws:\n    - {axis: [0, 1, 0], point: [0, 0, 0]}\n\
+                 tool: {point: [0, 0, -100]}\n";
+    put(&folder, "robot.yaml", robot);
+    let counted = |row: usize, column: usize| match column {
+        0 => format!("{}", 2048 + (900.0 * (0.1 * row as f64).sin()) as i64),
+        _ => wave(row, column),
+    };
+    put(
+        &folder,
+        "log.csv",
+        log("pos (5),current (5) [mA]", 2, counted),
+    );
+    let printed = calib(folder.path(), "init . --data log.csv");
+    assert_eq!(printed.code, Some(0), "{}", printed.both());
+    let made = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
+    assert!(
+        made.contains("q: {columns: [\"pos (5)\"], counts_per_turn: 4096}"),
+        "{made}"
+    );
+}
