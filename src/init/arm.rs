@@ -134,6 +134,7 @@ const OF_MOTORS: &str =
     "is it the torque at the joint? if at the motor: `torque_side: motor` next to `files`";
 const EXPECTED: &str =
     "by its name what the controller's own model expects; is it the measured torque at the joint?";
+const MODELLED: &str = "what the controller's own model expects: what it lacks is looked for; leave the line out to hold the declared masses against the torques";
 const EFFORT: &str = "drivers of ROS state torques or motor currents as effort";
 
 /// Whether the recordings are of torques: each has times, joints, and what drives them, and none has points. Then they are mapped as such.
@@ -159,6 +160,19 @@ impl ExaminedFile {
         let others = [TORQUES, CURRENTS, VELOCITIES];
         let joint = self.get("q").map(|joints| joints.choices[0].columns[0]);
         let own = joint.and_then(|column| Some(self.stated[column].joint()?.1));
+        // Numbers of motors on a bus begin anywhere.
+        let joints = self.get("q").into_iter();
+        let joints = joints.flat_map(|joints| &joints.choices[0].columns);
+        let numbers: Vec<usize> = joints
+            .filter_map(|column| Some(self.stated[*column].joint()?.1))
+            .collect();
+        let on_bus = |(key, number): (String, usize)| match own {
+            Some(first) if first > 1 && numbers.len() == count => {
+                let place = numbers.iter().position(|one| *one == number);
+                Some((key, place? + 1))
+            }
+            _ => Some((key, number)),
+        };
         let part = |column: usize| {
             let (name, joints) = (&self.stated[column], NAMED_JOINTS[2]);
             let stem = name.stem();
@@ -169,7 +183,7 @@ impl ExaminedFile {
                     Some((key, number)) if own == Some(number) => Some((key, 0)),
                     numbered => Some(numbered.unwrap_or((stem, 0))),
                 },
-                None => name.joint(),
+                None => name.joint().and_then(on_bus),
             }
         };
         let has = |key: &str, list| key.split(['_', '#']).any(|word| lists(list, word));
@@ -198,16 +212,14 @@ impl ExaminedFile {
         let wanted: Vec<bool> = self.stated.iter().map(wanted).collect();
         let is_wanted = |columns: &Vec<usize>| wanted[columns[0]];
         // What a controller expects is no measurement, where it says what it measured.
-        let is_measured = currents.iter().any(|columns| !is_wanted(columns));
+        let mut measured = currents.iter().chain(&torques);
+        let is_measured = measured.any(|columns| !is_wanted(columns));
         let (modelled, torques): (Vec<Vec<usize>>, Vec<Vec<usize>>) = torques
             .into_iter()
             .partition(|columns| is_measured && is_wanted(columns));
-        for columns in &modelled {
-            let names = self.shown(&columns[..1]);
-            self.remarks.push(format!(
-                "{} and so on: what the controller's own model expects, no measurement; currents are used",
-                quoted(&names)
-            ));
+        if let Some(best) = modelled.first() {
+            let is_stated = self.stated[best[0]].unit_of(&["Nm"]).is_some();
+            self.drive("simulated", &modelled, "Nm", is_stated, Some(MODELLED));
         }
         let joints = self.get("q").map(|joints| &joints.choices[0].lines[0]);
         let degrees = joints.is_some_and(|line| line.contains("unit: deg"));

@@ -141,20 +141,25 @@ pub(super) fn joints(
         found.extend((0..names.len()).filter(alone).map(|column| vec![column]));
         found.truncate(1);
     }
-    // Or that of the motor on a bus, where no other is logged: `pos (5)`.
-    if found.is_empty() && count == 1 {
+    // Or those of motors on a bus, whose numbers begin anywhere: `pos (5)`.
+    if found.is_empty() {
         let is_joint = |key: &str| {
             key.strip_suffix('#')
                 .is_some_and(|key| lists(ONE_JOINT, key))
         };
-        let numbered = |column: &usize| {
-            names[*column]
-                .joint()
-                .is_some_and(|(key, _)| is_joint(&key))
-                && angle(*column)
+        let number = |column: usize| {
+            let (key, number) = names[column].joint()?;
+            (is_joint(&key) && angle(column)).then_some((number, column))
         };
-        let all: Vec<usize> = (0..names.len()).filter(numbered).collect();
-        found.extend((all.len() == 1).then_some(all));
+        let mut all: Vec<(usize, usize)> = (0..names.len()).filter_map(number).collect();
+        all.sort_unstable();
+        let is_whole = all.windows(2).all(|pair| pair[0].0 < pair[1].0);
+        let columns = all.into_iter().map(|(_, column)| column);
+        match (count, is_whole) {
+            (1, _) => found.extend(columns.map(|column| vec![column])),
+            (_, true) if columns.len() == count => found.push(columns.collect()),
+            _ => {}
+        }
     }
     let longest = found.first().map_or(0, Vec::len);
     found.retain(|columns| columns.len() == longest);
@@ -374,7 +379,8 @@ mod tests {
         );
         let bus = ["pos (5)", "target pos (5)", "current (5)", "pos (3)"];
         assert_eq!(joints(&names(&bus[..3]), 1, |_| true), [[0]]);
-        assert!(joints(&names(&bus), 1, |_| true).is_empty());
+        assert_eq!(joints(&names(&bus), 1, |_| true), [[3], [0]]);
+        assert_eq!(joints(&names(&bus), 2, |_| true), [[3, 0]]);
         let robot = [
             "ur_shoulder_pan_joint",
             "ur_shoulder_lift_joint",

@@ -261,7 +261,7 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     out
 }
 
-const ORDER: &str = "point_id time trajectory q usage target torque current direction velocity x payload temperature";
+const ORDER: &str = "point_id time trajectory q usage target torque current simulated direction velocity x payload temperature";
 
 /// A mapping with what else may stand for it.
 fn mapped(mapping: &Mapping) -> String {

@@ -9,6 +9,8 @@ use crate::stage::ingest::is_clock_time;
 use crate::yaml::quoted;
 use std::path::Path;
 
+/// Larger numbers are no angles of joints, deg.
+const MOST_DEGREES: f64 = 400.0;
 /// No angle in rad is beyond this.
 const MOST_RADIANS: f64 = 6.5;
 /// rad: no joint turns as often.
@@ -76,10 +78,22 @@ impl ExaminedFile {
         let angle = |column: usize| {
             let unit = self.stated[column].unit;
             self.sheet.is_numeric(column)
-                && self.sheet.largest(column) <= 400.0
+                && self.sheet.largest(column) <= MOST_DEGREES
                 && unit.is_none_or(|unit| ["deg", "rad"].contains(&unit))
         };
+        let counted = |column: usize| {
+            let is_whole = self
+                .sheet
+                .numbers(column)
+                .all(|number| number.fract() == 0.0);
+            let none_said = self.stated[column].unit.is_none();
+            none_said && self.sheet.is_numeric(column) && is_whole
+        };
         let mut rows = joints(&self.stated, count, angle);
+        let in_counts = rows.is_empty();
+        if in_counts {
+            rows = joints(&self.stated, count, counted);
+        }
         rows.retain(|columns| {
             columns.iter().all(|column| self.sheet.is_numeric(*column)) && !self.is_unit(columns)
         });
@@ -112,6 +126,11 @@ impl ExaminedFile {
             .then(|| format!("of the {numbers} numbers of the list the first {count}"));
         let checks = several.into_iter().chain(of_list).chain(why);
         let what = format!("{} joints", best.len());
+        if in_counts && self.largest(&turning) > MOST_DEGREES {
+            let why = "counts of an encoder; how many are a turn, and which is zero?".to_string();
+            self.propose_joints("q", &rows, None, [why], &what);
+            return self.add("q", "counts_per_turn: 4096");
+        }
         self.propose_joints("q", &rows, Some(unit), checks, &what);
     }
 

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 pub struct CompareTorques {}
 
 crate::stage::stage! {
-    CompareTorques, "compare_torques", 6, "tests what changed between recordings of an arm's torques: what it carries, friction, offsets",
+    CompareTorques, "compare_torques", 7, "tests what changed between recordings of an arm's torques: what it carries, friction, offsets",
         CompareTorquesReads {
             robot: Robot,
             motion: Labelled<Chunks<ArmMotion>>,

@@ -210,6 +210,7 @@ impl<'a> RecordedTorques<'a> {
             time: motion.time,
             position: motion.q,
             velocity: motion.velocity,
+            simulated: motion.simulated,
             torque,
             temperature: motion.temperature,
             trajectory: trajectory.collect(),

@@ -31,6 +31,8 @@ pub struct ArmMotion {
     pub(crate) current: Option<Vec<f64>>,
     /// Nm, on the side of the joints.
     pub(crate) torque: Option<Vec<f64>>,
+    /// Nm, on the side of the joints, by another simulation.
+    pub(crate) simulated: Option<Vec<f64>>,
     /// C; NaN where a row has none.
     pub(crate) temperature: Option<Vec<f64>>,
 }
@@ -61,6 +63,7 @@ impl Table for ArmMotion {
             ("velocity", self.velocity.as_ref()),
             ("current", self.current.as_ref()),
             ("torque", self.torque.as_ref()),
+            ("simulated", self.simulated.as_ref()),
             ("temperature", self.temperature.as_ref()),
         ] {
             if let Some(values) = values {
@@ -97,6 +100,7 @@ impl Table for ArmMotion {
             velocity: numbers_of("velocity")?,
             current: numbers_of("current")?,
             torque: numbers_of("torque")?,
+            simulated: numbers_of("simulated")?,
             temperature: numbers_of("temperature")?,
             prismatic,
         })

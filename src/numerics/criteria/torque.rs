@@ -42,6 +42,8 @@ criteria! {
     /// Rows before that noise remembers, at most, where it is what the rich model leaves, whose slow part went with what is slow in that model,
     /// and where it is what a set leaves.
     MEMORY: [usize; 2] = [4, 12], "judged rows", "count: noise that lasts a fifth of a second has 0.71 of its density at rest by 4 rows, 0.98 by 12", "";
+    /// Times an upper bound of the scatter of least squares by which a fit by correlated noise must leave more than they do to be misled by it.
+    MISLED: f64 = 0.25, "ratio", "count: right models of twins leave less than 0.15, a servo in a loop of its encoder's counts 0.3 to 5", "";
     /// What a shape number that is not the usual one must gain beyond the logarithm of the number of rows.
     UNUSUAL: f64 = 4.0, "square", "literature: 95 % of one number", "";
     /// A gain that is worth a new shape or another step.

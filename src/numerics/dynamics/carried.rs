@@ -84,7 +84,7 @@ pub(super) fn carried(problem: &TorqueProblem) -> Vec<CarriedForm> {
 }
 
 /// The largest distance of the tool or a joint from another one, m.
-fn reach(arm: &DynamicArm) -> f64 {
+pub(super) fn reach(arm: &DynamicArm) -> f64 {
     let points = || arm.points.iter().chain([&arm.tool]);
     let far = points().flat_map(|a| points().map(move |b| (a - b).norm()));
     far.fold(SHORTEST, f64::max)
@@ -263,7 +263,9 @@ fn on_link(form: &TorqueForm, fitted: &Fitted) -> Vec<SeenNumber> {
     let length = Vector3::from_row_slice(&form.shape).norm();
     let mass = fitted.number("mass", "kg", values[0], &unit(0));
     let moment = fitted.number("moment", "kg m", values[1], &unit(1));
-    if is_seen(&mass) || !is_seen(&moment) {
+    // What is hardly seen of a mass says less of it than its moment and inertia do.
+    let is_known = mass.sigma < PRECISE * mass.value.abs();
+    if is_known || !is_seen(&moment) {
         let m = values[0];
         let place = unit(1) / m - unit(0) * (values[1] / (m * m));
         let place = fitted.number("distance", "m", values[1] / m, &place);

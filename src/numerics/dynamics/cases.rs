@@ -296,6 +296,58 @@ fn each_cause_of_one_joint_is_called_by_its_name() {
 }
 
 #[test]
+fn load_friction_is_found_by_its_law() {
+    fn friction(velocity: f64) -> f64 {
+        4.0 * velocity + 6.0 * sign(velocity)
+    }
+    let of_joint = |law: fn(Row) -> f64| {
+        diagnosed_with(&|row| friction(row.3) + if row.0 == 1 { law(row) } else { 0.0 })
+    };
+    let driven_back = of_joint(|row| {
+        let share = if row.5 * row.3 > 0.0 { 0.25 } else { 0.1 };
+        share * sign(row.3) * row.5.abs()
+    });
+    for (name, truth) in [("share", 0.25), ("share_driven_back", 0.1)] {
+        let share = number(&driven_back, "load_friction", name);
+        assert!((share - truth).abs() < 0.03, "{name}: {share}");
+    }
+    let square = of_joint(|row| 0.002 * sign(row.3) * row.5 * row.5);
+    let exponent = number(&square, "load_friction", "exponent");
+    assert!((exponent - 2.0).abs() < 0.3, "{exponent}");
+}
+
+#[test]
+fn what_the_simulation_of_a_recording_lacks_is_found_without_masses() {
+    let rigid = std::cell::RefCell::new(Vec::new());
+    let mut recording = record(&arm(), 0.0, &|row| {
+        rigid.borrow_mut().push(row.5);
+        match row.0 {
+            1 => 6.0 * row.3 + 5.0 * sign(row.3) + 0.2 * sign(row.3) * row.5.abs(),
+            _ => 0.0,
+        }
+    });
+    recording.simulated = Some(rigid.into_inner());
+    let bare = DynamicArm {
+        links: None,
+        ..arm()
+    };
+    let diagnosis = diagnose(&bare, &recording, &TorqueQuestion::default(), &mut |_| ()).unwrap();
+    let names = ["coulomb_friction", "load_friction", "viscous_friction"];
+    assert_eq!(
+        found(&diagnosis),
+        names.map(|name| format!("{name} joint 2"))
+    );
+    for (name, parameter, truth) in [
+        (names[0], "coulomb", 5.0),
+        (names[1], "share", 0.2),
+        (names[2], "viscous", 6.0),
+    ] {
+        let value = number(&diagnosis, name, parameter);
+        assert!((value / truth - 1.0).abs() < 0.05, "{name}: {value}");
+    }
+}
+
+#[test]
 fn a_payload_that_was_not_declared_is_found_with_its_mass() {
     let mut real = arm();
     real.payload = Some(Inertial {

@@ -253,7 +253,10 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
                 false => (DMatrix::zeros(0, 0), DVector::zeros(0)),
             });
         let forms = forms.collect();
-        let freedom = choice.weighted.measured.iter().map(Vec::len).sum::<usize>() as f64;
+        let measured = choice.weighted.measured.iter();
+        let rows = measured.zip(&choice.problem.noise);
+        let rows = rows.map(|(course, noise)| course.len() as f64 * noise.share_of_rows());
+        let freedom = rows.sum();
         let rows = EvidenceRows {
             freedom,
             square: choice.base.square,

@@ -2,19 +2,20 @@
 //! friction are common but for what the second recording shows to be another.
 
 use super::arm::DynamicArm;
-use super::carried::{Carried, carried, seen_numbers};
+use super::carried::{Carried, carried, reach, seen_numbers};
 use super::cause::{
-    COULOMB_FRICTION, CURRENT_OFFSET, InertialChanges, TorqueForm, VISCOUS_FRICTION,
+    COULOMB_FRICTION, CURRENT_OFFSET, FittedNumber, InertialChanges, TorqueForm, VISCOUS_FRICTION,
 };
 use super::columns::{TorqueColumn, TorqueColumns};
 use super::model::TorqueModel;
-use super::problem::{TorqueProblem, noise_of_fit};
+use super::problem::{TorqueBand, TorqueProblem, noise_of};
 use super::recording::TorqueSource;
 use super::sliding::unit_at;
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueQuestion};
 use super::used::UsedRecording;
 use super::weighted::{NoiseMemory, WeightedColumns};
+use crate::criteria::torque::NAMED;
 use crate::effect::Place;
 use crate::error::{Error, Result};
 use crate::estimate::tail;
@@ -100,7 +101,9 @@ pub fn changes(
         take_columns(problem, &base, &candidates, one.model, first.model);
     }
     let both = StackedColumns::new(&problems, shared.len());
-    let mut set = both.search();
+    let forms = first.model.places()?.forms;
+    let moved = problems[1].friction_moved(|scene| first.model.friction(&forms, scene));
+    let mut set = both.clear(both.search(), &problems[1], &moved);
     let fit = both.fit(&set);
     let solution = fit.solution();
     set.sort_by(|a, b| {
@@ -117,7 +120,8 @@ pub fn changes(
         }));
     }
     // A mass that is nowhere is not told of each link.
-    let unchanged = |form: &usize| !set.contains(form) && !both.is_link(*form);
+    let unchanged =
+        |form: &usize| !set.contains(form) && both.carries(*form) != Some(Carried::OnLink);
     for form in (0..both.all.forms.len()).filter(unchanged) {
         let with = fit.with(&[form]);
         changes.extend(change(&problems[1], &both, &with, form, None));
@@ -176,7 +180,13 @@ fn prepared<'a>(
         free_inertials: arm.links.is_none(),
         ..TorqueQuestion::default()
     };
-    let mut problem = TorqueProblem::new(arm, recording, &question, &clock, about.cutoff);
+    let mut problem = TorqueProblem::new(
+        arm,
+        recording,
+        &question,
+        &clock,
+        TorqueBand::whole(about.cutoff),
+    );
     problem.scene.turn_over(about.sign_width);
     problem
         .scene
@@ -211,7 +221,7 @@ fn take_columns(
     problem.theta.clone_from(&identified.inertials);
     problem.shift(identified.latency);
     let forms: Vec<usize> = (0..candidates.len()).collect();
-    problem.noise = noise_of_fit(problem, &forms, NoiseMemory::Short).0;
+    problem.noise = noise_of(problem, &forms, NoiseMemory::Short);
     problem.theta.clone_from(&about.inertials);
     problem.shift(identified.latency);
 }
@@ -286,12 +296,15 @@ struct StackedColumns {
     /// Judged rows of the second that count.
     rows: Vec<usize>,
     joints: usize,
+    /// kg, of the declared payload, and m, how far the arm reaches.
+    declared: f64,
+    reach: f64,
 }
 
 impl StackedColumns {
     /// Of two problems whose columns are alike; both have the first `shared` forms.
     fn new(problems: &[TorqueProblem; 2], shared: usize) -> Self {
-        let n = problems[0].joints();
+        let (n, arm) = (problems[0].joints(), problems[0].scene.arm);
         let runs = problems.each_ref().map(|problem| problem.runs(false));
         let weighings = [0, 1].map(|which| problems[which].weighing(&runs[which]));
         // A column of one of the two, as it is and whitened.
@@ -358,6 +371,8 @@ impl StackedColumns {
             measured: problems.each_ref().map(|one| one.measured.clone()).concat(),
             rows: problems[1].counted_rows(false),
             joints: n,
+            declared: arm.payload.map_or(0.0, |payload| payload.mass),
+            reach: reach(arm),
         }
     }
 
@@ -405,22 +420,68 @@ impl StackedColumns {
         }
     }
 
-    /// Whether a form is a mass on a link other than the last.
-    fn is_link(&self, form: usize) -> bool {
-        Carried::of(&self.all.forms[form]) == Some(Carried::OnLink)
+    /// What of a set is more than what the filter of the positions makes of friction in the second recording, Nm.
+    fn clear(&self, set: Vec<usize>, problem: &TorqueProblem, moved: &[Vec<f64>]) -> Vec<usize> {
+        let runs = problem.runs(false);
+        let unmoved = self.weighted.measured[..self.joints].iter();
+        let unmoved = unmoved.map(|course| vec![0.0; course.len()]);
+        let moved = problem.weighing(&runs).measured(moved);
+        let weighted = (self.weighted).with_measured(unmoved.chain(moved).collect());
+        let made = SweptColumns::base(&self.all, &weighted)
+            .with(&set)
+            .solution();
+        let solution = self.fit(&set).solution();
+        let square = |form: usize, solution: &[(usize, f64)]| -> f64 {
+            let mut torques = self
+                .measured
+                .iter()
+                .map(|course| vec![0.0; course.len()])
+                .collect::<Vec<_>>();
+            for column in self.all.of(form) {
+                self.all.columns[column].add(value_of(solution, column), &mut torques);
+            }
+            torques.iter().flatten().map(|value| value * value).sum()
+        };
+        let is_clear =
+            |form: &usize| square(*form, &solution) > NAMED.powi(2) * square(*form, &made);
+        set.into_iter().filter(is_clear).collect()
     }
 
-    /// Whether the numbers that a form would have are those of a body, where it is one.
+    /// What a form carries, if it does.
+    fn carries(&self, form: usize) -> Option<Carried> {
+        Carried::of(&self.all.forms[form])
+    }
+
+    /// Whether the numbers that a form would have are those of a body, where it is one: as far as they are seen.
     fn is_body(&self, now: &SweptColumns, form: usize) -> bool {
-        if !self.is_link(form) {
+        let Some(what) = self.carries(form) else {
             return true;
-        }
-        let solution = now.with(&[form]).solution();
-        let values: Vec<f64> = (self.all.of(form))
-            .map(|column| value_of(&solution, column))
-            .collect();
+        };
+        let fit = now.with(&[form]);
+        let (solution, columns) = (fit.solution(), self.all.of(form));
+        let number = |column: usize| FittedNumber {
+            value: value_of(&solution, column),
+            sigma: fit.sigma(column),
+        };
+        let numbers: Vec<FittedNumber> = columns.map(number).collect();
         let form = &self.all.forms[form];
-        (form.cause.is_possible)(form, &values)
+        match what {
+            Carried::OnLink => {
+                let seen = numbers.iter().map(|number| match number.is_seen() {
+                    true => number.value,
+                    false => 0.0,
+                });
+                (form.cause.is_possible)(form, &seen.collect::<Vec<f64>>())
+            }
+            // No mass is farther out than the arm reaches.
+            Carried::OnTool => {
+                let most = self.declared + numbers[0].value.abs() + 3.0 * numbers[0].sigma;
+                let moment = |number: &FittedNumber| number.value.abs() - 3.0 * number.sigma;
+                numbers[1..4]
+                    .iter()
+                    .all(|one| moment(one) < most * self.reach)
+            }
+        }
     }
 
     /// Other places where what a form carries would explain the data as well, with their probability among all places.

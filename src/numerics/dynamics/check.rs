@@ -51,11 +51,13 @@ fn sizes(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     claim("torques", n > 0 && joints == n, message);
     let message = format!("{rows} rows; at least {FEWEST} are needed");
     claim("torques", rows >= FEWEST, message);
-    let velocity = recording.velocity.as_ref().map_or(n * rows, Vec::len);
+    let [velocity, simulated] = [&recording.velocity, &recording.simulated]
+        .map(|values| values.as_ref().map_or(n * rows, Vec::len));
     let lengths = [
         ("position", recording.position.len(), n * rows),
         ("torque", recording.torque.len(), n * rows),
         ("velocity", velocity, n * rows),
+        ("simulated", simulated, n * rows),
         ("trajectory", recording.trajectory.len(), rows),
         ("held_out", recording.held_out.len(), rows),
     ];
@@ -165,7 +167,9 @@ pub(super) fn row_faults(
         ("position", &rows.position, n),
         ("torque", &rows.torque, n),
     ];
-    let faults: Vec<Fault> = columns.into_iter().filter_map(not_a_number).collect();
+    let simulated = rows.simulated.iter().map(|values| ("simulated", values, n));
+    let faults = columns.into_iter().chain(simulated);
+    let faults: Vec<Fault> = faults.filter_map(not_a_number).collect();
     if !faults.is_empty() {
         return faults;
     }

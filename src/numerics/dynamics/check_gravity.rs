@@ -22,9 +22,9 @@ const TRIED: usize = 300;
 /// rad.
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// All of them; none where no masses are declared.
+/// All of them; none where no masses are declared, or where another simulation stands for them.
 pub(super) fn gravity_faults(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
-    let Some(links) = &arm.links else {
+    let Some(links) = arm.links.as_ref().filter(|_| recording.simulated.is_none()) else {
         return Vec::new();
     };
     let theta = DeclaredInertials::of(arm, links).theta;

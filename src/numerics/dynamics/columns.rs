@@ -459,6 +459,8 @@ fn base_columns(scene: &DynamicScene, regressor: &ReducedRegressor) -> Base {
                 .flat_map(|(link, all)| all.iter().map(move |ten| (link, *ten)))
                 .collect()
         }
+        // Another simulation has its masses.
+        None if scene.beyond.is_some() => Vec::new(),
         None => {
             let base = base_parameters(regressor).into_iter();
             base.map(|number| (number / INERTIAL_NUMBERS, unit_number(number)))

@@ -3,7 +3,7 @@
 
 use super::problem::{TorqueProblem, basic_forms, noise_of_fit};
 use super::recording::square;
-use super::refine::{FrictionFit, joint_sign_widths, sign_width};
+use super::refine::{FrictionFit, take_sign_widths};
 use super::sweep::SweptColumns;
 use super::weighted::{NoiseMemory, Weighing};
 
@@ -163,13 +163,8 @@ pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
     let is_new = (found - before).abs() > SAME;
     problem.scene.friction_lead = if is_new { found } else { before };
     if is_new {
-        let width = sign_width(problem);
-        problem.scene.turn_over(width);
-        if is_one {
-            // A solver lets friction turn over an acceleration: the lighter a joint, the wider.
-            let widths = joint_sign_widths(problem);
-            problem.scene.turn_each_over(widths);
-        }
+        // A solver lets friction turn over an acceleration: the lighter a joint, the wider.
+        take_sign_widths(problem, is_one);
     }
     is_new
 }

@@ -138,17 +138,19 @@ fn solved<'a>(
         return Err(Error::data("time", message));
     }
     let most = HIGHEST_CUTOFF * clock.rate;
+    let usual = recording::cutoff(&recording, clock).min(most);
+    let common = (!question.free_inertials)
+        .then(|| spectrum::common(arm, &recording, clock, usual))
+        .flatten();
     let (cutoff, remark) = match question.cutoff {
         Some(asked) => (asked.min(most), None),
         None => {
-            let usual = recording::cutoff(&recording, clock).min(most);
-            let common = (!question.free_inertials)
-                .then(|| spectrum::common(arm, &recording, clock, usual))
-                .flatten();
             let remark = common.map(|common| spectrum::remark(common, usual));
             (common.unwrap_or(usual), remark)
         }
     };
-    let solved = solve::solve(arm, recording, question, clock, cutoff, tell);
+    let followed = common.map_or(cutoff, |common| common.min(cutoff));
+    let band = problem::TorqueBand { cutoff, followed };
+    let solved = solve::solve(arm, recording, question, clock, band, tell);
     Ok((solved, remark))
 }

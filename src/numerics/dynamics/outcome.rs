@@ -25,6 +25,9 @@ const UNEXPLAINED: f64 = 1.5;
 /// Rows that count as one, from which on a residual is no noise.
 const LASTING: f64 = 8.0;
 
+/// What is said where the recording has its own simulation.
+const SIMULATED: &str = "measured torques are held against the simulated ones of the recording: what is found is what that simulation lacks";
+
 /// All of it.
 pub(super) fn outcome(
     solved: &SolvedTorques,
@@ -52,6 +55,9 @@ pub(super) fn outcome(
         remarks.push(bodies_remark(enforced, &free, &after));
     }
     remarks.push(filters_remark(problem));
+    if problem.scene.beyond.is_some() {
+        remarks.push(SIMULATED.into());
+    }
     let mut found = fit.findings(&solved.silent, &held);
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));

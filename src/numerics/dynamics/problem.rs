@@ -3,22 +3,41 @@
 use super::arm::{DynamicArm, INERTIAL_NUMBERS};
 use super::cause::{
     COULOMB, OFFSET, ROTOR, TORQUE_CAUSES, TorqueCause, TorqueForm, VISCOUS, friction_of,
+    of_greatest_load,
 };
 use super::columns::{ReducedRegressor, Reduction, TorqueColumn, TorqueColumns, columns_of};
 use super::recording::{
-    RecordingClock, TorqueRecording, add, by_joint, ends, lagrange, largest, square,
+    RecordingClock, TorqueRecording, add, by_joint, dot, ends, lagrange, largest, square,
 };
 use super::scene::DynamicScene;
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{JointNoise, NoiseMemory, Weighing, WeightedColumns};
 use crate::criteria::cells::FAR;
+use crate::criteria::torque::MISLED;
 use crate::effect::Place;
 use crate::statistics::nearest;
 use std::ops::Range;
 
 /// s around an event whose rows do not count either.
 const EVENT_MARGIN: f64 = 0.3;
+
+/// Hz: the low-pass, and up to where positions are those of the motion, not counts of an encoder.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TorqueBand {
+    pub(crate) cutoff: f64,
+    pub(crate) followed: f64,
+}
+
+impl TorqueBand {
+    /// Positions are of the motion in all of it.
+    pub(crate) fn whole(cutoff: f64) -> Self {
+        Self {
+            cutoff,
+            followed: cutoff,
+        }
+    }
+}
 
 /// What all steps work on.
 pub(super) struct TorqueProblem<'a> {
@@ -32,11 +51,15 @@ pub(super) struct TorqueProblem<'a> {
     pub(crate) theta: Vec<f64>,
     /// `[joint][row]`, rows as recorded, filtered.
     torque: Vec<Vec<f64>>,
+    /// Nm, `[joint][judged row]`: of the recording's own simulation less those of the declared masses.
+    beyond: Option<Vec<Vec<f64>>>,
     /// s by which torques come late.
     pub(crate) latency: f64,
     /// Nm, `[joint][judged row]`: how far differentiation and rounding of the positions may move the rigid torque, by how far it moves with the
     /// filter of the positions; 0 where no masses are declared.
     pub(crate) numerics: Vec<Vec<f64>>,
+    /// rad/s, of positions filtered at half the frequency.
+    coarse_velocity: Vec<Vec<f64>>,
     /// `[joint]`: measured minus rigid torque of judged rows.
     pub(crate) measured: Vec<Vec<f64>>,
     /// Whether each judged row is held out.
@@ -59,9 +82,10 @@ impl<'a> TorqueProblem<'a> {
         recording: TorqueRecording,
         question: &TorqueQuestion,
         clock: &RecordingClock,
-        cutoff: f64,
+        band: TorqueBand,
     ) -> Self {
-        let scene = DynamicScene::new(arm, &recording, clock, cutoff, question.free_inertials);
+        let (cutoff, free) = (band.cutoff, question.free_inertials);
+        let scene = DynamicScene::new(arm, &recording, clock, band.followed, free);
         let reduction = Reduction::new(clock, cutoff);
         let regressor = ReducedRegressor::of(&scene, &reduction);
         let mut torque = by_joint(&recording.torque, recording.joints);
@@ -72,12 +96,13 @@ impl<'a> TorqueProblem<'a> {
         );
         let temperature = recording.temperature.as_ref();
         let temperature = temperature.map(|all| ends(all.iter().copied()));
-        let coarse =
-            DynamicScene::half_band(arm, &recording, clock, cutoff, question.free_inertials);
+        let coarse = DynamicScene::half_band(arm, &recording, clock, band.followed, free);
         let numerics = numerics_of(&scene, &coarse, &reduction);
         let rows = reduction.rows.iter();
         let mut problem = Self {
+            beyond: scene.beyond.clone().map(|beyond| reduction.reduce(beyond)),
             numerics,
+            coarse_velocity: coarse.velocity,
             held_out: rows.map(|row| recording.held_out[*row]).collect(),
             all: TorqueColumns::default(),
             scene,
@@ -209,6 +234,9 @@ impl<'a> TorqueProblem<'a> {
         {
             self.scene.tilt(theta);
         }
+        for form in &mut self.all.forms {
+            of_greatest_load(form, &self.scene);
+        }
         self.renew(0..self.all.forms.len(), |cause| cause.of_rigid);
     }
 
@@ -244,10 +272,21 @@ impl<'a> TorqueProblem<'a> {
         let course = &self.torque[joint];
         let stretches = &self.scene.stretches;
         let stretch_of = |row: usize| stretches.iter().find(|stretch| stretch.contains(&row));
+        let later = latency * self.scene.rate;
+        let (whole, share) = (later.floor(), later - later.floor());
+        let weights: Vec<f64> = lagrange(&NODES, share).collect();
         let at = |row: &usize| {
             let stretch = stretch_of(*row).cloned().unwrap_or(*row..*row + 1);
-            let at = (row - stretch.start) as f64 + latency * self.scene.rate;
-            interpolated(&course[stretch], at)
+            let begin = (row - stretch.start) as f64 + whole + NODES[0];
+            let course = &course[stretch];
+            let within = begin >= 0.0 && begin as usize + NODES.len() <= course.len();
+            match within {
+                true => dot(
+                    &weights,
+                    &course[begin as usize..begin as usize + NODES.len()],
+                ),
+                false => interpolated(course, begin - NODES[0] + share),
+            }
         };
         self.reduction.rows.iter().map(at).collect()
     }
@@ -261,6 +300,9 @@ impl<'a> TorqueProblem<'a> {
                 -1.0,
                 &self.regressor.torque(joint, &self.theta),
             );
+            if let Some(beyond) = &self.beyond {
+                add(&mut course, -1.0, &beyond[joint]);
+            }
             course
         };
         (0..self.torque.len()).map(of_joint).collect()
@@ -278,6 +320,43 @@ impl<'a> TorqueProblem<'a> {
         let courses = joints.iter().map(|joint| &self.numerics[*joint]);
         let squares = courses.flat_map(|course| rows.iter().map(|row| course[*row].powi(2)));
         (squares.sum::<f64>() / (rows.len() * joints.len()).max(1) as f64).sqrt()
+    }
+
+    /// Nm, `[joint][judged row]`: how far some friction moves with the filter of the positions. Where a joint turns is not exactly at a row.
+    pub(crate) fn friction_moved(
+        &mut self,
+        friction: impl Fn(&DynamicScene) -> Vec<Vec<f64>>,
+    ) -> Vec<Vec<f64>> {
+        let mut moved = friction(&self.scene);
+        std::mem::swap(&mut self.scene.velocity, &mut self.coarse_velocity);
+        let coarse = friction(&self.scene);
+        std::mem::swap(&mut self.scene.velocity, &mut self.coarse_velocity);
+        let courses = moved.iter_mut().zip(&coarse);
+        courses.for_each(|(fine, coarse)| add(fine, -1.0, coarse));
+        self.reduction.reduce(moved)
+    }
+
+    /// Coefficients that a fit of the base and a set has of how far the friction of a solution moves with the filter of the positions.
+    pub(crate) fn moved_by_filter(
+        &mut self,
+        weighted: &WeightedColumns,
+        set: &[usize],
+        solution: &[(usize, f64)],
+    ) -> Vec<(usize, f64)> {
+        let coefficients = set
+            .iter()
+            .map(|number| self.coefficients(*number, solution));
+        let coefficients: Vec<Vec<f64>> = coefficients.collect();
+        let forms = set.iter().map(|number| self.all.forms[*number].clone());
+        let forms: Vec<TorqueForm> = forms.collect();
+        let moved = self.friction_moved(|scene| {
+            let coefficients = coefficients.iter().map(Vec::as_slice);
+            friction_of(forms.iter().zip(coefficients), scene)
+        });
+        let runs = self.runs(false);
+        let weighted = weighted.with_measured(self.weighing(&runs).measured(&moved));
+        let fit = SweptColumns::base(&self.all, &weighted).with(set);
+        fit.solution()
     }
 
     /// Courses of the regressor at each joint in some judged rows.
@@ -401,7 +480,13 @@ fn runs_where(rows: Range<usize>, counts: impl Fn(usize) -> bool) -> Vec<Range<u
     ends.collect()
 }
 
-/// A smooth course between its rows: cubic through the four nearest.
+/// Rows about a time between two rows: a polynomial through fewer would smooth noise below the low-pass, which so would be less the farther
+/// a time is from a row.
+const NODES: [f64; 16] = [
+    -7.0, -6.0, -5.0, -4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0,
+];
+
+/// A smooth course between its rows near an end: cubic through the four nearest.
 fn interpolated(course: &[f64], at: f64) -> f64 {
     let last = course.len() - 1;
     let at = at.clamp(0.0, last as f64);
@@ -468,10 +553,48 @@ pub(super) fn noise_of_fit(
     (noise.collect(), residual)
 }
 
+/// s over which noise is summed up where its correlation misleads: friction changes its sign, and with it what it weighs, within a second.
+const LASTS: f64 = 0.25;
+
+/// Noise of each joint by a fit of the base and some forms that is thought to be right. White at joints where its correlation misleads (Hausman,
+/// 1978): a fit by correlated noise weighs what changes from row to row, where a model that only nearly holds is wrong, and leaves more than
+/// least squares by more than the scatter of these.
+pub(super) fn noise_of(
+    problem: &TorqueProblem,
+    forms: &[usize],
+    memory: NoiseMemory,
+) -> Vec<JointNoise> {
+    let (noise, least) = noise_of_fit(problem, forms, memory);
+    let runs = problem.runs(false);
+    let weighing = Weighing {
+        noise: &noise,
+        runs: &runs,
+    };
+    let weighted = problem.weighted_by(weighing, forms);
+    let fit = SweptColumns::base(&problem.all, &weighted).with(forms);
+    let left = problem.residual(&fit.solution());
+    let columns = problem.all.with_base(forms);
+    let lasts = (LASTS * problem.reduction.rate) as usize;
+    let of_joint = |(joint, noise): (usize, &JointNoise)| {
+        let sum = |course: &Vec<f64>| -> f64 {
+            runs.iter().map(|run| square(&course[run.clone()])).sum()
+        };
+        let more = sum(&left[joint]) - sum(&least[joint]);
+        let acting = columns.iter();
+        let acting = acting.filter(|column| problem.all.columns[**column].at(joint).is_some());
+        let scatter = acting.count() as f64 * noise.sigma.powi(2) * noise.autocorrelation();
+        match more > *MISLED * scatter {
+            true => noise.evened(&least[joint], &runs, lasts),
+            false => noise.clone(),
+        }
+    };
+    noise.iter().enumerate().map(of_joint).collect()
+}
+
 /// Noise by which what is found is weighed in the end: what the rich model leaves has lost its slow part with what is slow in that model, so
 /// that its course is that of what a set leaves.
 pub(super) fn noise_left(problem: &TorqueProblem, set: &[usize]) -> Vec<JointNoise> {
-    let left = noise_of_fit(problem, set, NoiseMemory::Long).0;
+    let left = noise_of(problem, set, NoiseMemory::Long);
     let rich = problem.noise.iter();
     rich.zip(left)
         .map(|(rich, left)| JointNoise {

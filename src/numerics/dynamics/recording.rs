@@ -19,6 +19,9 @@ pub struct TorqueRecording {
     pub velocity: Option<Vec<f64>>,
     /// Nm at the joint, rows x n: a torque sensor's, or current times ratio and torque constant.
     pub torque: Vec<f64>,
+    /// Nm at the joint by another simulation, rows x n: what is looked at is measured minus simulated. `None`: those of the declared masses, or of
+    /// identified ones, are the simulation.
+    pub simulated: Option<Vec<f64>>,
     /// Temperature of the gears, K or degrees C; length rows.
     pub temperature: Option<Vec<f64>>,
     /// Which trajectory a row belongs to, length rows: nothing is filtered from one into the next unless the clock goes on without a gap.
@@ -53,6 +56,7 @@ impl TorqueRecording {
         Self {
             joints: other.joints,
             velocity: other.velocity.as_ref().map(|_| Vec::new()),
+            simulated: other.simulated.as_ref().map(|_| Vec::new()),
             temperature: other.temperature.as_ref().map(|_| Vec::new()),
             from_current: other.from_current,
             ..Self::default()
@@ -60,12 +64,13 @@ impl TorqueRecording {
     }
 
     /// Columns of numbers, and how many of them a row has.
-    pub(super) fn columns(&self) -> [(Option<&Vec<f64>>, usize); 5] {
+    pub(super) fn columns(&self) -> [(Option<&Vec<f64>>, usize); 6] {
         [
             (Some(&self.time), 1),
             (Some(&self.position), self.joints),
             (self.velocity.as_ref(), self.joints),
             (Some(&self.torque), self.joints),
+            (self.simulated.as_ref(), self.joints),
             (self.temperature.as_ref(), 1),
         ]
     }
@@ -81,6 +86,7 @@ impl TorqueRecording {
             Some(&mut self.position),
             self.velocity.as_mut(),
             Some(&mut self.torque),
+            self.simulated.as_mut(),
             self.temperature.as_mut(),
         ];
         for (column, (other, wide)) in columns.into_iter().zip(other.columns()) {

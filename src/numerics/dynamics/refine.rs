@@ -344,7 +344,7 @@ const FINER: [f64; 4] = [0.35, 0.17, 0.08, 0.04];
 const RIDGE: f64 = 1e-6;
 
 /// The best near one of [`SIGN_WIDTHS`], rad/s.
-pub(super) fn sign_width(problem: &mut TorqueProblem) -> f64 {
+fn sign_width(problem: &mut TorqueProblem) -> f64 {
     let fit = FrictionFit::new(problem);
     best_width(&mut |width| {
         problem.scene.turn_over(width);
@@ -352,8 +352,20 @@ pub(super) fn sign_width(problem: &mut TorqueProblem) -> f64 {
     })
 }
 
+/// Takes the width that is best for all joints, or that of each by itself: where it is asked for, and where some joints turn and others slide,
+/// whose speeds have other units.
+pub(super) fn take_sign_widths(problem: &mut TorqueProblem, each: bool) {
+    let width = sign_width(problem);
+    problem.scene.turn_over(width);
+    let slides = &problem.scene.arm.prismatic;
+    if each || (slides.contains(&true) && slides.contains(&false)) {
+        let widths = joint_sign_widths(problem);
+        problem.scene.turn_each_over(widths);
+    }
+}
+
 /// The best of each joint by itself, rad/s.
-pub(super) fn joint_sign_widths(problem: &mut TorqueProblem) -> Vec<f64> {
+fn joint_sign_widths(problem: &mut TorqueProblem) -> Vec<f64> {
     let fit = FrictionFit::new(problem);
     let of_joint = |joint: usize| {
         best_width(&mut |width| {

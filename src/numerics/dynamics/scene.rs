@@ -1,9 +1,9 @@
 //! The recording as causes see it: motion, rigid torque and clock at the recording's own rate, joint after joint.
 
-use super::arm::{DeclaredInertials, DynamicArm};
+use super::arm::{DeclaredInertials, DynamicArm, INERTIAL_NUMBERS};
 use super::filter::{ZeroPhase, derivatives};
 use super::newton_euler::{InverseDynamics, MotionRow, turn};
-use super::recording::{RecordingClock, TorqueRecording, by_joint};
+use super::recording::{RecordingClock, TorqueRecording, add, by_joint};
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
 
@@ -28,6 +28,8 @@ pub(super) struct DynamicScene<'a> {
     pub(crate) acceleration: Vec<Vec<f64>>,
     /// Nm, of the inertials as they are believed at present, payload included.
     pub(crate) rigid: Vec<Vec<f64>>,
+    /// Nm, of the recording's own simulation less those of the declared masses (of none where none are declared).
+    pub(crate) beyond: Option<Vec<Vec<f64>>>,
     /// Nm, of friction as it is believed at present.
     pub(crate) friction: Vec<Vec<f64>>,
     /// Nm, under a gravity as strong as the declared one along two directions across it ([`across`]): of the declared masses, once a tilt is known
@@ -88,6 +90,7 @@ impl<'a> DynamicScene<'a> {
             velocity: nothing(),
             acceleration: nothing(),
             rigid: nothing(),
+            beyond: None,
             friction: nothing(),
             sideways: [nothing(), nothing()],
             sign_width: SIGN_WIDTHS[1],
@@ -106,10 +109,25 @@ impl<'a> DynamicScene<'a> {
                 );
             }
         }
-        if let Some(declared) = &scene.declared {
-            let theta = declared.theta.clone();
-            scene.believe(&theta);
-            scene.tilt(&theta);
+        let theta = scene
+            .declared
+            .as_ref()
+            .map(|declared| declared.theta.clone());
+        scene.beyond = recording.simulated.as_ref().map(|simulated| {
+            let mut beyond = by_joint(simulated, n);
+            if let Some(theta) = &theta {
+                let rigid = scene.torques_of(theta);
+                let courses = beyond.iter_mut().zip(&rigid);
+                courses.for_each(|(course, rigid)| add(course, -1.0, rigid));
+            }
+            beyond
+        });
+        match theta {
+            Some(theta) => {
+                scene.believe(&theta);
+                scene.tilt(&theta);
+            }
+            None => scene.believe(&vec![0.0; INERTIAL_NUMBERS * n]),
         }
         scene
     }
@@ -165,6 +183,9 @@ impl<'a> DynamicScene<'a> {
     /// Takes 10 n inertial numbers for the rigid torques.
     pub(crate) fn believe(&mut self, theta: &[f64]) {
         self.rigid = self.torques_of(theta);
+        let beyond = self.beyond.iter().flatten();
+        let courses = self.rigid.iter_mut().zip(beyond);
+        courses.for_each(|(course, beyond)| add(course, 1.0, beyond));
     }
 
     /// Rigid torques of 10 n inertial numbers, `[joint][row]`.

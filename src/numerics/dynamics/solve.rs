@@ -6,10 +6,11 @@ use super::cells::{CauseChoice, all_but, faint, from_common, priors, search, set
 use super::contact::contacts;
 use super::latency::{Latency, latency, take_friction_lead};
 use super::problem::{
-    TorqueProblem, basic_forms, noise_apart, noise_left, noise_of_fit, rich_forms,
+    TorqueBand, TorqueProblem, basic_forms, noise_apart, noise_left, noise_of, noise_of_fit,
+    rich_forms,
 };
 use super::recording::{RecordingClock, TorqueRecording};
-use super::refine::{ShapeSlopes, polish, refine, sign_width, take_out_ends};
+use super::refine::{ShapeSlopes, polish, refine, take_out_ends, take_sign_widths};
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{NoiseMemory, WeightedColumns};
@@ -43,12 +44,11 @@ pub(super) fn solve<'a>(
     recording: TorqueRecording,
     question: &TorqueQuestion,
     clock: &RecordingClock,
-    cutoff: f64,
+    band: TorqueBand,
     tell: &mut dyn FnMut(String),
 ) -> SolvedTorques<'a> {
-    let mut problem = TorqueProblem::new(arm, recording, question, clock, cutoff);
-    let width = sign_width(&mut problem);
-    problem.scene.turn_over(width);
+    let mut problem = TorqueProblem::new(arm, recording, question, clock, band);
+    take_sign_widths(&mut problem, false);
     problem.form();
     let found = clocked(&mut problem);
     if let Some(latency) = &found {
@@ -101,7 +101,8 @@ pub(super) fn solve<'a>(
     problem.noise = noise_left(&problem, &set);
     weighted = problem.weighted(&set);
     silent.extend(faint(&CauseChoice::new(&problem, &weighted), &set, &silent));
-    silent.extend(too_small(&problem, &weighted, &set, &silent));
+    let small = too_small(&mut problem, &weighted, &set, &silent);
+    silent.extend(small);
     problem.noise = rich;
     weighted = problem.weighted(&set);
     let priors = priors(&CauseChoice::new(&problem, &weighted), &set);
@@ -166,12 +167,12 @@ fn again(
 
 /// Takes noise from what the rich model and a set leave.
 fn learn(problem: &mut TorqueProblem, set: &[usize]) {
-    problem.noise = noise_of_fit(problem, &rich_forms(problem, set), NoiseMemory::Short).0;
+    problem.noise = noise_of(problem, &rich_forms(problem, set), NoiseMemory::Short);
 }
 
-/// What of a set makes less torque than differentiation and rounding of the positions may.
+/// What of a set makes less torque than differentiation and rounding of the positions may: in rigid torques, and in friction where a joint turns.
 fn too_small(
-    problem: &TorqueProblem,
+    problem: &mut TorqueProblem,
     weighted: &WeightedColumns,
     set: &[usize],
     silent: &[usize],
@@ -179,9 +180,11 @@ fn too_small(
     let solution = SweptColumns::base(&problem.all, weighted)
         .with(set)
         .solution();
+    let moved = problem.moved_by_filter(weighted, set, &solution);
     let is_small = |form: &usize| {
         let joints = problem.all.forms[*form].acts_on(problem.joints());
-        problem.rms_of(*form, &solution) < problem.numerics_at(&joints)
+        let rms = problem.rms_of(*form, &solution);
+        rms < problem.numerics_at(&joints) || rms < *NAMED * problem.rms_of(*form, &moved)
     };
     let asked = set.iter().copied().filter(|form| !silent.contains(form));
     asked.filter(is_small).collect()

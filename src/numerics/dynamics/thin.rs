@@ -212,6 +212,7 @@ impl Thinner {
                 position: thinned(&stretch.position),
                 velocity: stretch.velocity.as_deref().map(thinned),
                 torque: thinned(&stretch.torque),
+                simulated: stretch.simulated.as_deref().map(thinned),
                 temperature: stretch.temperature.as_deref().map(picked),
                 trajectory: vec![number; chosen.len()],
                 held_out: chosen.iter().map(|row| stretch.held_out[*row]).collect(),

@@ -264,6 +264,37 @@ impl JointNoise {
         }
     }
 
+    /// White noise as dense as a course over runs is where it changes slowly, by its correlation over so many rows (Newey & West, 1987): what
+    /// explains it need not be right from row to row.
+    pub(crate) fn evened(&self, course: &[f64], runs: &[Range<usize>], rows: usize) -> Self {
+        let products = |lag: usize| -> f64 {
+            let of_run = |run: &Range<usize>| {
+                let run = &course[run.clone()];
+                dot(
+                    &run[..run.len().saturating_sub(lag)],
+                    run.get(lag..).unwrap_or_default(),
+                )
+            };
+            runs.iter().map(of_run).sum()
+        };
+        let share = |lag: usize| 2.0 * (1.0 - lag as f64 / (rows + 1) as f64);
+        let others: f64 = (1..=rows).map(|lag| share(lag) * products(lag)).sum();
+        let lasting = 1.0 + others / products(0).max(f64::MIN_POSITIVE);
+        Self {
+            innovation: self.sigma * lasting.max(1.0).sqrt(),
+            memory: Vec::new(),
+            ..*self
+        }
+    }
+
+    /// What a row counts for: less than one where the noise is evened.
+    pub(crate) fn share_of_rows(&self) -> f64 {
+        match self.memory.is_empty() {
+            true => (self.sigma / self.innovation).powi(2).min(1.0),
+            false => 1.0,
+        }
+    }
+
     /// How many rows in a row count as one for what is slow.
     pub(crate) fn autocorrelation(&self) -> f64 {
         let gain = 1.0 - self.memory.iter().sum::<f64>();

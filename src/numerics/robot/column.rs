@@ -358,6 +358,18 @@ pub static CIRCUMSTANCES: &[DeclaredColumn] = &[
         )
     },
     DeclaredColumn {
+        shape: ColumnShape::Joints {
+            prismatic: Some((Force, [-1e7, 1e7])),
+        },
+        ..DeclaredColumn::number(
+            "simulated",
+            &["sim_tau{j}"],
+            Torque,
+            [-1e7, 1e7],
+            "The same by another simulation or by the controller's model, at the joints: `diagnose_torques` then looks at measured minus simulated.",
+        )
+    },
+    DeclaredColumn {
         shape: ColumnShape::Joints { prismatic: None },
         ..DeclaredColumn::number(
             "direction",

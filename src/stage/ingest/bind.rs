@@ -11,6 +11,7 @@ use crate::observation::{Convention, DeclaredColumn};
 use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
 use std::collections::BTreeSet;
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Names in an error message; a header of thousands must not fill the screen.
@@ -500,6 +501,12 @@ impl Binder<'_> {
                 true => (&joints.linear_unit, "prismatic", "linear_unit"),
                 false => (&joints.unit, "revolute", "unit"),
             };
+            let counts = joints.counts_per_turn.filter(|_| !linear);
+            let symbol = match (counts, declared.quantity) {
+                (None, _) => symbol.as_deref(),
+                (Some(_), Quantity::Angle) => Some("rad"),
+                (Some(_), _) => Some("rad/s"),
+            };
             if symbol.is_none() && declared.quantity != Quantity::Number {
                 let number = joint + 1;
                 self.fault(format!(
@@ -507,7 +514,7 @@ impl Binder<'_> {
                 ));
                 continue;
             }
-            let unit = unit(symbol.as_deref())?;
+            let unit = unit(symbol)?;
             if let Some(column) = self.column(reference, name, false) {
                 let index = arm.slots.of(name).start + joint;
                 let cell = self.cell(declared, is_prismatic, index, column, unit);
@@ -517,6 +524,7 @@ impl Binder<'_> {
                     optional: joints.optional,
                     sign,
                     zero,
+                    divisor: counts.map_or(1.0, |counts| counts / TAU),
                     unit_setting: setting,
                     ..cell
                 });

@@ -158,6 +158,9 @@ pub struct JointColumns {
     /// Unit of the file's numbers; for positions and velocities that of the revolute joints, e.g. `deg`.
     #[serde(default)]
     pub(crate) unit: Option<String>,
+    /// What an encoder counts in a turn of the joint, instead of `unit` for positions and velocities of revolute joints, e.g. 4096.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) counts_per_turn: Option<f64>,
     /// Unit of the positions, velocities or forces of prismatic joints, e.g. `mm`, `mm/s`, `N`.
     #[serde(default)]
     pub(crate) linear_unit: Option<String>,

@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct IngestTorques {
     /// The raw files, each with all quantities; one continues the other. `q`, `time`, and one of `torque` and `current` are needed;
-    /// `trajectory`, `usage`, `velocity` and `temperature` are used where they are mapped.
+    /// `simulated`, `trajectory`, `usage`, `velocity` and `temperature` are used where they are mapped.
     pub(crate) files: Vec<FileLayout>,
     /// On which side of the gears `torque` is stated.
     #[serde(default)]
@@ -53,7 +53,7 @@ fn few() -> f64 {
 }
 
 /// Quantities that a recording of torques may have.
-const USED: &str = "q, time, torque, current, trajectory, usage, velocity, temperature";
+const USED: &str = "q, time, torque, current, simulated, trajectory, usage, velocity, temperature";
 /// Rows of the table in memory at once.
 const CHUNK: usize = 1 << 16;
 /// More labels than these are no labels: another column is mapped.
@@ -266,10 +266,12 @@ impl<'a> MotionRows<'a> {
         }
         if self.written == 0 && self.chunk.rows() == 0 {
             self.chunk.velocity = has("velocity").then(Vec::new);
+            self.chunk.simulated = has("simulated").then(Vec::new);
             self.chunk.temperature = has("temperature").then(Vec::new);
         }
         for (name, first) in [
             ("velocity", self.chunk.velocity.is_some()),
+            ("simulated", self.chunk.simulated.is_some()),
             ("temperature", self.chunk.temperature.is_some()),
         ] {
             if first != has(name) {
@@ -292,13 +294,19 @@ impl<'a> MotionRows<'a> {
         };
         let has_velocity = self.chunk.velocity.is_some();
         let velocity = || has_velocity.then(|| blank("velocity")).flatten();
+        let has_simulated = self.chunk.simulated.is_some();
+        let simulated = || has_simulated.then(|| blank("simulated")).flatten();
         let is_timed = row.values.get(self.arm.slots.time);
         let time = || {
             is_timed
                 .filter(|time| time.is_nan())
                 .map(|_| "time is blank".into())
         };
-        match blank(signal).or_else(velocity).or_else(time) {
+        match blank(signal)
+            .or_else(velocity)
+            .or_else(simulated)
+            .or_else(time)
+        {
             Some(detail) => refuse(Reason::Blank, detail),
             None => Ok(()),
         }
@@ -311,8 +319,8 @@ impl<'a> MotionRows<'a> {
 
     fn push(&mut self, row: &RecordedRow, label: &str, context: &Context) -> Result<()> {
         let faulty = |message: String| Error::data(format!("{label}:{}", row.line), message);
-        let [q, velocity, temperature] =
-            ["q", "velocity", "temperature"].map(|setting| self.values(row, setting));
+        let [q, velocity, simulated, temperature] =
+            ["q", "velocity", "simulated", "temperature"].map(|setting| self.values(row, setting));
         let signal = self.values(row, self.signal.unwrap_or("torque"));
         let time = row.values.get(self.arm.slots.time).copied();
         let time = time.unwrap_or(f64::NAN);
@@ -346,6 +354,7 @@ impl<'a> MotionRows<'a> {
         }
         for (all, more) in [
             (&mut chunk.velocity, velocity),
+            (&mut chunk.simulated, simulated),
             (&mut chunk.temperature, temperature),
         ] {
             all.iter_mut().for_each(|all| all.extend_from_slice(more));
@@ -380,6 +389,7 @@ impl<'a> MotionRows<'a> {
         let next = ArmMotion {
             usages: self.chunk.usages.clone(),
             velocity: self.chunk.velocity.as_ref().map(|_| Vec::new()),
+            simulated: self.chunk.simulated.as_ref().map(|_| Vec::new()),
             temperature: self.chunk.temperature.as_ref().map(|_| Vec::new()),
             ..ArmMotion::default()
         };

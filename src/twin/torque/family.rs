@@ -67,8 +67,13 @@ families! {
     };
     alone "load_friction" {
         let scale = on.with_friction(true)?;
-        let exponent: f64 = if other { draw.uniform(0.7, 0.9) } else { 1.0 };
-        Law::load(on.joint, draw.uniform(0.06, 0.2) * scale.powf(1.0 - exponent), exponent, on.width)
+        let exponent: f64 = match other {
+            true => [draw.uniform(0.7, 0.9), 1.0, 2.0][draw.index(3)],
+            false => 1.0,
+        };
+        let share = draw.uniform(0.06, 0.2) * scale.powf(1.0 - exponent);
+        let back = if other && exponent == 1.0 { share * draw.uniform(0.3, 0.6) } else { share };
+        Law::load(on.joint, share, back, exponent, on.width)
     };
     alone "warmup_friction" {
         on.with_friction(true)?;

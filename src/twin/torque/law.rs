@@ -87,9 +87,12 @@ laws! { |now, past|
     Presliding presliding "presliding_friction" at joint { joint: usize, size: f64, travel: f64, width: f64, bristles: Bristles }
         other bristles != Bristles::One
         => size * (past.bend(bristles, now.v(joint) * now.step, travel) - sign(now.v(joint), width));
-    /// Friction as a share of what the gear transmits.
-    Load load "load_friction" at joint { joint: usize, share: f64, exponent: f64, width: f64 } other exponent != 1.0
-        => share * now.rigid[joint].abs().powf(exponent) * sign(now.v(joint), width);
+    /// Friction as a share of what the gear transmits; in other forms by another power of it, or another share where the load drives the gear.
+    Load load "load_friction" at joint { joint: usize, share: f64, back: f64, exponent: f64, width: f64 } other exponent != 1.0 || back != share => {
+        let (load, turns) = (now.rigid[joint], sign(now.v(joint), width));
+        let part = if load * turns < 0.0 { back } else { share };
+        part * load.abs().powf(exponent) * turns
+    };
     /// Friction that falls as the gear warms up: share at the begin, and time, s; exponential, in another form as 1 / (1 + t / time).
     Warmup warmup "warmup_friction" at joint { joint: usize, share: f64, time: f64, slow: bool } other slow => {
         let cold = if slow { 1.0 / (1.0 + now.time / time) } else { (-now.time / time).exp() };

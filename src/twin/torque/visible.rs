@@ -240,7 +240,7 @@ fn per_joint(joint: usize) -> [Law; 11] {
         Law::asymmetric(joint, size, width, 0.0),
         Law::stribeck(joint, size, 0.05, fall),
         Law::stribeck(joint, size, 0.1, fall),
-        Law::load(joint, 1.0, 1.0, width),
+        Law::load(joint, 1.0, 1.0, 1.0, width),
         Law::rotor(joint, 1.0),
         Law::offset(joint, size, 0.0),
         Law::cable(joint, 1.0, 0.0, 0.0),

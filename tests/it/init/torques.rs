@@ -329,7 +329,8 @@ fn what_a_controller_expects_is_no_measurement_where_currents_are() {
         "current: {columns: [\"actual_current_0\"",
         "velocity: {columns: [\"actual_qd_0\"",
     ]);
-    made.says(&["the controller's own model expects"]);
+    made.has(&["simulated: {columns: [\"target_moment_0\""]);
+    made.says(&["what the controller's own model expects"]);
     made.lacks(&["      torque: {columns: [\"target_moment_0\""]);
 }
 
@@ -362,4 +363,28 @@ fn the_only_joint_may_have_the_number_of_its_motor_on_a_bus() {
     ] {
         assert!(made.contains(part), "{part} in\n{made}");
     }
+}
+
+#[test]
+fn counts_of_the_motors_on_a_bus_are_joints_with_a_question() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = "calib_robot: 1\nname: one\nunits: {length: mm, angle: deg}\nkinematics:\n  screws:\n    - {axis: [0, 1, 0], point: [0, 0, 0]}\n\
+                 tool: {point: [0, 0, -100]}\n";
+    put(&folder, "robot.yaml", robot);
+    let counted = |row: usize, column: usize| match column {
+        0 => format!("{}", 2048 + (900.0 * (0.1 * row as f64).sin()) as i64),
+        _ => wave(row, column),
+    };
+    put(
+        &folder,
+        "log.csv",
+        log("pos (5),current (5) [mA]", 2, counted),
+    );
+    let printed = calib(folder.path(), "init . --data log.csv");
+    assert_eq!(printed.code, Some(0), "{}", printed.both());
+    let made = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
+    assert!(
+        made.contains("q: {columns: [\"pos (5)\"], counts_per_turn: 4096}"),
+        "{made}"
+    );
 }

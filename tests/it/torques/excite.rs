@@ -96,6 +96,7 @@ fn recorded(case: &TorqueCase, proposal: &MotionProposal) -> TorqueRecording {
             .iter()
             .flat_map(|state| state.q.clone())
             .collect(),
+        simulated: None,
         velocity: None,
         temperature: None,
         trajectory: rows

@@ -284,7 +284,7 @@ fn driven(folder: &Path, torque: &str) -> Answer {
             "{:.6},{:.3},{:.6},{:.6}",
             885.0 * duty,
             10.0 * supply,
-            row[1],
+            2048.0 + 4096.0 * row[1] / std::f64::consts::TAU,
             row[2]
         )
         .unwrap();
@@ -294,7 +294,7 @@ fn driven(folder: &Path, torque: &str) -> Answer {
         "calib: 1\nname: driven\nstages:\n\
          - {{uses: robot, with: {{file: robot.json, format: case}}}}\n\
          - uses: ingest_torques\n  with:\n    files:\n    - file: log.txt\n      header: false\n      columns:\n\
-         \x20       time: {{rate: 100}}\n        q: {{columns: [3], unit: rad}}\n        velocity: {{columns: [4], unit: rad/s}}\n\
+         \x20       time: {{rate: 100}}\n        q: {{columns: [3], counts_per_turn: 4096, zero: [2048]}}\n        velocity: {{columns: [4], unit: rad/s}}\n\
          \x20       torque: {torque}\n- uses: diagnose_torques\n"
     );
     put(folder, "p.yaml", pipeline);
@@ -377,15 +377,19 @@ fn motors_and_clocks_that_cannot_be_are_refused_with_their_place_and_what_is_all
             );
         }
     }
-    let pipeline =
-        crate::answer::read(folder.path().join("p.yaml")).replace("rate: 100", "rate: 0");
-    put(&folder, "p.yaml", pipeline);
-    let answer = calib(folder.path(), "run p.yaml --quiet");
-    assert!(
-        answer.err.contains("time.rate") && answer.err.contains("allowed: above 0"),
-        "{}",
-        answer.err
-    );
+    let pipeline = crate::answer::read(folder.path().join("p.yaml"));
+    for (from, to, place) in [
+        ("rate: 100", "rate: 0", "time.rate"),
+        ("turn: 4096", "turn: 0", "q.counts_per_turn"),
+    ] {
+        put(&folder, "p.yaml", pipeline.replace(from, to));
+        let answer = calib(folder.path(), "run p.yaml --quiet");
+        assert!(
+            answer.err.contains(place) && answer.err.contains("allowed: above 0"),
+            "{}",
+            answer.err
+        );
+    }
 }
 
 #[test]

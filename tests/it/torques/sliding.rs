@@ -42,7 +42,10 @@ fn rows(payload: f64, seed: u64) -> String {
         let force = (MASSES[0] + MASSES[1] + payload) * (lift[2] + GRAVITY)
             - moment * (cosine * turn[2] - sine * turn[1] * turn[1]);
         let torque = about * turn[2] - moment * cosine * (lift[2] + GRAVITY);
-        let dry = |joint: usize, v: f64| VISCOUS[joint] * v + COULOMB[joint] * (v / 0.01).tanh();
+        // m/s and rad/s over which friction turns.
+        let turns = [0.002, 0.01];
+        let dry =
+            |joint: usize, v: f64| VISCOUS[joint] * v + COULOMB[joint] * (v / turns[joint]).tanh();
         write!(
             text,
             "\n{time:.3},{:.5},{:.6},{:.4},{:.5}",

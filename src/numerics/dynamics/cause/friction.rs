@@ -2,10 +2,11 @@
 
 use super::angle::{UNKNOWN, ends};
 use super::{
-    ColumnTorque, LASTING, PLAIN, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, at_joints,
-    plain, shape, span, warming, wave,
+    ColumnTorque, FittedNumber, LASTING, PLAIN, ShapeSpan, TorqueCause, TorqueForm, at_each_joint,
+    at_joints, plain, shape, span, warming, wave,
 };
 use crate::recording::largest;
+use crate::scene::DynamicScene;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::PI;
 
@@ -169,27 +170,118 @@ fn falls(form: &TorqueForm, velocity: f64) -> f64 {
     }
 }
 
-/// Friction that grows with the torque that a gear transmits; a gear without preload has no other of one size.
+/// Powers of the load that stand in the table of causes.
+const LINEAR: f64 = 1.0;
+const SQUARE: f64 = 2.0;
+/// One share whichever way power goes; one where the motor drives its load and one where the load drives the motor.
+const LOAD_WIDTHS: [usize; 2] = [1, 2];
+/// Numbers of its shape.
+const LOAD_SHAPE: usize = 2;
+
+/// Friction that grows with the torque that a gear transmits; a gear without preload has no other of one size. A gear that drives its load may
+/// lose another share of it than one that its load drives. Shape: the power of the load that friction grows with, and the greatest load, Nm,
+/// of which shares are; tables of linear friction alone have none.
 pub(super) static LOAD: TorqueCause = TorqueCause {
     name: "load_friction",
-    coefficients: &[("share", "1")],
+    coefficients: &[("share", "1"), ("share_driven_back", "1")],
     of_sign: true,
-    rich: |_| true,
+    rich: |form| form.width == 1 && power_of_load(form) == LINEAR,
     modifies: &[VISCOUS],
     positive: true,
     of_rigid: true,
+    lengths: &[0, LOAD_SHAPE],
+    forms: |cause, scene| {
+        let shape = |power: f64| move |joint: usize| [power, greatest_load(scene, joint)];
+        // Identified masses are as much heavier as a joint that moves loses more where it drives.
+        let is_known = scene.declared.is_some() || scene.beyond.is_some();
+        let widths = &LOAD_WIDTHS[..if is_known { 2 } else { 1 }];
+        let linear = at_joints(cause, 0..scene.joints(), widths, shape(LINEAR));
+        let square = at_joints(cause, 0..scene.joints(), &LOAD_WIDTHS[..1], shape(SQUARE));
+        linear.into_iter().chain(square).collect()
+    },
+    is_possible: |_, values| values.iter().all(|value| *value >= 0.0),
+    spans: |form| {
+        let span = ShapeSpan {
+            usual: Some(LINEAR),
+            ..span("exponent", "1", [0.4, 2.6])
+        };
+        let has_power = form.width == 1 && !form.shape.is_empty();
+        has_power.then_some(span).into_iter().collect()
+    },
     torque: ColumnTorque::Row(|column, row| {
-        column.direction(row) * column.scene.rigid[column.form.joint()][row].abs()
+        let load = column.scene.rigid[column.form.joint()][row];
+        let direction = column.direction(row);
+        // At a turn of its direction a gear is driven back as much as it drives.
+        let drives = 0.5 * (1.0 + load.signum() * direction);
+        let part = match (column.form.width, column.column) {
+            (1, _) => 1.0,
+            (_, 0) => drives,
+            _ => 1.0 - drives,
+        };
+        part * direction * transmitted(column.form, load)
     }),
+    parameters: |form, fitted| {
+        let shares = form.cause.coefficients.iter().zip(fitted);
+        let shares = shares.map(|((name, unit), share)| plain(name, *share, unit));
+        let exponent = power_of_load(form);
+        let is_other = exponent != LINEAR;
+        let exponent = is_other.then(|| shape("exponent", exponent, "1"));
+        let load = is_other.then(|| shape("at_load", form.shape[1], "Nm"));
+        shares.chain(exponent).chain(load).collect()
+    },
     statement: |form, fitted| {
-        format!(
-            "{} loses {:.1} % of the torque that it transmits to friction",
-            form.place,
-            100.0 * fitted[0].value
-        )
+        let (place, exponent) = (form.place, power_of_load(form));
+        let percent = |share: &FittedNumber| format!("{:.1} %", 100.0 * share.value);
+        let transmitted = match exponent == LINEAR {
+            true => "of the torque that it transmits".to_string(),
+            false => format!("of its greatest load of {:.2} Nm", form.shape[1]),
+        };
+        let grows = match exponent == LINEAR {
+            true => String::new(),
+            false => format!(", and less by the power {exponent:.2} of a lower one"),
+        };
+        match fitted {
+            [driving, back] => format!(
+                "{place} loses {} {transmitted} to friction where it drives and {} where its load drives it{grows}",
+                percent(driving),
+                percent(back)
+            ),
+            _ => format!(
+                "{place} loses {} {transmitted} to friction{grows}",
+                percent(&fitted[0])
+            ),
+        }
     },
     ..PLAIN
 };
+
+/// The power of the load that its friction grows with.
+fn power_of_load(form: &TorqueForm) -> f64 {
+    form.shape.first().copied().unwrap_or(LINEAR)
+}
+
+/// Takes shares of load friction from the greatest load as it is believed now.
+pub(in super::super) fn of_greatest_load(form: &mut TorqueForm, scene: &DynamicScene) {
+    if form.cause.name == LOAD.name && form.shape.len() == LOAD_SHAPE {
+        form.shape[1] = greatest_load(scene, form.joint());
+    }
+}
+
+/// Nm, of the rigid arm as it is believed; 1 where no masses are.
+fn greatest_load(scene: &DynamicScene, joint: usize) -> f64 {
+    match largest(&scene.rigid[joint]) {
+        load if load > 0.0 => load,
+        _ => 1.0,
+    }
+}
+
+/// Nm, of a load, to the power that its friction grows with.
+fn transmitted(form: &TorqueForm, load: f64) -> f64 {
+    match form.shape[..] {
+        [power, most] if power != LINEAR => most * (load.abs() / most).powf(power),
+        _ => load.abs(),
+    }
+}
 
 /// s in which a gear warms up.
 const TIMES: [f64; 9] = [2.0, 4.0, 8.0, 12.0, 18.0, 26.0, 40.0, 120.0, 400.0];

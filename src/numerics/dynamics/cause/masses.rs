@@ -2,8 +2,8 @@
 
 use super::InertialChanges;
 use super::{
-    ColumnTorque, FittedNumber, PLAIN, TorqueCause, TorqueForm, at_each_joint, at_each_link, plain,
-    shape, size_of_two, span,
+    ColumnTorque, FittedNumber, PLAIN, SEEN, TorqueCause, TorqueForm, at_each_joint, at_each_link,
+    plain, shape, size_of_two, span,
 };
 use crate::arm::{
     DynamicArm, INERTIAL_NAMES, INERTIAL_NUMBERS, Inertial, inertial_unit, numbers, unit_number,
@@ -157,8 +157,6 @@ pub(crate) static PAYLOAD: TorqueCause = TorqueCause {
 
 /// Columns of a point along a link.
 const POINT: usize = 3;
-/// A number is seen whose standard deviation is below this share of it.
-const SEEN: f64 = 0.5;
 /// m: what is carried stands out by as much at least.
 const SHORT_ARM: f64 = 0.1;
 /// Share of a place beyond which it is not told.
@@ -169,10 +167,6 @@ fn part(form: &TorqueForm, first: usize) -> Vector3<f64> {
     Vector3::from_row_slice(&form.shape[first..first + 3])
 }
 
-fn is_seen(number: &FittedNumber) -> bool {
-    number.sigma > 0.0 && number.sigma < SEEN * number.value.abs()
-}
-
 /// Numbers that are told: those that the data see and those that are known to within `loose`; the best known where there are none. What is
 /// not seen is no number.
 fn told<'n>(
@@ -180,7 +174,7 @@ fn told<'n>(
     loose: f64,
 ) -> Vec<(&'n str, FittedNumber)> {
     let (told, unseen): (Vec<_>, Vec<_>) =
-        named.partition(|(_, number)| is_seen(number) || number.sigma < loose);
+        named.partition(|(_, number)| number.is_seen() || number.sigma < loose);
     if !told.is_empty() {
         return told;
     }
@@ -208,7 +202,7 @@ fn unseen_mass(form: &TorqueForm, fitted: &[FittedNumber]) -> Option<FittedNumbe
     };
     let lever = part(form, 4).norm().max(SHORT_ARM);
     let is_small = mass.sigma > 0.0 && mass.sigma * lever < SEEN * moment.value;
-    let is_unseen = !is_seen(&mass) && !is_small && is_seen(&moment);
+    let is_unseen = !mass.is_seen() && !is_small && moment.is_seen();
     is_unseen.then_some(moment)
 }
 
@@ -240,11 +234,11 @@ fn seen_point(length: f64, fitted: &[FittedNumber]) -> [Option<FittedNumber>; 3]
         value: a.value / b.value,
         sigma: (a.value / b.value).abs() * (a.sigma / a.value).hypot(b.sigma / b.value),
     };
-    if is_seen(&mass) {
-        let place = is_seen(&moment).then(|| ratio(moment, mass));
+    if mass.is_seen() && (mass.sigma < PRECISE * mass.value.abs() || !moment.is_seen()) {
+        let place = moment.is_seen().then(|| ratio(moment, mass));
         return [Some(mass), None, place];
     }
-    let place = (is_seen(&moment) && is_seen(&inertia)).then(|| ratio(inertia, moment));
+    let place = (moment.is_seen() && inertia.is_seen()).then(|| ratio(inertia, moment));
     let place = place.filter(|place| place.sigma < PRECISE * length);
     let point = place.map(|place| ratio(moment, place));
     [point, Some(moment), place]

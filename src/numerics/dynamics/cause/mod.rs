@@ -15,7 +15,9 @@ use crate::criteria::torque::AT_END;
 use crate::effect::Place;
 pub(super) use angle::{CURRENT_OFFSET, OFFSET, UNKNOWN};
 pub use friction::COULOMB;
-pub(super) use friction::{COULOMB_FRICTION, VISCOUS, VISCOUS_FRICTION, line_of_power};
+pub(super) use friction::{
+    COULOMB_FRICTION, VISCOUS, VISCOUS_FRICTION, line_of_power, of_greatest_load,
+};
 pub(super) use masses::{ADDED_MASS, CENTRE, PAYLOAD, ROTOR, TORQUE_CONSTANT, masses_on_links};
 
 /// A fitted number of a finding.
@@ -252,6 +254,16 @@ pub struct FittedNumber {
     pub value: f64,
     /// The same unit.
     pub sigma: f64,
+}
+
+/// A number is seen whose standard deviation is below this share of it.
+const SEEN: f64 = 0.5;
+
+impl FittedNumber {
+    /// Whether its rows show it.
+    pub(crate) fn is_seen(&self) -> bool {
+        self.sigma > 0.0 && self.sigma < SEEN * self.value.abs()
+    }
 }
 
 /// A cause at a place with its shape numbers.

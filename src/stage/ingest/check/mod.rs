@@ -378,6 +378,17 @@ fn joints(declared: &DeclaredColumn, joints: &JointColumns, file: &FileLayout, a
         column(Some(entry), file, &mut at.at("columns").item(index));
     }
     counting(joints, declared.setting == "q", at);
+    if let Some(counts) = joints.counts_per_turn {
+        let mut at = at.at("counts_per_turn");
+        let turns = [Quantity::Angle, Quantity::AngularRate].contains(&quantity);
+        at.must(turns, "for positions and velocities of joints that turn");
+        at.must(joints.unit.is_none(), "stands for `unit`; say one of them");
+        at.must(
+            counts > 0.0 && counts.is_finite(),
+            "allowed: above 0, e.g. 4096",
+        );
+        return;
+    }
     if quantity == Quantity::Angle && joints.optional {
         at.at("optional")
             .fault("no recording without joint positions");
