@@ -107,7 +107,7 @@ pub fn diagnose(problem: &Drives, options: &Options, tell: impl FnMut(String)) -
     let before = problem.angles(&problem.base, Which::All);
     let after = problem.angles(&physics, Which::All);
     let n = problem.chain.joints();
-    let held_out = problem.recording.trajectories.iter().any(|t| t.held_out);
+    let held_out = problem.recording.held_out.contains(&true);
     let mut joints: Vec<JointError> = (0..n)
         .map(|joint| problem.errors(Some(joint), [&before, &after]))
         .collect();
@@ -145,19 +145,17 @@ impl Drives {
                 .collect()
         };
         let rms = |held: bool, angles: &Vec<f64>| {
-            let rows = self
-                .recording
-                .trajectories
-                .iter()
-                .filter(|t| t.held_out == held)
-                .flat_map(|t| t.rows.clone());
+            let trajectories = self.recording.trajectories.iter();
+            let rows = trajectories
+                .flat_map(|t| t.rows.clone())
+                .filter(|row| self.recording.held_out[*row] == held);
             let all: Vec<f64> = rows
                 .flat_map(of)
                 .map(|at| (self.recording.angle[at] - angles[at]).powi(2))
                 .collect();
             (all.iter().sum::<f64>() / all.len().max(1) as f64).sqrt()
         };
-        let any = self.recording.trajectories.iter().any(|t| t.held_out);
+        let any = self.recording.held_out.contains(&true);
         let noise =
             |j: usize| self.recording.noise[j].powi(2) + self.recording.encoder[j].powi(2) / 12.0;
         let noises: Vec<f64> = (0..n)

@@ -428,12 +428,18 @@ impl Drives {
     fn independence_of(&self, angles: &[f64]) -> f64 {
         let n = self.chain.joints();
         let (mut next, mut own) = (0.0, 0.0);
-        for trajectory in self.recording.trajectories.iter().filter(|t| !t.held_out) {
-            for at in trajectory.rows.start * n..trajectory.rows.end * n {
+        let is_fitted = |row: usize| !self.recording.held_out[row];
+        for trajectory in &self.recording.trajectories {
+            let rows = trajectory.rows.clone();
+            for at in rows
+                .clone()
+                .filter(|row| is_fitted(*row))
+                .flat_map(|row| row * n..(row + 1) * n)
+            {
                 let whitened = |at: usize| (self.recording.angle[at] - angles[at]) / self.sigma[at];
                 let here = whitened(at);
                 own += here * here;
-                if at >= trajectory.rows.start * n + n {
+                if at >= (rows.start + 1) * n && is_fitted(at / n - 1) {
                     next += here * whitened(at - n);
                 }
             }

@@ -4,7 +4,7 @@ use crate::causes::{Key, Usual, cells};
 use crate::chain::{Chain, STEP};
 use crate::fit::{DriveFit, Normal};
 use crate::physics::Physics;
-use crate::recording::Recording;
+use crate::recording::{Recording, Trajectory};
 use crate::rollout::{Direction, Which, roll};
 use calib_dynamics::InertialTolerance;
 use calib_engine::{Accepted, Block, Cell, Problem, Rows, Scanned, ranked};
@@ -17,6 +17,9 @@ pub(crate) const FREE: usize = 5;
 const UNIT: f64 = 10.0;
 /// Standard deviations of what noise alone makes of a joint's squared residual, above which causes with a memory are asked there.
 const ABOVE_NOISE: f64 = 4.0;
+
+/// Share of the drive's error, rms, that is left at a joint whose gain may be far off.
+const FAR_OFF: f64 = 0.5;
 
 /// Longer steps that are tried, s, and the share of the noise, rms, that is the same motion: a drive four times as stiff errs four times as much.
 const LONGER: [f64; 2] = [2.5e-3, 1.7e-3];
@@ -50,8 +53,12 @@ impl Drives {
     ) -> Self {
         let sigma = recording.sigma();
         chain.step = step(&chain, &base, &recording, &sigma);
-        let duration = recording.time.last().copied().unwrap_or_default()
-            - recording.time.first().copied().unwrap_or_default();
+        let lasts = |t: &Trajectory| recording.time[t.rows.end - 1] - t.began;
+        let duration = recording
+            .trajectories
+            .iter()
+            .map(lasts)
+            .fold(0.0, f64::max);
         let usual = usual(&chain, &base, &recording);
         Self {
             chain,
@@ -96,8 +103,9 @@ impl Drives {
 
     /// Rows that are fitted.
     pub(crate) fn fitted(&self) -> impl Iterator<Item = usize> + '_ {
-        let fitted = self.recording.trajectories.iter().filter(|t| !t.held_out);
-        fitted.flat_map(|t| t.rows.clone())
+        let trajectories = self.recording.trajectories.iter();
+        let rows = trajectories.flat_map(|t| t.rows.clone());
+        rows.filter(|row| !self.recording.held_out[*row])
     }
 
     /// Whitened squared residual of fitted rows, joint by joint.
@@ -111,6 +119,21 @@ impl Drives {
             }
         }
         squares
+    }
+
+    /// rad rms of what is left at each joint in fitted rows.
+    fn errors_of(&self, angles: &[f64]) -> Vec<f64> {
+        let n = self.chain.joints();
+        let mut squares = vec![0.0; n];
+        let mut rows = 0.0;
+        for row in self.fitted() {
+            rows += 1.0;
+            for (joint, square) in squares.iter_mut().enumerate() {
+                let at = row * n + joint;
+                *square += (self.recording.angle[at] - angles[at]).powi(2);
+            }
+        }
+        squares.iter().map(|square| (square / rows).sqrt()).collect()
     }
 }
 
@@ -224,7 +247,17 @@ impl Problem for Drives {
             self.duration,
             self.recording.period,
         );
-        let all: Vec<Cell<Key>> = all.into_iter().filter(asked).collect();
+        let mut all: Vec<Cell<Key>> = all.into_iter().filter(asked).collect();
+        // A gain that is far off shows in what is left: as much as the drive's own error.
+        let left = self.errors_of(&fit.angles);
+        let is_far = |joint: usize| left[joint] > FAR_OFF * self.usual[joint].error;
+        for cell in &mut all {
+            if let Key::Gain(from, to) = cell.key
+                && !(from..=to).all(is_far)
+            {
+                cell.shapes.truncate(1);
+            }
+        }
         // Where each column comes from, in the order of cells, shapes and columns.
         let asked: Vec<(Key, &Vec<f64>)> = all
             .iter()
@@ -239,7 +272,7 @@ impl Problem for Drives {
             .map(|(key, x)| {
                 let mut changed = now.clone();
                 key.apply(x, &self.usual, self.duration, &mut changed);
-                match key.is_rolled() {
+                match key.is_rolled(x) {
                     true => {
                         let mut angles = self.angles(&changed, Which::Fitted);
                         for (angle, before) in angles.iter_mut().zip(&fit.angles) {

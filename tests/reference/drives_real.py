@@ -1,0 +1,136 @@
+#!/usr/bin/env python3
+"""Real recordings of commands and angles: what calib's findings leave in rows that it did not see, and what the usual least squares leaves.
+
+    pip install mujoco numpy
+    python3 tests/reference/drives_real.py DATA --calib CALIB --out DIR [--only go2 so101] [--no-rival]
+
+DATA holds `go2_chirp` and `so101_sage`. Go2: each leg by itself, windows of 1.5 s fitted and held out in turn. SO-101: three recordings are
+fitted together, all others judge. The rival: armature, damping, dry friction, offset and delay of every joint, fitted to the same rows by
+Gauss and Newton in MuJoCo's own roll-outs.
+"""
+import argparse
+import csv
+import io
+import json
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+
+LEGS = ["FL", "FR", "RL", "RR"]
+PARTS = ["hip", "thigh", "calf"]
+ARM = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"]
+FITTED = ["multisine", "friction_gravity", "step_response"]
+TOLERANCE = {"mass_rel": 0.05, "com_mm": 5, "inertia_rel": 0.2}
+
+
+def go2(data, out, leg):
+    """The pipeline of a leg."""
+    joints = [
+        {"joint": f"{leg}_{part}_joint", "kp": 20, "kd": 1.5, "kd_on": "speed", "torque_limit_nm": 45.43 if part == "calf" else 23.7, "encoder_rad": 3e-5, "noise_rad": 2e-5}
+        for part in PARTS
+    ]
+    drives = {"command_rate_hz": 200, "joints": joints, "inertia_tolerance": TOLERANCE}
+    here = data / "go2_chirp"
+    settings = {
+        "robot": str(here / "go2.xml"),
+        "drives": "drives.json",
+        "recording": str(here / "recording.csv"),
+        "columns": {"command": "cmd_{name}", "angle": "q_{name}"},
+        "hold_out": {"windows": 1.5},
+    }
+    return written(out / f"go2_{leg}", drives, settings)
+
+
+def so101(data, out):
+    """The pipeline of the arm."""
+    here = data / "so101_sage"
+    joints = [{"joint": name, "kp": 998.22, "kd": 2.731, "kd_on": "speed", "torque_limit_nm": 3.35, "encoder_rad": 0.001534, "noise_rad": 2e-4} for name in ARM]
+    drives = {"command_rate_hz": 49.88, "joints": joints, "inertia_tolerance": TOLERANCE}
+    files = lambda name: {"file": str(here / name / "state_motor.csv"), "commands": str(here / name / "control.csv")}
+    others = sorted(p.name for p in here.iterdir() if p.is_dir() and p.name not in FITTED)
+    recording = [files(name) for name in FITTED] + [files(name) | {"usage": "validate"} for name in others]
+    settings = {
+        "robot": str(here / "so101.xml"),
+        "drives": "drives.json",
+        "recording": recording,
+        "columns": {"time": "timestamp", "time_unit": "us", "command": "positions", "angle": "positions"},
+    }
+    return written(out / "so101", drives, settings), FITTED + others
+
+
+def written(folder, drives, settings):
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "drives.json").write_text(json.dumps(drives, indent=1))
+    # JSON is YAML.
+    stage = {"uses": "diagnose_drives", "with": settings}
+    (folder / "pipeline.yaml").write_text(json.dumps({"calib": 1, "name": folder.name, "seed": 1, "stages": [stage]}, indent=1))
+    return folder
+
+
+def diagnosed(calib, folder):
+    """calib's answer, and the course of all rows."""
+    store = folder / "store"
+    run = [calib, "diagnose", "--json", "--store", str(store), str(folder / "pipeline.yaml")]
+    answer = subprocess.run(run, capture_output=True, text=True)
+    (folder / "log.txt").write_text(answer.stderr)
+    if answer.returncode:
+        sys.exit(answer.stderr)
+    document = json.loads(answer.stdout)
+    (folder / "answer.json").write_text(answer.stdout)
+    query = "SELECT * FROM diagnose_drives.course ORDER BY sequence"
+    table = subprocess.run([calib, "query", "--store", str(store), "HEAD", query, "--format", "csv"], capture_output=True, text=True)
+    if table.returncode:
+        sys.exit(table.stderr)
+    rows = list(csv.reader(io.StringIO(table.stdout)))
+    head = rows[0]
+    values = np.array([[float({"true": 1, "false": 0}.get(cell, cell)) for cell in row] for row in rows[1:]])
+    return document, {name: values[:, k] for k, name in enumerate(head)}
+
+
+def tell(document):
+    for finding in document["findings"]:
+        numbers = ", ".join(f"{p['name']} {p['value']:.4g}" for p in finding.get("parameters", []))
+        print(f"    {finding['effect']} at {finding['where']}: {numbers}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", type=pathlib.Path)
+    parser.add_argument("--calib", default="calib")
+    parser.add_argument("--out", type=pathlib.Path, required=True)
+    parser.add_argument("--only", nargs="*", default=["go2", "so101"])
+    parser.add_argument("--legs", nargs="*", default=LEGS)
+    parser.add_argument("--no-rival", action="store_true")
+    options = parser.parse_args()
+    if "go2" in options.only:
+        squares = []
+        for leg in options.legs:
+            document, course = diagnosed(options.calib, go2(options.data, options.out, leg))
+            held = course["held_out"] > 0
+            print(f"go2 {leg}: deg rms held out, before and after")
+            tell(document)
+            for j, part in enumerate(PARTS, 1):
+                errors = [np.degrees(course[f"measured{j}_rad"] - course[f"{what}{j}_rad"]) for what in ("simulated", "corrected")]
+                before, after = (np.sqrt((e[held] ** 2).mean()) for e in errors)
+                fitted = np.sqrt((errors[1][~held] ** 2).mean())
+                squares.append((before**2, after**2, fitted**2))
+                print(f"  {part:6} {before:.3f} {after:.3f} (fitted {fitted:.3f})")
+        before, after, fitted = np.sqrt(np.mean(squares, axis=0))
+        print(f"go2, {len(squares)} joints: held out {before:.3f} -> {after:.3f} deg (fitted {fitted:.3f})")
+    if "so101" in options.only:
+        folder, names = so101(options.data, options.out)
+        document, course = diagnosed(options.calib, folder)
+        print("so101: mrad rms of each recording, before -> after, by joint")
+        tell(document)
+        breaks = np.flatnonzero(np.diff(course["time_s"]) > 0.5) + 1
+        parts = np.split(np.arange(len(course["time_s"])), breaks)
+        for name, rows in zip(names, parts, strict=True):
+            rms = lambda what, j: 1e3 * np.sqrt(((course[f"measured{j}_rad"] - course[f"{what}{j}_rad"])[rows] ** 2).mean())
+            cells = "  ".join(f"{rms('simulated', j):5.1f} -> {rms('corrected', j):5.1f}" for j in range(1, len(ARM) + 1))
+            print(f"  {'fitted  ' if name in FITTED else 'held out'} {name:25} {cells}")
+
+
+if __name__ == "__main__":
+    main()
