@@ -25,6 +25,9 @@ use serde::{Deserialize, Serialize};
 // Bytes: a million rows of six joints are 200 MB.
 const MOST_BYTES: u64 = 1 << 30;
 
+/// Causes a joint at most.
+const MOST_A_JOINT: usize = 5;
+
 /// Settings of `diagnose_drives`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -275,7 +278,11 @@ impl Stage for DiagnoseDrives {
     fn run(&self, _reads: DiagnoseDrivesReads, context: &Context) -> Result<DiagnoseDrivesWrites> {
         let (arm, mut drives) = self.problem(context)?;
         drives.without.clone_from(&self.without);
-        let diagnosis = diagnose(&drives, &Options::default(), |line| context.note(line));
+        let options = Options {
+            most: MOST_A_JOINT * drives.recording.joints(),
+            ..Options::default()
+        };
+        let diagnosis = diagnose(&drives, &options, |line| context.note(line));
         let mut writes = DiagnoseDrivesWrites {
             verdict: DriveVerdict::of(context.id, &diagnosis),
             sentences: VerdictSentences::of(context.id, &[]),

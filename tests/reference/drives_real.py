@@ -13,6 +13,7 @@ import csv
 import io
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 
@@ -72,15 +73,17 @@ def written(folder, drives, settings):
 def diagnosed(calib, folder):
     """calib's answer, and the course of all rows."""
     store = folder / "store"
-    run = [calib, "diagnose", "--json", "--store", str(store), str(folder / "pipeline.yaml")]
-    answer = subprocess.run(run, capture_output=True, text=True)
-    (folder / "log.txt").write_text(answer.stderr)
-    if answer.returncode:
-        sys.exit(answer.stderr)
+    shutil.rmtree(store, ignore_errors=True)
+    for verb in (["run"], ["diagnose", "--json"]):
+        answer = subprocess.run([calib, *verb, "--store", str(store), str(folder / "pipeline.yaml")], capture_output=True, text=True)
+        with (folder / "log.txt").open("w" if verb == ["run"] else "a") as log:
+            log.write(answer.stderr)
+        if answer.returncode:
+            sys.exit(answer.stderr)
     document = json.loads(answer.stdout)
     (folder / "answer.json").write_text(answer.stdout)
     query = "SELECT * FROM diagnose_drives.course ORDER BY sequence"
-    table = subprocess.run([calib, "query", "--store", str(store), "HEAD", query, "--format", "csv"], capture_output=True, text=True)
+    table = subprocess.run([calib, "query", "--store", str(store), "HEAD", query, "--csv"], capture_output=True, text=True)
     if table.returncode:
         sys.exit(table.stderr)
     rows = list(csv.reader(io.StringIO(table.stdout)))

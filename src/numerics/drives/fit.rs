@@ -1,6 +1,7 @@
 //! Everything at once, in the roll-out itself: Gauss-Newton on the numbers of causes and on inertials under their tolerance.
 
 use crate::causes::Key;
+use crate::independence::independent;
 use crate::problem::{Drives, FREE};
 use crate::rollout::{Direction, Which, roll};
 use calib_engine::Accepted;
@@ -270,7 +271,9 @@ impl Drives {
         if before.is_none() {
             fit.independence = self.independence_of(&fit.angles);
         }
-        let weigh = |fit: &DriveFit| fit.independence / (fit.square / freedom).max(1.0);
+        let weigh = |fit: &DriveFit| {
+            self.independence_beside(fit.independence) / (fit.square / freedom).max(1.0)
+        };
         let mut is_new = anew;
         for step in 1..=patience.steps {
             if !fit.square.is_finite() || columns.count() == 0 {
@@ -444,11 +447,10 @@ impl Drives {
                 }
             }
         }
-        let correlation = if own > 0.0 && own.is_finite() {
-            (next / own).clamp(0.0, 0.998)
+        if own > 0.0 && own.is_finite() {
+            independent(next / own)
         } else {
-            0.0
-        };
-        (1.0 - correlation) / (1.0 + correlation)
+            1.0
+        }
     }
 }

@@ -3,6 +3,7 @@
 use crate::causes::{Key, Usual, cells};
 use crate::chain::{Chain, STEP};
 use crate::fit::{DriveFit, Normal};
+use crate::independence::Rich;
 use crate::physics::Physics;
 use crate::recording::{Recording, Trajectory};
 use crate::rollout::{Direction, Which, roll};
@@ -10,6 +11,7 @@ use calib_dynamics::InertialTolerance;
 use calib_engine::{Accepted, Block, Cell, Problem, Rows, Scanned, ranked};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Inertial numbers of a link that are free within their tolerance: mass, centre, inertia.
 pub(crate) const FREE: usize = 5;
@@ -41,6 +43,8 @@ pub struct Drives {
     pub(crate) usual: Vec<Usual>,
     /// s.
     pub(crate) duration: f64,
+    /// Share of rows that are independent beside a rich model of the simulation as it is, once it was looked at.
+    rich: OnceLock<f64>,
 }
 
 impl Drives {
@@ -69,7 +73,13 @@ impl Drives {
             sigma,
             usual,
             duration,
+            rich: OnceLock::new(),
         }
+    }
+
+    /// Share of the rows that are independent: by what a model leaves, or by what a rich one would.
+    pub(crate) fn independence_beside(&self, own: f64) -> f64 {
+        own.max(self.rich.get().copied().unwrap_or_default())
     }
 
     /// The simulation with inertials within their tolerance and a set of causes.
@@ -309,6 +319,8 @@ impl Problem for Drives {
         let mut own = Normal::new(nb);
         let mut sums = Sums::new(nb, &blocks);
         let mut b = vec![0.0; nb];
+        let is_first = self.rich.get().is_none();
+        let mut rich = is_first.then(|| Rich::new(self, nb + columns.len()));
         roll(
             &self.chain,
             &now,
@@ -328,11 +340,18 @@ impl Problem for Drives {
                         (_, Some(k)) => row.change[joint][*k],
                         _ => 0.0,
                     });
+                    if let Some(rich) = &mut rich {
+                        let whitened = changes.clone().map(|change| change / sigma);
+                        rich.add(row.row, joint, residual, b.iter().copied().chain(whitened));
+                    }
                     sums.add(&b, residual, sigma, changes);
                 }
             },
         );
         sums.close();
+        if let Some(rich) = rich {
+            self.rich.get_or_init(|| rich.independence());
+        }
         let freedom = rows_a_joint * n as f64;
         let scale = (fit.square / freedom).max(1.0);
         let precision = DVector::from_vec(base.precision.iter().map(|p| p * scale).collect());
@@ -344,7 +363,7 @@ impl Problem for Drives {
             &precision,
         );
         rows.square = rows.square.max(freedom);
-        rows.independence = fit.independence;
+        rows.independence = self.independence_beside(fit.independence);
         rows.unit = UNIT;
         let mut next = 0;
         let mut scanned = Vec::new();
@@ -361,7 +380,12 @@ impl Problem for Drives {
     }
 
     fn fit(&self, set: &[Accepted<Key>], before: Option<&DriveFit>) -> DriveFit {
-        self.fitted_with(set, before, false)
+        let fit = self.fitted_with(set, before, false);
+        if before.is_none() && self.rich.get().is_none() {
+            // Before anything is weighed: how many rows count.
+            self.scan(&fit);
+        }
+        fit
     }
 
     fn settled(&self, fit: &DriveFit) -> DriveFit {
@@ -373,7 +397,7 @@ impl Problem for Drives {
     }
 
     fn independence(&self, fit: &DriveFit) -> f64 {
-        fit.independence
+        self.independence_beside(fit.independence)
     }
 
     fn log_evidence(&self, fit: &DriveFit, independence: f64) -> f64 {
