@@ -11,7 +11,7 @@ use calib_dynamics::InertialTolerance;
 use calib_engine::{Accepted, Block, Cell, Problem, Rows, Scanned, ranked};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::sync::OnceLock;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Inertial numbers of a link that are free within their tolerance: mass, centre, inertia.
 pub(crate) const FREE: usize = 5;
@@ -43,8 +43,8 @@ pub struct Drives {
     pub(crate) usual: Vec<Usual>,
     /// s.
     pub(crate) duration: f64,
-    /// Share of rows that are independent beside a rich model of the simulation as it is, once it was looked at.
-    rich: OnceLock<f64>,
+    /// Share of rows that are independent beside a rich model, the most of all scans: a linear model says the more, the less is missing.
+    rich: Mutex<f64>,
 }
 
 impl Drives {
@@ -73,13 +73,17 @@ impl Drives {
             sigma,
             usual,
             duration,
-            rich: OnceLock::new(),
+            rich: Mutex::new(0.0),
         }
+    }
+
+    fn rich(&self) -> MutexGuard<'_, f64> {
+        self.rich.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Share of the rows that are independent: by what a model leaves, or by what a rich one would.
     pub(crate) fn independence_beside(&self, own: f64) -> f64 {
-        own.max(self.rich.get().copied().unwrap_or_default())
+        own.max(*self.rich())
     }
 
     /// The simulation with inertials within their tolerance and a set of causes.
@@ -319,8 +323,7 @@ impl Problem for Drives {
         let mut own = Normal::new(nb);
         let mut sums = Sums::new(nb, &blocks);
         let mut b = vec![0.0; nb];
-        let is_first = self.rich.get().is_none();
-        let mut rich = is_first.then(|| Rich::new(self, nb + columns.len()));
+        let mut rich = Rich::new(self, nb + columns.len());
         roll(
             &self.chain,
             &now,
@@ -340,18 +343,16 @@ impl Problem for Drives {
                         (_, Some(k)) => row.change[joint][*k],
                         _ => 0.0,
                     });
-                    if let Some(rich) = &mut rich {
-                        let whitened = changes.clone().map(|change| change / sigma);
-                        rich.add(row.row, joint, residual, b.iter().copied().chain(whitened));
-                    }
+                    let whitened = changes.clone().map(|change| change / sigma);
+                    rich.add(row.row, joint, residual, b.iter().copied().chain(whitened));
                     sums.add(&b, residual, sigma, changes);
                 }
             },
         );
         sums.close();
-        if let Some(rich) = rich {
-            self.rich.get_or_init(|| rich.independence());
-        }
+        let beside = rich.independence();
+        let most = self.rich().max(beside);
+        *self.rich() = most;
         let freedom = rows_a_joint * n as f64;
         let scale = (fit.square / freedom).max(1.0);
         let precision = DVector::from_vec(base.precision.iter().map(|p| p * scale).collect());
@@ -380,12 +381,7 @@ impl Problem for Drives {
     }
 
     fn fit(&self, set: &[Accepted<Key>], before: Option<&DriveFit>) -> DriveFit {
-        let fit = self.fitted_with(set, before, false);
-        if before.is_none() && self.rich.get().is_none() {
-            // Before anything is weighed: how many rows count.
-            self.scan(&fit);
-        }
-        fit
+        self.fitted_with(set, before, false)
     }
 
     fn settled(&self, fit: &DriveFit) -> DriveFit {
