@@ -98,12 +98,18 @@ const REMAINS: f64 = 1.1;
 
 /// Diagnoses a recording of drives; `tell` receives the progress.
 pub fn diagnose(problem: &Drives, options: &Options, tell: impl FnMut(String)) -> DriveDiagnosis {
-    let answer = calib_engine::diagnose(problem, options, tell);
+    let part = problem.part();
+    let answer = calib_engine::diagnose(part.as_ref().unwrap_or(problem), options, tell);
+    // What stands is fitted to all rows.
+    let after = match part {
+        Some(_) => problem.fitted_with(&answer.after.set, None, true),
+        None => answer.after,
+    };
     let findings = answer.findings.iter();
     let findings = findings
-        .map(|finding| problem.finding(&answer.after, finding))
+        .map(|finding| problem.finding(&after, finding))
         .collect();
-    let physics = problem.physics(&answer.after.inertia, &answer.after.set);
+    let physics = problem.physics(&after.inertia, &after.set);
     let before = problem.angles(&problem.base, Which::All);
     let after = problem.angles(&physics, Which::All);
     let n = problem.chain.joints();
@@ -187,7 +193,8 @@ impl Drives {
             .map(|k| (without[k] - fit.angles[k]).powi(2))
             .collect();
         let cell = &one.cell;
-        let numbers = cell.cause.numbers.iter().zip(&one.numbers).enumerate();
+        let fitted = at.map_or(&one.numbers, |at| &fit.set[at].numbers);
+        let numbers = cell.cause.numbers.iter().zip(fitted).enumerate();
         let mut parameters: Vec<DriveNumber> = numbers
             .map(|(k, (number, x))| {
                 let sigma = sigma.get(k).copied().filter(|sigma| *sigma > 0.0);

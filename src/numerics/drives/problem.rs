@@ -23,6 +23,10 @@ const ABOVE_NOISE: f64 = 4.0;
 /// Share of the drive's error, rms, that is left at a joint whose gain may be far off.
 const FAR_OFF: f64 = 0.5;
 
+/// s of recordings in which causes are looked for, and of a window of longer ones.
+const SEARCHED: f64 = 100.0;
+const WINDOW: f64 = 8.0;
+
 /// Longer steps that are tried, s, and the share of the noise, rms, that is the same motion: a drive four times as stiff errs four times as much.
 const LONGER: [f64; 2] = [2.5e-3, 1.7e-3];
 const SAME: f64 = 0.03;
@@ -84,6 +88,53 @@ impl Drives {
     /// Share of the rows that are independent: by what a model leaves, or by what a rich one would.
     pub(crate) fn independence_beside(&self, own: f64) -> f64 {
         own.max(*self.rich())
+    }
+
+    /// The problem of a part of a long recording, in which causes are looked for: windows of all trajectories, each from where it begins.
+    pub(crate) fn part(&self) -> Option<Self> {
+        let time = |row: usize| self.recording.time[row];
+        let fitted = || {
+            let all = self.recording.trajectories.iter();
+            all.filter(|one| self.recording.is_fitted(one))
+        };
+        let lasts: f64 = fitted()
+            .map(|one| time(one.rows.end - 1) - time(one.rows.start))
+            .sum();
+        let every = (lasts / SEARCHED).ceil() as usize;
+        if every < 2 {
+            return None;
+        }
+        let mut windows: Vec<Trajectory> = Vec::new();
+        for one in fitted() {
+            let mut from = one.rows.start;
+            for row in one.rows.clone() {
+                if time(row) - time(from) >= WINDOW || row + 1 == one.rows.end {
+                    let began = one.began;
+                    windows.push(Trajectory {
+                        rows: from..row + 1,
+                        began,
+                    });
+                    from = row + 1;
+                }
+            }
+        }
+        let kept = windows.into_iter().step_by(every);
+        let kept = kept.filter(|one| one.rows.len() > 1 && self.recording.is_fitted(one));
+        let recording = Recording {
+            trajectories: kept.collect(),
+            ..self.recording.clone()
+        };
+        Some(Self {
+            chain: self.chain.clone(),
+            base: self.base.clone(),
+            recording,
+            tolerance: self.tolerance,
+            without: self.without.clone(),
+            sigma: self.sigma.clone(),
+            usual: self.usual.clone(),
+            duration: self.duration,
+            rich: Mutex::new(0.0),
+        })
     }
 
     /// The simulation with inertials within their tolerance and a set of causes.
