@@ -325,12 +325,7 @@ fn is_pattern(text: &str) -> bool {
 }
 
 /// Entries of a list of files, each that is a pattern, or whose `file` is one, once for every file that matches.
-fn expanded(
-    items: Vec<Node>,
-    folder: &Path,
-    list: &str,
-    troubles: &mut Vec<Trouble>,
-) -> Vec<Node> {
+fn expanded(items: Vec<Node>, folder: &Path, list: &str, troubles: &mut Vec<Trouble>) -> Vec<Node> {
     let mut all = Vec::with_capacity(items.len());
     for (index, item) in items.into_iter().enumerate() {
         let alone = matches!(item.value, YamlValue::Text(_));
@@ -391,7 +386,9 @@ fn expanded(
 /// `beside` with its stars replaced by what those of `pattern` stand for in `path`.
 fn alike(pattern: &str, path: &str, beside: &str) -> Result<String, String> {
     let wrong = || {
-        format!("`{beside}` is not like `{pattern}`: allowed is a pattern with no more stars, which stand for the same text in the same order")
+        format!(
+            "`{beside}` is not like `{pattern}`: allowed is a pattern with no more stars, which stand for the same text in the same order"
+        )
     };
     let parts = |text: &str| -> Vec<String> {
         let parts = text.split('/').filter(|part| *part != ".");

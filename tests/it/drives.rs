@@ -356,7 +356,10 @@ fn of_several(lines: &str) -> Answer {
     let case = in_lists(&folder(), false);
     for name in ["a", "b"] {
         std::fs::create_dir(case.path().join(name)).unwrap();
-        for (from, to) in [("state_motor.csv", "motor.csv"), ("control.csv", "sent.csv")] {
+        for (from, to) in [
+            ("state_motor.csv", "motor.csv"),
+            ("control.csv", "sent.csv"),
+        ] {
             std::fs::copy(case.path().join(from), case.path().join(name).join(to)).unwrap();
         }
     }
@@ -376,10 +379,13 @@ fn of_several(lines: &str) -> Answer {
 
 #[test]
 fn several_recordings_are_fitted_together_and_one_may_judge() {
-    let two = of_several("      recording: [{file: a/motor.csv, commands: a/sent.csv}, {file: b/motor.csv, commands: b/sent.csv}]\n");
+    let two = of_several(
+        "      recording: [{file: a/motor.csv, commands: a/sent.csv}, {file: b/motor.csv, commands: b/sent.csv}]\n",
+    );
     assert_eq!(two.code, Some(0), "{}", two.err);
     assert_eq!(two.json()["rows"], json!(400), "{}", two.out);
-    let pattern = of_several("      recording: [{file: \"*/motor.csv\", commands: \"*/sent.csv\"}]\n");
+    let pattern =
+        of_several("      recording: [{file: \"*/motor.csv\", commands: \"*/sent.csv\"}]\n");
     assert_eq!(pattern.code, Some(0), "{}", pattern.err);
     assert_eq!(pattern.json()["before"], two.json()["before"]);
     let judged = of_several(

@@ -243,7 +243,11 @@ pub fn cells(physics: &Physics, usual: &[Usual], duration: f64, period: f64) -> 
             for (k, shape) in gains.iter_mut().enumerate() {
                 let far = (FAR_SHARE / FAR.len() as f64, 1.0 - FAR_SHARE);
                 let share = if k > 0 { far.0 } else { far.1 };
-                shape.log_weight = if shapes > 1.0 { (share * shapes).ln() } else { 0.0 };
+                shape.log_weight = if shapes > 1.0 {
+                    (share * shapes).ln()
+                } else {
+                    0.0
+                };
             }
             add(Key::Gain(j, last), &GAIN, place.clone(), places, gains);
             add(
@@ -600,10 +604,9 @@ impl Key {
             (Self::Gain(a, b), Self::Gain(c, d)) | (Self::Damping(a, b), Self::Damping(c, d)) => {
                 (a, b) == (c, d)
             }
-            (
-                Self::Load(a, _) | Self::GearLoad(a, _),
-                Self::Load(b, _) | Self::GearLoad(b, _),
-            ) => a == b,
+            (Self::Load(a, _) | Self::GearLoad(a, _), Self::Load(b, _) | Self::GearLoad(b, _)) => {
+                a == b
+            }
             (
                 Self::Backlash(a, _) | Self::Elasticity(a),
                 Self::Backlash(b, _) | Self::Elasticity(b),

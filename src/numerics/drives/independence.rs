@@ -112,10 +112,7 @@ impl Rich {
         for joint in 0..self.joints {
             let used: Vec<usize> = (0..self.columns)
                 .filter(|column| {
-                    let most = sizes
-                        .iter()
-                        .map(|sizes| sizes[*column])
-                        .fold(0.0, f64::max);
+                    let most = sizes.iter().map(|sizes| sizes[*column]).fold(0.0, f64::max);
                     sizes[joint][*column] > HERE * most
                 })
                 .collect();
@@ -127,7 +124,11 @@ impl Rich {
                 }
             }
         }
-        if own > 0.0 { independent(next / own) } else { 1.0 }
+        if own > 0.0 {
+            independent(next / own)
+        } else {
+            1.0
+        }
     }
 
     /// What the best price leaves at a joint, each half of the blocks by what the other half says.

@@ -62,11 +62,7 @@ impl Drives {
         let sigma = recording.sigma();
         chain.step = step(&chain, &base, &recording, &sigma);
         let lasts = |t: &Trajectory| recording.time[t.rows.end - 1] - t.began;
-        let duration = recording
-            .trajectories
-            .iter()
-            .map(lasts)
-            .fold(0.0, f64::max);
+        let duration = recording.trajectories.iter().map(lasts).fold(0.0, f64::max);
         let usual = usual(&chain, &base, &recording);
         Self {
             chain,
@@ -198,7 +194,10 @@ impl Drives {
                 *square += (self.recording.angle[at] - angles[at]).powi(2);
             }
         }
-        squares.iter().map(|square| (square / rows).sqrt()).collect()
+        squares
+            .iter()
+            .map(|square| (square / rows).sqrt())
+            .collect()
     }
 }
 

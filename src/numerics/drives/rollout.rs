@@ -117,12 +117,7 @@ pub fn roll(
         }
         let commands = recording.commands(trajectory, physics.hold);
         let (at, speed) = recording.start(trajectory);
-        roller.start(
-            (&at, &speed),
-            &commands,
-            recording,
-            trajectory,
-        );
+        roller.start((&at, &speed), &commands, recording, trajectory);
         let mut guess = 0;
         for row in trajectory.rows.clone() {
             if which == Which::All || !recording.held_out[row] {

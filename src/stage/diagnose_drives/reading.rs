@@ -33,7 +33,9 @@ impl Rows {
         }
         let earlier =
             |range: &Range<usize>| range.start.saturating_sub(rows)..range.end.saturating_sub(rows);
-        self.runs.iter_mut().for_each(|range| *range = earlier(range));
+        self.runs
+            .iter_mut()
+            .for_each(|range| *range = earlier(range));
         self.runs.retain(|range| !range.is_empty());
         for (range, _) in &mut self.usages {
             *range = earlier(range);
@@ -171,7 +173,11 @@ pub(super) fn rows(
             out.runs.push(row..row);
             last = Some(here);
         }
-        if out.usages.last().is_none_or(|(_, usage)| *usage != use_of_row) {
+        if out
+            .usages
+            .last()
+            .is_none_or(|(_, usage)| *usage != use_of_row)
+        {
             out.usages.push((row..row, use_of_row));
         }
         if let (Some(run), Some((rows, _))) = (out.runs.last_mut(), out.usages.last_mut()) {
