@@ -24,7 +24,7 @@ const ABOVE_NOISE: f64 = 4.0;
 const FAR_OFF: f64 = 0.5;
 
 /// s of recordings in which causes are looked for, and of a window of longer ones.
-const SEARCHED: f64 = 100.0;
+const SEARCHED: f64 = 60.0;
 const WINDOW: f64 = 8.0;
 
 /// Longer steps that are tried, s, and the share of the noise, rms, that is the same motion: a drive four times as stiff errs four times as much.

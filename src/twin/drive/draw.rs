@@ -387,7 +387,7 @@ impl DriveCase {
 
     fn usual(&self, joint: usize) -> Usual {
         let n = self.stated.joints();
-        let angles = motion::angles(&self.stated, &self.commands, self.period);
+        let angles = motion::angles(&self.stated, &self.commands, self.period, motion::COARSE);
         let servo = &self.stated.servos[joint];
         let mut usual = Usual {
             range: [f64::MAX, f64::MIN],

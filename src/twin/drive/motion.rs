@@ -1,19 +1,20 @@
-//! A rig moved along commands: explicit steps (positions half a step ahead of speeds), dry friction as the set of joints that stick.
+//! A rig moved along commands: explicit steps of second order (torques at the middle, to which the last acceleration leads), dry friction as the set of joints that stick.
 
 use super::rig::{Rig, Servo};
 use crate::way::JointState;
 
-/// s of a step at most.
-const STEP: f64 = 5e-4;
+/// s of a step at most: of what is recorded, and of what only compares.
+pub(super) const FINE: f64 = 2.5e-4;
+pub(super) const COARSE: f64 = 1e-3;
 /// s for which the arm holds its pose before the first row.
 const BEFORE: f64 = 2.0;
 /// Exchanges between sticking and sliding at most.
 const EXCHANGES: usize = 30;
 
 /// Angles (row-major) at every row of commands, which are `period` s apart and of which each holds until the next.
-pub(super) fn angles(rig: &Rig, commands: &[f64], period: f64) -> Vec<f64> {
+pub(super) fn angles(rig: &Rig, commands: &[f64], period: f64, step: f64) -> Vec<f64> {
     let n = rig.joints();
-    let steps = (period / STEP).ceil() as usize;
+    let steps = (period / step - 1e-9).ceil() as usize;
     let h = period / steps as f64;
     let rows = commands.len() / n;
     let before = (BEFORE / period).ceil() as usize;
@@ -34,6 +35,7 @@ pub(super) fn angles(rig: &Rig, commands: &[f64], period: f64) -> Vec<f64> {
 struct Now {
     q: Vec<f64>,
     v: Vec<f64>,
+    a: Vec<f64>,
     set_point: Vec<f64>,
     integral: Vec<f64>,
     driven: Vec<f64>,
@@ -45,6 +47,7 @@ impl Now {
         Self {
             q: home.to_vec(),
             v: vec![0.0; n],
+            a: vec![0.0; n],
             set_point: home.to_vec(),
             integral: vec![0.0; n],
             driven: vec![0.0; n],
@@ -68,7 +71,9 @@ impl Now {
             })
         };
         let weight = torque(&still, &still);
-        let bias = torque(&self.v, &still);
+        let ahead = self.v.iter().zip(&self.a).map(|(v, a)| v + 0.5 * h * a);
+        let ahead: Vec<f64> = ahead.collect();
+        let bias = torque(&ahead, &still);
         let mut mass = vec![vec![0.0; n]; n];
         for k in 0..n {
             let mut unit = still.clone();
@@ -93,13 +98,12 @@ impl Now {
                     (self.integral[j] + servo.integral[0] * error * h).clamp(-most, most);
             }
             let rate = if servo.on_error { rate } else { 0.0 };
-            let asked = servo.kp * felt + servo.kd * (rate - self.v[j]) + self.integral[j];
+            let asked = servo.kp * felt + servo.kd * (rate - ahead[j]) + self.integral[j];
             self.driven[j] = asked.clamp(-servo.limit, servo.limit);
             let felt = servo.coupled.map_or(0.0, |(by, share)| share * driven[by]);
-            force[j] = self.driven[j] + felt - servo.damping * self.v[j]
-                + passive(servo, middle[j])
+            force[j] = self.driven[j] + felt - servo.damping * ahead[j] + passive(servo, middle[j])
                 - bias[j];
-            limit[j] = dry(servo, self.v[j], self.driven[j], time);
+            limit[j] = dry(servo, ahead[j], self.driven[j], time);
         }
         let free = solve(&mass, &force);
         let start: Vec<f64> = self.v.iter().zip(&free).map(|(v, a)| v + h * a).collect();
@@ -107,6 +111,11 @@ impl Now {
         for j in 0..n {
             self.q[j] = middle[j] + 0.5 * h * new[j];
         }
+        self.a = new
+            .iter()
+            .zip(&self.v)
+            .map(|(new, old)| (new - old) / h)
+            .collect();
         self.v = new;
     }
 }

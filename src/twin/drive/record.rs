@@ -97,7 +97,12 @@ impl DriveCase {
         let shown = |angle: f64| {
             ((angle + self.noise * noise.normal()) / self.encoder).round() * self.encoder
         };
-        let angles = motion::angles(&self.rig(&self.laws), &self.commands, self.period);
+        let angles = motion::angles(
+            &self.rig(&self.laws),
+            &self.commands,
+            self.period,
+            motion::FINE,
+        );
         let angles: Vec<f64> = angles.into_iter().map(shown).collect();
         let lengths = self.lengths.iter().enumerate();
         let number: Vec<usize> = lengths.flat_map(|(k, rows)| vec![k + 1; *rows]).collect();
