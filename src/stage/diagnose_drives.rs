@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 const MOST_BYTES: u64 = 1 << 30;
 
 /// Causes a joint at most.
-const MOST_A_JOINT: usize = 5;
+const MOST_A_JOINT: usize = 3;
 
 /// Settings of `diagnose_drives`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
