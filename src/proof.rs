@@ -7,6 +7,7 @@ use crate::raw;
 use crate::table::{Recording, Scoreboard, ScoreboardRow, Table, Truth};
 use crate::twin::conceal;
 use crate::twin::conceal::design::Design;
+use crate::twin::drive::DriveCase;
 use crate::twin::folder::{self, Decimals, File, Log};
 use crate::twin::reveal::board::Board;
 use crate::twin::reveal::mark::{Case, Marked, NAMELESS, left_out, mark};
@@ -25,6 +26,11 @@ use std::path::{Component, Path};
 pub fn conceal(folder: &Path, design: &Design, threads: usize) -> Result<usize> {
     let contents = design.contents();
     let made = in_order(threads, design.cases, |number| -> Result<Written, String> {
+        if design.drives {
+            let case = DriveCase::draw(design, number);
+            let files = case.recording().into();
+            return Ok((case.name.clone(), files, case.sealed()));
+        }
         if design.dynamics {
             let case = TorqueCase::draw(design, number);
             let files = case.recording().into();

@@ -145,6 +145,9 @@ fn table<T: Table>(outcome: &CompletedRun, store: &Store) -> Result<T> {
 ///
 /// With --dynamics recordings are torques or motor currents of an arm that moves (robot.json, recording.csv), for
 /// `calib diagnose pipelines/dynamics/pipeline.yaml`; most joints have friction in addition to the concealed effects.
+///
+/// With --drives recordings are commands and angles of position-controlled joints (robot.xml, drives.json, recording.csv), for
+/// `calib diagnose pipelines/drives/pipeline.yaml`.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib simulate conceal --out blind --seed 7 --cases 40 --nulls 0.25
@@ -152,7 +155,8 @@ fn table<T: Table>(outcome: &CompletedRun, store: &Store) -> Result<T> {
   calib simulate conceal --out pairs --seed 3 --cases 30 --pairs 1
   calib simulate conceal --out strange --cases 30 --open 1
   calib simulate conceal --out further --cases 30 --families beyond
-  calib simulate conceal --out moving --cases 30 --dynamics --nulls 0.2 --pairs 0.2")]
+  calib simulate conceal --out moving --cases 30 --dynamics --nulls 0.2 --pairs 0.2
+  calib simulate conceal --out servos --cases 30 --drives --nulls 0.2 --pairs 0.2")]
 pub(crate) struct ConcealArguments {
     /// The folder to make; it must not exist, or be empty
     #[arg(long, short, value_name = "DIR")]
@@ -166,6 +170,9 @@ pub(crate) struct ConcealArguments {
     /// Torques of an arm that moves instead of points
     #[arg(long, conflicts_with_all = OF_POINTS)]
     dynamics: bool,
+    /// Commands and angles of position-controlled joints instead of points
+    #[arg(long, conflicts_with_all = OF_POINTS, conflicts_with = "dynamics")]
+    drives: bool,
     /// Seconds of a recording of torques: 55 % are to fit, the rest judges
     #[arg(long, value_name = "S", default_value_t = 48.0, requires = "dynamics")]
     seconds: f64,
@@ -259,7 +266,8 @@ impl ConcealArguments {
         let design = design(self)?;
         vacant(&self.out)?;
         let rows = conceal(&self.out, &design, self.threads())?;
-        let row = if self.dynamics { "row" } else { "point" };
+        let moves = self.dynamics || self.drives;
+        let row = if moves { "row" } else { "point" };
         let (recordings, seal) = (self.out.join(RECORDINGS), self.out.join(SEAL));
         if self.json {
             let rows_of = format!("{row}s");
@@ -313,9 +321,9 @@ pub(crate) fn design(arguments: &ConcealArguments) -> Result<Design> {
         "add up to more than 1".into(),
     );
     wrong(
-        arguments.dynamics && arguments.foreign > 0.0,
+        (arguments.dynamics || arguments.drives) && arguments.foreign > 0.0,
         "--foreign",
-        "foreign effects move points; torques have none".into(),
+        "foreign effects move points; torques and drives have none".into(),
     );
     wrong(
         collection == Collection::Beyond && singled > 0.0,
@@ -364,6 +372,7 @@ pub(crate) fn design(arguments: &ConcealArguments) -> Result<Design> {
         layout: layout.unwrap_or_default(),
         tool_mass_kg: arguments.tool_mass,
         dynamics: arguments.dynamics,
+        drives: arguments.drives,
         seconds: arguments.seconds,
         rate: arguments.rate,
     })

@@ -267,9 +267,18 @@ fn variable_at(text: &str) -> Option<&str> {
 /// Most files that a pattern may stand for: a slip must not read a whole disk.
 const LIMIT: usize = 10_000;
 
-/// Fills in the entries of `files` below the settings of a stage; relative paths start at `folder`.
+/// Fills in the entries of `files` and `recording` below the settings of a stage; relative paths start at `folder`.
 pub(super) fn expand(with: &mut Node, folder: &Path) -> Vec<Trouble> {
     let mut troubles = Vec::new();
+    if let Some(node) = with.at_mut("recording") {
+        if node.text().is_some_and(|text| is_pattern(&text)) {
+            let alone = node.clone();
+            node.value = YamlValue::List(vec![alone]);
+        }
+        if let YamlValue::List(items) = &mut node.value {
+            *items = expanded(std::mem::take(items), folder, "recording", &mut troubles);
+        }
+    }
     let Some(Node {
         value: YamlValue::List(items),
         ..
@@ -277,44 +286,7 @@ pub(super) fn expand(with: &mut Node, folder: &Path) -> Vec<Trouble> {
     else {
         return troubles;
     };
-    let mut all = Vec::with_capacity(items.len());
-    for (index, item) in std::mem::take(items).into_iter().enumerate() {
-        let place = format!("files[{index}].file");
-        let file = item
-            .get("file")
-            .and_then(|node| Some((node.text()?, node.overridden, node.mark)));
-        let Some((pattern, overridden, mark)) =
-            file.filter(|(pattern, ..)| pattern.contains(['*', '?']))
-        else {
-            all.push(item);
-            continue;
-        };
-        let start = if overridden {
-            PathBuf::new()
-        } else {
-            folder.to_path_buf()
-        };
-        match matching(&start, &pattern) {
-            Ok(found) if found.is_empty() => {
-                troubles.push(
-                    Trouble::new(format!(
-                        "no file matches `{}`",
-                        start.join(&pattern).display()
-                    ))
-                    .at(mark)
-                    .below(&place),
-                );
-            }
-            Ok(found) => all.extend(found.into_iter().map(|path| {
-                let mut entry = item.clone();
-                if let Some(file) = entry.at_mut("file") {
-                    file.value = YamlValue::Text(path);
-                }
-                entry
-            })),
-            Err(message) => troubles.push(Trouble::new(message).at(mark).below(&place)),
-        }
-    }
+    let all = expanded(std::mem::take(items), folder, "files", &mut troubles);
     *items = all;
     for (index, item) in items.iter_mut().enumerate() {
         let path = item.get("file").and_then(Node::text).unwrap_or_default();
@@ -346,6 +318,113 @@ pub(super) fn expand(with: &mut Node, folder: &Path) -> Vec<Trouble> {
         }
     }
     troubles
+}
+
+fn is_pattern(text: &str) -> bool {
+    text.contains(['*', '?'])
+}
+
+/// Entries of a list of files, each that is a pattern, or whose `file` is one, once for every file that matches.
+fn expanded(items: Vec<Node>, folder: &Path, list: &str, troubles: &mut Vec<Trouble>) -> Vec<Node> {
+    let mut all = Vec::with_capacity(items.len());
+    for (index, item) in items.into_iter().enumerate() {
+        let alone = matches!(item.value, YamlValue::Text(_));
+        let below = if alone { "" } else { "file" };
+        let place = match alone {
+            true => format!("{list}[{index}]"),
+            false => format!("{list}[{index}].file"),
+        };
+        let file = item
+            .at(below)
+            .and_then(|node| Some((node.text()?, node.overridden, node.mark)));
+        let Some((pattern, overridden, mark)) = file.filter(|(pattern, ..)| is_pattern(pattern))
+        else {
+            all.push(item);
+            continue;
+        };
+        let start = if overridden {
+            PathBuf::new()
+        } else {
+            folder.to_path_buf()
+        };
+        let found = match matching(&start, &pattern) {
+            Ok(found) if found.is_empty() => Err(format!(
+                "no file matches `{}`",
+                start.join(&pattern).display()
+            )),
+            found => found,
+        };
+        let entries = found.and_then(|found| {
+            let entries = found.into_iter().map(|path| {
+                let mut entry = item.clone();
+                // Commands in a file of their own: their pattern's stars stand for what the file's stand for.
+                let beside = entry
+                    .get("commands")
+                    .and_then(Node::text)
+                    .filter(|beside| is_pattern(beside));
+                if let Some(beside) = beside {
+                    let text = alike(&pattern, &path, &beside)?;
+                    if let Some(node) = entry.at_mut("commands") {
+                        node.value = YamlValue::Text(text);
+                    }
+                }
+                if let Some(file) = entry.at_mut(below) {
+                    file.value = YamlValue::Text(path);
+                }
+                Ok(entry)
+            });
+            entries.collect::<Result<Vec<Node>, String>>()
+        });
+        match entries {
+            Ok(entries) => all.extend(entries),
+            Err(message) => troubles.push(Trouble::new(message).at(mark).below(&place)),
+        }
+    }
+    all
+}
+
+/// `beside` with its stars replaced by what those of `pattern` stand for in `path`.
+fn alike(pattern: &str, path: &str, beside: &str) -> Result<String, String> {
+    let wrong = || {
+        format!(
+            "`{beside}` is not like `{pattern}`: allowed is a pattern with no more stars, which stand for the same text in the same order"
+        )
+    };
+    let parts = |text: &str| -> Vec<String> {
+        let parts = text.split('/').filter(|part| *part != ".");
+        parts.map(str::to_string).collect()
+    };
+    let (parts, all) = (parts(pattern), parts(path));
+    if parts.len() != all.len() || pattern.contains('?') || beside.contains('?') {
+        return Err(wrong());
+    }
+    let mut names = Vec::new();
+    for (pattern, text) in parts.iter().zip(&all) {
+        names.extend(stars(pattern, text).ok_or_else(wrong)?);
+    }
+    let mut names = names.into_iter();
+    let mut out = String::new();
+    for (k, part) in beside.split('*').enumerate() {
+        if k > 0 {
+            out += &names.next().ok_or_else(wrong)?;
+        }
+        out += part;
+    }
+    Ok(out)
+}
+
+/// What stands for the stars of one name: each the shortest text that lets the rest match.
+fn stars(pattern: &str, text: &str) -> Option<Vec<String>> {
+    let Some((before, after)) = pattern.split_once('*') else {
+        return (pattern == text).then(Vec::new);
+    };
+    let text = text.strip_prefix(before)?;
+    let ends = text.char_indices().map(|(at, _)| at).chain([text.len()]);
+    ends.into_iter().find_map(|end| {
+        let more = stars(after, &text[end..])?;
+        let own = std::iter::once(text[..end].to_string());
+        Some(own.chain(more).collect())
+    })
 }
 
 /// Files that match, relative to `start`, in the order of their paths.
@@ -427,7 +506,20 @@ fn braces(pattern: &str, text: &str) -> Option<Vec<String>> {
 
 #[cfg(test)]
 mod tests {
-    use super::named;
+    use super::{alike, named};
+
+    #[test]
+    fn stars_of_a_file_beside_another_stand_for_the_same_text() {
+        let pattern = "../data/*/motor_*.csv";
+        let path = "../data/sine/motor_2.csv";
+        let beside = "../data/*/sent_*.csv";
+        assert_eq!(
+            alike(pattern, path, beside),
+            Ok("../data/sine/sent_2.csv".into())
+        );
+        assert_eq!(alike("*.csv", "a.csv", "b/*.csv"), Ok("b/a.csv".into()));
+        assert!(alike("*.csv", "a.csv", "*/*.csv").is_err());
+    }
 
     #[test]
     fn braces_name_what_stands_in_a_path() {

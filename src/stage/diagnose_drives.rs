@@ -1,13 +1,13 @@
 //! `diagnose_drives`: which physics the simulation of commanded joints lacks, from commands and measured angles alone.
 
 mod reading;
+mod recorded;
 
 pub(crate) use reading::short;
 
 use crate::drives::chain::{Bodies, Chain};
 use crate::drives::mjcf::{self, MjcfArm, MjcfText};
 use crate::drives::physics::{Joint, Physics};
-use crate::drives::recording::{Recording, Trajectory};
 use crate::drives::{CAUSES, Drives, diagnose};
 use crate::dynamics::InertialTolerance;
 use crate::engine::Options;
@@ -18,12 +18,15 @@ use crate::table::{
     Document, DocumentRow, DriveCourse, DriveSimulation, DriveVerdict, FindingNumbers, Findings,
     JointDrives, Rivals, VerdictSentences,
 };
-use reading::{Sheet, held, must_rise, rows};
+use recorded::Source;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 // Bytes: a million rows of six joints are 200 MB.
 const MOST_BYTES: u64 = 1 << 30;
+
+/// Causes a joint at most.
+const MOST_A_JOINT: usize = 3;
 
 /// Settings of `diagnose_drives`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -37,20 +40,74 @@ pub struct DiagnoseDrives {
     /// Gains, limits, encoders and the rate of the commands, JSON: `command_rate_hz`, `joints: [{joint, kp, kd, kd_on, torque_limit_nm,
     /// encoder_rad, noise_rad}]`, `inertia_tolerance: {mass_rel, com_mm, inertia_rel}`.
     pub(crate) drives: RawFile,
-    /// Commands and measured angles over time, CSV.
-    pub(crate) recording: RawFile,
-    /// The commands, where they are in a file of their own on the same clock: each holds until the next.
+    /// Commands and measured angles over time, CSV; or a list of such recordings, which are fitted together. A pattern stands for all files
+    /// that match.
+    pub(crate) recording: DriveRecordings,
+    /// The commands of one recording, where they are in a file of their own on the same clock: each holds until the next.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) commands: Option<RawFile>,
     /// Columns of the recording.
     #[serde(default)]
     pub(crate) columns: DriveColumns,
-    /// Labels of the recording's `usage` to fit; all other trajectories judge.
+    /// Labels of `usage` to fit; all other rows judge.
     #[serde(default = "crate::stage::fit_set")]
     pub(crate) on: Vec<String>,
+    /// Rows that judge of those that would be fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) hold_out: Option<DriveHoldOut>,
     /// Causes that are not tried and never named.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) without: Vec<String>,
+}
+
+/// One recording or several.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected a file, or a list of files or of `{file: ..., commands: ..., usage: ...}`"
+)]
+pub enum DriveRecordings {
+    /// A file.
+    One(RawFile),
+    /// Files, each with trajectories of its own.
+    Several(Vec<DriveRecording>),
+}
+
+/// One of several recordings.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected a file, or `{file: ..., commands: ..., usage: ...}`"
+)]
+pub enum DriveRecording {
+    /// A file.
+    File(RawFile),
+    /// A file, and what is known of it.
+    Described(DescribedRecording),
+}
+
+/// A recording with its commands and its use.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DescribedRecording {
+    /// Commands and measured angles.
+    file: RawFile,
+    /// The commands, where they are in a file of their own on the same clock; of a pattern, its stars stand for what those of `file` do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    commands: Option<RawFile>,
+    /// What it is for, where it has no column that says so: `validate` is not fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    usage: Option<String>,
+}
+
+/// Which rows judge.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum DriveHoldOut {
+    /// Windows of so many seconds of each trajectory are fitted and held out in turn; the simulation runs through them.
+    Windows(f64),
+    /// So large a share at the end of each trajectory, between 0 and 1.
+    Last(f64),
 }
 
 /// Columns of a recording of drives; `{j}` stands for the joint, from 1, `{name}` for its name, also without `_joint` at its end. A column
@@ -64,7 +121,7 @@ pub struct DriveColumns {
     pub(crate) time_unit: ClockUnit,
     /// What tells trajectories apart; without such a column all is one.
     pub(crate) trajectory: String,
-    /// What rows are for; without such a column all are fitted.
+    /// What rows are for; without such a column it is the file's `usage`, or all are fitted.
     pub(crate) usage: String,
     /// Commanded angles.
     pub(crate) command: String,
@@ -182,31 +239,50 @@ impl Stage for DiagnoseDrives {
             let message = format!("no cause `{name}`{hint} (causes: {})", listed(&names));
             at.at(format!("without[{k}]")).must(known, message);
         }
-        let one = self.columns.command == self.columns.angle && self.commands.is_none();
+        let one = self.columns.command == self.columns.angle;
+        let sources = self.sources();
+        let apart = |source: &Source| source.commands.is_some();
         at.at("columns").at("angle").must(
-            !one,
+            !one || sources.iter().all(apart),
             "is the column of the commands, too; allowed: another column, or `commands`, a file of their own",
         );
+        at.at("recording")
+            .must(!sources.is_empty(), "no file; name at least one");
+        let several = matches!(self.recording, DriveRecordings::Several(_));
+        at.at("commands").must(
+            !several || self.commands.is_none(),
+            "is of one recording; of several name the commands of each: `recording: [{file: ..., commands: ...}]`",
+        );
+        match self.hold_out {
+            Some(DriveHoldOut::Windows(s)) => at
+                .at("hold_out.windows")
+                .must(s > 0.0 && s.is_finite(), "allowed: above 0, s"),
+            Some(DriveHoldOut::Last(share)) => at
+                .at("hold_out.last")
+                .must(share > 0.0 && share < 1.0, "allowed: above 0 and below 1"),
+            None => {}
+        }
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
-        let one = [
-            ("robot", &self.robot),
-            ("drives", &self.drives),
-            ("recording", &self.recording),
-        ];
+        let one = [("robot", &self.robot), ("drives", &self.drives)];
         let one = one.map(|(name, file)| (name.to_string(), file.clone()));
         let includes = self.includes.iter().enumerate();
         let includes = includes.map(|(k, file)| (format!("includes[{k}]"), file.clone()));
-        let commands = self.commands.iter();
-        let commands = commands.map(|file| ("commands".to_string(), file.clone()));
-        one.into_iter().chain(commands).chain(includes).collect()
+        let sources = self.sources().into_iter();
+        let files = sources.flat_map(|source| [Some(source.file), source.commands]);
+        let files = files.flatten().map(|(place, file)| (place, file.clone()));
+        one.into_iter().chain(files).chain(includes).collect()
     }
 
     fn run(&self, _reads: DiagnoseDrivesReads, context: &Context) -> Result<DiagnoseDrivesWrites> {
         let (arm, mut drives) = self.problem(context)?;
         drives.without.clone_from(&self.without);
-        let diagnosis = diagnose(&drives, &Options::default(), |line| context.note(line));
+        let options = Options {
+            most: MOST_A_JOINT * drives.recording.joints(),
+            ..Options::default()
+        };
+        let diagnosis = diagnose(&drives, &options, |line| context.note(line));
         let mut writes = DiagnoseDrivesWrites {
             verdict: DriveVerdict::of(context.id, &diagnosis),
             sentences: VerdictSentences::of(context.id, &[]),
@@ -303,94 +379,6 @@ impl DiagnoseDrives {
         let recording = self.recorded(&file, context)?;
         let chain = Chain::new(&arm.arm, &reference);
         Ok((arm, Drives::new(chain, physics, recording, tolerance)))
-    }
-
-    fn recorded(&self, file: &DriveFile, context: &Context) -> Result<Recording> {
-        const WHAT: &str = "a CSV of commands and angles";
-        let (label, text) = context.text(&self.recording, WHAT, MOST_BYTES)?;
-        let names: Vec<String> = file.joints.iter().map(|one| one.joint.clone()).collect();
-        let sheet = Sheet {
-            label: &label,
-            text: &text,
-        };
-        let columns = &self.columns;
-        let [command, angle] = [columns.command.as_str(), columns.angle.as_str()];
-        let (mut rows, commands) = match &self.commands {
-            None => {
-                let mut rows = rows(&sheet, columns, &names, &[command, angle])?;
-                let commands = rows.values.remove(0);
-                (rows, commands)
-            }
-            Some(sent) => {
-                let (place, text) = context.text(sent, WHAT, MOST_BYTES)?;
-                let sheet_of_commands = Sheet {
-                    label: &place,
-                    text: &text,
-                };
-                let mut sent = reading::rows(&sheet_of_commands, columns, &names, &[command])?;
-                let mut rows = reading::rows(&sheet, columns, &names, &[angle])?;
-                must_rise(&place, &sent.time)?;
-                let (held, before) = held(&sent.time, &rows.time);
-                let beyond = rows.time.last() > sent.time.last();
-                if before > rows.time.len() / 2 {
-                    let message = format!(
-                        "its first command is sent at {} s, after half of the {} angles of {label}; both clocks are one, in `time_unit`",
-                        sent.time.first().copied().unwrap_or_default(),
-                        rows.time.len()
-                    );
-                    return Err(Error::data(&place, message));
-                }
-                if before > 0 {
-                    context.note(format!(
-                        "{label}: {before} rows before the first command are not used"
-                    ));
-                    rows.skip(before, names.len());
-                }
-                if beyond {
-                    context.note(format!(
-                        "{place}: its last command is held until {label} ends"
-                    ));
-                }
-                let n = names.len();
-                let values = sent.values.remove(0);
-                let of_row = |row: &usize| values[row * n..(row + 1) * n].to_vec();
-                let commands = held[before..].iter().flat_map(of_row).collect();
-                (rows, commands)
-            }
-        };
-        let by = match columns.unit {
-            AngleUnit::Rad => 1.0,
-            AngleUnit::Deg => 1f64.to_radians(),
-        };
-        let scaled = |values: Vec<f64>| values.into_iter().map(|value| by * value).collect();
-        let trajectory = |(rows, usage): &(std::ops::Range<usize>, Option<String>)| Trajectory {
-            rows: rows.clone(),
-            held_out: usage.as_ref().is_some_and(|usage| !self.on.contains(usage)),
-        };
-        let recording = Recording {
-            angle: scaled(rows.values.remove(0)),
-            command: scaled(commands),
-            trajectories: rows.runs.iter().map(trajectory).collect(),
-            time: rows.time,
-            period: 1.0 / file.command_rate_hz,
-            encoder: file.joints.iter().map(|joint| joint.encoder_rad).collect(),
-            noise: file.joints.iter().map(|joint| joint.noise_rad).collect(),
-        };
-        if recording
-            .trajectories
-            .iter()
-            .all(|trajectory| trajectory.held_out)
-        {
-            return Err(Error::data(
-                "with.on",
-                format!(
-                    "no row of {label} is left to fit; to fit: {}",
-                    self.on.join(", ")
-                ),
-            ));
-        }
-        recording.check(&label)?;
-        Ok(recording)
     }
 }
 

@@ -106,6 +106,8 @@ fn of_joint(joint: &Joint) -> Vec<Quantity> {
         ("stribeck_speed", "rad/s", joint.stribeck[1]),
         ("load_friction_driving", "1", joint.load_friction[0]),
         ("load_friction_back", "1", joint.load_friction[1]),
+        ("gear_friction_driving", "1", joint.gear_friction[0]),
+        ("gear_friction_back", "1", joint.gear_friction[1]),
         ("presliding", "rad", joint.presliding),
         ("warm_up_share", "1", joint.warm_up[0]),
         ("warm_up_share_viscous", "1", joint.warm_up_viscous),
@@ -255,10 +257,7 @@ impl DriveCourse {
             let of_row = |row: &usize| all[row * n..(row + 1) * n].to_vec();
             rows.iter().flat_map(of_row).collect()
         };
-        let held_out = |row: &usize| {
-            let mut trajectories = recording.trajectories.iter();
-            trajectories.any(|one| one.held_out && one.rows.contains(row))
-        };
+        let held_out = |row: &usize| recording.held_out[*row];
         Self {
             joints: n,
             sequence: rows.iter().map(|row| *row as i64).collect(),

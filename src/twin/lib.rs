@@ -8,6 +8,7 @@
 
 pub mod arm;
 pub mod conceal;
+pub mod drive;
 pub mod effect;
 pub mod folder;
 pub mod lists;

@@ -351,6 +351,87 @@ fn commands_and_angles_come_as_lists_in_two_files_too() {
     );
 }
 
+/// What is diagnosed of recordings a/motor.csv, b/motor.csv with commands beside them, by lines below `with`.
+fn of_several(lines: &str) -> Answer {
+    let case = in_lists(&folder(), false);
+    for name in ["a", "b"] {
+        std::fs::create_dir(case.path().join(name)).unwrap();
+        for (from, to) in [
+            ("state_motor.csv", "motor.csv"),
+            ("control.csv", "sent.csv"),
+        ] {
+            std::fs::copy(case.path().join(from), case.path().join(name).join(to)).unwrap();
+        }
+    }
+    put(
+        case.path(),
+        "pipeline.yaml",
+        format!(
+            "calib: 1\nname: several\nseed: 1\nstages:\n  - uses: diagnose_drives\n    with:\n      robot: robot.xml\n      drives: drives.json\n\
+             {lines}      columns: {{time: timestamp, time_unit: us, command: positions, angle: positions}}\n"
+        ),
+    );
+    calib(
+        case.path(),
+        "diagnose --quiet --json pipeline.yaml --store store",
+    )
+}
+
+#[test]
+fn several_recordings_are_fitted_together_and_one_may_judge() {
+    let two = of_several(
+        "      recording: [{file: a/motor.csv, commands: a/sent.csv}, {file: b/motor.csv, commands: b/sent.csv}]\n",
+    );
+    assert_eq!(two.code, Some(0), "{}", two.err);
+    assert_eq!(two.json()["rows"], json!(400), "{}", two.out);
+    let pattern =
+        of_several("      recording: [{file: \"*/motor.csv\", commands: \"*/sent.csv\"}]\n");
+    assert_eq!(pattern.code, Some(0), "{}", pattern.err);
+    assert_eq!(pattern.json()["before"], two.json()["before"]);
+    let judged = of_several(
+        "      recording: [{file: a/motor.csv, commands: a/sent.csv}, {file: b/motor.csv, commands: b/sent.csv, usage: validate}]\n",
+    );
+    let document = judged.json();
+    assert_eq!(document["rows"], json!(200));
+    let rms = |key: &str| document["before"][key].as_f64().unwrap();
+    assert!(
+        (rms("fit_rms_mrad") - rms("validate_rms_mrad")).abs() < 1e-9,
+        "the same rows: {document}"
+    );
+    let apart = of_several("      recording: [a/motor.csv]\n      commands: a/sent.csv\n");
+    assert!(
+        apart.err.contains("name the commands of each"),
+        "{}",
+        apart.err
+    );
+    let none = of_several("      recording: \"*/nothing.csv\"\n");
+    assert!(none.err.contains("no file matches"), "{}", none.err);
+}
+
+#[test]
+fn windows_of_a_trajectory_are_fitted_and_held_out_in_turn() {
+    let whole = of_several("      recording: a/motor.csv\n      commands: a/sent.csv\n");
+    let halves = of_several(
+        "      recording: a/motor.csv\n      commands: a/sent.csv\n      hold_out: {windows: 0.5}\n",
+    );
+    assert_eq!(halves.code, Some(0), "{}", halves.err);
+    let document = halves.json();
+    assert_eq!(document["rows"], json!(100));
+    // The simulation runs through the windows that judge: both halves together are the whole.
+    let square = |key: &str| document["before"][key].as_f64().unwrap().powi(2);
+    let both = 0.5 * (square("fit_rms_mrad") + square("validate_rms_mrad"));
+    let one = whole.json()["before"]["fit_rms_mrad"].as_f64().unwrap();
+    assert!((both.sqrt() / one - 1.0).abs() < 1e-6, "{both} {one}");
+    let wrong = of_several(
+        "      recording: a/motor.csv\n      commands: a/sent.csv\n      hold_out: {windows: 0}\n",
+    );
+    assert!(
+        wrong.err.contains("hold_out.windows") && wrong.err.contains("allowed: above 0"),
+        "{}",
+        wrong.err
+    );
+}
+
 #[test]
 fn init_writes_the_pipeline_of_commands_and_angles() {
     let plain = folder();

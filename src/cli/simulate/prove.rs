@@ -28,16 +28,17 @@ use std::process::{Command, Stdio};
   calib simulate prove --out open --seed 7 --cases 60 --natural 0 --left-out
   calib simulate prove --out foreign --seed 7 --cases 60 --foreign 1 --faulty 0
   calib simulate prove --out further --seed 7 --cases 300 --families beyond
-  calib simulate prove --out moving --seed 7 --cases 60 --dynamics --nulls 0.2 --pairs 0.2 --open 0.1")]
+  calib simulate prove --out moving --seed 7 --cases 60 --dynamics --nulls 0.2 --pairs 0.2 --open 0.1
+  calib simulate prove --out servos --seed 7 --cases 60 --drives --nulls 0.2 --pairs 0.2 --open 0.1")]
 pub(super) struct ProveArguments {
     #[command(flatten)]
     conceal: ConcealArguments,
     /// The pipeline with a stage that diagnoses and a variable `case` [default: pipelines/case/pipeline.yaml; of torques
-    /// pipelines/dynamics/pipeline.yaml]
+    /// pipelines/dynamics/pipeline.yaml, of drives pipelines/drives/pipeline.yaml]
     #[arg(long, value_name = "PIPELINE")]
     pipeline: Option<PathBuf>,
     /// Diagnoses every recording of one listed cause without that cause, too: `diagnose.without` of the pipeline is set
-    #[arg(long, conflicts_with = "dynamics")]
+    #[arg(long, conflicts_with_all = ["dynamics", "drives"])]
     left_out: bool,
     /// Prints no progress
     #[arg(long, short)]
@@ -49,9 +50,10 @@ const VERDICTS: &str = "verdicts";
 impl ProveArguments {
     pub(crate) fn run(&self) -> Result<()> {
         let (design, folder) = (design(&self.conceal)?, &self.conceal.out);
-        let usual = match design.dynamics {
-            false => "pipelines/case/pipeline.yaml",
-            true => "pipelines/dynamics/pipeline.yaml",
+        let usual = match (design.dynamics, design.drives) {
+            (true, _) => "pipelines/dynamics/pipeline.yaml",
+            (_, true) => "pipelines/drives/pipeline.yaml",
+            _ => "pipelines/case/pipeline.yaml",
         };
         let pipeline = self.pipeline.clone().unwrap_or_else(|| usual.into());
         if !pipeline.is_file() {

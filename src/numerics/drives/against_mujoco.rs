@@ -89,8 +89,9 @@ pub(crate) fn motion() -> (Chain, Physics, Recording) {
         angle,
         trajectories: vec![Trajectory {
             rows: 0..rows,
-            held_out: false,
+            began: 0.0,
         }],
+        held_out: vec![false; rows],
         period,
         encoder: vec![1e-6; 4],
         noise: vec![1e-6; 4],

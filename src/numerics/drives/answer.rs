@@ -98,16 +98,22 @@ const REMAINS: f64 = 1.1;
 
 /// Diagnoses a recording of drives; `tell` receives the progress.
 pub fn diagnose(problem: &Drives, options: &Options, tell: impl FnMut(String)) -> DriveDiagnosis {
-    let answer = calib_engine::diagnose(problem, options, tell);
+    let part = problem.part();
+    let answer = calib_engine::diagnose(part.as_ref().unwrap_or(problem), options, tell);
+    // What stands is fitted to all rows.
+    let after = match part {
+        Some(_) => problem.fitted_with(&answer.after.set, None, true),
+        None => answer.after,
+    };
     let findings = answer.findings.iter();
     let findings = findings
-        .map(|finding| problem.finding(&answer.after, finding))
+        .map(|finding| problem.finding(&after, finding))
         .collect();
-    let physics = problem.physics(&answer.after.inertia, &answer.after.set);
+    let physics = problem.physics(&after.inertia, &after.set);
     let before = problem.angles(&problem.base, Which::All);
     let after = problem.angles(&physics, Which::All);
     let n = problem.chain.joints();
-    let held_out = problem.recording.trajectories.iter().any(|t| t.held_out);
+    let held_out = problem.recording.held_out.contains(&true);
     let mut joints: Vec<JointError> = (0..n)
         .map(|joint| problem.errors(Some(joint), [&before, &after]))
         .collect();
@@ -145,19 +151,17 @@ impl Drives {
                 .collect()
         };
         let rms = |held: bool, angles: &Vec<f64>| {
-            let rows = self
-                .recording
-                .trajectories
-                .iter()
-                .filter(|t| t.held_out == held)
-                .flat_map(|t| t.rows.clone());
+            let trajectories = self.recording.trajectories.iter();
+            let rows = trajectories
+                .flat_map(|t| t.rows.clone())
+                .filter(|row| self.recording.held_out[*row] == held);
             let all: Vec<f64> = rows
                 .flat_map(of)
                 .map(|at| (self.recording.angle[at] - angles[at]).powi(2))
                 .collect();
             (all.iter().sum::<f64>() / all.len().max(1) as f64).sqrt()
         };
-        let any = self.recording.trajectories.iter().any(|t| t.held_out);
+        let any = self.recording.held_out.contains(&true);
         let noise =
             |j: usize| self.recording.noise[j].powi(2) + self.recording.encoder[j].powi(2) / 12.0;
         let noises: Vec<f64> = (0..n)
@@ -189,7 +193,8 @@ impl Drives {
             .map(|k| (without[k] - fit.angles[k]).powi(2))
             .collect();
         let cell = &one.cell;
-        let numbers = cell.cause.numbers.iter().zip(&one.numbers).enumerate();
+        let fitted = at.map_or(&one.numbers, |at| &fit.set[at].numbers);
+        let numbers = cell.cause.numbers.iter().zip(fitted).enumerate();
         let mut parameters: Vec<DriveNumber> = numbers
             .map(|(k, (number, x))| {
                 let sigma = sigma.get(k).copied().filter(|sigma| *sigma > 0.0);

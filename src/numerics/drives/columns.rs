@@ -192,7 +192,12 @@ impl<'a> Columns<'a> {
         self.count == 0
     }
 
-    /// At rest at the beginning of a trajectory; integrals run on.
+    /// At the beginning of a recording no drive has integrated anything.
+    pub(crate) fn begin(&mut self) {
+        self.slots.iter_mut().for_each(|slot| slot.integral = 0.0);
+    }
+
+    /// At the beginning of a trajectory, which is measured; integrals run on.
     pub(crate) fn start(
         &mut self,
         recording: &Recording,
@@ -446,7 +451,8 @@ fn slot_torque(
     let sag = sag.map_or(at.sag, |sag| 1.0 - (sag * at.drawn).clamp(0.0, 0.9));
     let t = changed.torque(joint, r, at.motion, &with, sag);
     let before = &at.torques[joint];
-    let dry = at.slides[r] * (t.limit - before.limit);
+    let way = usize::from(at.slides[r] < 0.0);
+    let dry = at.slides[r] * (t.limit[way] - before.limit[way]);
     let rotor = changed.armature - base.armature;
     push[0] = t.smooth - before.smooth - dry - rotor * acceleration[r];
     if r != joint {

@@ -1,6 +1,7 @@
 //! Everything at once, in the roll-out itself: Gauss-Newton on the numbers of causes and on inertials under their tolerance.
 
 use crate::causes::Key;
+use crate::independence::independent;
 use crate::problem::{Drives, FREE};
 use crate::rollout::{Direction, Which, roll};
 use calib_engine::Accepted;
@@ -270,7 +271,9 @@ impl Drives {
         if before.is_none() {
             fit.independence = self.independence_of(&fit.angles);
         }
-        let weigh = |fit: &DriveFit| fit.independence / (fit.square / freedom).max(1.0);
+        let weigh = |fit: &DriveFit| {
+            self.independence_beside(fit.independence) / (fit.square / freedom).max(1.0)
+        };
         let mut is_new = anew;
         for step in 1..=patience.steps {
             if !fit.square.is_finite() || columns.count() == 0 {
@@ -428,21 +431,26 @@ impl Drives {
     fn independence_of(&self, angles: &[f64]) -> f64 {
         let n = self.chain.joints();
         let (mut next, mut own) = (0.0, 0.0);
-        for trajectory in self.recording.trajectories.iter().filter(|t| !t.held_out) {
-            for at in trajectory.rows.start * n..trajectory.rows.end * n {
+        let is_fitted = |row: usize| !self.recording.held_out[row];
+        for trajectory in &self.recording.trajectories {
+            let rows = trajectory.rows.clone();
+            for at in rows
+                .clone()
+                .filter(|row| is_fitted(*row))
+                .flat_map(|row| row * n..(row + 1) * n)
+            {
                 let whitened = |at: usize| (self.recording.angle[at] - angles[at]) / self.sigma[at];
                 let here = whitened(at);
                 own += here * here;
-                if at >= trajectory.rows.start * n + n {
+                if at >= (rows.start + 1) * n && is_fitted(at / n - 1) {
                     next += here * whitened(at - n);
                 }
             }
         }
-        let correlation = if own > 0.0 && own.is_finite() {
-            (next / own).clamp(0.0, 0.998)
+        if own > 0.0 && own.is_finite() {
+            independent(next / own)
         } else {
-            0.0
-        };
-        (1.0 - correlation) / (1.0 + correlation)
+            1.0
+        }
     }
 }

@@ -16,6 +16,7 @@ mod causes;
 pub mod chain;
 mod columns;
 mod fit;
+mod independence;
 pub mod mjcf;
 pub mod physics;
 mod problem;

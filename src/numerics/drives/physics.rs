@@ -94,6 +94,8 @@ pub struct Joint {
     pub stribeck: [f64; 2],
     /// Nm of friction per Nm of drive torque: driving, driven back.
     pub load_friction: [f64; 2],
+    /// Nm of friction per Nm that the gear gives to the link: driving, driven back; a gear that locks itself has 1 and more back.
+    pub gear_friction: [f64; 2],
     /// rad until friction is whole.
     pub presliding: f64,
     /// Share of dry friction more at the beginning, and s in which it goes.
@@ -132,6 +134,9 @@ pub struct Physics {
 /// s, in which the supply's voltage follows the load.
 pub const SAG_LAG: f64 = 0.02;
 
+/// s, over which friction feels a gear's load: what it asks for is known after a step only.
+pub const LOAD_LAG: f64 = 0.005;
+
 /// An instant of the motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Motion<'a> {
@@ -145,6 +150,8 @@ pub struct Motion<'a> {
     pub time: f64,
     /// Nm of the drives in the step before.
     pub driven: &'a [f64],
+    /// Nm that links ask of their gears, over the last [`LOAD_LAG`].
+    pub load: &'a [f64],
 }
 
 /// What is commanded in a step, and what a drive remembers.
@@ -169,8 +176,8 @@ pub struct Torque {
     pub smooth: f64,
     /// On the link where the rotor moves by itself.
     pub link: f64,
-    /// Nm, up to which dry friction holds.
-    pub limit: f64,
+    /// Nm, up to which dry friction holds against a motion forward and back.
+    pub limit: [f64; 2],
     /// Fall of `smooth` per rad and per rad/s.
     pub stiffness: f64,
     /// See there.
@@ -196,6 +203,7 @@ impl Default for Joint {
             friction: 0.0,
             stribeck: [0.0, 1.0],
             load_friction: [0.0; 2],
+            gear_friction: [0.0; 2],
             presliding: 0.0,
             warm_up: [0.0, 1.0],
             warm_up_viscous: 0.0,
@@ -274,13 +282,21 @@ impl Joint {
                 false => out.smooth += value,
             }
         }
-        let dry = dry.max(0.0);
+        let mut limit = [dry.max(0.0); 2];
+        if self.gear_friction != [0.0; 2] {
+            let load = motion.load[joint];
+            for (way, limit) in [1.0, -1.0].into_iter().zip(&mut limit) {
+                let back = load * way < 0.0;
+                *limit = (dry + self.gear_friction[usize::from(back)] * load.abs()).max(0.0);
+            }
+        }
         if self.presliding > 0.0 {
+            let dry = limit[usize::from(v < 0.0)];
             // A spring in place of the stop: it bends with the way and slides when it is bent by its travel.
             out.smooth -= dry * commanded.bent;
             out.stiffness += dry / self.presliding * (1.0 - commanded.bent.abs()).max(0.0);
         } else {
-            out.limit = dry;
+            out.limit = limit;
         }
         if let Some(gear) = &self.gear {
             let (way, rate) = (q - motion.q[joint], v - motion.v[joint]);

@@ -3,13 +3,15 @@
 use crate::causes::{Key, Usual, cells};
 use crate::chain::{Chain, STEP};
 use crate::fit::{DriveFit, Normal};
+use crate::independence::Rich;
 use crate::physics::Physics;
-use crate::recording::Recording;
+use crate::recording::{Recording, Trajectory};
 use crate::rollout::{Direction, Which, roll};
 use calib_dynamics::InertialTolerance;
 use calib_engine::{Accepted, Block, Cell, Problem, Rows, Scanned, ranked};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Inertial numbers of a link that are free within their tolerance: mass, centre, inertia.
 pub(crate) const FREE: usize = 5;
@@ -17,6 +19,13 @@ pub(crate) const FREE: usize = 5;
 const UNIT: f64 = 10.0;
 /// Standard deviations of what noise alone makes of a joint's squared residual, above which causes with a memory are asked there.
 const ABOVE_NOISE: f64 = 4.0;
+
+/// Share of the drive's error, rms, that is left at a joint whose gain may be far off.
+const FAR_OFF: f64 = 0.5;
+
+/// s of recordings in which causes are looked for, and of a window of longer ones.
+const SEARCHED: f64 = 60.0;
+const WINDOW: f64 = 8.0;
 
 /// Longer steps that are tried, s, and the share of the noise, rms, that is the same motion: a drive four times as stiff errs four times as much.
 const LONGER: [f64; 2] = [2.5e-3, 1.7e-3];
@@ -38,6 +47,8 @@ pub struct Drives {
     pub(crate) usual: Vec<Usual>,
     /// s.
     pub(crate) duration: f64,
+    /// Share of rows that are independent beside a rich model, the most of all scans: a linear model says the more, the less is missing.
+    rich: Mutex<f64>,
 }
 
 impl Drives {
@@ -50,8 +61,8 @@ impl Drives {
     ) -> Self {
         let sigma = recording.sigma();
         chain.step = step(&chain, &base, &recording, &sigma);
-        let duration = recording.time.last().copied().unwrap_or_default()
-            - recording.time.first().copied().unwrap_or_default();
+        let lasts = |t: &Trajectory| recording.time[t.rows.end - 1] - t.began;
+        let duration = recording.trajectories.iter().map(lasts).fold(0.0, f64::max);
         let usual = usual(&chain, &base, &recording);
         Self {
             chain,
@@ -62,7 +73,64 @@ impl Drives {
             sigma,
             usual,
             duration,
+            rich: Mutex::new(0.0),
         }
+    }
+
+    fn rich(&self) -> MutexGuard<'_, f64> {
+        self.rich.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Share of the rows that are independent: by what a model leaves, or by what a rich one would.
+    pub(crate) fn independence_beside(&self, own: f64) -> f64 {
+        own.max(*self.rich())
+    }
+
+    /// The problem of a part of a long recording, in which causes are looked for: windows of all trajectories, each from where it begins.
+    pub(crate) fn part(&self) -> Option<Self> {
+        let time = |row: usize| self.recording.time[row];
+        let fitted = || {
+            let all = self.recording.trajectories.iter();
+            all.filter(|one| self.recording.is_fitted(one))
+        };
+        let lasts: f64 = fitted()
+            .map(|one| time(one.rows.end - 1) - time(one.rows.start))
+            .sum();
+        let every = (lasts / SEARCHED).ceil() as usize;
+        if every < 2 {
+            return None;
+        }
+        let mut windows: Vec<Trajectory> = Vec::new();
+        for one in fitted() {
+            let mut from = one.rows.start;
+            for row in one.rows.clone() {
+                if time(row) - time(from) >= WINDOW || row + 1 == one.rows.end {
+                    let began = one.began;
+                    windows.push(Trajectory {
+                        rows: from..row + 1,
+                        began,
+                    });
+                    from = row + 1;
+                }
+            }
+        }
+        let kept = windows.into_iter().step_by(every);
+        let kept = kept.filter(|one| one.rows.len() > 1 && self.recording.is_fitted(one));
+        let recording = Recording {
+            trajectories: kept.collect(),
+            ..self.recording.clone()
+        };
+        Some(Self {
+            chain: self.chain.clone(),
+            base: self.base.clone(),
+            recording,
+            tolerance: self.tolerance,
+            without: self.without.clone(),
+            sigma: self.sigma.clone(),
+            usual: self.usual.clone(),
+            duration: self.duration,
+            rich: Mutex::new(0.0),
+        })
     }
 
     /// The simulation with inertials within their tolerance and a set of causes.
@@ -96,8 +164,9 @@ impl Drives {
 
     /// Rows that are fitted.
     pub(crate) fn fitted(&self) -> impl Iterator<Item = usize> + '_ {
-        let fitted = self.recording.trajectories.iter().filter(|t| !t.held_out);
-        fitted.flat_map(|t| t.rows.clone())
+        let trajectories = self.recording.trajectories.iter();
+        let rows = trajectories.flat_map(|t| t.rows.clone());
+        rows.filter(|row| !self.recording.held_out[*row])
     }
 
     /// Whitened squared residual of fitted rows, joint by joint.
@@ -111,6 +180,24 @@ impl Drives {
             }
         }
         squares
+    }
+
+    /// rad rms of what is left at each joint in fitted rows.
+    fn errors_of(&self, angles: &[f64]) -> Vec<f64> {
+        let n = self.chain.joints();
+        let mut squares = vec![0.0; n];
+        let mut rows = 0.0;
+        for row in self.fitted() {
+            rows += 1.0;
+            for (joint, square) in squares.iter_mut().enumerate() {
+                let at = row * n + joint;
+                *square += (self.recording.angle[at] - angles[at]).powi(2);
+            }
+        }
+        squares
+            .iter()
+            .map(|square| (square / rows).sqrt())
+            .collect()
     }
 }
 
@@ -224,7 +311,17 @@ impl Problem for Drives {
             self.duration,
             self.recording.period,
         );
-        let all: Vec<Cell<Key>> = all.into_iter().filter(asked).collect();
+        let mut all: Vec<Cell<Key>> = all.into_iter().filter(asked).collect();
+        // A gain that is far off shows in what is left: as much as the drive's own error.
+        let left = self.errors_of(&fit.angles);
+        let is_far = |joint: usize| left[joint] > FAR_OFF * self.usual[joint].error;
+        for cell in &mut all {
+            if let Key::Gain(from, to) = cell.key
+                && !(from..=to).all(is_far)
+            {
+                cell.shapes.truncate(1);
+            }
+        }
         // Where each column comes from, in the order of cells, shapes and columns.
         let asked: Vec<(Key, &Vec<f64>)> = all
             .iter()
@@ -239,7 +336,7 @@ impl Problem for Drives {
             .map(|(key, x)| {
                 let mut changed = now.clone();
                 key.apply(x, &self.usual, self.duration, &mut changed);
-                match key.is_rolled() {
+                match key.is_rolled(x) {
                     true => {
                         let mut angles = self.angles(&changed, Which::Fitted);
                         for (angle, before) in angles.iter_mut().zip(&fit.angles) {
@@ -276,6 +373,7 @@ impl Problem for Drives {
         let mut own = Normal::new(nb);
         let mut sums = Sums::new(nb, &blocks);
         let mut b = vec![0.0; nb];
+        let mut rich = Rich::new(self, nb + columns.len());
         roll(
             &self.chain,
             &now,
@@ -295,11 +393,16 @@ impl Problem for Drives {
                         (_, Some(k)) => row.change[joint][*k],
                         _ => 0.0,
                     });
+                    let whitened = changes.clone().map(|change| change / sigma);
+                    rich.add(row.row, joint, residual, b.iter().copied().chain(whitened));
                     sums.add(&b, residual, sigma, changes);
                 }
             },
         );
         sums.close();
+        let beside = rich.independence();
+        let most = self.rich().max(beside);
+        *self.rich() = most;
         let freedom = rows_a_joint * n as f64;
         let scale = (fit.square / freedom).max(1.0);
         let precision = DVector::from_vec(base.precision.iter().map(|p| p * scale).collect());
@@ -311,7 +414,7 @@ impl Problem for Drives {
             &precision,
         );
         rows.square = rows.square.max(freedom);
-        rows.independence = fit.independence;
+        rows.independence = self.independence_beside(fit.independence);
         rows.unit = UNIT;
         let mut next = 0;
         let mut scanned = Vec::new();
@@ -340,7 +443,7 @@ impl Problem for Drives {
     }
 
     fn independence(&self, fit: &DriveFit) -> f64 {
-        fit.independence
+        self.independence_beside(fit.independence)
     }
 
     fn log_evidence(&self, fit: &DriveFit, independence: f64) -> f64 {

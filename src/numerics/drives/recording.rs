@@ -1,15 +1,16 @@
 //! What was commanded and what the joints did.
 
 use calib_numerics::error::{Error, Result};
+use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
 
-/// A trajectory: rows of the recording, one after the other, that begin at rest.
+/// A trajectory: rows of the recording, one after the other, that are rolled out at one go from where it begins.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     /// Its rows.
     pub rows: Range<usize>,
-    /// Whether it judges instead of being fitted.
-    pub held_out: bool,
+    /// s at which its recording began: from then on a joint warms up and drives integrate.
+    pub began: f64,
 }
 
 /// A recording: `rows x joints`, row-major, rad and s.
@@ -21,8 +22,10 @@ pub struct Recording {
     pub command: Vec<f64>,
     /// Measured angles.
     pub angle: Vec<f64>,
-    /// Stretches from rest to rest.
+    /// Stretches without a gap.
     pub trajectories: Vec<Trajectory>,
+    /// Whether a row judges instead of being fitted; a trajectory may have rows of both kinds.
+    pub held_out: Vec<bool>,
     /// s between two commands.
     pub period: f64,
     /// rad, steps of the encoder, by joint.
@@ -46,8 +49,16 @@ pub(crate) struct Commands {
 
 /// Rows that may be missing between two.
 const GAP: f64 = 12.0;
+/// s between two recordings, whose clocks do not say it.
+const BREAK: f64 = 1.0;
 /// s at the beginning in which a trajectory rests.
 const REST: f64 = 0.4;
+/// Steps of the encoder and standard deviations beside them that the angles of a joint at rest span at most.
+const STEPS_AT_REST: f64 = 2.5;
+const SIGMAS_AT_REST: f64 = 8.0;
+/// s, and rows at least, by which the speed of a joint is told that moves at the beginning.
+const GLANCE: f64 = 0.06;
+const LOOKS: usize = 5;
 
 impl Recording {
     /// Number of joints.
@@ -98,6 +109,12 @@ impl Recording {
                 self.period
             ));
         }
+        Ok(())
+    }
+
+    /// Fails where a joint never moves though it is commanded to; `label` names the recordings.
+    pub fn check_motion(&self, label: &str) -> Result<()> {
+        let n = self.joints();
         let still: Vec<String> = (0..n)
             .filter(|joint| {
                 let all = || (0..self.rows()).map(|row| self.angle[row * n + joint]);
@@ -113,30 +130,64 @@ impl Recording {
             .map(|joint| (joint + 1).to_string())
             .collect();
         if !still.is_empty() {
-            return fail(format!(
+            let message = format!(
                 "joint {} never moves though it is commanded to; is its column the right one? A joint that is held is left out of `joints`",
                 still.join(", ")
-            ));
+            );
+            return Err(Error::data(label, message));
         }
         Ok(())
     }
 
-    /// Where a trajectory rests at its beginning.
-    pub(crate) fn start(&self, trajectory: &Trajectory) -> Vec<f64> {
+    /// Puts another recording of the same drives behind this one; its clock goes on after ours.
+    pub fn append(&mut self, other: &Self) {
+        let rows = self.rows();
+        let last = self.time.last().copied().unwrap_or_default();
+        let later = last + BREAK - other.time.first().copied().unwrap_or_default();
+        self.time.extend(other.time.iter().map(|time| time + later));
+        self.command.extend_from_slice(&other.command);
+        self.angle.extend_from_slice(&other.angle);
+        self.held_out.extend_from_slice(&other.held_out);
+        let trajectories = other.trajectories.iter().map(|one| Trajectory {
+            rows: one.rows.start + rows..one.rows.end + rows,
+            began: one.began + later,
+        });
+        self.trajectories.extend(trajectories);
+    }
+
+    /// Whether a trajectory has rows to fit.
+    pub(crate) fn is_fitted(&self, trajectory: &Trajectory) -> bool {
+        self.held_out[trajectory.rows.clone()].contains(&false)
+    }
+
+    /// Angles and speeds of a trajectory's beginning: a joint rests, or it moves as its first rows say.
+    pub(crate) fn start(&self, trajectory: &Trajectory) -> (Vec<f64>, Vec<f64>) {
         let n = self.joints();
-        let begin = self.time[trajectory.rows.start];
-        let rows: Vec<usize> = trajectory
-            .rows
-            .clone()
-            .filter(|row| self.time[*row] - begin < REST)
-            .collect();
-        let mean = |joint: usize| {
-            rows.iter()
-                .map(|row| self.angle[row * n + joint])
-                .sum::<f64>()
-                / rows.len() as f64
+        let first = trajectory.rows.start;
+        let since = |row: usize| self.time[row] - self.time[first];
+        let rows = || trajectory.rows.clone();
+        let rest = rows().filter(|row| since(*row) < REST).count();
+        let glance = rows().filter(|row| since(*row) < GLANCE).count();
+        let glance = glance.max(LOOKS).min(trajectory.rows.len());
+        let of = |joint: usize| {
+            let angle = |row: usize| self.angle[row * n + joint];
+            let all = || (first..first + rest).map(angle);
+            let span = all().fold(f64::MIN, f64::max) - all().fold(f64::MAX, f64::min);
+            let still = STEPS_AT_REST * self.encoder[joint] + SIGMAS_AT_REST * self.noise[joint];
+            if span <= still || glance < LOOKS {
+                return (all().sum::<f64>() / rest as f64, 0.0);
+            }
+            // A parabola through the first rows.
+            let (mut gram, mut right) = (Matrix3::zeros(), Vector3::zeros());
+            for row in first..first + glance {
+                let x = Vector3::new(1.0, since(row), since(row) * since(row));
+                gram += x * x.transpose();
+                right += x * angle(row);
+            }
+            let fitted = gram.cholesky().map(|factor| factor.solve(&right));
+            fitted.map_or((angle(first), 0.0), |fitted| (fitted[0], fitted[1]))
         };
-        (0..n).map(mean).collect()
+        (0..n).map(of).unzip()
     }
 
     /// Standard deviation of each angle: of a coarse encoder one and the same error stands in all rows in which its count does not change.
@@ -274,5 +325,54 @@ impl Commands {
             (&self.speed, &self.summed_speed),
         ]
         .map(|(of, sums)| (integral(of, sums, b, to) - integral(of, sums, a, from)) / (to - from))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two joints at 100 Hz, steps of 1e-5 rad: the first moves from the beginning, the second after half a second.
+    fn recording() -> Recording {
+        let rows = 0..200;
+        let time: Vec<f64> = rows.clone().map(|row| 0.01 * f64::from(row)).collect();
+        let angle = time.iter().flat_map(|t| {
+            let second = if *t > 0.5 { 0.2 + 0.3 * (t - 0.5) } else { 0.2 };
+            [0.1 + 0.8 * t + 0.5 * t * t, second]
+        });
+        let angle: Vec<f64> = angle.collect();
+        Recording {
+            time,
+            command: angle.clone(),
+            angle,
+            trajectories: vec![Trajectory {
+                rows: 0..200,
+                began: 0.0,
+            }],
+            held_out: vec![false; 200],
+            period: 0.01,
+            encoder: vec![1e-5; 2],
+            noise: vec![1e-6; 2],
+        }
+    }
+
+    #[test]
+    fn a_trajectory_begins_as_it_is_measured_at_rest_or_in_motion() {
+        let recording = recording();
+        let (angle, speed) = recording.start(&recording.trajectories[0]);
+        assert!((angle[0] - 0.1).abs() < 1e-9 && (speed[0] - 0.8).abs() < 1e-6);
+        assert!((angle[1] - 0.2).abs() < 1e-12 && speed[1] == 0.0);
+    }
+
+    #[test]
+    fn recordings_of_the_same_drives_follow_each_other_each_with_its_own_clock() {
+        let (mut whole, later) = (recording(), recording());
+        whole.append(&later);
+        assert_eq!(whole.rows(), 400);
+        assert_eq!(whole.trajectories[1].rows, 200..400);
+        let since = whole.time[250] - whole.trajectories[1].began;
+        assert!((since - 0.5).abs() < 1e-9, "{since}");
+        assert!(whole.time.windows(2).all(|pair| pair[0] < pair[1]));
+        whole.check("both").unwrap();
     }
 }

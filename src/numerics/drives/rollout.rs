@@ -5,7 +5,7 @@
 
 use crate::chain::{Chain, MOST, Posed, Row, Square, invert};
 use crate::columns::{Columns, Instant, StepMatrices};
-use crate::physics::{Commanded, Motion, Physics, ROTOR_SHARE, SAG_LAG, Torque};
+use crate::physics::{Commanded, LOAD_LAG, Motion, Physics, ROTOR_SHARE, SAG_LAG, Torque};
 use crate::recording::{Commands, Recording, Trajectory};
 
 pub use crate::columns::Direction;
@@ -27,7 +27,7 @@ pub struct SimulatedRow<'a> {
 /// Which trajectories are rolled out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Which {
-    /// Those that are fitted.
+    /// Those with rows that are fitted, which alone are seen.
     Fitted,
     /// All.
     All,
@@ -55,6 +55,7 @@ struct Roller<'a> {
     bent: Row,
     set_point: Row,
     driven: Row,
+    load: Row,
     drawn: f64,
     posed: Posed,
     /// Nm/rad of gravity.
@@ -94,31 +95,34 @@ pub fn roll(
         bent: [0.0; MOST],
         set_point: [0.0; MOST],
         driven: [0.0; MOST],
+        load: [0.0; MOST],
         drawn: 0.0,
         posed: Posed::default(),
         gravity: [[0.0; MOST]; MOST],
         columns: Columns::new(physics, directions, freedoms),
     };
-    let begin = recording.time.first().copied().unwrap_or_default();
+    let mut began = None;
     let most = if freedoms > n {
         GEARED_STEP
     } else {
         chain.step
     };
     for trajectory in &recording.trajectories {
-        if which == Which::Fitted && trajectory.held_out {
+        if which == Which::Fitted && !recording.is_fitted(trajectory) {
             continue;
         }
+        if began.replace(trajectory.began) != Some(trajectory.began) {
+            roller.integral = [0.0; MOST];
+            roller.columns.begin();
+        }
         let commands = recording.commands(trajectory, physics.hold);
-        roller.start(
-            &recording.start(trajectory),
-            &commands,
-            recording,
-            trajectory,
-        );
+        let (at, speed) = recording.start(trajectory);
+        roller.start((&at, &speed), &commands, recording, trajectory);
         let mut guess = 0;
         for row in trajectory.rows.clone() {
-            roller.show(row, &mut see);
+            if which == Which::All || !recording.held_out[row] {
+                roller.show(row, &mut see);
+            }
             if row + 1 == trajectory.rows.end {
                 break;
             }
@@ -132,7 +136,7 @@ pub fn roll(
             for k in 0..steps {
                 let time = from + h * k as f64;
                 guess = commands.index(time, guess);
-                roller.advance(&commands, guess, time, time - begin, h);
+                roller.advance(&commands, guess, time, time - trajectory.began, h);
             }
             if !directions.is_empty() {
                 roller.columns.carry(&roller.rotor);
@@ -142,10 +146,10 @@ pub fn roll(
 }
 
 impl Roller<'_> {
-    /// At rest at the beginning of a trajectory: friction, integral and warmth run on.
+    /// The beginning of a trajectory, at rest or in motion: friction, integral and warmth run on.
     fn start(
         &mut self,
-        at: &[f64],
+        (at, speed): (&[f64], &[f64]),
         commands: &Commands,
         recording: &Recording,
         trajectory: &Trajectory,
@@ -166,7 +170,10 @@ impl Roller<'_> {
             let held = self.driven[joint]
                 - weight[joint]
                 - physics.spring[0] * (at[joint] - physics.spring[1]);
-            self.bent[joint] = (held / dry).clamp(-1.0, 1.0);
+            self.bent[joint] = match speed[joint] {
+                0.0 => (held / dry).clamp(-1.0, 1.0),
+                moving => sign(moving),
+            };
             let rotor = self.rotor[joint];
             if let Some(gear) = &physics.gear {
                 // The gear carries the weight, on the flank that it leans on.
@@ -180,7 +187,12 @@ impl Roller<'_> {
                 }
             }
         }
+        self.load = weight;
         self.v = [0.0; MOST];
+        for joint in 0..self.n {
+            self.v[joint] = speed[joint];
+            self.v[self.rotor[joint]] = speed[joint];
+        }
         self.a = [0.0; MOST];
         self.push = [0.0; MOST];
         self.columns.start(recording, trajectory, &self.set_point);
@@ -225,13 +237,14 @@ impl Roller<'_> {
         self.chain
             .torques(&self.posed, gravity, &ahead[..n], None, &mut bias);
         let sag = 1.0 - (physics.sag * self.drawn).clamp(0.0, 0.9);
-        let (q, v, a, driven) = (self.q, self.v, self.a, self.driven);
+        let (q, v, a, driven, load) = (self.q, self.v, self.a, self.driven, self.load);
         let motion = Motion {
             q: &q[..m],
             v: &v[..m],
             a: &a[..m],
             time: since,
             driven: &driven[..n],
+            load: &load[..n],
         };
         let mut torques = [Torque::default(); MOST];
         let mut sent = [Commanded::default(); MOST];
@@ -249,7 +262,8 @@ impl Roller<'_> {
             };
             torques[j] = joint.torque(j, self.rotor[j], &motion, &sent[j], sag);
         }
-        let (mut force, mut limit) = ([0.0; MOST], [0.0; MOST]);
+        let links = mass;
+        let (mut force, mut limit) = ([0.0; MOST], [[0.0; 2]; MOST]);
         let (mut stiff, mut damp) = ([[0.0; MOST]; MOST], [[0.0; MOST]; MOST]);
         for j in 0..n {
             let (t, r) = (&torques[j], self.rotor[j]);
@@ -305,8 +319,9 @@ impl Roller<'_> {
         }
         if !self.columns.is_empty() {
             let slides: Row = std::array::from_fn(|i| {
-                let share = if limit[i] > 0.0 {
-                    self.push[i] / (h * limit[i])
+                let against = limit[i][usize::from(self.push[i] < 0.0)];
+                let share = if against > 0.0 {
+                    self.push[i] / (h * against)
                 } else {
                     sign(self.v[i])
                 };
@@ -353,14 +368,18 @@ impl Roller<'_> {
             self.a[i] = (new[i] - self.v[i]) / h;
             self.v[i] = new[i];
         }
+        for i in 0..n {
+            let inertial: f64 = (0..n).map(|k| links[i][k] * self.a[k]).sum();
+            self.load[i] += (bias[i] + inertial - self.load[i]) * (h / LOAD_LAG).min(1.0);
+        }
     }
 
     /// Speeds after dry friction: impulses within their limits stop what they can.
-    fn slid(&mut self, w: &Square, free: &Row, limit: &Row, h: f64) -> Row {
+    fn slid(&mut self, w: &Square, free: &Row, limit: &[[f64; 2]; MOST], h: f64) -> Row {
         let m = self.freedoms;
         let mut new = *free;
         for i in 0..m {
-            self.push[i] = self.push[i].clamp(-h * limit[i], h * limit[i]);
+            self.push[i] = self.push[i].clamp(-h * limit[i][1], h * limit[i][0]);
             for k in 0..m {
                 new[k] -= w[k][i] * self.push[i];
             }
@@ -368,11 +387,11 @@ impl Roller<'_> {
         for _ in 0..SWEEPS {
             let mut most: f64 = 0.0;
             for i in 0..m {
-                if limit[i] == 0.0 {
+                let [forward, back] = limit[i];
+                if forward == 0.0 && back == 0.0 {
                     continue;
                 }
-                let top = h * limit[i];
-                let push = (self.push[i] + new[i] / w[i][i]).clamp(-top, top);
+                let push = (self.push[i] + new[i] / w[i][i]).clamp(-h * back, h * forward);
                 let change = push - self.push[i];
                 if change != 0.0 {
                     self.push[i] = push;
@@ -393,13 +412,16 @@ impl Roller<'_> {
     fn linearised(
         &self,
         (w, stiff, damp): (&Square, &Square, &Square),
-        limit: &Row,
+        limit: &[[f64; 2]; MOST],
         h: f64,
     ) -> StepMatrices {
         let m = self.freedoms;
         // What friction holds keeps its speed of zero.
         let held: Vec<usize> = (0..m)
-            .filter(|i| limit[*i] > 0.0 && self.push[*i].abs() < 0.999_999 * h * limit[*i])
+            .filter(|i| {
+                let against = limit[*i][usize::from(self.push[*i] < 0.0)];
+                against > 0.0 && self.push[*i].abs() < 0.999_999 * h * against
+            })
             .collect();
         let mut keep = [[0.0; MOST]; MOST];
         (0..m).for_each(|i| keep[i][i] = 1.0);

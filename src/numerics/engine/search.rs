@@ -116,10 +116,12 @@ pub fn search<P: Problem>(
 ) -> P::Fit {
     let mut fit = start.clone();
     while problem.set(&fit).len() < options.most {
+        // A scan may tell how many rows count.
+        let scanned = problem.scan(&fit);
         let independence = problem.independence(&fit);
         let now = problem.log_evidence(&fit, independence);
         let set = problem.set(&fit);
-        let asked = candidates(problem, problem.scan(&fit), &set, options);
+        let asked = candidates(problem, scanned, &set, options);
         let tried = trials(problem, &fit, asked, independence);
         for trial in tried.iter().take(4) {
             let (name, place) = (trial.cell.cause.name, &trial.cell.place);

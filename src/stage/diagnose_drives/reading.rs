@@ -18,8 +18,10 @@ pub(super) struct Rows {
     pub(super) time: Vec<f64>,
     /// Of each wanted quantity `rows x joints`, in the columns' unit.
     pub(super) values: Vec<Vec<f64>>,
-    /// Rows of one trajectory and usage, with what the usage is.
-    pub(super) runs: Vec<(Range<usize>, Option<String>)>,
+    /// Rows of each trajectory.
+    pub(super) runs: Vec<Range<usize>>,
+    /// Rows of one usage, with what that is.
+    pub(super) usages: Vec<(Range<usize>, Option<String>)>,
 }
 
 impl Rows {
@@ -29,10 +31,15 @@ impl Rows {
         for values in &mut self.values {
             values.drain(..rows * joints);
         }
-        for (range, _) in &mut self.runs {
-            *range = range.start.saturating_sub(rows)..range.end.saturating_sub(rows);
+        let earlier =
+            |range: &Range<usize>| range.start.saturating_sub(rows)..range.end.saturating_sub(rows);
+        self.runs
+            .iter_mut()
+            .for_each(|range| *range = earlier(range));
+        self.runs.retain(|range| !range.is_empty());
+        for (range, _) in &mut self.usages {
+            *range = earlier(range);
         }
-        self.runs.retain(|(range, _)| !range.is_empty());
     }
 }
 
@@ -139,8 +146,10 @@ pub(super) fn rows(
         time: Vec::new(),
         values: vec![Vec::new(); wanted.len()],
         runs: Vec::new(),
+        usages: Vec::new(),
     };
-    let (by, mut last) = (columns.time_unit.seconds(), None);
+    let by = columns.time_unit.seconds();
+    let mut last: Option<Option<String>> = None;
     for (row, record) in reader.records().enumerate() {
         let place = format!("{label}:{}", row + 2);
         let record = record.map_err(|error| Error::data(&place, error.to_string()))?;
@@ -158,16 +167,21 @@ pub(super) fn rows(
                 }
             }
         }
-        let here = (
-            trajectory.map(|column| record[column].to_string()),
-            usage.map(|column| record[column].to_string()),
-        );
+        let of = |column: Option<usize>| column.map(|column| record[column].to_string());
+        let (here, use_of_row) = (of(trajectory), of(usage));
         if last.as_ref() != Some(&here) {
-            out.runs.push((row..row, here.1.clone()));
+            out.runs.push(row..row);
             last = Some(here);
         }
-        if let Some((rows, _)) = out.runs.last_mut() {
-            rows.end = row + 1;
+        if out
+            .usages
+            .last()
+            .is_none_or(|(_, usage)| *usage != use_of_row)
+        {
+            out.usages.push((row..row, use_of_row));
+        }
+        if let (Some(run), Some((rows, _))) = (out.runs.last_mut(), out.usages.last_mut()) {
+            (run.end, rows.end) = (row + 1, row + 1);
         }
     }
     Ok(out)

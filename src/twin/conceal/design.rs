@@ -47,6 +47,8 @@ pub struct Design {
     /// Torques of an arm that moves instead of points: of what is above, seed, cases, shares (nulls have friction of all joints in half of
     /// them, the others in most) and forms count.
     pub dynamics: bool,
+    /// Commands and angles of drives instead of points: seed, cases and shares count.
+    pub drives: bool,
     /// Seconds of a recording of torques: two stretches to fit, two that judge.
     pub seconds: f64,
     /// Rows a second of it.
@@ -75,6 +77,7 @@ impl Default for Design {
             layout: Layout::default(),
             tool_mass_kg: 0.0,
             dynamics: false,
+            drives: false,
             seconds: 48.0,
             rate: 100.0,
         }

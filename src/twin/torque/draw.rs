@@ -15,7 +15,7 @@ use calib_foundation::description::{
 impl Design {
     /// What the recording of this number conceals, the friction of all joints apart: `null`, `single`, `pair`, or `open` for one effect that is
     /// in no list. Shares are kept by multiples of the golden ratio, whose order says nothing.
-    fn torque_content(&self, number: usize) -> &'static str {
+    pub(crate) fn moving_content(&self, number: usize) -> &'static str {
         let begin = Noise::new(self.seed, Purpose::Design).uniform(0.0, 1.0);
         let at = (begin + number as f64 * 0.618_033_988_749_895).fract();
         let shares = [
@@ -111,7 +111,7 @@ impl TorqueCase {
         let mut case = Self {
             name: format!("torque_{number:03}"),
             seed,
-            content: design.torque_content(number),
+            content: design.moving_content(number),
             laws: Vec::new(),
             common: 0,
             stated,

@@ -1,0 +1,96 @@
+//! An arm and its drives as they are.
+
+use crate::torque::{Body, Machine};
+
+/// A joint with its drive; what is 0, infinite or none changes nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Servo {
+    /// Nm/rad, Nm s/rad.
+    pub(super) kp: f64,
+    pub(super) kd: f64,
+    /// Whether the commanded speed is in the damping.
+    pub(super) on_error: bool,
+    /// Nm.
+    pub(super) limit: f64,
+    /// Nm s/rad, Nm, kg m2.
+    pub(super) damping: f64,
+    pub(super) friction: f64,
+    pub(super) armature: f64,
+    /// rad, s, rad.
+    pub(super) offset: f64,
+    pub(super) delay: f64,
+    pub(super) dead_band: f64,
+    /// rad/s of the set point.
+    pub(super) speed_limit: f64,
+    /// Nm/(rad s), Nm.
+    pub(super) integral: [f64; 2],
+    /// Nm, rad/s.
+    pub(super) stribeck: [f64; 2],
+    /// Of the drive's torque: driving, driven back.
+    pub(super) load: [f64; 2],
+    /// Share of dry friction more when cold, s.
+    pub(super) warm_up: [f64; 2],
+    /// Nm/rad, rad.
+    pub(super) spring: [f64; 2],
+    /// Nm, waves a turn, phase.
+    pub(super) ripple: [f64; 3],
+    /// Nm, at which angle, how wide.
+    pub(super) bump: [f64; 3],
+    /// Which drive is felt, and which share of it.
+    pub(super) coupled: Option<(usize, f64)>,
+}
+
+/// An arm with its drives.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Rig {
+    pub(super) machine: Machine,
+    pub(super) servos: Vec<Servo>,
+}
+
+impl Servo {
+    pub(super) fn plain(
+        [kp, kd, limit]: [f64; 3],
+        on_error: bool,
+        [damping, friction, armature]: [f64; 3],
+    ) -> Self {
+        Self {
+            kp,
+            kd,
+            on_error,
+            limit,
+            damping,
+            friction,
+            armature,
+            offset: 0.0,
+            delay: 0.0,
+            dead_band: 0.0,
+            speed_limit: f64::INFINITY,
+            integral: [0.0; 2],
+            stribeck: [0.0, 1.0],
+            load: [0.0; 2],
+            warm_up: [0.0, 1.0],
+            spring: [0.0; 2],
+            ripple: [0.0, 1.0, 0.0],
+            bump: [0.0, 0.0, 1.0],
+            coupled: None,
+        }
+    }
+}
+
+impl Rig {
+    pub(super) fn joints(&self) -> usize {
+        self.servos.len()
+    }
+
+    /// A number of a link's inertials changed by a share (mass 0, inertia 4) or a way (centre 1 to 3, m).
+    pub(super) fn off(&self, link: usize, number: usize, by: f64) -> Self {
+        let mut other = self.clone();
+        let body: &mut Body = &mut other.machine.links[link];
+        match number {
+            0 => body.mass *= 1.0 + by,
+            4 => body.inertia = body.inertia.map(|moment| moment * (1.0 + by)),
+            axis => body.centre[axis - 1] += by,
+        }
+        other
+    }
+}
