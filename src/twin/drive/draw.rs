@@ -207,9 +207,12 @@ impl Plan {
                 };
                 ways.push(way);
             }
-            for row in 0..rows {
-                all.extend((0..n).map(|j| self.home[j] + self.reach * ways[j][row]));
-            }
+            let of_row = |row: usize| {
+                let joints = ways.iter().zip(self.home);
+                let angles = joints.map(|(way, home)| home + self.reach * way[row]);
+                angles.collect::<Vec<f64>>()
+            };
+            all.extend((0..rows).flat_map(of_row));
             lengths.push(rows);
         }
         (all, lengths)

@@ -228,10 +228,11 @@ fn solve(matrix: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
             .unwrap_or(k);
         rows.swap(k, pivot);
         x.swap(k, pivot);
+        let pivot_row = rows[k].clone();
         for i in k + 1..n {
-            let by = rows[i][k] / rows[k][k];
-            for c in k..n {
-                rows[i][c] -= by * rows[k][c];
+            let by = rows[i][k] / pivot_row[k];
+            for (value, above) in rows[i].iter_mut().zip(&pivot_row) {
+                *value -= by * above;
             }
             x[i] -= by * x[k];
         }
