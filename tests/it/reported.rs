@@ -163,7 +163,9 @@ fn reported_recordings_are_answered_rightly_or_refused_with_the_reason() {
             let answer = calib(folder.path(), *command);
             // What a search weighs on its way is not what it says.
             let both = answer.both();
-            let lines = both.lines().filter(|line| !line.contains("looking for what"));
+            let lines = both
+                .lines()
+                .filter(|line| !line.contains("looking for what"));
             said.extend(lines.flat_map(|line| [line, "\n"]));
             code = answer.code;
         }
