@@ -181,7 +181,7 @@ impl ClockUnit {
 }
 
 crate::stage::stage! {
-    DiagnoseDrives, "diagnose_drives", 3, "names the physics that the simulation of commanded joints lacks, from commands and angles",
+    DiagnoseDrives, "diagnose_drives", 4, "names the physics that the simulation of commanded joints lacks, from commands and angles",
         DiagnoseDrivesReads {} -> DiagnoseDrivesWrites {
             verdict: DriveVerdict,
             sentences: VerdictSentences,
