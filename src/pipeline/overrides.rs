@@ -358,12 +358,12 @@ fn expanded(items: Vec<Node>, folder: &Path, list: &str, troubles: &mut Vec<Trou
             let entries = found.into_iter().map(|path| {
                 let mut entry = item.clone();
                 // Commands in a file of their own: their pattern's stars stand for what the file's stand for.
-                let beside = entry
+                let commands = entry
                     .get("commands")
                     .and_then(Node::text)
-                    .filter(|beside| is_pattern(beside));
-                if let Some(beside) = beside {
-                    let text = alike(&pattern, &path, &beside)?;
+                    .filter(|commands| is_pattern(commands));
+                if let Some(commands) = commands {
+                    let text = alike(&pattern, &path, &commands)?;
                     if let Some(node) = entry.at_mut("commands") {
                         node.value = YamlValue::Text(text);
                     }
@@ -383,11 +383,11 @@ fn expanded(items: Vec<Node>, folder: &Path, list: &str, troubles: &mut Vec<Trou
     all
 }
 
-/// `beside` with its stars replaced by what those of `pattern` stand for in `path`.
-fn alike(pattern: &str, path: &str, beside: &str) -> Result<String, String> {
+/// The pattern of `commands` with its stars replaced by the text that those of `pattern` stand for in `path`.
+fn alike(pattern: &str, path: &str, commands: &str) -> Result<String, String> {
     let wrong = || {
         format!(
-            "`{beside}` is not like `{pattern}`: allowed is a pattern with no more stars, which stand for the same text in the same order"
+            "`{commands}` is not like `{pattern}`: allowed is a pattern with no more stars, which stand for the same text in the same order"
         )
     };
     let parts = |text: &str| -> Vec<String> {
@@ -395,7 +395,7 @@ fn alike(pattern: &str, path: &str, beside: &str) -> Result<String, String> {
         parts.map(str::to_string).collect()
     };
     let (parts, all) = (parts(pattern), parts(path));
-    if parts.len() != all.len() || pattern.contains('?') || beside.contains('?') {
+    if parts.len() != all.len() || pattern.contains('?') || commands.contains('?') {
         return Err(wrong());
     }
     let mut names = Vec::new();
@@ -404,27 +404,13 @@ fn alike(pattern: &str, path: &str, beside: &str) -> Result<String, String> {
     }
     let mut names = names.into_iter();
     let mut out = String::new();
-    for (k, part) in beside.split('*').enumerate() {
+    for (k, part) in commands.split('*').enumerate() {
         if k > 0 {
             out += &names.next().ok_or_else(wrong)?;
         }
         out += part;
     }
     Ok(out)
-}
-
-/// What stands for the stars of one name: each the shortest text that lets the rest match.
-fn stars(pattern: &str, text: &str) -> Option<Vec<String>> {
-    let Some((before, after)) = pattern.split_once('*') else {
-        return (pattern == text).then(Vec::new);
-    };
-    let text = text.strip_prefix(before)?;
-    let ends = text.char_indices().map(|(at, _)| at).chain([text.len()]);
-    ends.into_iter().find_map(|end| {
-        let more = stars(after, &text[end..])?;
-        let own = std::iter::once(text[..end].to_string());
-        Some(own.chain(more).collect())
-    })
 }
 
 /// Files that match, relative to `start`, in the order of their paths.
@@ -482,25 +468,42 @@ fn named(pattern: &str, path: &str) -> Result<String, String> {
     Ok(names.join("/"))
 }
 
-/// What stands for the braces of one name: each the shortest text that lets the rest match.
+/// What stands for the braces of one name, each at least a character.
 fn braces(pattern: &str, text: &str) -> Option<Vec<String>> {
-    let Some((before, tail)) = pattern.split_once('{') else {
+    let brace = |pattern: &str| {
+        let (before, tail) = pattern.split_once('{')?;
+        let (_, after) = tail.split_once('}')?;
+        Some((before.to_string(), after.to_string()))
+    };
+    wildcards(pattern, text, 1, &brace)
+}
+
+/// What stands for the stars of one name.
+fn stars(pattern: &str, text: &str) -> Option<Vec<String>> {
+    let star = |pattern: &str| {
+        let (before, after) = pattern.split_once('*')?;
+        Some((before.to_string(), after.to_string()))
+    };
+    wildcards(pattern, text, 0, &star)
+}
+
+/// What stands for the wildcards of one name: each the shortest text, of at least so many bytes, that lets the rest match. `split` gives what is
+/// before and after the first wildcard of a pattern.
+fn wildcards(
+    pattern: &str,
+    text: &str,
+    least: usize,
+    split: &dyn Fn(&str) -> Option<(String, String)>,
+) -> Option<Vec<String>> {
+    let Some((before, after)) = split(pattern) else {
         return (pattern == text).then(Vec::new);
     };
-    let (_, after) = tail.split_once('}')?;
-    let text = text.strip_prefix(before)?;
-    let ends = text
-        .char_indices()
-        .skip(1)
-        .map(|(at, _)| at)
-        .chain([text.len()]);
-    ends.filter(|end| *end > 0).find_map(|end| {
-        let more = braces(after, &text[end..])?;
-        Some(
-            std::iter::once(text[..end].to_string())
-                .chain(more)
-                .collect(),
-        )
+    let text = text.strip_prefix(before.as_str())?;
+    let ends = text.char_indices().map(|(at, _)| at).chain([text.len()]);
+    ends.filter(|end| *end >= least).find_map(|end| {
+        let more = wildcards(&after, &text[end..], least, split)?;
+        let first = std::iter::once(text[..end].to_string());
+        Some(first.chain(more).collect())
     })
 }
 
@@ -509,12 +512,12 @@ mod tests {
     use super::{alike, named};
 
     #[test]
-    fn stars_of_a_file_beside_another_stand_for_the_same_text() {
+    fn stars_of_the_commands_stand_for_the_same_text_as_those_of_the_file() {
         let pattern = "../data/*/motor_*.csv";
         let path = "../data/sine/motor_2.csv";
-        let beside = "../data/*/sent_*.csv";
+        let commands = "../data/*/sent_*.csv";
         assert_eq!(
-            alike(pattern, path, beside),
+            alike(pattern, path, commands),
             Ok("../data/sine/sent_2.csv".into())
         );
         assert_eq!(alike("*.csv", "a.csv", "b/*.csv"), Ok("b/a.csv".into()));

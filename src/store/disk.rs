@@ -380,7 +380,7 @@ impl Claim {
         let file = match open().map(|file| (file.try_lock(), file)) {
             Ok((Err(TryLockError::WouldBlock), _)) => return None,
             Ok((Ok(()), mut file)) => {
-                // For whoever waits; where it cannot be written nobody is told.
+                // For runs that wait; one that cannot be written is not named.
                 let cleared = file.set_len(0);
                 let _ = cleared.and_then(|()| write!(file, "{}", std::process::id()));
                 Some(file)

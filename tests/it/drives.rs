@@ -351,7 +351,7 @@ fn commands_and_angles_come_as_lists_in_two_files_too() {
     );
 }
 
-/// What is diagnosed of recordings a/motor.csv, b/motor.csv with commands beside them, by lines below `with`.
+/// Diagnosis of recordings a/motor.csv, b/motor.csv, whose commands are in files of their own, by lines below `with`.
 fn of_several(lines: &str) -> Answer {
     let case = in_lists(&folder(), false);
     for name in ["a", "b"] {

@@ -157,16 +157,16 @@ fn reported_recordings_are_answered_rightly_or_refused_with_the_reason() {
             return;
         };
         let folder = copied(&folder);
-        let mut said = String::new();
+        let mut output = String::new();
         let mut code = None;
         for command in report.commands {
             let answer = calib(folder.path(), *command);
-            // What a search weighs on its way is not what it says.
+            // Progress of a search is no result.
             let both = answer.both();
             let lines = both
                 .lines()
                 .filter(|line| !line.contains("looking for what"));
-            said.extend(lines.flat_map(|line| [line, "\n"]));
+            output.extend(lines.flat_map(|line| [line, "\n"]));
             code = answer.code;
         }
         for file in ["arm.xml", "arm_out.urdf"] {
@@ -175,17 +175,17 @@ fn reported_recordings_are_answered_rightly_or_refused_with_the_reason() {
                 .iter()
                 .any(|command| command.ends_with(file))
             {
-                said += &read(folder.path().join(file));
+                output += &read(folder.path().join(file));
             }
         }
-        let lacks = |word: &&&str| !said.contains(**word);
+        let lacks = |word: &&&str| !output.contains(**word);
         let lacking: Vec<_> = report.says.iter().filter(lacks).collect();
-        let has = |word: &&&str| said.contains(**word);
+        let has = |word: &&&str| output.contains(**word);
         let too_much: Vec<_> = report.says_not.iter().filter(has).collect();
         if code != Some(report.code) || !lacking.is_empty() || !too_much.is_empty() {
             let name = report.folder;
             wrong.push(format!(
-                "{name}: code {code:?}, lacks {lacking:?}, has {too_much:?}:\n{said}"
+                "{name}: code {code:?}, lacks {lacking:?}, has {too_much:?}:\n{output}"
             ));
         }
     }

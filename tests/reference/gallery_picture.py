@@ -4,7 +4,7 @@
     python3 tests/reference/gallery_picture.py REPORT.html FINDING OUT.svg
     python3 tests/reference/gallery_picture.py PAGE.html causes OUT.svg
 
-Of a finding, which counts from 1 as in the report: what is left without it, and what is left with it; one point in three is drawn. `causes` is
+Of a finding, which counts from 1 as in the report: the residual without it, and with it; one point in three is drawn. `causes` is
 the table of causes with what was found. Needs no packages.
 """
 import re

@@ -5,7 +5,7 @@
 Kinds, at the sizes and noises of the real sets (pipelines/proof/real/README.md):
   mass     a surgical arm, two turning joints and one that slides, without and with 105 or 205 g at a place of a link
   servo    a pendulum on a servo by its duty: friction by load, driving and driven back, or with its square; an encoder of 4096 counts in the loop
-  model    six joints at 25 Hz beside the controller's own model: currents against its torques leave friction, over speed by a power below one
+  model    six joints at 25 Hz with the torques of the controller's own model: currents against its torques leave friction, over speed by a power below one
   mount    six joints on a wall, a ceiling or a slant; the robot file says nothing of it
 A null has no friction, no mass and stands upright. OUT holds a folder of each recording with its truth.json, and marks.json. Needs numpy.
 """
@@ -46,7 +46,7 @@ class Arm:
         self.inertia = [np.diag(i) for i in inertia]
 
     def torque(self, q, v, a, gravity, points=()):
-        """Nm and N; `points` are (link, kg, place at the zero pose) besides."""
+        """Nm and N; `points` are (link, kg, place at the zero pose) in addition."""
         rows, n = q.shape
         still = np.zeros((rows, 3))
         frame, shift = np.tile(np.eye(3), (rows, 1, 1)), still.copy()
@@ -313,7 +313,7 @@ def near(value, truth, share):
 
 
 def mark_of(found, truths):
-    """By (name, place) -> whether its numbers are right; what is found besides is wrong."""
+    """By (name, place) -> whether its numbers are right; any other finding is wrong."""
     named = {(one["effect"], one["where"]): one for one in found}
     extra = [key for key in named if key not in truths]
     if extra:
@@ -392,21 +392,21 @@ def mark_model(calib, folder, truth):
 
 def mark_mount(calib, folder, truth):
     answer, text = run(calib, folder, "diagnose", "pipeline.yaml", "--json", "--quiet")
-    told = re.search(r"gravity: \[([-\d., e]+)\]", text)
+    declared = re.search(r"gravity: \[([-\d., e]+)\]", text)
     if truth["null"]:
         found = answer.get("findings")
-        return ("right", "") if found == [] and not told else ("wrong", f"{found} {text[-300:]}")
-    if not told:
+        return ("right", "") if found == [] and not declared else ("wrong", f"{found} {text[-300:]}")
+    if not declared:
         return "wrong", text[-400:]
-    way = np.array([float(x) for x in told[1].split(",")])
+    way = np.array([float(x) for x in declared[1].split(",")])
     off = math.degrees(math.acos(min(1, float(way @ truth["down"]) / np.linalg.norm(way))))
-    # Friction hides some degrees of a slant: what is left is found as a tilt.
+    # Friction hides some degrees of a slant: the remainder is found as a tilt.
     if off > 10:
         return "wrong", f"{off:.1f} deg off"
     robot = os.path.join(folder, "robot.yaml")
     with open(robot) as file:
         text = file.read()
-    write(folder, "robot.yaml", text + f"gravity: [{told[1]}]\n")
+    write(folder, "robot.yaml", text + f"gravity: [{declared[1]}]\n")
     answer, text = run(calib, folder, "diagnose", "pipeline.yaml", "--json", "--quiet")
     if "findings" not in answer:
         return "blocked", text[-300:]

@@ -37,7 +37,7 @@ pub enum Key {
     Stribeck(usize),
     /// Friction by the drive's torque; when driven back alone or both ways.
     Load(usize, bool),
-    /// Friction by what the gear gives to the link; likewise.
+    /// Friction by the torque that the gear transmits to the link; likewise.
     GearLoad(usize, bool),
     /// Friction that bends before it slides.
     Presliding(usize),

@@ -272,7 +272,7 @@ impl Drives {
             fit.independence = self.independence_of(&fit.angles);
         }
         let weigh = |fit: &DriveFit| {
-            self.independence_beside(fit.independence) / (fit.square / freedom).max(1.0)
+            self.independence_given(fit.independence) / (fit.square / freedom).max(1.0)
         };
         let mut is_new = anew;
         for step in 1..=patience.steps {

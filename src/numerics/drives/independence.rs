@@ -1,5 +1,5 @@
 //! How many rows count: what noise and unmodelled physics leave lasts from row to row, and a model that lacks a cause must not take the
-//! cause's own residual for lasting noise. So that correlation is told by what a rich model leaves: all causes at once, linear, as much
+//! cause's own residual for lasting noise. That correlation is estimated from the residual of a rich model: all causes at once, linear, as much
 //! as they help in rows that it was not fitted to.
 
 use crate::problem::Drives;
@@ -90,7 +90,7 @@ impl Rich {
         }
     }
 
-    /// Share of rows that are independent beside the rich model.
+    /// Share of rows that are independent given the rich model.
     pub(crate) fn independence(&self) -> f64 {
         if self.samples.last().is_none_or(|(_, block)| *block < 1) {
             return 0.0;
@@ -116,11 +116,11 @@ impl Rich {
                     sizes[joint][*column] > HERE * most
                 })
                 .collect();
-            let left = self.left(joint, &used, &sizes[joint]);
+            let residuals = self.residual(joint, &used, &sizes[joint]);
             for (k, (row, block)) in self.samples.iter().enumerate() {
-                own += left[k] * left[k];
+                own += residuals[k] * residuals[k];
                 if k > 0 && self.samples[k - 1] == (row - 1, *block) {
-                    next += left[k] * left[k - 1];
+                    next += residuals[k] * residuals[k - 1];
                 }
             }
         }
@@ -131,8 +131,8 @@ impl Rich {
         }
     }
 
-    /// What the best price leaves at a joint, each half of the blocks by what the other half says.
-    fn left(&self, joint: usize, used: &[usize], sizes: &[f64]) -> Vec<f64> {
+    /// Residual at a joint by the best price, each half of the blocks predicted from the other half.
+    fn residual(&self, joint: usize, used: &[usize], sizes: &[f64]) -> Vec<f64> {
         let rows = self.samples.len() as f64;
         let scale: Vec<f64> = used
             .iter()
@@ -162,23 +162,23 @@ impl Rich {
             .each_ref()
             .map(|(_, matrix, right)| (matrix.tr_mul(matrix), matrix.tr_mul(right)));
         let of_ridge = |ridge: &f64| {
-            let mut left = vec![0.0; self.samples.len()];
+            let mut residuals = vec![0.0; self.samples.len()];
             for (half, (of, matrix, right)) in halves.iter().enumerate() {
                 let (gram, gradient) = &sums[1 - half];
                 let price = ridge * halves[1 - half].0.len() as f64;
                 let whole = gram + DMatrix::identity(used.len(), used.len()) * price;
                 let Some(factor) = whole.cholesky() else {
-                    return (f64::INFINITY, left);
+                    return (f64::INFINITY, residuals);
                 };
                 let remains = right - matrix * factor.solve(gradient);
                 for (sample, value) in of.iter().zip(remains.iter()) {
-                    left[*sample] = *value;
+                    residuals[*sample] = *value;
                 }
             }
-            (left.iter().map(|x| x * x).sum::<f64>(), left)
+            (residuals.iter().map(|x| x * x).sum::<f64>(), residuals)
         };
         let all = RIDGES.iter().map(of_ridge);
         let best = all.min_by(|a, b| a.0.total_cmp(&b.0));
-        best.map_or_else(Vec::new, |(_, left)| left)
+        best.map_or_else(Vec::new, |(_, residuals)| residuals)
     }
 }

@@ -47,7 +47,7 @@ pub struct Drives {
     pub(crate) usual: Vec<Usual>,
     /// s.
     pub(crate) duration: f64,
-    /// Share of rows that are independent beside a rich model, the most of all scans: a linear model says the more, the less is missing.
+    /// Share of rows that are independent given a rich model, the most of all scans: a linear model says the more, the less is missing.
     rich: Mutex<f64>,
 }
 
@@ -82,7 +82,7 @@ impl Drives {
     }
 
     /// Share of the rows that are independent: by what a model leaves, or by what a rich one would.
-    pub(crate) fn independence_beside(&self, own: f64) -> f64 {
+    pub(crate) fn independence_given(&self, own: f64) -> f64 {
         own.max(*self.rich())
     }
 
@@ -182,7 +182,7 @@ impl Drives {
         squares
     }
 
-    /// rad rms of what is left at each joint in fitted rows.
+    /// rad rms of the residual of each joint in fitted rows.
     fn errors_of(&self, angles: &[f64]) -> Vec<f64> {
         let n = self.chain.joints();
         let mut squares = vec![0.0; n];
@@ -312,9 +312,9 @@ impl Problem for Drives {
             self.recording.period,
         );
         let mut all: Vec<Cell<Key>> = all.into_iter().filter(asked).collect();
-        // A gain that is far off shows in what is left: as much as the drive's own error.
-        let left = self.errors_of(&fit.angles);
-        let is_far = |joint: usize| left[joint] > FAR_OFF * self.usual[joint].error;
+        // A gain that is far off shows in the residual: as much as the drive's own error.
+        let residual = self.errors_of(&fit.angles);
+        let is_far = |joint: usize| residual[joint] > FAR_OFF * self.usual[joint].error;
         for cell in &mut all {
             if let Key::Gain(from, to) = cell.key
                 && !(from..=to).all(is_far)
@@ -400,8 +400,8 @@ impl Problem for Drives {
             },
         );
         sums.close();
-        let beside = rich.independence();
-        let most = self.rich().max(beside);
+        let independence = rich.independence();
+        let most = self.rich().max(independence);
         *self.rich() = most;
         let freedom = rows_a_joint * n as f64;
         let scale = (fit.square / freedom).max(1.0);
@@ -414,7 +414,7 @@ impl Problem for Drives {
             &precision,
         );
         rows.square = rows.square.max(freedom);
-        rows.independence = self.independence_beside(fit.independence);
+        rows.independence = self.independence_given(fit.independence);
         rows.unit = UNIT;
         let mut next = 0;
         let mut scanned = Vec::new();
@@ -443,7 +443,7 @@ impl Problem for Drives {
     }
 
     fn independence(&self, fit: &DriveFit) -> f64 {
-        self.independence_beside(fit.independence)
+        self.independence_given(fit.independence)
     }
 
     fn log_evidence(&self, fit: &DriveFit, independence: f64) -> f64 {

@@ -53,10 +53,10 @@ const GAP: f64 = 12.0;
 const BREAK: f64 = 1.0;
 /// s at the beginning in which a trajectory rests.
 const REST: f64 = 0.4;
-/// Steps of the encoder and standard deviations beside them that the angles of a joint at rest span at most.
+/// Steps of the encoder, plus standard deviations of the noise, that the angles of a joint at rest span at most.
 const STEPS_AT_REST: f64 = 2.5;
 const SIGMAS_AT_REST: f64 = 8.0;
-/// s, and rows at least, by which the speed of a joint is told that moves at the beginning.
+/// s, and rows at least, from which the speed of a joint is estimated that moves at the beginning.
 const GLANCE: f64 = 0.06;
 const LOOKS: usize = 5;
 

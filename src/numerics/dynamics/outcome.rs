@@ -25,7 +25,7 @@ const UNEXPLAINED: f64 = 1.5;
 /// Rows that count as one, from which on a residual is no noise.
 const LASTING: f64 = 8.0;
 
-/// What is said where the recording has its own simulation.
+/// Remark on a recording that has its own simulation.
 const SIMULATED: &str = "measured torques are held against the simulated ones of the recording: what is found is what that simulation lacks";
 
 /// All of it.

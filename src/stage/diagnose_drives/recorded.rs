@@ -100,7 +100,7 @@ impl DiagnoseDrives {
                 let commands = rows.values.remove(0);
                 (rows, commands)
             }
-            Some((_, sent)) => self.beside(&sheet, sent, &names, context)?,
+            Some((_, sent)) => self.with_commands(&sheet, sent, &names, context)?,
         };
         let by = match columns.unit {
             AngleUnit::Rad => 1.0,
@@ -135,7 +135,7 @@ impl DiagnoseDrives {
     }
 
     /// Rows of the angles with the commands that hold in them, which are in a file of their own.
-    fn beside(
+    fn with_commands(
         &self,
         sheet: &Sheet,
         sent: &RawFile,

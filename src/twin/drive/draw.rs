@@ -27,7 +27,7 @@ pub struct DriveCase {
     pub(super) commands: Vec<f64>,
     /// Rows of each trajectory; the last one judges.
     pub(super) lengths: Vec<usize>,
-    /// rad: step of the encoders, white noise beside it.
+    /// rad: step of the encoders, standard deviation of the white noise.
     pub(super) encoder: f64,
     pub(super) noise: f64,
 }

@@ -1,4 +1,4 @@
-//! A case measured: angles by encoders with white noise beside their steps, and the files of its user.
+//! A case measured: angles by encoders with their steps and white noise, and the files of its user.
 
 use super::draw::{DriveCase, TOLERANCE};
 use super::motion;

@@ -7,7 +7,7 @@ use super::motion;
 use super::rig::Rig;
 use crate::matrix::{Column, Shadow, length};
 
-/// What is left of an effect beside another name, as a share and as L, where data cannot separate the two.
+/// Residual of an effect after another name is fitted in its place, as a share and as L, where data cannot separate the two.
 const SAME_SHARE: f64 = 0.02;
 const SAME: f64 = 12.0;
 
