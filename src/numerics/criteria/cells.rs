@@ -125,6 +125,8 @@ criteria! {
     LEVELS: i32 = 5, "levels", "judgement: bounds time", "";
     /// Exchanges of a search at most.
     EXCHANGES: usize = 8, "exchanges", "judgement: bounds time", "";
+    /// Share of the evidence of a curve that waves may lack before all sizes are taken anew.
+    NEARLY: f64 = 0.2, "share", "judgement: sizes and shapes taken anew gain less", "";
     /// Waves that may stand in for a free curve of a joint's own angle.
     WAVES: usize = 3, "waves", "judgement: gears have few strong orders", "";
 }

@@ -241,14 +241,10 @@ fn stacked<'f>(factored: &[&'f FactoredColumns]) -> Cow<'f, DMatrix<f64>> {
     if let [one] = factored {
         return Cow::Borrowed(&one.functions.values);
     }
-    let rows = factored
-        .first()
-        .map_or(0, |one| one.functions.values.nrows());
-    let values: Vec<f64> = factored
-        .iter()
-        .flat_map(|one| one.functions.values.as_slice())
-        .copied()
-        .collect();
+    let each = || factored.iter().map(|one| &one.functions.values);
+    let rows = each().next().map_or(0, DMatrix::nrows);
+    let mut values = Vec::with_capacity(each().map(DMatrix::len).sum());
+    each().for_each(|one| values.extend_from_slice(one.as_slice()));
     Cow::Owned(DMatrix::from_vec(rows, values.len() / rows.max(1), values))
 }
 

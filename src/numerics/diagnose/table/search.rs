@@ -7,7 +7,7 @@ use super::evidence::AMPLITUDES;
 use super::state::KnownState;
 use crate::criteria::cells::{
     ALIKE, BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER,
-    SWAPS, TRACE, WAVES,
+    NEARLY, SWAPS, TRACE, WAVES,
 };
 use crate::effect::{Form, Variable, names};
 use std::collections::BTreeSet;
@@ -342,6 +342,8 @@ impl CauseTable<'_, '_> {
             let kappa = self.noise(&components);
             let before = self.total(&components, kappa);
             let mut next = without(&components, &[at]);
+            // Coefficients are always those of all components together: taking all anew changes sizes and shapes, and gains little.
+            let near = before - (*NEARLY * (before - self.total(&next, kappa))).max(*JOINS);
             for _ in 0..*WAVES {
                 self.know(&next);
                 let state = self.state(&next, Some(kappa));
@@ -350,6 +352,9 @@ impl CauseTable<'_, '_> {
                     break;
                 };
                 next.push(self.component(best, &scan.closely[&best]));
+                if self.total(&next, kappa) < near {
+                    continue;
+                }
                 next = self.backfit(next, 1);
                 if self.total(&next, kappa) > before {
                     components = next;
