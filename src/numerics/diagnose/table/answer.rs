@@ -77,7 +77,6 @@ impl CauseTable<'_, '_> {
 
     /// The findings that components are; `first` is where the residual sat before any of them.
     pub(super) fn answer(&mut self, components: &[Component], first: (Located, f64)) -> Answer {
-        self.know(components);
         let state = self.state(components, None);
         let scan = self.scan(&state, 4, &[]);
         let mut ranges = Vec::new();

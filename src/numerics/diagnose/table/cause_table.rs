@@ -1,16 +1,17 @@
 //! All cells of a recording with their columns, and the products of these with components of a model.
 
 use super::cell::{CauseCell, FreeShape, Over, ShapeGroup, Shapes};
+use super::coarse::CoarseProducts;
 use super::component::{CellColumns, ColumnProducts, Component, PartProducts};
 use super::frame::{MultipliedColumns, SearchRows};
 use super::state::KnownState;
 use super::{generated, listed};
-use crate::criteria::cells::{ALIKE, CLOSELY, COMPONENTS, USUAL_MOST};
+use crate::criteria::cells::{CLOSELY, USUAL_MOST};
 use crate::diagnose::types::{KnownCell, Question};
 use crate::effect::{Survey, Term, Variable, cause, names};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 /// The table of cells over the rows of a recording.
@@ -20,15 +21,12 @@ pub(super) struct CauseTable<'f, 'a> {
     pub(crate) cells: Vec<CauseCell>,
     pub(crate) coarse: Vec<CellColumns>,
     fine: Vec<OnceLock<CellColumns>>,
-    /// Products of the columns of each component with those of every coarse block.
-    products: BTreeMap<u64, DMatrix<f64>>,
+    pub(super) products: CoarseProducts,
     pub(crate) parts: PartProducts,
-    known: ColumnProducts,
-    /// Cells by the motion of their coarse columns: what a component has in common with its directions is computed once.
-    of_motions: Vec<Vec<usize>>,
+    pub(super) known: ColumnProducts,
     /// The first of all coarse columns of each cell, and their number.
     pub(crate) first: Vec<usize>,
-    columns: usize,
+    pub(super) columns: usize,
     pub(crate) next: u64,
     /// Variables with numbers that components follow.
     pub(crate) numbers: Vec<Variable>,
@@ -101,10 +99,9 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             cells: Vec::new(),
             coarse: Vec::new(),
             fine: Vec::new(),
-            products: BTreeMap::new(),
+            products: CoarseProducts::default(),
             parts: PartProducts::default(),
             known: ColumnProducts::default(),
-            of_motions: Vec::new(),
             first: Vec::new(),
             columns: 0,
             next: 0,
@@ -137,13 +134,6 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             self.coarse.push(block);
             self.cells.push(cell);
         }
-        let mut of_motions: BTreeMap<Result<usize, usize>, Vec<usize>> = BTreeMap::new();
-        for (cell, block) in self.coarse.iter().enumerate() {
-            let motion = block.motion().ok_or(cell);
-            of_motions.entry(motion).or_default().push(cell);
-        }
-        self.of_motions = of_motions.into_values().collect();
-        self.products.clear();
     }
 
     /// A component's product with the numbers that its variables have; none of what is no product.
@@ -202,7 +192,6 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         }
         if !fresh.is_empty() {
             self.extend(fresh);
-            self.know(components);
         }
     }
 
@@ -220,103 +209,6 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             let groups = self.cells[cell].groups(self.survey, &values, true);
             CellColumns::of(groups, self.frame).between(self.cells[cell].between)
         })
-    }
-
-    /// Computes once what scans need of some components.
-    pub(crate) fn know(&mut self, components: &[Component]) {
-        for component in components {
-            if !self.products.contains_key(&component.id) {
-                let of_motion = |cells: &Vec<usize>| {
-                    let columns = self.frame.multiplied(&component.values);
-                    let blocks: Vec<_> = cells.iter().map(|cell| &self.coarse[*cell]).collect();
-                    let known = &self.known;
-                    let products = known.of_each(component, &columns, &blocks, self.frame);
-                    let products = products.iter().map(|product| component.by_part(product));
-                    cells.iter().copied().zip(products).collect::<Vec<_>>()
-                };
-                let all = self.of_motions.par_iter().flat_map_iter(of_motion);
-                let rows = component.part.ncols();
-                let mut values = vec![0.0; rows * self.columns];
-                for (cell, products) in all.collect::<Vec<_>>() {
-                    let first = rows * self.first[cell];
-                    values[first..first + products.len()].copy_from_slice(products.as_slice());
-                }
-                self.products.insert(
-                    component.id,
-                    DMatrix::from_vec(component.part.ncols(), self.columns, values),
-                );
-            }
-        }
-        let known: BTreeSet<u64> = components.iter().map(|component| component.id).collect();
-        if self.products.len() > 3 * *COMPONENTS {
-            self.products.retain(|id, _| known.contains(id));
-        }
-    }
-
-    /// L^-1 Z'X of the coarse columns of some cells given a state, with the first column of each.
-    pub(crate) fn across_cells(
-        &self,
-        cells: &[usize],
-        state: &KnownState,
-    ) -> (DMatrix<f64>, Vec<usize>) {
-        let parts: Vec<&DMatrix<f64>> = state
-            .components
-            .iter()
-            .map(|component| &self.products[&component.id])
-            .collect();
-        let mut first = Vec::with_capacity(cells.len());
-        let mut columns = Vec::new();
-        for cell in cells {
-            first.push(columns.len());
-            let count = self.coarse[*cell].count();
-            columns.extend(self.first[*cell]..self.first[*cell] + count);
-        }
-        let solved: Vec<DMatrix<f64>> = columns
-            .par_chunks(512)
-            .map(|some| state.solved(stacked(&parts, some.iter().copied())))
-            .collect();
-        let rows: usize = parts.iter().map(|part| part.nrows()).sum();
-        let mut values = Vec::with_capacity(rows * columns.len());
-        for part in &solved {
-            values.extend_from_slice(part.as_slice());
-        }
-        (DMatrix::from_vec(rows, columns.len(), values), first)
-    }
-
-    /// Cells that do most of what a component does, so many of them at most.
-    pub(crate) fn alike(&self, component: &Component, most: usize) -> Vec<usize> {
-        let all = self.overlaps(component).into_iter();
-        all.take(most).map(|(_, cell)| cell).collect()
-    }
-
-    /// Cells that do much of what a component does with their shares of its squared motion, those that do most first.
-    pub(crate) fn overlaps(&self, component: &Component) -> Vec<(f64, usize)> {
-        // Its likeliest motion, of unit length, in the directions of its part.
-        let state = self.state(std::slice::from_ref(component), None);
-        let Some(weights) = state.weights() else {
-            return Vec::new();
-        };
-        let motion = &*component.part * &weights;
-        let length = motion.norm().max(f64::MIN_POSITIVE);
-        let Some(products) = self.products.get(&component.id) else {
-            return Vec::new();
-        };
-        let along: Vec<f64> = products
-            .tr_mul(&weights)
-            .iter()
-            .map(|value| value / length)
-            .collect();
-        let overlap = |cell: usize| {
-            let range = self.first[cell]..self.first[cell] + self.coarse[cell].count();
-            (self.coarse[cell].overlap(&along[range]), cell)
-        };
-        let mut all: Vec<(f64, usize)> = (0..self.cells.len())
-            .into_par_iter()
-            .map(overlap)
-            .filter(|(share, _)| *share > *ALIKE)
-            .collect();
-        all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        all
     }
 
     /// Cells with a name at the place of a component, and of a curve those over its variable there or next to it: columns that are looked at
@@ -362,20 +254,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         promising
     }
 
-    /// L^-1 Z'X of a block's columns given a state.
-    pub(crate) fn across_block(&self, block: &CellColumns, state: &KnownState) -> DMatrix<f64> {
-        let part = |component: &Component| {
-            let columns = self.frame.multiplied(&component.values);
-            let known = &self.known;
-            let products = known.of_each(component, &columns, &[block], self.frame);
-            component.by_part(&products[0])
-        };
-        let parts: Vec<DMatrix<f64>> = state.components.iter().map(part).collect();
-        let parts: Vec<&DMatrix<f64>> = parts.iter().collect();
-        state.solved(stacked(&parts, 0..block.count()))
-    }
-
-    /// The same of a block that is asked once, by the columns of the state.
+    /// L^-1 Z'X of a block that is asked once, by the columns of the state.
     pub(crate) fn across_once(
         &self,
         block: &CellColumns,
@@ -389,18 +268,4 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         self.parts.know(components, self.frame);
         KnownState::of(components.to_vec(), &self.parts, self.frame, kappa)
     }
-}
-
-/// Some columns of matrices that stand on each other.
-fn stacked(parts: &[&DMatrix<f64>], columns: impl ExactSizeIterator<Item = usize>) -> DMatrix<f64> {
-    let rows: usize = parts.iter().map(|part| part.nrows()).sum();
-    let count = columns.len();
-    let mut values = Vec::with_capacity(rows * count);
-    for column in columns {
-        for part in parts {
-            let rows = part.nrows();
-            values.extend_from_slice(&part.as_slice()[column * rows..(column + 1) * rows]);
-        }
-    }
-    DMatrix::from_vec(rows, count, values)
 }

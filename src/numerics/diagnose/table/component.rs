@@ -295,8 +295,30 @@ struct ProductCache {
 
 struct KnownProduct {
     /// What it is of: as long as it is known, nothing else comes to lie there.
-    _of: (Weak<Columns>, Weak<Vec<f64>>),
+    of: (Weak<Columns>, Weak<Vec<f64>>),
     product: Arc<DMatrix<f64>>,
+}
+
+impl ProductCache {
+    /// Beyond 128 MB what nobody can ask again goes, or else everything.
+    fn forget(&mut self) {
+        const MOST: usize = 1 << 24;
+        if self.size <= MOST {
+            return;
+        }
+        self.known.retain(|_, known| known.is_used());
+        let sizes = self.known.values().map(|known| known.product.len());
+        self.size = sizes.sum();
+        if 2 * self.size > MOST {
+            *self = Self::default();
+        }
+    }
+}
+
+impl KnownProduct {
+    fn is_used(&self) -> bool {
+        self.of.0.strong_count() > 0 && self.of.1.strong_count() > 0
+    }
 }
 
 impl ColumnProducts {
@@ -330,16 +352,13 @@ impl ColumnProducts {
             let Some(cache) = cache.as_mut() else {
                 continue;
             };
-            // 128 MB.
-            if cache.size > 1 << 24 {
-                **cache = ProductCache::default();
-            }
+            cache.forget();
             cache.size += product.len();
             let of = (&component.values, &blocks[k].square);
             cache.known.insert(
                 key(blocks[k]),
                 KnownProduct {
-                    _of: (Arc::downgrade(of.0), Arc::downgrade(of.1)),
+                    of: (Arc::downgrade(of.0), Arc::downgrade(of.1)),
                     product,
                 },
             );

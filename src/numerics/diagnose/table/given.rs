@@ -153,7 +153,6 @@ impl CauseTable<'_, '_> {
             }
         }
         let out: Vec<Component> = out.into_iter().map(|(_, component)| component).collect();
-        self.know(&out);
         out
     }
 

@@ -7,6 +7,7 @@
 mod answer;
 mod cause_table;
 mod cell;
+mod coarse;
 mod component;
 mod evidence;
 mod factored;

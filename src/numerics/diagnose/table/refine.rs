@@ -16,13 +16,9 @@ type ShapeEvidence = (f64, f64);
 type Variant<T> = (T, Vec<Form>);
 
 impl CauseTable<'_, '_> {
-    /// Gives the best cell, and listed shapes near it, the numbers that say most.
-    pub(crate) fn refine(
-        &self,
-        scan: &mut CellScan,
-        state: &KnownState,
-        prior: &(dyn Fn(usize) -> f64 + Sync),
-    ) {
+    /// Gives the best cell, and listed shapes near it, the numbers that say most; none to one that has them.
+    pub(crate) fn refine(&self, scan: &mut CellScan, state: &KnownState, but: Option<usize>) {
+        let prior = |cell: usize| self.log_prior(cell, &state.components);
         let most = scan.best().map_or(0.0, |best| scan.log_odds[best]);
         let best = scan.best();
         let open = best.is_some_and(|best| !self.cells[best].is_named());
@@ -39,6 +35,9 @@ impl CauseTable<'_, '_> {
         nameless.truncate(*SEPARATED);
         // Over a variable of a component with other numbers a cell may be far below the best until it has its own.
         let asked = |cell: &usize| {
+            if Some(*cell) == but {
+                return false;
+            }
             Some(*cell) == best
                 || self.declared.contains(cell)
                 || nameless.contains(cell)

@@ -183,6 +183,13 @@ impl CauseTable<'_, '_> {
         most: usize,
         also: &[usize],
     ) -> CellScan {
+        let mut scan = self.ranked(cells, state, most, also);
+        self.refine(&mut scan, state, None);
+        scan
+    }
+
+    /// The same without numbers of shapes that say more.
+    fn ranked(&self, cells: &[usize], state: &KnownState, most: usize, also: &[usize]) -> CellScan {
         let prior = |cell: usize| self.log_prior(cell, &state.components);
         let across = self.across_cells(cells, state);
         let (bounds, promising) = self.by_bound(cells, state, &across);
@@ -217,13 +224,11 @@ impl CauseTable<'_, '_> {
             log_odds[*cell] = prior(*cell) + found.log;
         }
         let order = promising.into_iter().map(|k| cells[k]).collect();
-        let mut scan = CellScan {
+        CellScan {
             log_odds,
             closely,
             order,
-        };
-        self.refine(&mut scan, state, &prior);
-        scan
+        }
     }
 
     /// Some cells that may stand for a component, given a state without it, some closely in any case; of a product also those that may do the
@@ -236,7 +241,16 @@ impl CauseTable<'_, '_> {
         most: usize,
         also: &[usize],
     ) -> CellScan {
-        let mut scan = self.scan_some(cells, state, most, also);
+        let mut scan = self.ranked(cells, state, most, also);
+        // A component has its numbers.
+        self.refine(&mut scan, state, Some(component.cell));
+        if let Some(found) = scan.closely.get_mut(&component.cell)
+            && let Some((log, _)) = self.component_evidence(component, state)
+            && log > found.log
+        {
+            scan.log_odds[component.cell] += log - found.log;
+            found.log = log;
+        }
         let siblings = self.siblings(component);
         if !siblings.is_empty() {
             scan.join(self.scan_some(&siblings, state, *SEPARATED, &[]));

@@ -6,8 +6,8 @@ use super::component::Component;
 use super::evidence::AMPLITUDES;
 use super::state::KnownState;
 use crate::criteria::cells::{
-    ALIKE, BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER,
-    NEARLY, SWAPS, TRACE, WAVES,
+    ALIKE, BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NEARLY, NU,
+    SECOND_ORDER, SWAPS, TRACE, WAVES,
 };
 use crate::effect::{Form, Variable, names};
 use std::collections::BTreeSet;
@@ -176,7 +176,6 @@ impl CauseTable<'_, '_> {
                 break;
             }
         }
-        self.know(&components);
         components
     }
 
@@ -212,7 +211,6 @@ impl CauseTable<'_, '_> {
 
     /// Adds cells while they pay, then takes all anew.
     pub(crate) fn grow(&mut self, components: Vec<Component>) -> Vec<Component> {
-        self.know(&components);
         self.likely = (0..self.cells.len()).collect();
         let before = components.len();
         let components = self.add(components);
@@ -240,7 +238,6 @@ impl CauseTable<'_, '_> {
         };
         let mut seen = BTreeSet::from([key(&components)]);
         'rounds: for _ in 0..*EXCHANGES {
-            self.know(&components);
             let kappa = self.noise(&components);
             let mut order: Vec<usize> = (0..components.len()).collect();
             let size = |i: &usize| components[*i].amplitude;
@@ -287,7 +284,6 @@ impl CauseTable<'_, '_> {
         if self.is_better(&others, &components) {
             others
         } else {
-            self.know(&components);
             components
         }
     }
@@ -327,7 +323,6 @@ impl CauseTable<'_, '_> {
             let Some(at) = components.iter().position(|component| component.id == id) else {
                 continue;
             };
-            self.know(&components);
             let mut named = self.overlaps(&components[at]);
             named.retain(|(_, cell)| self.cells[*cell].is_named());
             // What several do together is not much more than what each of them does.
@@ -345,7 +340,6 @@ impl CauseTable<'_, '_> {
             // Coefficients are always those of all components together: taking all anew changes sizes and shapes, and gains little.
             let near = before - (*NEARLY * (before - self.total(&next, kappa))).max(*JOINS);
             for _ in 0..*WAVES {
-                self.know(&next);
                 let state = self.state(&next, Some(kappa));
                 let scan = self.scan_some(&named, &state, 4, &[]);
                 let Some(best) = scan.best().filter(|best| scan.log_odds[*best] > 0.0) else {
@@ -362,7 +356,6 @@ impl CauseTable<'_, '_> {
                 }
             }
         }
-        self.know(&components);
         components
     }
 
