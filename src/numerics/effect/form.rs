@@ -466,14 +466,8 @@ impl Term {
 
     /// Whether a joint follows nothing but its own angle and the side from which it came there: a gear's flanks differ.
     pub fn is_own_table(&self) -> bool {
-        let Motion::Joint { joint } = self.motion else {
-            return false;
-        };
-        let angle = Variable::Angle { joint };
-        let variables = self.law.variables();
-        let is_own = |variable: &Variable| *variable == angle || variable.is_side_of(joint);
-        let is_table = variables.contains(&angle) && variables.iter().all(is_own);
-        self.is_own_curve() || self.law.times.is_some() && is_table
+        let is_table = || is_own_table(self.motion, &self.law.variables());
+        self.is_own_curve() || self.law.times.is_some() && is_table()
     }
 
     /// The angles of which it is a function, where they are two.
@@ -483,6 +477,16 @@ impl Term {
             _ => None,
         }
     }
+}
+
+/// Whether a motion is that of a joint over its own angle and, if at all, the side from which it came there.
+pub fn is_own_table(motion: Motion, variables: &[Variable]) -> bool {
+    let Motion::Joint { joint } = motion else {
+        return false;
+    };
+    let angle = Variable::Angle { joint };
+    let is_own = |variable: &Variable| *variable == angle || variable.is_side_of(joint);
+    variables.contains(&angle) && variables.iter().all(is_own)
 }
 
 impl PartialEq for Term {

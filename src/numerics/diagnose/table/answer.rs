@@ -2,7 +2,7 @@
 //! the residual sits before and after.
 
 use super::cause_table::CauseTable;
-use super::cell::Shapes;
+use super::cell::{CauseCell, FreeShape, Shapes};
 use super::component::{CellColumns, Component};
 use super::evidence::log_sum;
 use super::scan::{CellEvidence, CellScan};
@@ -12,7 +12,7 @@ use crate::criteria::cells::{BENDS, MISLED, RIVAL, SWAPS};
 use crate::diagnose::types::{
     ExplainedCell, ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine,
 };
-use crate::effect::{Basis, Clock, Form, Place, Variable, names};
+use crate::effect::{Basis, Clock, Form, Place, Term, Variable, names};
 use std::collections::BTreeMap;
 
 /// One finding of a search.
@@ -68,11 +68,64 @@ impl CauseTable<'_, '_> {
     /// The name of a component.
     fn name_of(&self, component: &Component) -> &'static str {
         let cell = &self.cells[component.cell];
+        let is_table = |form: &Form| form.term().is_some_and(Term::is_own_table);
         if cell.name == names::JOINT_COMPLIANCE && component.shape.is_bent {
             self.bent
+        } else if self.may_be_table(cell) && component.forms.iter().all(is_table) {
+            names::JOINT_TABLE
         } else {
             cell.name
         }
+    }
+
+    /// The name of a cell, whatever its shape.
+    fn name_of_cell(&self, cell: &CauseCell) -> &'static str {
+        if self.may_be_table(cell) && cell.free().is_some_and(FreeShape::is_own_table) {
+            names::JOINT_TABLE
+        } else {
+            cell.name
+        }
+    }
+
+    /// Whether a curve over the own angle of a cell's place has the name of a transmission.
+    fn may_be_table(&self, cell: &CauseCell) -> bool {
+        let turns =
+            |place| matches!(place, Place::Joint(joint) if self.survey.robot.is_revolute(joint));
+        !cell.is_named() && turns(cell.place) && self.has_tables
+    }
+
+    /// Components by name and place. A transmission that errs less than what else follows from its place without a name is a part of that.
+    fn by_name<'c>(
+        &self,
+        components: &'c [Component],
+    ) -> BTreeMap<(&'static str, Place), Vec<usize>> {
+        let mut groups: BTreeMap<(&'static str, Place), Vec<usize>> = BTreeMap::new();
+        for (i, component) in components.iter().enumerate() {
+            let cell = &self.cells[component.cell];
+            let name = match self.name_of(component) {
+                names::JOINT_TABLE => names::JOINT_TABLE,
+                _ => cell.name,
+            };
+            groups.entry((name, cell.place)).or_default().push(i);
+        }
+        let square = |members: &Vec<usize>| {
+            let sizes = members.iter().map(|i| components[*i].amplitude.powi(2));
+            sizes.sum::<f64>()
+        };
+        let tables = groups
+            .keys()
+            .filter(|(name, _)| *name == names::JOINT_TABLE);
+        let tables: Vec<Place> = tables.map(|(_, place)| *place).collect();
+        for place in tables {
+            let unnamed = groups.get(&(names::UNKNOWN, place)).map_or(0.0, square);
+            if square(&groups[&(names::JOINT_TABLE, place)]) < unnamed {
+                let members = groups.remove(&(names::JOINT_TABLE, place));
+                let all = groups.entry((names::UNKNOWN, place)).or_default();
+                all.extend(members.into_iter().flatten());
+                all.sort_unstable();
+            }
+        }
+        groups
     }
 
     /// The findings that components are; `first` is where the residual sat before any of them.
@@ -85,14 +138,9 @@ impl CauseTable<'_, '_> {
             ranges.push(at..at + component.forms.len());
             at += component.forms.len();
         }
-        let mut groups: BTreeMap<(&'static str, Place), Vec<usize>> = BTreeMap::new();
-        for (i, component) in components.iter().enumerate() {
-            let cell = &self.cells[component.cell];
-            groups.entry((cell.name, cell.place)).or_default().push(i);
-        }
         let (mut found, mut better) = (Vec::new(), None);
-        for members in groups.into_values() {
-            let (mut one, instead) = self.found(components, &members, state.kappa);
+        for ((name, _), members) in self.by_name(components) {
+            let (mut one, instead) = self.found(components, (name, &members), state.kappa);
             one.members = members.iter().flat_map(|i| ranges[*i].clone()).collect();
             found.push(one);
             better = better.or(instead.map(|instead| (members, instead)));
@@ -121,7 +169,7 @@ impl CauseTable<'_, '_> {
     fn found(
         &self,
         components: &[Component],
-        members: &[usize],
+        (name, members): (&'static str, &[usize]),
         kappa: f64,
     ) -> (FoundCell, Option<(usize, CellEvidence)>) {
         let mut known = without(components, members);
@@ -154,7 +202,11 @@ impl CauseTable<'_, '_> {
         let least = scan.log_odds[cell] + *SWAPS;
         let better = scan.best().filter(|best| scan.log_odds[*best] > least);
         let better = better.and_then(|best| Some((best, scan.closely.get(&best)?.clone())));
-        let (effect, place) = (self.name_of(component), self.cells[cell].place);
+        let place = self.cells[cell].place;
+        let effect = match self.name_of(component) {
+            names::JOINT_TABLE => name,
+            other => other,
+        };
         let (probabilities, rivals) = self.weigh((effect, place), component, &scan);
         let bounds = members.iter().flat_map(|i| {
             let one = &components[*i];
@@ -206,7 +258,12 @@ impl CauseTable<'_, '_> {
                 *shares.entry((self.bent, cell.place)).or_default() += bent * probability;
                 *shares.entry((cell.name, cell.place)).or_default() += (1.0 - bent) * probability;
             } else {
-                *shares.entry((cell.name, cell.place)).or_default() += probability;
+                let name = if k == component.cell {
+                    effect
+                } else {
+                    self.name_of_cell(cell)
+                };
+                *shares.entry((name, cell.place)).or_default() += probability;
             }
         }
         let sound = 1.0 - *MISLED;

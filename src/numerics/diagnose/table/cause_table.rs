@@ -42,6 +42,8 @@ pub(super) struct CauseTable<'f, 'a> {
     pub(crate) has_steps: bool,
     /// What a joint that yields out of proportion to its load is called.
     pub(crate) bent: &'static str,
+    /// Whether a curve over a joint's own angle has a name.
+    pub(crate) has_tables: bool,
 }
 
 impl<'f, 'a> CauseTable<'f, 'a> {
@@ -115,6 +117,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 true => names::UNKNOWN,
                 false => names::JOINT_HARDENING,
             },
+            has_tables: !excludes(names::JOINT_TABLE),
         };
         table.extend(named.into_iter().zip(groups).collect());
         table

@@ -4,7 +4,7 @@ use crate::criteria::cells::{
     BENDING, BENT, EACH, FEW, LENGTHS, MARGIN, ONE_DIRECTION, ROUGHLY, STEPS,
 };
 use crate::effect::{
-    Basis, Form, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names,
+    Basis, Form, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, is_own_table, names,
 };
 use nalgebra::Vector3;
 use std::f64::consts::PI;
@@ -178,6 +178,16 @@ impl FreeShape {
 
     pub(super) fn is_curve(&self) -> bool {
         matches!(self.over, Over::Curve { .. })
+    }
+
+    /// Whether a joint follows any curve of its own angle, the same to both sides of its approach or not.
+    pub(super) fn is_own_table(&self) -> bool {
+        let variables = match self.over {
+            Over::Curve { .. } => vec![self.variable],
+            Over::Product(other) => vec![self.variable, other],
+            Over::Line | Over::Step => return false,
+        };
+        is_own_table(self.motion, &variables)
     }
 
     /// Whether it is a product of one variable with itself.

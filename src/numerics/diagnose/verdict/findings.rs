@@ -5,7 +5,7 @@ use crate::criteria::words::FIRM;
 use crate::diagnose::table::{Answer, FoundCell, places};
 use crate::effect::{
     Cause, Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Survey,
-    Term, Variable, cause, figure, moved_with_the_payload, names, people, turned_holder,
+    Variable, cause, figure, moved_with_the_payload, names, people, turned_holder,
 };
 use crate::estimate::{Model, ParameterStatus, tail};
 use crate::observation::Dimension;
@@ -75,7 +75,8 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
         let unclear_main = out
             .iter()
             .position(|(_, main, _)| main.place == found.place && unclear(main));
-        let first = (found.effect == names::UNKNOWN).then(|| {
+        let is_curve = [names::UNKNOWN, names::JOINT_TABLE].contains(&found.effect);
+        let first = is_curve.then(|| {
             let mut mains = out.iter();
             let here =
                 mains.position(|(most, main, _)| main.place == found.place && rms < *DETAIL * most);
@@ -185,10 +186,6 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
         _ if !named && excluded => (names::UNKNOWN, left_out(&summary, &rms)),
         (Some(why), _) if named => (names::UNKNOWN, not_so(effect, &summary, &why, &rms)),
         (_, Some(modelled)) => (effect, with_size(&modelled.sentence, &rms)),
-        _ if !named && is_table(last, &forms) => (
-            names::JOINT_TABLE,
-            sentence(names::JOINT_TABLE, &summary, &rms),
-        ),
         _ => (effect, sentence(effect, &summary, &rms)),
     };
     rivals.retain(|rival| {
@@ -207,15 +204,6 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
         valid,
         forms,
     }
-}
-
-/// Whether forms without a name are curves of a turning joint over its own angle, whether they are the same to both sides of its approach or
-/// not: transmission or encoder, which nothing else of an arm follows.
-fn is_table(last: &LastRound, forms: &[Form]) -> bool {
-    let robot = last.survey.robot;
-    let turns = |place| matches!(place, Place::Joint(joint) if robot.is_revolute(joint));
-    let is_curve = |form: &Form| form.term().is_some_and(Term::is_own_table) && turns(form.place());
-    !forms.is_empty() && forms.iter().all(is_curve) && !last.excludes(names::JOINT_TABLE)
 }
 
 /// What a finding is in the fitted model as a whole, unless the user excludes what would do the same.
@@ -285,7 +273,8 @@ fn parameters(last: &LastRound, effect: &str, members: &[usize]) -> Vec<Paramete
     let mut out: Vec<ParameterEstimate> = Vec::new();
     for (form, i) in members.iter().enumerate() {
         let cause = state.causes[*i].form.name();
-        let hidden = if last.excludes(cause) { cause } else { effect };
+        let is_hidden = last.excludes(cause) || state.causes[*i].form.cause().is_nameless();
+        let hidden = if is_hidden { cause } else { effect };
         for k in state.ranges[*i].clone() {
             let spec = &state.model.stack.specs()[k];
             let sigma = match state.fitted.statuses[k] {
