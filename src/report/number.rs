@@ -50,6 +50,19 @@ pub(super) fn measured(value: f64, sigma: Option<f64>) -> String {
     let Some(sigma) = sigma.filter(|sigma| *sigma > 0.0 && sigma.is_finite()) else {
         return significant(value, 4);
     };
+    rounded(value, sigma, value)
+}
+
+/// The standard deviation of a value, written as [`measured`] writes that: both with the same decimals, or both in powers of ten.
+pub(super) fn deviation(sigma: f64, value: f64) -> String {
+    match sigma > 0.0 && sigma.is_finite() {
+        true => rounded(sigma, sigma, value),
+        false => significant(sigma, 4),
+    }
+}
+
+/// A number with the digits that `sigma` tells; whether in powers of ten is decided by `value`.
+fn rounded(number: f64, sigma: f64, value: f64) -> String {
     let first = sigma.log10().floor();
     let digits = if sigma / 10f64.powf(first) < 2.0 {
         2.0
@@ -59,11 +72,11 @@ pub(super) fn measured(value: f64, sigma: Option<f64>) -> String {
     let place = first - digits + 1.0;
     let size = value.abs().max(sigma);
     if size.log10().floor() < -3.0 || size >= 1e7 {
-        let kept = (value.abs().max(f64::MIN_POSITIVE).log10().floor() - place).max(0.0);
-        return significant(value, kept as usize + 1);
+        let kept = (number.abs().max(f64::MIN_POSITIVE).log10().floor() - place).max(0.0);
+        return significant(number, kept as usize + 1);
     }
     let unit = 10f64.powf(place);
-    fixed((value / unit).round() * unit, (-place).max(0.0) as usize)
+    fixed((number / unit).round() * unit, (-place).max(0.0) as usize)
 }
 
 /// The same without trailing zeros, for a number that is to be copied.
@@ -201,6 +214,12 @@ pub(super) fn render(
             of_measured.decimal(measured(value, sigma))
         })
     });
+    let of_deviation = locale.clone();
+    environment.add_filter("deviation", move |sigma: Option<f64>, value: f64| {
+        sigma.map_or_else(String::new, |sigma| {
+            of_deviation.decimal(deviation(sigma, value))
+        })
+    });
     let fixed = move |value: Option<f64>, decimals: usize| {
         value.map_or_else(String::new, |value| of_fixed.fixed(value, decimals))
     };
@@ -254,6 +273,11 @@ mod tests {
             ["179.6", "180", "0.0331", "4.17e-7", "1800"]
         );
         assert_eq!(measured(12.3456, None), "12.35");
+        assert_eq!(
+            [(5e-4, 0.2196), (7e-6, 0.015007), (2e-9, 4.17e-7)]
+                .map(|(sigma, value)| deviation(sigma, value)),
+            ["0.0005", "0.000007", "2e-9"]
+        );
         assert_eq!(
             [7, -1234, 10_000_000].map(count),
             ["7", "-1\u{202f}234", "10\u{202f}000\u{202f}000"]
