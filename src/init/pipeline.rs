@@ -251,6 +251,10 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
         for (column, name) in unused.iter().take(MOST_NAMED) {
             match name.as_str() {
                 "" => put(&format!("# not used: column {}", column + 1)),
+                name if file.has("x") && is_of_space(name) => put(&format!(
+                    "# u95: {{column: {}, unit: mm, coverage_factor: 3.5}}   # CHECK: of the point in space; of each coordinate without coverage_factor",
+                    quoted(name)
+                )),
                 name => put(&format!("# not used: {}", quoted(name))),
             }
         }
@@ -262,6 +266,17 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
             .for_each(|column| put(&format!("# seen: {}", one_line(&sheet.seen(column)))));
     }
     out
+}
+
+/// Whether a column has the uncertainty of a point in space with 95 %, as `Uxyz (95%)` and `U95`: the root of the sum of the squares of two sigma of
+/// three coordinates, 3.5 times that of one.
+fn is_of_space(name: &str) -> bool {
+    let letters: String = name
+        .chars()
+        .filter(char::is_ascii_alphanumeric)
+        .map(|letter| letter.to_ascii_lowercase())
+        .collect();
+    letters.starts_with('u') && letters.contains("95")
 }
 
 const ORDER: &str = "point_id time trajectory q usage target torque current simulated direction velocity x payload temperature";
@@ -367,4 +382,18 @@ pub(crate) fn marked(paths: &[&Path]) -> Vec<MarkedLines> {
         .map(of_mark)
         .filter(|marked| !marked.lines.is_empty())
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_of_space;
+
+    #[test]
+    fn an_uncertainty_of_a_point_in_space_is_known_by_its_name() {
+        let names = ["Uxyz (95%)", "U95", "u_95 [mm]", "Usage", "q95", "unit"];
+        assert_eq!(
+            names.map(is_of_space),
+            [true, true, true, false, false, false]
+        );
+    }
 }

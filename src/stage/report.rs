@@ -270,7 +270,7 @@ pub struct ReportTorques {
 }
 
 crate::stage::stage! {
-    ReportTorques, "report_torques", 9, "writes one self-contained HTML file: torques before and after, friction, what was found",
+    ReportTorques, "report_torques", 10, "writes one self-contained HTML file: torques before and after, friction, what was found",
         ReportTorquesReads -> ReportTorquesWrites {
             document: Document,
         }

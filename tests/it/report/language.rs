@@ -12,9 +12,10 @@ const MESSAGES: &str = include_str!("../../../src/report/language/de.po");
 const STORED: &str = include_str!("../../../src/report/language/de_stored.po");
 
 /// Sources whose sentences stand in tables that the page shows.
-const SOURCES: [&str; 22] = [
+const SOURCES: [&str; 24] = [
     "fleet/cause_answers",
     "numerics/drives/causes",
+    "numerics/effect/words",
     "numerics/dynamics/cause/",
     "numerics/dynamics/even",
     "numerics/dynamics/findings",
@@ -25,6 +26,7 @@ const SOURCES: [&str; 22] = [
     "numerics/compensate/remark",
     "numerics/diagnose/setup/",
     "numerics/diagnose/unasked",
+    "numerics/diagnose/verdict/",
     "numerics/diagnose/words/",
     "numerics/estimate/observe",
     "stage/advice",
