@@ -177,7 +177,7 @@ fn the_page_is_german_but_for_names_and_reasons() {
         "<html lang=\"de\">",
         "Flotte line",
         "Getriebe, periodisch (Gelenk 2)",
-        "seit 2026-04-01: +0,021 +- 0,002",
+        "seit 2026-04-01: +0,021 \u{b1} 0,002 \u{b0} zero_shift.j3.step",
         "seine Einrichtung ist falsch",
         "2,000",
     ] {
