@@ -100,7 +100,7 @@ impl RunArguments {
             let message = format!(
                 "{} has no stage that writes a page; allowed: {}",
                 self.pipeline.display(),
-                listed(&REPORTS)
+                listed(REPORTS)
             );
             return Err(Error::spec("--language", message));
         }
