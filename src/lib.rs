@@ -1,4 +1,26 @@
-//! `calib` makes industrial robots accurate and says why they were not.
+//! `calib` makes industrial robots accurate and says why they were not: from measured points, from torques, or from commands and
+//! positions it names the physics that a model leaves out, with its place, its size and what these data cannot tell apart from it.
+//!
+//! Most people use the command: the README and its three tutorials (`pipelines/tutorials`). This page is for those who call calib
+//! from a program, and for those who change it: [the library](#as-a-library), [the map](#the-map) of the sources,
+//! [a measurement from file to report](#a-measurement-from-file-to-report), [how to add things](#adding-things), [the words](#glossary).
+//!
+//! # As a library
+//! The command line is one user of this crate; a program is another, by [`api`]; the Python package (`src/python`) is made of it too. Inside,
+//! numbers are SI, arrays are row-major, joints count from 0.
+//!
+//! Identify an arm from arrays:
+//! ```
+#![doc = include_str!("../tests/it/library/identify.rs")]
+//! ```
+//! Diagnose what a model of it leaves out:
+//! ```
+#![doc = include_str!("../tests/it/library/diagnose.rs")]
+//! ```
+//! Read the tables of a run:
+//! ```
+#![doc = include_str!("../tests/it/library/tables.rs")]
+//! ```
 //!
 //! # The map
 //! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> observation -> estimate -> diagnose`)
@@ -98,23 +120,6 @@
 //! Errors name the place and what is allowed, all faults at once. Joints count from 1 for people and from 0 in code. Tests are named as
 //! facts, their numbers come from elsewhere; a bug fix starts with the failing test. Pages are generated where code knows better:
 //! `CALIB_UPDATE=1 cargo test --test it pages`; golden answers of the command line: `TRYCMD=overwrite cargo test --test it cmd`.
-//!
-//! # As a library
-//! The command line is one user of this crate; a program is another, by [`api`]; the Python package (`src/python`) is made of it too. Inside,
-//! numbers are SI, arrays are row-major, joints count from 0.
-//!
-//! Identify an arm from arrays:
-//! ```
-#![doc = include_str!("../tests/it/library/identify.rs")]
-//! ```
-//! Diagnose what a model of it leaves out:
-//! ```
-#![doc = include_str!("../tests/it/library/diagnose.rs")]
-//! ```
-//! Read the tables of a run:
-//! ```
-#![doc = include_str!("../tests/it/library/tables.rs")]
-//! ```
 //!
 //! # Glossary
 //! Terms are those of the field: the *International Vocabulary of Metrology* (VIM: repeatability, standard uncertainty, expanded uncertainty,

@@ -7,7 +7,7 @@ pub use fleet::FleetProgress;
 use crate::error::counted;
 use crate::pipeline::{Observer, StageReport, StageStatus};
 use crate::summary::folded;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -47,6 +47,8 @@ struct State {
     total: Option<u64>,
     begun: Instant,
     printed: Instant,
+    /// When the stage is over, by what it took in the run before.
+    over: Option<Instant>,
     /// What was warned of: several stages say the same of one recording.
     warned: BTreeSet<String>,
 }
@@ -66,6 +68,7 @@ impl Progress {
             total: None,
             begun: now,
             printed: now,
+            over: None,
             warned: BTreeSet::new(),
         };
         let columns = std::io::stderr()
@@ -118,9 +121,26 @@ impl Progress {
     }
 }
 
-fn spinner() -> ProgressStyle {
-    ProgressStyle::with_template("{prefix}  {spinner} {msg} ({elapsed})")
+/// Work that is shorter than this has no time that is left.
+const LONG: Duration = Duration::from_secs(5);
+
+/// What is left until then, in words; nothing where the run before says nothing, or was shorter.
+fn left(over: Option<Instant>) -> String {
+    let left = over.map(|over| over.saturating_duration_since(Instant::now()).as_secs());
+    match left {
+        Some(seconds) if seconds > 0 => format!(", about {seconds} s left by the run before"),
+        _ => String::new(),
+    }
+}
+
+fn spinner(over: Option<Instant>) -> ProgressStyle {
+    let left = move |_: &ProgressState, out: &mut dyn std::fmt::Write| {
+        // A line that cannot be written is no fault.
+        let _ = out.write_str(&left(over));
+    };
+    ProgressStyle::with_template("{prefix}  {spinner} {msg} ({elapsed}{left})")
         .unwrap_or_else(|_| ProgressStyle::default_spinner())
+        .with_key("left", left)
 }
 fn bar_of(unit: &str) -> ProgressStyle {
     // Braces in a template are its own.
@@ -134,13 +154,31 @@ fn bar_of(unit: &str) -> ProgressStyle {
 impl Observer for Progress {
     fn stage_begins(&self, id: &str, _uses: &str, reason: &str) {
         self.detail(id, &format!("runs ({reason})"));
-        if let Some(bar) = &self.state().bar {
+        let mut state = self.state();
+        state.over = None;
+        if let Some(bar) = &state.bar {
             bar.reset();
-            bar.set_style(spinner());
+            bar.set_style(spinner(None));
             bar.set_prefix(format!("{id:width$}", width = self.width));
             bar.set_message("");
             bar.enable_steady_tick(Duration::from_millis(120));
         }
+    }
+
+    fn expects(&self, _id: &str, seconds: f64) {
+        let lasts = Duration::try_from_secs_f64(seconds).unwrap_or_default();
+        if lasts < LONG {
+            return;
+        }
+        let mut state = self.state();
+        state.over = Instant::now().checked_add(lasts);
+        if let Some(bar) = &state.bar {
+            bar.set_style(spinner(state.over));
+        }
+    }
+
+    fn waits(&self, id: &str, line: &str) {
+        self.line(id, line);
     }
 
     fn stage_ends(&self, report: &StageReport) {
@@ -202,7 +240,7 @@ impl Observer for Progress {
                     bar.set_length(total);
                     bar.set_style(bar_of(unit));
                 }
-                None => bar.set_style(spinner()),
+                None => bar.set_style(spinner(state.over)),
             }
             bar.set_message(what.to_string());
         }
@@ -236,7 +274,7 @@ impl Observer for Progress {
                     state.unit
                 )
             }
-            _ => format!("  {text}, {done} {}", state.unit),
+            _ => format!("  {text}, {done} {}{}", state.unit, left(state.over)),
         };
         drop(state);
         self.line(id, &line);

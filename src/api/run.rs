@@ -9,10 +9,11 @@ use crate::pipeline::{
     find_run,
 };
 use crate::poses::{PoseRequest, proposal};
+use crate::report::{Page, PageLanguage};
 use crate::stage::DIAGNOSES;
 use crate::store::Store;
 use crate::store::frame::Frame;
-use crate::summary::{DiagnosisSummary, LimitsSummary};
+use crate::summary::{DiagnosisSummary, LimitsSummary, diagnosis_page};
 use serde_json::Value;
 use std::path::Path;
 
@@ -109,6 +110,14 @@ impl CalibRun {
         let (_, stage) = diagnosis(&self.store, run, step, &DIAGNOSES)?;
         let summary = DiagnosisSummary::read(run, &stage, &self.store)?;
         Ok((stage.id.clone(), summary))
+    }
+
+    /// The page of a diagnosis, `step` where there are several.
+    pub fn diagnosis_page(&self, step: Option<&str>, language: PageLanguage) -> Result<Page> {
+        let run = &self.manifest.run_id;
+        let (_, stage) = diagnosis(&self.store, run, step, &DIAGNOSES)?;
+        let summary = DiagnosisSummary::read(run, &stage, &self.store)?;
+        diagnosis_page(&summary, &stage, (&self.store, ""), language)
     }
 }
 

@@ -1,15 +1,18 @@
 //! `calib diagnose`: where simulation and recording differ, what physics is missing, the fit before and after.
 
-use super::pipeline_arguments::{CommandTask, ExecutionArguments, reported_as, shown};
+use super::pipeline_arguments::{
+    CommandTask, ExecutionArguments, language_parser, reported_as, shown,
+};
 use super::run::WRONG_SETUP;
 use super::surroundings::columns;
-use super::{emit_json, emit_lines, note};
+use super::{emit_json, emit_lines, note, warn};
 use crate::audit::{diagnosis, the_stage};
 use crate::error::{Error, Result};
 use crate::pipeline::{Purpose, Selection, later_diagnosis};
 use crate::raw::ending;
-use crate::stage::{DIAGNOSES, DeclaredStage, DiagnoseTorques};
-use crate::summary::{DiagnosisSummary, rejected};
+use crate::report::PageLanguage;
+use crate::stage::DIAGNOSES;
+use crate::summary::{DiagnosisSummary, diagnosis_page, rejected};
 use clap::Args;
 use std::ffi::OsString;
 use std::io::Write;
@@ -41,6 +44,9 @@ pub(super) struct DiagnoseArguments {
     /// Writes the diagnosis as one HTML file, the table of causes first
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// Language of that page
+    #[arg(long, value_name = "LANGUAGE", default_value = "en", requires = "html", value_parser = language_parser())]
+    language: PageLanguage,
     /// Prints all of the diagnosis: where, probabilities of places, numbers, formulas, every rival, what cannot be observed and why
     #[arg(long, conflicts_with = "json")]
     details: bool,
@@ -56,7 +62,7 @@ const EXAMPLES: &str = "Examples:
   calib diagnose pipelines/case/pipeline.yaml --set case=recordings/robot-7
   calib diagnose pipeline.yaml --json > diagnosis.json
   calib diagnose HEAD --details
-  calib diagnose HEAD --html diagnosis.html
+  calib diagnose HEAD --html diagnosis.html --language de
   calib diagnose HEAD --export-effect worn_tooth.yaml
   calib diagnose HEAD~1/second --json";
 
@@ -85,10 +91,6 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
                 "has no stage `diagnose`; put `- uses: diagnose` after the split, or `- uses: diagnose_torques` after `ingest_torques`",
             ));
         };
-        // Before minutes are spent on what cannot be shown.
-        if arguments.html.is_some() && plan.stages[at].entry.name == DiagnoseTorques::NAME {
-            return Err(DiagnosisSummary::no_page());
-        }
         let id = id.to_string();
         let plan = plan.needed_for(at);
         let shown = shown(arguments.quiet, arguments.details);
@@ -130,7 +132,9 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
     }
     let again = arguments.means.store_again();
     if let Some(file) = &arguments.html {
-        write_new(file, &diagnosis.page(&again)?)?;
+        let page = diagnosis_page(&diagnosis, &stage, (&store, &again), arguments.language)?;
+        write_new(file, &page.html)?;
+        warn(page.untranslated(arguments.language));
     }
     if arguments.json {
         emit_json(&diagnosis.document(&again))?;

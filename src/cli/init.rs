@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// Write a robot file and a pipeline to start from: with comments, for the columns found in your recordings.
 ///
-/// Nothing is asked and nothing is overwritten: a robot.yaml that is there is used as it is. What was read from the files' columns is a proposal: lines to look at are marked CHECK, numbers
+/// Nothing is asked and nothing is overwritten: a robot.yaml (or the robot.json of a simulation) that is there is used as it is. What was read from the files' columns is a proposal: lines to look at are marked CHECK, numbers
 /// to fill in REPLACE. Then: `calib check pipeline.yaml`, `calib run pipeline.yaml`.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
@@ -220,7 +220,11 @@ fn tables_in(folder: &Path) -> Vec<String> {
 }
 
 fn closing(arguments: &InitArguments, start: &StarterFiles, files: &[PathBuf; 2]) -> String {
-    let [robot, pipeline] = files.each_ref().map(|path| path.display().to_string());
+    let robot = files[0]
+        .with_file_name(start.robot_file)
+        .display()
+        .to_string();
+    let pipeline = files[1].display().to_string();
     let account =
         |(path, account): &(PathBuf, String)| (path.display().to_string(), account.clone());
     let first = match (&start.robot, arguments.robot, &arguments.urdf) {

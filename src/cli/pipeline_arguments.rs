@@ -14,11 +14,13 @@ use crate::pipeline::{
 };
 use crate::progress::{Progress, Verbosity};
 use crate::raw::ending;
+use crate::report::PageLanguage;
 use crate::shell::typed;
 use crate::spatial::Pose;
 use crate::store::Store;
 use crate::summary::LimitsSummary;
 use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use nalgebra::Vector3;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::json;
@@ -54,6 +56,12 @@ pub(super) struct ExecutionArguments {
     /// Worker threads; no result depends on it [default: all cores]
     #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
+}
+
+/// The languages of pages, by their codes.
+pub(super) fn language_parser() -> impl TypedValueParser<Value = PageLanguage> {
+    let codes = PossibleValuesParser::new(PageLanguage::ALL.map(PageLanguage::code));
+    codes.map(|code| PageLanguage::of_code(&code).unwrap_or_default())
 }
 
 /// What a pipeline is run for, how much of it, and how much of its progress is shown.

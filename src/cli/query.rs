@@ -136,13 +136,18 @@ pub(super) struct SchemaArguments {
 #[derive(Subcommand)]
 enum SchemaVerb {
     /// All tables, one a line
+    #[command(after_help = "Examples:\n  calib schema list | grep torque")]
     List,
     /// The columns of a table with type, unit and meaning
+    #[command(after_help = "Examples:\n  calib schema show recording")]
     Show {
         /// The table's kind, e.g. `recording`
         kind: String,
     },
     /// Checks a table's file: columns, types, units' columns, ranges, key, no NaN
+    #[command(
+        after_help = "Examples:\n  calib schema check prediction.parquet\n  calib schema check points.parquet --as recording"
+    )]
     Check {
         /// A Parquet file
         file: PathBuf,
@@ -151,8 +156,10 @@ enum SchemaVerb {
         kind: Option<String>,
     },
     /// The JSON Schema of the pipeline's YAML, for editors
+    #[command(after_help = "Examples:\n  calib schema pipeline > pipeline.schema.json")]
     Pipeline,
     /// The JSON Schema of FLEET.yaml, for editors
+    #[command(after_help = "Examples:\n  calib schema fleet > fleet.schema.json")]
     Fleet,
 }
 

@@ -2,10 +2,12 @@
 //!
 //! `calib check`: whether a pipeline can run: what is still to fill in and to look at, every fault at once, and with `--data` what a first fit says.
 
-use super::pipeline_arguments::{CommandTask, ExecutionArguments, reported_as, shown};
+use super::pipeline_arguments::{
+    CommandTask, ExecutionArguments, language_parser, reported_as, shown,
+};
 use super::surroundings::columns;
 use super::{emit, emit_json, emit_lines};
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result, counted, listed};
 use crate::identified::{standing_of, wrong_setup_of};
 use crate::init::{MarkedLines, marked};
 use crate::pipeline::{
@@ -15,10 +17,9 @@ use crate::pipeline::{
 use crate::progress::Verbosity;
 use crate::raw::ending;
 use crate::report::PageLanguage;
-use crate::stage::{DeclaredStage, Identify, Report};
+use crate::stage::{DeclaredStage, Identify, Report, ReportDrives, ReportTorques};
 use crate::summary::{self, ResultScreen, RunResult, first_look, graph, labelled};
 use clap::Args;
-use clap::builder::PossibleValuesParser;
 use serde_json::json;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -59,8 +60,8 @@ pub(super) struct RunArguments {
     #[arg(long, conflicts_with = "json")]
     details: bool,
     /// Language of the report, instead of the one that the pipeline names
-    #[arg(long, value_name = "LANGUAGE", value_parser = PossibleValuesParser::new(PageLanguage::ALL.map(PageLanguage::code)))]
-    language: Option<String>,
+    #[arg(long, value_name = "LANGUAGE", value_parser = language_parser())]
+    language: Option<PageLanguage>,
     /// Runs again though cached: all selected stages, or this one (give it after PIPELINE)
     #[arg(long, value_name = "STAGE", num_args = 0..=1, default_missing_value = "")]
     force: Option<Vec<String>>,
@@ -74,6 +75,9 @@ const EXAMPLES: &str = "Examples:
   calib run pipeline.yaml --language de
   calib run pipeline.yaml --json --quiet > result.json";
 
+/// The stages that write a page.
+const REPORTS: [&str; 3] = [Report::NAME, ReportTorques::NAME, ReportDrives::NAME];
+
 impl RunArguments {
     pub(crate) fn run(&self, command_line: &[OsString]) -> Result<u8> {
         reported_as(self.json, execute(self, command_line))
@@ -82,21 +86,21 @@ impl RunArguments {
     /// The pipeline, its reports in another language where one is given.
     fn plan(&self) -> Result<Plan> {
         let plan = self.means.plan(&self.pipeline)?;
-        let Some(language) = &self.language else {
+        let Some(language) = self.language else {
             return Ok(plan);
         };
         let stages = plan.stages.iter();
-        let reports = stages.filter(|stage| stage.entry.name == Report::NAME);
+        let reports = stages.filter(|stage| REPORTS.contains(&stage.entry.name));
         let sets = reports.map(|stage| Override {
             target: format!("{}.language", stage.id),
-            value: language.into(),
+            value: language.code().into(),
         });
         let sets: Vec<Override> = sets.collect();
         if sets.is_empty() {
             let message = format!(
-                "{} has no stage `{}`",
+                "{} has no stage that writes a page; allowed: {}",
                 self.pipeline.display(),
-                Report::NAME
+                listed(REPORTS)
             );
             return Err(Error::spec("--language", message));
         }

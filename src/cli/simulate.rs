@@ -27,6 +27,9 @@ mod prove;
 
 /// Make recordings of a simulated robot: with stated or hidden effects; and mark what a diagnosis made of them.
 #[derive(Args)]
+#[command(after_help = "Examples:
+  calib simulate record pipelines/sr210d/pipeline.yaml --out cell
+  calib simulate conceal --out cases --seed 6 --cases 1 --family zero_shift")]
 pub(super) struct SimulateArguments {
     #[command(subcommand)]
     verb: SimulateVerb,
@@ -242,7 +245,8 @@ pub(crate) struct ConcealArguments {
     pub(crate) json: bool,
 }
 
-/// Options that only recordings of points have.
+/// Options that only recordings of points have. They are refused by name with torques and drives: a set that ignored one would be another
+/// set than was asked for, and its score would be believed.
 const OF_POINTS: [&str; 10] = [
     "families", "family", "robot", "points", "natural", "faulty", "scatter", "bare", "log_step",
     "layout",

@@ -185,7 +185,8 @@ fn keep(panic: &PanicHookInfo) {
         format!("{}{place}", message.replace('\n', " "));
 }
 
-/// Labels of lines that say what is to be seen to, and all others.
+/// Labels of lines that say what is to be seen to, and all others. Colour is laid over finished lines, so that the text is the same where there
+/// is none, and no meaning hangs on it.
 const ALARMS: [&str; 4] = ["warning", "doubt", "rejected", "withdrawn"];
 const LABELS: [&str; 14] = [
     "robot",

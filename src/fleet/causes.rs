@@ -249,6 +249,8 @@ pub struct Published {
     /// Where people find the tables and the page.
     pub(crate) tables: Vec<PathBuf>,
     pub(crate) page: PathBuf,
+    /// A warning for each text of the page that its language lacks.
+    pub(crate) untranslated: Vec<String>,
 }
 
 /// Makes the tables and the page from the last round's records and publishes them.
@@ -259,11 +261,12 @@ pub(crate) fn publish(
     records: &[Option<RobotRecord>],
 ) -> Result<Published> {
     let answers = cause_answers::of(fleet, ledger, search.round(), records)?;
-    let html = page::html(
+    let made = page::html(
         fleet.name(),
         &answers.findings,
         &answers.cells,
         &answers.outliers,
+        fleet.file.language,
     )?;
     let robots = fleet.roster.0.iter().zip(records).map(|(robot, record)| {
         let table = record
@@ -275,18 +278,22 @@ pub(crate) fn publish(
             table.map(|table| table.table_hash.to_string())
         ])
     });
-    let settings = json!({ "robots": robots.collect::<Vec<_>>(), "round": search.round() });
+    let settings = json!({
+        "robots": robots.collect::<Vec<_>>(), "round": search.round(), "language": fleet.file.language,
+    });
     let frames = vec![
         ("fleet_findings", answers.findings.to_frame()?),
         ("fleet_cells", answers.cells.to_frame()?),
         ("fleet_outliers", answers.outliers.to_frame()?),
     ];
-    let page = ("causes.html", html.as_str());
+    let untranslated = made.untranslated(fleet.file.language);
+    let page = ("causes.html", made.html.as_str());
     let (tables, page) = ledger.publish((STAGE, 5), settings, frames, NOTE, page)?;
     Ok(Published {
         answers,
         tables,
         page,
+        untranslated,
     })
 }
 

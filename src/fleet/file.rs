@@ -3,6 +3,7 @@
 use crate::error::{Error, Fault, Result};
 use crate::pipeline::{Override, misnamed, sort_by_place, trouble_at, unreadable_text};
 use crate::raw;
+use crate::report::PageLanguage;
 use crate::yaml::{self, Node, Trouble, typed};
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
@@ -42,6 +43,9 @@ pub struct FleetFile {
     /// What an earlier fleet in the same store says of parameters, as priors.
     #[serde(default)]
     pub(crate) prior: Option<PriorFrom>,
+    /// Language of the fleet's pages: `en` or `de`; that of the robots' own is their pipeline's.
+    #[serde(default)]
+    pub(crate) language: PageLanguage,
 }
 
 /// What distinguishes robots in tables and pools.

@@ -25,6 +25,8 @@ pub(crate) struct FleetSummary {
     pub(crate) tables: Vec<PathBuf>,
     /// The page about the fleet.
     pub(crate) page: PathBuf,
+    /// A warning for each text of it that its language lacks.
+    pub(crate) untranslated: Vec<String>,
 }
 
 /// Makes the tables and the page from the records (in the order of the roster; none: missing) and publishes them.
@@ -75,18 +77,21 @@ pub(crate) fn publish(
             ))
         })
         .collect();
-    let html = page::html(fleet.name(), &table, &changes, &links)?;
+    let language = fleet.file.language;
+    let made = page::html(fleet.name(), &table, &changes, &links, language)?;
+    let untranslated = made.untranslated(language);
     let frames = vec![
         ("fleet", table.to_frame()?),
         ("fleet_changes", changes.to_frame()?),
     ];
-    let page = ("fleet.html", html.as_str());
+    let page = ("fleet.html", made.html.as_str());
     let settings = settings(fleet, &table, records);
     let (tables, page) = ledger.publish((STAGE, 1), settings, frames, "tables.json", page)?;
     Ok(FleetSummary {
         fleet: table,
         tables,
         page,
+        untranslated,
     })
 }
 
@@ -113,7 +118,7 @@ fn settings(fleet: &Fleet, table: &FleetTable, records: &[Option<RobotRecord>]) 
             ])
         });
     let alpha = fleet.file.previous.as_ref().map(|previous| previous.alpha);
-    json!({ "robots": robots.collect::<Vec<_>>(), "alpha": alpha })
+    json!({ "robots": robots.collect::<Vec<_>>(), "alpha": alpha, "language": fleet.file.language })
 }
 
 /// The tables of a robot that the fleet's row is made of.

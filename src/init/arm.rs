@@ -9,7 +9,9 @@ use crate::init::names::{
 };
 use crate::raw;
 use crate::robot::LibraryArm;
-use crate::robot::import::{RobotFileText, UrdfOutline, read_calib, urdf_outline};
+use crate::robot::import::{
+    Imported, RobotFileText, UrdfOutline, read_calib, read_case, urdf_outline,
+};
 use crate::yaml::quoted;
 use std::path::Path;
 
@@ -17,6 +19,8 @@ use std::path::Path;
 pub(super) struct StartingArm {
     /// Text of its robot file; none where the folder has one.
     pub(crate) text: Option<String>,
+    /// The file, as settings of the stage `robot`.
+    pub(crate) file: &'static RobotFile,
     pub(crate) joints: usize,
     /// Which of them slide, where one does.
     pub(crate) sliding: Vec<bool>,
@@ -28,12 +32,33 @@ pub(super) struct StartingArm {
     other: (&'static str, String),
 }
 
+/// A robot file of a folder.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct RobotFile {
+    /// Its name.
+    pub(crate) name: &'static str,
+    /// As settings of the stage `robot`.
+    settings: &'static str,
+}
+
+/// The file that is written, and that is used where it is there.
+pub(crate) static ROBOT_YAML: RobotFile = RobotFile {
+    name: "robot.yaml",
+    settings: "file: robot.yaml",
+};
+/// What simulations and the folders of `pipelines/case` and `pipelines/dynamics` have in its place.
+static ROBOT_JSON: RobotFile = RobotFile {
+    name: "robot.json",
+    settings: "file: robot.json, format: case",
+};
+
 impl StartingArm {
     /// Fails where a file cannot be read, or is there and another arm is asked for.
     pub(crate) fn of(request: &InitRequest) -> Result<Self> {
-        let file = request.folder.join("robot.yaml");
-        if file.exists() {
-            return Self::there(request, &file);
+        for file in [&ROBOT_YAML, &ROBOT_JSON] {
+            if request.folder.join(file.name).exists() {
+                return Self::there(request, file);
+            }
         }
         let Some(urdf) = request.urdf else {
             return Self::to_start_from(request.robot.unwrap_or(&TYPICAL[0].0));
@@ -51,6 +76,7 @@ impl StartingArm {
         );
         Ok(Self {
             text: Some(of_urdf(&base, request.tip)),
+            file: &ROBOT_YAML,
             joints: sliding.len(),
             sliding,
             counting: None,
@@ -59,17 +85,21 @@ impl StartingArm {
         })
     }
 
-    fn there(request: &InitRequest, file: &Path) -> Result<Self> {
-        let (label, text) = read(file)?;
-        if request.robot.is_some() {
+    fn there(request: &InitRequest, file: &'static RobotFile) -> Result<Self> {
+        let (label, text) = read(&request.folder.join(file.name))?;
+        let is_yaml = *file == ROBOT_YAML;
+        if request.robot.is_some() || (request.urdf.is_some() && !is_yaml) {
             return Err(Error::spec(
                 label,
-                "is already there and would be used: leave out --robot, or move the file away",
+                "is already there and would be used: leave out --robot and --urdf, or move the file away",
             ));
         }
         let urdf = request.urdf.map(read).transpose()?;
         let urdf = urdf.as_ref().map(|(label, text)| file_text(label, text));
-        let read = read_calib(file_text(&label, &text), urdf)?;
+        let read: Imported = match is_yaml {
+            true => read_calib(file_text(&label, &text), urdf)?,
+            false => read_case(file_text(&label, &text))?,
+        };
         let joints = read.robot.joints.iter();
         let sliding: Vec<bool> = joints
             .map(|joint| joint.kind == JointKind::Prismatic)
@@ -80,11 +110,12 @@ impl StartingArm {
         );
         Ok(Self {
             text: None,
+            file,
             joints: sliding.len(),
             sliding,
             counting: read.about.counting(),
             notes: Vec::new(),
-            other: ("robot.yaml", other),
+            other: (file.name, other),
         })
     }
 
@@ -98,12 +129,18 @@ impl StartingArm {
         );
         Ok(Self {
             text: Some(arm.text.into()),
+            file: &ROBOT_YAML,
             joints,
             sliding: Vec::new(),
             counting: read.about.counting(),
             notes: Vec::new(),
             other: ("--robot", other),
         })
+    }
+
+    /// Settings of the stage `robot`, with the URDF that a robot file refers to.
+    pub(crate) fn settings(&self, urdf: &str) -> String {
+        format!("{{{}{urdf}}}", self.file.settings)
     }
 
     /// Fails unless a recording has as many joints.

@@ -27,7 +27,7 @@ pub(crate) struct InitRequest<'a> {
     pub(crate) folder: &'a Path,
     /// Recordings: one file, or the controller's and the tracker's.
     pub(crate) data: &'a [PathBuf],
-    /// The kind to start from; none where nobody asked for one: the folder's own robot.yaml, else the first kind.
+    /// The kind to start from; none where nobody asked for one: the folder's own robot file, else the first kind.
     pub(crate) robot: Option<&'static LibraryArm>,
     /// The robot instead, and its last link; of a robot.yaml that is there the URDF that it refers to.
     pub(crate) urdf: Option<&'a Path>,
@@ -36,8 +36,10 @@ pub(crate) struct InitRequest<'a> {
 }
 
 pub(crate) struct StarterFiles {
-    /// Text of `robot.yaml`; none where it is there already.
+    /// Text of `robot.yaml`; none where the folder has a robot file.
     pub(crate) robot: Option<String>,
+    /// Name of the robot file.
+    pub(crate) robot_file: &'static str,
     pub(crate) pipeline: String,
     /// What was found in each recording, and which.
     pub(crate) accounts: Vec<(PathBuf, String)>,
@@ -86,6 +88,7 @@ pub(crate) fn start(request: &InitRequest) -> Result<StarterFiles> {
     let unknown = unknown.into_iter().zip(missing(&found));
     let files = found.iter().chain(more.iter().map(|(_, file)| file));
     Ok(StarterFiles {
+        robot_file: arm.file.name,
         robot: arm.text,
         pipeline,
         accounts: files

@@ -1,7 +1,7 @@
 //! A recording of commands and measured angles, with the MJCF that is simulated: which columns are which, the rate, the encoder's steps, and
 //! the files that `diagnose_drives` takes.
 
-use super::pipeline::from_folder;
+use super::pipeline::{from_folder, name_of};
 use crate::drives::mjcf::{self, MjcfArm, MjcfText};
 use crate::error::{Error, Result, listed};
 use crate::raw;
@@ -378,7 +378,7 @@ pub(crate) fn start_drives(folder: &Path, data: &[PathBuf], robot: &Path) -> Res
     let mut lines = vec![
         "# Commands and angles of simulated joints: what the simulation lacks. `calib check` reports every fault, `calib diagnose` answers.".into(),
         "calib: 1".into(),
-        "name: drives".into(),
+        format!("name: {}", name_of(folder)),
         "seed: 1".into(),
         "stages:".into(),
         "  - uses: diagnose_drives".into(),
@@ -419,6 +419,7 @@ pub(crate) fn start_drives(folder: &Path, data: &[PathBuf], robot: &Path) -> Res
     if !table.head.iter().any(|column| column == "use") {
         lines.push("        # usage: use   # CHECK a column that says `fit` or `validate`; without it all rows are fitted, and the errors flatter".into());
     }
+    lines.push("  - uses: report_drives".into());
     let mut notes = arm.notes.clone();
     let others: Vec<&str> = all
         .iter()
@@ -454,7 +455,8 @@ fn encoder(values: impl Iterator<Item = f64>) -> f64 {
         .filter(|step| *step > 1e-9)
         .fold(f64::INFINITY, f64::min);
     if least > 1e-4 && least.is_finite() {
-        least
+        // A difference of written decimals has their rounding in it.
+        (1e9 * least).round() / 1e9
     } else {
         0.0
     }

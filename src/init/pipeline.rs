@@ -21,26 +21,29 @@ pub(super) fn from_folder(folder: &Path, file: &Path) -> String {
     quoted(&path.display().to_string())
 }
 
-/// Name, and the stage that reads the robot.
-fn head(request: &InitRequest) -> String {
+/// The name of a pipeline: that of its folder.
+pub(super) fn name_of(folder: &Path) -> String {
     // A folder that is still to be made has its name already.
-    let folder = request
-        .folder
+    let folder = folder
         .canonicalize()
-        .unwrap_or_else(|_| request.folder.to_path_buf());
+        .unwrap_or_else(|_| folder.to_path_buf());
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     let allowed = |c: &char| c.is_ascii_alphanumeric() || "_-".contains(*c);
     let name: String = name.chars().filter(allowed).collect();
-    let name = if name.is_empty() { "cell".into() } else { name };
+    if name.is_empty() { "cell".into() } else { name }
+}
+
+/// Name, and the stage that reads the robot.
+fn head(request: &InitRequest, arm: &StartingArm) -> String {
+    let name = name_of(request.folder);
     let mut out = format!(
         "# A calibration, step by step. `calib check` reports every fault with its line, `calib run` computes what is not yet done.\ncalib: 1\nname: {name}\nseed: 1                 # everything random derives from it\n\nstages:\n"
     );
     let urdf = request.urdf.map_or_else(String::new, |path| {
         format!(", urdf: {}", from_folder(request.folder, path))
     });
-    out.push_str(&format!(
-        "  - uses: robot\n    with: {{file: robot.yaml{urdf}}}\n\n"
-    ));
+    let settings = arm.settings(&urdf);
+    out.push_str(&format!("  - uses: robot\n    with: {settings}\n\n"));
     out + "  # Which column holds what, in which unit. Nothing is guessed when this runs: only what is written here counts.\n"
 }
 
@@ -50,7 +53,7 @@ pub(super) fn of_torques(
     found: &[ExaminedFile],
     arm: &StartingArm,
 ) -> String {
-    let mut out = head(request) + "  - uses: ingest_torques\n    with:\n      files:\n";
+    let mut out = head(request, arm) + "  - uses: ingest_torques\n    with:\n      files:\n";
     out.push_str(&files(request, found, arm, [false; 2]));
     out + OF_TORQUES
 }
@@ -60,7 +63,7 @@ pub(super) fn text(
     found: &[ExaminedFile],
     (joined, arm): (&[String], &StartingArm),
 ) -> String {
-    let mut out = head(request) + "  - uses: ingest\n    with:\n      files:\n";
+    let mut out = head(request, arm) + "  - uses: ingest\n    with:\n      files:\n";
     if found.is_empty() {
         out.push_str(&counted(EMPTY, counting(found, arm).as_deref()));
     }
@@ -248,6 +251,10 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
         for (column, name) in unused.iter().take(MOST_NAMED) {
             match name.as_str() {
                 "" => put(&format!("# not used: column {}", column + 1)),
+                name if file.has("x") && is_of_space(name) => put(&format!(
+                    "# u95: {{column: {}, unit: mm, coverage_factor: 3.5}}   # CHECK: of the point in space; of each coordinate without coverage_factor",
+                    quoted(name)
+                )),
                 name => put(&format!("# not used: {}", quoted(name))),
             }
         }
@@ -259,6 +266,17 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
             .for_each(|column| put(&format!("# seen: {}", one_line(&sheet.seen(column)))));
     }
     out
+}
+
+/// Whether a column has the uncertainty of a point in space with 95 %, as `Uxyz (95%)` and `U95`: the root of the sum of the squares of two sigma of
+/// three coordinates, 3.5 times that of one.
+fn is_of_space(name: &str) -> bool {
+    let letters: String = name
+        .chars()
+        .filter(char::is_ascii_alphanumeric)
+        .map(|letter| letter.to_ascii_lowercase())
+        .collect();
+    letters.starts_with('u') && letters.contains("95")
 }
 
 const ORDER: &str = "point_id time trajectory q usage target torque current simulated direction velocity x payload temperature";
@@ -364,4 +382,18 @@ pub(crate) fn marked(paths: &[&Path]) -> Vec<MarkedLines> {
         .map(of_mark)
         .filter(|marked| !marked.lines.is_empty())
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_of_space;
+
+    #[test]
+    fn an_uncertainty_of_a_point_in_space_is_known_by_its_name() {
+        let names = ["Uxyz (95%)", "U95", "u_95 [mm]", "Usage", "q95", "unit"];
+        assert_eq!(
+            names.map(is_of_space),
+            [true, true, true, false, false, false]
+        );
+    }
 }

@@ -9,9 +9,9 @@ use crate::stage::ingest::is_clock_time;
 use crate::yaml::quoted;
 use std::path::Path;
 
-/// Larger numbers are no angles of joints, deg.
+/// Larger numbers are no angles of joints, deg: wrists turn by a turn and a little more either way.
 const MOST_DEGREES: f64 = 400.0;
-/// No angle in rad is beyond this.
+/// No angle in rad is beyond this: a turn with a margin. What is beyond is in degrees.
 const MOST_RADIANS: f64 = 6.5;
 /// rad: no joint turns as often.
 const MOST_TURNS: f64 = 65.0;

@@ -12,9 +12,10 @@ use std::path::Path;
 
 pub(super) use crate::raw::number_of_any_mark as number;
 
-/// So many lines say what separates fields.
+/// So many lines say what separates fields: a decimal comma shows within a few rows, and notes above the data are shorter.
 const ENOUGH: usize = 500;
 
+/// Of SpatialAnalyzer, of scripts, of MATLAB and TeX, of FANUC.
 const COMMENTS: [&str; 4] = ["//", "#", "%", "!"];
 
 /// Fewer columns are no table of joints or points.
@@ -369,7 +370,7 @@ fn bare_rows(table: &[Vec<String>]) -> Option<usize> {
     (0..table.len()).find(|k| is_data(table, *k, table[*k].len()))
 }
 
-/// Bytes and lines that are looked at.
+/// Bytes and lines that are looked at: `init` answers at once whatever is behind them, and columns do not change their meaning there.
 const LOOKED: u64 = 16 << 20;
 const LINES: usize = 20_000;
 

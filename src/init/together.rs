@@ -8,9 +8,9 @@ use crate::statistics;
 use crate::yaml::quoted;
 use std::collections::BTreeSet;
 
-/// Names that fewer rows share than this are not the same names.
+/// Names that fewer rows share than this are not the same names: a tracker may have lost many points, hardly most of them.
 const LEAST_SHARED: f64 = 0.5;
-/// Fewer shared names than this are asked about.
+/// Fewer shared names than this are asked about: a tracker loses a few points of a hundred, not more.
 const PLENTY: f64 = 0.95;
 
 /// Columns of both files that name points alike.

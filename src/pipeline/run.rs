@@ -1,8 +1,8 @@
 //! The run: every stage in order; what is already done is taken as it is, the rest is executed and published.
 
 use super::manifest::{
-    FileRecord, InputRecord, Manifest, OutputRecord, Purpose, RunOptions, RunStatus, StageStatus,
-    Surroundings,
+    FileRecord, InputRecord, Manifest, OutputRecord, Purpose, RunOptions, RunStatus, StageReport,
+    StageStatus, Surroundings,
 };
 use super::plan::{Plan, Selected};
 use super::run_state::{self, KeyState, RunState};
@@ -63,6 +63,12 @@ pub fn run(
     manifest.previous = store.last_ended()?;
     manifest.run_id = store.reserve_run(&manifest.run_id)?;
     let record = store.begin_run(&manifest.run_id, &manifest)?;
+    let before = manifest
+        .previous
+        .as_ref()
+        .filter(|_| options.purpose != Purpose::Fleet);
+    let before = before.and_then(|link| Manifest::of(store, &link.run).ok());
+    let before = before.filter(|before| before.pipeline.name == plan.name);
     let mut running = Running {
         state: RunState::new(plan),
         store,
@@ -73,6 +79,7 @@ pub fn run(
         manifest,
         record,
         documents: Vec::new(),
+        before,
         at_risk: 0.0,
     };
     let result = (0..plan.stages.len()).try_for_each(|index| running.stage(index));
@@ -111,6 +118,8 @@ struct Running<'a> {
     manifest: Manifest,
     record: Run,
     documents: Vec<PathBuf>,
+    /// The run of this pipeline before this one.
+    before: Option<Manifest>,
     /// Seconds of work that a power cut would lose; a killed process loses none.
     at_risk: f64,
 }
@@ -153,7 +162,7 @@ impl Running<'_> {
         let mut waiting = |holder: Option<u32>| {
             let holder = holder.map_or_else(String::new, |process| format!(" (process {process})"));
             let what = format!("waiting for another run that does the same{holder}");
-            self.observer.note(id, &what);
+            self.observer.waits(id, &what);
         };
         let claim = run_state::claim(self.store, &key.id(), &mut waiting);
         if let (false, Lookup::Done(record)) = (forced, self.store.action(&key)?) {
@@ -178,6 +187,9 @@ impl Running<'_> {
         let stage = &self.state.plan.stages[index];
         self.observer
             .stage_begins(&stage.id, stage.entry.name, &reason);
+        if let Some(seconds) = self.expected(index) {
+            self.observer.expects(&stage.id, seconds);
+        }
         let started = (self.now)();
         self.event("begins", index, serde_json::json!({ "reason": reason }))?;
         self.manifest.stages[index].reason = Some(reason);
@@ -212,6 +224,21 @@ impl Running<'_> {
         self.at_risk = 0.0;
         self.store.sync()?;
         self.store.write_manifest(&self.record, &self.manifest)
+    }
+
+    /// Seconds that a stage takes by what it took in the run before, in proportion to the rows that it reads; nothing where that run was of
+    /// another pipeline, or took none.
+    fn expected(&self, index: usize) -> Option<f64> {
+        let stage = &self.state.plan.stages[index];
+        let is_it = |old: &&StageReport| old.id == stage.id && old.uses == stage.entry.name;
+        let before = self.before.as_ref()?.stages.iter().find(is_it)?;
+        let rows = |inputs: &[InputRecord]| inputs.iter().map(|input| input.table.rows).max();
+        let now = rows(&self.inputs(index).ok()?);
+        let more = match (rows(&before.inputs), now) {
+            (Some(then), Some(now)) if then > 0 => now as f64 / then as f64,
+            _ => 1.0,
+        };
+        before.wall_seconds.map(|seconds| seconds * more)
     }
 
     /// Takes the tables of a stage that is done into the plan, the manifest and the human paths.

@@ -15,6 +15,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub trait Observer: Sync {
     /// A stage starts to execute, with the reason.
     fn stage_begins(&self, _id: &str, _uses: &str, _reason: &str) {}
+    /// It will take about so many seconds, by what it took when it last ran.
+    fn expects(&self, _id: &str, _seconds: f64) {}
+    /// It waits for another process.
+    fn waits(&self, _id: &str, _line: &str) {}
     /// A stage is over; the report says how.
     fn stage_ends(&self, _report: &super::manifest::StageReport) {}
     /// Units of work: what is done, how many in all, and what a unit is called.

@@ -212,6 +212,33 @@ fn what_is_done_is_not_done_again_and_what_changed_says_why() {
     assert_eq!(messages, [""; 0], "going back costs nothing");
 }
 
+/// Remembers how long stages are expected to take, s.
+#[derive(Default)]
+struct Watch(Mutex<Vec<(String, f64)>>);
+impl Observer for Watch {
+    fn expects(&self, id: &str, seconds: f64) {
+        self.0.lock().unwrap().push((id.into(), seconds));
+    }
+}
+
+#[test]
+fn a_stage_that_ran_before_is_expected_to_take_as_long_in_proportion_to_its_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, first) = go(folder.path(), &plan(TWO, &[]).unwrap(), &options(None)).unwrap();
+    let store = Store::open(folder.path()).unwrap();
+    let watch = Watch::default();
+    let longer = plan(TWO, &["b.rows=10"]).unwrap();
+    run(&longer, &store, &options(None), &surroundings(), &watch).unwrap();
+    let seen = watch.0.into_inner().unwrap();
+    let lasted = |stage: usize| first.manifest.stages[stage].wall_seconds.unwrap();
+    // `b` reads no rows; the longest table that `count` reads is twice as long.
+    let expected = [("b", lasted(1)), ("count", 2.0 * lasted(2))];
+    let expected: Vec<(String, f64)> = expected
+        .map(|(id, seconds)| (id.to_string(), seconds))
+        .into();
+    assert_eq!(seen, expected);
+}
+
 #[test]
 fn a_stage_whose_inputs_came_out_equal_is_not_run_again() {
     let folder = tempfile::tempdir().unwrap();

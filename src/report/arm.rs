@@ -26,11 +26,11 @@ pub(crate) struct PlacedArm {
 /// Points that are drawn: more would hide each other.
 const DRAWN: usize = 600;
 const SIZE: [f64; 2] = [720.0, 460.0];
-/// Azimuth and elevation from which the still picture is seen, rad.
+/// Azimuth and elevation from which the still picture is seen, rad: from no axis, so that no two axes fall onto each other.
 const VIEW: [f64; 2] = [0.6, 0.45];
 /// Of the height: from whatever side one looks at it, the longest way through the scene is rarely upright.
 const FILLED: f64 = 1.25;
-/// A large error is drawn so long, as a share of the measured region.
+/// A large error is drawn so long, as a share of the measured region: long enough to see where it points, short enough not to cross the next.
 const LONG: f64 = 0.12;
 
 /// The row with the largest error of the first step, whose pose the still picture shows.

@@ -4,8 +4,6 @@ use crate::error::{Error, Result};
 use crate::report::errors::{Steps, before};
 use crate::report::findings::wrong_setup;
 use crate::report::language::{Locale, say};
-use crate::report::number::{count, render};
-use crate::report::workspace::{StepErrors, histogram};
 use crate::report::{Accepted, Tables};
 use crate::table::{AcceptanceRow, StatisticsRow, SuspectsRow, VerdictRow, VerdictTopic, inert};
 use crate::units::Unit;
@@ -13,7 +11,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// Standard deviations of an expanded uncertainty (VIM: coverage factor).
+/// Standard deviations of an expanded uncertainty (VIM: coverage factor): 2 is what calibration laboratories state, for some 95 %.
 const COVERAGE: f64 = 2.0;
 
 pub(super) fn certificate(
@@ -104,7 +102,8 @@ pub(super) fn identity(
     fields.chain(others).collect()
 }
 
-/// A clock that shows more than this (s, a year) counts since 1970.
+/// A clock that shows more than this (s, a year) counts since 1970: no recording lasts a year, and no controller was on for longer without
+/// a restart of its own clock.
 const EPOCH: f64 = 3e7;
 
 /// The days of a recording whose clock counts since 1970.
@@ -346,57 +345,4 @@ impl<'a> Judgement<'a> {
             .iter()
             .filter_map(|row| Some((row, row.found_mm?)))
     }
-}
-
-/// What the page shows; lengths in mm.
-pub struct AchievedTables<'a> {
-    pub(crate) title: &'a str,
-    /// Where the model is from.
-    pub(crate) model: &'a str,
-    /// Name, mean, 95th percentile, largest, and what they are of.
-    pub(crate) rows: Vec<(&'static str, [f64; 3], String)>,
-    /// Errors of the uncorrected targets, by the model, and of the measured points.
-    pub(crate) errors: [Vec<f64>; 2],
-    /// Cycles, accuracy and repeatability.
-    pub(crate) poses: Vec<(usize, f64, f64)>,
-    /// What to know of the figures, a sentence each.
-    pub(crate) remarks: Vec<String>,
-}
-
-/// The page as one file that needs no other.
-pub fn achieved_page(tables: &AchievedTables) -> Result<String> {
-    let locale = Locale::default();
-    let errors = tables
-        .errors
-        .iter()
-        .zip([("before", "s0"), ("achieved", "s-last")])
-        .map(|(lengths, (step, colour))| {
-            let mut sorted_mm = lengths.clone();
-            sorted_mm.sort_by(f64::total_cmp);
-            let mean_mm = sorted_mm.iter().sum::<f64>() / sorted_mm.len().max(1) as f64;
-            StepErrors {
-                step: step.into(),
-                colour: colour.into(),
-                sorted_mm,
-                mean_mm,
-            }
-        });
-    let errors: Vec<StepErrors> = errors
-        .filter(|errors| !errors.sorted_mm.is_empty())
-        .collect();
-    let page = json!({
-        "title": tables.title,
-        "model": tables.model,
-        "points": count(tables.errors[1].len() as i64),
-        "rows": &tables.rows,
-        "remarks": &tables.remarks,
-        "picture": histogram(&locale, &errors, "Histogram of the position error before and after correction"),
-        "poses": (1..).zip(&tables.poses).collect::<Vec<(i64, _)>>(),
-    });
-    render(
-        &locale,
-        "achieved.html",
-        include_str!("achieved.html"),
-        page,
-    )
 }

@@ -252,7 +252,7 @@ const CLOSURE_WIDTH: f64 = 640.0;
 const LEFT: f64 = 150.0;
 /// Height of a fixture's two bars.
 const ROW: f64 = 20.0;
-/// Fixtures in the picture; the table has all.
+/// Fixtures in the picture: a page of paper has room for so many; the table has all.
 const LIMIT: usize = 40;
 
 /// Nothing where no row is a contact, or nothing was predicted.

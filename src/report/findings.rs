@@ -1,10 +1,10 @@
 //! What was left out of the simulation: the diagnosis' verdict, its findings with their curves, what it could not see.
 
 use crate::error::Result;
-use crate::report::Tables;
-use crate::report::language::{Locale, say};
+use crate::report::language::{Locale, PageLanguage, say};
 use crate::report::number::render;
 use crate::report::svg::{Area, Scale, Svg, baseline, label, name_x, name_y};
+use crate::report::{Page, Tables};
 use crate::table::{CauseGrid, CurveRow, FindingRow, VerdictTopic};
 use crate::units::Unit;
 use serde_json::{Value, json};
@@ -195,7 +195,12 @@ fn pictures(locale: &Locale, finding: &FindingRow, curve: &[&CurveRow]) -> Vec<(
 }
 
 /// A diagnosis as one file that needs no other.
-pub(crate) fn diagnosed_page(page: Value) -> Result<String> {
+pub(crate) fn diagnosed_page(page: Value, language: PageLanguage) -> Result<Page> {
+    let locale = Locale::new(language);
     let template = include_str!("diagnosed.html");
-    render(&Locale::default(), "diagnosed.html", template, page)
+    let html = render(&locale, "diagnosed.html", template, page)?;
+    Ok(Page {
+        html,
+        missing: locale.missing(),
+    })
 }

@@ -3,9 +3,9 @@
 //! Rivals of learned corrections.
 
 use super::Tables;
+use super::charts::{Line, course, spectrum};
 use super::errors::Steps;
 use super::language::{Locale, say};
-use super::svg::{Line, course, spectrum};
 use crate::table::{CorrectionsRow, FitRow, ObservabilityRow, TrainingRow};
 use serde_json::{Value, json};
 

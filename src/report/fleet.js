@@ -31,5 +31,5 @@ search.addEventListener("input", () => {
     row.hidden = !wanted.every((word) => text.includes(word));
     count += row.hidden ? 0 : 1;
   }
-  shown.textContent = count + " of " + rows.length;
+  shown.textContent = shown.dataset.of.replace("#", count);
 });

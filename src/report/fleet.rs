@@ -1,6 +1,7 @@
 //! A fleet as one self-contained page: every robot a row, sorted and filtered in the browser without a request.
 
-use super::language::Locale;
+use super::Page;
+use super::language::{Locale, PageLanguage, say};
 use super::number::render;
 use super::svg::Svg;
 use crate::error::{Result, visible};
@@ -14,13 +15,18 @@ pub fn html(
     fleet: &FleetTable,
     changes: &FleetChanges,
     links: &BTreeMap<String, String>,
-) -> Result<String> {
+    language: PageLanguage,
+) -> Result<Page> {
+    let locale = &Locale::new(language);
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for row in &fleet.0 {
         *counts.entry(&row.status).or_default() += 1;
     }
-    let mut rows: Vec<(Option<(u8, String)>, &FleetRow)> =
-        fleet.0.iter().map(|row| (needs(row), row)).collect();
+    let mut rows: Vec<(Option<(u8, String)>, &FleetRow)> = fleet
+        .0
+        .iter()
+        .map(|row| (needs(locale, row), row))
+        .collect();
     // Robots that need nobody come last, in the order of the fleet.
     rows.sort_by_key(|(needs, _)| needs.as_ref().map_or(u8::MAX, |(urgency, _)| *urgency));
     let urgent = rows.iter().filter_map(|(needs, row)| {
@@ -33,54 +39,68 @@ pub fn html(
         // The robots that need a technician, the most urgent first.
         "urgent": urgent.take(NAMED).collect::<Vec<_>>(),
         "name": name,
-        "title": format!("Fleet {name}"),
+        "title": say!(locale, "Fleet {name}", name),
         "policy": "; script-src 'unsafe-inline'; img-src data:",
         "style": include_str!("fleet.css"),
         "script": include_str!("fleet.js"),
         "counts": counts.into_iter().map(|(status, count)| (status.to_string(), count)).collect::<Vec<_>>(),
-        "robots": rows.iter().map(|(_, row)| self::row(row, links)).collect::<Vec<_>>(),
+        "robots": rows.iter().map(|(_, row)| self::row(locale, row, links)).collect::<Vec<_>>(),
         "changes": changes.0.iter().filter(|row| row.flagged).map(change).collect::<Vec<_>>(),
         "flagged": fleet.0.iter().filter(|row| row.flags.is_some()).count(),
         "diagnosed": fleet.0.iter().any(|row| row.verdict.is_some()),
         "compared": fleet.0.iter().any(|row| row.changes.is_some()),
         "grouped": fleet.0.iter().any(|row| row.model.is_some() || row.plant.is_some() || row.campaign.is_some()),
     });
-    render(
-        &Locale::default(),
-        "fleet.html",
-        include_str!("fleet.html"),
-        page,
-    )
+    let html = render(locale, "fleet.html", include_str!("fleet.html"), page)?;
+    Ok(Page {
+        html,
+        missing: locale.missing(),
+    })
 }
 
 /// Robots that are named above the table, at most.
 const NAMED: usize = 30;
 
 /// What a robot needs a technician for, in a sentence, and how urgently, 0 first; nothing where it needs none.
-fn needs(row: &FleetRow) -> Option<(u8, String)> {
+fn needs(locale: &Locale, row: &FleetRow) -> Option<(u8, String)> {
     let verdict = row.verdict.as_deref();
     let errors = row.before_rms_mm.zip(row.after_rms_mm);
+    let stored = |text: &Option<String>| {
+        let given = text.as_deref().filter(|text| !text.is_empty());
+        given.map(|text| locale.stored(text))
+    };
     let (urgency, what, why) = match () {
+        // A reason is what calib said of the data, with places and names.
         () if matches!(row.status.as_str(), "failed" | "rejected") => {
-            (0, "was not calibrated", &row.reason)
+            (0, say!(locale, "was not calibrated"), row.reason.clone())
         }
-        () if verdict == Some("wrong_setup") => (1, "its set-up is wrong", &row.causes),
+        () if verdict == Some("wrong_setup") => {
+            let what = say!(locale, "its set-up is wrong");
+            (1, what, stored(&row.causes))
+        }
         () if errors.is_some_and(|(before, after)| after >= before) => {
-            (2, "the calibration did not make it more accurate", &None)
+            let what = say!(locale, "the calibration did not make it more accurate");
+            (2, what, None)
         }
         () if row.flags.is_some() => {
-            let what = "changed beyond its limits since the last calibration";
-            (3, what, &row.flags)
+            let what = say!(
+                locale,
+                "changed beyond its limits since the last calibration"
+            );
+            (3, what, stored(&row.flags))
         }
-        () if verdict == Some("unexplained") => (4, "its error is not explained", &row.causes),
+        () if verdict == Some("unexplained") => {
+            let what = say!(locale, "its error is not explained");
+            (4, what, stored(&row.causes))
+        }
         () => return None,
     };
-    let why = why.as_ref().filter(|why| !why.is_empty());
-    let sentence = why.map_or_else(|| what.into(), |why| format!("{what}: {why}"));
+    let why = why.filter(|why| !why.is_empty());
+    let sentence = why.map_or_else(|| what.clone(), |why| format!("{what}: {why}"));
     Some((urgency, sentence))
 }
 
-fn row(row: &FleetRow, links: &BTreeMap<String, String>) -> Value {
+fn row(locale: &Locale, row: &FleetRow, links: &BTreeMap<String, String>) -> Value {
     let group: Vec<&str> = [&row.model, &row.plant, &row.campaign]
         .into_iter()
         .filter_map(|group| group.as_deref())
@@ -90,7 +110,10 @@ fn row(row: &FleetRow, links: &BTreeMap<String, String>) -> Value {
     shown["name"] = visible(&row.robot).into();
     shown["link"] = json!(links.get(&row.robot));
     shown["group"] = group.join(", ").into();
-    shown["spark"] = json!(course.and_then(|course| spark(course, row.floor_mm)));
+    shown["spark"] = json!(course.and_then(|course| spark(locale, course, row.floor_mm)));
+    let stored = |text: &Option<String>| text.as_deref().map(|text| locale.stored(text));
+    shown["causes"] = json!(stored(&row.causes));
+    shown["flags"] = json!(stored(&row.flags));
     shown
 }
 
@@ -117,7 +140,7 @@ fn change(row: &crate::table::FleetChangeRow) -> Value {
 const SIZE: [f64; 2] = [72.0, 18.0];
 
 /// The error after every step on a logarithmic scale, with the noise as a line below.
-fn spark(course: &str, floor: Option<f64>) -> Option<String> {
+fn spark(locale: &Locale, course: &str, floor: Option<f64>) -> Option<String> {
     let values: Vec<f64> = course
         .split(' ')
         .filter_map(|value| value.parse::<f64>().ok())
@@ -139,8 +162,7 @@ fn spark(course: &str, floor: Option<f64>) -> Option<String> {
         .enumerate()
         .map(|(i, value)| [2.0 + step * i as f64, height(*value)])
         .collect();
-    let locale = Locale::default();
-    let mut svg = Svg::new(&locale, SIZE[0], SIZE[1]);
+    let mut svg = Svg::new(locale, SIZE[0], SIZE[1]);
     if let Some(floor) = floor {
         svg.line("floor", [0.0, height(floor)], [SIZE[0], height(floor)]);
     }
@@ -148,5 +170,10 @@ fn spark(course: &str, floor: Option<f64>) -> Option<String> {
     if let Some(last) = points.last() {
         svg.circle("end", *last, 1.5);
     }
-    Some(svg.finish(&format!("rms error after each step, mm: {course}")))
+    let course = locale.decimal(course.into());
+    Some(svg.finish(&say!(
+        locale,
+        "rms error after each step, mm: {course}",
+        course
+    )))
 }

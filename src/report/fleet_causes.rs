@@ -1,20 +1,22 @@
 //! What the robots of a fleet have in common, as one self-contained page: the table of causes, every robot's size, who needs a technician.
 
-use super::language::Locale;
+use super::Page;
+use super::language::{Locale, PageLanguage, say};
 use super::number::render;
 use super::svg::Svg;
-use crate::error::{Result, counted, visible};
+use crate::error::{Result, visible};
 use crate::table::{FleetCellRow, FleetCells, FleetFindingRow, FleetFindings, FleetOutliers};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Name of an effect that no cause of the list is.
 const UNNAMED: &str = "unknown";
-/// Robots that are named at the head, at most.
+/// Robots that are named at the head, at most: a morning of visits. The table has all.
 const NAMED: usize = 40;
-/// Standard deviations from its siblings from which a robot is marked.
+/// Standard deviations from its siblings from which a robot is marked: of 2,000 robots with five causes each, chance marks one.
 const OFF: f64 = 4.0;
-/// Sizes (mm) at the ends of the scale of colours; of torques (Nm) a hundred times as much.
+/// Sizes (mm) at the ends of the scale of colours: what a tracker just tells, and what stops a process. Of torques (Nm) a hundred times as much,
+/// which is friction of a small wrist and of a large shoulder.
 const SCALE: [f64; 2] = [0.003, 1.0];
 
 /// The page.
@@ -23,7 +25,9 @@ pub fn html(
     findings: &FleetFindings,
     cells: &FleetCells,
     outliers: &FleetOutliers,
-) -> Result<String> {
+    language: PageLanguage,
+) -> Result<Page> {
+    let locale = &Locale::new(language);
     // What a robot has or lacks comes before its size, and that before recordings that could not be asked.
     let rank = |kind: &str| {
         ["alone", "lacks", "larger", "smaller", "not_asked"]
@@ -45,7 +49,7 @@ pub fn html(
             .copied()
             .filter(|row| row.group == **group)
             .collect();
-        self::group(group, &of_cell, cells)
+        self::group(locale, group, &of_cell, cells)
     });
     let mut groups: Vec<Value> = groups.collect();
     if groups.is_empty() {
@@ -53,38 +57,47 @@ pub fn html(
     }
     let page = json!({
         "name": name,
-        "title": format!("Fleet {name}: causes"),
+        "title": say!(locale, "Fleet {name}: causes", name),
         "policy": "; script-src 'unsafe-inline'; img-src data:",
         "style": concat!(include_str!("fleet.css"), include_str!("fleet_causes.css")),
         "script": include_str!("fleet.js"),
-        "lead": format!(
-            "{} that robots have in common, {} of single robots; {} with a size of one of them",
-            counted(shared.len(), "cause"), findings.0.len() - shared.len(), counted(asked.len(), "robot")
+        "lead": say!(
+            locale,
+            "Causes that robots have in common: {shared}; of single robots: {single}; robots with a size of one of them: {asked}.",
+            shared = shared.len(), single = findings.0.len() - shared.len(), asked = asked.len()
         ),
-        "urgent": urgent.iter().take(NAMED).map(|row| visible(&row.statement)).collect::<Vec<_>>(),
+        "urgent": urgent.iter().take(NAMED).map(|row| outlier(locale, &row.kind, &visible(&row.statement))).collect::<Vec<_>>(),
         "more": urgent.len().saturating_sub(NAMED),
         "groups": groups,
-        "heads": shared.iter().map(|row| words(&row.effect, &row.place)).collect::<Vec<_>>(),
-        "robots": robots(&shared, cells),
+        "heads": shared.iter().map(|row| words(locale, &row.effect, &row.place)).collect::<Vec<_>>(),
+        "robots": robots(locale, &shared, cells),
     });
-    render(
-        &Locale::default(),
-        "fleet_causes.html",
-        include_str!("fleet_causes.html"),
-        page,
-    )
+    let template = include_str!("fleet_causes.html");
+    let html = render(locale, "fleet_causes.html", template, page)?;
+    Ok(Page {
+        html,
+        missing: locale.missing(),
+    })
 }
 
-fn words(effect: &str, place: &str) -> String {
-    format!("{} at {place}", effect.replace('_', " "))
+fn words(locale: &Locale, effect: &str, place: &str) -> String {
+    locale.stored(&format!("{} at {place}", effect.replace('_', " ")))
+}
+
+/// Why somebody should look at a robot; what kept it from being asked is as calib said it of the data.
+fn outlier(locale: &Locale, kind: &str, statement: &str) -> String {
+    match kind {
+        "not_asked" => statement.into(),
+        _ => locale.stored(statement),
+    }
 }
 
 /// A size; a length in the unit in which it is short.
-fn short(size: f64, unit: &str) -> String {
+fn short(locale: &Locale, size: f64, unit: &str) -> String {
     match unit {
         "mm" if size < 1.0 => format!("{:.0} \u{b5}m", 1e3 * size),
-        "mm" => format!("{size:.1} mm"),
-        _ => format!("{size:.2} {unit}"),
+        "mm" => format!("{} mm", locale.fixed(size, 1)),
+        _ => format!("{} {unit}", locale.fixed(size, 2)),
     }
 }
 
@@ -103,7 +116,7 @@ fn along(place: &str) -> (usize, String) {
     (rank, place.into())
 }
 
-fn group(name: &str, findings: &[&FleetFindingRow], cells: &FleetCells) -> Value {
+fn group(locale: &Locale, name: &str, findings: &[&FleetFindingRow], cells: &FleetCells) -> Value {
     let columns: BTreeSet<&str> = findings.iter().map(|row| row.follows.as_str()).collect();
     let mut places: Vec<&str> = findings.iter().map(|row| row.place.as_str()).collect();
     places.sort_by_key(|place| along(place));
@@ -120,7 +133,7 @@ fn group(name: &str, findings: &[&FleetFindingRow], cells: &FleetCells) -> Value
             let size = here.iter().map(|row| row.size).fold(0.0, f64::max);
             let effects: Vec<String> = here
                 .iter()
-                .map(|row| row.effect.replace('_', " "))
+                .map(|row| locale.stored(&row.effect.replace('_', " ")))
                 .collect();
             let share = first.robots as f64 / first.of_robots.max(1) as f64;
             let scaled = if first.unit == "mm" {
@@ -132,8 +145,8 @@ fn group(name: &str, findings: &[&FleetFindingRow], cells: &FleetCells) -> Value
             json!({
                 "name": effects.join(", "),
                 "open": here.iter().any(|row| row.effect == UNNAMED),
-                "size": short(size, &first.unit),
-                "share": format!("{} of {}", first.robots, first.of_robots),
+                "size": short(locale, size, &first.unit),
+                "share": say!(locale, "{shown} of {all}", shown = first.robots, all = first.of_robots),
                 "height": (100.0 * share).round(),
                 "strong": (20.0 + 50.0 * strong.min(1.0)).round(),
             })
@@ -141,16 +154,21 @@ fn group(name: &str, findings: &[&FleetFindingRow], cells: &FleetCells) -> Value
         json!({ "place": place, "cells": columns.iter().map(cell).collect::<Vec<_>>() })
     });
     let lines = findings.iter().map(|row| {
-        let rival = row
-            .rival
-            .as_ref()
-            .map(|rival| format!("; or {rival}"))
-            .unwrap_or_default();
-        format!(
-            "{} (probability {:.2}{rival})",
-            visible(&row.statement),
-            row.probability
-        )
+        let statement = locale.stored(&visible(&row.statement));
+        let p = locale.fixed(row.probability, 2);
+        match &row.rival {
+            None => say!(locale, "{statement} (probability {p})", statement, p),
+            Some(rival) => {
+                let rival = locale.stored(rival);
+                say!(
+                    locale,
+                    "{statement} (probability {p}; or {rival})",
+                    statement,
+                    p,
+                    rival
+                )
+            }
+        }
     });
     let strips = findings.iter().map(|row| {
         let sizes: Vec<&FleetCellRow> = cells
@@ -159,7 +177,7 @@ fn group(name: &str, findings: &[&FleetFindingRow], cells: &FleetCells) -> Value
             .filter(|cell| cell.cell == row.cell && cell.group == row.group)
             .filter(|cell| cell.deviation.is_some())
             .collect();
-        json!({ "title": words(&row.effect, &row.place), "svg": strip(&sizes, row) })
+        json!({ "title": words(locale, &row.effect, &row.place), "svg": strip(locale, &sizes, row) })
     });
     json!({
         "name": visible(name),
@@ -174,12 +192,12 @@ fn group(name: &str, findings: &[&FleetFindingRow], cells: &FleetCells) -> Value
 const WIDTH: [f64; 2] = [760.0, 110.0];
 
 /// Every robot's size with its standard deviation, a lane for each plant.
-fn strip(robots: &[&FleetCellRow], finding: &FleetFindingRow) -> String {
-    let usual = finding.size;
+fn strip(locale: &Locale, robots: &[&FleetCellRow], finding: &FleetFindingRow) -> String {
+    let (usual, all) = (finding.size, say!(locale, "all"));
     let mut lanes: BTreeMap<&str, Vec<&FleetCellRow>> = BTreeMap::new();
     for robot in robots {
         lanes
-            .entry(robot.plant.as_deref().unwrap_or("all"))
+            .entry(robot.plant.as_deref().unwrap_or(&all))
             .or_default()
             .push(robot);
     }
@@ -194,8 +212,7 @@ fn strip(robots: &[&FleetCellRow], finding: &FleetFindingRow) -> String {
         .map(|lane| high(lane.len()) + 8.0)
         .sum::<f64>()
         + 22.0;
-    let locale = Locale::default();
-    let mut svg = Svg::new(&locale, WIDTH[0], height);
+    let mut svg = Svg::new(locale, WIDTH[0], height);
     let mut top = 2.0;
     for (name, mut lane) in lanes {
         lane.sort_by(|a, b| a.size.total_cmp(&b.size));
@@ -221,16 +238,18 @@ fn strip(robots: &[&FleetCellRow], finding: &FleetFindingRow) -> String {
     svg.text(
         "end",
         [at(largest), top + 16.0],
-        &short(largest, &finding.unit),
+        &short(locale, largest, &finding.unit),
     );
-    svg.finish(&format!(
-        "Size of every robot, {} as a rule",
-        short(usual, &finding.unit)
+    let usual = short(locale, usual, &finding.unit);
+    svg.finish(&say!(
+        locale,
+        "Size of every robot, {usual} as a rule",
+        usual
     ))
 }
 
 /// A row for each robot with its size of every shared cause.
-fn robots(shared: &[&FleetFindingRow], cells: &FleetCells) -> Vec<Value> {
+fn robots(locale: &Locale, shared: &[&FleetFindingRow], cells: &FleetCells) -> Vec<Value> {
     let column: BTreeMap<(&str, &str), usize> = shared
         .iter()
         .enumerate()
@@ -259,7 +278,7 @@ fn robots(shared: &[&FleetFindingRow], cells: &FleetCells) -> Vec<Value> {
         let robot = by
             .entry(&cell.robot)
             .or_insert_with(|| (vec![Value::Null; shared.len()], 0.0, label()));
-        robot.0[*k] = json!({ "value": cell.size, "shown": format!("{:.3} \u{b1} {:.3}", cell.size, cell.sigma) });
+        robot.0[*k] = json!({ "value": cell.size, "shown": format!("{} \u{b1} {}", locale.fixed(cell.size, 3), locale.fixed(cell.sigma, 3)) });
         let off = cell.deviation.unwrap_or(0.0);
         if off.abs() > robot.1.abs() {
             robot.1 = off;
@@ -269,7 +288,7 @@ fn robots(shared: &[&FleetFindingRow], cells: &FleetCells) -> Vec<Value> {
     all.sort_by(|a, b| b.1.1.abs().total_cmp(&a.1.1.abs()).then(a.0.cmp(b.0)));
     all.into_iter()
         .map(|(name, (cells, off, group))| {
-            json!({ "name": visible(name), "group": group, "deviation": format!("{off:.1}"), "is_off": off.abs() > OFF, "cells": cells })
+            json!({ "name": visible(name), "group": group, "deviation": off, "is_off": off.abs() > OFF, "cells": cells })
         })
         .collect()
 }

@@ -2,8 +2,11 @@
 //!
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
 
+mod achieved;
 mod arm;
 mod certificate;
+mod charts;
+mod curves;
 mod data;
 mod drives;
 mod errors;
@@ -11,6 +14,7 @@ mod findings;
 mod fits;
 pub mod fleet;
 pub mod fleet_causes;
+mod followed;
 mod language;
 mod number;
 mod parameters;
@@ -19,13 +23,15 @@ mod svg;
 mod torques;
 mod workspace;
 
+pub use achieved::{AchievedTables, achieved_page};
 pub(crate) use arm::{PlacedArm, shown_row};
-pub use certificate::{AchievedTables, achieved_page};
-pub(crate) use drives::{DrivePage, drive_page};
+pub use drives::ReportDrivesReads;
+pub(crate) use drives::drive_page;
 pub(crate) use findings::diagnosed_page;
 pub use language::PageLanguage;
 use language::{Locale, say};
-pub use torques::{ReportTorquesReads, torque_page};
+pub use torques::ReportTorquesReads;
+pub(crate) use torques::torque_page;
 
 use crate::error::Result;
 use crate::table::{
@@ -39,6 +45,42 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::ops::Deref;
+
+/// A page as one file that needs no other.
+pub struct Page {
+    /// All of it.
+    pub html: String,
+    /// What it says in English since its language lacks it.
+    missing: Vec<String>,
+}
+
+impl Page {
+    /// A warning for each text that stayed English.
+    pub fn untranslated(&self, language: PageLanguage) -> Vec<String> {
+        untranslated(&self.missing, language)
+    }
+}
+
+/// A warning for each text of a page that its language lacks.
+pub(crate) fn untranslated(missing: &[String], language: PageLanguage) -> Vec<String> {
+    let language = language.code();
+    let texts = missing.iter();
+    texts
+        .map(|text| format!("the page says this in English, as `{language}` lacks it: {text}"))
+        .collect()
+}
+
+/// Joints that a page shows more closely: of six, two bear most of the error as a rule, and a reader compares two.
+const SHOWN_CLOSELY: usize = 2;
+
+/// The joints of the largest errors, the largest first, and the others in their order.
+fn worst_first(errors: &[f64]) -> (Vec<usize>, Vec<usize>) {
+    let mut worst: Vec<usize> = (0..errors.len()).collect();
+    worst.sort_by(|a, b| errors[*b].total_cmp(&errors[*a]));
+    let mut others = worst.split_off(worst.len().min(SHOWN_CLOSELY));
+    others.sort_unstable();
+    (worst, others)
+}
 
 /// Writes `report.html`.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]

@@ -1,15 +1,19 @@
-//! The page of a diagnosis of torques: what was found, and measured, simulated and corrected torque of each joint over time.
+//! The page of a diagnosis of torques: what was found; of the two worst joints measured, simulated and corrected torque over time and the
+//! error over speed and load, of the others over time alone.
 
+use super::curves::{WIDTH, over_quantity, over_time};
 use super::data;
-use super::language::Locale;
+use super::followed::{FollowedFinding, grid};
+use super::language::{Locale, PageLanguage, say};
 use super::number::render;
 use super::result;
 use super::svg::{Area, Scale, Svg, baseline, name_x, name_y};
+use super::{Page, worst_first};
 use crate::error::{Error, Result};
 use crate::table::{
     BodyConsistencies, Contacts, FrictionCurveRow, FrictionCurves, Inertials, JointTorques,
-    Labelled, Robot, TorqueCourse, TorqueFindingRow, TorqueFindings, TorqueNumbers, TorqueRivals,
-    TorqueVerdict, VerdictSentences, VerdictTopic,
+    Labelled, Robot, TorqueCourse, TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict,
+    VerdictSentences, VerdictTopic,
 };
 use serde_json::{Value, json};
 
@@ -32,31 +36,48 @@ crate::table::reads! {
 }
 
 /// The page; fails where the verdict is missing.
-pub fn torque_page(
+pub(crate) fn torque_page(
     tables: &ReportTorquesReads,
     title: Option<&str>,
+    language: PageLanguage,
     hashes: &[(String, String)],
-) -> Result<String> {
+) -> Result<Page> {
     let verdict = tables.verdict.0.first();
     let verdict =
         verdict.ok_or_else(|| Error::Bug("a diagnosis of torques without a verdict".into()))?;
-    let locale = Locale::default();
+    let locale = Locale::new(language);
     let robot = data::robot_name(&locale, &tables.robot);
     let sentences_of = |topic| -> Vec<&str> {
         let all = tables.sentences.iter();
         all.flat_map(|table| table.about(&verdict.step, topic))
             .collect()
     };
+    let errors = tables.joints.0.iter();
+    let errors: Vec<f64> = errors.map(|row| row.before_rms_nm).collect();
+    let (worst, others) = worst_first(&errors);
+    let joints = worst.iter().map(|joint| (*joint, true));
+    let joints = joints.chain(others.iter().map(|joint| (*joint, false)));
+    let followed: Vec<FollowedFinding> = tables
+        .findings
+        .0
+        .iter()
+        .map(|row| FollowedFinding {
+            effect: &row.effect,
+            place: &row.place,
+            statement: &row.statement,
+            size: row.effect_rms_nm,
+        })
+        .collect();
     let page = json!({
-        "title": title.map_or_else(|| format!("Torques of {robot}"), str::to_owned),
+        "title": title.map_or_else(|| say!(locale, "Torques of {robot}", robot), str::to_owned),
         "robot": robot,
         "joints": tables.course.joints,
         "slides": &tables.course.prismatic,
         "verdict": verdict,
-        "grid": grid(&tables.findings.0),
+        "grid": grid(&followed),
         "findings": result::findings(&tables.findings.0, &tables.numbers.0, &tables.rivals.0),
         "errors": &tables.joints.0,
-        "pictures": (0..tables.course.joints).map(|joint| pictures(&locale, tables, joint)).collect::<Vec<_>>(),
+        "pictures": joints.map(|(joint, is_worst)| pictures(&locale, tables, joint, is_worst)).collect::<Vec<_>>(),
         "contacts": &tables.contacts.0,
         "inertials": &tables.inertials.0,
         "bodies": &tables.consistency.0,
@@ -64,105 +85,14 @@ pub fn torque_page(
         "remarks": sentences_of(VerdictTopic::Remark),
         "hashes": hashes,
     });
-    render(&locale, "torques.html", include_str!("torques.html"), page)
+    let html = render(&locale, "torques.html", include_str!("torques.html"), page)?;
+    Ok(Page {
+        html,
+        missing: locale.missing(),
+    })
 }
 
-/// What torques follow, as columns of the table of causes, each with the causes that do.
-const FOLLOWED: [(&str, &[&str]); 6] = [
-    (
-        "own speed",
-        &[
-            "viscous_friction",
-            "coulomb_friction",
-            "asymmetric_friction",
-            "stribeck_friction",
-            "presliding_friction",
-            "backlash_spikes",
-        ],
-    ),
-    ("load", &["load_friction", "torque_constant"]),
-    (
-        "own angle",
-        &[
-            "torque_ripple",
-            "spring_balance",
-            "cable_stiffness",
-            "link_mass",
-            "link_com",
-            "payload_error",
-            "gravity_direction",
-        ],
-    ),
-    (
-        "acceleration",
-        &["rotor_inertia", "link_inertia", "joint_elasticity"],
-    ),
-    ("time", &["warmup_friction", "contact", "current_latency"]),
-    ("constant", &["current_offset"]),
-];
-/// What a cause without a name follows is the end of its statement.
-const DEPENDS: [(&str, &str); 3] = [
-    ("the angle of the joint", "own angle"),
-    ("the velocity of the joint", "own speed"),
-    ("the load of the joint", "load"),
-];
-const OTHER: &str = "other";
-
-/// What a finding's torque follows.
-fn followed(finding: &TorqueFindingRow) -> &'static str {
-    let of_name = |(_, names): &&(&str, &[&str])| names.contains(&&*finding.effect);
-    let statement = finding.statement.trim_end_matches('.');
-    let depends = DEPENDS.iter().find(|(end, _)| statement.ends_with(end));
-    let named = FOLLOWED.iter().find(of_name).map(|(column, _)| *column);
-    named
-        .or(depends.map(|(_, column)| *column))
-        .unwrap_or(OTHER)
-}
-
-/// The table of causes: places down the chain, what is followed across; size in Nm and the names.
-fn grid(findings: &[TorqueFindingRow]) -> Value {
-    let columns = FOLLOWED.iter().map(|(column, _)| *column).chain([OTHER]);
-    let columns: Vec<&str> = columns
-        .filter(|column| findings.iter().any(|finding| followed(finding) == *column))
-        .collect();
-    let mut places: Vec<&str> = findings.iter().map(|finding| &*finding.place).collect();
-    places.sort_by_key(|place| place_order(place));
-    places.dedup();
-    let largest = findings
-        .iter()
-        .map(|finding| finding.effect_rms_nm)
-        .fold(0.0, f64::max);
-    let cell = |place: &str, column: &str| {
-        let here: Vec<&TorqueFindingRow> = findings
-            .iter()
-            .filter(|finding| finding.place == place && followed(finding) == column)
-            .collect();
-        let nm = here
-            .iter()
-            .map(|finding| finding.effect_rms_nm)
-            .reduce(f64::max)?;
-        let names: Vec<&str> = here.iter().map(|finding| &*finding.effect).collect();
-        let share = nm / largest.max(f64::MIN_POSITIVE);
-        let shade = [0.01, 0.03, 0.1, 0.3, 0.6, 0.9]
-            .iter()
-            .filter(|edge| share >= **edge)
-            .count();
-        Some(json!({ "nm": nm, "names": names, "shade": shade, "open": names == ["unknown"] }))
-    };
-    let row = |place: &&str| {
-        let cells: Vec<_> = columns.iter().map(|column| cell(place, column)).collect();
-        json!({ "place": place, "cells": cells })
-    };
-    json!({ "columns": columns, "rows": places.iter().map(row).collect::<Vec<_>>() })
-}
-
-/// Down the chain; what is no joint or link stands below.
-fn place_order(place: &str) -> (i64, String) {
-    let number = place.split([' ', '-']).find_map(|word| word.parse().ok());
-    (number.unwrap_or(i64::MAX), place.into())
-}
-
-fn pictures(locale: &Locale, tables: &ReportTorquesReads, joint: usize) -> Value {
+fn pictures(locale: &Locale, tables: &ReportTorquesReads, joint: usize, is_worst: bool) -> Value {
     let course = &tables.course;
     let of_joint = |all: &[f64]| course.of_joint(all, joint).collect::<Vec<f64>>();
     let (measured, simulated, corrected) = (
@@ -179,113 +109,54 @@ fn pictures(locale: &Locale, tables: &ReportTorquesReads, joint: usize) -> Value
     };
     let (before, after) = (less(&simulated), less(&corrected));
     let slides = course.prismatic[joint];
-    let unit = if slides { "N" } else { "Nm" };
-    let name = format!("joint {}", joint + 1);
+    let [unit, speed_unit] = match slides {
+        true => ["N", "m/s"],
+        false => ["Nm", "rad/s"],
+    };
+    let name = say!(locale, "joint {joint}", joint = joint + 1);
     let clock = (course.time.as_slice(), course.held_out.as_slice());
     let torque = [
         ("s1", simulated.as_slice()),
         ("s0", &measured),
         ("s-last", &corrected),
     ];
+    let errors = [("s1", before.as_slice()), ("s-last", &after)];
     let curve: Vec<&FrictionCurveRow> = tables
         .friction
         .0
         .iter()
         .filter(|row| row.joint == joint as i64 + 1)
         .collect();
+    let over = |quantity: Vec<f64>, title: String, across: String| {
+        is_worst.then(|| over_quantity(locale, &quantity, &errors, [&title, &across, unit]))
+    };
+    let course_title = say!(
+        locale,
+        "torque of {name}: measured, simulated, corrected",
+        name
+    );
+    let error_title = say!(locale, "error of {name} before and after", name);
     json!({
-        "torque": over_time(locale, clock, &torque, [&format!("torque of {name}: measured, simulated, corrected"), unit]),
-        "error": over_time(locale, clock, &[("s1", &before), ("s-last", &after)], [&format!("error of {name} before and after"), unit]),
-        "friction": (!curve.is_empty()).then(|| friction(locale, &curve, slides, &format!("friction of {name}"))),
+        "torque": over_time(locale, clock, &torque, [&course_title, unit]),
+        "error": over_time(locale, clock, &errors, [&error_title, unit]),
+        "speed": over(
+            of_joint(&course.velocity),
+            say!(locale, "error of {name} over its speed, before and after", name),
+            say!(locale, "velocity, {unit}", unit = speed_unit),
+        ),
+        "load": over(
+            simulated.clone(),
+            say!(locale, "error of {name} over its load, before and after", name),
+            say!(locale, "simulated torque, {unit}", unit),
+        ),
+        "friction": (!curve.is_empty()).then(|| friction(locale, &curve, slides, &say!(locale, "friction of {name}", name))),
         "name": name,
     })
 }
 
-const WIDTH: f64 = 640.0;
-/// Steps of time in a picture: more would not be seen; of each the least and the largest value are drawn.
-const STEPS: usize = 300;
-/// Steps of the clock without rows that break a line.
-const GAP: f64 = 8.0;
-
-/// Lines over time, of rows with whether they are held out, which is shaded; the title, and what is over time.
-pub(super) fn over_time(
-    locale: &Locale,
-    (time, held_out): (&[f64], &[bool]),
-    lines: &[(&str, &[f64])],
-    [title, what]: [&str; 2],
-) -> String {
-    let area = Area::new([52.0, 26.0, WIDTH - 14.0, 200.0]);
-    let (first, last) = (
-        time.first().copied().unwrap_or(0.0),
-        time.last().copied().unwrap_or(1.0),
-    );
-    let all = || lines.iter().flat_map(|(_, values)| values.iter().copied());
-    let (low, high) = (
-        all().fold(f64::INFINITY, f64::min),
-        all().fold(f64::NEG_INFINITY, f64::max),
-    );
-    let x = Scale::linear(first, last).over(area.left, area.right);
-    let y = Scale::linear(low.min(0.0), high.max(0.0)).over(area.bottom, area.top);
-    let mut svg = Svg::new(locale, WIDTH, area.bottom + 38.0);
-    let stretches = stretches(time);
-    for rows in &stretches {
-        let held = |row: &usize| held_out.get(*row).copied().unwrap_or(false);
-        if let (Some(from), Some(to)) = (rows.clone().find(held), rows.clone().rfind(held)) {
-            let (left, right) = (x.at(time[from]), x.at(time[to]));
-            svg.rect(
-                "held",
-                [left, area.top],
-                [right - left, area.bottom - area.top],
-            );
-        }
-    }
-    x.grid_x(&mut svg, area, 8);
-    y.grid_y(&mut svg, area, 5);
-    let every = time.len().div_ceil(STEPS).max(1);
-    for (colour, values) in lines {
-        for rows in &stretches {
-            let mut points = Vec::new();
-            for from in rows.clone().step_by(every) {
-                let step = from..(from + every).min(rows.end);
-                let by_value = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
-                let mut ends = [step.clone().min_by(by_value), step.max_by(by_value)];
-                ends.sort();
-                points.extend(
-                    ends.into_iter()
-                        .flatten()
-                        .map(|row| [x.at(time[row]), y.at(values[row])]),
-                );
-            }
-            points.dedup();
-            svg.path(&format!("curve {colour}"), &points);
-        }
-    }
-    baseline(&mut svg, area);
-    name_x(&mut svg, area, "time, s");
-    name_y(&mut svg, area, what);
-    svg.finish(title)
-}
-
-/// Rows without a gap of the clock.
-fn stretches(time: &[f64]) -> Vec<std::ops::Range<usize>> {
-    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_by(f64::total_cmp);
-    let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-    let mut stretches = Vec::new();
-    let mut begin = 0;
-    for row in 1..time.len() {
-        if time[row] - time[row - 1] > GAP * usual {
-            stretches.push(begin..row);
-            begin = row;
-        }
-    }
-    stretches.push(begin..time.len());
-    stretches
-}
-
 /// Friction over velocity with a band of two standard deviations.
 fn friction(locale: &Locale, curve: &[&FrictionCurveRow], slides: bool, title: &str) -> String {
-    let area = Area::new([52.0, 26.0, 406.0, 200.0]);
+    let area = Area::new([52.0, 26.0, WIDTH - 14.0, 200.0]);
     let ends = |sign: f64| {
         curve
             .iter()
@@ -302,7 +173,7 @@ fn friction(locale: &Locale, curve: &[&FrictionCurveRow], slides: bool, title: &
     )
     .over(area.left, area.right);
     let y = Scale::linear(low, high).over(area.bottom, area.top);
-    let mut svg = Svg::new(locale, 420.0, area.bottom + 38.0);
+    let mut svg = Svg::new(locale, WIDTH, area.bottom + 38.0);
     x.grid_x(&mut svg, area, 6);
     y.grid_y(&mut svg, area, 5);
     let point = |row: &&FrictionCurveRow, sigmas: f64| {
@@ -319,11 +190,19 @@ fn friction(locale: &Locale, curve: &[&FrictionCurveRow], slides: bool, title: &
         &curve.iter().map(|row| point(row, 0.0)).collect::<Vec<_>>(),
     );
     baseline(&mut svg, area);
-    let [x, y] = match slides {
-        true => ["velocity, m/s", "friction, N"],
-        false => ["velocity, rad/s", "friction, Nm"],
+    let [speed, torque] = match slides {
+        true => ["m/s", "N"],
+        false => ["rad/s", "Nm"],
     };
-    name_x(&mut svg, area, x);
-    name_y(&mut svg, area, y);
+    name_x(
+        &mut svg,
+        area,
+        &say!(locale, "velocity, {unit}", unit = speed),
+    );
+    name_y(
+        &mut svg,
+        area,
+        &say!(locale, "friction, {unit}", unit = torque),
+    );
     svg.finish(title)
 }

@@ -4,8 +4,9 @@ use super::language::{Locale, say};
 use super::svg::{Area, Scale, Svg, baseline, label, name_x, name_y, round_down};
 use crate::table::{Prediction, PredictionRow};
 
-/// Points drawn in one picture: more would hide each other.
+/// Points drawn in one picture: more would hide each other. Every so many of the recording are taken, so that no region is left out.
 const DRAWN: usize = 600;
+/// Colours that an eye still tells apart on paper and by night.
 const CLASSES: usize = 7;
 
 /// Two coordinates of a point, as a view of the workspace.
@@ -48,6 +49,7 @@ impl Colours {
                 .copied()
                 .unwrap_or(1.0)
         };
+        // Quantiles, not ends: one wrong point would give all others the same colour.
         let upper = round_down(quantile(before, 0.9).max(quantile(after, 0.9)).max(1e-6));
         let lower = quantile(after, 0.4).max(upper * 1e-6);
         let count = CLASSES - 1;

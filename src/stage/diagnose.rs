@@ -177,15 +177,7 @@ impl Stage for Diagnose {
         let asked = AskedRows::of(self, &reads, context)?;
         let question = asked.question(self, context.seed);
         let (data, corrected) = (&asked.data, asked.corrected);
-        context
-            .services
-            .begin("looking for what the model lacks", None, "steps");
-        let mut steps = 0;
-        let tell = |line: String| {
-            steps += 1;
-            context.note(line.clone());
-            context.services.advance(steps, &line);
-        };
+        let tell = context.searching("looking for what the model lacks");
         let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, tell));
         let mut diagnosis = with_remarks(diagnosis, &question, context)?;
         context.warn_each(blank_payload(&reads.recording));

@@ -12,11 +12,10 @@ use crate::drives::{CAUSES, Drives, diagnose};
 use crate::dynamics::InertialTolerance;
 use crate::engine::Options;
 use crate::error::{Error, Fault, Place, Result, did_you_mean, listed};
-use crate::report::{DrivePage, drive_page};
 use crate::stage::{Context, RawFile, Stage};
 use crate::table::{
-    Document, DocumentRow, DriveCourse, DriveSimulation, DriveVerdict, FindingNumbers, Findings,
-    JointDrives, Rivals, VerdictSentences,
+    DriveCourse, DriveSimulation, DriveVerdict, FindingNumbers, Findings, JointDrives, Rivals,
+    VerdictSentences,
 };
 use recorded::Source;
 use schemars::JsonSchema;
@@ -181,7 +180,7 @@ impl ClockUnit {
 }
 
 crate::stage::stage! {
-    DiagnoseDrives, "diagnose_drives", 4, "names the physics that the simulation of commanded joints lacks, from commands and angles",
+    DiagnoseDrives, "diagnose_drives", 5, "names the physics that the simulation of commanded joints lacks, from commands and angles",
         DiagnoseDrivesReads {} -> DiagnoseDrivesWrites {
             verdict: DriveVerdict,
             sentences: VerdictSentences,
@@ -191,7 +190,6 @@ crate::stage::stage! {
             joints: JointDrives,
             simulation: DriveSimulation,
             course: DriveCourse,
-            document: Document,
         }
 }
 
@@ -282,8 +280,12 @@ impl Stage for DiagnoseDrives {
             most: MOST_A_JOINT * drives.recording.joints(),
             ..Options::default()
         };
-        let diagnosis = diagnose(&drives, &options, |line| context.note(line));
-        let mut writes = DiagnoseDrivesWrites {
+        let diagnosis = diagnose(
+            &drives,
+            &options,
+            context.searching("looking for what the simulation lacks"),
+        );
+        Ok(DiagnoseDrivesWrites {
             verdict: DriveVerdict::of(context.id, &diagnosis),
             sentences: VerdictSentences::of(context.id, &[]),
             findings: Findings::of_drives(&diagnosis),
@@ -292,23 +294,7 @@ impl Stage for DiagnoseDrives {
             joints: JointDrives::of(&diagnosis),
             simulation: DriveSimulation::of(&arm, &drives, &diagnosis),
             course: DriveCourse::of(&drives.recording, &diagnosis),
-            document: Document::default(),
-        };
-        let content = drive_page(&DrivePage {
-            verdict: &writes.verdict,
-            findings: &writes.findings,
-            numbers: &writes.numbers,
-            rivals: &writes.rivals,
-            joints: &writes.joints,
-            simulation: &writes.simulation,
-            course: &writes.course,
-        })?;
-        writes.document = Document(vec![DocumentRow {
-            name: "drives.html".into(),
-            media_type: "text/html".into(),
-            content,
-        }]);
-        Ok(writes)
+        })
     }
 }
 

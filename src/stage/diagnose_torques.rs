@@ -125,7 +125,8 @@ impl Stage for DiagnoseTorques {
 
     fn run(&self, reads: DiagnoseTorquesReads, context: &Context) -> Result<DiagnoseTorquesWrites> {
         let (arm, recording, question) = self.asked(&reads, context)?;
-        let diagnosis = diagnose(&arm, &recording, &question, &mut |line| context.note(line))?;
+        let mut tell = context.searching("looking for what the torques lack");
+        let diagnosis = diagnose(&arm, &recording, &question, &mut tell)?;
         for remark in &diagnosis.remarks {
             context.note(remark);
         }

@@ -10,6 +10,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::Read;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 mod cell_evidence;
 mod compare;
@@ -38,7 +39,9 @@ pub mod split;
 mod transfer;
 mod validate;
 
-pub use crate::report::{Accepted, Report, ReportPages, ReportReads, ReportTorquesReads};
+pub use crate::report::{
+    Accepted, Report, ReportDrivesReads, ReportPages, ReportReads, ReportTorquesReads,
+};
 pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given, TorqueEvidence};
 pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};
@@ -56,7 +59,7 @@ pub use identify::{Stiffness, StiffnessReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
 pub use masses::{Masses, MassesReads, MassesWrites};
 pub use optimise::{BenchmarkProblem, Optimise, OptimiseReads};
-pub use report::{ReportTorques, ReportTorquesWrites};
+pub use report::{ReportDrives, ReportDrivesWrites, ReportTorques, ReportTorquesWrites};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use settings::FoldSetting;
 pub(crate) use settings::matches;
@@ -134,6 +137,16 @@ impl Context<'_> {
     /// The same of every line.
     pub(crate) fn warn_each(&self, lines: impl IntoIterator<Item = String>) {
         lines.into_iter().for_each(|line| self.services.warn(line));
+    }
+    /// Takes the lines of a search whose length nobody knows: each is noted, and is a step of what is shown of it.
+    pub(crate) fn searching(&self, what: &str) -> impl Fn(String) + '_ {
+        self.services.begin(what, None, "steps");
+        let steps = AtomicU64::new(0);
+        move |line| {
+            let step = steps.fetch_add(1, Ordering::Relaxed) + 1;
+            self.services.advance(step, &line);
+            self.services.note(line);
+        }
     }
     /// The label and content of a file that should hold `what`, a text of at most so many bytes.
     pub(crate) fn text(&self, file: &RawFile, what: &str, most: u64) -> Result<(String, String)> {
@@ -250,6 +263,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<Masses>(),
     StageEntry::of::<CompareTorques>(),
     StageEntry::of::<ReportTorques>(),
+    StageEntry::of::<ReportDrives>(),
     StageEntry::of::<Compare>(),
     StageEntry::of::<Learn>(),
     StageEntry::of::<Optimise>(),

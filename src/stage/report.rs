@@ -4,7 +4,8 @@ use crate::effect::Load;
 use crate::error::{Error, Fault, Place, Result};
 use crate::estimate::align_points;
 use crate::report::{
-    PlacedArm, Report, ReportReads, ReportTorquesReads, Tables, pages, shown_row, torque_page,
+    Page, PageLanguage, PlacedArm, Report, ReportDrivesReads, ReportReads, ReportTorquesReads,
+    Tables, drive_page, pages, shown_row, torque_page, untranslated,
 };
 use crate::robot::RobotModel;
 use crate::spatial::{Pose, Twist};
@@ -18,7 +19,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 crate::stage::stage! {
-    Report, "report", 28, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
+    Report, "report", 29, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
         ReportReads -> ReportWrites {
             document: Document,
             acceptance: Acceptance,
@@ -84,12 +85,7 @@ impl Stage for Report {
             hashes,
         };
         let pages = pages(&tables, self).map_err(|error| placed(error, context.id))?;
-        for text in &pages.missing {
-            let language = self.language.code();
-            context.warn(format!(
-                "the page says this in English, as `{language}` lacks it: {text}"
-            ));
-        }
+        context.warn_each(untranslated(&pages.missing, self.language));
         let document = |name: &str, media_type: &str, content| DocumentRow {
             name: name.into(),
             media_type: media_type.into(),
@@ -269,31 +265,64 @@ fn placed(error: Error, stage: &str) -> Error {
 pub struct ReportTorques {
     /// Heading of the page; without it, the robot's name.
     pub(crate) title: Option<String>,
+    /// Language of the page: `en` or `de`.
+    pub(crate) language: PageLanguage,
 }
 
 crate::stage::stage! {
-    ReportTorques, "report_torques", 8, "writes one self-contained HTML file: torques before and after, friction, what was found",
+    ReportTorques, "report_torques", 10, "writes one self-contained HTML file: torques before and after, friction, what was found",
         ReportTorquesReads -> ReportTorquesWrites {
             document: Document,
         }
 }
 
 impl Stage for ReportTorques {
-    fn run(&self, reads: ReportTorquesReads, _context: &Context) -> Result<ReportTorquesWrites> {
+    fn run(&self, reads: ReportTorquesReads, context: &Context) -> Result<ReportTorquesWrites> {
         let hash = |name: &str, frame: Frame| (name.into(), frame.table_hash().to_string());
         let hashes = vec![
             hash("robot", reads.robot.to_frame()?),
             hash("findings", reads.findings.to_frame()?),
             hash("course", reads.course.to_frame()?),
         ];
-        let content = torque_page(&reads, self.title.as_deref(), &hashes)?;
-        let html = DocumentRow {
-            name: "torques.html".into(),
-            media_type: "text/html".into(),
-            content,
-        };
+        let page = torque_page(&reads, self.title.as_deref(), self.language, &hashes)?;
         Ok(ReportTorquesWrites {
-            document: Document(vec![html]),
+            document: document("torques.html", page, self.language, context),
         })
     }
+}
+
+/// Writes `drives.html`.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ReportDrives {
+    /// Heading of the page.
+    pub(crate) title: Option<String>,
+    /// Language of the page: `en` or `de`.
+    pub(crate) language: PageLanguage,
+}
+
+crate::stage::stage! {
+    ReportDrives, "report_drives", 1, "writes one self-contained HTML file: commanded, measured and simulated angles before and after, what was found",
+        ReportDrivesReads -> ReportDrivesWrites {
+            document: Document,
+        }
+}
+
+impl Stage for ReportDrives {
+    fn run(&self, reads: ReportDrivesReads, context: &Context) -> Result<ReportDrivesWrites> {
+        let page = drive_page(&reads, self.title.as_deref(), self.language)?;
+        Ok(ReportDrivesWrites {
+            document: document("drives.html", page, self.language, context),
+        })
+    }
+}
+
+/// A page as the only document of a stage, which warns of what its language lacks.
+fn document(name: &str, page: Page, language: PageLanguage, context: &Context) -> Document {
+    context.warn_each(page.untranslated(language));
+    Document(vec![DocumentRow {
+        name: name.into(),
+        media_type: "text/html".into(),
+        content: page.html,
+    }])
 }

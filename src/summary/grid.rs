@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::fmt::Display;
 use unicode_width::UnicodeWidthStr;
 
-/// Significant digits of the largest number of a column.
+/// Significant digits of the largest number of a column: more than any recording tells, fewer than hide a drift from row to row.
 const DIGITS: i32 = 6;
 /// Decimals of a length in mm at least: a tracker tells micrometres also far away.
 const LENGTH: i32 = 4;

@@ -3,6 +3,9 @@
 mod changed;
 mod columns;
 mod diagnosis;
+mod diagnosis_head;
+mod diagnosis_page;
+mod effect_file;
 mod estimate;
 mod found;
 #[cfg(feature = "query")]
@@ -15,6 +18,7 @@ mod screen;
 pub use columns::{columns, columns_text, effects_json};
 pub use diagnosis::DiagnosisSummary;
 pub(crate) use diagnosis::Subject;
+pub(crate) use diagnosis_page::diagnosis_page;
 #[cfg(feature = "query")]
 pub use grid::grid;
 #[cfg(feature = "query")]

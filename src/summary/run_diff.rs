@@ -120,7 +120,7 @@ fn measure(diff: &TableDiff) -> String {
     }
 }
 
-/// Less probable than this, a rival is excluded.
+/// Less probable than this, a rival is excluded: one in twenty is what a reader takes for decided.
 const OPEN: f64 = 0.05;
 
 /// A finding of one of two runs and an explanation that one of them could not exclude.

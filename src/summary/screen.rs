@@ -1,18 +1,16 @@
 //! The lines of a result, as `run` and `diagnose` print them: 100 columns at most.
 
 use super::found::ShortFinding;
-use crate::effect::{EffectDeclaration, ShapeRange};
-use crate::error::{Error, Result};
-use serde::Serialize;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
-/// Columns of a result at most.
+/// Columns of a result at most. Two findings side by side need 90; on a terminal that is wider still, an eye loses the line.
 const WIDTH: usize = 100;
-/// Findings that are told of many; one more is told rather than counted.
+/// Findings that are told of many: the largest five are nearly all of an error as a rule, and a reader acts on those. One more is told rather
+/// than counted, since "and 1 smaller" takes its place.
 const FOUND: usize = 5;
 /// Lines of them on a wide terminal.
 const LINES: usize = 3;
-/// Below this (mm) a mean error has four decimals.
+/// Below this (mm) a mean error has four decimals, or before and after would both read 0.00 something.
 const SMALL: f64 = 0.01;
 
 /// Columns that a result has, on a terminal of this width or elsewhere.
@@ -87,6 +85,7 @@ pub(super) fn found(findings: &[ShortFinding], width: usize) -> String {
         false => findings.len(),
     };
     let mut lines = in_lines(&findings, shown, width);
+    // On a narrow terminal each stands alone whatever is done: there the number of findings decides, not that of lines.
     while width >= WIDTH && lines.len() > LINES {
         shown -= 1;
         lines = in_lines(&findings, shown, width);
@@ -198,54 +197,6 @@ pub(super) fn cut(text: &str, width: usize) -> String {
     out + "…"
 }
 
-/// The file's text; `heading` says where it is from.
-pub(super) fn declared_in_yaml(declaration: &str, heading: &str) -> Result<String> {
-    let unreadable =
-        |error: serde_json::Error| Error::data("table forms", format!("`{declaration}`: {error}"));
-    let declared: EffectDeclaration = serde_json::from_str(declaration).map_err(unreadable)?;
-    let mut lines = vec![
-        format!("# {heading}."),
-        "# `with: {effects: [this file]}` below `uses: diagnose` tries it; rename it once its cause is known.".into(),
-        "calib_effect: 1".into(),
-        line("name", &declared.name),
-        line("place", &declared.place),
-    ];
-    lines.extend(declared.motion.iter().map(|motion| line("motion", motion)));
-    match &declared.law.0[..] {
-        [one] => lines.push(line("law", one)),
-        several => {
-            lines.push("law:".into());
-            lines.extend(several.iter().map(|law| format!("  - {}", json(law))));
-        }
-    }
-    if !declared.shape.is_empty() {
-        lines.push("shape:".into());
-    }
-    let shape = declared.shape.iter();
-    lines.extend(shape.map(|(name, range)| format!("  {name}: {}", bounds(range))));
-    lines.extend(declared.unit.iter().map(|unit| line("unit", unit)));
-    lines.extend(declared.sentence.iter().map(|text| line("sentence", text)));
-    Ok(lines.join("\n") + "\n")
-}
-
-fn line(key: &str, value: &impl Serialize) -> String {
-    format!("{key}: {}", json(value))
-}
-
-fn bounds(range: &ShapeRange) -> String {
-    format!(
-        "{{from: {}, to: {}, start: {}}}",
-        range.from,
-        range.to,
-        json(&range.start)
-    )
-}
-
-/// JSON's texts and lists are YAML's.
-fn json(value: &impl Serialize) -> String {
-    serde_json::to_string(value).expect("numbers and texts serialise")
-}
-
 /// Columns of a label.
 pub const LABEL: usize = 10;
 /// A terminal narrower than this breaks lines itself.
@@ -259,6 +210,7 @@ pub fn labelled(label: &str, text: &str) -> String {
 /// The same lines, none wider than `width` but for words that are longer and commands, which are there to be copied.
 pub fn folded(text: &str, width: usize) -> String {
     let fold = |line: &str| {
+        // A command that is broken over lines cannot be copied.
         if line.trim_start().starts_with("calib ") {
             format!("{line}\n")
         } else {

@@ -78,6 +78,7 @@ const TRIALS: &[(&str, &str, &str)] = &[
     ("masses", "torques", "{}"),
     ("compare_torques", "torques", "{}"),
     ("report_torques", "torques", "{}"),
+    ("report_drives", "drives", "{}"),
     (
         "compare",
         "points",

@@ -104,17 +104,25 @@ fn the_example_is_diagnosed_as_cloned_and_its_concealed_causes_are_named() {
         said.out
     );
     assert!(!said.out.contains("arcsec"), "{}", said.out);
-    let page = tempfile::tempdir().unwrap();
-    let file = page.path().join("drives.html");
+    let page_folder = tempfile::tempdir().unwrap();
+    let file = page_folder.path().join("drives.html");
     let written = of_the_example(&format!("diagnose --quiet --html {}", file.display()));
     assert_eq!(written.code, Some(0), "{}", written.err);
     let page = read(&file);
     assert_eq!(
         page.matches("<svg").count(),
-        4,
-        "two joints, angle and error"
+        6,
+        "two joints: the angle, and the error over time and speed"
     );
     assert!(page.contains("commanded") && page.contains("(lift)"));
+    let file = page_folder.path().join("antriebe.html");
+    let file = file.display();
+    let written = of_the_example(&format!("diagnose --quiet --html {file} --language de"));
+    assert_eq!(
+        (written.code, &*written.err),
+        (Some(0), ""),
+        "all is German"
+    );
 }
 
 #[test]

@@ -11,6 +11,7 @@ mod seat_compliance;
 mod settings;
 mod stages;
 mod tables;
+mod tutorials;
 mod typed;
 
 use blocks::root;

@@ -202,6 +202,27 @@ fn the_example_of_torques_is_solved_and_reported() {
         &format!("run --quiet --store {store} {}", pipeline.display()),
     )
     .ok();
+    let folder = tempfile::tempdir().unwrap();
+    let page = |name: &str, more: &str| {
+        let (file, pipeline) = (folder.path().join(name), pipeline.display());
+        let file = file.display();
+        let answer = calib(
+            ".",
+            &format!("diagnose --quiet --store {store} {pipeline} --html {file}{more}"),
+        );
+        assert_eq!((answer.code, &*answer.err), (Some(0), ""), "{name}");
+        std::fs::read_to_string(file.to_string()).unwrap()
+    };
+    let english = page("torques.html", "");
+    // Six joints over time, two of them over speed and load, and friction where it was found.
+    assert!(english.matches("<svg").count() >= 16, "{english}");
+    assert!(english.len() < 2_500_000, "{} bytes", english.len());
+    // All of it: what stays English is warned of.
+    let german = page("momente.html", " --language de");
+    assert!(
+        german.contains("Gelenk 2 hat eine Trockenreibung von 14,"),
+        "{german}"
+    );
 }
 
 /// Two mathematics that share nothing: sums over the bodies beyond each joint, and the estimator's recursion.

@@ -98,6 +98,15 @@ fn every_setting_that_a_help_shows_is_one_of_a_shipped_pipeline() {
 }
 
 #[test]
+fn every_verb_shows_an_example() {
+    let without: Vec<Vec<String>> = verbs(&[])
+        .into_iter()
+        .filter(|verb| !help(verb).contains("\nExamples:\n"))
+        .collect();
+    assert_eq!(without, Vec::<Vec<String>>::new());
+}
+
+#[test]
 fn the_help_has_every_verb_in_a_group_within_a_hundred_columns() {
     let text = help(&[]);
     for group in [

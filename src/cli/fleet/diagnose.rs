@@ -1,7 +1,7 @@
 //! `calib fleet diagnose`: causes that the robots of a model have in common.
 
 use super::super::surroundings::surroundings;
-use super::super::{emit, emit_json};
+use super::super::{emit, emit_json, warn};
 use super::cluster::EngineArguments;
 use super::run::{note, sound};
 use super::{FleetLocation, workshop};
@@ -107,6 +107,7 @@ impl FleetDiagnoseArguments {
             workshop.round = Some(search.round().clone());
         };
         let made = causes::publish(&fleet, &workshop.ledger, &search, &last)?;
+        warn(&made.untranslated);
         let seconds = begun.elapsed().as_secs_f64();
         if self.json {
             let rejected = last

@@ -17,6 +17,10 @@ use std::path::{Path, PathBuf};
 
 /// Run one pipeline over many robots: fleet files, workers, the state of each, tables and a page.
 #[derive(Args)]
+#[command(after_help = "Examples:
+  calib fleet run FLEET.yaml
+  calib fleet diagnose FLEET.yaml
+  calib fleet status FLEET.yaml --robot r7")]
 pub(super) struct FleetArguments {
     #[command(subcommand)]
     verb: FleetVerb,

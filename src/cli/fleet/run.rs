@@ -3,7 +3,7 @@
 //! `calib fleet exec`: the one command that a cluster runs; idempotent, and silent about names.
 
 use super::super::surroundings::surroundings;
-use super::super::{emit, emit_json};
+use super::super::{emit, emit_json, warn};
 use super::cluster::EngineArguments;
 use super::{FleetLocation, records, verdict, workshop};
 use crate::error::{Error, Result, counted, visible};
@@ -53,6 +53,9 @@ pub(super) struct FleetRunOptions {
 
 /// Compute robots again that were rejected or failed.
 #[derive(Args)]
+#[command(after_help = "Examples:
+  calib fleet retry FLEET.yaml --failed
+  calib fleet retry FLEET.yaml --failed --robot r7")]
 pub(super) struct RetryArguments {
     #[command(flatten)]
     place: FleetLocation,
@@ -125,6 +128,7 @@ fn run(
     }
     workshop.ledger.close(&note)?;
     let shown = tables::publish(fleet, &workshop.ledger, &all)?;
+    warn(&shown.untranslated);
     let seconds = begun.elapsed().as_secs_f64();
     if how.json {
         emit_json(&document(fleet, &note.run, &all, computed, seconds, &shown))?;

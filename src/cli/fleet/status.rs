@@ -34,6 +34,8 @@ pub(super) struct StatusArguments {
 
 /// Stop the latest run after the robots in hand, and take its jobs from the cluster.
 #[derive(Args)]
+#[command(after_help = "Examples:
+  calib fleet cancel FLEET.yaml")]
 pub(super) struct CancelArguments {
     #[command(flatten)]
     place: FleetLocation,

@@ -8,6 +8,7 @@ use calib::api::{self, Options, RunRequest};
 use calib::cli::{cores, open_store, surroundings};
 use calib::pipeline::StageTables;
 use calib::poses::PoseRequest;
+use calib::report::PageLanguage;
 use calib::table::Table;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -155,7 +156,9 @@ impl Robot {
                 .as_ref()
                 .map(|remarks| remarks.document("").to_string()),
             text: remarks.as_ref().map(|remarks| remarks.text("")),
-            page: remarks.and_then(|remarks| remarks.page("").ok()),
+            page: remarks
+                .and_then(|remarks| remarks.page("", PageLanguage::English).ok())
+                .map(|page| page.html),
             model: Py::new(py, Model::new(model))?,
             notes: given.notes.clone(),
             warnings: given.warnings.clone(),
@@ -307,7 +310,10 @@ impl Run {
             stage,
             summary.document("").to_string(),
             summary.text(""),
-            summary.page("").ok(),
+            self.0
+                .diagnosis_page(step, PageLanguage::English)
+                .ok()
+                .map(|page| page.html),
         ))
     }
 }

@@ -58,6 +58,11 @@ impl PageLanguage {
         }
     }
 
+    /// The language of a code.
+    pub(crate) fn of_code(code: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| known.code() == code)
+    }
+
     fn catalogue(self) -> Option<&'static Catalogue> {
         match self {
             Self::English => None,
@@ -140,7 +145,14 @@ impl Locale {
 
     /// A statement of a table as a sentence.
     pub(super) fn sentence(&self, statement: &str) -> String {
-        sentence_case(&self.stored(statement.trim_end_matches('.')))
+        let statement = statement.trim_end_matches('.');
+        // Some tables hold statements as sentences already.
+        let stored = self.language.stored(statement);
+        let stored = stored.or_else(|| self.language.stored(&with_small_letter(statement)));
+        sentence_case(&stored.unwrap_or_else(|| {
+            self.miss(statement);
+            statement.into()
+        }))
     }
 
     /// A number that was written with a decimal point.
@@ -178,6 +190,12 @@ impl Locale {
         });
         environment.add_global("lang", self.language.code());
     }
+}
+
+fn with_small_letter(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    let first = letters.next().map(|letter| letter.to_lowercase());
+    first.into_iter().flatten().chain(letters).collect()
 }
 
 /// A statement as a sentence.
@@ -318,8 +336,12 @@ impl Reading<'_> {
         if depth > DEEPEST {
             return None;
         }
-        let whole = self.table.whole.get(text).map(|whole| whole.to_string());
-        let found = whole.or_else(|| {
+        // The name of a cause is read as its words.
+        let whole = self.table.whole.get(text).copied().or_else(|| {
+            let words = text.contains('_').then(|| text.replace('_', " "))?;
+            self.table.whole.get(words.as_str()).copied()
+        });
+        let found = whole.map(str::to_string).or_else(|| {
             self.table.patterns.iter().find_map(|(pieces, other)| {
                 let mut holes = Vec::new();
                 let fits = self.fits(pieces, text, depth, &mut holes);

@@ -1,5 +1,6 @@
 //! The fleet's page at 5,000 robots: small, sorted in the browser, without a request.
 
+use calib::report::PageLanguage;
 use calib::report::fleet::html;
 use calib::table::{FleetChanges, FleetRow, FleetTable};
 use std::collections::BTreeMap;
@@ -48,7 +49,10 @@ fn page() -> String {
     let links: BTreeMap<String, String> = (0..5000)
         .map(|k| (format!("robot {k}"), format!("../line.{k}/report.html")))
         .collect();
-    html("line", &table, &FleetChanges::default(), &links).unwrap()
+    let changes = FleetChanges::default();
+    html("line", &table, &changes, &links, PageLanguage::English)
+        .unwrap()
+        .html
 }
 
 #[test]
@@ -69,7 +73,9 @@ fn robots_that_need_a_technician_come_first_with_the_reason() {
     table.0[2].verdict = Some("unexplained".into());
     table.0[4].flags = Some("zero of joint 2".into());
     table.0[5].after_rms_mm = Some(2.5);
-    let page = html("line", &table, &FleetChanges::default(), &BTreeMap::new()).unwrap();
+    let (changes, links) = (FleetChanges::default(), BTreeMap::new());
+    let page = html("line", &table, &changes, &links, PageLanguage::English).unwrap();
+    let page = page.html;
     let at = |text: &str| {
         page.find(text)
             .unwrap_or_else(|| panic!("{text} is not there"))
@@ -146,4 +152,35 @@ fn a_browser_sorts_and_filters_the_page_without_a_request() {
         dom.contains("aria-sort=\"ascending\"") && best < other,
         "sorted by the error after"
     );
+}
+
+#[test]
+fn the_page_is_german_but_for_names_and_reasons() {
+    let mut table = FleetTable((0..60).map(row).collect());
+    table.0[1].flags = Some(
+        "zero_shift joint 3 since 2026-04-01: +0.021 +- 0.002 deg zero_shift.j3.step (10.5 sigma)"
+            .into(),
+    );
+    table.0[1].changes = Some(1);
+    table.0[2].flags = Some(
+        "backlash joint 2 since 2026-04-01: diagnosed, it was not before; not in the campaign before"
+            .into(),
+    );
+    table.0[4].verdict = Some("unexplained".into());
+    table.0[5].verdict = Some("wrong_setup".into());
+    table.0[6].after_rms_mm = Some(9.0);
+    let (changes, links) = (FleetChanges::default(), BTreeMap::new());
+    let german = PageLanguage::German;
+    let page = html("line", &table, &changes, &links, german).unwrap();
+    assert_eq!(page.untranslated(german), Vec::<String>::new());
+    for said in [
+        "<html lang=\"de\">",
+        "Flotte line",
+        "Getriebe, periodisch (Gelenk 2)",
+        "seit 2026-04-01: +0,021 \u{b1} 0,002 \u{b0} zero_shift.j3.step",
+        "seine Einrichtung ist falsch",
+        "2,000",
+    ] {
+        assert!(page.html.contains(said), "{said} is not in {}", page.html);
+    }
 }

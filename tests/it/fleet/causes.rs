@@ -3,6 +3,7 @@
 use super::{fleet, output, write};
 use crate::answer::{has, read, root};
 use crate::fixture::spread;
+use calib::report::PageLanguage;
 use calib::report::fleet_causes::html;
 use calib::table::{FleetCellRow, FleetCells, FleetFindingRow, FleetFindings, FleetOutliers};
 use calib::twin::conceal::design::Design;
@@ -191,8 +192,9 @@ fn the_page_of_two_thousand_robots_is_small_and_the_furthest_robot_comes_first()
         &FleetFindings(vec![finding]),
         &cells,
         &FleetOutliers::default(),
+        PageLanguage::English,
     );
-    let page = page.unwrap();
+    let page = page.unwrap().html;
     assert!(page.len() < 2_000_000, "{}", page.len());
     assert!(page.contains("height: 75.0%") && !page.contains("<b>7"));
     assert_eq!(page.matches("class=\"sigma\"").count(), 2000);

@@ -1,6 +1,9 @@
 //! The report in a browser, where there is one: what it refuses or complains of stands on the console.
 
-use super::{html, tables::tables};
+use super::{
+    html,
+    tables::{tables, tables_of},
+};
 use crate::desk::skipped;
 use calib::stage::{Report, ReportPages};
 use std::path::{Path, PathBuf};
@@ -231,6 +234,33 @@ fn the_short_report_prints_on_at_most_four_pages() {
         .filter(|bytes| bytes == b"/Type /Page\n");
     let pages = pages.count();
     assert!((1..=4).contains(&pages), "{pages} pages");
+}
+
+/// Says in the page how long it took from the request until all of it was read, its scripts had run and it was laid out, ms.
+const OPENED: &str = r#"<pre id="opened"></pre><script>addEventListener("load", () => {
+  document.body.getBoundingClientRect();
+  document.getElementById("opened").textContent = Math.round(performance.now());
+})</script></main>"#;
+
+#[test]
+fn a_report_of_five_thousand_points_is_light_and_opens_at_once() {
+    let page = html(Report::default(), tables_of("Heavy 6R, cell 4", 5_000));
+    assert!(page.len() < 2_500_000, "{} bytes", page.len());
+    let Some(chromium) = chromium() else {
+        return skipped("no chromium on PATH");
+    };
+    let folder = folder(&page.replace("</main>", OPENED));
+    // By the clock on the wall, so that a machine which does other things gets three chances.
+    let opened = || -> Option<u32> {
+        let arguments = ["--dump-dom"];
+        let file = folder.path().join("report.html");
+        let output = browser(&chromium, folder.path(), &arguments, &file);
+        let dom = String::from_utf8_lossy(&output.stdout).into_owned();
+        let text = dom.split("<pre id=\"opened\">").nth(1)?.split('<').next()?;
+        text.parse().ok()
+    };
+    let best = (0..3).filter_map(|_| opened()).min();
+    assert!(best.is_some_and(|ms| ms < 2_000), "{best:?} ms");
 }
 
 /// What somebody does with the picture of the arm: turns it, looks at the errors after, and clicks on a point.

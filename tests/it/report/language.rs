@@ -12,10 +12,21 @@ const MESSAGES: &str = include_str!("../../../src/report/language/de.po");
 const STORED: &str = include_str!("../../../src/report/language/de_stored.po");
 
 /// Sources whose sentences stand in tables that the page shows.
-const SOURCES: [&str; 13] = [
+const SOURCES: [&str; 24] = [
+    "fleet/cause_answers",
+    "numerics/drives/causes",
+    "numerics/effect/words",
+    "numerics/dynamics/cause/",
+    "numerics/dynamics/even",
+    "numerics/dynamics/findings",
+    "numerics/dynamics/outcome",
+    "numerics/dynamics/spectrum",
+    "numerics/dynamics/used",
+    "table/drives",
     "numerics/compensate/remark",
     "numerics/diagnose/setup/",
     "numerics/diagnose/unasked",
+    "numerics/diagnose/verdict/",
     "numerics/diagnose/words/",
     "numerics/estimate/observe",
     "stage/advice",
@@ -29,8 +40,12 @@ const SOURCES: [&str; 13] = [
 ];
 /// A file of them that writes no sentence.
 const WORDLESS: &str = "numerics/diagnose/words/mod";
-/// Errors, notes of the terminal and markup among the sentences of these sources.
-const NOT_SHOWN: [&str; 7] = [
+/// Errors, notes of the terminal, names of numbers and markup among the sentences of these sources.
+const NOT_SHOWN: [&str; 11] = [
+    "not computed yet",
+    "share of dry friction",
+    "share of viscous friction",
+    "share per torque",
     "cross-validated error on its own training rows",
     "cannot be computed",
     "shows at best as an angle, without a stiffness",
@@ -39,6 +54,8 @@ const NOT_SHOWN: [&str; 7] = [
     "is no parameter of this robot",
     "numbers and names serialise",
 ];
+/// Units at the beginning of a part, the longer first.
+const UNITS: [&str; 6] = ["Nm s/rad", "Nm/rad", "Nm", "kg m2", "rad/s", "rad"];
 /// Words that make a part of a literal a sentence.
 const WORDS: usize = 3;
 
@@ -150,10 +167,15 @@ fn every_message_of_templates_and_sources_has_its_german_and_none_is_left_over()
     }
 }
 
-/// The templates of the report.
-const TEMPLATES: [&str; 2] = [
+/// The templates of pages that have languages.
+const TEMPLATES: [&str; 7] = [
     include_str!("../../../src/report/report.html"),
     include_str!("../../../src/report/head.html"),
+    include_str!("../../../src/report/torques.html"),
+    include_str!("../../../src/report/drives.html"),
+    include_str!("../../../src/report/diagnosed.html"),
+    include_str!("../../../src/report/fleet.html"),
+    include_str!("../../../src/report/fleet_causes.html"),
 ];
 
 #[test]
@@ -193,6 +215,13 @@ fn no_stored_sentence_of_the_sources_lacks_its_german() {
             parts(literal)
                 .into_iter()
                 .map(move |part| (file, part.trim_start_matches("in `ingest`: ").to_string()))
+        })
+        // Of a joint that slides the unit is another one.
+        .map(|(file, part)| {
+            let unit = UNITS.iter().find_map(|unit| part.strip_prefix(unit));
+            let rest = unit.filter(|rest| !rest.starts_with(char::is_alphanumeric));
+            let rest = rest.map(|rest| rest.trim_start_matches([' ', ';', ':', ',']).to_string());
+            (file, rest.unwrap_or(part))
         })
         // What is written into a pipeline or a robot file is YAML in every language.
         .filter(|(_, part)| part.matches('`').count().is_multiple_of(2))

@@ -34,7 +34,7 @@ pub fn point(
 }
 
 /// Noise and a smooth remainder that each step makes smaller.
-fn predictions() -> Vec<Prediction> {
+fn predictions(points: usize) -> Vec<Prediction> {
     let mut random = ChaCha8Rng::seed_from_u64(20200116);
     let mut normal = move || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
     let steps = [
@@ -43,7 +43,7 @@ fn predictions() -> Vec<Prediction> {
         ("stiffness", 0.25, 0.16),
         ("network", 0.05, 0.1),
     ];
-    let places: Vec<[f64; 3]> = (0..500)
+    let places: Vec<[f64; 3]> = (0..points)
         .map(|_| {
             [
                 1900.0 + 420.0 * normal(),
@@ -514,7 +514,12 @@ fn rejected(rows: i64) -> Vec<Labelled<Rejected>> {
 
 /// The tables of a whole pipeline of a robot with this name.
 pub fn tables(name: &str) -> ReportReads {
-    let prediction = predictions();
+    tables_of(name, 500)
+}
+
+/// The same of so many points.
+pub fn tables_of(name: &str, points: usize) -> ReportReads {
+    let prediction = predictions(points);
     let last = &prediction[3].0;
     let split = last
         .iter()
