@@ -7,7 +7,7 @@ FOLDER holds the public sets, as far as they were fetched (pipelines/proof/real/
   ur10_bags  ur10_exciting_trajectory.db3                tx40      curr_data.csv and pos_read_data.csv
 The rows are those that calib read (its table of motion) and fitted. Least squares know nothing of noise, of other causes and of tolerances: viscous and
 Coulomb friction (none where it would drive) and an offset of every joint, load friction where calib names it, beside the rigid arm: point masses that span the ten numbers of
-each link, gravity and inertia of the pendulum, or the controller's own torques. The width over which the sign of friction turns is the best of a few.
+each link, the inertia of the pendulum of known weight, or the controller's own torques. The width over which the sign of friction turns is the best of a few.
 Prints a line a number: calib's, that of least squares, and the ratio. Needs numpy.
 """
 
@@ -47,7 +47,7 @@ def chain(lines):
     return Arm(axes, points, [False] * count, pose[:3, 3], [0] * count, points, [[0, 0, 0]] * count)
 
 
-# The recordings: a pipeline in a folder, and how their rigid torque is modelled.
+# The recordings: a pipeline in a folder; columns of the rigid torque, joints whose motor turns with another joint, and what is known of the torque.
 
 
 def head(name):
@@ -66,7 +66,7 @@ def put(folder, name, text):
 
 def xl330(source, out):
     real_torques.xl330(source, out)
-    return (lambda q, v, a: [[np.sin(q[:, 0])], [a[:, 0]]]), {}
+    return (lambda q, v, a: [[a[:, 0]]]), {}, lambda q: 0.49 * G * 0.1 * np.sin(q)
 
 
 def ur3e(source, out):
@@ -79,7 +79,7 @@ def ur3e(source, out):
     file = os.path.abspath(os.path.join(source, "fig9.xlsx"))
     put(out, "pipeline.yaml", head("ur3e") + "- {uses: robot, with: {file: arm/robot.yaml}}\n- uses: ingest_torques\n  with:\n    files:\n"
         f"    - file: {file}\n      columns:\n        time: {{column: timestamp, unit: s}}\n{columns}- uses: diagnose_torques\n")
-    return (lambda q, v, a: []), {}
+    return (lambda q, v, a: []), {}, nothing
 
 
 def ur10(source, out):
@@ -92,7 +92,7 @@ def ur10(source, out):
     put(out, "robot.yaml", robot_of(UR10, "UR10"))
     put(out, "pipeline.yaml", head("ur10") + "- {uses: robot, with: {file: robot.yaml}}\n- uses: ingest_torques\n  with:\n    files:\n"
         f"    - file: {file}\n      topic: /joint_states\n      columns:\n        time: {{column: stamp, unit: s}}\n{columns}- uses: diagnose_torques\n")
-    return by_masses(chain(UR10)), {}
+    return by_masses(chain(UR10)), {}, nothing
 
 
 def tx40(source, out):
@@ -108,7 +108,11 @@ def tx40(source, out):
     put(out, "robot.yaml", robot_of(TX40, "TX40"))
     put(out, "pipeline.yaml", head("tx40") + "- {uses: robot, with: {file: robot.yaml}}\n- uses: ingest_torques\n  with:\n    files:\n    - file: log.csv\n"
         "      columns:\n        time: {column: t, unit: s}\n        q: {column: 'q{j}', unit: rad}\n        torque: {column: 'u{j}', unit: Nm}\n- uses: diagnose_torques\n")
-    return by_masses(chain(TX40)), {5: 4}
+    return by_masses(chain(TX40)), {5: 4}, nothing
+
+
+def nothing(q):
+    return np.zeros(q.shape)
 
 
 def by_masses(arm):
@@ -151,7 +155,7 @@ def columns_of(table, what):
 class Run:
     """A trajectory at even times: angles, their derivatives, torques, and which rows are fitted."""
 
-    def __init__(self, table, rows, fitted, torque, cutoff):
+    def __init__(self, table, rows, fitted, torque, cutoff, known):
         time = table["time_s"][rows]
         step = np.median(np.diff(time))
         even = time[0] + step * np.arange(int((time[-1] - time[0]) / step) + 1)
@@ -162,7 +166,8 @@ class Run:
         self.a = np.gradient(self.v, step, axis=0)
         simulated = columns_of(table, "sim_tau")
         self.simulated = None if simulated is None else at(simulated)
-        self.torque = at(torque) - (0 if simulated is None else self.simulated)
+        self.known = known(self.q)
+        self.torque = at(torque) - self.known - (0 if simulated is None else self.simulated)
         use = np.interp(even, time, fitted[rows]) > 0.5
         use[: int(self.rate)] = use[-int(self.rate) :] = False
         self.rows = np.flatnonzero(use)[:: max(1, int(self.rate / (2.5 * cutoff)))]
@@ -172,10 +177,10 @@ class Run:
         return low_passed(course, self.rate, self.cutoff)[self.rows]
 
 
-def runs(table, fitted, torque, cutoff):
+def runs(table, fitted, torque, cutoff, known):
     edges = np.flatnonzero(np.diff(table["trajectory"])) + 1
     rows = [rows for rows in np.split(np.arange(len(table)), edges) if len(rows) > 200]
-    all = [Run(table, one, fitted, torque, cutoff) for one in rows]
+    all = [Run(table, one, fitted, torque, cutoff, known) for one in rows]
     return [run for run in all if len(run.rows)]
 
 
@@ -212,7 +217,7 @@ def solved(all, base, width, load, rigid, coupled, drives):
     scale = np.linalg.norm(matrix, axis=0) + 1e-12
     values, *_ = np.linalg.lstsq(matrix / scale, right, rcond=SHOWN)
     left = np.sum((right - matrix / scale @ values) ** 2)
-    values, masses = values / scale, len(base[0])
+    values, masses = np.where(scale > 1e-9, values / scale, 0), len(base[0])
     found, k = [], masses
     for j in joints:
         found.append(values[k : k + 3 + load[j]])
@@ -233,7 +238,7 @@ def least_squares(all, masses, load, coupled):
     if any(load) and rigid[0] is None:
         # The load is that of the masses without load friction.
         weights = best(none)[1]
-        rigid = [sum(weight * np.array(column).T for weight, column in zip(weights, columns)) for columns in base]
+        rigid = [run.known + sum(weight * np.array(column).T for weight, column in zip(weights, columns)) for run, columns in zip(all, base)]
     _, _, found, width = best(load)
     return width, found
 
@@ -284,13 +289,13 @@ def torques(folder, table):
 def compare(name, folder, rigid, cutoff):
     asked(folder, ["run", "pipeline.yaml", "--quiet", "--set", f"diagnose_torques.cutoff_hz={cutoff}"])
     table, usage = motion(folder)
-    masses, coupled = rigid
+    masses, coupled, known = rigid
     joints = columns_of(table, "q").shape[1]
     by = findings(folder)
     load = [sum(name.startswith("share") for name in by.get(("load_friction", f"joint {j + 1}"), [])) for j in range(joints)]
     labels = set(usage)
     fitted = (usage == "fit").astype(float) if {"fit"} < labels else (np.arange(len(table)) < 0.7 * len(table)).astype(float)
-    width, numbers = least_squares(runs(table, fitted, torques(folder, table), cutoff), masses, load, coupled)
+    width, numbers = least_squares(runs(table, fitted, torques(folder, table), cutoff, known), masses, load, coupled)
     within = []
     for j in range(joints):
         place = f"joint {j + 1}"
@@ -301,6 +306,11 @@ def compare(name, folder, rigid, cutoff):
         also = sorted(effect for effect, where in by if where == place and effect not in names + ["load_friction"])
         for effect, quantity, k in lines:
             ours, theirs = by.get((effect, place), {}).get(quantity), numbers[j][k]
+            if quantity == "coulomb" and ours is not None:
+                # Of one that is greater in one direction, the mean of both.
+                ours += 0.5 * by.get(("asymmetric_friction", place), {}).get("asymmetry", 0)
+            if ours is None and theirs == 0:
+                continue
             ratio = ours / theirs if ours is not None and theirs else None
             good = ratio is not None and abs(ratio - 1) <= SHARE
             within.append(good)

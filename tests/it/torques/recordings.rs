@@ -456,3 +456,35 @@ fn a_torque_that_acts_a_little_later_than_its_row_makes_no_other_friction() {
         );
     }
 }
+
+#[test]
+fn a_name_that_is_left_out_leaves_a_finding_without_a_name_at_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path().join("case");
+    Planar::new(1, 61).write(&at);
+    let store = folder.path().join("store");
+    let without = "--json --set diagnose_torques.without=[coulomb_friction]";
+    let answer = super::diagnose(&at, &store, without).ok();
+    let found: serde_json::Value = serde_json::from_str(&answer).unwrap();
+    let findings = found["findings"].as_array().unwrap();
+    let mut names: Vec<_> = (findings.iter())
+        .map(|one| {
+            (
+                one["effect"].as_str().unwrap(),
+                one["where"].as_str().unwrap(),
+            )
+        })
+        .collect();
+    names.sort_unstable();
+    assert_eq!(
+        names,
+        [("unknown", "joint 1"), ("viscous_friction", "joint 1")]
+    );
+    let whole = document(&at, &store);
+    let [left, right] =
+        [&found, &whole].map(|one| one["after"]["validate_nrmse"].as_f64().unwrap());
+    assert!(
+        (left - right).abs() < 1e-12,
+        "what explains the torques stays: {left}, {right}"
+    );
+}
