@@ -6,7 +6,7 @@ FOLDER holds the public sets, as far as they were fetched (pipelines/proof/real/
   xl330_bam  the servo with a pendulum, JSON files       ur3e_rad  fig9.xlsx, RTDE of a UR3e
   ur10_bags  ur10_exciting_trajectory.db3                tx40      curr_data.csv and pos_read_data.csv
 The rows are those that calib read (its table of motion) and fitted. Least squares know nothing of noise, of other causes and of tolerances: viscous and
-Coulomb friction (none where it would drive) and an offset of every joint, load friction where calib names it, beside the rigid arm: point masses that span the ten numbers of
+Coulomb friction (none that would drive) and an offset of every joint, load friction where calib names it, beside the rigid arm: point masses that span the ten numbers of
 each link, the inertia of the pendulum of known weight, or the controller's own torques. The width over which the sign of friction turns is the best of a few.
 Prints a line a number: calib's, that of least squares, and the ratio. Needs numpy.
 """
@@ -185,13 +185,13 @@ def runs(table, fitted, torque, cutoff, known):
 
 
 def friction(run, joint, width, load, rigid, coupled, drives):
-    """Courses at joints: (joint, course) of each coefficient; none of Coulomb friction that `drives`."""
+    """Courses at joints: (joint, course) of each coefficient; none of viscous (0) and Coulomb friction (1) that `drives`."""
     ones, also = np.ones(len(run.q)), coupled.get(joint)
     v = run.v[:, joint] + (run.v[:, also] if also is not None else 0)
     sign = np.tanh(v / width)
-    brakes = 0 if joint in drives else sign
+    viscous, coulomb = [0 * ones if (joint, k) in drives else course for k, course in enumerate((v, sign))]
     at = [joint] if also is None else [joint, also]
-    columns = [[(j, v) for j in at], [(j, brakes * ones) for j in at], [(joint, ones)]]
+    columns = [[(j, viscous) for j in at], [(j, coulomb) for j in at], [(joint, ones)]]
     if load:
         forward = 0.5 * (1 + np.sign(rigid) * sign)
         for share in [ones] if load == 1 else [forward, 1 - forward]:
@@ -232,7 +232,7 @@ def least_squares(all, masses, load, coupled):
 
     def best(load, drives=()):
         found = min((solved(all, base, width, load, rigid, coupled, drives) + (width,) for width in WIDTHS), key=lambda one: one[0])
-        negative = [j for j, numbers in enumerate(found[2]) if numbers[1] < 0 and j not in drives]
+        negative = [(j, k) for j, numbers in enumerate(found[2]) for k in (0, 1) if numbers[k] < 0 and (j, k) not in drives]
         return best(load, [*drives, *negative]) if negative else found
 
     if any(load) and rigid[0] is None:

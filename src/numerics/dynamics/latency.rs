@@ -45,8 +45,12 @@ impl TorqueProblem<'_> {
     }
 
     /// Lets the torque of each joint come earlier or later by what is too little to be called a latency: a command that is held until the next row
-    /// acts half a period later than its row, and friction that is asked to take that up is another friction.
+    /// acts half a period later than its row, and friction that is asked to take that up is another friction. Where masses are identified, too,
+    /// rows that are held out are predicted better without it (a UR10: 0.103 of the torques' rms against 0.109).
     pub(super) fn let_come_later(&mut self) {
+        if self.scene.declared.is_none() && self.scene.beyond.is_none() {
+            return;
+        }
         let first = self.all.base_changes.len();
         for joint in 0..self.joints() {
             self.all.columns[first + joint] = self.come_later(joint);
