@@ -179,7 +179,7 @@ pub(super) fn of_torques(found: &mut [ExaminedFile]) -> bool {
     let driven = |file: &ExaminedFile, listed| !file.by_joint(listed).is_empty();
     let fits = |file: &ExaminedFile| {
         let moves = file.has("q") && file.has("time") && !file.has("x");
-        moves && (driven(file, TORQUES) || driven(file, CURRENTS))
+        moves && (file.has("torque") || driven(file, TORQUES) || driven(file, CURRENTS))
     };
     let all = !found.is_empty() && found.iter().all(fits);
     if all {
@@ -241,6 +241,10 @@ impl ExaminedFile {
     }
 
     fn drives(&mut self) {
+        // Columns without a header are mapped by their values.
+        if self.has("torque") {
+            return;
+        }
         self.mappings
             .retain(|mapping| WITH_TORQUES.contains(&mapping.quantity));
         let [torques, currents, velocities] =

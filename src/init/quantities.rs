@@ -15,6 +15,9 @@ const MOST_DEGREES: f64 = 400.0;
 const MOST_RADIANS: f64 = 6.5;
 /// rad: no joint turns as often.
 const MOST_TURNS: f64 = 65.0;
+/// Rows of an arm that moves, at least, and what an angle goes on by from one to the next, on average, over its range.
+const LEAST_ROWS: f64 = 20.0;
+const STEP: f64 = 0.1;
 /// Beyond this coordinates are millimetres, by the size of robots.
 const MOST_METRES: f64 = 50.0;
 
@@ -23,7 +26,7 @@ pub(super) fn examine(path: &Path, places: usize, joints: usize) -> Result<Vec<E
     let examined = |sheet| {
         let mut found = ExaminedFile::unknown(path, sheet);
         if !found.sheet.header {
-            found.bare();
+            found.bare(joints);
         } else if found.sheet.trouble.is_none() {
             found.joints(joints);
             found.point();
@@ -39,8 +42,9 @@ pub(super) fn examine(path: &Path, places: usize, joints: usize) -> Result<Vec<E
 }
 
 impl ExaminedFile {
-    /// A list of points, or of joints, without a header: perhaps names, then three lengths, or six or seven angles.
-    fn bare(&mut self) {
+    /// A list without a header: of points or joints, perhaps names, then three lengths, or six or seven angles; or of an arm of `count` joints
+    /// that moved.
+    fn bare(&mut self, count: usize) {
         let width = self.sheet.names.len();
         // A name in parts (collection, group, point) stands in columns of its own.
         let texts = (0..width).take_while(|column| !self.sheet.is_numeric(*column));
@@ -49,6 +53,9 @@ impl ExaminedFile {
         let named = texts.max(numbered);
         let columns: Vec<usize> = (named..width).collect();
         if !columns.iter().all(|column| self.sheet.is_numeric(*column)) {
+            return;
+        }
+        if texts == 0 && self.bare_motion(&(0..width).collect::<Vec<_>>(), count) {
             return;
         }
         let most = self.largest(&columns);
@@ -72,6 +79,72 @@ impl ExaminedFile {
         let account = format!("{what} ({})", self.shown(&columns));
         let check = "no header says so; is it right?".to_string();
         self.propose(quantity, [Choice::of(lines, columns)], [check], account);
+    }
+
+    /// Perhaps times, then angles, perhaps velocities, and torques, a column a joint each.
+    fn bare_motion(&mut self, columns: &[usize], count: usize) -> bool {
+        let times = columns.len() % count.max(1);
+        let parts: Vec<&[usize]> = columns[times..].chunks(count.max(1)).collect();
+        let is_clock = times == 0 || (times == 1 && self.runs(columns[0]));
+        let (&[q, ref between @ .., torque], true) = (&parts[..], count > 1 && is_clock) else {
+            return false;
+        };
+        let moves = |column: &usize| self.moves_on(*column);
+        if between.len() > 1 || self.largest(q) > MOST_DEGREES || !q.iter().all(moves) {
+            return false;
+        }
+        let unit = match self.largest(q) > MOST_RADIANS {
+            true => "deg",
+            false => "rad",
+        };
+        let check = "no header says so; is it right?";
+        let velocity = between
+            .first()
+            .map(|columns| ("velocity", *columns, "rad/s"));
+        let parts = [("q", q, unit)].into_iter().chain(velocity);
+        let parts: Vec<_> = parts.chain([("torque", torque, "Nm")]).collect();
+        self.sheet.trouble = None;
+        for (quantity, columns, unit) in parts {
+            let (first, last) = (columns[0] + 1, columns[columns.len() - 1] + 1);
+            let line = self.joints_line(quantity, columns, Some(unit));
+            let account = format!("{quantity} (columns {first} to {last})");
+            self.propose(
+                quantity,
+                [Choice::of(vec![line], columns.to_vec())],
+                [check.into()],
+                account,
+            );
+        }
+        match times {
+            1 => self.map("time", &columns[..1], Some("s"), Some("the unit".into())),
+            _ => {
+                let line = "time: {rate: 100}".to_string();
+                let check = "rows a second; nothing says how many".to_string();
+                self.propose(
+                    "time",
+                    [Choice::of(vec![line], Vec::new())],
+                    [check],
+                    "time by a rate".into(),
+                );
+            }
+        }
+        true
+    }
+
+    /// Whether a column goes on from row to row, as angles of an arm that moves do and those of poses do not.
+    fn moves_on(&self, column: usize) -> bool {
+        let values: Vec<f64> = self.sheet.numbers(column).collect();
+        let steps: f64 = values
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]).abs())
+            .sum();
+        let [least, most] = values
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
+                [a.min(*x), b.max(*x)]
+            });
+        let rows = values.len() as f64;
+        rows > LEAST_ROWS && steps <= STEP * rows * (most - least)
     }
 
     fn joints(&mut self, count: usize) {

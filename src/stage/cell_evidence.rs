@@ -78,7 +78,7 @@ impl Stage for CellEvidence {
 }
 
 crate::stage::stage! {
-    TorqueEvidence, "torque_evidence", 7, "says what every possible cause explains of the torques of one robot",
+    TorqueEvidence, "torque_evidence", 8, "says what every possible cause explains of the torques of one robot",
         DiagnoseTorquesReads -> CellEvidenceWrites
 }
 

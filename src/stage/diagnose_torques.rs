@@ -77,7 +77,7 @@ pub enum ConsistencySetting {
 const LAST: f64 = 0.3;
 
 crate::stage::stage! {
-    DiagnoseTorques, "diagnose_torques", 21, "names the physics that the simulated torques of a moving arm lack",
+    DiagnoseTorques, "diagnose_torques", 22, "names the physics that the simulated torques of a moving arm lack",
         DiagnoseTorquesReads {
             robot: Robot,
             motion: Chunks<ArmMotion>,

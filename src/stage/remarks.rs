@@ -9,7 +9,7 @@ use crate::robot::{Measurements, RobotModel};
 use crate::table::Recording;
 use crate::units::Unit;
 use nalgebra::Vector3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What is said where cells of the column are empty.
 pub(super) fn blank_payload(recording: &Recording) -> Option<String> {
@@ -30,24 +30,61 @@ pub(super) fn blank_payload(recording: &Recording) -> Option<String> {
 /// Copies that are named.
 const COPIES_NAMED: usize = 3;
 
-/// Rows (second) whose joints and measured point are those of an earlier row (first) to the last digit.
+/// Numbers to the last digit, and the target where there are several.
+type Digits<'a> = (Vec<u64>, Option<&'a str>);
+
+/// Rows (second) whose joints and measured point are those of an earlier row (first) to the last digit. Where joints or points come back to a few
+/// counts of an encoder, as one does that dithers between two, rows are alike without being copies.
 pub(super) fn copied_rows(recording: &Recording) -> Vec<(usize, usize)> {
-    let mut first: BTreeMap<(Vec<u64>, Option<&str>), usize> = BTreeMap::new();
+    let digits =
+        |values: &[f64]| -> Vec<u64> { values.iter().map(|value| value.to_bits()).collect() };
+    let target = |row: usize| {
+        recording
+            .target
+            .as_ref()
+            .and_then(|all| all[row].as_deref())
+    };
+    let rows: Vec<(usize, Digits, Digits)> = (0..recording.rows())
+        .filter_map(|row| {
+            let point = digits(&recording.point(row)?);
+            Some((
+                row,
+                (digits(recording.q(row)), target(row)),
+                (point, target(row)),
+            ))
+        })
+        .collect();
+    let counted_joints = counted_alike(rows.iter().map(|(_, joints, point)| (joints, point)));
+    let counted_points = counted_alike(rows.iter().map(|(_, joints, point)| (point, joints)));
+    let mut first: BTreeMap<(&Digits, &Digits), usize> = BTreeMap::new();
     let mut copies = Vec::new();
-    for row in 0..recording.rows() {
-        let Some(point) = recording.point(row) else {
-            continue;
-        };
-        let values = recording.q(row).iter().chain(&point);
-        let values = values.map(|value| value.to_bits()).collect();
-        let targets = recording.target.as_ref();
-        let target = targets.and_then(|all| all[row].as_deref());
-        let earlier = *first.entry((values, target)).or_insert(row);
-        if earlier != row {
-            copies.push((earlier, row));
+    for (row, joints, point) in &rows {
+        let earlier = *first.entry((joints, point)).or_insert(*row);
+        let is_counted = counted_joints.contains(joints) || counted_points.contains(point);
+        if earlier != *row && !is_counted {
+            copies.push((earlier, *row));
         }
     }
     copies
+}
+
+/// Of pairs, the firsts whose seconds are several but no more than half of their rows.
+fn counted_alike<'a>(
+    pairs: impl Iterator<Item = (&'a Digits<'a>, &'a Digits<'a>)>,
+) -> BTreeSet<&'a Digits<'a>> {
+    let mut seconds: BTreeMap<&Digits, (usize, BTreeSet<&Digits>)> = BTreeMap::new();
+    for (one, second) in pairs {
+        let (rows, different) = seconds.entry(one).or_default();
+        *rows += 1;
+        different.insert(second);
+    }
+    let is_counted =
+        |(rows, different): &(usize, BTreeSet<&Digits>)| (2..=rows / 2).contains(&different.len());
+    seconds
+        .into_iter()
+        .filter(|(_, of_one)| is_counted(of_one))
+        .map(|(one, _)| one)
+        .collect()
 }
 
 /// What is said of them; none where there are none.

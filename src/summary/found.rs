@@ -1,7 +1,7 @@
 //! A finding in a few words: what it is, its number, its size, and what it might be instead.
 
 use super::estimate::{angle, estimate, length};
-use crate::effect::{figure, names};
+use crate::effect::{Clock, Form, Summary, cause, figure, names};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -116,15 +116,24 @@ pub(super) fn words(effect: &str, place: &str) -> String {
     }
 }
 
-/// How the statement of a finding without a name ends, before its size.
-const UNNAMED: &str = ", unnamed";
-
-/// Place, motion and variable of a finding without a name, as its statement has them.
-fn unnamed(found: &Found) -> String {
-    match found.statement.split_once(UNNAMED) {
-        Some((what, _)) => format!("{what}{UNNAMED}"),
-        None => words(&found.effect, &found.place),
-    }
+/// Place, motion and variables of a finding without a name, by its forms; words for its place alone where these are of a cause whose name it does
+/// not bear.
+fn unnamed(found: &Found, rows: bool) -> String {
+    let forms: Vec<Form> = serde_json::from_str(&found.forms).unwrap_or_default();
+    let is_nameless = forms.iter().all(|form| form.cause().is_nameless());
+    let first = forms.first().filter(|_| is_nameless);
+    let described = first.zip(cause(names::UNKNOWN)).map(|(first, unknown)| {
+        unknown.sentence(&Summary {
+            place: first.place(),
+            forms: &forms,
+            parameters: &[],
+            clock: match rows {
+                true => Clock::Rows,
+                false => Clock::Seconds { first: 0.0 },
+            },
+        })
+    });
+    described.unwrap_or_else(|| words(&found.effect, &found.place))
 }
 
 impl ShortFinding {
@@ -158,7 +167,7 @@ impl ShortFinding {
         let mut what = if of_rows {
             found.statement.trim_end_matches('.').to_string()
         } else if effect == names::UNKNOWN {
-            unnamed(found)
+            unnamed(found, rows)
         } else {
             words(effect, &found.place)
         };
@@ -336,7 +345,7 @@ fn amplitude(all: &[FoundNumber]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::CAUSES;
+    use crate::effect::{Basis, CAUSES, Law, Motion, Term, Unknown, Variable};
     use serde_json::json;
 
     fn rival(effect: &str, probability: f64) -> FoundRival {
@@ -474,16 +483,18 @@ mod tests {
             rivals: rivals(),
             ..found("unknown", numbers())
         };
+        let joint = Motion::Joint { joint: 2 };
+        let law = Law::new(Variable::Angle { joint: 4 }, Basis::PROPORTIONAL);
+        let form = Form::from(Term::new(&Unknown, joint, law));
         let stated = Found {
-            statement: "joint 3 tilts with the angle of joint 5, unnamed (31 um rms at the tool)."
-                .into(),
+            forms: serde_json::to_string(&[form]).expect("JSON"),
             ..far.clone()
         };
         assert_eq!(lines_of(far), ["an unnamed error of joint 3", "", ""]);
         let stated = lines_of(stated);
         assert_eq!(
             stated,
-            ["joint 3 tilts with the angle of joint 5, unnamed", "", ""]
+            ["joint 3 errs with the angle of joint 5, unnamed", "", ""]
         );
     }
 

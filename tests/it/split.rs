@@ -199,6 +199,23 @@ fn no_choice_parts_the_targets_of_a_pose() {
 }
 
 #[test]
+fn points_of_an_encoder_that_dithers_between_two_counts_are_no_copies() {
+    // Four poses, each read six times: the joint stands, one coordinate is one of two counts.
+    let mut all = recording(&[
+        0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3, 3,
+    ]);
+    let count = |row: usize| 1.534e-3 * f64::from(u8::from([1, 4, 5].contains(&(row % 6))));
+    all.position = (0..24)
+        .map(|row| [1.0 + all.q[row], 2.0 + count(row), 3.0])
+        .collect();
+    let desk = Desk::default();
+    let read = SplitReads { recording: all };
+    desk.run(&settings("{by: every, n: 4}"), read).unwrap();
+    let said = desk.warnings.lock().unwrap().join(" ");
+    assert!(!said.contains("copies"), "{said}");
+}
+
+#[test]
 fn copies_of_a_row_under_other_ids_stay_in_one_set_and_are_counted() {
     let copied = || {
         let mut all = recording(&[0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3]);

@@ -1,9 +1,11 @@
 """Inputs for `calib diagnose` of public recordings of real arms, and the marks of what is known of them.
 
     python real_torques.py xl330 FOLDER_OF_THE_SET OUT     a servo with a pendulum, by duty (Rhoban/bam, Apache-2.0)
+    python real_torques.py backlash FILE SERVO UP DOWN     a servo that holds its angle while two others push it (roboninecom, CC BY 4.0)
 
-Writes OUT/robot.yaml, OUT/recording.csv and OUT/pipeline.yaml; run `calib diagnose OUT/pipeline.yaml`. What is known of the set, and
-today's figures, are in pipelines/proof/real/README.md. Nothing but Python's own library is needed.
+The first writes OUT/robot.json, OUT/recording.csv and OUT/pipeline.yaml; run `calib diagnose OUT/pipeline.yaml`. The second prints between which
+angles SERVO rests after it was pushed up by the servo UP and down by DOWN, and between which it stands while they push: its makers' backlash.
+What is known of the sets, and today's figures, are in pipelines/proof/real/README.md. Nothing but Python's own library is needed.
 """
 
 import csv
@@ -59,7 +61,39 @@ def xl330(source, out):
         )
 
 
+# Counts by which a servo that pushes is away from where it waits.
+AWAY = 100
+
+
+def backlash(source, servo, *pushers):
+    with open(source) as file:
+        rows = list(csv.DictReader(file))
+    waits = [float(rows[0][f"target pos ({pusher})"]) for pusher in pushers]
+    stands = {"at rest": {}, "pushed": {}}
+    last, before = None, None
+    for row in rows:
+        target, angle = row[f"target pos ({servo})"], row[f"pos ({servo})"]
+        places = [row[f"pos ({pusher})"] for pusher in pushers]
+        if not angle or not all(places):
+            continue
+        if target != before:
+            # It moved by itself: from where it came is no push.
+            last, before = None, target
+        away = [abs(float(place) - wait) > AWAY for place, wait in zip(places, waits)]
+        if any(away):
+            last = away.index(True)
+        moves = any(float(row[f"speed ({one})"]) for one in (servo, *pushers))
+        if last is not None and not moves:
+            stands["pushed" if any(away) else "at rest"].setdefault(last, []).append(float(angle))
+    for what, sides in stands.items():
+        up, down = [sum(sides[side]) / len(sides[side]) for side in (0, 1)]
+        print(f"{what}: {(up - down) * 360 / 4096:.2f} deg ({len(sides[0])} and {len(sides[1])} rows)")
+
+
 if __name__ == "__main__":
-    if len(sys.argv) != 4 or sys.argv[1] != "xl330":
+    if len(sys.argv) == 4 and sys.argv[1] == "xl330":
+        xl330(sys.argv[2], sys.argv[3])
+    elif len(sys.argv) == 6 and sys.argv[1] == "backlash":
+        backlash(*sys.argv[2:])
+    else:
         sys.exit(__doc__)
-    xl330(sys.argv[2], sys.argv[3])

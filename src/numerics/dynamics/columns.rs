@@ -331,6 +331,13 @@ impl TorqueColumns {
         }
     }
 
+    /// Takes a further column of the base, before any form; whose coefficient is held at 0 until something is known of it beforehand.
+    pub(crate) fn take_held(&mut self, column: TorqueColumn) {
+        self.columns.push(column);
+        self.prior.push(f64::INFINITY);
+        self.base = self.columns.len();
+    }
+
     /// Columns of a form by those of one at another joint, where they are alike.
     pub(crate) fn alike(&self, form: &TorqueForm) -> Option<Vec<TorqueColumn>> {
         let known = self.forms.iter().position(|known| {

@@ -9,7 +9,7 @@ use super::model::{COVERAGE, JointRange, TorqueModel, TorqueTerm};
 use super::problem::TorqueProblem;
 use super::recording::{ends, largest};
 use super::refine::{ShapeNumber, ShapeSlopes};
-use super::sliding::{said_at, unit_at};
+use super::sliding::unit_of;
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueFinding};
 use crate::criteria::cells::{MISLED, RIVAL};
@@ -95,10 +95,10 @@ impl<'a> FittedSet<'a> {
             false => self.choice.base.with(&all_but(self.set, number)).solution(),
         };
         let gain = || held_out_gain(problem, &left_without, &self.solution, held_out);
-        let slides = form.slides(&problem.scene.arm.prismatic);
+        let unit = unit_of(form.slides(&problem.scene.arm.prismatic));
         let mut parameters = (form.cause.parameters)(form, &fitted);
         for parameter in &mut parameters {
-            parameter.unit = unit_at(slides, parameter.unit);
+            parameter.unit = unit(parameter.unit);
         }
         for span in form.shape_numbers() {
             if let Some(entry) = parameters.iter_mut().find(|one| one.name == span.name) {
@@ -108,7 +108,7 @@ impl<'a> FittedSet<'a> {
         TorqueFinding {
             effect: form.cause.name,
             place: form.place,
-            statement: said_at(slides, (form.cause.statement)(form, &fitted)),
+            statement: (form.cause.statement)(form, &fitted, unit),
             parameters,
             evidence: Evidence {
                 delta_bic: loss.square - rank * (self.choice.weighted.rows as f64).ln(),

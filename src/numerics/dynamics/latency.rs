@@ -1,8 +1,9 @@
 //! How much later torques come than the positions of their rows, and by how much friction turns before the velocity does: friction that a
 //! simulator lets a solver find turns with velocity and acceleration, and velocities that a drive smooths lag behind the friction that it feels.
 
+use super::columns::TorqueColumn;
 use super::problem::{TorqueProblem, basic_forms, noise_of_fit};
-use super::recording::square;
+use super::recording::{add, square};
 use super::refine::{FrictionFit, take_sign_widths};
 use super::sweep::SweptColumns;
 use super::weighted::{NoiseMemory, Weighing};
@@ -27,6 +28,35 @@ pub(super) struct Latency {
     pub(crate) sigma: f64,
     /// Fall of the whitened squared residual.
     pub(crate) gain: f64,
+}
+
+impl TorqueProblem<'_> {
+    /// Nm per s by which the torque of a joint comes later.
+    pub(super) fn come_later(&self, joint: usize) -> TorqueColumn {
+        let step = 0.5 / self.scene.rate;
+        let [mut course, before] =
+            [step, -step].map(|step| self.torque_at(joint, self.latency + step));
+        add(&mut course, -1.0, &before);
+        course.iter_mut().for_each(|value| *value /= -2.0 * step);
+        TorqueColumn {
+            joints: vec![joint],
+            courses: vec![course],
+        }
+    }
+
+    /// Lets the torque of each joint come earlier or later by what is too little to be called a latency: a command that is held until the next row
+    /// acts half a period later than its row, and friction that is asked to take that up is another friction. Where masses are identified, too,
+    /// rows that are held out are predicted better without it (a UR10: 0.103 of the torques' rms against 0.109).
+    pub(super) fn let_come_later(&mut self) {
+        if self.scene.declared.is_none() && self.scene.beyond.is_none() {
+            return;
+        }
+        let first = self.all.base_changes.len();
+        for joint in 0..self.joints() {
+            self.all.columns[first + joint] = self.come_later(joint);
+            self.all.prior[first + joint] = LEAST.powi(-2);
+        }
+    }
 }
 
 /// Whether so many joints gain enough that all of them have it.

@@ -86,7 +86,7 @@ pub(super) fn outcome(
         remarks,
         basis: match problem.scene.declared {
             Some(_) => InertialBasis::Declared,
-            None => InertialBasis::Free(problem.all.base),
+            None => InertialBasis::Free(problem.all.base_changes.len()),
         },
         cutoff: problem.reduction.cutoff,
         rate: problem.reduction.rate,

@@ -123,7 +123,7 @@ impl<'a> TorqueProblem<'a> {
         problem
     }
 
-    /// Forms the columns of the base alone.
+    /// Forms the columns of the base alone: of inertial numbers, and of how much earlier or later each joint's torque may come, which is held.
     pub(crate) fn form_base(&mut self) {
         let half_range = |joint: usize| {
             let course = self.torque_at(joint, self.latency).into_iter();
@@ -133,6 +133,9 @@ impl<'a> TorqueProblem<'a> {
         };
         let torque = (0..self.joints()).map(half_range).collect();
         self.all = TorqueColumns::of_base(&self.scene, &self.regressor, torque);
+        for joint in 0..self.joints() {
+            self.all.take_held(self.come_later(joint));
+        }
     }
 
     /// Forms the columns: of the base, and of all forms of all causes.

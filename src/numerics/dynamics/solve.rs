@@ -57,6 +57,7 @@ pub(super) fn solve<'a>(
             1e3 * latency.seconds
         ));
     }
+    problem.let_come_later();
     problem.events = first_contacts(&problem);
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted(&[]);

@@ -388,3 +388,63 @@ fn counts_of_the_motors_on_a_bus_are_joints_with_a_question() {
         "{made}"
     );
 }
+
+#[test]
+fn columns_without_a_header_of_an_arm_that_moves_are_angles_and_torques() {
+    let folder = tempfile::tempdir().unwrap();
+    let angle = |row: usize, joint: usize| (0.03 * row as f64 + joint as f64).sin();
+    let torque = |row: usize, joint: usize| 5.0 * (0.03 * row as f64 + joint as f64).cos();
+    let cells = |row: usize, of: &dyn Fn(usize, usize) -> f64| {
+        let cells = (0..6).map(|joint| format!("{:.5}", of(row, joint)));
+        cells.collect::<Vec<_>>().join(",")
+    };
+    let rows = |time: bool| {
+        let row = |k: usize| {
+            let time = if time {
+                format!("{:.3},", 0.01 * k as f64)
+            } else {
+                String::new()
+            };
+            format!("{time}{},{}", cells(k, &angle), cells(k, &torque))
+        };
+        (0..900).map(row).collect::<Vec<_>>().join("\n")
+    };
+    put(&folder, "timed.csv", rows(true));
+    put(&folder, "bare.csv", rows(false));
+    for (name, expected) in [
+        (
+            "timed",
+            [
+                "time: {column: 1, unit: s}",
+                "q: {columns: [2, 3, 4, 5, 6, 7], unit: rad}",
+                "torque: {columns: [8, 9, 10, 11, 12, 13], unit: Nm}",
+            ],
+        ),
+        (
+            "bare",
+            [
+                "time: {rate: 100}",
+                "q: {columns: [1, 2, 3, 4, 5, 6], unit: rad}",
+                "torque: {columns: [7, 8, 9, 10, 11, 12], unit: Nm}",
+            ],
+        ),
+    ] {
+        calib(
+            folder.path(),
+            &format!("init {name} --robot ur5 --data {name}.csv"),
+        )
+        .ok();
+        let made = std::fs::read_to_string(folder.path().join(name).join("pipeline.yaml")).unwrap();
+        for part in expected
+            .iter()
+            .chain(&["uses: ingest_torques", "header: false"])
+        {
+            assert!(made.contains(part), "{part} in\n{made}");
+        }
+        calib(
+            folder.path(),
+            &format!("run {name}/pipeline.yaml --quiet --until ingest_torques"),
+        )
+        .ok();
+    }
+}

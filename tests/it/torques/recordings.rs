@@ -2,7 +2,7 @@
 //! written as motors and loggers write them.
 
 use super::masses::table;
-use super::write;
+use super::{document, write};
 use crate::answer::{Answer, calib, put, root};
 use calib::table::{TorqueChangeRow, TorqueChangeTable};
 use serde_json::json;
@@ -423,5 +423,68 @@ fn objects_of_json_in_a_list_or_a_line_each_are_rows() {
         answer.err.contains("lines.jsonl:201") && answer.err.contains("JSON"),
         "{}",
         answer.err
+    );
+}
+
+#[test]
+fn a_torque_that_acts_a_little_later_than_its_row_makes_no_other_friction() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = Planar::new(1, 51);
+    let rows = case.rows();
+    let mut text = String::from("time_s,q1_deg,tau1_nm");
+    for pair in rows.windows(2) {
+        // A fifth of a period, 2 ms.
+        let torque = 0.8 * pair[0][3] + 0.2 * pair[1][3];
+        let angle = pair[0][1].to_degrees();
+        write!(text, "\n{:.3},{angle:.6},{torque:.6}", pair[0][0]).unwrap();
+    }
+    let at = folder.path().join("case");
+    write(
+        &at,
+        &[("robot.json", case.robot()), ("recording.csv", text)],
+    );
+    let found = document(&at, &folder.path().join("store"));
+    let findings = found["findings"].as_array().unwrap();
+    assert_eq!(findings.len(), 2, "{findings:#?}");
+    // As [`Planar`] has them; 2 ms are 6 % of the viscous one where nothing takes them up.
+    for (name, truth) in [("viscous_friction", 0.05), ("coulomb_friction", 0.03)] {
+        let one = findings.iter().find(|one| one["effect"] == name);
+        let value = one.and_then(|one| one["parameters"][0]["value"].as_f64());
+        assert!(
+            value.is_some_and(|value| (value / truth - 1.0).abs() < 0.03),
+            "{name}: {value:?}, truly {truth}"
+        );
+    }
+}
+
+#[test]
+fn a_name_that_is_left_out_leaves_a_finding_without_a_name_at_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path().join("case");
+    Planar::new(1, 61).write(&at);
+    let store = folder.path().join("store");
+    let without = "--json --set diagnose_torques.without=[coulomb_friction]";
+    let answer = super::diagnose(&at, &store, without).ok();
+    let found: serde_json::Value = serde_json::from_str(&answer).unwrap();
+    let findings = found["findings"].as_array().unwrap();
+    let mut names: Vec<_> = (findings.iter())
+        .map(|one| {
+            (
+                one["effect"].as_str().unwrap(),
+                one["where"].as_str().unwrap(),
+            )
+        })
+        .collect();
+    names.sort_unstable();
+    assert_eq!(
+        names,
+        [("unknown", "joint 1"), ("viscous_friction", "joint 1")]
+    );
+    let whole = document(&at, &store);
+    let [left, right] =
+        [&found, &whole].map(|one| one["after"]["validate_nrmse"].as_f64().unwrap());
+    assert!(
+        (left - right).abs() < 1e-12,
+        "what explains the torques stays: {left}, {right}"
     );
 }

@@ -47,10 +47,11 @@ pub(crate) static CURRENT_OFFSET: TorqueCause = TorqueCause {
         0 => 1.0,
         _ => (-column.scene.time[row] / column.form.shape[0]).exp(),
     }),
-    statement: |form, fitted| {
+    statement: |form, fitted, unit| {
         let is_little = fitted[0].value < 0.0;
+        let newtons = unit("Nm");
         let constant = format!(
-            "the torque of {} reads {:.3} Nm too {}, whatever it does",
+            "the torque of {} reads {:.3} {newtons} too {}, whatever it does",
             form.place,
             fitted[0].value.abs(),
             if is_little { "little" } else { "much" }
@@ -58,7 +59,7 @@ pub(crate) static CURRENT_OFFSET: TorqueCause = TorqueCause {
         match fitted.get(1) {
             None => constant,
             Some(cold) => format!(
-                "{constant}; it begins {:.3} Nm from that and comes there over {:.1} s",
+                "{constant}; it begins {:.3} {newtons} from that and comes there over {:.1} s",
                 cold.value, form.shape[0]
             ),
         }
@@ -112,10 +113,10 @@ const SPRING: TorqueCause = TorqueCause {
         };
         (0..=CHECKED).all(|k| stiffness(least + (most - least) * k as f64 / CHECKED as f64) > 0.0)
     },
-    statement: |form, fitted| {
+    statement: |form, fitted, unit| {
         let is_cable = form.cause.name != SPRING_BALANCE_NAME;
         format!(
-            "{} acts on {} with {:.3} Nm/rad and {:.3} Nm at zero",
+            "{} acts on {} with {:.3} {} and {:.3} {} at zero",
             if is_cable {
                 "a cable or hose"
             } else {
@@ -123,7 +124,9 @@ const SPRING: TorqueCause = TorqueCause {
             },
             form.place,
             fitted[0].value,
-            fitted[1].value
+            unit("Nm/rad"),
+            fitted[1].value,
+            unit("Nm")
         )
     },
     ..PLAIN
@@ -195,7 +198,7 @@ pub(super) static BALANCER: TorqueCause = TorqueCause {
         };
         square(values.len()) >= LEAST_WHOLE * LEAST_WHOLE * square(values.len().min(BALANCERS[0]))
     },
-    statement: |form, fitted| {
+    statement: |form, fitted, _| {
         let size = fitted[0].value.hypot(fitted[1].value);
         // -size sin(q - zero).
         let zero = fitted[0].value.atan2(-fitted[1].value).to_degrees();
@@ -265,7 +268,7 @@ pub(super) static RIPPLE: TorqueCause = TorqueCause {
             shape(["order", "motor_order"][motor.min(1)], order as f64, "1"),
         ]
     },
-    statement: |form, fitted| {
+    statement: |form, fitted, _| {
         let [order, motor] = form.with;
         format!(
             "the torque of {} ripples by {:.3} Nm, {order} times a turn of {}",
@@ -310,7 +313,7 @@ pub(super) static ONE_ANGLE: TorqueCause = TorqueCause {
         let (from, to) = (column.form.shape[0], column.form.shape[1]);
         (PI * column.column as f64 * (column.angle(row) - from) / (to - from)).cos()
     }),
-    statement: |form, _| {
+    statement: |form, _, _| {
         format!(
             "something without a name acts at {}; it depends on the angle of the joint",
             form.place
@@ -350,7 +353,7 @@ pub(super) static TWO_ANGLES: TorqueCause = TorqueCause {
             .map(|joint| column.scene.position[joint][row]);
         wave(1 - column.column / 2, first) * wave(1 + column.column, 2.0 * second)
     }),
-    statement: |form, _| {
+    statement: |form, _, _| {
         let [first, second] = form.with.map(|joint| joint + 1);
         format!(
             "something without a name acts at {}; it depends on the angles of joint {first} and joint {second}",

@@ -31,13 +31,15 @@ pub(crate) static VISCOUS_FRICTION: TorqueCause = TorqueCause {
         form.shape.first().map(|_| span).into_iter().collect()
     },
     torque: ColumnTorque::Friction(|form, _, velocity, _| power(form, velocity)),
-    statement: |form, fitted| {
+    statement: |form, fitted, unit| {
         let grows = exponent(form).map_or_else(String::new, |exponent| {
             format!(", which grows with the power {exponent:.2} of speed")
         });
         format!(
-            "{} has viscous friction of {:.3} Nm s/rad{grows}",
-            form.place, fitted[0].value
+            "{} has viscous friction of {:.3} {}{grows}",
+            form.place,
+            fitted[0].value,
+            unit("Nm s/rad")
         )
     },
     ..PLAIN
@@ -80,10 +82,12 @@ pub(crate) static COULOMB_FRICTION: TorqueCause = TorqueCause {
     rich: |_| true,
     brakes: true,
     torque: ColumnTorque::Friction(|_, _, _, sign| sign),
-    statement: |form, fitted| {
+    statement: |form, fitted, unit| {
         format!(
-            "{} has Coulomb friction of {:.3} Nm",
-            form.place, fitted[0].value
+            "{} has Coulomb friction of {:.3} {}",
+            form.place,
+            fitted[0].value,
+            unit("Nm")
         )
     },
     ..PLAIN
@@ -97,12 +101,13 @@ pub(super) static ASYMMETRIC: TorqueCause = TorqueCause {
     rich: |_| true,
     modifies: &[COULOMB],
     torque: ColumnTorque::Friction(|_, _, _, sign| sign.max(0.0)),
-    statement: |form, fitted| {
+    statement: |form, fitted, unit| {
         let is_negative = fitted[0].value < 0.0;
         format!(
-            "friction of {} is {:.3} Nm greater in its {} direction",
+            "friction of {} is {:.3} {} greater in its {} direction",
             form.place,
             fitted[0].value.abs(),
+            unit("Nm"),
             if is_negative { "negative" } else { "positive" }
         )
     },
@@ -152,10 +157,14 @@ pub(super) static STRIBECK: TorqueCause = TorqueCause {
         vec![speed, exponent, speed]
     },
     torque: ColumnTorque::Friction(|form, _, velocity, sign| sign * falls(form, velocity)),
-    statement: |form, fitted| {
+    statement: |form, fitted, unit| {
         format!(
-            "friction of {} is {:.3} Nm greater when it begins to move, which falls over {:.3} rad/s",
-            form.place, fitted[0].value, form.shape[0]
+            "friction of {} is {:.3} {} greater when it begins to move, which falls over {:.3} {}",
+            form.place,
+            fitted[0].value,
+            unit("Nm"),
+            form.shape[0],
+            unit("rad/s")
         )
     },
     ..PLAIN
@@ -229,12 +238,16 @@ pub(super) static LOAD: TorqueCause = TorqueCause {
         let load = is_other.then(|| shape("at_load", form.shape[1], "Nm"));
         shares.chain(exponent).chain(load).collect()
     },
-    statement: |form, fitted| {
+    statement: |form, fitted, unit| {
         let (place, exponent) = (form.place, power_of_load(form));
         let percent = |share: &FittedNumber| format!("{:.1} %", 100.0 * share.value);
         let transmitted = match exponent == LINEAR {
             true => "of the torque that it transmits".to_string(),
-            false => format!("of its greatest load of {:.2} Nm", form.shape[1]),
+            false => format!(
+                "of its greatest load of {:.2} {}",
+                form.shape[1],
+                unit("Nm")
+            ),
         };
         let grows = match exponent == LINEAR {
             true => String::new(),
@@ -315,10 +328,15 @@ pub(super) static WARMUP: TorqueCause = TorqueCause {
         };
         decay * value
     }),
-    statement: |form, fitted| {
+    statement: |form, fitted, unit| {
         format!(
-            "friction of {} begins {:.3} Nm and {:.3} Nm s/rad higher and falls over {:.1} s",
-            form.place, fitted[1].value, fitted[0].value, form.shape[0]
+            "friction of {} begins {:.3} {} and {:.3} {} higher and falls over {:.1} s",
+            form.place,
+            fitted[1].value,
+            unit("Nm"),
+            fitted[0].value,
+            unit("Nm s/rad"),
+            form.shape[0]
         )
     },
     ..PLAIN
@@ -402,7 +420,7 @@ pub(super) static WRIST_COUPLING: TorqueCause = TorqueCause {
             shape("ratio", form.shape[0], "1"),
         ]
     },
-    statement: |form, fitted| {
+    statement: |form, fitted, _| {
         format!(
             "gears of {} turn with joint {} too (ratio {:.2}): friction of both together is {:.3} Nm and {:.3} Nm s/rad",
             form.place,
@@ -450,7 +468,7 @@ pub(super) static BY_SPEED: TorqueCause = TorqueCause {
     torque: ColumnTorque::Friction(|form, column, velocity, sign| {
         sign * bent(form, column, velocity)
     }),
-    statement: |form, _| {
+    statement: |form, _, _| {
         format!(
             "friction without a name acts at {}: a curve of how fast the joint moves, of which viscous and Coulomb friction are the straight line",
             form.place
@@ -522,7 +540,7 @@ pub(super) static BY_ANGLE: TorqueCause = TorqueCause {
             shape("order", form.with[0] as f64, "1"),
         ]
     },
-    statement: |form, _| {
+    statement: |form, _, _| {
         format!(
             "friction without a name acts at {} in addition to Coulomb friction; it depends on the angle of the joint",
             form.place

@@ -118,7 +118,7 @@ pub(crate) static PAYLOAD: TorqueCause = TorqueCause {
         }
         all
     },
-    statement: |form, fitted| {
+    statement: |form, fitted, _| {
         let lever = part(form, 4).norm();
         if form.width == POINT {
             return point_statement("the last link carries", lever, fitted);
@@ -365,7 +365,7 @@ pub(super) static LINK_MASS: TorqueCause = TorqueCause {
         POINT => point_parameters(part(form, 0).norm(), fitted),
         _ => vec![plain("relative", fitted[0], "1")],
     },
-    statement: |form, fitted| {
+    statement: |form, fitted, _| {
         if form.width == POINT {
             let what = format!("{} carries", form.place);
             return point_statement(&what, part(form, 0).norm(), fitted);
@@ -413,7 +413,7 @@ pub(super) static LINK_CENTRE: TorqueCause = TorqueCause {
         let told = shifts_in_mm(fitted).into_iter();
         told.map(|(name, value)| plain(name, value, "mm")).collect()
     },
-    statement: |form, fitted| {
+    statement: |form, fitted, _| {
         let told = shifts_in_mm(fitted);
         if told.len() == CENTRE.len() {
             let [x, y, z] = [0, 1, 2].map(|axis| told[axis].1.value);
@@ -452,7 +452,7 @@ pub(super) static LINK_INERTIA: TorqueCause = TorqueCause {
         told.map(|(name, value)| plain(name, value, "kg m2"))
             .collect()
     },
-    statement: |form, fitted| {
+    statement: |form, fitted, _| {
         let told = seen_inertias(fitted);
         let values = told.iter().map(|(_, number)| number.value);
         let largest = values.max_by(|a, b| a.abs().total_cmp(&b.abs()));
@@ -505,7 +505,7 @@ pub(super) static GRAVITY_DIRECTION: TorqueCause = TorqueCause {
             shape("azimuth", azimuth, "deg"),
         ]
     },
-    statement: |_, fitted| {
+    statement: |_, fitted, _| {
         let azimuth = fitted[1].value.atan2(fitted[0].value).to_degrees();
         format!(
             "the base is tilted by {:.2} deg: gravity pulls towards {azimuth:.0} deg of the plane across the declared one",
@@ -529,10 +529,12 @@ pub(super) static ROTOR_INERTIA: TorqueCause = TorqueCause {
     inertial: true,
     positive: true,
     torque: ColumnTorque::Row(|column, row| column.scene.acceleration[column.form.joint()][row]),
-    statement: |form, fitted| {
+    statement: |form, fitted, unit| {
         format!(
-            "the rotor of {} adds an inertia of {:.4} kg m2 at the joint",
-            form.place, fitted[0].value
+            "the rotor of {} adds an inertia of {:.4} {} at the joint",
+            form.place,
+            fitted[0].value,
+            unit("kg m2")
         )
     },
     ..PLAIN
@@ -583,14 +585,15 @@ pub(super) static WRONG_CONSTANT: TorqueCause = TorqueCause {
             }
         }
     }),
-    statement: |form, fitted| {
+    statement: |form, fitted, unit| {
         let (place, percent) = (form.place, 100.0 * fitted[0].value);
         match form.shape.first() {
             None => format!(
                 "torques of {place} read {percent:+.1} % off: its torque constant is not the declared one"
             ),
             Some(half) => format!(
-                "small torques of {place} read {percent:+.1} % off, half of that at {half:.3} Nm: its torque constant is not the declared one"
+                "small torques of {place} read {percent:+.1} % off, half of that at {half:.3} {}: its torque constant is not the declared one",
+                unit("Nm")
             ),
         }
     },
@@ -612,7 +615,7 @@ mod tests {
         let told = (LINK_CENTRE.parameters)(&form, &fitted);
         let names: Vec<&str> = told.iter().map(|one| one.name.as_str()).collect();
         assert_eq!(names, ["centre_x", "centre_z"]);
-        let said = (LINK_CENTRE.statement)(&form, &fitted);
+        let said = (LINK_CENTRE.statement)(&form, &fitted, |unit| unit);
         assert!(
             said.contains("21.0 mm along x and 1.0 mm along z") && said.ends_with("is not seen"),
             "{said}"
@@ -633,6 +636,8 @@ mod tests {
         fitted[3] = number(0.3, 0.02);
         let told = (LINK_INERTIA.parameters)(&form, &fitted);
         assert_eq!((told.len(), told[0].name.as_str()), (1, "inertia_yy"));
-        assert!((LINK_INERTIA.statement)(&form, &fitted).contains("by up to 0.300 kg m2"));
+        assert!(
+            (LINK_INERTIA.statement)(&form, &fitted, |unit| unit).contains("by up to 0.300 kg m2")
+        );
     }
 }

@@ -64,11 +64,14 @@ pub(super) static PRESLIDING: TorqueCause = TorqueCause {
             }
         }
     }),
-    statement: |form, fitted| {
+    statement: |form, fitted, unit| {
         let value: f64 = fitted.iter().map(|kept| kept.value).sum();
         format!(
-            "friction of {} turns over a travel of {:.2e} rad and is kept at rest, {value:.3} Nm of it",
-            form.place, form.shape[0]
+            "friction of {} turns over a travel of {:.2e} {} and is kept at rest, {value:.3} {} of it",
+            form.place,
+            form.shape[0],
+            unit("rad"),
+            unit("Nm")
         )
     },
     ..PLAIN
@@ -98,10 +101,12 @@ pub(super) static HYSTERESIS: TorqueCause = TorqueCause {
             }
         }
     }),
-    statement: |form, _| {
+    statement: |form, _, unit| {
         format!(
-            "something without a name drags at {} and turns over only after a travel of {:.3} rad",
-            form.place, form.shape[0]
+            "something without a name drags at {} and turns over only after a travel of {:.3} {}",
+            form.place,
+            form.shape[0],
+            unit("rad")
         )
     },
     ..PLAIN
@@ -144,10 +149,13 @@ pub(super) static SPIKES: TorqueCause = TorqueCause {
             }
         }
     }),
-    statement: |form, fitted| {
+    statement: |form, fitted, unit| {
         format!(
-            "each reversal of {} knocks with {:.3} Nm, {:.3} s later: lost motion",
-            form.place, fitted[0].value, form.shape[0]
+            "each reversal of {} knocks with {:.3} {}, {:.3} s later: lost motion",
+            form.place,
+            fitted[0].value,
+            unit("Nm"),
+            form.shape[0]
         )
     },
     ..PLAIN
@@ -224,7 +232,7 @@ pub(super) static ELASTICITY: TorqueCause = TorqueCause {
             plain("transmitted_damping", fitted[1], "1"),
         ]
     },
-    statement: |form, _| {
+    statement: |form, _, _| {
         format!(
             "{} swings at {:.1} Hz with a damping ratio of {:.2}",
             form.place, form.shape[0], form.shape[1]

@@ -11,6 +11,7 @@ mod memory;
 use super::arm::{DeclaredInertials, INERTIAL_NUMBERS};
 use super::recording::add;
 use super::scene::DynamicScene;
+use super::sliding::UnitAt;
 use crate::criteria::torque::AT_END;
 use crate::effect::Place;
 pub(super) use angle::{CURRENT_OFFSET, OFFSET, UNKNOWN};
@@ -150,8 +151,8 @@ pub(super) struct TorqueCause {
     pub(crate) has_ends: fn(&TorqueForm) -> bool,
     /// Its numbers as people read them: its coefficients and shape numbers unless it has others.
     pub(crate) parameters: fn(&TorqueForm, &[FittedNumber]) -> Vec<TorqueParameter>,
-    /// A sentence without a full stop, with its size.
-    pub(crate) statement: fn(&TorqueForm, &[FittedNumber]) -> String,
+    /// A sentence without a full stop, with its size, in units of a joint that slides or turns by those of one that turns.
+    pub(crate) statement: fn(&TorqueForm, &[FittedNumber], UnitAt) -> String,
 }
 
 /// Torque per coefficient of a form's column at a velocity and its smoothed sign.
@@ -225,7 +226,7 @@ const PLAIN: TorqueCause = TorqueCause {
     spans: |_| Vec::new(),
     has_ends: |_| false,
     parameters: plain_parameters,
-    statement: |form, _| form.place.to_string(),
+    statement: |form, _, _| form.place.to_string(),
 };
 
 impl TorqueCause {
