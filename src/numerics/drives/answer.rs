@@ -102,7 +102,10 @@ pub fn diagnose(problem: &Drives, options: &Options, tell: impl FnMut(String)) -
     let answer = calib_engine::diagnose(part.as_ref().unwrap_or(problem), options, tell);
     // What stands is fitted to all rows.
     let after = match part {
-        Some(_) => problem.fitted_with(&answer.after.set, None, true),
+        Some(_) => {
+            let (found, worth) = (&answer.after, f64::NEG_INFINITY);
+            problem.fitted_with(&found.set, Some(found), true, worth)
+        }
         None => answer.after,
     };
     let findings = answer.findings.iter();

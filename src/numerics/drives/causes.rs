@@ -595,6 +595,48 @@ impl Key {
         }
     }
 
+    /// Whether it is a gear that yields.
+    pub fn is_gear(self) -> bool {
+        matches!(self, Self::Backlash(..) | Self::Elasticity(_))
+    }
+
+    /// Joints at which it acts, from .. to, both inclusive.
+    fn joints(self) -> [usize; 2] {
+        match self {
+            Self::Delay(None) | Self::Hold | Self::Sag | Self::Payload | Self::Gravity => {
+                [0, usize::MAX]
+            }
+            Self::LinkMass(link) | Self::LinkCentre(link) => [0, link],
+            Self::Gain(from, to) | Self::Damping(from, to) => [from, to],
+            Self::Delay(Some(j))
+            | Self::Offset(j)
+            | Self::Rotor(j)
+            | Self::Integral(j)
+            | Self::DeadBand(j)
+            | Self::TorqueLimit(j)
+            | Self::SpeedLimit(j)
+            | Self::Viscous(j)
+            | Self::Coulomb(j)
+            | Self::Stribeck(j)
+            | Self::Load(j, _)
+            | Self::GearLoad(j, _)
+            | Self::Presliding(j)
+            | Self::WarmUp(j)
+            | Self::Backlash(j, _)
+            | Self::Elasticity(j)
+            | Self::Cable(j)
+            | Self::Ripple(j, _)
+            | Self::Coupling(j, _)
+            | Self::Unknown(j, ..) => [j, j],
+        }
+    }
+
+    /// Whether both act at a joint.
+    pub fn meets(self, other: Self) -> bool {
+        let ([a, b], [c, d]) = (self.joints(), other.joints());
+        a <= d && c <= b
+    }
+
     /// Whether one of two must not stand beside the other: the same field of the physics.
     pub fn excludes(self, other: Self) -> bool {
         match (self, other) {

@@ -30,6 +30,9 @@ const STANDS: Patience = Patience {
     share: 1e-5,
 };
 
+/// Times what a linear step promises that a fit may still gain.
+const REACH: f64 = 3.0;
+
 /// A fitted model.
 #[derive(Debug, Clone)]
 pub struct DriveFit {
@@ -43,8 +46,10 @@ pub struct DriveFit {
     pub square: f64,
     /// Fitted numbers.
     pub freedom: f64,
-    /// Effective rows a row.
+    /// Effective rows a row, by what the model leaves.
     pub independence: f64,
+    /// The same by what a rich model would leave, the most of all looks.
+    pub rich: f64,
     /// Squared distance of all numbers from where they are expected, in their usual sizes.
     pub penalty: f64,
     /// One standard deviation of each number of the set, as it is fitted.
@@ -53,6 +58,8 @@ pub struct DriveFit {
     pub log_prior: f64,
     /// Products of the columns in units of their priors.
     gram: DMatrix<f64>,
+    /// Cause and number of each column beyond the inertials.
+    numbers: Vec<(usize, usize)>,
     /// Responses to the inertials, each rows x joints, rad: they hardly change with the causes.
     responses: Arc<Vec<Vec<f64>>>,
 }
@@ -109,7 +116,7 @@ pub(crate) struct BaseColumns {
     /// Of the priors.
     pub(crate) precision: Vec<f64>,
     /// Cause and number of each column beyond the inertials.
-    numbers: Vec<(usize, usize)>,
+    pub(crate) numbers: Vec<(usize, usize)>,
 }
 
 impl BaseColumns {
@@ -140,11 +147,61 @@ fn log_likelihood(square: f64, rows: f64, independence: f64) -> f64 {
 }
 
 impl DriveFit {
+    /// Share of the rows that is independent: by what the model leaves, or by what a rich one would.
+    pub fn share(&self) -> f64 {
+        self.independence.max(self.rich)
+    }
+
+    /// Inverse of the posterior's variance, in units of the priors.
+    fn precision(&self, independence: f64) -> DMatrix<f64> {
+        let scale = (self.square / self.freedom).max(1.0);
+        let count = self.gram.nrows();
+        &self.gram * (independence / scale) + DMatrix::identity(count, count)
+    }
+
+    /// ln of the odds of a member against nothing: its prior over its posterior where it is nothing (Dickey, 1971); `None` where no number
+    /// of it is 0 then.
+    pub fn odds(&self, member: usize, independence: f64) -> Option<f64> {
+        let one = &self.set[member];
+        let shape = &one.cell.shapes[one.shape];
+        let sizes: Vec<usize> = (0..one.numbers.len())
+            .filter(|k| shape.start[*k] == 0.0 && shape.centre[*k] == 0.0)
+            .filter(|k| shape.columns.iter().any(|column| column[*k] != 0.0))
+            .collect();
+        let columns: Option<Vec<usize>> = sizes
+            .iter()
+            .map(|k| {
+                self.numbers
+                    .iter()
+                    .position(|number| *number == (member, *k))
+            })
+            .collect();
+        let columns = columns.filter(|columns| !columns.is_empty())?;
+        let inverse = self.precision(independence).cholesky()?.inverse();
+        let nb = self.inertia.len();
+        let count = columns.len();
+        let variance = DMatrix::from_fn(count, count, |i, k| {
+            inverse[(nb + columns[i], nb + columns[k])]
+        });
+        let size = DVector::from_fn(count, |i, _| one.numbers[sizes[i]] / shape.usual[sizes[i]]);
+        let factor = variance.cholesky()?;
+        let half_log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+        Some(
+            0.5 * size.dot(&factor.solve(&size))
+                + half_log_det
+                + one.cell.log_prior
+                + shape.log_weight,
+        )
+    }
+
+    /// What evidence may be reached at most where the squared residual still falls by so much.
+    fn reach(&self, falls: f64, independence: f64) -> f64 {
+        log_likelihood((self.square - falls).max(0.0), self.freedom, independence) + self.log_prior
+    }
+
     /// ln of the evidence, where so large a share of the rows is independent.
     pub fn log_evidence(&self, independence: f64) -> f64 {
-        let scale = (self.square / self.freedom).max(1.0);
-        let whole = &self.gram * (independence / scale)
-            + DMatrix::identity(self.gram.nrows(), self.gram.ncols());
+        let whole = self.precision(independence);
         let log_det = whole.cholesky().map_or(f64::INFINITY, |factor| {
             2.0 * factor
                 .l_dirty()
@@ -234,12 +291,13 @@ impl Drives {
         (angles, square)
     }
 
-    /// Fits inertials and a set's numbers from where they are.
+    /// Fits inertials and a set's numbers from where they are; stops where evidence `worth` is out of reach.
     pub(crate) fn fitted_with(
         &self,
         set: &[Accepted<Key>],
         before: Option<&DriveFit>,
         anew: bool,
+        worth: f64,
     ) -> DriveFit {
         let anew = anew || before.is_none();
         let patience = if anew { &STANDS } else { &TRIAL };
@@ -253,6 +311,7 @@ impl Drives {
             square: f64::INFINITY,
             freedom,
             independence: before.map_or(1.0, |fit| fit.independence),
+            rich: before.map_or(0.0, |fit| fit.rich),
             penalty: 0.0,
             sigma: Vec::new(),
             log_prior: set
@@ -260,6 +319,7 @@ impl Drives {
                 .map(|one| one.cell.log_prior + one.cell.shapes[one.shape].log_weight)
                 .sum(),
             gram: DMatrix::zeros(0, 0),
+            numbers: Vec::new(),
             responses: before.map_or_else(Default::default, |fit| fit.responses.clone()),
         };
         // Columns that are roll-outs of their own are dear: they wait until the step is known to be good.
@@ -271,9 +331,7 @@ impl Drives {
         if before.is_none() {
             fit.independence = self.independence_of(&fit.angles);
         }
-        let weigh = |fit: &DriveFit| {
-            self.independence_given(fit.independence) / (fit.square / freedom).max(1.0)
-        };
+        let weigh = |fit: &DriveFit| fit.share() / (fit.square / freedom).max(1.0);
         let mut is_new = anew;
         for step in 1..=patience.steps {
             if !fit.square.is_finite() || columns.count() == 0 {
@@ -289,6 +347,11 @@ impl Drives {
                 break;
             };
             let change = factor.solve(&gradient);
+            // The first step leads from where a linear scan began; from then on a step says how far the next ones may lead.
+            let falls = REACH * gradient.dot(&change) / weight;
+            if step > 1 && fit.reach(falls, fit.share()) < worth {
+                break;
+            }
             let objective = weight * fit.square + self.penalty(&fit);
             let again = anew && step < 2;
             let (mut by, mut moved) = (1.0, None);
@@ -331,6 +394,7 @@ impl Drives {
         }
         fit.independence = self.independence_of(&fit.angles);
         fit.penalty = self.penalty(&fit);
+        fit.numbers.clone_from(&columns.numbers);
         let roots: Vec<f64> = columns.precision.iter().map(|p| 1.0 / p.sqrt()).collect();
         let gram = normal.gram_matrix();
         fit.gram = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, k| {

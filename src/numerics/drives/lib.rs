@@ -12,6 +12,7 @@
 #[cfg(test)]
 mod against_mujoco;
 mod answer;
+mod around;
 mod causes;
 pub mod chain;
 mod columns;
@@ -24,6 +25,7 @@ pub mod recording;
 pub mod rollout;
 
 pub use answer::{DriveDiagnosis, DriveFinding, DriveNumber, DriveRival, JointError, diagnose};
+pub use around::Around;
 pub use causes::{CAUSES, Key, Usual};
 pub use fit::DriveFit;
 pub use problem::Drives;
