@@ -1,12 +1,12 @@
 //! What a diagnosis of drives says.
 
-use crate::causes::Key;
 use crate::chain::Chain;
 use crate::fit::DriveFit;
+use crate::key::Key;
 use crate::physics::Physics;
 use crate::problem::Drives;
 use crate::rollout::Which;
-use calib_engine::{Accepted, Finding, Options};
+use calib_engine::{Accepted, Cell, Finding, Options};
 
 /// A number of a finding.
 #[derive(Debug, Clone, PartialEq)]
@@ -230,7 +230,7 @@ impl Drives {
         DriveFinding {
             effect: cell.cause.name,
             place: cell.place.clone(),
-            statement: sentence(cell.cause.sentence, &cell.place),
+            statement: sentence(cell),
             parameters,
             effect_rms: (rows.iter().sum::<f64>() / rows.len().max(1) as f64).sqrt(),
             probability: finding.probability,
@@ -251,11 +251,13 @@ impl Drives {
     }
 }
 
-fn sentence(words: &str, place: &str) -> String {
-    let text = words.replace("{}", place);
+fn sentence(cell: &Cell<Key>) -> String {
+    let text = cell.cause.sentence.replace("{}", &cell.place);
     let mut letters = text.chars();
     let first = letters
         .next()
         .map(|letter| letter.to_uppercase().to_string());
-    first.unwrap_or_default() + letters.as_str() + "."
+    let follows = cell.key.follows();
+    let follows = follows.map_or(String::new(), |what| format!(": {what}"));
+    first.unwrap_or_default() + letters.as_str() + &follows + "."
 }

@@ -1,9 +1,10 @@
 //! What every cell of the table would do around a fit: columns of all of them by their products, and what each member of the set does, so that
 //! one look serves the cells beside the set and those in place of a member.
 
-use crate::causes::{Key, cells};
-use crate::fit::{DriveFit, Normal};
+use crate::causes::cells;
+use crate::fit::{Anew, DriveFit, Normal};
 use crate::independence::Rich;
+use crate::key::Key;
 use crate::physics::Physics;
 use crate::problem::Drives;
 use crate::rollout::{Direction, Which, roll};
@@ -103,12 +104,7 @@ impl Drives {
             let wanted = !self.without.iter().any(|name| name == cell.cause.name);
             (seen && wanted).then_some(Asked { cell, instead })
         };
-        let all = cells(
-            &self.base,
-            &self.usual,
-            self.duration,
-            self.recording.period,
-        );
+        let all = cells(&self.base, &self.usual, self.recording.period);
         all.into_iter().filter_map(asked).collect()
     }
 
@@ -169,7 +165,7 @@ impl Around {
             .into_iter()
             .map(|(_, without)| changed(fit.angles.clone(), &without))
             .collect();
-        let base = drives.base_columns(fit, true);
+        let base = drives.base_columns(fit, Anew::Unknown);
         let nb = base.count();
         let mut carried = base.directions.clone();
         let mut place = Vec::with_capacity(columns.len());
@@ -397,7 +393,8 @@ fn begun(shape: &calib_engine::Shape, log: f64, size: &[f64]) -> (f64, Vec<f64>)
     }
     for (k, number) in numbers.iter_mut().enumerate() {
         let (at, wide) = (shape.centre[k], 3.0 * shape.usual[k]);
-        *number = number.clamp(at - wide, at + wide);
+        let [low, high] = shape.bounds[k];
+        *number = number.clamp(at - wide, at + wide).clamp(low, high);
     }
     (log, numbers)
 }

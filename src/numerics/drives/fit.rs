@@ -1,7 +1,7 @@
 //! Everything at once, in the roll-out itself: Gauss-Newton on the numbers of causes and on inertials under their tolerance.
 
-use crate::causes::Key;
 use crate::independence::independent;
+use crate::key::Key;
 use crate::problem::{Drives, FREE};
 use crate::rollout::{Direction, Which, roll};
 use calib_engine::Accepted;
@@ -60,8 +60,28 @@ pub struct DriveFit {
     gram: DMatrix<f64>,
     /// Cause and number of each column beyond the inertials.
     numbers: Vec<(usize, usize)>,
-    /// Responses to the inertials, each rows x joints, rad: they hardly change with the causes.
-    responses: Arc<Vec<Vec<f64>>>,
+    /// Responses as they were when all of them were made anew: they hardly change with a further cause.
+    responses: Arc<Responses>,
+}
+
+/// Responses to inertials and to numbers of causes.
+#[derive(Debug, Clone, Default)]
+struct Responses {
+    /// Of each column beyond the inertials.
+    numbers: Vec<(Key, usize)>,
+    /// Each rows x joints, rad.
+    changes: Vec<Vec<f64>>,
+}
+
+/// Which columns are made anew.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Anew {
+    /// All.
+    All,
+    /// Those of causes.
+    Causes,
+    /// Those of which no response is known.
+    Unknown,
 }
 
 /// Sums of products of columns.
@@ -104,8 +124,8 @@ impl Normal {
 enum Source {
     Carried(usize, f64),
     Rolled(Vec<f64>, f64),
-    /// One of the responses to the inertials.
-    Known(Arc<Vec<Vec<f64>>>, usize),
+    /// One of the responses that are known.
+    Known(Arc<Responses>, usize),
 }
 
 /// Columns of all that is free in a model.
@@ -130,7 +150,7 @@ impl BaseColumns {
             *out = match source {
                 Source::Carried(k, size) => change[*k] / (size * sigma),
                 Source::Rolled(changes, size) => changes[at] / (size * sigma),
-                Source::Known(responses, k) => responses[*k][at] / sigma,
+                Source::Known(responses, k) => responses.changes[*k][at] / sigma,
             };
         }
     }
@@ -150,6 +170,13 @@ impl DriveFit {
     /// Share of the rows that is independent: by what the model leaves, or by what a rich one would.
     pub fn share(&self) -> f64 {
         self.independence.max(self.rich)
+    }
+
+    /// Number of the known response to a number of a cause.
+    fn known(&self, key: Key, number: usize) -> Option<usize> {
+        let numbers = &self.responses.numbers;
+        let at = numbers.iter().position(|one| *one == (key, number))?;
+        Some(self.inertia.len() + at)
     }
 
     /// Inverse of the posterior's variance, in units of the priors.
@@ -217,7 +244,7 @@ impl DriveFit {
 
 impl Drives {
     /// Columns of inertials and of the numbers of a fit.
-    pub(crate) fn base_columns(&self, fit: &DriveFit, anew: bool) -> BaseColumns {
+    pub(crate) fn base_columns(&self, fit: &DriveFit, anew: Anew) -> BaseColumns {
         let now = self.physics(&fit.inertia, &fit.set);
         let mut columns = BaseColumns {
             directions: Vec::new(),
@@ -227,7 +254,7 @@ impl Drives {
         };
         for k in 0..fit.inertia.len() {
             columns.precision.push(1.0);
-            if !anew && k < fit.responses.len() {
+            if anew != Anew::All && k < fit.responses.changes.len() {
                 columns
                     .sources
                     .push(Source::Known(fit.responses.clone(), k));
@@ -249,6 +276,15 @@ impl Drives {
                 .enumerate()
                 .filter(|(_, usual)| **usual > 0.0)
             {
+                columns.precision.push(1.0 / (usual * usual));
+                columns.numbers.push((c, k));
+                let known = fit.known(accepted.cell.key, k);
+                if let Some(at) = known.filter(|_| anew == Anew::Unknown) {
+                    columns
+                        .sources
+                        .push(Source::Known(fit.responses.clone(), at));
+                    continue;
+                }
                 let memory = accepted.cell.key.has_memory();
                 let size = if memory { 0.02 * usual } else { 2e-3 * usual };
                 let mut set = fit.set.clone();
@@ -272,8 +308,6 @@ impl Drives {
                     }
                 };
                 columns.sources.push(source);
-                columns.precision.push(1.0 / (usual * usual));
-                columns.numbers.push((c, k));
             }
         }
         columns
@@ -323,16 +357,20 @@ impl Drives {
             responses: before.map_or_else(Default::default, |fit| fit.responses.clone()),
         };
         // Columns that are roll-outs of their own are dear: they wait until the step is known to be good.
-        let dear = set.iter().any(|one| one.cell.key.has_memory());
+        let dear = set.iter().any(|one| {
+            let key = one.cell.key;
+            key.has_memory() && (anew || fit.known(key, 0).is_none())
+        });
         if dear {
             (fit.angles, fit.square) = self.evaluated(&fit.inertia, set);
         }
-        let (mut columns, mut normal) = self.looked(&mut fit, anew);
+        let first = if anew { Anew::All } else { Anew::Unknown };
+        let (mut columns, mut normal) = self.looked(&mut fit, first);
         if before.is_none() {
             fit.independence = self.independence_of(&fit.angles);
         }
         let weigh = |fit: &DriveFit| fit.share() / (fit.square / freedom).max(1.0);
-        let mut is_new = anew;
+        let mut is_new = true;
         for step in 1..=patience.steps {
             if !fit.square.is_finite() || columns.count() == 0 {
                 break;
@@ -353,7 +391,11 @@ impl Drives {
                 break;
             }
             let objective = weight * fit.square + self.penalty(&fit);
-            let again = anew && step < 2;
+            let again = match anew {
+                true if step < 2 => Anew::All,
+                true => Anew::Causes,
+                false => Anew::Unknown,
+            };
             let (mut by, mut moved) = (1.0, None);
             while by > 0.02 {
                 let mut trial = fit.clone();
@@ -362,9 +404,17 @@ impl Drives {
                     *number += by * change[k];
                 }
                 for ((c, k), by_column) in columns.numbers.iter().zip(change.iter().skip(nb)) {
-                    let usual = trial.set[*c].cell.shapes[trial.set[*c].shape].usual[*k];
+                    let Accepted {
+                        cell,
+                        shape,
+                        numbers,
+                    } = &mut trial.set[*c];
+                    let shape = &cell.shapes[*shape];
                     // No further than the linear model can be believed.
-                    trial.set[*c].numbers[*k] += (by * by_column).clamp(-3.0 * usual, 3.0 * usual);
+                    let most = 3.0 * shape.usual[*k];
+                    let [low, high] = shape.bounds[*k];
+                    let number = numbers[*k] + (by * by_column).clamp(-most, most);
+                    numbers[*k] = number.clamp(low, high);
                 }
                 let seen = if dear {
                     (trial.angles, trial.square) = self.evaluated(&trial.inertia, &trial.set);
@@ -384,13 +434,13 @@ impl Drives {
             };
             fit = next;
             (columns, normal) = seen.unwrap_or_else(|| self.looked(&mut fit, again));
-            is_new = again;
+            is_new = again == Anew::All;
             if fall < patience.fall.max(patience.share * objective) {
                 break;
             }
         }
         if anew && !is_new {
-            (columns, normal) = self.looked(&mut fit, true);
+            (columns, normal) = self.looked(&mut fit, Anew::All);
         }
         fit.independence = self.independence_of(&fit.angles);
         fit.penalty = self.penalty(&fit);
@@ -417,22 +467,21 @@ impl Drives {
     }
 
     /// Columns around a fit and their products.
-    fn looked(&self, fit: &mut DriveFit, anew: bool) -> (BaseColumns, Normal) {
+    fn looked(&self, fit: &mut DriveFit, anew: Anew) -> (BaseColumns, Normal) {
         let columns = self.base_columns(fit, anew);
-        let normal = self.normal(fit, &columns);
+        let normal = self.normal(fit, &columns, anew == Anew::All);
         (columns, normal)
     }
 
-    /// Products of the columns around a fit; the fit's angles are those of the same roll-out, and responses to the inertials are kept where
-    /// they were made anew.
-    fn normal(&self, fit: &mut DriveFit, columns: &BaseColumns) -> Normal {
+    /// Products of the columns around a fit; the fit's angles are those of the same roll-out, and responses are `kept` where all were made
+    /// anew.
+    fn normal(&self, fit: &mut DriveFit, columns: &BaseColumns, kept: bool) -> Normal {
         let n = self.chain.joints();
         let physics = self.physics(&fit.inertia, &fit.set);
-        let mut normal = Normal::new(columns.count());
-        let mut x = vec![0.0; columns.count()];
-        let anew = matches!(columns.sources.first(), Some(Source::Carried(..)))
-            .then_some(fit.inertia.len());
-        let mut responses = vec![vec![0.0; fit.angles.len()]; anew.unwrap_or(0)];
+        let count = columns.count();
+        let mut normal = Normal::new(count);
+        let mut x = vec![0.0; count];
+        let mut changes = vec![vec![0.0; fit.angles.len()]; if kept { count } else { 0 }];
         let angles = &mut fit.angles;
         roll(
             &self.chain,
@@ -446,16 +495,20 @@ impl Drives {
                     let sigma = self.sigma[at];
                     angles[at] = row.angle[joint];
                     columns.at(at, row.change[joint], sigma, &mut x);
-                    responses
+                    changes
                         .iter_mut()
                         .zip(&x)
-                        .for_each(|(response, x)| response[at] = x * sigma);
+                        .for_each(|(change, x)| change[at] = x * sigma);
                     normal.add(&x, (self.recording.angle[at] - row.angle[joint]) / sigma);
                 }
             },
         );
-        if anew.is_some() {
-            fit.responses = Arc::new(responses);
+        if kept {
+            let key = |(c, k): &(usize, usize)| (fit.set[*c].cell.key, *k);
+            fit.responses = Arc::new(Responses {
+                numbers: columns.numbers.iter().map(key).collect(),
+                changes,
+            });
         }
         let square = normal.square;
         fit.square = if square.is_finite() {

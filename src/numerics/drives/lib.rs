@@ -18,6 +18,7 @@ pub mod chain;
 mod columns;
 mod fit;
 mod independence;
+mod key;
 pub mod mjcf;
 pub mod physics;
 mod problem;
@@ -26,6 +27,7 @@ pub mod rollout;
 
 pub use answer::{DriveDiagnosis, DriveFinding, DriveNumber, DriveRival, JointError, diagnose};
 pub use around::Around;
-pub use causes::{CAUSES, Key, Usual};
+pub use causes::{CAUSES, Usual};
 pub use fit::DriveFit;
+pub use key::Key;
 pub use problem::Drives;

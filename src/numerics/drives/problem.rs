@@ -1,9 +1,10 @@
 //! Commands and responses as a problem of the engine: residual is measured minus simulated angle, whitened by encoder and noise.
 
 use crate::around::Around;
-use crate::causes::{Key, Usual};
+use crate::causes::Usual;
 use crate::chain::{Chain, STEP};
 use crate::fit::DriveFit;
+use crate::key::Key;
 use crate::physics::Physics;
 use crate::recording::{Recording, Trajectory};
 use crate::rollout::{Which, roll};

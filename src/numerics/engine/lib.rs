@@ -63,6 +63,8 @@ pub struct Shape {
     pub usual: Vec<f64>,
     /// Where they are expected.
     pub centre: Vec<f64>,
+    /// Between which each may be, as it is fitted.
+    pub bounds: Vec<[f64; 2]>,
     /// Numbers of which the columns of a scan are the whole effects.
     pub columns: Vec<Vec<f64>>,
     /// ln of its share of the cell.
