@@ -93,20 +93,43 @@ pub struct DriveDiagnosis {
     pub rows: usize,
 }
 
+/// Times that steps are halved at most.
+const HALVED: usize = 2;
 /// Times the noise from which on something remains.
 const REMAINS: f64 = 1.1;
 
 /// Diagnoses a recording of drives; `tell` receives the progress.
-pub fn diagnose(problem: &Drives, options: &Options, tell: impl FnMut(String)) -> DriveDiagnosis {
+pub fn diagnose(
+    problem: &Drives,
+    options: &Options,
+    mut tell: impl FnMut(String),
+) -> DriveDiagnosis {
     let part = problem.part();
-    let answer = calib_engine::diagnose(part.as_ref().unwrap_or(problem), options, tell);
+    let is_part = part.is_some();
+    let mut searched = part.unwrap_or_else(|| problem.clone());
+    let mut whole = problem.clone();
+    let mut answer = calib_engine::diagnose(&searched, &[], options, &mut tell);
+    // Steps that serve the simulation as it is may be too long for what was found; what finer ones may still err by is below the noise of no
+    // encoder, and nothing is named for it.
+    for _ in 0..HALVED {
+        let found = searched.physics(&answer.after.inertia, &answer.after.set);
+        let moves = searched.coarseness(&found);
+        if searched.is_nothing(&moves) {
+            break;
+        }
+        let off: Vec<f64> = moves.iter().map(|way| 0.5 * way).collect();
+        (searched, whole) = (searched.finer(&off), whole.finer(&off));
+        tell(format!("steps of {:.2} ms", 1e3 * searched.chain.step));
+        answer = calib_engine::diagnose(&searched, &answer.after.set, options, &mut tell);
+    }
     // What stands is fitted to all rows.
-    let after = match part {
-        Some(_) => {
+    let problem = &whole;
+    let after = match is_part {
+        true => {
             let (found, worth) = (&answer.after, f64::NEG_INFINITY);
             problem.fitted_with(&found.set, Some(found), true, worth)
         }
-        None => answer.after,
+        false => answer.after,
     };
     let findings = answer.findings.iter();
     let findings = findings

@@ -17,11 +17,12 @@ pub(crate) const FREE: usize = 5;
 const SEARCHED: f64 = 60.0;
 const WINDOW: f64 = 8.0;
 
-/// Longer steps that are tried, s, and the share of the noise, rms, that is the same motion: a drive four times as stiff errs four times as much.
+/// Longer steps that are tried, s, and the share of the noise, rms, that is the same motion.
 const LONGER: [f64; 2] = [2.5e-3, 1.7e-3];
 const SAME: f64 = 0.03;
 
 /// A simulated arm and its recording.
+#[derive(Debug, Clone)]
 pub struct Drives {
     /// What moves.
     pub chain: Chain,
@@ -100,15 +101,57 @@ impl Drives {
             .iter()
             .flat_map(|one| &self.sigma[one.rows.start * n..one.rows.end * n]);
         Some(Self {
-            chain: self.chain.clone(),
-            base: self.base.clone(),
             sigma: sigma.copied().collect(),
             recording: self.recording.cut(&kept),
-            tolerance: self.tolerance,
-            without: self.without.clone(),
-            usual: self.usual.clone(),
-            duration: self.duration,
+            ..self.clone()
         })
+    }
+
+    /// By joint, rad rms by which a simulation moves where its steps are halved.
+    pub(crate) fn coarseness(&self, physics: &Physics) -> Vec<f64> {
+        let n = self.chain.joints();
+        let mut fine = self.clone();
+        fine.chain.halve();
+        let (now, finer) = (
+            self.angles(physics, Which::Fitted),
+            fine.angles(physics, Which::Fitted),
+        );
+        let mut squares = vec![0.0; n];
+        let mut rows = 0.0;
+        for row in self.fitted() {
+            rows += 1.0;
+            for (joint, square) in squares.iter_mut().enumerate() {
+                *square += (now[row * n + joint] - finer[row * n + joint]).powi(2);
+            }
+        }
+        let root = |square: f64| (square / rows).sqrt();
+        squares.into_iter().map(root).collect()
+    }
+
+    /// Whether so much, rad by joint, is nothing beside the noise.
+    pub(crate) fn is_nothing(&self, errors: &[f64]) -> bool {
+        let n = self.chain.joints();
+        let mut least = vec![f64::MAX; n];
+        for row in self.fitted() {
+            for (joint, least) in least.iter_mut().enumerate() {
+                *least = least.min(self.sigma[row * n + joint]);
+            }
+        }
+        errors
+            .iter()
+            .zip(least)
+            .all(|(error, sigma)| *error < SAME * sigma)
+    }
+
+    /// The same by steps of half the length; what these may still be off, rad by joint, is noise.
+    pub(crate) fn finer(&self, off: &[f64]) -> Self {
+        let n = self.chain.joints();
+        let mut finer = self.clone();
+        finer.chain.halve();
+        for (at, sigma) in finer.sigma.iter_mut().enumerate() {
+            *sigma = sigma.hypot(off[at % n]);
+        }
+        finer
     }
 
     /// The simulation with inertials within their tolerance and a set of causes.

@@ -33,8 +33,6 @@ pub enum Which {
     All,
 }
 
-/// s of a step at most where a gear yields.
-const GEARED_STEP: f64 = 5e-4;
 /// Sweeps of the impulses of dry friction at most, and rad/s at which they are settled.
 const SWEEPS: usize = 20;
 const SETTLED: f64 = 1e-9;
@@ -104,7 +102,7 @@ pub fn roll(
     };
     let mut began = None;
     let most = if freedoms > n {
-        GEARED_STEP
+        chain.geared_step
     } else {
         chain.step
     };

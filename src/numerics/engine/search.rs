@@ -291,14 +291,19 @@ fn posterior<P: Problem>(
     }
 }
 
-/// Searches until nothing changes, and says what stands.
+/// Searches from a set on until nothing changes, and says what stands.
 pub fn diagnose<P: Problem>(
     problem: &P,
+    start: &[Accepted<P::Key>],
     options: &Options,
     mut tell: impl FnMut(String),
 ) -> Answer<P> {
     let before = problem.fit(&[], None, f64::NEG_INFINITY);
-    let mut stand = search(problem, before.clone(), None, options, &mut tell);
+    let begun = match start {
+        [] => before.clone(),
+        set => problem.fit(set, None, f64::NEG_INFINITY),
+    };
+    let mut stand = search(problem, begun, None, options, &mut tell);
     let mut exchanges = 0;
     let findings = loop {
         let found = posterior(problem, &stand, exchanges < EXCHANGES, options);
