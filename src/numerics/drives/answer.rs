@@ -93,8 +93,9 @@ pub struct DriveDiagnosis {
     pub rows: usize,
 }
 
-/// Times that steps are halved at most.
+/// Times that steps are halved at most, and times what they err by that a finding explains at least.
 const HALVED: usize = 2;
+const DOUBT: f64 = 3.0;
 /// Times the noise from which on something remains.
 const REMAINS: f64 = 1.1;
 
@@ -109,12 +110,17 @@ pub fn diagnose(
     let mut searched = part.unwrap_or_else(|| problem.clone());
     let mut whole = problem.clone();
     let mut answer = calib_engine::diagnose(&searched, &[], options, &mut tell);
-    // Steps that serve the simulation as it is may be too long for what was found; what finer ones may still err by is below the noise of no
-    // encoder, and nothing is named for it.
+    // Steps that serve the simulation as it is may be too long for what was found: a finding that explains no more than they err by may be
+    // their error. Then they are halved, and what finer ones may still err by is noise.
     for _ in 0..HALVED {
         let found = searched.physics(&answer.after.inertia, &answer.after.set);
-        let moves = searched.coarseness(&found);
-        if searched.is_nothing(&moves) {
+        let (moves, square) = searched.coarseness(&found);
+        let explained = 0.5 * answer.after.share() * square;
+        if answer
+            .findings
+            .iter()
+            .all(|one| one.log_odds > DOUBT * explained)
+        {
             break;
         }
         let off: Vec<f64> = moves.iter().map(|way| 0.5 * way).collect();

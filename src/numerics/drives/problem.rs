@@ -107,8 +107,8 @@ impl Drives {
         })
     }
 
-    /// By joint, rad rms by which a simulation moves where its steps are halved.
-    pub(crate) fn coarseness(&self, physics: &Physics) -> Vec<f64> {
+    /// By joint, rad rms by which a simulation moves where its steps are halved, and the whitened square of that in all rows.
+    pub(crate) fn coarseness(&self, physics: &Physics) -> (Vec<f64>, f64) {
         let n = self.chain.joints();
         let mut fine = self.clone();
         fine.chain.halve();
@@ -117,30 +117,18 @@ impl Drives {
             fine.angles(physics, Which::Fitted),
         );
         let mut squares = vec![0.0; n];
-        let mut rows = 0.0;
+        let (mut rows, mut whitened) = (0.0, 0.0);
         for row in self.fitted() {
             rows += 1.0;
             for (joint, square) in squares.iter_mut().enumerate() {
-                *square += (now[row * n + joint] - finer[row * n + joint]).powi(2);
+                let at = row * n + joint;
+                let moves = (now[at] - finer[at]).powi(2);
+                *square += moves;
+                whitened += moves / self.sigma[at].powi(2);
             }
         }
         let root = |square: f64| (square / rows).sqrt();
-        squares.into_iter().map(root).collect()
-    }
-
-    /// Whether so much, rad by joint, is nothing beside the noise.
-    pub(crate) fn is_nothing(&self, errors: &[f64]) -> bool {
-        let n = self.chain.joints();
-        let mut least = vec![f64::MAX; n];
-        for row in self.fitted() {
-            for (joint, least) in least.iter_mut().enumerate() {
-                *least = least.min(self.sigma[row * n + joint]);
-            }
-        }
-        errors
-            .iter()
-            .zip(least)
-            .all(|(error, sigma)| *error < SAME * sigma)
+        (squares.into_iter().map(root).collect(), whitened)
     }
 
     /// The same by steps of half the length; what these may still be off, rad by joint, is noise.

@@ -206,13 +206,20 @@ fn revised<P: Problem>(
     fit
 }
 
-/// What stands with what else could, and the first exchange for the better.
+/// What stands with what else could, up to the first change for the better.
 struct Posterior<P: Problem> {
     findings: Vec<Finding<P::Key>>,
-    better: Option<(Cell<P::Key>, Trial<P>)>,
+    better: Option<Change<P>>,
 }
 
-/// What stands, each with what else could stand in its place; up to the first exchange for the better where `exchange`.
+/// A member that goes, what comes in its place, and the fit then.
+struct Change<P: Problem> {
+    out: Cell<P::Key>,
+    into: Option<Cell<P::Key>>,
+    fit: P::Fit,
+}
+
+/// What stands, each with what else could stand in its place; up to the first that is useless, or where `exchange` worse than another.
 fn posterior<P: Problem>(
     problem: &P,
     stand: &Stand<P>,
@@ -236,6 +243,14 @@ fn posterior<P: Problem>(
             cell.cause.name != own.cause.name || cell.place != own.place
         });
         let lost = now - none;
+        if lost < options.leaves {
+            let better = Some(Change {
+                out: own.clone(),
+                into: None,
+                fit: without,
+            });
+            return Posterior { findings, better };
+        }
         let least = lost - BLUR.max(BLUR_SHARE * lost);
         let asked = candidates(problem, others.collect(), &rest, least, options);
         let told = options.told.ln();
@@ -249,7 +264,12 @@ fn posterior<P: Problem>(
         );
         let is_better = |trial: &Trial<P>| trial.log - now > options.exchanges;
         if exchange && others.first().is_some_and(is_better) {
-            let better = Some((own.clone(), others.remove(0)));
+            let other = others.remove(0);
+            let better = Some(Change {
+                out: own.clone(),
+                into: Some(other.cell),
+                fit: other.fit,
+            });
             return Posterior { findings, better };
         }
         let logs: Vec<f64> = [now, none]
@@ -307,16 +327,20 @@ pub fn diagnose<P: Problem>(
     let mut exchanges = 0;
     let findings = loop {
         let found = posterior(problem, &stand, exchanges < EXCHANGES, options);
-        let Some((out, into)) = found.better else {
+        let Some(Change { out, into, fit }) = found.better else {
             break found.findings;
         };
+        let gone = format!("{} at {}", out.cause.name, out.place);
+        tell(match &into {
+            Some(into) => format!("{} at {} in place of {gone}", into.cause.name, into.place),
+            None => format!("{gone} leaves"),
+        });
+        let fit = revised(problem, problem.settled(&fit), options, &mut tell);
+        stand = match exchanges < EXCHANGES {
+            true => search(problem, fit, Some(&stand.around), options, &mut tell),
+            false => Stand::new(problem, fit, Some(&stand.around)),
+        };
         exchanges += 1;
-        tell(format!(
-            "{} at {} in place of {} at {}",
-            into.cell.cause.name, into.cell.place, out.cause.name, out.place
-        ));
-        let fit = revised(problem, problem.settled(&into.fit), options, &mut tell);
-        stand = search(problem, fit, Some(&stand.around), options, &mut tell);
     };
     Answer {
         before,
