@@ -39,7 +39,7 @@ pub struct DiagnoseDrives {
     /// Gains, limits, encoders and the rate of the commands, JSON: `command_rate_hz`, `joints: [{joint, kp, kd, kd_on, torque_limit_nm,
     /// encoder_rad, noise_rad}]`, `inertia_tolerance: {mass_rel, com_mm, inertia_rel}`.
     pub(crate) drives: RawFile,
-    /// Commands and measured angles over time, CSV; or a list of such recordings, which are fitted together. A pattern stands for all files
+    /// Commands and measured angles over time, a table of any kind (CSV, Parquet with lists, npz, workbook); or a list of such recordings, which are fitted together. A pattern stands for all files
     /// that match.
     pub(crate) recording: DriveRecordings,
     /// The commands of one recording, where they are in a file of their own on the same clock: each holds until the next.
@@ -152,6 +152,10 @@ pub enum AngleUnit {
     Rad,
     /// Degrees.
     Deg,
+    /// From -100 to 100 over the joint's range: of the robot file, or `range_rad` of the drives file.
+    Percent,
+    /// Steps of the encoder, `encoder_rad` each, of which `zero_count` of the drives file (0) is 0 rad.
+    Counts,
 }
 
 /// A unit of time.
@@ -211,6 +215,11 @@ struct DriveOfJoint {
     encoder_rad: f64,
     #[serde(default)]
     noise_rad: f64,
+    /// From .. to, which are -100 and 100 per cent.
+    range_rad: Option<[f64; 2]>,
+    /// Count of the encoder at 0 rad.
+    #[serde(default)]
+    zero_count: f64,
 }
 
 #[derive(Clone, Copy, PartialEq, Deserialize)]
@@ -362,7 +371,7 @@ impl DiagnoseDrives {
                 centre: 1e-3 * stated.com_mm,
                 inertia_relative: stated.inertia_rel,
             });
-        let recording = self.recorded(&file, context)?;
+        let recording = self.recorded(&file, &arm, context)?;
         let chain = Chain::new(&arm.arm, &reference);
         Ok((arm, Drives::new(chain, physics, recording, tolerance)))
     }

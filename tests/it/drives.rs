@@ -191,13 +191,13 @@ fn friction_that_warms_up_and_turned_gravity_are_named_beside_each_other_and_not
 }
 
 /// An arm of one joint with its drive and 2 s of a recording.
-struct Folder {
-    robot: String,
-    drives: Value,
-    recording: String,
+pub(crate) struct Folder {
+    pub(crate) robot: String,
+    pub(crate) drives: Value,
+    pub(crate) recording: String,
 }
 
-fn folder() -> Folder {
+pub(crate) fn folder() -> Folder {
     let robot = r#"<mujoco><compiler angle="radian"/><worldbody><body name="link">
         <joint name="j1" axis="0 1 0" damping="0.1" armature="0.01"/><inertial pos="0.1 0 0" mass="0.5" diaginertia="0.001 0.001 0.001"/>
         </body></worldbody></mujoco>"#;

@@ -30,6 +30,7 @@ mod diagnose;
 mod diff;
 mod digests;
 mod drives;
+mod drives_tables;
 mod effects;
 mod export;
 mod fixture;

@@ -1,12 +1,12 @@
 //! What a diagnosis of drives says.
 
-use crate::causes::Key;
 use crate::chain::Chain;
 use crate::fit::DriveFit;
+use crate::key::Key;
 use crate::physics::Physics;
 use crate::problem::Drives;
 use crate::rollout::Which;
-use calib_engine::{Accepted, Finding, Options};
+use calib_engine::{Accepted, Cell, Finding, Options};
 
 /// A number of a finding.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,17 +93,49 @@ pub struct DriveDiagnosis {
     pub rows: usize,
 }
 
+/// Times that steps are halved at most, and times what they err by that a finding explains at least.
+const HALVED: usize = 2;
+const DOUBT: f64 = 3.0;
 /// Times the noise from which on something remains.
 const REMAINS: f64 = 1.1;
 
 /// Diagnoses a recording of drives; `tell` receives the progress.
-pub fn diagnose(problem: &Drives, options: &Options, tell: impl FnMut(String)) -> DriveDiagnosis {
+pub fn diagnose(
+    problem: &Drives,
+    options: &Options,
+    mut tell: impl FnMut(String),
+) -> DriveDiagnosis {
     let part = problem.part();
-    let answer = calib_engine::diagnose(part.as_ref().unwrap_or(problem), options, tell);
+    let is_part = part.is_some();
+    let mut searched = part.unwrap_or_else(|| problem.clone());
+    let mut whole = problem.clone();
+    let mut answer = calib_engine::diagnose(&searched, &[], options, &mut tell);
+    // Steps that serve the simulation as it is may be too long for what was found: a finding that explains no more than they err by may be
+    // their error. Then they are halved, and what finer ones may still err by is noise.
+    for _ in 0..HALVED {
+        let found = searched.physics(&answer.after.inertia, &answer.after.set);
+        let (moves, square) = searched.coarseness(&found);
+        let explained = 0.5 * answer.after.share() * square;
+        if answer
+            .findings
+            .iter()
+            .all(|one| one.log_odds > DOUBT * explained)
+        {
+            break;
+        }
+        let off: Vec<f64> = moves.iter().map(|way| 0.5 * way).collect();
+        (searched, whole) = (searched.finer(&off), whole.finer(&off));
+        tell(format!("steps of {:.2} ms", 1e3 * searched.chain.step));
+        answer = calib_engine::diagnose(&searched, &answer.after.set, options, &mut tell);
+    }
     // What stands is fitted to all rows.
-    let after = match part {
-        Some(_) => problem.fitted_with(&answer.after.set, None, true),
-        None => answer.after,
+    let problem = &whole;
+    let after = match is_part {
+        true => {
+            let (found, worth) = (&answer.after, f64::NEG_INFINITY);
+            problem.fitted_with(&found.set, Some(found), true, worth)
+        }
+        false => answer.after,
     };
     let findings = answer.findings.iter();
     let findings = findings
@@ -227,7 +259,7 @@ impl Drives {
         DriveFinding {
             effect: cell.cause.name,
             place: cell.place.clone(),
-            statement: sentence(cell.cause.sentence, &cell.place),
+            statement: sentence(cell),
             parameters,
             effect_rms: (rows.iter().sum::<f64>() / rows.len().max(1) as f64).sqrt(),
             probability: finding.probability,
@@ -248,11 +280,13 @@ impl Drives {
     }
 }
 
-fn sentence(words: &str, place: &str) -> String {
-    let text = words.replace("{}", place);
+fn sentence(cell: &Cell<Key>) -> String {
+    let text = cell.cause.sentence.replace("{}", &cell.place);
     let mut letters = text.chars();
     let first = letters
         .next()
         .map(|letter| letter.to_uppercase().to_string());
-    first.unwrap_or_default() + letters.as_str() + "."
+    let follows = cell.key.follows();
+    let follows = follows.map_or(String::new(), |what| format!(": {what}"));
+    first.unwrap_or_default() + letters.as_str() + &follows + "."
 }

@@ -8,6 +8,8 @@ use nalgebra::{Matrix3, Point3, Vector3};
 pub const MOST: usize = 14;
 /// s of a step at which roll-outs are those of finer ones, whatever the arm.
 pub(crate) const STEP: f64 = 1e-3;
+/// s of a step where a gear yields.
+const GEARED_STEP: f64 = 5e-4;
 /// A number a degree of freedom.
 pub type Row = [f64; MOST];
 /// A matrix over them.
@@ -21,8 +23,9 @@ pub struct Chain {
     prismatic: Vec<bool>,
     reference: Vec<f64>,
     tool: Vector3<f64>,
-    /// s of a step of a roll-out at most.
+    /// s of a step of a roll-out at most, and where a gear yields.
     pub(crate) step: f64,
+    pub(crate) geared_step: f64,
 }
 
 /// What it carries, a body a link, in world axes at the reference pose.
@@ -64,12 +67,19 @@ impl Chain {
             reference: reference.to_vec(),
             tool: arm.tool.coords,
             step: STEP,
+            geared_step: GEARED_STEP,
         }
     }
 
     /// Number of joints.
     pub fn joints(&self) -> usize {
         self.axes.len()
+    }
+
+    /// Steps of half the length.
+    pub(crate) fn halve(&mut self) {
+        self.step *= 0.5;
+        self.geared_step *= 0.5;
     }
 
     /// The tool point at the reference pose.

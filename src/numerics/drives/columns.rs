@@ -4,7 +4,7 @@
 //! where it acts.
 
 use crate::chain::{Bodies, Chain, MOST, Moved, Posed, Row, Square};
-use crate::physics::{Commanded, Curve, Joint, Motion, Physics, Torque};
+use crate::physics::{Commanded, Curve, Joint, Motion, Physics, Torque, slewed};
 use crate::recording::{Commands, Recording, Trajectory};
 
 /// A change of the physics whose response is wanted: joints and bodies as they would be.
@@ -243,7 +243,7 @@ impl<'a> Columns<'a> {
                         wave = (
                             joint,
                             *waves,
-                            libm::sincos(waves * at.motion.q[at.rotor[joint]]),
+                            libm::sincos(waves * at.motion.middle[at.rotor[joint]]),
                         );
                     }
                     push[0] = cosine * wave.2.1 + sine * wave.2.0;
@@ -432,21 +432,15 @@ fn slot_torque(
         (with.angle, with.speed) = (angle, speed);
     }
     if changed.speed_limit != base.speed_limit {
-        let [angle, _] = commands.mean(
-            joint,
-            at.time - changed.delay,
-            at.time + at.h - changed.delay,
-            at.guess,
-        );
-        let way = changed.speed_limit * at.h;
-        *set_point += (angle - *set_point).clamp(-way, way);
-        with.angle = *set_point;
+        let from = at.time - changed.delay;
+        let [angle, _] = commands.mean(joint, from, from + at.h, at.guess);
+        (with.angle, *set_point) = slewed(*set_point, angle, changed.speed_limit, at.h);
     }
     if changed.integral != base.integral {
-        with.integral = *integral;
-        let error = with.angle + changed.offset - at.motion.q[r];
-        let most = changed.integral[1];
-        *integral = (*integral + changed.integral[0] * error * at.h).clamp(-most, most);
+        let error = with.angle + changed.offset - at.motion.middle[r];
+        let (most, before) = (changed.integral[1], *integral);
+        *integral = (before + changed.integral[0] * error * at.h).clamp(-most, most);
+        with.integral = 0.5 * (before + *integral);
     }
     let sag = sag.map_or(at.sag, |sag| 1.0 - (sag * at.drawn).clamp(0.0, 0.9));
     let t = changed.torque(joint, r, at.motion, &with, sag);

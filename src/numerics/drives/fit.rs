@@ -1,7 +1,7 @@
 //! Everything at once, in the roll-out itself: Gauss-Newton on the numbers of causes and on inertials under their tolerance.
 
-use crate::causes::Key;
 use crate::independence::independent;
+use crate::key::Key;
 use crate::problem::{Drives, FREE};
 use crate::rollout::{Direction, Which, roll};
 use calib_engine::Accepted;
@@ -30,6 +30,9 @@ const STANDS: Patience = Patience {
     share: 1e-5,
 };
 
+/// Times what a linear step promises that a fit may still gain.
+const REACH: f64 = 3.0;
+
 /// A fitted model.
 #[derive(Debug, Clone)]
 pub struct DriveFit {
@@ -43,8 +46,10 @@ pub struct DriveFit {
     pub square: f64,
     /// Fitted numbers.
     pub freedom: f64,
-    /// Effective rows a row.
+    /// Effective rows a row, by what the model leaves.
     pub independence: f64,
+    /// The same by what a rich model would leave, the most of all looks.
+    pub rich: f64,
     /// Squared distance of all numbers from where they are expected, in their usual sizes.
     pub penalty: f64,
     /// One standard deviation of each number of the set, as it is fitted.
@@ -53,8 +58,30 @@ pub struct DriveFit {
     pub log_prior: f64,
     /// Products of the columns in units of their priors.
     gram: DMatrix<f64>,
-    /// Responses to the inertials, each rows x joints, rad: they hardly change with the causes.
-    responses: Arc<Vec<Vec<f64>>>,
+    /// Cause and number of each column beyond the inertials.
+    numbers: Vec<(usize, usize)>,
+    /// Responses as they were when all of them were made anew: they hardly change with a further cause.
+    responses: Arc<Responses>,
+}
+
+/// Responses to inertials and to numbers of causes.
+#[derive(Debug, Clone, Default)]
+struct Responses {
+    /// Of each column beyond the inertials.
+    numbers: Vec<(Key, usize)>,
+    /// Each rows x joints, rad.
+    changes: Vec<Vec<f64>>,
+}
+
+/// Which columns are made anew.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Anew {
+    /// All.
+    All,
+    /// Those of causes.
+    Causes,
+    /// Those of which no response is known.
+    Unknown,
 }
 
 /// Sums of products of columns.
@@ -97,8 +124,8 @@ impl Normal {
 enum Source {
     Carried(usize, f64),
     Rolled(Vec<f64>, f64),
-    /// One of the responses to the inertials.
-    Known(Arc<Vec<Vec<f64>>>, usize),
+    /// One of the responses that are known.
+    Known(Arc<Responses>, usize),
 }
 
 /// Columns of all that is free in a model.
@@ -109,7 +136,7 @@ pub(crate) struct BaseColumns {
     /// Of the priors.
     pub(crate) precision: Vec<f64>,
     /// Cause and number of each column beyond the inertials.
-    numbers: Vec<(usize, usize)>,
+    pub(crate) numbers: Vec<(usize, usize)>,
 }
 
 impl BaseColumns {
@@ -123,7 +150,7 @@ impl BaseColumns {
             *out = match source {
                 Source::Carried(k, size) => change[*k] / (size * sigma),
                 Source::Rolled(changes, size) => changes[at] / (size * sigma),
-                Source::Known(responses, k) => responses[*k][at] / sigma,
+                Source::Known(responses, k) => responses.changes[*k][at] / sigma,
             };
         }
     }
@@ -140,11 +167,68 @@ fn log_likelihood(square: f64, rows: f64, independence: f64) -> f64 {
 }
 
 impl DriveFit {
+    /// Share of the rows that is independent: by what the model leaves, or by what a rich one would.
+    pub fn share(&self) -> f64 {
+        self.independence.max(self.rich)
+    }
+
+    /// Number of the known response to a number of a cause.
+    fn known(&self, key: Key, number: usize) -> Option<usize> {
+        let numbers = &self.responses.numbers;
+        let at = numbers.iter().position(|one| *one == (key, number))?;
+        Some(self.inertia.len() + at)
+    }
+
+    /// Inverse of the posterior's variance, in units of the priors.
+    fn precision(&self, independence: f64) -> DMatrix<f64> {
+        let scale = (self.square / self.freedom).max(1.0);
+        let count = self.gram.nrows();
+        &self.gram * (independence / scale) + DMatrix::identity(count, count)
+    }
+
+    /// ln of the odds of a member against nothing: its prior over its posterior where it is nothing (Dickey, 1971); `None` where no number
+    /// of it is 0 then.
+    pub fn odds(&self, member: usize, independence: f64) -> Option<f64> {
+        let one = &self.set[member];
+        let shape = &one.cell.shapes[one.shape];
+        let sizes: Vec<usize> = (0..one.numbers.len())
+            .filter(|k| shape.start[*k] == 0.0 && shape.centre[*k] == 0.0)
+            .filter(|k| shape.columns.iter().any(|column| column[*k] != 0.0))
+            .collect();
+        let columns: Option<Vec<usize>> = sizes
+            .iter()
+            .map(|k| {
+                self.numbers
+                    .iter()
+                    .position(|number| *number == (member, *k))
+            })
+            .collect();
+        let columns = columns.filter(|columns| !columns.is_empty())?;
+        let inverse = self.precision(independence).cholesky()?.inverse();
+        let nb = self.inertia.len();
+        let count = columns.len();
+        let variance = DMatrix::from_fn(count, count, |i, k| {
+            inverse[(nb + columns[i], nb + columns[k])]
+        });
+        let size = DVector::from_fn(count, |i, _| one.numbers[sizes[i]] / shape.usual[sizes[i]]);
+        let factor = variance.cholesky()?;
+        let half_log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+        Some(
+            0.5 * size.dot(&factor.solve(&size))
+                + half_log_det
+                + one.cell.log_prior
+                + shape.log_weight,
+        )
+    }
+
+    /// What evidence may be reached at most where the squared residual still falls by so much.
+    fn reach(&self, falls: f64, independence: f64) -> f64 {
+        log_likelihood((self.square - falls).max(0.0), self.freedom, independence) + self.log_prior
+    }
+
     /// ln of the evidence, where so large a share of the rows is independent.
     pub fn log_evidence(&self, independence: f64) -> f64 {
-        let scale = (self.square / self.freedom).max(1.0);
-        let whole = &self.gram * (independence / scale)
-            + DMatrix::identity(self.gram.nrows(), self.gram.ncols());
+        let whole = self.precision(independence);
         let log_det = whole.cholesky().map_or(f64::INFINITY, |factor| {
             2.0 * factor
                 .l_dirty()
@@ -160,7 +244,7 @@ impl DriveFit {
 
 impl Drives {
     /// Columns of inertials and of the numbers of a fit.
-    pub(crate) fn base_columns(&self, fit: &DriveFit, anew: bool) -> BaseColumns {
+    pub(crate) fn base_columns(&self, fit: &DriveFit, anew: Anew) -> BaseColumns {
         let now = self.physics(&fit.inertia, &fit.set);
         let mut columns = BaseColumns {
             directions: Vec::new(),
@@ -170,7 +254,7 @@ impl Drives {
         };
         for k in 0..fit.inertia.len() {
             columns.precision.push(1.0);
-            if !anew && k < fit.responses.len() {
+            if anew != Anew::All && k < fit.responses.changes.len() {
                 columns
                     .sources
                     .push(Source::Known(fit.responses.clone(), k));
@@ -192,6 +276,15 @@ impl Drives {
                 .enumerate()
                 .filter(|(_, usual)| **usual > 0.0)
             {
+                columns.precision.push(1.0 / (usual * usual));
+                columns.numbers.push((c, k));
+                let known = fit.known(accepted.cell.key, k);
+                if let Some(at) = known.filter(|_| anew == Anew::Unknown) {
+                    columns
+                        .sources
+                        .push(Source::Known(fit.responses.clone(), at));
+                    continue;
+                }
                 let memory = accepted.cell.key.has_memory();
                 let size = if memory { 0.02 * usual } else { 2e-3 * usual };
                 let mut set = fit.set.clone();
@@ -215,8 +308,6 @@ impl Drives {
                     }
                 };
                 columns.sources.push(source);
-                columns.precision.push(1.0 / (usual * usual));
-                columns.numbers.push((c, k));
             }
         }
         columns
@@ -234,12 +325,13 @@ impl Drives {
         (angles, square)
     }
 
-    /// Fits inertials and a set's numbers from where they are.
+    /// Fits inertials and a set's numbers from where they are; stops where evidence `worth` is out of reach.
     pub(crate) fn fitted_with(
         &self,
         set: &[Accepted<Key>],
         before: Option<&DriveFit>,
         anew: bool,
+        worth: f64,
     ) -> DriveFit {
         let anew = anew || before.is_none();
         let patience = if anew { &STANDS } else { &TRIAL };
@@ -253,6 +345,7 @@ impl Drives {
             square: f64::INFINITY,
             freedom,
             independence: before.map_or(1.0, |fit| fit.independence),
+            rich: before.map_or(0.0, |fit| fit.rich),
             penalty: 0.0,
             sigma: Vec::new(),
             log_prior: set
@@ -260,21 +353,24 @@ impl Drives {
                 .map(|one| one.cell.log_prior + one.cell.shapes[one.shape].log_weight)
                 .sum(),
             gram: DMatrix::zeros(0, 0),
+            numbers: Vec::new(),
             responses: before.map_or_else(Default::default, |fit| fit.responses.clone()),
         };
         // Columns that are roll-outs of their own are dear: they wait until the step is known to be good.
-        let dear = set.iter().any(|one| one.cell.key.has_memory());
+        let dear = set.iter().any(|one| {
+            let key = one.cell.key;
+            key.has_memory() && (anew || fit.known(key, 0).is_none())
+        });
         if dear {
             (fit.angles, fit.square) = self.evaluated(&fit.inertia, set);
         }
-        let (mut columns, mut normal) = self.looked(&mut fit, anew);
+        let first = if anew { Anew::All } else { Anew::Unknown };
+        let (mut columns, mut normal) = self.looked(&mut fit, first);
         if before.is_none() {
             fit.independence = self.independence_of(&fit.angles);
         }
-        let weigh = |fit: &DriveFit| {
-            self.independence_given(fit.independence) / (fit.square / freedom).max(1.0)
-        };
-        let mut is_new = anew;
+        let weigh = |fit: &DriveFit| fit.share() / (fit.square / freedom).max(1.0);
+        let mut is_new = true;
         for step in 1..=patience.steps {
             if !fit.square.is_finite() || columns.count() == 0 {
                 break;
@@ -289,8 +385,17 @@ impl Drives {
                 break;
             };
             let change = factor.solve(&gradient);
+            // The first step leads from where a linear scan began; from then on a step says how far the next ones may lead.
+            let falls = REACH * gradient.dot(&change) / weight;
+            if step > 1 && fit.reach(falls, fit.share()) < worth {
+                break;
+            }
             let objective = weight * fit.square + self.penalty(&fit);
-            let again = anew && step < 2;
+            let again = match anew {
+                true if step < 2 => Anew::All,
+                true => Anew::Causes,
+                false => Anew::Unknown,
+            };
             let (mut by, mut moved) = (1.0, None);
             while by > 0.02 {
                 let mut trial = fit.clone();
@@ -299,9 +404,17 @@ impl Drives {
                     *number += by * change[k];
                 }
                 for ((c, k), by_column) in columns.numbers.iter().zip(change.iter().skip(nb)) {
-                    let usual = trial.set[*c].cell.shapes[trial.set[*c].shape].usual[*k];
+                    let Accepted {
+                        cell,
+                        shape,
+                        numbers,
+                    } = &mut trial.set[*c];
+                    let shape = &cell.shapes[*shape];
                     // No further than the linear model can be believed.
-                    trial.set[*c].numbers[*k] += (by * by_column).clamp(-3.0 * usual, 3.0 * usual);
+                    let most = 3.0 * shape.usual[*k];
+                    let [low, high] = shape.bounds[*k];
+                    let number = numbers[*k] + (by * by_column).clamp(-most, most);
+                    numbers[*k] = number.clamp(low, high);
                 }
                 let seen = if dear {
                     (trial.angles, trial.square) = self.evaluated(&trial.inertia, &trial.set);
@@ -321,16 +434,17 @@ impl Drives {
             };
             fit = next;
             (columns, normal) = seen.unwrap_or_else(|| self.looked(&mut fit, again));
-            is_new = again;
+            is_new = again == Anew::All;
             if fall < patience.fall.max(patience.share * objective) {
                 break;
             }
         }
         if anew && !is_new {
-            (columns, normal) = self.looked(&mut fit, true);
+            (columns, normal) = self.looked(&mut fit, Anew::All);
         }
         fit.independence = self.independence_of(&fit.angles);
         fit.penalty = self.penalty(&fit);
+        fit.numbers.clone_from(&columns.numbers);
         let roots: Vec<f64> = columns.precision.iter().map(|p| 1.0 / p.sqrt()).collect();
         let gram = normal.gram_matrix();
         fit.gram = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, k| {
@@ -353,22 +467,21 @@ impl Drives {
     }
 
     /// Columns around a fit and their products.
-    fn looked(&self, fit: &mut DriveFit, anew: bool) -> (BaseColumns, Normal) {
+    fn looked(&self, fit: &mut DriveFit, anew: Anew) -> (BaseColumns, Normal) {
         let columns = self.base_columns(fit, anew);
-        let normal = self.normal(fit, &columns);
+        let normal = self.normal(fit, &columns, anew == Anew::All);
         (columns, normal)
     }
 
-    /// Products of the columns around a fit; the fit's angles are those of the same roll-out, and responses to the inertials are kept where
-    /// they were made anew.
-    fn normal(&self, fit: &mut DriveFit, columns: &BaseColumns) -> Normal {
+    /// Products of the columns around a fit; the fit's angles are those of the same roll-out, and responses are `kept` where all were made
+    /// anew.
+    fn normal(&self, fit: &mut DriveFit, columns: &BaseColumns, kept: bool) -> Normal {
         let n = self.chain.joints();
         let physics = self.physics(&fit.inertia, &fit.set);
-        let mut normal = Normal::new(columns.count());
-        let mut x = vec![0.0; columns.count()];
-        let anew = matches!(columns.sources.first(), Some(Source::Carried(..)))
-            .then_some(fit.inertia.len());
-        let mut responses = vec![vec![0.0; fit.angles.len()]; anew.unwrap_or(0)];
+        let count = columns.count();
+        let mut normal = Normal::new(count);
+        let mut x = vec![0.0; count];
+        let mut changes = vec![vec![0.0; fit.angles.len()]; if kept { count } else { 0 }];
         let angles = &mut fit.angles;
         roll(
             &self.chain,
@@ -382,16 +495,20 @@ impl Drives {
                     let sigma = self.sigma[at];
                     angles[at] = row.angle[joint];
                     columns.at(at, row.change[joint], sigma, &mut x);
-                    responses
+                    changes
                         .iter_mut()
                         .zip(&x)
-                        .for_each(|(response, x)| response[at] = x * sigma);
+                        .for_each(|(change, x)| change[at] = x * sigma);
                     normal.add(&x, (self.recording.angle[at] - row.angle[joint]) / sigma);
                 }
             },
         );
-        if anew.is_some() {
-            fit.responses = Arc::new(responses);
+        if kept {
+            let key = |(c, k): &(usize, usize)| (fit.set[*c].cell.key, *k);
+            fit.responses = Arc::new(Responses {
+                numbers: columns.numbers.iter().map(key).collect(),
+                changes,
+            });
         }
         let square = normal.square;
         fit.square = if square.is_finite() {

@@ -12,11 +12,13 @@
 #[cfg(test)]
 mod against_mujoco;
 mod answer;
+mod around;
 mod causes;
 pub mod chain;
 mod columns;
 mod fit;
 mod independence;
+mod key;
 pub mod mjcf;
 pub mod physics;
 mod problem;
@@ -24,6 +26,8 @@ pub mod recording;
 pub mod rollout;
 
 pub use answer::{DriveDiagnosis, DriveFinding, DriveNumber, DriveRival, JointError, diagnose};
-pub use causes::{CAUSES, Key, Usual};
+pub use around::Around;
+pub use causes::{CAUSES, Usual};
 pub use fit::DriveFit;
+pub use key::Key;
 pub use problem::Drives;

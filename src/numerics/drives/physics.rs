@@ -35,9 +35,9 @@ impl Curve {
     /// Its value in a motion, Nm.
     pub fn value(&self, motion: &Motion) -> f64 {
         let x = match self.over {
-            Over::Angle(joint) => motion.q[joint],
-            Over::Speed(joint) => motion.v[joint].abs(),
-            Over::Velocity(joint) => motion.v[joint],
+            Over::Angle(joint) => motion.middle[joint],
+            Over::Speed(joint) => motion.ahead[joint].abs(),
+            Over::Velocity(joint) => motion.ahead[joint],
             Over::Acceleration(joint) => motion.a[joint],
             Over::Time => motion.time,
         };
@@ -137,18 +137,23 @@ pub const SAG_LAG: f64 = 0.02;
 /// s, over which friction feels a gear's load: what it asks for is known after a step only.
 pub const LOAD_LAG: f64 = 0.005;
 
-/// An instant of the motion.
+/// A step of the motion: what is linear in the state is taken at its beginning and made implicit, everything else in its middle, so that both are
+/// of second order.
 #[derive(Debug, Clone, Copy)]
 pub struct Motion<'a> {
-    /// Positions: of links, then of rotors that move by themselves.
+    /// Positions at the beginning: of links, then of rotors that move by themselves.
     pub q: &'a [f64],
-    /// Speeds.
+    /// Speeds there.
     pub v: &'a [f64],
+    /// Positions in the middle.
+    pub middle: &'a [f64],
+    /// Speeds there, as the last accelerations lead on.
+    pub ahead: &'a [f64],
     /// Accelerations of the step before.
     pub a: &'a [f64],
-    /// s.
+    /// s, in the middle.
     pub time: f64,
-    /// Nm of the drives in the step before.
+    /// Nm of the drives, in the middle.
     pub driven: &'a [f64],
     /// Nm that links ask of their gears, over the last [`LOAD_LAG`].
     pub load: &'a [f64],
@@ -170,8 +175,6 @@ pub struct Commanded {
 /// Torques on a joint.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Torque {
-    /// Of the drive, Nm.
-    pub drive: f64,
     /// All of it but dry friction, on the rotor where that moves by itself, else on the link.
     pub smooth: f64,
     /// On the link where the rotor moves by itself.
@@ -184,6 +187,27 @@ pub struct Torque {
     pub damping: f64,
     /// Fall of the gear's torque per rad and rad/s between its sides.
     pub gear: [f64; 2],
+}
+
+/// What a drive gives, Nm.
+#[derive(Debug, Clone, Copy)]
+pub struct Drive {
+    /// In the middle of a step.
+    pub given: f64,
+    /// At its beginning, of which the implicit part leads to the middle.
+    explicit: f64,
+    /// Fall per rad and per rad/s.
+    stiffness: f64,
+    damping: f64,
+}
+
+/// The mean over a step of `h` of a set point that follows a command no faster than `limit`, and where it is then.
+pub(crate) fn slewed(from: f64, command: f64, limit: f64, h: f64) -> (f64, f64) {
+    let (far, way) = (command - from, limit * h);
+    if far.abs() >= way {
+        return (from + 0.5 * way.copysign(far), from + way.copysign(far));
+    }
+    (command - 0.5 * far * far.abs() / way, command)
 }
 
 impl Default for Joint {
@@ -218,6 +242,49 @@ impl Default for Joint {
 }
 
 impl Joint {
+    /// What the drive of joint `joint` gives, whose rotor is degree of freedom `rotor`; `sag` scales it.
+    pub fn drive(
+        &self,
+        joint: usize,
+        rotor: usize,
+        motion: &Motion,
+        commanded: &Commanded,
+        sag: f64,
+    ) -> Drive {
+        let on_link = self.gear.is_some_and(|gear| gear.encoder_on_link);
+        let seen = if on_link { joint } else { rotor };
+        let speed = if self.kd_on_error {
+            commanded.speed
+        } else {
+            0.0
+        };
+        let error = |q: f64| commanded.angle + self.offset - q;
+        let middle = error(motion.middle[seen]);
+        let band = middle.clamp(-self.dead_band, self.dead_band);
+        let feels = self.dead_band == 0.0 || middle != band;
+        let asked = |error: f64, v: f64| {
+            let felt = if feels { error - band } else { 0.0 };
+            sag * (self.kp * felt + self.kd * (speed - v) + commanded.integral)
+        };
+        let limit = self.limit * sag;
+        let wanted = asked(middle, motion.ahead[seen]);
+        let given = wanted.clamp(-limit, limit);
+        if given != wanted || on_link {
+            return Drive {
+                given,
+                explicit: given,
+                stiffness: 0.0,
+                damping: 0.0,
+            };
+        }
+        Drive {
+            given,
+            explicit: asked(error(motion.q[seen]), motion.v[seen]),
+            stiffness: if feels { self.kp * sag } else { 0.0 },
+            damping: self.kd * sag,
+        }
+    }
+
     /// The torques of joint `joint`, whose rotor is degree of freedom `rotor`; `sag` scales what the drive gives.
     pub fn torque(
         &self,
@@ -229,37 +296,19 @@ impl Joint {
     ) -> Torque {
         let mut out = Torque::default();
         let (q, v) = (motion.q[rotor], motion.v[rotor]);
-        let (seen_q, seen_v, seen) = match &self.gear {
-            Some(gear) if gear.encoder_on_link => (motion.q[joint], motion.v[joint], 0.0),
-            _ => (q, v, 1.0),
-        };
-        let error = commanded.angle + self.offset - seen_q;
-        let felt = error - error.clamp(-self.dead_band, self.dead_band);
-        let speed = if self.kd_on_error {
-            commanded.speed
-        } else {
-            0.0
-        };
-        let asked = self.kp * felt + self.kd * (speed - seen_v) + commanded.integral;
-        let limit = self.limit * sag;
-        let drive = (asked * sag).clamp(-limit, limit);
-        if drive.abs() < limit || limit.is_infinite() {
-            out.damping += self.kd * sag * seen;
-            if self.dead_band == 0.0 || felt != 0.0 {
-                out.stiffness += self.kp * sag * seen;
-            }
-        }
-        out.drive = drive;
+        let (middle, ahead) = (motion.middle[rotor], motion.ahead[rotor]);
+        let drive = self.drive(joint, rotor, motion, commanded, sag);
+        (out.stiffness, out.damping) = (drive.stiffness, drive.damping);
         let cold = match (self.warm_up[0], self.warm_up_viscous) {
             (0.0, 0.0) => 0.0,
             _ => libm::exp(-motion.time / self.warm_up[1]),
         };
         let damping = self.damping * (1.0 + self.warm_up_viscous * cold).max(0.0);
-        out.smooth = drive - damping * v - self.spring[0] * (q - self.spring[1]);
+        out.smooth = drive.explicit - damping * v - self.spring[0] * (q - self.spring[1]);
         out.damping += damping;
         out.stiffness += self.spring[0].max(0.0);
         for [waves, cosine, sine] in &self.ripple {
-            let (s, c) = libm::sincos(waves * q);
+            let (s, c) = libm::sincos(waves * middle);
             out.smooth += cosine * c + sine * s;
         }
         for (by, share) in &self.coupling {
@@ -267,13 +316,16 @@ impl Joint {
         }
         let mut dry = self.friction;
         if self.stribeck[0] != 0.0 {
-            let ratio = v / self.stribeck[1];
-            dry += self.stribeck[0] * libm::exp(-ratio * ratio);
+            let ratio = ahead / self.stribeck[1];
+            // Beyond it is nothing.
+            if ratio.abs() < 6.0 {
+                dry += self.stribeck[0] * libm::exp(-ratio * ratio);
+            }
         }
         dry *= 1.0 + self.warm_up[0] * cold;
         if self.load_friction != [0.0; 2] {
-            let back = drive * v < 0.0;
-            dry += self.load_friction[usize::from(back)] * drive.abs();
+            let back = drive.given * ahead < 0.0;
+            dry += self.load_friction[usize::from(back)] * drive.given.abs();
         }
         for curve in &self.curves {
             let value = curve.value(motion);
@@ -291,7 +343,7 @@ impl Joint {
             }
         }
         if self.presliding > 0.0 {
-            let dry = limit[usize::from(v < 0.0)];
+            let dry = limit[usize::from(ahead < 0.0)];
             // A spring in place of the stop: it bends with the way and slides when it is bent by its travel.
             out.smooth -= dry * commanded.bent;
             out.stiffness += dry / self.presliding * (1.0 - commanded.bent.abs()).max(0.0);
@@ -301,9 +353,10 @@ impl Joint {
         if let Some(gear) = &self.gear {
             let (way, rate) = (q - motion.q[joint], v - motion.v[joint]);
             let half = 0.5 * gear.play;
-            let bent = way - way.clamp(-half, half);
-            if bent != 0.0 || half == 0.0 {
-                let torque = gear.stiffness * bent + gear.damping * rate;
+            let between = middle - motion.middle[joint];
+            let flank = between.clamp(-half, half);
+            if between != flank || half == 0.0 {
+                let torque = gear.stiffness * (way - flank) + gear.damping * rate;
                 out.smooth -= torque;
                 out.link += torque;
                 out.gear = [gear.stiffness, gear.damping];

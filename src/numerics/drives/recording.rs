@@ -155,6 +155,34 @@ impl Recording {
         self.trajectories.extend(trajectories);
     }
 
+    /// Some trajectories alone.
+    pub(crate) fn cut(&self, trajectories: &[Trajectory]) -> Self {
+        let n = self.joints();
+        let mut cut = Self {
+            time: Vec::new(),
+            command: Vec::new(),
+            angle: Vec::new(),
+            trajectories: Vec::new(),
+            held_out: Vec::new(),
+            period: self.period,
+            encoder: self.encoder.clone(),
+            noise: self.noise.clone(),
+        };
+        for one in trajectories {
+            let (rows, cells) = (one.rows.clone(), one.rows.start * n..one.rows.end * n);
+            let from = cut.rows();
+            cut.time.extend_from_slice(&self.time[rows.clone()]);
+            cut.command.extend_from_slice(&self.command[cells.clone()]);
+            cut.angle.extend_from_slice(&self.angle[cells]);
+            cut.held_out.extend_from_slice(&self.held_out[rows]);
+            cut.trajectories.push(Trajectory {
+                rows: from..cut.rows(),
+                began: one.began,
+            });
+        }
+        cut
+    }
+
     /// Whether a trajectory has rows to fit.
     pub(crate) fn is_fitted(&self, trajectory: &Trajectory) -> bool {
         self.held_out[trajectory.rows.clone()].contains(&false)

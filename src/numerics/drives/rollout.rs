@@ -5,7 +5,7 @@
 
 use crate::chain::{Chain, MOST, Posed, Row, Square, invert};
 use crate::columns::{Columns, Instant, StepMatrices};
-use crate::physics::{Commanded, LOAD_LAG, Motion, Physics, ROTOR_SHARE, SAG_LAG, Torque};
+use crate::physics::{Commanded, LOAD_LAG, Motion, Physics, ROTOR_SHARE, SAG_LAG, Torque, slewed};
 use crate::recording::{Commands, Recording, Trajectory};
 
 pub use crate::columns::Direction;
@@ -33,8 +33,6 @@ pub enum Which {
     All,
 }
 
-/// s of a step at most where a gear yields.
-const GEARED_STEP: f64 = 5e-4;
 /// Sweeps of the impulses of dry friction at most, and rad/s at which they are settled.
 const SWEEPS: usize = 20;
 const SETTLED: f64 = 1e-9;
@@ -56,7 +54,8 @@ struct Roller<'a> {
     set_point: Row,
     driven: Row,
     load: Row,
-    drawn: f64,
+    /// Nm that all drives give, over the last [`SAG_LAG`] and now.
+    drawn: [f64; 2],
     posed: Posed,
     /// Nm/rad of gravity.
     gravity: Square,
@@ -96,14 +95,14 @@ pub fn roll(
         set_point: [0.0; MOST],
         driven: [0.0; MOST],
         load: [0.0; MOST],
-        drawn: 0.0,
+        drawn: [0.0; 2],
         posed: Posed::default(),
         gravity: [[0.0; MOST]; MOST],
         columns: Columns::new(physics, directions, freedoms),
     };
     let mut began = None;
     let most = if freedoms > n {
-        GEARED_STEP
+        chain.geared_step
     } else {
         chain.step
     };
@@ -225,9 +224,12 @@ impl Roller<'_> {
     fn advance(&mut self, commands: &Commands, guess: usize, time: f64, since: f64, h: f64) {
         let (n, m, physics) = (self.n, self.freedoms, self.physics);
         let (mut middle, mut ahead) = ([0.0; MOST], [0.0; MOST]);
-        for i in 0..n {
+        for i in 0..m {
             middle[i] = self.q[i] + 0.5 * h * self.v[i];
-            ahead[i] = self.v[i] + 0.5 * h * self.a[i];
+            // What stopped in the last step does not go back by it.
+            if self.v[i] != 0.0 {
+                ahead[i] = self.v[i] + 0.5 * h * self.a[i];
+            }
         }
         self.chain
             .pose(&middle[..n], &physics.bodies, &mut self.posed);
@@ -236,31 +238,45 @@ impl Roller<'_> {
         let gravity = &physics.bodies.gravity;
         self.chain
             .torques(&self.posed, gravity, &ahead[..n], None, &mut bias);
-        let sag = 1.0 - (physics.sag * self.drawn).clamp(0.0, 0.9);
-        let (q, v, a, driven, load) = (self.q, self.v, self.a, self.driven, self.load);
-        let motion = Motion {
+        let drawn = self.drawn[0] + (self.drawn[1] - self.drawn[0]) * 0.5 * h / SAG_LAG;
+        let sag = 1.0 - (physics.sag * drawn).clamp(0.0, 0.9);
+        let (q, v, a, load) = (self.q, self.v, self.a, self.load);
+        let mut motion = Motion {
             q: &q[..m],
             v: &v[..m],
+            middle: &middle[..m],
+            ahead: &ahead[..m],
             a: &a[..m],
-            time: since,
-            driven: &driven[..n],
+            time: since + 0.5 * h,
+            driven: &[],
             load: &load[..n],
         };
         let mut torques = [Torque::default(); MOST];
         let mut sent = [Commanded::default(); MOST];
         for j in 0..n {
-            let joint = &physics.joints[j];
+            let (joint, r) = (&physics.joints[j], self.rotor[j]);
             let [angle, speed] =
                 commands.mean(j, time - joint.delay, time + h - joint.delay, guess);
-            let way = joint.speed_limit * h;
-            self.set_point[j] += (angle - self.set_point[j]).clamp(-way, way);
+            let (angle, reached) = slewed(self.set_point[j], angle, joint.speed_limit, h);
+            self.set_point[j] = reached;
+            let before = self.integral[j];
+            if joint.integral[0] != 0.0 {
+                let error = angle + joint.offset - middle[r];
+                let most = joint.integral[1];
+                self.integral[j] = (before + joint.integral[0] * error * h).clamp(-most, most);
+            }
             sent[j] = Commanded {
-                angle: self.set_point[j],
+                angle,
                 speed,
-                integral: self.integral[j],
+                integral: 0.5 * (before + self.integral[j]),
                 bent: self.bent[j],
             };
-            torques[j] = joint.torque(j, self.rotor[j], &motion, &sent[j], sag);
+            self.driven[j] = joint.drive(j, r, &motion, &sent[j], sag).given;
+        }
+        let driven = self.driven;
+        motion.driven = &driven[..n];
+        for j in 0..n {
+            torques[j] = physics.joints[j].torque(j, self.rotor[j], &motion, &sent[j], sag);
         }
         let links = mass;
         let (mut force, mut limit) = ([0.0; MOST], [[0.0; 2]; MOST]);
@@ -338,7 +354,7 @@ impl Roller<'_> {
                 sent: &sent[..n],
                 torques: &torques[..n],
                 slides: &slides,
-                drawn: self.drawn,
+                drawn,
                 sag,
             };
             self.columns
@@ -346,17 +362,12 @@ impl Roller<'_> {
             let step = self.linearised((&w, &stiff, &damp), &limit, h);
             self.columns.push_step(step);
         }
-        let total: f64 = torques[..n].iter().map(|t| t.drive.abs()).sum();
-        self.drawn += (total - self.drawn) * (h / SAG_LAG).min(1.0);
+        let total: f64 = driven[..n].iter().map(|drive| drive.abs()).sum();
+        let lag = h / SAG_LAG;
+        let drawn = (self.drawn[0] * (1.0 - 0.5 * lag) + total * lag) / (1.0 + 0.5 * lag);
+        self.drawn = [drawn, total];
         for j in 0..n {
             let (joint, r) = (&physics.joints[j], self.rotor[j]);
-            self.driven[j] = torques[j].drive;
-            if joint.integral[0] != 0.0 {
-                let error = sent[j].angle + joint.offset - self.q[r];
-                let most = joint.integral[1];
-                self.integral[j] =
-                    (self.integral[j] + joint.integral[0] * error * h).clamp(-most, most);
-            }
             if joint.presliding > 0.0 {
                 let v = 0.5 * (self.v[r] + new[r]);
                 let rate = v.abs() * h / joint.presliding;

@@ -1,8 +1,8 @@
 //! One search for the physics that a model leaves out, whatever was recorded.
 //!
 //! A [`Problem`] says which [`Cell`]s there are, what each would do to the rows around the present fit (a [`Block`] of columns by its products),
-//! and fits a set of them with everything that is not linear in it. [`search`] adds, exchanges and drops cells by one price, the evidence;
-//! [`posterior`] says of each cell that stands which others could stand in its place. No cause is known here by its name.
+//! and fits a set of them with everything that is not linear in it. [`diagnose`] adds, exchanges and drops cells by one price, the evidence,
+//! and says of each cell that stands which others could stand in its place. No cause is known here by its name.
 //!
 //! The formula of the evidence is that of the table of causes (`calib_diagnose`).
 
@@ -13,7 +13,7 @@ mod rows;
 mod search;
 
 pub use rows::{Block, Rows, ranked};
-pub use search::{Answer, Options, diagnose, posterior, search};
+pub use search::{Answer, Options, diagnose};
 
 /// A cause: a row of the table.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,6 +63,8 @@ pub struct Shape {
     pub usual: Vec<f64>,
     /// Where they are expected.
     pub centre: Vec<f64>,
+    /// Between which each may be, as it is fitted.
+    pub bounds: Vec<[f64; 2]>,
     /// Numbers of which the columns of a scan are the whole effects.
     pub columns: Vec<Vec<f64>>,
     /// ln of its share of the cell.
@@ -123,11 +125,23 @@ pub trait Problem: Sync {
     type Key: Clone + PartialEq + Send + Sync;
     /// A fitted model.
     type Fit: Clone + Send + Sync;
+    /// What every cell of the table, and every member of a set, does around a fit.
+    type Around: Send + Sync;
 
-    /// What every cell of the table would do around a fit, those of no use left out; likeliest first.
-    fn scan(&self, fit: &Self::Fit) -> Vec<Scanned<Self::Key>>;
-    /// Everything fitted at once, from the numbers of the set and the fit before.
-    fn fit(&self, set: &[Accepted<Self::Key>], before: Option<&Self::Fit>) -> Self::Fit;
+    /// What the cells of the table would do around a fit; what still holds of a look around another fit need not be made again.
+    fn around(&self, fit: &Self::Fit, before: Option<&Self::Around>) -> Self::Around;
+    /// The fit that knows how many rows count by what is seen around it.
+    fn informed(&self, fit: Self::Fit, around: &Self::Around) -> Self::Fit;
+    /// Cells by their evidence around a fit, those of no use left out; member `out` of its set is left out to first order. Likeliest first.
+    fn scan(
+        &self,
+        fit: &Self::Fit,
+        around: &Self::Around,
+        out: Option<usize>,
+    ) -> Vec<Scanned<Self::Key>>;
+    /// Everything fitted at once, from the numbers of the set and the fit before; it may stop where evidence `worth` is out of reach.
+    fn fit(&self, set: &[Accepted<Self::Key>], before: Option<&Self::Fit>, worth: f64)
+    -> Self::Fit;
     /// The same with every derivative made anew, to the end: a trial among many may reuse those of the fit before.
     fn settled(&self, fit: &Self::Fit) -> Self::Fit;
     /// The set with its numbers as fitted.
@@ -136,6 +150,8 @@ pub trait Problem: Sync {
     fn independence(&self, fit: &Self::Fit) -> f64;
     /// ln of the evidence of a fit, priors of its cells included, where so large a share of the rows is independent.
     fn log_evidence(&self, fit: &Self::Fit, independence: f64) -> f64;
+    /// ln of the odds of a member of the set against nothing, to first order; `None` where only a fit without it tells.
+    fn odds(&self, fit: &Self::Fit, member: usize, independence: f64) -> Option<f64>;
     /// Whether two cells do the same in these rows' words, so that one must not stand beside the other.
     fn excludes(&self, one: &Self::Key, other: &Self::Key) -> bool;
 }

@@ -46,7 +46,24 @@ pub struct Answer<P: Problem> {
 }
 
 /// Exchanges at most: each is for the better, so none comes twice.
-const EXCHANGES: usize = 6;
+const EXCHANGES: usize = 8;
+/// ln by which a linear scan may be wrong, and the share of it: what is further behind is not fitted.
+const BLUR: f64 = 20.0;
+const BLUR_SHARE: f64 = 0.5;
+
+/// A model, and what is seen around it.
+struct Stand<P: Problem> {
+    fit: P::Fit,
+    around: P::Around,
+}
+
+impl<P: Problem> Stand<P> {
+    fn new(problem: &P, fit: P::Fit, before: Option<&P::Around>) -> Self {
+        let around = problem.around(&fit, before);
+        let fit = problem.informed(fit, &around);
+        Self { fit, around }
+    }
+}
 
 /// A fit of a trial with the evidence that decides.
 struct Trial<P: Problem> {
@@ -55,11 +72,13 @@ struct Trial<P: Problem> {
     cell: Cell<P::Key>,
 }
 
-/// Cells of a scan that a set allows, the first of each name and place, as many as are tried.
+/// Cells of a scan that a set allows, the first of each name and place, as many as are tried; `least` is the linear evidence below which
+/// none is.
 fn candidates<P: Problem>(
     problem: &P,
     scanned: Vec<Scanned<P::Key>>,
     set: &[Accepted<P::Key>],
+    least: f64,
     options: &Options,
 ) -> Vec<Scanned<P::Key>> {
     let free = |one: &Scanned<P::Key>| {
@@ -74,7 +93,7 @@ fn candidates<P: Problem>(
             let other = &other.accepted.cell;
             other.cause.name == cell.cause.name && other.place == cell.place
         };
-        if one.log_odds > options.joins && kept.iter().find(is_same).is_none() {
+        if one.log_odds > least.max(options.joins) && kept.iter().find(is_same).is_none() {
             kept.push(one);
         }
         if kept.len() == options.tried {
@@ -84,45 +103,55 @@ fn candidates<P: Problem>(
     kept
 }
 
-/// Fits of a set with each of some cells beside it, best first.
+/// Fits of a set with each of some cells beside it, best first; what stays behind `worth`, or behind the likeliest by `by`, need not be
+/// fitted to the end.
 fn trials<P: Problem>(
     problem: &P,
     fit: &P::Fit,
+    set: &[Accepted<P::Key>],
     candidates: Vec<Scanned<P::Key>>,
     independence: f64,
+    (worth, by): (f64, f64),
 ) -> Vec<Trial<P>> {
-    let set = problem.set(fit);
-    let mut trials: Vec<Trial<P>> = candidates
-        .into_par_iter()
-        .map(|one| {
-            let cell = one.accepted.cell.clone();
-            let mut with = set.clone();
-            with.push(one.accepted);
-            let fit = problem.fit(&with, Some(fit));
-            let log = problem.log_evidence(&fit, independence);
-            Trial { fit, log, cell }
-        })
-        .collect();
+    let tried = |one: Scanned<P::Key>, worth: f64| {
+        let cell = one.accepted.cell.clone();
+        let mut with = set.to_vec();
+        with.push(one.accepted);
+        let fit = problem.fit(&with, Some(fit), worth);
+        let log = problem.log_evidence(&fit, independence);
+        Trial { fit, log, cell }
+    };
+    let mut candidates = candidates.into_iter();
+    let Some(likeliest) = candidates.next() else {
+        return Vec::new();
+    };
+    let first = tried(likeliest, worth);
+    let worth = worth.max(first.log - by);
+    let rest: Vec<Scanned<P::Key>> = candidates.collect();
+    let rest = rest.into_par_iter().map(|one| tried(one, worth));
+    let mut trials: Vec<Trial<P>> = rest.collect();
+    trials.push(first);
     trials.sort_by(|a, b| b.log.total_cmp(&a.log));
     trials
 }
 
 /// The likeliest set from a fit on: a pure function of the problem and its start.
-pub fn search<P: Problem>(
+fn search<P: Problem>(
     problem: &P,
-    start: &P::Fit,
+    start: P::Fit,
+    seen: Option<&P::Around>,
     options: &Options,
-    mut tell: impl FnMut(String),
-) -> P::Fit {
-    let mut fit = start.clone();
-    while problem.set(&fit).len() < options.most {
-        // A scan may tell how many rows count.
-        let scanned = problem.scan(&fit);
-        let independence = problem.independence(&fit);
-        let now = problem.log_evidence(&fit, independence);
-        let set = problem.set(&fit);
-        let asked = candidates(problem, scanned, &set, options);
-        let tried = trials(problem, &fit, asked, independence);
+    tell: &mut impl FnMut(String),
+) -> Stand<P> {
+    let mut stand = Stand::new(problem, start, seen);
+    while problem.set(&stand.fit).len() < options.most {
+        let independence = problem.independence(&stand.fit);
+        let now = problem.log_evidence(&stand.fit, independence);
+        let set = problem.set(&stand.fit);
+        let scanned = problem.scan(&stand.fit, &stand.around, None);
+        let asked = candidates(problem, scanned, &set, f64::NEG_INFINITY, options);
+        let least = (now + options.joins, 0.0);
+        let tried = trials(problem, &stand.fit, &set, asked, independence, least);
         for trial in tried.iter().take(4) {
             let (name, place) = (trial.cell.cause.name, &trial.cell.place);
             tell(format!(
@@ -130,23 +159,21 @@ pub fn search<P: Problem>(
                 trial.log - now
             ));
         }
-        let Some(best) = tried.into_iter().next() else {
+        let best = tried.into_iter().next();
+        let Some(best) = best.filter(|best| best.log - now >= options.joins) else {
             break;
         };
-        if best.log - now < options.joins {
-            break;
-        }
         tell(format!(
             "{} at {} joins",
             best.cell.cause.name, best.cell.place
         ));
-        fit = problem.settled(&best.fit);
-        fit = revised(problem, fit, options, &mut tell);
+        let fit = revised(problem, problem.settled(&best.fit), options, tell);
+        stand = Stand::new(problem, fit, Some(&stand.around));
     }
-    fit
+    stand
 }
 
-/// Earlier members are dropped or exchanged where the later ones made them so.
+/// Earlier members are dropped where the later ones made them useless.
 fn revised<P: Problem>(
     problem: &P,
     mut fit: P::Fit,
@@ -154,12 +181,17 @@ fn revised<P: Problem>(
     tell: &mut impl FnMut(String),
 ) -> P::Fit {
     let mut at = 0;
-    while problem.set(&fit).len() > 1 && at + 1 < problem.set(&fit).len() {
+    while at + 1 < problem.set(&fit).len() {
         let independence = problem.independence(&fit);
+        let odds = problem.odds(&fit, at, independence);
+        if odds.is_some_and(|odds| odds > options.leaves + BLUR) {
+            at += 1;
+            continue;
+        }
         let now = problem.log_evidence(&fit, independence);
         let mut rest = problem.set(&fit);
         let out = rest.remove(at);
-        let without = problem.fit(&rest, Some(&fit));
+        let without = problem.fit(&rest, Some(&fit), now - options.leaves);
         let log = problem.log_evidence(&without, independence);
         if now - log < options.leaves {
             tell(format!(
@@ -174,98 +206,145 @@ fn revised<P: Problem>(
     fit
 }
 
-/// What stands, each with what else could stand in its place.
-pub fn posterior<P: Problem>(problem: &P, fit: &P::Fit, options: &Options) -> Vec<Finding<P::Key>> {
+/// What stands with what else could, up to the first change for the better.
+struct Posterior<P: Problem> {
+    findings: Vec<Finding<P::Key>>,
+    better: Option<Change<P>>,
+}
+
+/// A member that goes, what comes in its place, and the fit then.
+struct Change<P: Problem> {
+    out: Cell<P::Key>,
+    into: Option<Cell<P::Key>>,
+    fit: P::Fit,
+}
+
+/// What stands, each with what else could stand in its place; up to the first that is useless, or where `exchange` worse than another.
+fn posterior<P: Problem>(
+    problem: &P,
+    stand: &Stand<P>,
+    exchange: bool,
+    options: &Options,
+) -> Posterior<P> {
+    let fit = &stand.fit;
     let set = problem.set(fit);
     let independence = problem.independence(fit);
     let now = problem.log_evidence(fit, independence);
-    let mut findings: Vec<Finding<P::Key>> = set
-        .iter()
-        .enumerate()
-        .map(|(at, accepted)| {
-            let mut rest = set.clone();
-            rest.remove(at);
-            let without = problem.fit(&rest, Some(fit));
-            let none = problem.log_evidence(&without, independence);
-            let asked = candidates(problem, problem.scan(&without), &rest, options);
-            let own = &accepted.cell;
-            let asked = asked
-                .into_iter()
-                .filter(|one| {
-                    let cell = &one.accepted.cell;
-                    cell.cause.name != own.cause.name || cell.place != own.place
-                })
-                .collect();
-            let others = trials(problem, &without, asked, independence);
-            let logs: Vec<f64> = [now, none]
-                .into_iter()
-                .chain(others.iter().map(|trial| trial.log))
-                .collect();
-            let whole = log_sum(&logs);
-            let share = |log: f64| (log - whole).exp();
-            let here: f64 = others
-                .iter()
-                .filter(|trial| trial.cell.place == own.place)
-                .map(|trial| share(trial.log))
-                .sum();
-            let rivals = others
-                .iter()
-                .map(|trial| Rival {
-                    accepted: problem
-                        .set(&trial.fit)
-                        .pop()
-                        .unwrap_or_else(|| accepted.clone()),
-                    probability: share(trial.log),
-                    log_odds: trial.log - now,
-                })
-                .filter(|rival| rival.probability >= options.told)
-                .collect();
-            Finding {
-                accepted: accepted.clone(),
-                probability: share(now),
-                place_probability: (share(now) + here).min(1.0),
-                none_probability: share(none),
-                log_odds: now - none,
-                rivals,
-            }
-        })
-        .collect();
+    let mut findings: Vec<Finding<P::Key>> = Vec::new();
+    for (at, accepted) in set.iter().enumerate() {
+        let own = &accepted.cell;
+        let mut rest = set.clone();
+        rest.remove(at);
+        let without = problem.fit(&rest, Some(fit), f64::NEG_INFINITY);
+        let none = problem.log_evidence(&without, independence);
+        let scanned = problem.scan(fit, &stand.around, Some(at));
+        let others = scanned.into_iter().filter(|one| {
+            let cell = &one.accepted.cell;
+            cell.cause.name != own.cause.name || cell.place != own.place
+        });
+        let lost = now - none;
+        if lost < options.leaves {
+            let better = Some(Change {
+                out: own.clone(),
+                into: None,
+                fit: without,
+            });
+            return Posterior { findings, better };
+        }
+        let least = lost - BLUR.max(BLUR_SHARE * lost);
+        let asked = candidates(problem, others.collect(), &rest, least, options);
+        let told = options.told.ln();
+        let mut others = trials(
+            problem,
+            fit,
+            &rest,
+            asked,
+            independence,
+            (log_sum(&[now, none]) + told, -told),
+        );
+        let is_better = |trial: &Trial<P>| trial.log - now > options.exchanges;
+        if exchange && others.first().is_some_and(is_better) {
+            let other = others.remove(0);
+            let better = Some(Change {
+                out: own.clone(),
+                into: Some(other.cell),
+                fit: other.fit,
+            });
+            return Posterior { findings, better };
+        }
+        let logs: Vec<f64> = [now, none]
+            .into_iter()
+            .chain(others.iter().map(|trial| trial.log))
+            .collect();
+        let whole = log_sum(&logs);
+        let share = |log: f64| (log - whole).exp();
+        let here: f64 = others
+            .iter()
+            .filter(|trial| trial.cell.place == own.place)
+            .map(|trial| share(trial.log))
+            .sum();
+        let rivals = others
+            .iter()
+            .map(|trial| Rival {
+                accepted: problem
+                    .set(&trial.fit)
+                    .pop()
+                    .unwrap_or_else(|| accepted.clone()),
+                probability: share(trial.log),
+                log_odds: trial.log - now,
+            })
+            .filter(|rival| rival.probability >= options.told)
+            .collect();
+        findings.push(Finding {
+            accepted: accepted.clone(),
+            probability: share(now),
+            place_probability: (share(now) + here).min(1.0),
+            none_probability: share(none),
+            log_odds: lost,
+            rivals,
+        });
+    }
     findings.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
-    findings
+    Posterior {
+        findings,
+        better: None,
+    }
 }
 
-/// Searches until nothing changes, and says what stands.
+/// Searches from a set on until nothing changes, and says what stands.
 pub fn diagnose<P: Problem>(
     problem: &P,
+    start: &[Accepted<P::Key>],
     options: &Options,
     mut tell: impl FnMut(String),
 ) -> Answer<P> {
-    let before = problem.fit(&[], None);
-    let mut after = search(problem, &before, options, &mut tell);
-    let mut findings = posterior(problem, &after, options);
-    for _ in 0..EXCHANGES {
-        let better = findings.iter().find_map(|finding| {
-            let rival = finding.rivals.first()?;
-            (rival.log_odds > options.exchanges)
-                .then(|| (finding.accepted.clone(), rival.accepted.clone()))
-        });
-        let Some((out, into)) = better else {
-            break;
+    let before = problem.fit(&[], None, f64::NEG_INFINITY);
+    let begun = match start {
+        [] => before.clone(),
+        set => problem.fit(set, None, f64::NEG_INFINITY),
+    };
+    let mut stand = search(problem, begun, None, options, &mut tell);
+    let mut exchanges = 0;
+    let findings = loop {
+        let found = posterior(problem, &stand, exchanges < EXCHANGES, options);
+        let Some(Change { out, into, fit }) = found.better else {
+            break found.findings;
         };
-        tell(format!(
-            "{} at {} in place of {} at {}",
-            into.cell.cause.name, into.cell.place, out.cell.cause.name, out.cell.place
-        ));
-        let mut set = problem.set(&after);
-        set.retain(|one| one.cell != out.cell);
-        set.push(into);
-        let exchanged = problem.settled(&problem.fit(&set, Some(&after)));
-        after = search(problem, &exchanged, options, &mut tell);
-        findings = posterior(problem, &after, options);
-    }
+        let gone = format!("{} at {}", out.cause.name, out.place);
+        tell(match &into {
+            Some(into) => format!("{} at {} in place of {gone}", into.cause.name, into.place),
+            None => format!("{gone} leaves"),
+        });
+        let fit = revised(problem, problem.settled(&fit), options, &mut tell);
+        stand = match exchanges < EXCHANGES {
+            true => search(problem, fit, Some(&stand.around), options, &mut tell),
+            false => Stand::new(problem, fit, Some(&stand.around)),
+        };
+        exchanges += 1;
+    };
     Answer {
         before,
-        after,
+        after: stand.fit,
         findings,
     }
 }

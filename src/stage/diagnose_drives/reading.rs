@@ -1,16 +1,11 @@
-//! Recordings of drives: CSV with a column for each joint or with a list a row, commands in the same file or in one of their own.
+//! Recordings of drives: tables with a column for each joint or with a list a row, commands in the same file or in one of their own.
 
 use super::DriveColumns;
 use crate::error::{Error, Fault, Result, did_you_mean, listed};
-use csv::StringRecord;
+use crate::raw::{DecimalMark, Record, TextLayout};
+use crate::stage::ingest::{TableLayout, records};
+use crate::stage::{Context, OpenedInput, RawFile};
 use std::ops::Range;
-
-/// A file of a recording.
-pub(super) struct Sheet<'a> {
-    /// For messages.
-    pub(super) label: &'a str,
-    pub(super) text: &'a str,
-}
 
 /// What was read of one.
 pub(super) struct Rows {
@@ -78,33 +73,42 @@ fn of_joint(column: &str, joint: usize, name: &str) -> String {
     column.replace("{name}", name)
 }
 
-/// The rows of a file with the quantities `wanted`, a column each. Fails with every column that is not there, or with the first cell that is
-/// no number.
+/// The rows of a file with the quantities `wanted`, a column each, and its name for messages. Fails with every column that is not there, or
+/// with the first cell that is no number.
 pub(super) fn rows(
-    sheet: &Sheet,
+    file: &RawFile,
     columns: &DriveColumns,
     names: &[String],
     wanted: &[&str],
-) -> Result<Rows> {
-    let label = sheet.label;
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_reader(sheet.text.as_bytes());
-    let head = reader
-        .headers()
-        .map_err(|error| Error::data(label, error.to_string()))?
-        .clone();
+    context: &Context,
+) -> Result<(String, Rows)> {
+    let OpenedInput { label, reader, .. } = context.services.open(file)?;
+    let layout = TableLayout {
+        sheet: None,
+        topic: None,
+        text: TextLayout::default(),
+        decimal: DecimalMark::Point,
+    };
+    let (label, mut reader) = records(reader, &label, layout)?;
+    let mut record = Record::default();
+    if !reader.next(&mut record)? {
+        return Err(Error::data(
+            label,
+            "is empty; expected a header and rows below it",
+        ));
+    }
+    let head = record.cells();
     let find = |name: &str| head.iter().position(|column| column == name);
     let mut faults = Vec::new();
     let mut needed = |name: String| {
         find(&name).unwrap_or_else(|| {
-            let hint = did_you_mean(&name, head.iter());
-            let all: Vec<&str> = head.iter().collect();
+            let hint = did_you_mean(&name, head.iter().map(String::as_str));
+            let all: Vec<&str> = head.iter().map(String::as_str).collect();
             let message = format!(
                 "no column `{name}`{hint} (columns: {}); name others in `columns`",
                 listed(&all)
             );
-            faults.push(Fault::new(label, message));
+            faults.push(Fault::new(&label, message));
             0
         })
     };
@@ -124,6 +128,11 @@ pub(super) fn rows(
                     })
                 };
                 Cells::Each(joints.map(of).collect())
+            }
+            // Lists in columns of a file of columns are a column for each number.
+            false if find(column).is_none() && find(&format!("{column}[1]")).is_some() => {
+                let of = |k| needed(format!("{column}[{k}]"));
+                Cells::Each((1..=names.len()).map(of).collect())
             }
             false => Cells::List(needed((*column).to_string())),
         })
@@ -150,9 +159,12 @@ pub(super) fn rows(
     };
     let by = columns.time_unit.seconds();
     let mut last: Option<Option<String>> = None;
-    for (row, record) in reader.records().enumerate() {
-        let place = format!("{label}:{}", row + 2);
-        let record = record.map_err(|error| Error::data(&place, error.to_string()))?;
+    let mut row = 0;
+    while reader.next(&mut record)? {
+        let place = format!("{label}:{}", record.line);
+        if let Some((_, message)) = &record.fault {
+            return Err(Error::data(&place, message));
+        }
         let number = |column: usize| of_cell(&record, &head, column, &place);
         out.time.push(by * number(time)?);
         for (cells, values) in cells.iter().zip(&mut out.values) {
@@ -167,7 +179,7 @@ pub(super) fn rows(
                 }
             }
         }
-        let of = |column: Option<usize>| column.map(|column| record[column].to_string());
+        let of = |column: Option<usize>| column.map(|column| cell(&record, column).to_string());
         let (here, use_of_row) = (of(trajectory), of(usage));
         if last.as_ref() != Some(&here) {
             out.runs.push(row..row);
@@ -180,11 +192,16 @@ pub(super) fn rows(
         {
             out.usages.push((row..row, use_of_row));
         }
+        row += 1;
         if let (Some(run), Some((rows, _))) = (out.runs.last_mut(), out.usages.last_mut()) {
-            (run.end, rows.end) = (row + 1, row + 1);
+            (run.end, rows.end) = (row, row);
         }
     }
-    Ok(out)
+    Ok((label, out))
+}
+
+fn cell(record: &Record, column: usize) -> &str {
+    std::str::from_utf8(record.field(column)).unwrap_or_default()
 }
 
 fn finite(text: &str) -> Option<f64> {
@@ -194,27 +211,24 @@ fn finite(text: &str) -> Option<f64> {
         .filter(|value: &f64| value.is_finite())
 }
 
-fn of_cell(record: &StringRecord, head: &StringRecord, column: usize, place: &str) -> Result<f64> {
-    let cell = record.get(column).unwrap_or_default();
+fn of_cell(record: &Record, head: &[String], column: usize, place: &str) -> Result<f64> {
+    let cell = cell(record, column);
     finite(cell).ok_or_else(|| {
-        let message = format!(
-            "column `{}` holds `{cell}`; expected a finite number",
-            &head[column]
-        );
+        let name = &head[column];
+        let message = format!("column `{name}` holds `{cell}`; expected a finite number");
         Error::data(place, message)
     })
 }
 
 /// The first `joints` numbers of a list; a gripper's may follow.
 fn of_list(
-    record: &StringRecord,
-    head: &StringRecord,
+    record: &Record,
+    head: &[String],
     column: usize,
     joints: usize,
     place: &str,
 ) -> Result<Vec<f64>> {
-    let cell = record.get(column).unwrap_or_default();
-    let name = &head[column];
+    let (cell, name) = (cell(record, column), &head[column]);
     let inside = cell
         .strip_prefix('[')
         .and_then(|cell| cell.strip_suffix(']'));

@@ -1,14 +1,11 @@
 //! The recordings of drives: rows of each file, commands of a file of their own, and which rows judge.
 
-use super::reading::{self, Rows, Sheet};
-use super::{
-    AngleUnit, DiagnoseDrives, DriveFile, DriveHoldOut, DriveRecording, DriveRecordings, MOST_BYTES,
-};
+use super::reading::{self, Rows};
+use super::{AngleUnit, DiagnoseDrives, DriveFile, DriveHoldOut, DriveRecording, DriveRecordings};
+use crate::drives::mjcf::MjcfArm;
 use crate::drives::recording::{Recording, Trajectory};
-use crate::error::{Error, Result};
+use crate::error::{Error, Fault, Result};
 use crate::stage::{Context, RawFile};
-
-const WHAT: &str = "a CSV of commands and angles";
 
 /// A recording's files, each with its place below `with`.
 pub(super) struct Source<'a> {
@@ -51,12 +48,18 @@ impl DiagnoseDrives {
     }
 
     /// All recordings, one after the other.
-    pub(super) fn recorded(&self, file: &DriveFile, context: &Context) -> Result<Recording> {
+    pub(super) fn recorded(
+        &self,
+        file: &DriveFile,
+        arm: &MjcfArm,
+        context: &Context,
+    ) -> Result<Recording> {
+        let units = self.units(file, arm)?;
         let sources = self.sources();
         let mut whole: Option<Recording> = None;
         let mut labels = Vec::new();
         for source in &sources {
-            let (label, part) = self.part(file, source, context)?;
+            let (label, part) = self.part(file, source, &units, context)?;
             part.check(&label)?;
             labels.push(label);
             match &mut whole {
@@ -84,30 +87,29 @@ impl DiagnoseDrives {
         &self,
         file: &DriveFile,
         source: &Source,
+        units: &[[f64; 2]],
         context: &Context,
     ) -> Result<(String, Recording)> {
-        let (label, text) = context.text(source.file.1, WHAT, MOST_BYTES)?;
         let names: Vec<String> = file.joints.iter().map(|one| one.joint.clone()).collect();
-        let sheet = Sheet {
-            label: &label,
-            text: &text,
-        };
         let columns = &self.columns;
         let [command, angle] = [columns.command.as_str(), columns.angle.as_str()];
-        let (mut rows, commands) = match &source.commands {
+        let (label, mut rows, commands) = match &source.commands {
             None => {
-                let mut rows = reading::rows(&sheet, columns, &names, &[command, angle])?;
+                let wanted = [command, angle];
+                let (label, mut rows) =
+                    reading::rows(source.file.1, columns, &names, &wanted, context)?;
                 let commands = rows.values.remove(0);
-                (rows, commands)
+                (label, rows, commands)
             }
-            Some((_, sent)) => self.with_commands(&sheet, sent, &names, context)?,
+            Some((_, sent)) => self.with_commands(source.file.1, sent, &names, context)?,
         };
-        let by = match columns.unit {
-            AngleUnit::Rad => 1.0,
-            AngleUnit::Deg => 1f64.to_radians(),
+        let scaled = |values: Vec<f64>| -> Vec<f64> {
+            let units = units.iter().cycle();
+            let values = values.into_iter().zip(units);
+            values
+                .map(|(value, [by, zero])| by * value + zero)
+                .collect()
         };
-        let scaled = |values: Vec<f64>| values.into_iter().map(|value| by * value).collect();
-        let began = rows.time.first().copied().unwrap_or_default();
         let mut held_out = vec![false; rows.time.len()];
         for (range, usage) in &rows.usages {
             let usage = usage.as_deref().or(source.usage);
@@ -117,14 +119,25 @@ impl DiagnoseDrives {
         for range in &rows.runs {
             self.hold_out(&rows.time, range, &mut held_out);
         }
-        let trajectory = |rows: &std::ops::Range<usize>| Trajectory {
-            rows: rows.clone(),
-            began,
+        // A clock that falls back begins anew: an episode is a recording of its own.
+        let mut began = rows.time.first().copied().unwrap_or_default();
+        let mut last = began;
+        let time = &rows.time;
+        let trajectory = |rows: &std::ops::Range<usize>| {
+            if time[rows.start] < last {
+                began = time[rows.start];
+            }
+            last = time[rows.end - 1];
+            Trajectory {
+                rows: rows.clone(),
+                began,
+            }
         };
+        let trajectories = rows.runs.iter().map(trajectory).collect();
         let recording = Recording {
             angle: scaled(rows.values.remove(0)),
             command: scaled(commands),
-            trajectories: rows.runs.iter().map(trajectory).collect(),
+            trajectories,
             time: rows.time,
             held_out,
             period: 1.0 / file.command_rate_hz,
@@ -134,28 +147,49 @@ impl DiagnoseDrives {
         Ok((label, recording))
     }
 
+    /// Of each joint the angle of a unit, and that of 0, rad.
+    fn units(&self, file: &DriveFile, arm: &MjcfArm) -> Result<Vec<[f64; 2]>> {
+        let mut faults = Vec::new();
+        let joints = file.joints.iter().zip(&arm.joints).enumerate();
+        let of = |(k, (drive, joint)): (
+            usize,
+            (&super::DriveOfJoint, &crate::drives::mjcf::MjcfJoint),
+        )| {
+            match self.columns.unit {
+                AngleUnit::Rad => [1.0, 0.0],
+                AngleUnit::Deg => [1f64.to_radians(), 0.0],
+                AngleUnit::Counts => [drive.encoder_rad, -drive.encoder_rad * drive.zero_count],
+                AngleUnit::Percent => {
+                    let range = drive.range_rad.or(joint.range);
+                    let [low, high] = range.unwrap_or_else(|| {
+                        let place = format!("{}: joints[{k}].range_rad", drive.joint);
+                        let message = "is missing, and the robot file states no range of this joint; per cent are of [from, to], rad";
+                        faults.push(Fault::new(place, message));
+                        [0.0, 1.0]
+                    });
+                    // From -100 to 100.
+                    [0.005 * (high - low), 0.5 * (low + high)]
+                }
+            }
+        };
+        let units = joints.map(of).collect();
+        Error::if_spec(faults)?;
+        Ok(units)
+    }
+
     /// Rows of the angles with the commands that hold in them, which are in a file of their own.
     fn with_commands(
         &self,
-        sheet: &Sheet,
+        angles: &RawFile,
         sent: &RawFile,
         names: &[String],
         context: &Context,
-    ) -> Result<(Rows, Vec<f64>)> {
-        let label = sheet.label;
-        let (place, text) = context.text(sent, WHAT, MOST_BYTES)?;
-        let sheet_of_commands = Sheet {
-            label: &place,
-            text: &text,
-        };
+    ) -> Result<(String, Rows, Vec<f64>)> {
         let columns = &self.columns;
-        let mut sent = reading::rows(
-            &sheet_of_commands,
-            columns,
-            names,
-            &[columns.command.as_str()],
-        )?;
-        let mut rows = reading::rows(sheet, columns, names, &[columns.angle.as_str()])?;
+        let wanted = [columns.command.as_str()];
+        let (place, mut sent) = reading::rows(sent, columns, names, &wanted, context)?;
+        let wanted = [columns.angle.as_str()];
+        let (label, mut rows) = reading::rows(angles, columns, names, &wanted, context)?;
         reading::must_rise(&place, &sent.time)?;
         let (held, before) = reading::held(&sent.time, &rows.time);
         let beyond = rows.time.last() > sent.time.last();
@@ -182,7 +216,7 @@ impl DiagnoseDrives {
         let values = sent.values.remove(0);
         let of_row = |row: &usize| values[row * n..(row + 1) * n].to_vec();
         let commands = held[before..].iter().flat_map(of_row).collect();
-        Ok((rows, commands))
+        Ok((label, rows, commands))
     }
 
     /// Rows of a trajectory that judge by `hold_out`.

@@ -42,7 +42,7 @@ const LASTS: [f64; 3] = [8.0, 7.0, 6.0];
 const REST: f64 = 0.6;
 const RAMP: f64 = 0.8;
 /// Laws of [`law`].
-const LAWS: usize = 20;
+const LAWS: usize = 26;
 
 /// What arms of a kind have: rows are joints.
 struct Plan {
@@ -156,6 +156,8 @@ impl Plan {
             Servo::plain(drive, self.on_error, self.joint.map(&mut by))
         });
         Rig {
+            hold: 0.0,
+            sag: 0.0,
             servos: servos.collect(),
             machine: Machine {
                 axes: self.axes.to_vec(),
@@ -346,7 +348,8 @@ impl DriveCase {
                     },
                 )
             }
-            13 => Law::WarmUp(j, [draw.uniform(0.6, 1.5), draw.uniform(4.0, 12.0)]),
+            // No servo is warm sooner than in ten seconds.
+            13 => Law::WarmUp(j, [draw.uniform(0.6, 1.5), draw.uniform(12.0, 40.0)]),
             14 => Law::Cable(
                 j,
                 [servo.kp * draw.uniform(0.05, 0.15), draw.uniform(-0.3, 0.3)],
@@ -372,6 +375,23 @@ impl DriveCase {
             19 => {
                 let [x, y, _] = draw.vector(0.05, 0.1);
                 Law::Gravity([x, y])
+            }
+            20 => {
+                let k = servo.kp * draw.uniform(6.0, 30.0);
+                let damping = draw.uniform(0.05, 0.2) * (k * servo.armature).sqrt();
+                Law::Elasticity(j, [k, damping])
+            }
+            21 => {
+                let k = servo.kp * draw.uniform(30.0, 60.0);
+                let damping = draw.uniform(0.1, 0.3) * (k * servo.armature).sqrt();
+                Law::Backlash(j, [draw.uniform(0.004, 0.02), k, damping])
+            }
+            22 => Law::Presliding(j, draw.uniform(0.002, 0.01)),
+            23 => Law::GearLoad(j, [draw.uniform(0.0, 0.2), draw.uniform(0.3, 0.9)]),
+            24 => Law::Hold(self.period * (2 + draw.index(4)) as f64),
+            25 => {
+                let all: f64 = (0..n).map(|joint| self.usual(joint).torque).sum();
+                Law::Sag(draw.uniform(0.15, 0.4) / all)
             }
             _ => {
                 let width = 0.25 * (usual.range[1] - usual.range[0]) * draw.uniform(0.4, 0.8);

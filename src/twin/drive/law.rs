@@ -1,6 +1,6 @@
 //! What is concealed, and what it changes of a rig.
 
-use super::rig::Rig;
+use super::rig::{Gear, Rig};
 use crate::matrix::{self, Vector};
 
 /// A cause; joints and links from 0, SI.
@@ -26,6 +26,14 @@ pub(super) enum Law {
     Payload(f64),
     Centre(usize, Vector),
     Gravity([f64; 2]),
+    /// Stiffness, damping.
+    Elasticity(usize, [f64; 2]),
+    /// Play, stiffness, damping.
+    Backlash(usize, [f64; 3]),
+    Presliding(usize, f64),
+    GearLoad(usize, [f64; 2]),
+    Hold(f64),
+    Sag(f64),
     /// In no list: a bump of torque at an angle.
     Bump(usize, [f64; 3]),
 }
@@ -45,7 +53,12 @@ impl Law {
             Self::Viscous(..) => "viscous_friction",
             Self::Coulomb(..) => "coulomb_friction",
             Self::Stribeck(..) => "stribeck_friction",
-            Self::Load(..) => "load_friction",
+            Self::Load(..) | Self::GearLoad(..) => "load_friction",
+            Self::Elasticity(..) => "joint_elasticity",
+            Self::Backlash(..) => "backlash",
+            Self::Presliding(..) => "presliding_friction",
+            Self::Hold(..) => "command_hold",
+            Self::Sag(..) => "voltage_sag",
             Self::WarmUp(..) => "warmup_friction",
             Self::Cable(..) => "cable_stiffness",
             Self::Ripple(..) => "torque_ripple",
@@ -59,7 +72,7 @@ impl Law {
 
     pub(super) fn place(&self) -> String {
         match self {
-            Self::Delay(None, _) => "arm".into(),
+            Self::Delay(None, _) | Self::Hold(_) | Self::Sag(_) => "arm".into(),
             Self::Payload(_) => "tool".into(),
             Self::Gravity(_) => "base".into(),
             Self::Centre(link, _) => format!("link {}", link + 1),
@@ -80,6 +93,10 @@ impl Law {
             | Self::Cable(joint, _)
             | Self::Ripple(joint, _)
             | Self::Coupling(joint, ..)
+            | Self::Elasticity(joint, _)
+            | Self::Backlash(joint, _)
+            | Self::Presliding(joint, _)
+            | Self::GearLoad(joint, _)
             | Self::Bump(joint, _) => format!("joint {}", joint + 1),
         }
     }
@@ -105,6 +122,24 @@ impl Law {
             Self::Cable(j, both) => servos[j].spring = both,
             Self::Ripple(j, wave) => servos[j].ripple = wave,
             Self::Bump(j, bump) => servos[j].bump = bump,
+            Self::Elasticity(j, [stiffness, damping]) => {
+                servos[j].gear = Some(Gear {
+                    stiffness,
+                    damping,
+                    play: 0.0,
+                });
+            }
+            Self::Backlash(j, [play, stiffness, damping]) => {
+                servos[j].gear = Some(Gear {
+                    stiffness,
+                    damping,
+                    play,
+                });
+            }
+            Self::Presliding(j, travel) => servos[j].travel = travel,
+            Self::GearLoad(j, both) => servos[j].gear_load = both,
+            Self::Hold(s) => rig.hold = s,
+            Self::Sag(share) => rig.sag = share,
             Self::Coupling(j, by, share) => servos[j].coupled = Some((by, share)),
             Self::Payload(mass) => {
                 let tool = rig.machine.tool;

@@ -1,17 +1,54 @@
 //! A rig moved along commands: explicit steps of second order (torques at the middle, to which the last acceleration leads), dry friction as the set of joints that stick.
+//! What is recorded is made by steps so fine that finer ones change nothing beside the noise.
 
 use super::rig::{Rig, Servo};
 use crate::way::JointState;
 
-/// s of a step at most: of what is recorded, and of what only compares.
-pub(super) const FINE: f64 = 2.5e-4;
+/// s of a step at most: the first of what is recorded, of what only compares, and of that where a gear yields.
+const FINE: f64 = 2.5e-4;
 pub(super) const COARSE: f64 = 1e-3;
+const GEARED: f64 = 2.5e-4;
+/// Times that a step is halved at most, and the share of the noise that a joint may still move by then, rms.
+const HALVED: usize = 3;
+const SETTLED: f64 = 0.05;
 /// s for which the arm holds its pose before the first row.
 const BEFORE: f64 = 2.0;
 /// Exchanges between sticking and sliding at most.
 const EXCHANGES: usize = 30;
+/// s in which the supply follows the load.
+const SUPPLY: f64 = 0.02;
+/// Share of the armature on the rotor's side of a gear that yields.
+const ROTOR: f64 = 0.95;
 
-/// Angles (row-major) at every row of commands, which are `period` s apart and of which each holds until the next.
+/// s of a step that compares.
+pub(super) fn coarse(rig: &Rig) -> f64 {
+    if rig.yields() { GEARED } else { COARSE }
+}
+
+/// Angles by a step so fine that half of it changes nothing beside noise of `sigma` rad.
+pub(super) fn settled(rig: &Rig, commands: &[f64], period: f64, sigma: f64) -> Vec<f64> {
+    let n = rig.joints();
+    let mut before = angles(rig, commands, period, FINE);
+    for halved in 1..=HALVED {
+        let step = FINE * 0.5_f64.powi(halved as i32);
+        let finer = angles(rig, commands, period, step);
+        let mut squares = vec![0.0; n];
+        for (k, (a, b)) in finer.iter().zip(&before).enumerate() {
+            squares[k % n] += (a - b).powi(2);
+        }
+        before = finer;
+        let rows = (before.len() / n) as f64;
+        let moves = squares
+            .iter()
+            .fold(0.0_f64, |most, square| most.max(*square));
+        if (moves / rows).sqrt() < SETTLED * sigma {
+            break;
+        }
+    }
+    before
+}
+
+/// Angles (row-major) as encoders see them at every row of commands, which are `period` s apart and of which each holds until the next.
 pub(super) fn angles(rig: &Rig, commands: &[f64], period: f64, step: f64) -> Vec<f64> {
     let n = rig.joints();
     let steps = (period / step - 1e-9).ceil() as usize;
@@ -23,7 +60,7 @@ pub(super) fn angles(rig: &Rig, commands: &[f64], period: f64, step: f64) -> Vec
     for row in 0..before + rows {
         let time = (row as f64 - before as f64) * period;
         if row >= before {
-            out.extend_from_slice(&now.q);
+            out.extend(now.rotor.iter().map(|r| now.q[*r]));
         }
         for k in 0..steps {
             now.step(rig, commands, period, time + h * k as f64, h);
@@ -32,49 +69,65 @@ pub(super) fn angles(rig: &Rig, commands: &[f64], period: f64, step: f64) -> Vec
     out
 }
 
+/// Links come first, then rotors that move by themselves.
 struct Now {
+    /// By joint, what its drive turns.
+    rotor: Vec<usize>,
     q: Vec<f64>,
     v: Vec<f64>,
     a: Vec<f64>,
     set_point: Vec<f64>,
     integral: Vec<f64>,
-    driven: Vec<f64>,
+    /// -1 to 1: how far friction is bent.
+    bent: Vec<f64>,
+    /// Nm that gears give to their links.
+    given: Vec<f64>,
+    /// Nm that all drives give, as the supply has followed.
+    drawn: f64,
 }
 
 impl Now {
     fn new(rig: &Rig, home: &[f64]) -> Self {
         let n = rig.joints();
+        let (mut rotor, mut q): (Vec<usize>, Vec<f64>) = ((0..n).collect(), home.to_vec());
+        for joint in (0..n).filter(|joint| rig.servos[*joint].gear.is_some()) {
+            rotor[joint] = q.len();
+            q.push(home[joint]);
+        }
+        let m = q.len();
         Self {
-            q: home.to_vec(),
-            v: vec![0.0; n],
-            a: vec![0.0; n],
+            rotor,
+            q,
+            v: vec![0.0; m],
+            a: vec![0.0; m],
             set_point: home.to_vec(),
             integral: vec![0.0; n],
-            driven: vec![0.0; n],
+            bent: vec![0.0; n],
+            given: vec![0.0; n],
+            drawn: 0.0,
         }
     }
 
     fn step(&mut self, rig: &Rig, commands: &[f64], period: f64, time: f64, h: f64) {
-        let n = rig.joints();
+        let (n, m) = (rig.joints(), self.q.len());
         let still = vec![0.0; n];
-        let middle: Vec<f64> = self
-            .q
-            .iter()
-            .zip(&self.v)
-            .map(|(q, v)| q + 0.5 * h * v)
-            .collect();
+        let middle: Vec<f64> = (0..m).map(|i| self.q[i] + 0.5 * h * self.v[i]).collect();
+        // What stopped in the last step does not go back by it.
+        let lead = |i: usize| match self.v[i] {
+            0.0 => 0.0,
+            v => v + 0.5 * h * self.a[i],
+        };
+        let ahead: Vec<f64> = (0..m).map(lead).collect();
         let torque = |v: &[f64], a: &[f64]| {
             rig.machine.torque(&JointState {
-                q: middle.clone(),
+                q: middle[..n].to_vec(),
                 v: v.to_vec(),
                 a: a.to_vec(),
             })
         };
         let weight = torque(&still, &still);
-        let ahead = self.v.iter().zip(&self.a).map(|(v, a)| v + 0.5 * h * a);
-        let ahead: Vec<f64> = ahead.collect();
-        let bias = torque(&ahead, &still);
-        let mut mass = vec![vec![0.0; n]; n];
+        let bias = torque(&ahead[..n], &still);
+        let mut mass = vec![vec![0.0; m]; m];
         for k in 0..n {
             let mut unit = still.clone();
             unit[k] = 1.0;
@@ -82,54 +135,126 @@ impl Now {
             for i in 0..n {
                 mass[i][k] = column[i] - weight[i];
             }
-            mass[k][k] += rig.servos[k].armature;
         }
-        let (mut force, mut limit) = (vec![0.0; n], vec![0.0; n]);
-        let driven = self.driven.clone();
+        let links = mass.clone();
+        let drives = self.drives(rig, commands, period, (time, h), (&middle, &ahead));
+        let (mut force, mut limit) = (vec![0.0; m], vec![0.0; m]);
         for (j, servo) in rig.servos.iter().enumerate() {
-            let [command, rate] = commanded(commands, n, j, period, time + 0.5 * h - servo.delay);
-            let way = servo.speed_limit * h;
-            self.set_point[j] += (command - self.set_point[j]).clamp(-way, way);
-            let error = self.set_point[j] + servo.offset - middle[j];
-            let felt = error - error.clamp(-servo.dead_band, servo.dead_band);
-            if servo.integral[0] > 0.0 {
-                let most = servo.integral[1];
-                self.integral[j] =
-                    (self.integral[j] + servo.integral[0] * error * h).clamp(-most, most);
+            let r = self.rotor[j];
+            let felt = servo.coupled.map_or(0.0, |(by, share)| share * drives[by]);
+            force[j] -= bias[j];
+            force[r] += drives[j] + felt - servo.damping * ahead[r] + passive(servo, middle[r]);
+            let mut dry = dry(servo, ahead[r], drives[j], time + 0.5 * h);
+            let back = usize::from(self.given[j] * ahead[r] < 0.0);
+            dry += servo.gear_load[back] * self.given[j].abs();
+            if servo.travel > 0.0 {
+                // Dahl: it bends with the way and slides when it is bent whole.
+                let sign = ahead[r].signum();
+                let half = (-0.5 * h * ahead[r].abs() / servo.travel).exp();
+                let bent = sign + (self.bent[j] - sign) * half;
+                force[r] -= dry * bent;
+                self.bent[j] = sign + (bent - sign) * half;
+            } else {
+                limit[r] = dry;
             }
-            let rate = if servo.on_error { rate } else { 0.0 };
-            let asked = servo.kp * felt + servo.kd * (rate - ahead[j]) + self.integral[j];
-            self.driven[j] = asked.clamp(-servo.limit, servo.limit);
-            let felt = servo.coupled.map_or(0.0, |(by, share)| share * driven[by]);
-            force[j] = self.driven[j] + felt - servo.damping * ahead[j] + passive(servo, middle[j])
-                - bias[j];
-            limit[j] = dry(servo, ahead[j], self.driven[j], time);
+            match servo.gear {
+                None => mass[j][j] += servo.armature,
+                Some(gear) => {
+                    mass[j][j] += (1.0 - ROTOR) * servo.armature;
+                    mass[r][r] = ROTOR * servo.armature;
+                    let between = middle[r] - middle[j];
+                    let bend = between - between.clamp(-0.5 * gear.play, 0.5 * gear.play);
+                    if bend != 0.0 || gear.play == 0.0 {
+                        let torque = gear.stiffness * bend + gear.damping * (ahead[r] - ahead[j]);
+                        force[r] -= torque;
+                        force[j] += torque;
+                    }
+                }
+            }
         }
         let free = solve(&mass, &force);
         let start: Vec<f64> = self.v.iter().zip(&free).map(|(v, a)| v + h * a).collect();
         let new = stuck(&mass, &start, &self.v, &limit, h);
-        for j in 0..n {
-            self.q[j] = middle[j] + 0.5 * h * new[j];
+        for i in 0..m {
+            self.q[i] = middle[i] + 0.5 * h * new[i];
+            self.a[i] = (new[i] - self.v[i]) / h;
         }
-        self.a = new
-            .iter()
-            .zip(&self.v)
-            .map(|(new, old)| (new - old) / h)
-            .collect();
         self.v = new;
+        for j in 0..n {
+            let inertial: f64 = (0..n).map(|k| links[j][k] * self.a[k]).sum();
+            self.given[j] = bias[j] + inertial;
+        }
+        let total: f64 = drives.iter().map(|drive| drive.abs()).sum();
+        self.drawn += (total - self.drawn) * (1.0 - (-h / SUPPLY).exp());
+    }
+
+    /// What the drives give in the middle of a step, Nm.
+    fn drives(
+        &mut self,
+        rig: &Rig,
+        commands: &[f64],
+        period: f64,
+        (time, h): (f64, f64),
+        (middle, ahead): (&[f64], &[f64]),
+    ) -> Vec<f64> {
+        let n = rig.joints();
+        let supply = 1.0 - (rig.sag * self.drawn).clamp(0.0, 0.9);
+        let drive = |(j, servo): (usize, &Servo)| {
+            let r = self.rotor[j];
+            let from = time - servo.delay;
+            let [command, rate] = commanded((commands, n, j), period, rig.hold, [from, from + h]);
+            let (far, way) = (command - self.set_point[j], servo.speed_limit * h);
+            // The set point goes on through the step; its middle is what is felt.
+            let goes = far.clamp(-way, way);
+            let wanted = match far.abs() < way {
+                true => command - 0.5 * far * far.abs() / way,
+                false => self.set_point[j] + 0.5 * goes,
+            };
+            self.set_point[j] += goes;
+            let error = wanted + servo.offset - middle[r];
+            let felt = error - error.clamp(-servo.dead_band, servo.dead_band);
+            let mut sum = self.integral[j];
+            if servo.integral[0] > 0.0 {
+                let most = servo.integral[1];
+                self.integral[j] = (sum + servo.integral[0] * error * h).clamp(-most, most);
+                sum = 0.5 * (sum + self.integral[j]);
+            }
+            let rate = if servo.on_error { rate } else { 0.0 };
+            let asked = servo.kp * felt + servo.kd * (rate - ahead[r]) + sum;
+            supply * asked.clamp(-servo.limit, servo.limit)
+        };
+        rig.servos.iter().enumerate().map(drive).collect()
     }
 }
 
-/// The command of a joint that holds at a time, and how fast it came: what was sent before the first row was the same.
-fn commanded(commands: &[f64], n: usize, joint: usize, period: f64, time: f64) -> [f64; 2] {
+/// The mean command of a joint between two times, and how fast it came: what was sent before the first row was the same. Of commands that come
+/// while one is held the last is taken when that ends.
+fn commanded(
+    (commands, n, joint): (&[f64], usize, usize),
+    period: f64,
+    hold: f64,
+    [from, to]: [f64; 2],
+) -> [f64; 2] {
     let rows = commands.len() / n;
-    let row = (time / period).floor();
-    if row < 1.0 {
-        return [commands[joint], 0.0];
-    }
-    let row = (row as usize).min(rows - 1);
-    let value = commands[row * n + joint];
-    [value, (value - commands[(row - 1) * n + joint]) / period]
+    let every = if hold > 0.0 { hold } else { period };
+    // Times of steps are sums; a row begins at its own.
+    let slot = |time: f64| (time / every + 1e-9).floor();
+    let of = |slot: f64| {
+        let row = ((slot * every / period + 1e-6).floor().max(0.0) as usize).min(rows - 1);
+        commands[row * n + joint]
+    };
+    let at = |time: f64| {
+        let here = slot(time);
+        [of(here), (of(here) - of(here - 1.0)) / every]
+    };
+    let (first, last) = (at(from), at(to - 1e-9 * every));
+    let turn = slot(to - 1e-9 * every) * every;
+    let share = if turn > from {
+        (turn - from) / (to - from)
+    } else {
+        0.0
+    };
+    std::array::from_fn(|k| share * first[k] + (1.0 - share) * last[k])
 }
 
 /// Springs, waves and bumps.

@@ -97,12 +97,8 @@ impl DriveCase {
         let shown = |angle: f64| {
             ((angle + self.noise * noise.normal()) / self.encoder).round() * self.encoder
         };
-        let angles = motion::angles(
-            &self.rig(&self.laws),
-            &self.commands,
-            self.period,
-            motion::FINE,
-        );
+        let sigma = (self.noise.powi(2) + self.encoder.powi(2) / 12.0).sqrt();
+        let angles = motion::settled(&self.rig(&self.laws), &self.commands, self.period, sigma);
         let angles: Vec<f64> = angles.into_iter().map(shown).collect();
         let lengths = self.lengths.iter().enumerate();
         let number: Vec<usize> = lengths.flat_map(|(k, rows)| vec![k + 1; *rows]).collect();

@@ -36,13 +36,33 @@ pub(super) struct Servo {
     pub(super) ripple: [f64; 3],
     /// Nm, at which angle, how wide.
     pub(super) bump: [f64; 3],
+    /// Of the torque that the gear gives to the link: driving, driven back.
+    pub(super) gear_load: [f64; 2],
+    /// rad in which friction bends until it slides; 0 is a stop.
+    pub(super) travel: f64,
+    /// A gear that yields.
+    pub(super) gear: Option<Gear>,
     /// Which drive is felt, and which share of it.
     pub(super) coupled: Option<(usize, f64)>,
+}
+
+/// A spring with play between a rotor, on which the encoder is, and its link.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Gear {
+    /// Nm/rad, Nm s/rad.
+    pub(super) stiffness: f64,
+    pub(super) damping: f64,
+    /// rad, the whole of it.
+    pub(super) play: f64,
 }
 
 /// An arm with its drives.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Rig {
+    /// s between two commands that are taken; 0 takes all.
+    pub(super) hold: f64,
+    /// Share of torque and limit that is lost per Nm that all drives together give.
+    pub(super) sag: f64,
     pub(super) machine: Machine,
     pub(super) servos: Vec<Servo>,
 }
@@ -72,6 +92,9 @@ impl Servo {
             spring: [0.0; 2],
             ripple: [0.0, 1.0, 0.0],
             bump: [0.0, 0.0, 1.0],
+            gear_load: [0.0; 2],
+            travel: 0.0,
+            gear: None,
             coupled: None,
         }
     }
@@ -80,6 +103,11 @@ impl Servo {
 impl Rig {
     pub(super) fn joints(&self) -> usize {
         self.servos.len()
+    }
+
+    /// Whether a gear yields somewhere.
+    pub(super) fn yields(&self) -> bool {
+        self.servos.iter().any(|servo| servo.gear.is_some())
     }
 
     /// A number of a link's inertials changed by a share (mass 0, inertia 4) or a way (centre 1 to 3, m).

@@ -33,8 +33,9 @@ impl DriveCase {
         let judged = self.lengths.last().copied().unwrap_or_default();
         let fit = self.commands.len() - judged * n;
         let sigma = (self.noise.powi(2) + self.encoder.powi(2) / 12.0).sqrt();
-        let simulated =
-            |rig: &Rig| motion::angles(rig, &self.commands[..fit], self.period, motion::COARSE);
+        let simulated = |rig: &Rig| {
+            motion::angles(rig, &self.commands[..fit], self.period, motion::coarse(rig))
+        };
         let whole_rig = self.rig(&self.laws);
         let whole = simulated(&whole_rig);
         let numbers = 5 * n;

@@ -152,8 +152,14 @@ impl<'a> Reader<'a> {
             }
         }
         let most = self.range(node, class, "actuatorfrcrange", "actuatorfrclimited");
+        let range = self.numbers(node, class, "range");
+        let range = range.and_then(|range| match range[..] {
+            [low, high] if low < high => Some([angular(self, low), angular(self, high)]),
+            _ => None,
+        });
         MjcfJoint {
             name: joint.name.clone(),
+            range,
             reference: angular(self, reference),
             damping,
             armature,

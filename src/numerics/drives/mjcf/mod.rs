@@ -41,6 +41,8 @@ pub struct MjcfJoint {
     pub name: String,
     /// The position at which bodies stand as the file draws them, rad or m.
     pub reference: f64,
+    /// From .. to, rad or m; `None` where the file states no range.
+    pub range: Option<[f64; 2]>,
     /// Nm s/rad.
     pub damping: f64,
     /// kg m^2.
