@@ -95,7 +95,7 @@ const MOST_CLOSED: f64 = 0.001;
 const MOST_OPEN: f64 = 0.999;
 
 crate::stage::stage! {
-    Diagnose, "diagnose", 51, "locates where simulation and recording differ, and names the physics that the model leaves out",
+    Diagnose, "diagnose", 52, "locates where simulation and recording differ, and names the physics that the model leaves out",
         DiagnoseReads {
             robot: Robot,
             recording: Recording,
