@@ -133,9 +133,7 @@ impl<'a> TorqueProblem<'a> {
         };
         let torque = (0..self.joints()).map(half_range).collect();
         self.all = TorqueColumns::of_base(&self.scene, &self.regressor, torque);
-        for joint in 0..self.joints() {
-            self.all.take_held(self.come_later(joint));
-        }
+        self.hold_shifts();
     }
 
     /// Forms the columns: of the base, and of all forms of all causes.

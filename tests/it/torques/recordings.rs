@@ -433,8 +433,8 @@ fn a_torque_that_acts_a_little_later_than_its_row_makes_no_other_friction() {
     let rows = case.rows();
     let mut text = String::from("time_s,q1_deg,tau1_nm");
     for pair in rows.windows(2) {
-        // A fifth of a period, 2 ms.
-        let torque = 0.8 * pair[0][3] + 0.2 * pair[1][3];
+        // Half a period, 5 ms, as that of a command that is held until the next row.
+        let torque = 0.5 * (pair[0][3] + pair[1][3]);
         let angle = pair[0][1].to_degrees();
         write!(text, "\n{:.3},{angle:.6},{torque:.6}", pair[0][0]).unwrap();
     }
@@ -446,7 +446,7 @@ fn a_torque_that_acts_a_little_later_than_its_row_makes_no_other_friction() {
     let found = document(&at, &folder.path().join("store"));
     let findings = found["findings"].as_array().unwrap();
     assert_eq!(findings.len(), 2, "{findings:#?}");
-    // As [`Planar`] has them; 2 ms are 6 % of the viscous one where nothing takes them up.
+    // As [`Planar`] has them.
     for (name, truth) in [("viscous_friction", 0.05), ("coulomb_friction", 0.03)] {
         let one = findings.iter().find(|one| one["effect"] == name);
         let value = one.and_then(|one| one["parameters"][0]["value"].as_f64());
