@@ -14,7 +14,7 @@ use calib_engine::{Accepted, Problem, Scanned};
 /// Inertial numbers of a link that are free within their tolerance: mass, centre, inertia.
 pub(crate) const FREE: usize = 5;
 /// s of recordings in which causes are looked for, and of a window of longer ones.
-const SEARCHED: f64 = 60.0;
+const SEARCHED: f64 = 40.0;
 const WINDOW: f64 = 8.0;
 
 /// Longer steps that are tried, s, and the share of the noise, rms, that is the same motion.
@@ -81,17 +81,14 @@ impl Drives {
         }
         let mut windows: Vec<Trajectory> = Vec::new();
         for one in fitted() {
-            let mut from = one.rows.start;
-            for row in one.rows.clone() {
-                if time(row) - time(from) >= WINDOW || row + 1 == one.rows.end {
-                    let began = one.began;
-                    windows.push(Trajectory {
-                        rows: from..row + 1,
-                        began,
-                    });
-                    from = row + 1;
-                }
-            }
+            // A trajectory is cut where it is long: what begins in motion begins less surely than what rests.
+            let lasts = time(one.rows.end - 1) - time(one.rows.start);
+            let count = (lasts / WINDOW).round().max(1.0) as usize;
+            let end = |k: usize| one.rows.start + one.rows.len() * k / count;
+            windows.extend((0..count).map(|k| Trajectory {
+                rows: end(k)..end(k + 1),
+                began: one.began,
+            }));
         }
         let kept = windows.into_iter().step_by(every);
         let kept = kept.filter(|one| one.rows.len() > 1 && self.recording.is_fitted(one));
@@ -210,14 +207,15 @@ impl Drives {
     }
 }
 
-/// The longest step, s, at which the simulation as it is goes where finer steps go, to a small share of the noise.
+/// The longest step, s, at which the simulation as it is goes where finer steps go, to a small share of the noise: in all rows, as those that
+/// judge may ask more of a drive.
 fn step(chain: &Chain, base: &Physics, recording: &Recording, sigma: &[f64]) -> f64 {
     let n = chain.joints();
     let rolled = |step: f64| {
         let mut chain = chain.clone();
         chain.step = step;
         let mut angles = Vec::new();
-        roll(&chain, base, recording, &[], Which::Fitted, |row| {
+        roll(&chain, base, recording, &[], Which::All, |row| {
             let at = row.row * n;
             let whitened = row.angle.iter().zip(&sigma[at..at + n]);
             angles.extend(whitened.map(|(angle, sigma)| angle / sigma));
