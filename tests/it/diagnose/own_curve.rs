@@ -47,6 +47,6 @@ fn a_curve_over_a_joints_own_angle_is_an_error_of_its_transmission_or_encoder_ev
     diagnose(&["--html", page.to_str().expect("UTF-8")]).ok();
     has(
         &crate::answer::read(&page),
-        ["joint_table at joint 2", "joint table</span>"],
+        ["joint table at joint 2", "joint table</span>"],
     );
 }

@@ -95,10 +95,7 @@ impl CauseTable<'_, '_> {
     }
 
     /// Components by name and place. A transmission that errs less than what else follows from its place without a name is a part of that.
-    fn by_name<'c>(
-        &self,
-        components: &'c [Component],
-    ) -> BTreeMap<(&'static str, Place), Vec<usize>> {
+    fn by_name(&self, components: &[Component]) -> BTreeMap<(&'static str, Place), Vec<usize>> {
         let mut groups: BTreeMap<(&'static str, Place), Vec<usize>> = BTreeMap::new();
         for (i, component) in components.iter().enumerate() {
             let cell = &self.cells[component.cell];

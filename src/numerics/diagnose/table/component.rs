@@ -302,14 +302,14 @@ struct KnownProduct {
 impl ProductCache {
     /// Beyond 128 MB what nobody can ask again goes, or else everything.
     fn forget(&mut self) {
-        const MOST: usize = 1 << 24;
-        if self.size <= MOST {
+        let most = 1 << 24;
+        if self.size <= most {
             return;
         }
         self.known.retain(|_, known| known.is_used());
         let sizes = self.known.values().map(|known| known.product.len());
         self.size = sizes.sum();
-        if 2 * self.size > MOST {
+        if 2 * self.size > most {
             *self = Self::default();
         }
     }
