@@ -142,6 +142,7 @@ impl CauseTable<'_, '_> {
             found.push(one);
             better = better.or(instead.map(|instead| (members, instead)));
         }
+        join_tables(&mut found);
         let better = better.map(|(members, (cell, found))| (members, self.component(cell, &found)));
         let next = scan
             .best()
@@ -383,6 +384,40 @@ impl CauseTable<'_, '_> {
             }
         }
         out
+    }
+}
+
+/// Waves of a gear that are less probable than another curve of the same joint, where such a curve is found as well, are a part of that.
+fn join_tables(found: &mut Vec<FoundCell>) {
+    let is_table = |one: &FoundCell| one.effect == names::JOINT_TABLE;
+    let tables: Vec<Place> = found
+        .iter()
+        .filter(|one| is_table(one))
+        .map(|one| one.place)
+        .collect();
+    for place in tables {
+        let is_part = |one: &FoundCell| {
+            let Probabilities { name, none, .. } = one.probabilities;
+            let mut rivals = one.rivals.iter();
+            let curve =
+                rivals.find(|rival| (rival.effect, rival.place) == (names::JOINT_TABLE, place));
+            one.place == place
+                && one.effect == names::GEAR_CYCLIC
+                && curve.is_some_and(|curve| curve.probability > name + none)
+        };
+        let parts: Vec<FoundCell> = found.extract_if(.., |one| is_part(one)).collect();
+        let table = found
+            .iter_mut()
+            .find(|one| is_table(one) && one.place == place);
+        let Some(table) = table else { continue };
+        for part in parts {
+            table.log += part.log.max(0.0);
+            table.gain += part.gain;
+            table.numbers += part.numbers;
+            table.members.extend(part.members);
+            table.bounds.extend(part.bounds);
+            table.rivals.retain(|rival| rival.effect != part.effect);
+        }
     }
 }
 
