@@ -1,7 +1,7 @@
 """The simulation that calib exports of a diagnosis of drives, rolled out in MuJoCo itself: its residual is the one that calib states.
 
-Cases are folders as pipelines/drives takes them: the example, recordings that are concealed for the test (DRIVE_CONCEALED, how many; DRIVE_SEED,
-of which seed), and those that are named in DRIVE_CASES (folders, with `:` between them).
+Cases are folders as pipelines/drives takes them: the example, recordings that are concealed for a proof (DRIVE_CONCEALED, how many, none unless
+stated; DRIVE_SEED, of which seed), and those that are named in DRIVE_CASES (folders, with `:` between them).
 """
 
 import csv
@@ -17,7 +17,7 @@ mujoco = pytest.importorskip("mujoco")
 
 CALIB = os.environ.get("CALIB", "calib")
 PIPELINE = pathlib.Path(__file__).resolve().parents[2] / "pipelines/drives/pipeline.yaml"
-CONCEALED = int(os.environ.get("DRIVE_CONCEALED", "2"))
+CONCEALED = int(os.environ.get("DRIVE_CONCEALED", "0"))
 CASES = [PIPELINE.parent / "example", *map(pathlib.Path, filter(None, os.environ.get("DRIVE_CASES", "").split(":")))]
 
 
