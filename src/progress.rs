@@ -47,7 +47,7 @@ struct State {
     total: Option<u64>,
     begun: Instant,
     printed: Instant,
-    /// When the stage is over, by what it took in the run before.
+    /// When the stage is expected to end, from its time in the run before.
     over: Option<Instant>,
     /// What was warned of: several stages say the same of one recording.
     warned: BTreeSet<String>,
@@ -124,7 +124,7 @@ impl Progress {
 /// Work that is shorter than this has no time that is left.
 const LONG: Duration = Duration::from_secs(5);
 
-/// What is left until then, in words; nothing where the run before says nothing, or was shorter.
+/// The time until then, in words; nothing where the run before says nothing, or was shorter.
 fn left(over: Option<Instant>) -> String {
     let left = over.map(|over| over.saturating_duration_since(Instant::now()).as_secs());
     match left {

@@ -226,7 +226,7 @@ impl Running<'_> {
         self.store.write_manifest(&self.record, &self.manifest)
     }
 
-    /// Seconds that a stage takes by what it took in the run before, in proportion to the rows that it reads; nothing where that run was of
+    /// Seconds that a stage is expected to take, from its time in the run before in proportion to the rows that it reads; nothing where that run was of
     /// another pipeline, or took none.
     fn expected(&self, index: usize) -> Option<f64> {
         let stage = &self.state.plan.stages[index];

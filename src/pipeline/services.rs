@@ -15,7 +15,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub trait Observer: Sync {
     /// A stage starts to execute, with the reason.
     fn stage_begins(&self, _id: &str, _uses: &str, _reason: &str) {}
-    /// It will take about so many seconds, by what it took when it last ran.
+    /// It will take about so many seconds, estimated from its last run.
     fn expects(&self, _id: &str, _seconds: f64) {}
     /// It waits for another process.
     fn waits(&self, _id: &str, _line: &str) {}

@@ -47,11 +47,11 @@ pub(crate) fn drive_page(
         .findings
         .0
         .iter()
-        .map(|row| FollowedFinding {
-            effect: &row.effect,
-            place: &row.place,
-            statement: &row.statement,
-            size: MRAD * row.effect_rms_rad.unwrap_or_default(),
+        .map(|row| {
+            FollowedFinding::new(
+                (&row.effect, &row.place, &row.statement),
+                MRAD * row.effect_rms_rad.unwrap_or_default(),
+            )
         })
         .collect();
     let page = json!({

@@ -66,14 +66,23 @@ const SHADES: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 0.6, 0.9];
 
 /// A finding as the table shows it.
 pub(super) struct FollowedFinding<'a> {
-    pub(super) effect: &'a str,
-    pub(super) place: &'a str,
-    pub(super) statement: &'a str,
-    /// In the unit of the table.
-    pub(super) size: f64,
+    effect: &'a str,
+    place: &'a str,
+    statement: &'a str,
+    size: f64,
 }
 
-impl FollowedFinding<'_> {
+impl<'a> FollowedFinding<'a> {
+    /// A finding of a size in the unit of the table.
+    pub(super) fn new((effect, place, statement): (&'a str, &'a str, &'a str), size: f64) -> Self {
+        Self {
+            effect,
+            place,
+            statement,
+            size,
+        }
+    }
+
     fn column(&self) -> &'static str {
         let of_name = |(_, names): &&(&str, &[&str])| names.contains(&self.effect);
         let statement = self.statement.trim_end_matches('.');

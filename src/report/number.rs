@@ -61,14 +61,14 @@ pub(super) fn with_digits(statement: &str, numbers: &[(f64, Option<f64>)]) -> St
         let stated: f64 = word.parse().ok()?;
         let is_it = |(value, _): &&(f64, Option<f64>)| fixed(value.abs(), decimals) == word;
         let (value, sigma) = numbers.iter().find(is_it)?;
-        let told = measured(value.abs(), Some((*sigma)?));
+        let short = measured(value.abs(), Some((*sigma)?));
         // Statements of small numbers have all of their digits already.
-        (told.len() < word.len() && !told.contains('e') && stated > 0.0).then_some(told)
+        (short.len() < word.len() && !short.contains('e') && stated > 0.0).then_some(short)
     };
     let shorter = |word: &str| {
         let tail = word.trim_start_matches(['(', '+', '-']);
         let number = tail.trim_end_matches([',', ';', '.', ')', ':']);
-        known(number).map_or_else(|| word.into(), |told| word.replacen(number, &told, 1))
+        known(number).map_or_else(|| word.into(), |short| word.replacen(number, &short, 1))
     };
     let words: Vec<String> = statement.split(' ').map(shorter).collect();
     words.join(" ")

@@ -61,11 +61,8 @@ pub(crate) fn torque_page(
         .findings
         .0
         .iter()
-        .map(|row| FollowedFinding {
-            effect: &row.effect,
-            place: &row.place,
-            statement: &row.statement,
-            size: row.effect_rms_nm,
+        .map(|row| {
+            FollowedFinding::new((&row.effect, &row.place, &row.statement), row.effect_rms_nm)
         })
         .collect();
     let page = json!({

@@ -132,8 +132,8 @@ pub fn diagnose(
     let problem = &whole;
     let after = match is_part {
         true => {
-            let (found, worth) = (&answer.after, f64::NEG_INFINITY);
-            problem.fitted_with(&found.set, Some(found), true, worth)
+            let (found, least) = (&answer.after, f64::NEG_INFINITY);
+            problem.fitted_with(&found.set, Some(found), true, least)
         }
         false => answer.after,
     };

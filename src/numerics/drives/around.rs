@@ -1,5 +1,5 @@
 //! What every cell of the table would do around a fit: columns of all of them by their products, and what each member of the set does, so that
-//! one look serves the cells beside the set and those in place of a member.
+//! one linearisation serves the cells that may join the set and those that may replace a member.
 
 use crate::causes::cells;
 use crate::fit::{Anew, DriveFit, Normal};
@@ -15,14 +15,14 @@ use std::sync::Arc;
 
 /// rad rms of a unit of amplitude: the amplitudes of the table of causes are those of metres at a tool.
 const UNIT: f64 = 10.0;
-/// Standard deviations of what noise alone makes of a joint's squared residual, above which causes with a memory are asked there.
+/// Standard deviations of what noise alone makes of a joint's squared residual, above which causes with a memory are evaluated there.
 const ABOVE_NOISE: f64 = 4.0;
 /// Share of the drive's error, rms, that is left at a joint whose gain may be far off.
 const FAR_OFF: f64 = 0.5;
 
 /// What cells and members do around a fit.
 pub struct Around {
-    asked: Vec<Asked>,
+    candidates: Vec<Candidate>,
     sums: Sums,
     /// Base columns, then what each member does: products with each other and with the residual.
     own: Normal,
@@ -36,8 +36,8 @@ pub struct Around {
     pub(crate) rich: f64,
 }
 
-/// A cell that is asked: beside the set, or in place of a member that leaves it no room.
-struct Asked {
+/// A cell that may join the set, or replace the member that excludes it.
+struct Candidate {
     cell: Cell<Key>,
     instead: Option<usize>,
 }
@@ -47,7 +47,7 @@ struct Asked {
 struct Rolled {
     key: Key,
     numbers: Vec<f64>,
-    beside: Vec<Key>,
+    neighbours: Vec<Key>,
     /// rad, by row and joint.
     change: Arc<Vec<f64>>,
 }
@@ -69,7 +69,7 @@ fn changed(after: Vec<f64>, before: &[f64]) -> Vec<f64> {
 
 impl Drives {
     /// Cells that may be there around a fit.
-    fn asked(&self, fit: &DriveFit) -> Vec<Asked> {
+    fn candidates(&self, fit: &DriveFit) -> Vec<Candidate> {
         let n = self.chain.joints();
         let rows_a_joint = self.fitted().count() as f64;
         let squares = self.squares(&fit.angles);
@@ -79,7 +79,7 @@ impl Drives {
         // A gain that is far off shows in the residual: as much as the drive's own error.
         let residual = self.errors_of(&fit.angles);
         let is_far = |joint: usize| residual[joint] > FAR_OFF * self.usual[joint].error;
-        let asked = |mut cell: Cell<Key>| {
+        let candidate = |mut cell: Cell<Key>| {
             let key = cell.key;
             let leaves: Vec<usize> = (0..fit.set.len())
                 .filter(|member| key.excludes(fit.set[*member].cell.key))
@@ -102,10 +102,10 @@ impl Drives {
                 cell.shapes.truncate(1);
             }
             let wanted = !self.without.iter().any(|name| name == cell.cause.name);
-            (seen && wanted).then_some(Asked { cell, instead })
+            (seen && wanted).then_some(Candidate { cell, instead })
         };
         let all = cells(&self.base, &self.usual, self.recording.period);
-        all.into_iter().filter_map(asked).collect()
+        all.into_iter().filter_map(candidate).collect()
     }
 
     /// Angles without a member of a set.
@@ -122,13 +122,13 @@ impl Around {
     pub(crate) fn new(drives: &Drives, fit: &DriveFit, before: Option<&Self>) -> Self {
         let n = drives.chain.joints();
         let now = drives.physics(&fit.inertia, &fit.set);
-        let asked = drives.asked(fit);
+        let candidates = drives.candidates(fit);
         let members: Vec<(Physics, Vec<f64>)> = (0..fit.set.len())
             .into_par_iter()
             .map(|member| drives.without(fit, member))
             .collect();
         // In the order of cells, shapes and columns.
-        let wanted: Vec<(&Asked, &Vec<f64>)> = asked
+        let wanted: Vec<(&Candidate, &Vec<f64>)> = candidates
             .iter()
             .flat_map(|one| {
                 let shapes = one.cell.shapes.iter();
@@ -136,7 +136,7 @@ impl Around {
             })
             .collect();
         let set: Vec<Key> = fit.set.iter().map(|one| one.cell.key).collect();
-        let column = |(one, x): &(&Asked, &Vec<f64>)| {
+        let column = |(one, x): &(&Candidate, &Vec<f64>)| {
             let key = one.cell.key;
             let (base, angles) = one
                 .instead
@@ -147,16 +147,16 @@ impl Around {
                 return Column::Carried(Direction::between(&now, &with));
             }
             let near = |other: &Key| key.meets(*other);
-            let beside: Vec<Key> = set.iter().copied().filter(near).collect();
+            let neighbours: Vec<Key> = set.iter().copied().filter(near).collect();
             let known = before.and_then(|before| {
                 before.rolled.iter().find(|known| {
-                    known.key == key && known.numbers == **x && known.beside == beside
+                    known.key == key && known.numbers == **x && known.neighbours == neighbours
                 })
             });
             Column::Rolled(known.cloned().unwrap_or_else(|| Rolled {
                 key,
                 numbers: (*x).clone(),
-                beside,
+                neighbours,
                 change: Arc::new(changed(drives.angles(&with, Which::Fitted), angles)),
             }))
         };
@@ -179,7 +179,7 @@ impl Around {
         }
         let mut blocks: Vec<(usize, usize)> = Vec::new();
         let mut from = 0;
-        for shape in asked.iter().flat_map(|one| &one.cell.shapes) {
+        for shape in candidates.iter().flat_map(|one| &one.cell.shapes) {
             blocks.push((from, shape.columns.len()));
             from += shape.columns.len();
         }
@@ -236,7 +236,7 @@ impl Around {
                 })
                 .collect(),
             rich: rich.independence(),
-            asked,
+            candidates,
         }
     }
 
@@ -266,7 +266,7 @@ impl Around {
         rows.unit = UNIT;
         let mut next = 0;
         let mut scanned = Vec::new();
-        for one in &self.asked {
+        for one in &self.candidates {
             let first = next;
             next += one.cell.shapes.len();
             if one.instead.is_some() && one.instead != out {

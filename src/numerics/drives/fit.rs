@@ -46,9 +46,9 @@ pub struct DriveFit {
     pub square: f64,
     /// Fitted numbers.
     pub freedom: f64,
-    /// Effective rows a row, by what the model leaves.
+    /// Effective rows per row, estimated from this model's residual.
     pub independence: f64,
-    /// The same by what a rich model would leave, the most of all looks.
+    /// The same from the residual of a rich model, the largest estimate so far.
     pub rich: f64,
     /// Squared distance of all numbers from where they are expected, in their usual sizes.
     pub penalty: f64,
@@ -167,7 +167,7 @@ fn log_likelihood(square: f64, rows: f64, independence: f64) -> f64 {
 }
 
 impl DriveFit {
-    /// Share of the rows that is independent: by what the model leaves, or by what a rich one would.
+    /// Share of independent rows: the larger of the estimates from this model's residual and from that of a rich one.
     pub fn share(&self) -> f64 {
         self.independence.max(self.rich)
     }
@@ -325,13 +325,13 @@ impl Drives {
         (angles, square)
     }
 
-    /// Fits inertials and a set's numbers from where they are; stops where evidence `worth` is out of reach.
+    /// Fits inertials and a set's numbers from where they are; stops where evidence `least` is out of reach.
     pub(crate) fn fitted_with(
         &self,
         set: &[Accepted<Key>],
         before: Option<&DriveFit>,
         anew: bool,
-        worth: f64,
+        least: f64,
     ) -> DriveFit {
         let anew = anew || before.is_none();
         let patience = if anew { &STANDS } else { &TRIAL };
@@ -387,7 +387,7 @@ impl Drives {
             let change = factor.solve(&gradient);
             // The first step leads from where a linear scan began; from then on a step says how far the next ones may lead.
             let falls = REACH * gradient.dot(&change) / weight;
-            if step > 1 && fit.reach(falls, fit.share()) < worth {
+            if step > 1 && fit.reach(falls, fit.share()) < least {
                 break;
             }
             let objective = weight * fit.square + self.penalty(&fit);

@@ -262,7 +262,7 @@ impl Key {
         Some(format!("{kind} over {what}"))
     }
 
-    /// Whether one of two must not stand beside the other: the same field of the physics.
+    /// Whether two cells exclude each other: they set the same field of the physics.
     pub fn excludes(self, other: Self) -> bool {
         match (self, other) {
             (Self::Unknown(a, over, dry), Self::Unknown(b, by, wet)) => {

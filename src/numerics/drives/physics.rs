@@ -262,12 +262,12 @@ impl Joint {
         let middle = error(motion.middle[seen]);
         let band = middle.clamp(-self.dead_band, self.dead_band);
         let feels = self.dead_band == 0.0 || middle != band;
-        let asked = |error: f64, v: f64| {
+        let demand = |error: f64, v: f64| {
             let felt = if feels { error - band } else { 0.0 };
             sag * (self.kp * felt + self.kd * (speed - v) + commanded.integral)
         };
         let limit = self.limit * sag;
-        let wanted = asked(middle, motion.ahead[seen]);
+        let wanted = demand(middle, motion.ahead[seen]);
         let given = wanted.clamp(-limit, limit);
         if given != wanted || on_link {
             return Drive {
@@ -279,7 +279,7 @@ impl Joint {
         }
         Drive {
             given,
-            explicit: asked(error(motion.q[seen]), motion.v[seen]),
+            explicit: demand(error(motion.q[seen]), motion.v[seen]),
             stiffness: if feels { self.kp * sag } else { 0.0 },
             damping: self.kd * sag,
         }

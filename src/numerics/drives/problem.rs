@@ -298,8 +298,8 @@ impl Problem for Drives {
         around.scan(fit, out)
     }
 
-    fn fit(&self, set: &[Accepted<Key>], before: Option<&DriveFit>, worth: f64) -> DriveFit {
-        self.fitted_with(set, before, false, worth)
+    fn fit(&self, set: &[Accepted<Key>], before: Option<&DriveFit>, least: f64) -> DriveFit {
+        self.fitted_with(set, before, false, least)
     }
 
     fn settled(&self, fit: &DriveFit) -> DriveFit {

@@ -31,8 +31,8 @@ pub(super) struct Latency {
 }
 
 impl TorqueProblem<'_> {
-    /// Takes columns of the base by which torques come earlier or later, held. Beside masses that are identified, rows that are held out are
-    /// predicted better without (a UR10: 0.103 of the torques' rms against 0.109).
+    /// Adds a column of the base for the time shift of each joint's torque, held at zero for now. Where masses are identified, held-out rows are
+    /// predicted better without it (a UR10: 0.103 of the torques' rms against 0.109).
     pub(super) fn hold_shifts(&mut self) {
         if self.scene.declared.is_some() || self.scene.beyond.is_some() {
             for joint in 0..self.joints() {
@@ -54,8 +54,8 @@ impl TorqueProblem<'_> {
         }
     }
 
-    /// Lets the torque of each joint come earlier or later by what is too little to be called a latency: a command that is held until the next row
-    /// acts half a period later than its row, and friction that is asked to take that up is another friction.
+    /// Lets the torque of each joint shift in time by less than what counts as a latency: a command that is held until the next row acts half
+    /// a period later than its row, which a fit would otherwise take for friction.
     pub(super) fn let_come_later(&mut self) {
         let first = self.all.base_changes.len();
         for joint in 0..self.all.base - first {

@@ -128,9 +128,9 @@ pub trait Problem: Sync {
     /// What every cell of the table, and every member of a set, does around a fit.
     type Around: Send + Sync;
 
-    /// What the cells of the table would do around a fit; what still holds of a look around another fit need not be made again.
+    /// The cells of the table linearised around a fit; columns of an earlier linearisation that still hold may be reused.
     fn around(&self, fit: &Self::Fit, before: Option<&Self::Around>) -> Self::Around;
-    /// The fit that knows how many rows count by what is seen around it.
+    /// The fit with its number of effective rows, estimated from the linearisation around it.
     fn informed(&self, fit: Self::Fit, around: &Self::Around) -> Self::Fit;
     /// Cells by their evidence around a fit, those of no use left out; member `out` of its set is left out to first order. Likeliest first.
     fn scan(
@@ -139,8 +139,8 @@ pub trait Problem: Sync {
         around: &Self::Around,
         out: Option<usize>,
     ) -> Vec<Scanned<Self::Key>>;
-    /// Everything fitted at once, from the numbers of the set and the fit before; it may stop where evidence `worth` is out of reach.
-    fn fit(&self, set: &[Accepted<Self::Key>], before: Option<&Self::Fit>, worth: f64)
+    /// Everything fitted at once, from the numbers of the set and the fit before; it may stop where the evidence cannot reach `least`.
+    fn fit(&self, set: &[Accepted<Self::Key>], before: Option<&Self::Fit>, least: f64)
     -> Self::Fit;
     /// The same with every derivative made anew, to the end: a trial among many may reuse those of the fit before.
     fn settled(&self, fit: &Self::Fit) -> Self::Fit;

@@ -103,21 +103,21 @@ fn candidates<P: Problem>(
     kept
 }
 
-/// Fits of a set with each of some cells beside it, best first; what stays behind `worth`, or behind the likeliest by `by`, need not be
-/// fitted to the end.
+/// Fits of a set with each of some cells added, best first; a fit may stop early where its evidence cannot reach `least`, or that of the
+/// likeliest less `margin`.
 fn trials<P: Problem>(
     problem: &P,
     fit: &P::Fit,
     set: &[Accepted<P::Key>],
     candidates: Vec<Scanned<P::Key>>,
     independence: f64,
-    (worth, by): (f64, f64),
+    (least, margin): (f64, f64),
 ) -> Vec<Trial<P>> {
-    let tried = |one: Scanned<P::Key>, worth: f64| {
+    let tried = |one: Scanned<P::Key>, least: f64| {
         let cell = one.accepted.cell.clone();
         let mut with = set.to_vec();
         with.push(one.accepted);
-        let fit = problem.fit(&with, Some(fit), worth);
+        let fit = problem.fit(&with, Some(fit), least);
         let log = problem.log_evidence(&fit, independence);
         Trial { fit, log, cell }
     };
@@ -125,10 +125,10 @@ fn trials<P: Problem>(
     let Some(likeliest) = candidates.next() else {
         return Vec::new();
     };
-    let first = tried(likeliest, worth);
-    let worth = worth.max(first.log - by);
+    let first = tried(likeliest, least);
+    let least = least.max(first.log - margin);
     let rest: Vec<Scanned<P::Key>> = candidates.collect();
-    let rest = rest.into_par_iter().map(|one| tried(one, worth));
+    let rest = rest.into_par_iter().map(|one| tried(one, least));
     let mut trials: Vec<Trial<P>> = rest.collect();
     trials.push(first);
     trials.sort_by(|a, b| b.log.total_cmp(&a.log));

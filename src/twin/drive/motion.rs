@@ -1,5 +1,5 @@
 //! A rig moved along commands: explicit steps of second order (torques at the middle, to which the last acceleration leads), dry friction as the set of joints that stick.
-//! What is recorded is made by steps so fine that finer ones change nothing beside the noise.
+//! Recordings are integrated in steps so fine that finer ones change nothing that the noise would show.
 
 use super::rig::{Rig, Servo};
 use crate::way::JointState;
@@ -25,7 +25,7 @@ pub(super) fn coarse(rig: &Rig) -> f64 {
     if rig.yields() { GEARED } else { COARSE }
 }
 
-/// Angles by a step so fine that half of it changes nothing beside noise of `sigma` rad.
+/// Angles in steps so fine that half of them changes little against noise of `sigma` rad.
 pub(super) fn settled(rig: &Rig, commands: &[f64], period: f64, sigma: f64) -> Vec<f64> {
     let n = rig.joints();
     let mut before = angles(rig, commands, period, FINE);
@@ -220,8 +220,8 @@ impl Now {
                 sum = 0.5 * (sum + self.integral[j]);
             }
             let rate = if servo.on_error { rate } else { 0.0 };
-            let asked = servo.kp * felt + servo.kd * (rate - ahead[r]) + sum;
-            supply * asked.clamp(-servo.limit, servo.limit)
+            let demand = servo.kp * felt + servo.kd * (rate - ahead[r]) + sum;
+            supply * demand.clamp(-servo.limit, servo.limit)
         };
         rig.servos.iter().enumerate().map(drive).collect()
     }

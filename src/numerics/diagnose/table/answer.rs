@@ -94,7 +94,8 @@ impl CauseTable<'_, '_> {
         !cell.is_named() && turns(cell.place) && self.has_tables
     }
 
-    /// Components by name and place. A transmission that errs less than what else follows from its place without a name is a part of that.
+    /// Components by name and place. A joint's curve over its own angle that is smaller than the unnamed components of that joint is grouped with
+    /// them.
     fn by_name(&self, components: &[Component]) -> BTreeMap<(&'static str, Place), Vec<usize>> {
         let mut groups: BTreeMap<(&'static str, Place), Vec<usize>> = BTreeMap::new();
         for (i, component) in components.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Products of components with the coarse columns of cells, each computed once somebody asks: a search looks at most cells a few times only.
+//! Products of components with the coarse columns of cells, computed on first use: a search evaluates most cells only a few times.
 
 use super::cause_table::CauseTable;
 use super::component::{CellColumns, Component};
@@ -15,7 +15,7 @@ pub(super) struct CoarseProducts(Mutex<KnownParts>);
 
 #[derive(Default)]
 struct KnownParts {
-    /// With the turn in which it was last asked for.
+    /// With the turn of its last use.
     of: BTreeMap<u64, (u64, Arc<PartOfCells>)>,
     turn: u64,
 }
@@ -23,7 +23,7 @@ struct KnownParts {
 /// Products of the part of a component with the coarse columns of cells.
 #[derive(Clone, Default)]
 struct PartOfCells {
-    /// Columns of the part x coarse columns of all cells; zero of those that nobody asked.
+    /// Columns of the part x coarse columns of all cells; zero where not computed yet.
     values: DMatrix<f64>,
     is_known: Vec<bool>,
 }
@@ -46,7 +46,7 @@ impl CoarseProducts {
         part.map(Arc::unwrap_or_clone).unwrap_or_default()
     }
 
-    /// Keeps what is known of a component now; what was not asked for long goes.
+    /// Stores the products of a component; the half that was not used for longest is dropped when there are too many.
     fn keep(&self, id: u64, part: Arc<PartOfCells>) {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let turn = known.turn;
