@@ -19,7 +19,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 crate::stage::stage! {
-    Report, "report", 30, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
+    Report, "report", 31, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
         ReportReads -> ReportWrites {
             document: Document,
             acceptance: Acceptance,
@@ -270,7 +270,7 @@ pub struct ReportTorques {
 }
 
 crate::stage::stage! {
-    ReportTorques, "report_torques", 11, "writes one self-contained HTML file: torques before and after, friction, what was found",
+    ReportTorques, "report_torques", 12, "writes one self-contained HTML file: torques before and after, friction, what was found",
         ReportTorquesReads -> ReportTorquesWrites {
             document: Document,
         }
@@ -302,7 +302,7 @@ pub struct ReportDrives {
 }
 
 crate::stage::stage! {
-    ReportDrives, "report_drives", 2, "writes one self-contained HTML file: commanded, measured and simulated angles before and after, what was found",
+    ReportDrives, "report_drives", 3, "writes one self-contained HTML file: commanded, measured and simulated angles before and after, what was found",
         ReportDrivesReads -> ReportDrivesWrites {
             document: Document,
         }
