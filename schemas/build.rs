@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 fn main() {
     let folder =
-        Path::new(&std::env::var("CARGO_MANIFEST_DIR").expect("cargo says it")).join("schemas");
+        Path::new(&std::env::var("CARGO_MANIFEST_DIR").expect("cargo says it")).join("../../schemas");
     let out = PathBuf::from(std::env::var("OUT_DIR").expect("cargo says it"));
     println!("cargo::rerun-if-changed={}", folder.display());
     let entries = std::fs::read_dir(&folder).expect("schemas are a folder");

@@ -161,28 +161,21 @@ pub use calib_diagnose as diagnose;
 pub use calib_drives as drives;
 pub use calib_dynamics as dynamics;
 pub use calib_engine as engine;
-pub use calib_foundation::{description, statistics, units};
+pub use calib_foundation::{description, error, statistics, units};
 pub use calib_numerics::{
-    compensate, criteria, effect, error, estimate, observation, robot, spatial, yaml,
+    compensate, criteria, effect, estimate, observation, robot, spatial, yaml,
 };
+pub use calib_program::{self as program, targets};
+pub use calib_raw as raw;
+pub use calib_report as report;
+pub use calib_stage as stage;
+pub use calib_store as store;
+pub use calib_table as table;
 pub use calib_twin as twin;
 
-pub mod program;
-pub mod raw;
+pub(crate) mod diff;
 pub(crate) mod shell;
 pub(crate) mod text;
-
-pub mod targets;
-
-pub mod store;
-
-pub(crate) mod diff;
-
-pub mod table;
-
-pub mod report;
-
-pub mod stage;
 
 pub mod pipeline;
 

@@ -1,8 +1,9 @@
-//! What estimator and twin may both use: the robot as plain data, the units of numbers, order statistics. It computes no pose.
+//! What all packages may use: errors by reader, the robot as plain data, the units of numbers, order statistics. It computes no pose.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
 pub mod description;
+pub mod error;
 pub mod statistics;
 pub mod units;

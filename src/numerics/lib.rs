@@ -6,8 +6,9 @@
 
 use calib_foundation::{description, statistics, units};
 
+pub use calib_foundation::error;
+
 pub mod criteria;
-pub mod error;
 pub mod yaml;
 
 pub mod spatial;

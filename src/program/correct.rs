@@ -29,7 +29,7 @@ pub struct ProgramFile<'a> {
 
 impl ProgramFile<'_> {
     /// File, line and column.
-    pub(crate) fn at(&self, note: &Note) -> String {
+    pub fn at(&self, note: &Note) -> String {
         format!("{}:{}:{}", self.place, note.line, note.column)
     }
 

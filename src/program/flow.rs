@@ -36,9 +36,9 @@ pub(super) enum FlowStep {
 /// A line: its step, the routines that it calls, whether it sets something.
 #[derive(Debug, Clone)]
 pub(super) struct FlowLine {
-    pub(crate) step: FlowStep,
-    pub(crate) calls: Vec<String>,
-    pub(crate) sets: bool,
+    pub step: FlowStep,
+    pub calls: Vec<String>,
+    pub sets: bool,
 }
 
 /// Which lines may follow each.
@@ -103,7 +103,7 @@ impl Flow {
     }
 
     /// What is known before each line runs, none where it is never reached; `step` takes it through a line.
-    pub(crate) fn states<S: JoinedState>(
+    pub fn states<S: JoinedState>(
         &self,
         start: &S,
         step: impl Fn(usize, &mut S),

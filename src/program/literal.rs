@@ -26,7 +26,7 @@ pub enum TargetKind {
 
 impl TargetKind {
     /// Whether it is a target of joints.
-    pub(crate) fn is_of_joints(self) -> bool {
+    pub fn is_of_joints(self) -> bool {
         matches!(self, Self::Joints | Self::Radians)
     }
 }
@@ -41,15 +41,15 @@ pub struct Literal {
     /// Where each value stands, sign included.
     pub spans: Vec<Range<usize>>,
     /// External axes, deg or mm; none where one is not connected.
-    pub(crate) external: Vec<Option<f64>>,
+    pub external: Vec<Option<f64>>,
     /// In which posture.
     pub posture: PostureStatement,
     /// Where each number of the posture stands.
-    pub(crate) posture_spans: Vec<Range<usize>>,
+    pub posture_spans: Vec<Range<usize>>,
     /// The frame that a Cartesian target stands in, in the robot's base (m); none: the base itself.
     pub frame: Option<Pose>,
     /// The tool that reaches a Cartesian target, in the frame of the robot file's tool (m); none: that one itself.
-    pub(crate) tool: Option<Pose>,
+    pub tool: Option<Pose>,
     /// As the program has it.
     pub(super) tool_in_force: Option<ToolInForce>,
     /// The mass at the flange that the program states, kg.
@@ -97,7 +97,7 @@ impl Literal {
     }
 
     /// The byte at which its first number stands.
-    pub(crate) fn at(&self) -> usize {
+    pub fn at(&self) -> usize {
         let starts = self.spans.iter().map(|span| span.start);
         starts.min().unwrap_or_default()
     }
@@ -163,18 +163,18 @@ pub(super) enum Setting<T> {
 /// A tool by its name and, where that is declared, its frame at the flange (m).
 #[derive(Debug, Clone)]
 pub(super) struct ToolInForce {
-    pub(crate) name: String,
-    pub(crate) frame: Option<Pose>,
+    pub name: String,
+    pub frame: Option<Pose>,
 }
 
 /// At a motion.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct InForce {
     /// In the robot's base, m.
-    pub(crate) base: Setting<Pose>,
-    pub(crate) tool: Setting<ToolInForce>,
+    pub base: Setting<Pose>,
+    pub tool: Setting<ToolInForce>,
     /// kg; none where its declaration does not say.
-    pub(crate) load: Setting<Option<f64>>,
+    pub load: Setting<Option<f64>>,
 }
 
 impl PartialEq for ToolInForce {
@@ -239,14 +239,14 @@ impl JoinedState for InForce {
 
 impl InForce {
     /// Where nothing is set.
-    pub(crate) const NOTHING: Self = Self {
+    pub const NOTHING: Self = Self {
         base: Setting::Unset,
         tool: Setting::Unset,
         load: Setting::Unset,
     };
 
     /// Where nothing is known, for one reason.
-    pub(crate) fn open(why: &str) -> Self {
+    pub fn open(why: &str) -> Self {
         Self {
             base: Setting::Open(why.into()),
             tool: Setting::Open(why.into()),
@@ -259,24 +259,24 @@ impl InForce {
 #[derive(Debug, Default)]
 pub(super) struct Reached {
     /// By the name of a target, in capitals.
-    pub(crate) named: BTreeMap<String, Vec<InForce>>,
+    pub named: BTreeMap<String, Vec<InForce>>,
     /// By the bytes of a target that stands in a motion of the file that is corrected.
-    pub(crate) placed: Vec<(Range<usize>, InForce)>,
+    pub placed: Vec<(Range<usize>, InForce)>,
     /// Names that are used otherwise than by motions.
-    pub(crate) mentioned: BTreeMap<String, InForce>,
+    pub mentioned: BTreeMap<String, InForce>,
     /// What was assumed of other files, at the bytes of the file that is corrected.
-    pub(crate) assumed: Messages,
+    pub assumed: Messages,
 }
 
 impl Reached {
     /// Takes note of what is in force where a motion leads to a name.
-    pub(crate) fn moved_to(&mut self, name: &Token, force: &InForce) {
+    pub fn moved_to(&mut self, name: &Token, force: &InForce) {
         let uses = self.named.entry(name.upper()).or_default();
         uses.push(force.clone());
     }
 
     /// Takes note of names whose targets are handed on in `place`: where these go is not followed.
-    pub(crate) fn handed_on(&mut self, tokens: &[Token], place: &str) {
+    pub fn handed_on(&mut self, tokens: &[Token], place: &str) {
         for word in words(tokens) {
             let force = InForce::open(&format!("is not followed: {place} hands the target on"));
             self.mentioned.entry(word.upper()).or_insert(force);
@@ -285,7 +285,7 @@ impl Reached {
 
     /// For each literal what is in force wherever it is reached; `names`: numbers of literals that a variable holds, and its name. Both are in the
     /// order of the program.
-    pub(crate) fn uses(
+    pub fn uses(
         &self,
         literals: &[Literal],
         names: &[(Range<usize>, String)],
@@ -308,10 +308,10 @@ impl Reached {
 
 /// How the language calls what is in force.
 pub(super) struct Words {
-    pub(crate) base: &'static str,
-    pub(crate) tool: &'static str,
+    pub base: &'static str,
+    pub tool: &'static str,
     /// What is assumed where nothing is set.
-    pub(crate) no_base: &'static str,
+    pub no_base: &'static str,
 }
 
 /// Gives literals their frames, tools and payloads, as they are in force where the literals are reached, and reports them.

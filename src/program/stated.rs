@@ -52,9 +52,9 @@ const QUADRANTS: [usize; 3] = [0, 3, 5];
 
 /// An arm in the controller's counting.
 pub(super) struct PostureReader<'a> {
-    pub(crate) robot: &'a RobotModel,
-    pub(crate) convention: &'a JointConvention,
-    pub(crate) sides: Option<&'a ArmSides>,
+    pub robot: &'a RobotModel,
+    pub convention: &'a JointConvention,
+    pub sides: Option<&'a ArmSides>,
 }
 
 impl PostureStatement {
@@ -91,7 +91,7 @@ impl PostureStatement {
 
 impl PostureReader<'_> {
     /// Why sides that a target states are not checked, where they are not.
-    pub(crate) fn unchecked(&self, stated: PostureStatement) -> Option<String> {
+    pub fn unchecked(&self, stated: PostureStatement) -> Option<String> {
         let name = match stated {
             PostureStatement::Configuration(_) => "cfx",
             PostureStatement::StatusTurn {
@@ -117,7 +117,7 @@ impl PostureReader<'_> {
     }
 
     /// What a target states as a posture; none where it states nothing.
-    pub(crate) fn posture(&self, stated: PostureStatement) -> Option<StatedPosture> {
+    pub fn posture(&self, stated: PostureStatement) -> Option<StatedPosture> {
         let sides = match self.uses_sides(stated) {
             true => stated.sides(),
             false => [None; 3],
@@ -147,7 +147,7 @@ impl PostureReader<'_> {
     }
 
     /// What a target states once its joints are `q` (rad, as the controller counts); what it does not state stays unstated.
-    pub(crate) fn restated(&self, stated: PostureStatement, q: &[f64]) -> PostureStatement {
+    pub fn restated(&self, stated: PostureStatement, q: &[f64]) -> PostureStatement {
         let mut joints = q.to_vec();
         self.convention.to_robot(&mut joints);
         let sides = self.sides.filter(|_| self.uses_sides(stated));

@@ -186,13 +186,13 @@ fn unquoted(field: &[u8]) -> Cow<'_, [u8]> {
 /// How a delimited text is written; without more, commas between fields and a header on the first line.
 #[derive(Debug, Clone)]
 pub struct TextLayout {
-    pub(crate) delimiter: Delimiter,
+    pub delimiter: Delimiter,
     /// How lines begin that are no rows.
-    pub(crate) comment: Option<String>,
+    pub comment: Option<String>,
     /// The first row is the header, and a comment.
-    pub(crate) header_in_comment: bool,
+    pub header_in_comment: bool,
     /// Lines above the first row.
-    pub(crate) skip: u64,
+    pub skip: u64,
 }
 
 impl Default for TextLayout {
@@ -218,7 +218,7 @@ pub struct TextRows<R> {
 
 impl<R: BufRead> TextRows<R> {
     /// Opens a text without a byte-order mark and skips what stands above header and data.
-    pub(crate) fn open(mut reader: R, label: &str, layout: TextLayout) -> Result<Self> {
+    pub fn open(mut reader: R, label: &str, layout: TextLayout) -> Result<Self> {
         let head = reader.fill_buf().map_err(|error| failed(label, &error))?;
         // Old Macintosh; one at the end may be a CRLF that was cut.
         let lone = head

@@ -22,9 +22,9 @@ pub enum RecordFault {
 #[derive(Default)]
 pub struct Record {
     /// Line where it begins, from 1; of a file without lines the row.
-    pub(crate) line: u64,
+    pub line: u64,
     /// The bytes as they stand, without the line end.
-    pub(crate) text: Vec<u8>,
+    pub text: Vec<u8>,
     /// Why its source says that it is not to be used.
     pub fault: Option<(RecordFault, String)>,
     /// The fields without quotes, of a row that has some.
@@ -36,14 +36,14 @@ pub struct Record {
 
 impl Record {
     /// Starts a row whose fields are pushed one by one.
-    pub(crate) fn begin(&mut self, line: u64) {
+    pub fn begin(&mut self, line: u64) {
         self.line = line;
         self.text.clear();
         self.fields.clear();
         self.is_quoted = false;
         self.fault = None;
     }
-    pub(crate) fn push(&mut self, field: &[u8]) {
+    pub fn push(&mut self, field: &[u8]) {
         if !self.fields.is_empty() {
             self.text.push(b',');
         }
@@ -51,11 +51,11 @@ impl Record {
         self.text.extend_from_slice(field);
         self.fields.push(start..self.text.len());
     }
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.fields.len()
     }
     /// A field without the blanks around it; empty beyond the last.
-    pub(crate) fn field(&self, index: usize) -> &[u8] {
+    pub fn field(&self, index: usize) -> &[u8] {
         let bytes = if self.is_quoted {
             &self.unquoted
         } else {
@@ -73,7 +73,7 @@ impl Record {
             .collect()
     }
     /// Whether nothing stands in the fields from this one on.
-    pub(crate) fn is_blank(&self, from: usize) -> bool {
+    pub fn is_blank(&self, from: usize) -> bool {
         (from..self.len()).all(|index| self.field(index).is_empty())
     }
 }

@@ -59,7 +59,7 @@ impl Workbook {
     }
 
     /// The sheet that is read: the one of this name, else the only visible one with rows of numbers.
-    pub(crate) fn sheet(&mut self, wanted: Option<&str>) -> Result<String, String> {
+    pub fn sheet(&mut self, wanted: Option<&str>) -> Result<String, String> {
         let listed = |names: &[String]| {
             let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
             names.join(", ")
@@ -89,7 +89,7 @@ impl Workbook {
     }
 
     /// The visible sheets with rows of numbers.
-    pub(crate) fn tables(&mut self) -> Result<Vec<String>, String> {
+    pub fn tables(&mut self) -> Result<Vec<String>, String> {
         let sheets = self.book.sheets_metadata().to_vec();
         let mut tables = Vec::new();
         for sheet in sheets {
@@ -137,7 +137,7 @@ impl Workbook {
     }
 
     /// A sheet as lines, numbers with this decimal mark.
-    pub(crate) fn lines(&mut self, sheet: &str, decimal: DecimalMark) -> Result<String, String> {
+    pub fn lines(&mut self, sheet: &str, decimal: DecimalMark) -> Result<String, String> {
         let is_1904 = self.is_1904;
         let mut texts = String::new();
         let mut cells: Vec<([u32; 2], [usize; 2])> = Vec::new();

@@ -1,24 +1,24 @@
 //! The page of `calib verify-robot`: what the correction achieved at points that were measured after it.
 
 use crate::error::Result;
-use crate::report::language::Locale;
-use crate::report::number::{count, render};
-use crate::report::workspace::{StepErrors, histogram};
+use crate::language::Locale;
+use crate::number::{count, render};
+use crate::workspace::{StepErrors, histogram};
 use serde_json::json;
 
 /// What the page shows; lengths in mm.
 pub struct AchievedTables<'a> {
-    pub(crate) title: &'a str,
+    pub title: &'a str,
     /// Where the model is from.
-    pub(crate) model: &'a str,
+    pub model: &'a str,
     /// Name, mean, 95th percentile, largest, and what they are of.
-    pub(crate) rows: Vec<(&'static str, [f64; 3], String)>,
+    pub rows: Vec<(&'static str, [f64; 3], String)>,
     /// Errors of the uncorrected targets, by the model, and of the measured points.
-    pub(crate) errors: [Vec<f64>; 2],
+    pub errors: [Vec<f64>; 2],
     /// Cycles, accuracy and repeatability.
-    pub(crate) poses: Vec<(usize, f64, f64)>,
+    pub poses: Vec<(usize, f64, f64)>,
     /// What to know of the figures, a sentence each.
-    pub(crate) remarks: Vec<String>,
+    pub remarks: Vec<String>,
 }
 
 /// The page as one file that needs no other.

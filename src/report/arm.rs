@@ -10,17 +10,17 @@ use crate::table::PredictionRow;
 use serde_json::{Value, json};
 
 /// An arm, and where it stands.
-pub(crate) struct PlacedArm {
+pub struct PlacedArm {
     /// Rotation and place (mm) of the base in the instrument's frame, row-major 3 x 4.
-    pub(crate) base: [f64; 12],
+    pub base: [f64; 12],
     /// Axis, a point on it (mm), both in the base at the zero pose, and whether the joint slides.
-    pub(crate) joints: Vec<([f64; 3], [f64; 3], bool)>,
+    pub joints: Vec<([f64; 3], [f64; 3], bool)>,
     /// The measured point in the base at the zero pose, mm.
-    pub(crate) tool: [f64; 3],
+    pub tool: [f64; 3],
     /// Base, joints and measured point in the pose of `row`, mm in the base.
-    pub(crate) chain: Vec<[f64; 3]>,
+    pub chain: Vec<[f64; 3]>,
     /// Row of the recording whose pose is shown.
-    pub(crate) row: usize,
+    pub row: usize,
 }
 
 /// Points that are drawn: more would hide each other.
@@ -34,7 +34,7 @@ const FILLED: f64 = 1.25;
 const LONG: f64 = 0.12;
 
 /// The row with the largest error of the first step, whose pose the still picture shows.
-pub(crate) fn shown_row(rows: &[PredictionRow]) -> Option<usize> {
+pub fn shown_row(rows: &[PredictionRow]) -> Option<usize> {
     let usable = rows.iter().enumerate().filter(|(_, row)| !row.suspect);
     let worst = usable.max_by(|a, b| a.1.error_mm.total_cmp(&b.1.error_mm));
     worst.map(|(at, _)| at)

@@ -1,12 +1,12 @@
 //! The first page: what was calibrated with what, how accurate it is, whether that is accepted, under which conditions, and what was not seen.
 
 use crate::error::{Error, Result};
-use crate::report::errors::{Steps, before};
-use crate::report::findings::wrong_setup;
-use crate::report::language::{Locale, say};
-use crate::report::{Accepted, Tables};
+use crate::errors::{Steps, before};
+use crate::findings::wrong_setup;
+use crate::language::{Locale, say};
 use crate::table::{AcceptanceRow, StatisticsRow, SuspectsRow, VerdictRow, VerdictTopic, inert};
 use crate::units::Unit;
+use crate::{Accepted, Tables};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -242,8 +242,8 @@ pub(super) struct Judgement<'a> {
     wrong: Option<String>,
     row: Option<&'a StatisticsRow>,
     /// Limits as they were set; none where a wrong set-up alone is not accepted.
-    pub(crate) limits: Vec<AcceptanceRow>,
-    pub(crate) kept: bool,
+    pub limits: Vec<AcceptanceRow>,
+    pub kept: bool,
 }
 
 /// The row that is judged: of `set`, else of the held-out set with most points, after the step that stands.
@@ -260,7 +260,7 @@ pub(super) fn judged<'a>(tables: &'a Tables, set: Option<&str>) -> Option<&'a St
 
 impl<'a> Judgement<'a> {
     /// None where there are no limits and the set-up is right.
-    pub(crate) fn new(tables: &'a Tables, limits: &Accepted, set: Option<&str>) -> Option<Self> {
+    pub fn new(tables: &'a Tables, limits: &Accepted, set: Option<&str>) -> Option<Self> {
         let wrong = wrong_setup(tables);
         let row = judged(tables, set).filter(|_| wrong.is_none());
         let figures = [
@@ -306,7 +306,7 @@ impl<'a> Judgement<'a> {
     }
 
     /// The judgement in a sentence.
-    pub(crate) fn sentence(&self, locale: &Locale) -> String {
+    pub fn sentence(&self, locale: &Locale) -> String {
         let Some(row) = self.row else {
             return match &self.wrong {
                 Some(wrong) => say!(
@@ -340,7 +340,7 @@ impl<'a> Judgement<'a> {
     }
 
     /// Limits with what was found.
-    pub(crate) fn found(&self) -> impl Iterator<Item = (&AcceptanceRow, f64)> {
+    pub fn found(&self) -> impl Iterator<Item = (&AcceptanceRow, f64)> {
         self.limits
             .iter()
             .filter_map(|row| Some((row, row.found_mm?)))

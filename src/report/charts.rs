@@ -6,8 +6,8 @@ use super::svg::{Area, Scale, Svg, baseline, name_x, name_y};
 /// One line of a chart.
 pub(super) struct Line {
     /// Class of its colour; with a further word, of its style.
-    pub(crate) colour: String,
-    pub(crate) points: Vec<[f64; 2]>,
+    pub colour: String,
+    pub points: Vec<[f64; 2]>,
 }
 
 const WIDTH: f64 = 420.0;

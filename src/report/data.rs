@@ -2,13 +2,13 @@
 //!
 //! `report.json`: what the report says, for other programs. Every figure is a column of a table.
 
+use crate::certificate::Judgement;
 use crate::error::Result;
-use crate::report::certificate::Judgement;
-use crate::report::language::{Locale, say};
-use crate::report::number::count;
-use crate::report::{Report, Tables, result};
+use crate::language::{Locale, say};
+use crate::number::count;
 use crate::table::{RejectedRow, Robot, RobotRow, VerdictTopic, picked, picked_of};
 use crate::units::Unit;
+use crate::{Report, Tables, result};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 

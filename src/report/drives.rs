@@ -27,7 +27,7 @@ crate::table::reads! {
 }
 
 /// The page; fails where the verdict is missing.
-pub(crate) fn drive_page(
+pub fn drive_page(
     tables: &ReportDrivesReads,
     title: Option<&str>,
     language: PageLanguage,

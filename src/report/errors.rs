@@ -1,13 +1,13 @@
 //! The verdict, the table of errors after every step, and their pictures; held-out and training points never together.
 
+use crate::Tables;
 use crate::error::{Error, Result};
-use crate::report::Tables;
-use crate::report::findings::wrong_setup;
-use crate::report::language::{Locale, say};
-use crate::report::number::count;
-use crate::report::svg::{Area, Scale, Svg, baseline, name_x};
-use crate::report::workspace::{Colours, StepErrors, VIEWS, cumulative, histogram, scatter};
+use crate::findings::wrong_setup;
+use crate::language::{Locale, say};
+use crate::number::count;
+use crate::svg::{Area, Scale, Svg, baseline, name_x};
 use crate::table::{Labelled, Prediction, PredictionRow, Statistics, StatisticsRow, UNFOLDED};
+use crate::workspace::{Colours, StepErrors, VIEWS, cumulative, histogram, scatter};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ pub(super) struct Steps {
 
 impl Steps {
     /// `standing` is the step that the report speaks of; without one, the last.
-    pub(crate) fn new(statistics: &Statistics, standing: Option<&str>) -> Self {
+    pub fn new(statistics: &Statistics, standing: Option<&str>) -> Self {
         let names: BTreeMap<i64, String> = statistics
             .0
             .iter()
@@ -48,7 +48,7 @@ impl Steps {
         }
     }
     /// Colour of a step by name; a step without predictions has the first one's.
-    pub(crate) fn colour_of(&self, step: &str) -> String {
+    pub fn colour_of(&self, step: &str) -> String {
         let order = self
             .names
             .iter()

@@ -1,12 +1,12 @@
 //! What was left out of the simulation: the diagnosis' verdict, its findings with their curves, what it could not see.
 
 use crate::error::Result;
-use crate::report::language::{Locale, PageLanguage, say};
-use crate::report::number::render;
-use crate::report::svg::{Area, Scale, Svg, baseline, label, name_x, name_y};
-use crate::report::{Page, Tables};
+use crate::language::{Locale, PageLanguage, say};
+use crate::number::render;
+use crate::svg::{Area, Scale, Svg, baseline, label, name_x, name_y};
 use crate::table::{CauseGrid, CurveRow, FindingRow, VerdictTopic};
 use crate::units::Unit;
+use crate::{Page, Tables};
 use serde_json::{Value, json};
 
 /// Points drawn in one picture: more would hide each other.
@@ -195,7 +195,7 @@ fn pictures(locale: &Locale, finding: &FindingRow, curve: &[&CurveRow]) -> Vec<(
 }
 
 /// A diagnosis as one file that needs no other.
-pub(crate) fn diagnosed_page(page: Value, language: PageLanguage) -> Result<Page> {
+pub fn diagnosed_page(page: Value, language: PageLanguage) -> Result<Page> {
     let locale = Locale::new(language);
     let template = include_str!("diagnosed.html");
     let html = render(&locale, "diagnosed.html", template, page)?;

@@ -134,7 +134,7 @@ fn place_order(place: &str) -> (i64, String) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drives::CAUSES;
+    use calib_drives::CAUSES;
 
     #[test]
     fn every_cause_of_drives_stands_in_a_column() {

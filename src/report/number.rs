@@ -131,13 +131,13 @@ pub(super) fn count(value: i64) -> String {
 
 /// The same in the language of a page.
 impl Locale {
-    pub(crate) fn fixed(&self, value: f64, decimals: usize) -> String {
+    pub fn fixed(&self, value: f64, decimals: usize) -> String {
         self.decimal(fixed(value, decimals))
     }
-    pub(crate) fn mm(&self, value: f64) -> String {
+    pub fn mm(&self, value: f64) -> String {
         self.decimal(mm(value))
     }
-    pub(crate) fn significant(&self, value: f64, digits: usize) -> String {
+    pub fn significant(&self, value: f64, digits: usize) -> String {
         self.decimal(significant(value, digits))
     }
 }
@@ -146,7 +146,7 @@ impl Locale {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct UnitFormat {
     factor: f64,
-    pub(crate) symbol: &'static str,
+    pub symbol: &'static str,
     decimals: usize,
 }
 
@@ -188,17 +188,17 @@ pub(super) fn readings(stored: &str) -> Option<(UnitFormat, UnitFormat)> {
 
 impl UnitFormat {
     /// Decimals that show a sigma with two digits, at least the usual ones.
-    pub(crate) fn decimals_for(&self, sigma: Option<f64>) -> usize {
+    pub fn decimals_for(&self, sigma: Option<f64>) -> usize {
         let needed = match sigma.map(|s| (s * self.factor).abs()) {
             Some(s) if s > 0.0 => (1.0 - s.log10().floor()).max(0.0) as usize,
             _ => 0,
         };
         self.decimals.max(needed).min(self.decimals + 4)
     }
-    pub(crate) fn show(&self, value: f64, decimals: usize) -> String {
+    pub fn show(&self, value: f64, decimals: usize) -> String {
         fixed(value * self.factor, decimals)
     }
-    pub(crate) fn show_signed(&self, value: f64, decimals: usize) -> String {
+    pub fn show_signed(&self, value: f64, decimals: usize) -> String {
         signed(value * self.factor, decimals)
     }
 }

@@ -14,7 +14,7 @@ fn values<'a, R: Serialize + 'a>(rows: impl IntoIterator<Item = &'a R>) -> Vec<V
 
 /// Findings on positions or torques: their rows, each with its `numbers` and its `rivals`. A rival is `open` where it is more than the nearest
 /// name of a finding that has none: one that the data exclude.
-pub(crate) fn findings<'a, F: Serialize + 'a, N: Serialize + 'a, R: Serialize + 'a>(
+pub fn findings<'a, F: Serialize + 'a, N: Serialize + 'a, R: Serialize + 'a>(
     rows: impl IntoIterator<Item = &'a F>,
     numbers: impl IntoIterator<Item = &'a N>,
     rivals: impl IntoIterator<Item = &'a R>,
@@ -34,7 +34,7 @@ pub(crate) fn findings<'a, F: Serialize + 'a, N: Serialize + 'a, R: Serialize + 
 }
 
 /// The formulas of a finding: what each costs and brings, all of it in `words`, and its `numbers`.
-pub(crate) fn formulas<'a>(forms: impl IntoIterator<Item = &'a Forms>, rank: i64) -> Value {
+pub fn formulas<'a>(forms: impl IntoIterator<Item = &'a Forms>, rank: i64) -> Value {
     let rows = forms.into_iter().flat_map(|forms| forms.of_finding(rank));
     let formula = |rows: &[FormRow]| {
         let mut formula = json!(rows[0]);
@@ -46,7 +46,7 @@ pub(crate) fn formulas<'a>(forms: impl IntoIterator<Item = &'a Forms>, rank: i64
 }
 
 /// A finding for other programs; `evidence` are the columns that speak for it.
-pub(crate) fn document(finding: &Value, evidence: &str) -> Value {
+pub fn document(finding: &Value, evidence: &str) -> Value {
     let columns = "effect where=place statement probability place_probability none_probability";
     let rows = |name: &str| finding[name].as_array().into_iter().flatten();
     let mut document = picked(finding, columns);

@@ -15,7 +15,7 @@ pub(super) struct Svg<'a> {
 }
 
 impl<'a> Svg<'a> {
-    pub(crate) fn new(locale: &'a Locale, width: f64, height: f64) -> Self {
+    pub fn new(locale: &'a Locale, width: f64, height: f64) -> Self {
         Self {
             locale,
             width,
@@ -23,11 +23,11 @@ impl<'a> Svg<'a> {
             body: String::new(),
         }
     }
-    pub(crate) fn line(&mut self, class: &str, from: SvgPoint, to: SvgPoint) {
+    pub fn line(&mut self, class: &str, from: SvgPoint, to: SvgPoint) {
         self.path(class, &[from, to]);
     }
     /// An open line through the points.
-    pub(crate) fn path(&mut self, class: &str, points: &[SvgPoint]) {
+    pub fn path(&mut self, class: &str, points: &[SvgPoint]) {
         let _ = write!(self.body, "<path class=\"{class}\" d=\"");
         for (i, point) in points.iter().enumerate() {
             let _ = write!(
@@ -41,7 +41,7 @@ impl<'a> Svg<'a> {
         self.body.push_str("\"/>\n");
     }
     /// An open line with gaps as one element.
-    pub(crate) fn strokes(&mut self, class: &str, strokes: &[Vec<SvgPoint>]) {
+    pub fn strokes(&mut self, class: &str, strokes: &[Vec<SvgPoint>]) {
         let mut d = String::new();
         for stroke in strokes {
             for (k, [x, y]) in stroke.iter().enumerate() {
@@ -57,7 +57,7 @@ impl<'a> Svg<'a> {
         self.many(class, "", d);
     }
     /// Many lines as one element.
-    pub(crate) fn lines(&mut self, class: &str, lines: &[[SvgPoint; 2]]) {
+    pub fn lines(&mut self, class: &str, lines: &[[SvgPoint; 2]]) {
         let each = lines.iter().map(|[from, to]| {
             let [x, y, to_x, to_y] = [from[0], from[1], to[0], to[1]].map(tenth);
             format!("M{x} {y}L{to_x} {to_y}")
@@ -65,7 +65,7 @@ impl<'a> Svg<'a> {
         self.many(class, "", each.collect());
     }
     /// Many dots as one element: thousands of circles make a page slow and its print large.
-    pub(crate) fn dots(&mut self, class: &str, width: f64, centres: &[SvgPoint]) {
+    pub fn dots(&mut self, class: &str, width: f64, centres: &[SvgPoint]) {
         let each = centres
             .iter()
             .map(|[x, y]| format!("M{} {}h0", tenth(*x), tenth(*y)));
@@ -80,7 +80,7 @@ impl<'a> Svg<'a> {
             let _ = writeln!(self.body, "<path class=\"{class}\"{more} d=\"{d}\"/>");
         }
     }
-    pub(crate) fn rect(&mut self, class: &str, corner: SvgPoint, size: SvgPoint) {
+    pub fn rect(&mut self, class: &str, corner: SvgPoint, size: SvgPoint) {
         let _ = writeln!(
             self.body,
             "<rect class=\"{class}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>",
@@ -90,7 +90,7 @@ impl<'a> Svg<'a> {
             tenth(size[1])
         );
     }
-    pub(crate) fn circle(&mut self, class: &str, centre: SvgPoint, radius: f64) {
+    pub fn circle(&mut self, class: &str, centre: SvgPoint, radius: f64) {
         let _ = writeln!(
             self.body,
             "<circle class=\"{class}\" cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
@@ -104,7 +104,7 @@ impl<'a> Svg<'a> {
         self.words(class, "", at, text);
     }
     /// A name that somebody gave, which no language changes.
-    pub(crate) fn name(&mut self, class: &str, at: SvgPoint, text: &str) {
+    pub fn name(&mut self, class: &str, at: SvgPoint, text: &str) {
         self.words(class, " translate=\"no\"", at, text);
     }
     fn words(&mut self, class: &str, more: &str, at: SvgPoint, text: &str) {
@@ -116,7 +116,7 @@ impl<'a> Svg<'a> {
         );
     }
     /// The `svg` element; `title` is what a screen reader says.
-    pub(crate) fn finish(self, title: &str) -> String {
+    pub fn finish(self, title: &str) -> String {
         format!(
             "<svg class=\"chart\" viewBox=\"0 0 {} {}\" role=\"img\">\n<title>{}</title>\n{}</svg>",
             tenth(self.width),
@@ -148,15 +148,15 @@ fn escape(text: &str) -> String {
 /// Where in a picture the data go: left, top, right, bottom, in user units.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Area {
-    pub(crate) left: f64,
-    pub(crate) top: f64,
-    pub(crate) right: f64,
-    pub(crate) bottom: f64,
+    pub left: f64,
+    pub top: f64,
+    pub right: f64,
+    pub bottom: f64,
 }
 
 impl Area {
     /// Left, top, right, bottom.
-    pub(crate) fn new([left, top, right, bottom]: [f64; 4]) -> Self {
+    pub fn new([left, top, right, bottom]: [f64; 4]) -> Self {
         Self {
             left,
             top,
@@ -178,7 +178,7 @@ pub(super) struct Scale {
 
 impl Scale {
     /// Linear over [lower, upper], widened where that is empty.
-    pub(crate) fn linear(lower: f64, upper: f64) -> Self {
+    pub fn linear(lower: f64, upper: f64) -> Self {
         let upper = if upper > lower {
             upper
         } else {
@@ -193,7 +193,7 @@ impl Scale {
         }
     }
     /// Logarithmic over the next rounder numbers around positive [lower, upper].
-    pub(crate) fn log(lower: f64, upper: f64) -> Self {
+    pub fn log(lower: f64, upper: f64) -> Self {
         let upper = round_up(upper.max(1e-9));
         let lower = round_down(lower.max(upper * 1e-16)).min(upper * 0.5);
         Self {
@@ -205,7 +205,7 @@ impl Scale {
         }
     }
     /// For positive values: logarithmic where they differ by more than a linear axis can show, else linear from zero.
-    pub(crate) fn positive(lower: f64, upper: f64) -> Self {
+    pub fn positive(lower: f64, upper: f64) -> Self {
         // Over a ratio of 12, the smaller values would share less than a tenth of a linear axis.
         if lower > 0.0 && upper / lower > 12.0 {
             Self::log(lower, upper)
@@ -214,11 +214,11 @@ impl Scale {
         }
     }
     /// The same scale drawn from `from` to `to`.
-    pub(crate) fn over(self, from: f64, to: f64) -> Self {
+    pub fn over(self, from: f64, to: f64) -> Self {
         Self { from, to, ..self }
     }
     /// Where a value is drawn; what lies outside is drawn on the edge.
-    pub(crate) fn at(&self, value: f64) -> f64 {
+    pub fn at(&self, value: f64) -> f64 {
         let share = if self.log {
             (value.max(self.lower) / self.lower).ln() / (self.upper / self.lower).ln()
         } else {
@@ -227,7 +227,7 @@ impl Scale {
         self.from + share.clamp(0.0, 1.0) * (self.to - self.from)
     }
     /// Round values within the scale, about `wanted` of them.
-    pub(crate) fn ticks(&self, wanted: usize) -> Vec<f64> {
+    pub fn ticks(&self, wanted: usize) -> Vec<f64> {
         if !self.log {
             let step = round_up((self.upper - self.lower) / wanted.max(1) as f64);
             let first = (self.lower / step).ceil() as i64;
@@ -255,7 +255,7 @@ impl Scale {
             .filter(|tick| (self.lower * 0.999..=self.upper * 1.001).contains(tick))
             .collect()
     }
-    pub(crate) fn grid_x(&self, svg: &mut Svg, area: Area, wanted: usize) {
+    pub fn grid_x(&self, svg: &mut Svg, area: Area, wanted: usize) {
         for tick in self.ticks(wanted) {
             let x = self.at(tick);
             svg.line("grid", [x, area.top], [x, area.bottom]);
@@ -266,7 +266,7 @@ impl Scale {
             );
         }
     }
-    pub(crate) fn grid_y(&self, svg: &mut Svg, area: Area, wanted: usize) {
+    pub fn grid_y(&self, svg: &mut Svg, area: Area, wanted: usize) {
         for tick in self.ticks(wanted) {
             let y = self.at(tick);
             svg.line("grid", [area.left, y], [area.right, y]);

@@ -36,7 +36,7 @@ crate::table::reads! {
 }
 
 /// The page; fails where the verdict is missing.
-pub(crate) fn torque_page(
+pub fn torque_page(
     tables: &ReportTorquesReads,
     title: Option<&str>,
     language: PageLanguage,

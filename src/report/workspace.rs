@@ -12,7 +12,7 @@ const CLASSES: usize = 7;
 /// Two coordinates of a point, as a view of the workspace.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WorkspaceView {
-    pub(crate) name: &'static str,
+    pub name: &'static str,
     axes: [ViewAxis; 2],
 }
 
@@ -40,7 +40,7 @@ pub(super) struct Colours {
 
 impl Colours {
     /// Round edges from below the median error of `after` to within the largest errors of `before`.
-    pub(crate) fn new(before: &Prediction, after: &Prediction) -> Self {
+    pub fn new(before: &Prediction, after: &Prediction) -> Self {
         let quantile = |table: &Prediction, share: f64| {
             let mut errors: Vec<f64> = table.0.iter().map(|row| row.error_mm).collect();
             errors.sort_by(f64::total_cmp);
@@ -69,7 +69,7 @@ impl Colours {
         self.edges.iter().take_while(|edge| error > **edge).count()
     }
     /// What each class means, e.g. `0.1 - 0.2`.
-    pub(crate) fn legend(&self, locale: &Locale) -> Vec<(String, String)> {
+    pub fn legend(&self, locale: &Locale) -> Vec<(String, String)> {
         let label = |edge: f64| locale.decimal(label(edge));
         let text = |k: usize| match (
             k.checked_sub(1).and_then(|k| self.edges.get(k)),
@@ -198,12 +198,12 @@ pub(super) fn scatter(
 
 /// The errors of one set of points after one step.
 pub(super) struct StepErrors {
-    pub(crate) step: String,
+    pub step: String,
     /// Class of its colour, the same in all pictures.
-    pub(crate) colour: String,
+    pub colour: String,
     /// Ascending, mm; not empty.
-    pub(crate) sorted_mm: Vec<f64>,
-    pub(crate) mean_mm: f64,
+    pub sorted_mm: Vec<f64>,
+    pub mean_mm: f64,
 }
 
 const WIDTH: f64 = 420.0;

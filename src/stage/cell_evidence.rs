@@ -1,14 +1,14 @@
 //! `cell_evidence`: what every cell of the table of causes says of a robot given cells that its fleet has accepted. `calib fleet diagnose` puts
 //! it in the place of a stage `diagnose`, with that stage's settings; `torque_evidence` in that of a stage `diagnose_torques`.
 
-use crate::diagnose::{CellAnswer, GivenCell, cell_evidence};
 use crate::dynamics;
 use crate::error::{Error, Place, Result};
-use crate::stage::{
+use crate::table::{CellEvidence as CellEvidenceTable, CellEvidenceRow};
+use crate::{
     AskedRows, Context, Diagnose, DiagnoseReads, DiagnoseTorques, DiagnoseTorquesReads, RawFile,
     Stage,
 };
-use crate::table::{CellEvidence as CellEvidenceTable, CellEvidenceRow};
+use calib_diagnose::{CellAnswer, GivenCell, cell_evidence};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -17,10 +17,10 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Evidence<D> {
     /// Settings as of a stage `diagnose`, or `diagnose_torques`.
-    pub(crate) diagnose: D,
+    pub diagnose: D,
     /// Cells that are taken to be in the robot.
     #[serde(default)]
-    pub(crate) given: Vec<Given>,
+    pub given: Vec<Given>,
 }
 
 /// Of positions.
@@ -33,15 +33,15 @@ pub type TorqueEvidence = Evidence<DiagnoseTorques>;
 #[serde(deny_unknown_fields)]
 pub struct Given {
     /// Its key, as the table cell_evidence has it.
-    pub(crate) cell: String,
+    pub cell: String,
     /// Key of the shape that all robots share; the robot's likeliest if none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) shape: Option<String>,
+    pub shape: Option<String>,
     /// Rms motion at the tool that is expected of it, mm, or rms torque, Nm.
-    pub(crate) size: f64,
+    pub size: f64,
 }
 
-crate::stage::stage! {
+crate::stage! {
     CellEvidence, "cell_evidence", 8, "says what every possible cause explains of one robot, for the sum over a fleet",
         DiagnoseReads -> CellEvidenceWrites {
             cell_evidence: CellEvidenceTable,
@@ -77,7 +77,7 @@ impl Stage for CellEvidence {
     }
 }
 
-crate::stage::stage! {
+crate::stage! {
     TorqueEvidence, "torque_evidence", 8, "says what every possible cause explains of the torques of one robot",
         DiagnoseTorquesReads -> CellEvidenceWrites
 }

@@ -1,13 +1,13 @@
 //! `compare`: what changed on the robot since an earlier recording of it; the earlier model is the prior and the comparison.
 
+use crate::doubtful::{FittedRows, fit_rows};
 use crate::effect::{Load, names};
 use crate::error::{Error, Place, Result};
 use crate::estimate::{Prior, align, changes};
-use crate::robot::{Measurements, NoiseBasis, RobotModel};
-use crate::stage::doubtful::{FittedRows, fit_rows};
-use crate::stage::settings::Repeatability;
-use crate::stage::{Context, OpenedInput, RawFile, Stage};
+use crate::settings::Repeatability;
 use crate::table::{ChangeRow, Changes, Parameters, Recording, Robot, Split, Table, from_parquet};
+use crate::{Context, OpenedInput, RawFile, Stage};
+use calib_numerics::robot::{Measurements, NoiseBasis, RobotModel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::io::Read;
@@ -17,14 +17,14 @@ use std::io::Read;
 #[serde(deny_unknown_fields, default)]
 pub struct Compare {
     /// Table `parameters` of the earlier model, Parquet.
-    pub(crate) previous_parameters: Option<RawFile>,
+    pub previous_parameters: Option<RawFile>,
     /// Table `recording` that it was fitted to, Parquet.
-    pub(crate) previous_recording: Option<RawFile>,
+    pub previous_recording: Option<RawFile>,
     /// How well joints come back to a pose, as in `identify`.
-    pub(crate) repeatability: Repeatability,
+    pub repeatability: Repeatability,
 }
 
-crate::stage::stage! {
+crate::stage! {
     Compare, "compare", 6, "tests which parameters changed since an earlier recording of the same robot",
         CompareReads {
             robot: Robot,

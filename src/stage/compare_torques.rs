@@ -2,13 +2,13 @@
 //! which of them agree, and in what the others differ.
 
 use crate::description::RobotDescription;
+use crate::dynamic_arm::{RecordedTorques, dynamic_arm};
 use crate::dynamics::{
     ContactEvent, DiagnosedRecording, DynamicArm, TorqueChange, TorqueChanges, TorqueModel, changes,
 };
 use crate::error::{Error, Result, counted, listed};
-use crate::stage::dynamic_arm::{RecordedTorques, dynamic_arm};
-use crate::stage::{Chunks, Context, Labelled, Stage};
 use crate::table::{ArmMotion, Contacts, Robot, TorqueChangeTable, TorqueParameters};
+use crate::{Chunks, Context, Labelled, Stage};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct CompareTorques {}
 
-crate::stage::stage! {
+crate::stage! {
     CompareTorques, "compare_torques", 7, "tests what changed between recordings of an arm's torques: what it carries, friction, offsets",
         CompareTorquesReads {
             robot: Robot,
@@ -198,7 +198,7 @@ impl<'r> Compared<'r> {
                     [from, to].map(|one| RecordedTorques::of(self.all[one].motion, self.robot));
                 let [first, second] = torques;
                 let (first, second) = (first?, second?);
-                let events = [from, to].map(|one| self.all[one].contacts.events());
+                let events = [from, to].map(|one| events(&self.all[one].contacts));
                 let diagnosed = |recording, place: usize, one: usize| DiagnosedRecording {
                     recording,
                     model: &self.models[one],
@@ -270,16 +270,14 @@ fn sentence(change: &TorqueChange) -> String {
     )
 }
 
-impl Contacts {
-    fn events(&self) -> Vec<ContactEvent> {
-        let event = |row: &crate::table::ContactRow| ContactEvent {
-            start: row.start_s,
-            end: row.end_s,
-            joints: Vec::new(),
-            force: [row.force_x_n, row.force_y_n, row.force_z_n],
-            sigma: [row.sigma_x_n, row.sigma_y_n, row.sigma_z_n],
-            gain: 0.0,
-        };
-        self.0.iter().map(event).collect()
-    }
+fn events(contacts: &Contacts) -> Vec<ContactEvent> {
+    let event = |row: &crate::table::ContactRow| ContactEvent {
+        start: row.start_s,
+        end: row.end_s,
+        joints: Vec::new(),
+        force: [row.force_x_n, row.force_y_n, row.force_z_n],
+        sigma: [row.sigma_x_n, row.sigma_y_n, row.sigma_z_n],
+        gain: 0.0,
+    };
+    contacts.0.iter().map(event).collect()
 }

@@ -1,13 +1,13 @@
 //! What identifications and diagnoses say of rows in which a socket, plane or sphere holds the target: how well they close, which rows stand
 //! out, and what such data say of the scale of the arm.
 
+use crate::Context;
 use crate::effect::names;
 use crate::error::{counted, first_of};
 use crate::estimate::{Model, ParameterStatus, Session, reseated, scale};
 use crate::observation::contacts;
-use crate::robot::Shape;
-use crate::stage::Context;
 use crate::table::Recording;
+use calib_numerics::robot::Shape;
 use nalgebra::Vector3;
 
 /// A row farther off than so many standard deviations is named.
@@ -214,7 +214,7 @@ fn places(model: &Model) -> Vec<(String, Vector3<f64>)> {
     let first = first.unwrap_or_default();
     let anchors = setup.anchors.iter().enumerate();
     let all = anchors.filter(|(_, anchor)| anchor.shape == Shape::Point);
-    let place = |(number, anchor): (usize, &crate::robot::Anchor)| {
+    let place = |(number, anchor): (usize, &calib_numerics::robot::Anchor)| {
         let at = first + setup.first_of_anchor(number);
         let shift = model.x.get(at..at + 3);
         let shift = shift.map_or_else(Vector3::zeros, Vector3::from_column_slice);

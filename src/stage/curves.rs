@@ -5,9 +5,9 @@
 use crate::effect::{Effect, Form, Place, PointMotion, Variable};
 use crate::error::{Error, Result};
 use crate::estimate::Model;
-use crate::robot::{Measurements, RobotModel};
 use crate::table::{CurveRow, Curves, FindingRow, Findings, Parameters, Prediction, Recording};
 use crate::units::Unit;
+use calib_numerics::robot::{Measurements, RobotModel};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::collections::BTreeMap;
 

@@ -1,23 +1,23 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
-use crate::diagnose::{
-    Diagnosis, KnownCell, Question, VerdictKind, against_simulation, diagnose, wrong_setup,
-};
+use crate::declared_effects::declared_effects;
+use crate::doubtful::{self, KnownModel};
 use crate::effect::{CAUSES, DeclaredCause, names};
 use crate::error::{Error, Place, Result, instead};
 use crate::estimate::{Session, gauge};
 use crate::observation::values;
-use crate::robot::{Measurements, RobotModel};
-use crate::stage::declared_effects::declared_effects;
-use crate::stage::doubtful::{self, KnownModel};
-use crate::stage::remarks::{
+use crate::remarks::{
     WeightlessLinks, blank_payload, misplaced_tool, must_move, rounded_logs, weightless_links,
 };
-use crate::stage::{Context, RawFile, Stage, contact};
 use crate::table::{
     Cells, Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction,
     Recording, Rivals, Robot, Shares, Spectrum, Split, Suspects, Verdict, VerdictSentences,
 };
+use crate::{Context, RawFile, Stage, contact};
+use calib_diagnose::{
+    Diagnosis, KnownCell, Question, VerdictKind, against_simulation, diagnose, wrong_setup,
+};
+use calib_numerics::robot::{Measurements, RobotModel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -27,26 +27,26 @@ use std::collections::BTreeMap;
 #[serde(deny_unknown_fields)]
 pub struct Diagnose {
     /// Sets of the split to fit; all others are predicted in the end and choose nothing.
-    #[serde(default = "crate::stage::fit_set")]
-    pub(crate) on: Vec<String>,
+    #[serde(default = "crate::fit_set")]
+    pub on: Vec<String>,
     /// By what ln of the odds of rare causes against common ones is multiplied: 0.5 or 2 shows how much a diagnosis rests on them.
     #[serde(default = "as_believed")]
-    pub(crate) prior_weight: f64,
+    pub prior_weight: f64,
     /// Prior probability that what acts somewhere is no cause of the list: 0.1 for an arm like many, 0.5 where little is known of it. Its odds
     /// scale those of causes without a name, products of two variables apart.
     #[serde(default = "open_world")]
-    pub(crate) open_world: f64,
+    pub open_world: f64,
     /// Causes that are never named: what an arm cannot have, or what a test of the library leaves out. What looks like one all the same is
     /// `unknown` at its place; of geometry and ratios the numbers of the robot file stay.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(crate) without: Vec<String>,
+    pub without: Vec<String>,
     /// What other robots of the model say of causes: cells of the table `fleet_findings` with the share of robots that have each and their
     /// sizes. `prior: {fleet: F, stage: diagnose, by: causes}` of a fleet's file fills it in.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(crate) prior: Vec<CellPrior>,
+    pub prior: Vec<CellPrior>,
     /// Files with effects of your own, which are compared with those of the library.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(crate) effects: Vec<RawFile>,
+    pub effects: Vec<RawFile>,
 }
 
 /// What other robots of the model say of a cause.
@@ -54,14 +54,14 @@ pub struct Diagnose {
 #[serde(deny_unknown_fields)]
 pub struct CellPrior {
     /// Key of the cell, e.g. `backlash@joint 3`.
-    pub(crate) cell: String,
+    pub cell: String,
     /// Share of the robots that have it, 0 to 1.
-    pub(crate) share: f64,
+    pub share: f64,
     /// Usual rms motion at the tool, mm.
-    pub(crate) size_mm: f64,
+    pub size_mm: f64,
     /// Its standard deviation from robot to robot, mm.
     #[serde(default)]
-    pub(crate) spread_mm: f64,
+    pub spread_mm: f64,
 }
 
 impl CellPrior {
@@ -94,7 +94,7 @@ const HEAVIEST: f64 = 10.0;
 const MOST_CLOSED: f64 = 0.001;
 const MOST_OPEN: f64 = 0.999;
 
-crate::stage::stage! {
+crate::stage! {
     Diagnose, "diagnose", 52, "locates where simulation and recording differ, and names the physics that the model leaves out",
         DiagnoseReads {
             robot: Robot,
@@ -119,7 +119,7 @@ crate::stage::stage! {
 
 impl Stage for Diagnose {
     fn faults(&self, at: &mut Place) {
-        crate::stage::must_name_sets(&self.on, "fit", at);
+        crate::must_name_sets(&self.on, "fit", at);
         at.at("prior_weight").must(
             (0.0..=HEAVIEST).contains(&self.prior_weight),
             format!("expected a number from 0 to {HEAVIEST}"),
@@ -170,7 +170,7 @@ impl Stage for Diagnose {
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
-        crate::stage::on(&self.on)
+        crate::on(&self.on)
     }
 
     fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<DiagnoseWrites> {
@@ -296,9 +296,9 @@ const SORTED_OTHERWISE: &str = "rows stand in another order than their times (so
 pub(super) struct AskedRows {
     declared: Vec<&'static DeclaredCause>,
     known: Vec<KnownCell>,
-    pub(crate) data: Measurements,
-    pub(crate) corrected: Corrected,
-    pub(crate) fit: Vec<usize>,
+    pub data: Measurements,
+    pub corrected: Corrected,
+    pub fit: Vec<usize>,
     validate: Vec<usize>,
     robot: RobotModel,
     set: Vec<usize>,
@@ -342,7 +342,7 @@ impl AskedRows {
     }
 
     /// What is asked of them.
-    pub(crate) fn question<'a>(&'a self, settings: &'a Diagnose, seed: u64) -> Question<'a> {
+    pub fn question<'a>(&'a self, settings: &'a Diagnose, seed: u64) -> Question<'a> {
         Question {
             robot: &self.robot,
             data: &self.data,

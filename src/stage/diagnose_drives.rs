@@ -3,7 +3,7 @@
 mod reading;
 mod recorded;
 
-pub(crate) use reading::short;
+pub use reading::short;
 
 use crate::drives::chain::{Bodies, Chain};
 use crate::drives::mjcf::{self, MjcfArm, MjcfText};
@@ -12,11 +12,11 @@ use crate::drives::{CAUSES, Drives, diagnose};
 use crate::dynamics::InertialTolerance;
 use crate::engine::Options;
 use crate::error::{Error, Fault, Place, Result, did_you_mean, listed};
-use crate::stage::{Context, RawFile, Stage};
 use crate::table::{
     DriveCourse, DriveSimulation, DriveVerdict, FindingNumbers, Findings, JointDrives, Rivals,
     VerdictSentences,
 };
+use crate::{Context, RawFile, Stage};
 use recorded::Source;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -32,31 +32,31 @@ const MOST_A_JOINT: usize = 3;
 #[serde(deny_unknown_fields)]
 pub struct DiagnoseDrives {
     /// The robot as it is simulated, an MJCF.
-    pub(crate) robot: RawFile,
+    pub robot: RawFile,
     /// Files that the MJCF includes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(crate) includes: Vec<RawFile>,
+    pub includes: Vec<RawFile>,
     /// Gains, limits, encoders and the rate of the commands, JSON: `command_rate_hz`, `joints: [{joint, kp, kd, kd_on, torque_limit_nm,
     /// encoder_rad, noise_rad}]`, `inertia_tolerance: {mass_rel, com_mm, inertia_rel}`.
-    pub(crate) drives: RawFile,
+    pub drives: RawFile,
     /// Commands and measured angles over time, a table of any kind (CSV, Parquet with lists, npz, workbook); or a list of such recordings, which are fitted together. A pattern stands for all files
     /// that match.
-    pub(crate) recording: DriveRecordings,
+    pub recording: DriveRecordings,
     /// The commands of one recording, where they are in a file of their own on the same clock: each holds until the next.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) commands: Option<RawFile>,
+    pub commands: Option<RawFile>,
     /// Columns of the recording.
     #[serde(default)]
-    pub(crate) columns: DriveColumns,
+    pub columns: DriveColumns,
     /// Labels of `usage` to fit; all other rows judge.
-    #[serde(default = "crate::stage::fit_set")]
-    pub(crate) on: Vec<String>,
+    #[serde(default = "crate::fit_set")]
+    pub on: Vec<String>,
     /// Rows that judge of those that would be fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) hold_out: Option<DriveHoldOut>,
+    pub hold_out: Option<DriveHoldOut>,
     /// Causes that are not tried and never named.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(crate) without: Vec<String>,
+    pub without: Vec<String>,
 }
 
 /// One recording or several.
@@ -115,19 +115,19 @@ pub enum DriveHoldOut {
 #[serde(deny_unknown_fields, default)]
 pub struct DriveColumns {
     /// Time.
-    pub(crate) time: String,
+    pub time: String,
     /// Its unit.
-    pub(crate) time_unit: ClockUnit,
+    pub time_unit: ClockUnit,
     /// What tells trajectories apart; without such a column all is one.
-    pub(crate) trajectory: String,
+    pub trajectory: String,
     /// What rows are for; without such a column it is the file's `usage`, or all are fitted.
-    pub(crate) usage: String,
+    pub usage: String,
     /// Commanded angles.
-    pub(crate) command: String,
+    pub command: String,
     /// Measured angles.
-    pub(crate) angle: String,
+    pub angle: String,
     /// Unit of both.
-    pub(crate) unit: AngleUnit,
+    pub unit: AngleUnit,
 }
 
 impl Default for DriveColumns {
@@ -183,7 +183,7 @@ impl ClockUnit {
     }
 }
 
-crate::stage::stage! {
+crate::stage! {
     DiagnoseDrives, "diagnose_drives", 6, "names the physics that the simulation of commanded joints lacks, from commands and angles",
         DiagnoseDrivesReads {} -> DiagnoseDrivesWrites {
             verdict: DriveVerdict,
@@ -238,7 +238,7 @@ struct ToleranceFile {
 
 impl Stage for DiagnoseDrives {
     fn faults(&self, at: &mut Place) {
-        crate::stage::must_name_sets(&self.on, "fit", at);
+        crate::must_name_sets(&self.on, "fit", at);
         let names: Vec<&str> = CAUSES.iter().map(|cause| cause.name).collect();
         for (k, name) in self.without.iter().enumerate() {
             let known = names.contains(&name.as_str());

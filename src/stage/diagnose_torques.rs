@@ -1,14 +1,14 @@
 //! `diagnose_torques`: which physics the rigid inverse dynamics of the robot file lacks while the arm moves.
 
+use crate::dynamic_arm::{HeldOut, RecordedTorques, dynamic_arm, must_be_bodies};
 use crate::dynamics::{DynamicArm, TorqueQuestion, diagnose};
 use crate::error::{Error, Place, Result, counted};
-use crate::stage::dynamic_arm::{HeldOut, RecordedTorques, dynamic_arm, must_be_bodies};
-use crate::stage::{Chunks, Context, Stage};
 use crate::table::{
     ArmMotion, BodyConsistencies, Contacts, FrictionCurves, Inertials, JointTorques, Robot,
     TorqueCourse, TorqueCovariance, TorqueFindings, TorqueNumbers, TorqueParameters, TorqueRivals,
     TorqueVerdict, VerdictSentences,
 };
+use crate::{Chunks, Context, Stage};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -18,25 +18,25 @@ use std::collections::BTreeSet;
 #[serde(deny_unknown_fields)]
 pub struct DiagnoseTorques {
     /// Labels of the recording's `usage` to fit; all other rows judge.
-    #[serde(default = "crate::stage::fit_set")]
-    pub(crate) on: Vec<String>,
+    #[serde(default = "crate::fit_set")]
+    pub on: Vec<String>,
     /// Rows that are held out instead of those that `usage` labels otherwise; by default the last 30 %.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) hold_out: Option<HoldOut>,
+    pub hold_out: Option<HoldOut>,
     /// Whether masses are free within their tolerance, or identified without regard to what is declared.
     #[serde(default)]
-    pub(crate) inertials: InertialSetting,
+    pub inertials: InertialSetting,
     /// Whether it is reported that no body has a link's inertial numbers, or the nearest of bodies are taken (in the metric of their
     /// covariance), which needs declared masses.
     #[serde(default)]
-    pub(crate) consistency: ConsistencySetting,
+    pub consistency: ConsistencySetting,
     /// Hz, of the low-pass that measured and simulated torque have in common; by default from 10 Hz to a tenth of the rate, by how fast the
     /// joints come and go.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) cutoff_hz: Option<f64>,
+    pub cutoff_hz: Option<f64>,
     /// Names that are not given: what such a cause explains is `unknown` at its place.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(crate) without: Vec<String>,
+    pub without: Vec<String>,
 }
 
 /// Which rows are held out.
@@ -76,7 +76,7 @@ pub enum ConsistencySetting {
 /// Share of the rows that is held out where nothing is said.
 const LAST: f64 = 0.3;
 
-crate::stage::stage! {
+crate::stage! {
     DiagnoseTorques, "diagnose_torques", 22, "names the physics that the simulated torques of a moving arm lack",
         DiagnoseTorquesReads {
             robot: Robot,
@@ -100,7 +100,7 @@ crate::stage::stage! {
 
 impl Stage for DiagnoseTorques {
     fn faults(&self, at: &mut Place) {
-        crate::stage::must_name_sets(&self.on, "fit", at);
+        crate::must_name_sets(&self.on, "fit", at);
         match &self.hold_out {
             Some(HoldOut::Last(share)) => at
                 .at("hold_out.last")

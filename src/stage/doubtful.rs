@@ -1,29 +1,29 @@
 //! Where a model is not to be believed without a word: uncertain corrections, residuals below the noise; and what to measure so that data show
 //! more.
 
+use crate::Context;
 use crate::compensate::{IdentifiedArm, Scatter, Uncertainty, doubts};
 use crate::error::{counted, first_of};
 use crate::estimate::{
     Covariance, Fitted, Model, Remedy, Screening, Session, Suspect, SuspectKind, fit_screened,
     remedies,
 };
-use crate::robot::Measurements;
-use crate::stage::Context;
 use crate::table::{Prediction, PredictionRow, Recording, Split, slip};
+use calib_numerics::robot::Measurements;
 use std::collections::BTreeMap;
 
 /// A model, and where it was measured.
-pub(crate) struct KnownModel<'a> {
-    pub(crate) model: &'a Model,
+pub struct KnownModel<'a> {
+    pub model: &'a Model,
     /// Covariance of all of its parameters; none where that is not known.
-    pub(crate) covariance: Option<&'a Covariance>,
+    pub covariance: Option<&'a Covariance>,
     /// The recording that it was identified by.
-    pub(crate) measured: &'a Measurements,
+    pub measured: &'a Measurements,
 }
 
 impl KnownModel<'_> {
     /// A remark for each row of `data` among `rows` of which the correction is doubtful, none for all others.
-    pub(crate) fn remarks(&self, data: &Measurements, rows: &[usize]) -> Vec<Option<String>> {
+    pub fn remarks(&self, data: &Measurements, rows: &[usize]) -> Vec<Option<String>> {
         let mut out = vec![None; data.rows()];
         let Some(covariance) = self.covariance else {
             return out;
@@ -39,7 +39,7 @@ impl KnownModel<'_> {
 }
 
 /// How many held-out points have a remark, of how many, in a sentence; none where none has.
-pub(crate) fn sentence(prediction: &Prediction) -> Option<String> {
+pub fn sentence(prediction: &Prediction) -> Option<String> {
     let held_out = || prediction.0.iter().filter(|row| row.held_out);
     let remarked: Vec<&PredictionRow> = held_out().filter(|row| row.remark.is_some()).collect();
     (!remarked.is_empty()).then(|| {
@@ -56,7 +56,7 @@ pub(crate) fn sentence(prediction: &Prediction) -> Option<String> {
 const NAMED: usize = 3;
 
 /// The first of some points, each once, with the remark of the first one.
-pub(crate) fn named(rows: &[&PredictionRow]) -> String {
+pub fn named(rows: &[&PredictionRow]) -> String {
     let mut names: Vec<&str> = Vec::new();
     for row in rows {
         if !names.contains(&row.point_id.as_str()) {
@@ -78,7 +78,7 @@ const FAR_BELOW: f64 = 5.0;
 const FEWEST_VALUES: f64 = 10.0;
 
 /// What to tell the person where whole points miss the model by far less than their noise, both mm; `parameters` were fitted to them.
-pub(crate) fn suspicion(
+pub fn suspicion(
     points: impl Iterator<Item = [f64; 2]>,
     parameters: usize,
 ) -> Option<String> {
@@ -117,7 +117,7 @@ fn plain(mm: f64) -> String {
 }
 
 /// Sentences for the remarks of parameters that the data do not determine, by name; the measurements that would determine most are noted.
-pub(crate) fn advice(context: &Context, session: &Session) -> BTreeMap<String, String> {
+pub fn advice(context: &Context, session: &Session) -> BTreeMap<String, String> {
     let model = session.model;
     let found = remedies(session);
     let last = model.robot.joints();
@@ -164,13 +164,13 @@ fn measure(remedy: &Remedy, last: usize) -> Option<String> {
 
 /// A model fitted to rows of a recording.
 pub struct FittedRows {
-    pub(crate) model: Model,
-    pub(crate) fitted: Fitted,
-    pub(crate) screening: Screening,
+    pub model: Model,
+    pub fitted: Fitted,
+    pub screening: Screening,
 }
 
 impl FittedRows {
-    pub(crate) fn session<'a>(&'a self, data: &'a Measurements) -> Session<'a> {
+    pub fn session<'a>(&'a self, data: &'a Measurements) -> Session<'a> {
         Session {
             data,
             rows: &self.screening.kept,
@@ -181,7 +181,7 @@ impl FittedRows {
 }
 
 /// Fits, and with a split whose sets are `screened` sets aside what does not belong.
-pub(crate) fn fit_rows(
+pub fn fit_rows(
     start: &Model,
     data: &Measurements,
     rows: &[usize],
@@ -198,7 +198,7 @@ pub(crate) fn fit_rows(
 }
 
 /// The number of the set that each row belongs to.
-pub(crate) fn numbered(split: &Split) -> Vec<usize> {
+pub fn numbered(split: &Split) -> Vec<usize> {
     let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
     let rows = split.0.iter().map(|row| {
         let next = numbers.len();
@@ -211,7 +211,7 @@ pub(crate) fn numbered(split: &Split) -> Vec<usize> {
 const CASES_NAMED: usize = 4;
 
 /// Notes for the person: who was set aside and why, and what looks like mistakes and was kept.
-pub(crate) fn note_screened(context: &Context, screening: &Screening, recording: &Recording) {
+pub fn note_screened(context: &Context, screening: &Screening, recording: &Recording) {
     if let Some(offset) = screening.apart {
         context.warn(format!(
             "most points belong to the joints {offset:+} rows away: the two logs are misaligned: join them again before anything else"

@@ -1,11 +1,11 @@
 //! The arm whose torques are simulated, from the robot table, and a recorded motion with its torques at the joints.
 
+use crate::Chunks;
 use crate::description::{InertiaMoments, JointDescription, JointKind, RobotDescription};
 use crate::dynamics::{DynamicArm, Inertial, InertialTolerance, TorqueRecording, TorqueSource};
 use crate::error::{Error, Result};
-use crate::robot::import::impossible_inertia;
-use crate::stage::Chunks;
 use crate::table::ArmMotion;
+use calib_numerics::robot::import::impossible_inertia;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// How far masses may be off where the robot file does not say it: those of CAD models and of data sheets.
@@ -20,7 +20,7 @@ fn slides(joint: &JointDescription) -> bool {
 }
 
 /// Fails with a joint that slides, where `what` is of joints that turn alone.
-pub(crate) fn must_turn(robot: &RobotDescription, what: &str) -> Result<()> {
+pub fn must_turn(robot: &RobotDescription, what: &str) -> Result<()> {
     match robot.joints.iter().position(slides) {
         None => Ok(()),
         Some(joint) => {
@@ -32,7 +32,7 @@ pub(crate) fn must_turn(robot: &RobotDescription, what: &str) -> Result<()> {
 }
 
 /// The arm, and what a person should know of what the robot file leaves open.
-pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<String>)> {
+pub fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<String>)> {
     let mut notes = Vec::new();
     let declared = |(index, joint): (usize, &JointDescription)| {
         let moments = robot.inertias.links.get(index).copied().flatten();
@@ -98,7 +98,7 @@ pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<S
 }
 
 /// Fails where no body has the declared moments of inertia of a link: the torques of such an arm are no arm's.
-pub(crate) fn must_be_bodies(robot: &RobotDescription) -> Result<()> {
+pub fn must_be_bodies(robot: &RobotDescription) -> Result<()> {
     let links = (1..)
         .zip(&robot.inertias.links)
         .map(|(link, moments): (usize, _)| (format!("link {link}"), moments));
@@ -123,7 +123,7 @@ fn inertial(mass: f64, centre: [f64; 3], [xx, xy, xz, yy, yz, zz]: &InertiaMomen
 }
 
 /// Nm at the joint (N of one that slides) per ampere of its motor, joint by joint. Fails with the joints whose numbers are missing.
-pub(crate) fn torque_per_ampere(robot: &RobotDescription) -> Result<Vec<f64>> {
+pub fn torque_per_ampere(robot: &RobotDescription) -> Result<Vec<f64>> {
     let factor = |joint: &JointDescription| Some(joint.reduction_ratio? * joint.motor_constant?);
     let all: Vec<Option<f64>> = robot.joints.iter().map(factor).collect();
     let missing = (1..=all.len()).filter(|joint| all[joint - 1].is_none());
@@ -178,7 +178,7 @@ impl<'a> RecordedTorques<'a> {
     }
 
     /// The same with rows that judge in the end.
-    pub(crate) fn holding_out(self, held_out: Box<HeldOut<'a>>) -> Self {
+    pub fn holding_out(self, held_out: Box<HeldOut<'a>>) -> Self {
         Self {
             held_out: Some(held_out),
             ..self
@@ -186,7 +186,7 @@ impl<'a> RecordedTorques<'a> {
     }
 
     /// Whether torques are motor currents times a constant.
-    pub(crate) fn is_current(&self) -> bool {
+    pub fn is_current(&self) -> bool {
         self.factor.is_some()
     }
 

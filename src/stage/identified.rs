@@ -1,17 +1,17 @@
 //! What identifications share: the choice of load, and what they hand back (model, course, visibility, residuals).
 
+use crate::Context;
+use crate::doubtful::{self, FittedRows, KnownModel, advice, suspicion};
 use crate::effect::Load;
 use crate::error::{Result, counted, listed};
 use crate::estimate::{CONFLICT, Covariance, ParameterStatus, Session, beyond_tolerance};
 use crate::observation::noise;
-use crate::robot::{Measurements, NoiseBasis, RobotModel};
-use crate::stage::Context;
-use crate::stage::doubtful::{self, FittedRows, KnownModel, advice, suspicion};
-use crate::stage::settings::{FoldSetting, note_repeats};
+use crate::settings::{FoldSetting, note_repeats};
 use crate::table::{
     CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split,
     Suspects,
 };
+use calib_numerics::robot::{Measurements, NoiseBasis, RobotModel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -53,30 +53,30 @@ macro_rules! identification {
             /// What is known of parameters beforehand, by name: `{link_geometry.*: {sigma: 0.1}}`, in the unit of the table
             /// `parameters`; of several patterns that match the longest counts.
             #[serde(default)]
-            pub prior: std::collections::BTreeMap<String, crate::stage::settings::PriorSetting>,
+            pub prior: std::collections::BTreeMap<String, crate::settings::PriorSetting>,
             /// Between which values parameters may change from nominal, by name: `{reduction_ratio.*: [-5e-4, 5e-4]}`, in the unit of
             /// the table `parameters`.
             #[serde(default)]
             pub bounds: std::collections::BTreeMap<String, [f64; 2]>,
             /// What winds the joints up: gravity torque of the robot's masses, or motor currents.
             #[serde(default)]
-            pub load: crate::stage::identified::LoadSetting,
+            pub load: crate::identified::LoadSetting,
             /// Whether rows that no smooth model can follow (exchanged, slipped, lost, shifted, gross) are set aside and listed.
-            #[serde(default = "crate::stage::yes")]
+            #[serde(default = "crate::yes")]
             pub screen: bool,
             /// How well joints come back to a pose: `measured` from poses that the recording returns to, `ignored`, or
             /// `{arcsec: 3}`.
             #[serde(default)]
-            pub repeatability: crate::stage::settings::Repeatability,
+            pub repeatability: crate::settings::Repeatability,
             /// Cross-validation: the fit is repeated without each of so many parts of its poses, drawn at random, and again without
             /// each contiguous stretch; 0 for none, `n` without each pose in turn.
             #[serde(default)]
-            pub folds: crate::stage::settings::FoldSetting,
+            pub folds: crate::settings::FoldSetting,
         }
 
         impl $name {
-            fn parameter_set(&self) -> crate::stage::settings::ParameterSet<'_> {
-                crate::stage::settings::ParameterSet {
+            fn parameter_set(&self) -> crate::settings::ParameterSet<'_> {
+                crate::settings::ParameterSet {
                     free: self.free.as_deref(),
                     hold: &self.hold,
                     prior: &self.prior,
@@ -89,19 +89,19 @@ macro_rules! identification {
                 &self,
                 model: &crate::estimate::Model,
                 candidates: &[usize],
-                asked: &mut crate::stage::identified::RowsToFit,
-                context: &crate::stage::Context,
-            ) -> crate::stage::doubtful::FittedRows {
-                let crate::stage::identified::RowsToFit { data, rows, .. } = asked;
+                asked: &mut crate::identified::RowsToFit,
+                context: &crate::Context,
+            ) -> crate::doubtful::FittedRows {
+                let crate::identified::RowsToFit { data, rows, .. } = asked;
                 asked.repeatability = self.repeatability.apply(model, data, rows, context);
                 let screened = self.screen.then_some(asked.split);
-                crate::stage::doubtful::fit_rows(model, data, rows, candidates, screened)
+                crate::doubtful::fit_rows(model, data, rows, candidates, screened)
             }
 
             /// Faults of the settings that all identifications share; `example` names a set.
             fn shared_faults(&self, example: &str, at: &mut crate::error::Place) {
                 self.parameter_set().faults(at);
-                crate::stage::must_name_sets(&self.on, example, at);
+                crate::must_name_sets(&self.on, example, at);
                 self.folds.faults(at);
                 self.repeatability.faults(at);
             }
@@ -124,12 +124,12 @@ crate::table::writes! {
 
 /// Rows of a recording that are to be fitted.
 pub struct RowsToFit<'a> {
-    pub(crate) recording: &'a Recording,
-    pub(crate) split: &'a Split,
-    pub(crate) data: Measurements,
-    pub(crate) rows: Vec<usize>,
+    pub recording: &'a Recording,
+    pub split: &'a Split,
+    pub data: Measurements,
+    pub rows: Vec<usize>,
     /// One standard deviation of every revolute joint that rows are weighted by, rad.
-    pub(crate) repeatability: Option<f64>,
+    pub repeatability: Option<f64>,
 }
 
 impl<'a> RowsToFit<'a> {
@@ -147,24 +147,24 @@ impl<'a> RowsToFit<'a> {
 
 /// A finished fit, and what a step says of it.
 pub struct Fitting<'a> {
-    pub(crate) asked: &'a RowsToFit<'a>,
-    pub(crate) fit: &'a FittedRows,
+    pub asked: &'a RowsToFit<'a>,
+    pub fit: &'a FittedRows,
     /// Parameters that the user holds.
-    pub(crate) held: &'a [usize],
-    pub(crate) folds: FoldSetting,
-    pub(crate) earlier: Option<&'a Parameters>,
+    pub held: &'a [usize],
+    pub folds: FoldSetting,
+    pub earlier: Option<&'a Parameters>,
     /// Covariance of the earlier parameters.
-    pub(crate) earlier_covariance: Option<&'a CovarianceTable>,
+    pub earlier_covariance: Option<&'a CovarianceTable>,
     /// Rows that an earlier step was fitted to.
-    pub(crate) seen_before: Vec<bool>,
+    pub seen_before: Vec<bool>,
     /// Geometric rank: found and expected.
-    pub(crate) geometry: Option<(usize, usize)>,
+    pub geometry: Option<(usize, usize)>,
     /// What the model as a whole was identified by.
-    pub(crate) measured: &'a Measurements,
+    pub measured: &'a Measurements,
     /// Rows at which the model may say that it does not hold; the arm was fitted to none of them.
-    pub(crate) doubtful: Vec<usize>,
+    pub doubtful: Vec<usize>,
     /// Rows of places that none of them was fitted to, with what their errors are to be multiplied by: each has a part in its place.
-    pub(crate) placed: BTreeMap<usize, f64>,
+    pub placed: BTreeMap<usize, f64>,
 }
 
 impl<'a> Fitting<'a> {
@@ -194,7 +194,7 @@ impl<'a> Fitting<'a> {
     }
 
     /// The fitted rows with their model.
-    pub(crate) fn session(&self) -> Session<'_> {
+    pub fn session(&self) -> Session<'_> {
         self.fit.session(&self.asked.data)
     }
 }

@@ -4,30 +4,30 @@
 //!
 //! Joint stiffness on top of an identified geometry, which is kept: the second step of the paper's sequence (Sec. 4, Eqs. 24-30).
 
-use crate::diagnose::{Question, wrong_setup};
+use crate::doubtful::numbered;
 use crate::effect::{Effect, EffectContext, EffectStack, arm_effect, identified, names};
 use crate::error::{Error, Place, Result, instead, listed};
 use crate::estimate::{
     Fitted, Model, ParameterStatus, Session, determined_directions, fit, gauge, known_places,
     placed_by_left_out,
 };
+use crate::identified::{Fitting, Identified, LoadSetting, RowsToFit};
+use crate::known_cell::{self, KnownCell, KnownDistance, KnownPoint, KnownSphere};
 use crate::observation;
-use crate::robot::{Measurements, RobotModel};
+use crate::remarks::{must_move, unmoved_remark, weightless_links};
 use crate::spatial::Pose;
-use crate::stage::doubtful::numbered;
-use crate::stage::identified::{Fitting, Identified, LoadSetting, RowsToFit};
-use crate::stage::known_cell::{self, KnownCell, KnownDistance, KnownPoint, KnownSphere};
-use crate::stage::remarks::{must_move, unmoved_remark, weightless_links};
-use crate::stage::{Context, Stage, contact};
 use crate::table::{CovarianceTable, Parameters, Prediction, Recording, Robot, Split};
+use crate::{Context, Stage, contact};
+use calib_diagnose::{Question, wrong_setup};
+use calib_numerics::robot::{Measurements, RobotModel};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
-crate::stage::identified::identification! {
+crate::identified::identification! {
     /// Settings of `identify`.
     pub struct Identify {
         /// Sets of the split to fit.
-        #[serde(default = "crate::stage::fit_set")]
+        #[serde(default = "crate::fit_set")]
         pub on: Vec<String>,
         /// Effects to estimate, by canonical name; those that the recording cannot support are left out with a note.
         #[serde(default = "all_effects")]
@@ -53,7 +53,7 @@ fn all_effects() -> Vec<String> {
     identified().map(|cause| cause.name().to_string()).collect()
 }
 
-crate::stage::stage! {
+crate::stage! {
     Identify, "identify", 21, "identifies geometry, transmission and compliance from the nominal robot in one estimation",
         IdentifyReads {
             robot: Robot,
@@ -84,7 +84,7 @@ impl Stage for Identify {
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
-        crate::stage::on(&self.on)
+        crate::on(&self.on)
     }
 
     fn run(&self, reads: IdentifyReads, context: &Context) -> Result<Identified> {
@@ -342,18 +342,18 @@ fn evidence(fitted: &Fitted, data: &Measurements, rows: &[usize]) -> f64 {
         + fitted.singular.len() as f64 * values.ln()
 }
 
-crate::stage::identified::identification! {
+crate::identified::identification! {
     /// Settings of `stiffness`.
     pub struct Stiffness {
         /// Sets of the split to fit: loaded poses.
-        pub(crate) on: Vec<String>,
+        pub on: Vec<String>,
         /// Joints to estimate, from 1; all that the data see if empty.
         #[serde(default)]
-        pub(crate) joints: Vec<usize>,
+        pub joints: Vec<usize>,
     }
 }
 
-crate::stage::stage! {
+crate::stage! {
     Stiffness, "stiffness", 20, "identifies joint compliance from loaded poses; everything identified before is kept",
         StiffnessReads {
             robot: Robot,
@@ -371,7 +371,7 @@ impl Stage for Stiffness {
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
-        crate::stage::on(&self.on)
+        crate::on(&self.on)
     }
 
     fn run(&self, reads: StiffnessReads, context: &Context) -> Result<Identified> {

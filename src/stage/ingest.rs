@@ -34,7 +34,7 @@ pub use mapped::{
 };
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
-pub(crate) use reading::FileKind;
+pub use reading::FileKind;
 pub use reading::{TableLayout, records};
 pub use stretch::{clock_seconds, is_clock_time};
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
@@ -42,10 +42,10 @@ pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, Torque
 use pair::Measurement;
 
 use crate::error::{Error, Place, Result};
-use crate::robot::{CountedCoupling, JointConvention};
-use crate::stage::{Context, RawFile, Stage, StreamedTable};
 use crate::table::{Intake, JointConventions, Recording, Rejected, Robot};
 use crate::units::Unit;
+use crate::{Context, RawFile, Stage, StreamedTable};
+use calib_numerics::robot::{CountedCoupling, JointConvention};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -55,43 +55,43 @@ use std::path::Path;
 #[serde(deny_unknown_fields)]
 pub struct Ingest {
     /// The raw files; the first one leads: its order is that of the recording.
-    pub(crate) files: Vec<FileLayout>,
+    pub files: Vec<FileLayout>,
     /// Files of later measurements in the same layout, e.g. of another day: joined among themselves, then appended.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(crate) later: Vec<LaterFiles>,
+    pub later: Vec<LaterFiles>,
     /// How several files belong together.
     #[serde(default)]
-    pub(crate) join: Option<Join>,
+    pub join: Option<Join>,
     /// What becomes of rows whose point id occurs more than once in a file.
     #[serde(default)]
-    pub(crate) duplicates: Duplicates,
+    pub duplicates: Duplicates,
     /// What becomes of rows with a joint beyond the robot's limits.
     #[serde(default)]
-    pub(crate) limits: LimitPolicy,
+    pub limits: LimitPolicy,
     /// Axes of the points that were measured at all, e.g. `[z]` for a dial gauge on a plate; without it all three, unless
     /// orientations or distances are mapped. The others are not mapped; of those listed a cell may be blank where its column is
     /// `optional`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) axes: Option<Vec<Axis>>,
+    pub axes: Option<Vec<Axis>>,
     /// By what points were measured, for rows that record no standard deviation: a name, e.g. `leica_at960`, or figures, e.g.
     /// `{constant_um: 10, per_metre_um: 2.5, coverage: 2}`. With neither, noise is not known: points are
     /// weighted by an assumed one, and every figure that rests on it says so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) instrument: Option<InstrumentSetting>,
+    pub instrument: Option<InstrumentSetting>,
     /// The arm moves while it is measured: joint velocities follow from the joints over time where no columns give them. `motion: {}`
     /// takes the usual settings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) motion: Option<VelocitySettings>,
+    pub motion: Option<VelocitySettings>,
     /// A file of which more than this share of rows is rejected is an error.
     #[serde(default = "half")]
-    pub(crate) max_rejected_fraction: f64,
+    pub max_rejected_fraction: f64,
 }
 
 fn half() -> f64 {
     0.5
 }
 
-crate::stage::stage! {
+crate::stage! {
     Ingest, "ingest", 9, "reads raw files into a recording, and lists every rejected row with its reason",
         IngestReads {
             robot: Robot,

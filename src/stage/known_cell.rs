@@ -1,12 +1,12 @@
 //! What is known of a cell from elsewhere where sockets, planes and spheres hold the target: lengths, sizes, places.
 
+use crate::Context;
 use crate::effect::AnchorShift;
 use crate::error::{Error, Place, Result, listed};
 use crate::estimate::{KnownLength, Model, Prior, align_points};
 use crate::observation::only_contacts;
-use crate::robot::{Measurements, RobotModel, Shape};
 use crate::spatial::Pose;
-use crate::stage::Context;
+use calib_numerics::robot::{Measurements, RobotModel, Shape};
 use nalgebra::{Rotation3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,11 +18,11 @@ use std::collections::BTreeMap;
 pub struct KnownDistance {
     /// Their names in the recording, of spheres for their centres; a `*` stands in both for the same text, as of one
     /// print at several places, whose error is the same everywhere: `["*/0", "*/1"]`.
-    pub(crate) between: [String; 2],
+    pub between: [String; 2],
     /// The distance, mm.
-    pub(crate) mm: f64,
+    pub mm: f64,
     /// Its standard deviation, mm.
-    pub(crate) sigma: f64,
+    pub sigma: f64,
 }
 
 /// The known size of a sphere.
@@ -30,9 +30,9 @@ pub struct KnownDistance {
 #[serde(deny_unknown_fields)]
 pub struct KnownSphere {
     /// Its diameter together with that of the ball on the tool, mm.
-    pub(crate) diameter: f64,
+    pub diameter: f64,
     /// The standard deviation of that, mm.
-    pub(crate) sigma: f64,
+    pub sigma: f64,
 }
 
 /// The known place of a socket.
@@ -40,21 +40,21 @@ pub struct KnownSphere {
 #[serde(deny_unknown_fields)]
 pub struct KnownPoint {
     /// x, y, z in the frame of the cell, which is the tracker's where one was used, mm.
-    pub(crate) mm: [f64; 3],
+    pub mm: [f64; 3],
     /// The standard deviation of each, mm.
-    pub(crate) sigma: f64,
+    pub sigma: f64,
 }
 
 /// What is known of a cell from elsewhere.
 pub(super) struct KnownCell<'a> {
-    pub(crate) distances: &'a [KnownDistance],
-    pub(crate) spheres: &'a BTreeMap<String, KnownSphere>,
-    pub(crate) points: &'a BTreeMap<String, KnownPoint>,
+    pub distances: &'a [KnownDistance],
+    pub spheres: &'a BTreeMap<String, KnownSphere>,
+    pub points: &'a BTreeMap<String, KnownPoint>,
 }
 
 impl KnownCell<'_> {
     /// Faults of known distances, spheres and points.
-    pub(crate) fn faults(&self, at: &mut Place) {
+    pub fn faults(&self, at: &mut Place) {
         let is_size = |value: f64| value > 0.0 && value.is_finite();
         for (name, KnownPoint { mm, sigma }) in self.points {
             let possible = mm.iter().all(|value| value.is_finite()) && is_size(*sigma);

@@ -11,12 +11,12 @@ use crate::estimate::network::{
     Activation, JudgedRival, OUTPUTS, Phase, Recipe, Rival, TrainingSamples, TrainingStart,
     TrainingStep, compare,
 };
-use crate::stage::{Context, Stage};
 use crate::statistics::nearest;
 use crate::table::{
     Corrections, CorrectionsRow, Network, Prediction, PredictionRow, Recording, Split, Training,
     TrainingRow,
 };
+use crate::{Context, Stage};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -37,33 +37,33 @@ const FOLD_ITERATIONS: usize = 60;
 #[serde(deny_unknown_fields, default)]
 pub struct Learn {
     /// Sets of the split to train on.
-    pub(crate) on: Vec<String>,
+    pub on: Vec<String>,
     /// What is compared; "no correction" always is.
-    pub(crate) rivals: Vec<RivalSetting>,
+    pub rivals: Vec<RivalSetting>,
     /// Where the training of networks starts, each a rival.
-    pub(crate) starts: Vec<StartSetting>,
+    pub starts: Vec<StartSetting>,
     /// What networks and the Gaussian process see.
-    pub(crate) inputs: Inputs,
+    pub inputs: Inputs,
     /// Whether they also see the payload; the recording must have it in every row to train on.
-    pub(crate) payload: bool,
+    pub payload: bool,
     /// Neurons of the hidden layer.
-    pub(crate) hidden: usize,
+    pub hidden: usize,
     /// Activation of the hidden layer.
-    pub(crate) activation: Activation,
+    pub activation: Activation,
     /// Beetles of the swarm that finds where the gradient training starts.
-    pub(crate) beetles: usize,
+    pub beetles: usize,
     /// Generations of the swarm.
-    pub(crate) generations: usize,
+    pub generations: usize,
     /// Most iterations of the gradient training.
-    pub(crate) iterations: usize,
+    pub iterations: usize,
     /// Weight decay: half of it times the squared weights stands beside half the squared standardised errors of all rows. Chosen by
     /// cross-validation if not given.
-    pub(crate) decay: Option<f64>,
+    pub decay: Option<f64>,
     /// Share of the training rows that a network keeps back to stop in time, below 0.5. With the decay chosen by cross-validation the
     /// rows are worth more in training than kept back, hence 0.
-    pub(crate) keep_back: f64,
+    pub keep_back: f64,
     /// Folds of the cross-validation.
-    pub(crate) folds: usize,
+    pub folds: usize,
 }
 
 impl Default for Learn {
@@ -93,7 +93,7 @@ impl Default for Learn {
 /// A kind of correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum RivalSetting {
+pub enum RivalSetting {
     /// Harmonics of the joints, alone and two by two, along the tracker's axes.
     Ridge,
     /// A smooth function of the inputs with a length for each.
@@ -105,7 +105,7 @@ pub(crate) enum RivalSetting {
 /// Where the training of networks starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum StartSetting {
+pub enum StartSetting {
     /// Anywhere.
     Random,
     /// At what a beetle swarm found, as in the paper.
@@ -124,14 +124,14 @@ impl From<StartSetting> for TrainingStart {
 /// What the networks see of each joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Inputs {
+pub enum Inputs {
     /// Its position, as in the paper.
     Joints,
     /// Sine and cosine of its angle; the position of a prismatic joint.
     SinCos,
 }
 
-crate::stage::stage! {
+crate::stage! {
     Learn, "learn", 9, "learns the residual of the model: compares several corrections, and keeps the best only where it helps",
         LearnReads {
             recording: Recording,
@@ -147,7 +147,7 @@ crate::stage::stage! {
 
 impl Stage for Learn {
     fn faults(&self, at: &mut Place) {
-        crate::stage::must_name_sets(&self.on, "learn", at);
+        crate::must_name_sets(&self.on, "learn", at);
         at.at("hidden").whole(self.hidden, 1..=200);
         at.at("beetles").whole(self.beetles, 1..=1000);
         at.at("generations").whole(self.generations, 0..=10_000);
@@ -174,7 +174,7 @@ impl Stage for Learn {
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
-        crate::stage::on(&self.on)
+        crate::on(&self.on)
     }
 
     fn run(&self, reads: LearnReads, context: &Context) -> Result<LearnWrites> {
@@ -356,7 +356,7 @@ fn residual(row: &PredictionRow) -> [f64; OUTPUTS] {
 }
 
 /// What the comparison comes to, for the person who waits.
-pub(crate) fn sentence(comparison: &RivalComparison, learnt: bool) -> String {
+pub fn sentence(comparison: &RivalComparison, learnt: bool) -> String {
     let tell = |judged: &JudgedRival| {
         let name = judged.rival.map_or("none", Rival::name);
         format!("{name} {:.3} mm", judged.mean() * 1e3)
@@ -373,7 +373,7 @@ pub(crate) fn sentence(comparison: &RivalComparison, learnt: bool) -> String {
     )
 }
 
-pub(crate) fn comparison_table(
+pub fn comparison_table(
     step: &str,
     contest: &RivalContest,
     comparison: &RivalComparison,
@@ -433,7 +433,7 @@ pub(crate) fn comparison_table(
 }
 
 /// The course of a training as a table.
-pub(crate) fn history(step: &str, course: Vec<TrainingStep>) -> Training {
+pub fn history(step: &str, course: Vec<TrainingStep>) -> Training {
     let rows = course.into_iter().map(|record| TrainingRow {
         step: step.into(),
         phase: match record.phase {
@@ -451,7 +451,7 @@ pub(crate) fn history(step: &str, course: Vec<TrainingStep>) -> Training {
 }
 
 /// Every prediction with the correction; rows that were trained on are no longer held out.
-pub(crate) fn corrected(
+pub fn corrected(
     prediction: &Prediction,
     network: &Network,
     recording: &Recording,

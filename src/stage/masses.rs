@@ -1,11 +1,11 @@
 //! `masses`: the robot with the masses and the dry friction that its torques show, so that what depends on gravity, and on which side a
 //! joint comes to rest, rests on them from here on.
 
+use crate::dynamic_arm::dynamic_arm;
 use crate::dynamics::LinkFromTorques;
 use crate::error::Result;
-use crate::stage::dynamic_arm::dynamic_arm;
-use crate::stage::{Context, Stage};
 use crate::table::{Robot, TorqueParameters};
+use crate::{Context, Stage};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ const NOTIONAL: f64 = 10.0;
 #[serde(deny_unknown_fields, default)]
 pub struct Masses {}
 
-crate::stage::stage! {
+crate::stage! {
     Masses, "masses", 3, "gives the robot of later stages the masses, centres and dry friction that its torques show",
         MassesReads {
             robot: Robot,

@@ -6,9 +6,9 @@
 use crate::error::{Place, Result};
 use crate::estimate::swarm::{Algorithm, Budget, Landscape, SearchStop, SwarmResult};
 use crate::estimate::threads::in_order;
-use crate::stage::{Context, Stage};
 use crate::statistics::quantile;
 use crate::table::{SearchCourse, SearchCourseRow, Searches, SearchesRow};
+use crate::{Context, Stage};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Mutex;
@@ -20,17 +20,17 @@ pub struct Optimise {
     /// What is minimised.
     pub problems: Vec<BenchmarkProblem>,
     /// The optimisers to compare.
-    pub(crate) methods: Vec<Algorithm>,
+    pub methods: Vec<Algorithm>,
     /// Individuals of a swarm; half of a bee colony is employed.
-    pub(crate) population: usize,
+    pub population: usize,
     /// Evaluations that each search may spend.
     pub evaluations: u64,
     /// Searches of every method on every problem.
     pub seeds: usize,
     /// Searches of every method on every problem of which the whole course is kept.
-    pub(crate) courses: usize,
+    pub courses: usize,
     /// Published times to stand beside ours.
-    pub(crate) reference: Vec<PublishedTime>,
+    pub reference: Vec<PublishedTime>,
 }
 
 /// A function, and how near to its minimum counts as found.
@@ -48,14 +48,14 @@ pub struct BenchmarkProblem {
 /// A published time to the target.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct PublishedTime {
+pub struct PublishedTime {
     /// Where it stands, e.g. `Table 2`.
-    pub(crate) label: String,
-    pub(crate) function: Landscape,
-    pub(crate) dimensions: usize,
-    pub(crate) method: Algorithm,
+    pub label: String,
+    pub function: Landscape,
+    pub dimensions: usize,
+    pub method: Algorithm,
     /// s.
-    pub(crate) seconds: f64,
+    pub seconds: f64,
 }
 
 impl Default for Optimise {
@@ -76,7 +76,7 @@ impl Default for Optimise {
     }
 }
 
-crate::stage::stage! {
+crate::stage! {
     Optimise, "optimise", 1, "compares swarm optimisers on functions with known minima, over many seeds",
         OptimiseReads {} -> OptimiseWrites {
             searches: Searches,

@@ -5,9 +5,9 @@ use crate::description::JointDescription;
 use crate::effect::{STANDS, ToolOffset, figure};
 use crate::error::{Error, Result, counted, listed};
 use crate::estimate::{Fitted, Model, ParameterStatus};
-use crate::robot::{Measurements, RobotModel};
 use crate::table::Recording;
 use crate::units::Unit;
+use calib_numerics::robot::{Measurements, RobotModel};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -216,9 +216,9 @@ const UPRIGHT: f64 = 0.99;
 /// What is said where links without masses are under load.
 pub(super) struct WeightlessLinks {
     /// What is missing, for a verdict.
-    pub(crate) missing: String,
+    pub missing: String,
     /// The same with what it costs and what to do.
-    pub(crate) warning: String,
+    pub warning: String,
 }
 
 /// What is said of links without masses at some rows; none where all masses are known, or weight turns no joint.

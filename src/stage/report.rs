@@ -3,22 +3,22 @@
 use crate::effect::Load;
 use crate::error::{Error, Fault, Place, Result};
 use crate::estimate::align_points;
-use crate::report::{
-    Page, PageLanguage, PlacedArm, Report, ReportDrivesReads, ReportReads, ReportTorquesReads,
-    Tables, drive_page, pages, shown_row, torque_page, untranslated,
-};
-use crate::robot::RobotModel;
 use crate::spatial::{Pose, Twist};
-use crate::stage::{Context, Labelled, Stage, curves};
 use crate::table::{
     Acceptance, Curves, Document, DocumentRow, Frame, Prediction, Recording, Standing, Step, Table,
     Unseen, standing,
+};
+use crate::{Context, Labelled, Stage, curves};
+use calib_numerics::robot::RobotModel;
+use calib_report::{
+    Page, PageLanguage, PlacedArm, Report, ReportDrivesReads, ReportReads, ReportTorquesReads,
+    Tables, drive_page, pages, shown_row, torque_page, untranslated,
 };
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-crate::stage::stage! {
+crate::stage! {
     Report, "report", 31, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
         ReportReads -> ReportWrites {
             document: Document,
@@ -34,8 +34,8 @@ impl Stage for Report {
     }
 
     fn run(&self, mut reads: ReportReads, context: &Context) -> Result<ReportWrites> {
-        let curves = reads.curves()?;
-        let hashes = reads.hashes()?;
+        let curves = curves_of(&reads)?;
+        let hashes = hashes(&reads)?;
         // A diagnosis against an outside simulation speaks of that, not of this robot's model.
         let is_of_robot_file = reads.recording.simulated.is_none();
         let diagnosed = reads.findings.last().filter(|_| is_of_robot_file);
@@ -60,7 +60,7 @@ impl Stage for Report {
         let withdrawn = stands.iter().flat_map(|stands| stands.withdrawn.clone());
         let withdrawn = withdrawn.collect();
         context.warn_each(stands.iter().flat_map(Standing::warnings));
-        let counting = reads.counting()?;
+        let counting = counting(&reads)?;
         let mut standing = stands.map(|stands| [stands.step, stands.model]);
         let step = standing.as_ref().map(|[step, _]| step);
         if let Some(carried) = carried(step, &reads.prediction, &reads.recording) {
@@ -74,7 +74,7 @@ impl Stage for Report {
             reads.parameters = model;
         }
         let step = standing.as_ref().map(|[step, _]| step);
-        let arm = reads.placed_arm(step);
+        let arm = placed_arm(&reads, step);
         let tables = Tables {
             arm,
             counting,
@@ -132,121 +132,119 @@ fn carried(
     carried.map(|step| step.stage.clone())
 }
 
-impl ReportReads {
-    /// Curves of the last diagnosis' findings; none without a diagnosis.
-    fn curves(&self) -> Result<Curves> {
-        let found = self
-            .findings
-            .last()
-            .filter(|findings| !findings.0.is_empty());
-        let diagnosis = found.and_then(|findings| {
-            let (mut models, mut steps) = (self.models.iter(), self.prediction.iter());
-            let parameters = models.find(|model| model.stage == findings.stage)?;
-            let prediction = steps.find(|step| step.stage == findings.stage)?;
-            Some((findings, parameters, prediction))
-        });
-        let Some((findings, parameters, prediction)) = diagnosis else {
-            return Ok(Curves::default());
-        };
-        let (robot, recording) = (self.robot.to_description()?, &self.recording);
-        let model = parameters.model(RobotModel::new(robot), &[], Load::GravityTorque)?;
-        let data = recording.measurements();
-        curves::curves(findings, parameters, &model, recording, &data, prediction)
-    }
+/// Curves of the last diagnosis' findings; none without a diagnosis.
+fn curves_of(reads: &ReportReads) -> Result<Curves> {
+    let found = reads
+        .findings
+        .last()
+        .filter(|findings| !findings.0.is_empty());
+    let diagnosis = found.and_then(|findings| {
+        let (mut models, mut steps) = (reads.models.iter(), reads.prediction.iter());
+        let parameters = models.find(|model| model.stage == findings.stage)?;
+        let prediction = steps.find(|step| step.stage == findings.stage)?;
+        Some((findings, parameters, prediction))
+    });
+    let Some((findings, parameters, prediction)) = diagnosis else {
+        return Ok(Curves::default());
+    };
+    let (robot, recording) = (reads.robot.to_description()?, &reads.recording);
+    let model = parameters.model(RobotModel::new(robot), &[], Load::GravityTorque)?;
+    let data = recording.measurements();
+    curves::curves(findings, parameters, &model, recording, &data, prediction)
+}
 
-    /// The nominal arm where it stands in the instrument's frame, by the points themselves, in the pose of the largest error before anything.
-    fn placed_arm(&self, standing: Option<&String>) -> Option<PlacedArm> {
-        const FEWEST: usize = 4;
-        let named = |table: &&Labelled<Prediction>| {
-            table.0.first().map(|row| &row.step) == standing && table.is_of(&self.recording)
+/// The nominal arm where it stands in the instrument's frame, by the points themselves, in the pose of the largest error before anything.
+fn placed_arm(reads: &ReportReads, standing: Option<&String>) -> Option<PlacedArm> {
+    const FEWEST: usize = 4;
+    let named = |table: &&Labelled<Prediction>| {
+        table.0.first().map(|row| &row.step) == standing && table.is_of(&reads.recording)
+    };
+    let last = reads.prediction.iter().rfind(named);
+    let first = reads.prediction.first()?;
+    let last = last.or(reads.prediction.last())?;
+    let rows = last.0.len().min(first.0.len()).min(reads.recording.rows());
+    // A picture is no reason to fail: a table that is no whole robot has none.
+    let robot = reads.robot.to_description().map(RobotModel::new);
+    let robot = robot
+        .ok()
+        .filter(|robot| robot.joints() == reads.recording.joints)?;
+    let is_usable = |row: &usize| {
+        let predicted = &last.0[*row];
+        let place = [predicted.x_mm, predicted.y_mm, predicted.z_mm];
+        !predicted.suspect && place.iter().all(|mm| mm.is_finite())
+    };
+    let used: Vec<usize> = (0..rows).filter(is_usable).collect();
+    let row = shown_row(&first.0[..rows]).filter(|_| used.len() >= FEWEST)?;
+    let metres = |at: &usize| {
+        let row = &last.0[*at];
+        Vector3::new(row.x_mm, row.y_mm, row.z_mm) * 1e-3
+    };
+    let commanded = |at: &usize| robot.forward(reads.recording.q(*at)).translation;
+    let model: Vec<Vector3<f64>> = used.iter().map(commanded).collect();
+    let seen: Vec<Vector3<f64>> = used.iter().map(metres).collect();
+    let base = align_points(&model, &seen);
+    let mm = |point: &Vector3<f64>| [0, 1, 2].map(|axis| 1e3 * point[axis]);
+    let mut rows = [0.0; 12];
+    for (place, number) in rows.iter_mut().enumerate() {
+        let (row, column) = (place / 4, place % 4);
+        *number = match column {
+            3 => 1e3 * base.translation[row],
+            _ => base.rotation[(row, column)],
         };
-        let last = self.prediction.iter().rfind(named);
-        let first = self.prediction.first()?;
-        let last = last.or(self.prediction.last())?;
-        let rows = last.0.len().min(first.0.len()).min(self.recording.rows());
-        // A picture is no reason to fail: a table that is no whole robot has none.
-        let robot = self.robot.to_description().map(RobotModel::new);
-        let robot = robot
-            .ok()
-            .filter(|robot| robot.joints() == self.recording.joints)?;
-        let is_usable = |row: &usize| {
-            let predicted = &last.0[*row];
-            let place = [predicted.x_mm, predicted.y_mm, predicted.z_mm];
-            !predicted.suspect && place.iter().all(|mm| mm.is_finite())
-        };
-        let used: Vec<usize> = (0..rows).filter(is_usable).collect();
-        let row = shown_row(&first.0[..rows]).filter(|_| used.len() >= FEWEST)?;
-        let metres = |at: &usize| {
-            let row = &last.0[*at];
-            Vector3::new(row.x_mm, row.y_mm, row.z_mm) * 1e-3
-        };
-        let commanded = |at: &usize| robot.forward(self.recording.q(*at)).translation;
-        let model: Vec<Vector3<f64>> = used.iter().map(commanded).collect();
-        let seen: Vec<Vector3<f64>> = used.iter().map(metres).collect();
-        let base = align_points(&model, &seen);
-        let mm = |point: &Vector3<f64>| [0, 1, 2].map(|axis| 1e3 * point[axis]);
-        let mut rows = [0.0; 12];
-        for (place, number) in rows.iter_mut().enumerate() {
-            let (row, column) = (place / 4, place % 4);
-            *number = match column {
-                3 => 1e3 * base.translation[row],
-                _ => base.rotation[(row, column)],
-            };
-        }
-        let (mut body, mut chain) = (Pose::identity(), vec![[0.0; 3]]);
-        // Of each axis the point nearest to what it carries: a file may name any.
-        let tool = robot.home().translation;
-        let (mut points, mut carried) = (vec![tool; robot.joints()], tool);
-        for joint in (0..robot.joints()).rev() {
-            let (axis, point) = (robot.axis(joint), robot.point(joint));
-            carried = point + axis * axis.dot(&(carried - point));
-            points[joint] = carried;
-        }
-        let mut joints = Vec::new();
-        for (joint, travel) in self.recording.q(row).iter().enumerate() {
-            let (axis, point) = (robot.axis(joint), &points[joint]);
-            chain.push(mm(&body.point(point)));
-            let twist = match robot.is_revolute(joint) {
-                true => {
-                    let about = point.cross(axis);
-                    Twist::new(about.x, about.y, about.z, axis.x, axis.y, axis.z)
-                }
-                false => Twist::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0),
-            };
-            body = body * Pose::exp(&(twist * *travel));
-            joints.push(((*axis).into(), mm(point), !robot.is_revolute(joint)));
-        }
-        chain.push(mm(&body.point(&tool)));
-        Some(PlacedArm {
-            base: rows,
-            joints,
-            tool: mm(&tool),
-            chain,
-            row,
-        })
     }
+    let (mut body, mut chain) = (Pose::identity(), vec![[0.0; 3]]);
+    // Of each axis the point nearest to what it carries: a file may name any.
+    let tool = robot.home().translation;
+    let (mut points, mut carried) = (vec![tool; robot.joints()], tool);
+    for joint in (0..robot.joints()).rev() {
+        let (axis, point) = (robot.axis(joint), robot.point(joint));
+        carried = point + axis * axis.dot(&(carried - point));
+        points[joint] = carried;
+    }
+    let mut joints = Vec::new();
+    for (joint, travel) in reads.recording.q(row).iter().enumerate() {
+        let (axis, point) = (robot.axis(joint), &points[joint]);
+        chain.push(mm(&body.point(point)));
+        let twist = match robot.is_revolute(joint) {
+            true => {
+                let about = point.cross(axis);
+                Twist::new(about.x, about.y, about.z, axis.x, axis.y, axis.z)
+            }
+            false => Twist::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0),
+        };
+        body = body * Pose::exp(&(twist * *travel));
+        joints.push(((*axis).into(), mm(point), !robot.is_revolute(joint)));
+    }
+    chain.push(mm(&body.point(&tool)));
+    Some(PlacedArm {
+        base: rows,
+        joints,
+        tool: mm(&tool),
+        chain,
+        row,
+    })
+}
 
-    /// What the controller counts otherwise than the robot file, where it does.
-    fn counting(&self) -> Result<Option<String>> {
-        let Some(convention) = self.convention.last() else {
-            return Ok(None);
-        };
-        let robot = RobotModel::new(self.robot.to_description()?);
-        Ok(convention.to_convention()?.difference(&robot))
-    }
+/// What the controller counts otherwise than the robot file, where it does.
+fn counting(reads: &ReportReads) -> Result<Option<String>> {
+    let Some(convention) = reads.convention.last() else {
+        return Ok(None);
+    };
+    let robot = RobotModel::new(reads.robot.to_description()?);
+    Ok(convention.to_convention()?.difference(&robot))
+}
 
-    /// The identity of what the report rests on.
-    fn hashes(&self) -> Result<Vec<(String, String)>> {
-        let mut out = Vec::new();
-        let mut add = |name: String, frame: Frame| out.push((name, frame.table_hash().to_string()));
-        add("robot".into(), self.robot.to_frame()?);
-        add("recording".into(), self.recording.to_frame()?);
-        add("split".into(), self.split.to_frame()?);
-        for model in &self.models {
-            add(format!("parameters of {}", model.stage), model.to_frame()?);
-        }
-        Ok(out)
+/// The identity of what the report rests on.
+fn hashes(reads: &ReportReads) -> Result<Vec<(String, String)>> {
+    let mut out = Vec::new();
+    let mut add = |name: String, frame: Frame| out.push((name, frame.table_hash().to_string()));
+    add("robot".into(), reads.robot.to_frame()?);
+    add("recording".into(), reads.recording.to_frame()?);
+    add("split".into(), reads.split.to_frame()?);
+    for model in &reads.models {
+        add(format!("parameters of {}", model.stage), model.to_frame()?);
     }
+    Ok(out)
 }
 
 /// Faults of the settings with the stage they belong to.
@@ -264,12 +262,12 @@ fn placed(error: Error, stage: &str) -> Error {
 #[serde(deny_unknown_fields, default)]
 pub struct ReportTorques {
     /// Heading of the page; without it, the robot's name.
-    pub(crate) title: Option<String>,
+    pub title: Option<String>,
     /// Language of the page: `en` or `de`.
-    pub(crate) language: PageLanguage,
+    pub language: PageLanguage,
 }
 
-crate::stage::stage! {
+crate::stage! {
     ReportTorques, "report_torques", 12, "writes one self-contained HTML file: torques before and after, friction, what was found",
         ReportTorquesReads -> ReportTorquesWrites {
             document: Document,
@@ -296,12 +294,12 @@ impl Stage for ReportTorques {
 #[serde(deny_unknown_fields, default)]
 pub struct ReportDrives {
     /// Heading of the page.
-    pub(crate) title: Option<String>,
+    pub title: Option<String>,
     /// Language of the page: `en` or `de`.
-    pub(crate) language: PageLanguage,
+    pub language: PageLanguage,
 }
 
-crate::stage::stage! {
+crate::stage! {
     ReportDrives, "report_drives", 3, "writes one self-contained HTML file: commanded, measured and simulated angles before and after, what was found",
         ReportDrivesReads -> ReportDrivesWrites {
             document: Document,

@@ -2,8 +2,8 @@
 
 use super::{Context, RawFile, Stage};
 use crate::error::{Place, Result};
-use crate::robot::import::{RobotFileText, read_calib, read_case};
 use crate::table::Robot;
+use calib_numerics::robot::import::{RobotFileText, read_calib, read_case};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -36,7 +36,7 @@ pub struct ReadRobot {
     pub urdf: Option<RawFile>,
 }
 
-crate::stage::stage! {
+crate::stage! {
     ReadRobot, "robot", 3, "reads a robot file (screws, DH, modified DH, URDF, or a practice robot.json)",
         RobotReads {} -> RobotWrites {
             robot: Robot,

@@ -10,7 +10,7 @@ use crate::estimate::{
     Bounds, Folds, Known, Model, Poses, Prior, Repeated, Session, cross_validate, fold_poses,
     leave_one_out, spread,
 };
-use crate::robot::{Measurements, NoiseBasis};
+use calib_numerics::robot::{Measurements, NoiseBasis};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserializer, Unexpected, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
@@ -23,18 +23,18 @@ use std::fmt;
 #[serde(deny_unknown_fields)]
 pub struct PriorSetting {
     /// One standard deviation, in the parameter's unit.
-    pub(crate) sigma: f64,
+    pub sigma: f64,
     /// Expected change from nominal, in the parameter's unit.
     #[serde(default)]
-    pub(crate) mean: f64,
+    pub mean: f64,
 }
 
 /// The settings `free`, `hold`, `prior` and `bounds` of a stage.
-pub(crate) struct ParameterSet<'a> {
-    pub(crate) free: Option<&'a [String]>,
-    pub(crate) hold: &'a [String],
-    pub(crate) prior: &'a BTreeMap<String, PriorSetting>,
-    pub(crate) bounds: &'a BTreeMap<String, [f64; 2]>,
+pub struct ParameterSet<'a> {
+    pub free: Option<&'a [String]>,
+    pub hold: &'a [String],
+    pub prior: &'a BTreeMap<String, PriorSetting>,
+    pub bounds: &'a BTreeMap<String, [f64; 2]>,
 }
 
 impl ParameterSet<'_> {
@@ -53,7 +53,7 @@ impl ParameterSet<'_> {
     }
 
     /// What is wrong with the settings whatever the robot.
-    pub(crate) fn faults(&self, at: &mut Place) {
+    pub fn faults(&self, at: &mut Place) {
         let names: Vec<&str> = identified().map(|cause| cause.name()).collect();
         for (setting, pattern) in self.patterns() {
             let effect = pattern.split('.').next().unwrap_or_default();
@@ -92,7 +92,7 @@ impl ParameterSet<'_> {
 
     /// Sorts the parameters that this stage may estimate (`open`, positions in the stack) into (candidates, held), and tells the
     /// model what is known beforehand. Patterns that match none of them are warned of.
-    pub(crate) fn apply(
+    pub fn apply(
         &self,
         model: &mut Model,
         open: &[usize],
@@ -147,7 +147,7 @@ fn longest<'a, T>(patterns: &'a BTreeMap<String, T>, name: &str) -> Option<&'a T
 }
 
 /// Whether a pattern with `*` for anything matches the whole name.
-pub(crate) fn matches(pattern: &str, name: &str) -> bool {
+pub fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
         Some((head, tail)) => name.strip_prefix(head).is_some_and(|middle| {
@@ -296,7 +296,7 @@ pub enum Repeatability {
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
 impl Repeatability {
-    pub(crate) fn faults(&self, at: &mut Place) {
+    pub fn faults(&self, at: &mut Place) {
         let possible = !matches!(self, Self::Arcsec(sigma) if !(*sigma > 0.0 && sigma.is_finite()));
         at.at("repeatability").must(
             possible,
@@ -305,7 +305,7 @@ impl Repeatability {
     }
 
     /// Gives every row the covariance that the joints make of it; the standard deviation of a joint (rad), where one is known.
-    pub(crate) fn apply(
+    pub fn apply(
         &self,
         model: &Model,
         data: &mut Measurements,
@@ -332,7 +332,7 @@ impl Repeatability {
 const UNLIKELY: f64 = 0.01;
 
 /// Notes for the person on what repeats say against the fit.
-pub(crate) fn note_repeats(context: &Context, repeated: &Repeated) {
+pub fn note_repeats(context: &Context, repeated: &Repeated) {
     let Repeated {
         poses,
         noise,

@@ -2,8 +2,6 @@
 
 use crate::description::{JointKind, RobotDescription};
 use crate::error::{Error, Place, Result, counted};
-use crate::robot::{Instrument, START, SigmaSource};
-use crate::stage::{Context, Stage};
 use crate::table::{Recording, Robot, Truth, TruthRow};
 use crate::twin::effect::Physical;
 use crate::twin::plan::{Block, Climate, Poses, given};
@@ -13,6 +11,8 @@ use crate::twin::tracker::Tracker;
 use crate::twin::truth::TrueRobot;
 use crate::twin::truth::TrueValue;
 use crate::twin::way::Way;
+use crate::{Context, Stage};
+use calib_numerics::robot::{Instrument, START, SigmaSource};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -71,7 +71,7 @@ pub struct Simulate {
     pub seed: Option<u64>,
 }
 
-crate::stage::stage! {
+crate::stage! {
     Simulate, "simulate", 3, "records an experiment on a twin whose truth is known",
         SimulateReads {
             robot: Robot,

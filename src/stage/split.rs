@@ -6,11 +6,11 @@
 
 use crate::error::{Error, Place, Result, counted, listed};
 use crate::estimate::Units;
-use crate::robot::Measurements;
-use crate::robot::pose_groups::near;
-use crate::stage::remarks::{copied_rows, copies_remark};
-use crate::stage::{Context, Stage, matches};
+use crate::remarks::{copied_rows, copies_remark};
 use crate::table::{Recording, Split, SplitRow};
+use crate::{Context, Stage, matches};
+use calib_numerics::robot::Measurements;
+use calib_numerics::robot::pose_groups::near;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
@@ -95,10 +95,10 @@ pub enum SplitBy {
 #[serde(deny_unknown_fields)]
 pub struct Stretch {
     /// Name of the set.
-    pub(crate) set: String,
+    pub set: String,
     /// Number of rows.
     #[serde(default)]
-    pub(crate) rows: Option<u64>,
+    pub rows: Option<u64>,
 }
 
 fn validate() -> String {
@@ -109,7 +109,7 @@ fn fit() -> String {
     "fit".into()
 }
 
-crate::stage::stage! {
+crate::stage! {
     SplitBy, "split", 5, "deals rows out to named sets: every n-th, by name, blocks, random, by usage, by order",
         SplitReads {
             recording: Recording,

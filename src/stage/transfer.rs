@@ -1,29 +1,29 @@
 //! `transfer`: an identified model on another recording of the same robot. The arm is held; only where its base stands is found anew.
 
-use crate::diagnose::BASE;
+use crate::doubtful::{FittedRows, fit_rows};
 use crate::effect::{Load, names};
 use crate::error::{Place, Result, counted};
 use crate::estimate::{Model, Screening, align_points, fit};
-use crate::robot::{Measurements, RobotModel};
-use crate::stage::doubtful::{FittedRows, fit_rows};
-use crate::stage::identified::{Fitting, Identified, RowsToFit};
-use crate::stage::{Context, Labelled, Stage};
+use crate::identified::{Fitting, Identified, RowsToFit};
 use crate::table::{
     CovarianceTable, ParameterRow, Parameters, Prediction, Recording, Robot, Split,
 };
+use crate::{Context, Labelled, Stage};
+use calib_diagnose::BASE;
+use calib_numerics::robot::{Measurements, RobotModel};
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
 
-crate::stage::identified::identification! {
+crate::identified::identification! {
     /// Settings of `transfer`.
     pub struct Transfer {
         /// Sets of the split by which the base is found.
-        #[serde(default = "crate::stage::fit_set")]
-        pub(crate) on: Vec<String>,
+        #[serde(default = "crate::fit_set")]
+        pub on: Vec<String>,
     }
 }
 
-crate::stage::stage! {
+crate::stage! {
     Transfer, "transfer", 17, "tests an identified model on another recording of the robot; only its base is estimated anew",
         TransferReads {
             robot: Robot,
@@ -43,7 +43,7 @@ impl Stage for Transfer {
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
-        crate::stage::on(&self.on)
+        crate::on(&self.on)
     }
 
     fn run(&self, reads: TransferReads, context: &Context) -> Result<Identified> {
@@ -192,9 +192,9 @@ fn sides(data: &Measurements, asked: &[usize], screenings: [&Screening; 2]) -> C
 /// A recording that a model was fitted to.
 pub(super) struct CarriedFrom<'a> {
     stage: String,
-    pub(crate) recording: &'a Recording,
+    pub recording: &'a Recording,
     /// Rows that it was fitted to.
-    pub(crate) rows: Vec<usize>,
+    pub rows: Vec<usize>,
 }
 
 impl<'a> CarriedFrom<'a> {
@@ -219,7 +219,7 @@ impl<'a> CarriedFrom<'a> {
 
     /// The geometry that an earlier stage identified by itself from the same recording, else the carried model's, fitted anew to the
     /// same rows without what else was found.
-    pub(crate) fn geometry(&self, reads: &TransferReads, load: Load) -> Result<Parameters> {
+    pub fn geometry(&self, reads: &TransferReads, load: Load) -> Result<Parameters> {
         let of_the_arm = |row: &ParameterRow| {
             row.status == "free"
                 && ![names::BASE_FRAME, names::TOOL_OFFSET].contains(&row.effect.as_str())
@@ -302,13 +302,13 @@ impl Compared {
 }
 
 /// Rows of whole points: held-out ones judge and never choose.
-pub(crate) struct ComparedRows {
-    pub(crate) choose: Vec<usize>,
-    pub(crate) judge: Vec<usize>,
+pub struct ComparedRows {
+    pub choose: Vec<usize>,
+    pub judge: Vec<usize>,
 }
 
 /// Both models at the points that judge them.
-pub(crate) struct Comparison {
+pub struct Comparison {
     chosen_by: Compared,
     all: Compared,
     /// In cells of the joint space that the model was fitted in, and outside of them; none where that is not known.
@@ -348,7 +348,7 @@ impl Comparison {
     }
 
     /// Both, with their figures.
-    pub(crate) fn words(&self) -> String {
+    pub fn words(&self) -> String {
         let [whole, geometry] = [&self.all.whole, &self.all.geometry].map(CarriedErrors::words);
         let points = counted(self.all.points, "point");
         let mut text = format!(
@@ -375,7 +375,7 @@ impl Comparison {
 const CELLS: f64 = 8.0;
 
 /// Cells of pairs of joints that rows lie in; a pose is visited where each of its pairs of joints lies in one of them or next to one.
-pub(crate) struct VisitedCells {
+pub struct VisitedCells {
     /// Least position and width of a cell of each joint, rad or m.
     grid: Vec<[f64; 2]>,
     cells: BTreeSet<(usize, usize, i64, i64)>,
@@ -404,7 +404,7 @@ impl VisitedCells {
     }
 
     /// Whether joints lie where rows lie.
-    pub(crate) fn has(&self, q: &[f64]) -> bool {
+    pub fn has(&self, q: &[f64]) -> bool {
         let cell = self.cell(q);
         let near = |cell: i64| cell - 1..=cell + 1;
         pairs(cell.len()).all(|(a, b)| {

@@ -1,11 +1,11 @@
 //! `validate`: statistics of the position error after every step, held-out and training rows apart.
 
+use crate::doubtful::{named, suspicion};
 use crate::error::{Error, Result, counted, first_of};
-use crate::robot::NoiseBasis;
-use crate::stage::doubtful::{named, suspicion};
-use crate::stage::{Context, Labelled, Stage};
 use crate::statistics::quantile;
 use crate::table::{Observability, Prediction, PredictionRow, Statistics, StatisticsRow};
+use crate::{Context, Labelled, Stage};
+use calib_numerics::robot::NoiseBasis;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -17,30 +17,30 @@ use std::collections::BTreeMap;
 pub struct Validate {
     /// Figures from elsewhere (a paper, a data sheet, last year's report) to stand beside ours.
     #[serde(default)]
-    pub(crate) reference: Vec<PublishedErrors>,
+    pub reference: Vec<PublishedErrors>,
 }
 
 /// Published or agreed statistics of one step on one set.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct PublishedErrors {
+pub struct PublishedErrors {
     /// Where the figures stand, e.g. `Table 9`.
-    pub(crate) label: String,
+    pub label: String,
     /// The step of ours that they belong beside.
-    pub(crate) step: String,
+    pub step: String,
     /// The set of ours that they belong beside.
-    pub(crate) set: String,
+    pub set: String,
     /// Mean of the position error, mm.
-    pub(crate) mean_mm: f64,
+    pub mean_mm: f64,
     /// Its standard deviation, mm.
     #[serde(default)]
-    pub(crate) std_mm: Option<f64>,
+    pub std_mm: Option<f64>,
     /// The largest error, mm.
     #[serde(default)]
-    pub(crate) max_mm: Option<f64>,
+    pub max_mm: Option<f64>,
 }
 
-crate::stage::stage! {
+crate::stage! {
     Validate, "validate", 6, "states the position error after every step, held-out and training rows apart",
         ValidateReads {
             prediction: Vec<Labelled<Prediction>>,

@@ -19,11 +19,11 @@ const RECORD_FORMAT: u32 = 1;
 /// What a stage made, and how it went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionRecord {
-    pub(crate) record_format: u32,
+    pub record_format: u32,
     /// Hash of the key.
     pub id: ActionId,
     /// What the tables depend on.
-    pub(crate) key: StageKey,
+    pub key: StageKey,
     /// By port.
     pub tables: BTreeMap<String, TableRef>,
     /// How it went.
@@ -97,7 +97,7 @@ impl Store {
     }
 
     /// The file of a published table, which of a store in a bucket is fetched first; fails where the bucket does not hold it whole.
-    pub(crate) fn object(&self, table: &TableRef) -> Result<PathBuf> {
+    pub fn object(&self, table: &TableRef) -> Result<PathBuf> {
         let path = self.object_path(table);
         match path.exists() || !self.in_bucket() || self.obtain(table, &path)? {
             true => Ok(path),
@@ -208,12 +208,12 @@ impl Store {
     }
 
     /// The same, to be read chunk by chunk.
-    pub(crate) fn published(&self, table: &TableRef) -> Result<PublishedTable> {
+    pub fn published(&self, table: &TableRef) -> Result<PublishedTable> {
         PublishedTable::open(self.object(table)?, table.clone())
     }
 
     /// Whether the file of a published table is there, byte for byte.
-    pub(crate) fn is_whole(&self, table: &TableRef) -> Result<bool> {
+    pub fn is_whole(&self, table: &TableRef) -> Result<bool> {
         Ok(same_bytes(&self.object(table)?, table))
     }
 

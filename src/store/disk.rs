@@ -195,7 +195,7 @@ impl Store {
     }
 
     /// Makes everything durable that was written so far.
-    pub(crate) fn sync(&self) -> Result<()> {
+    pub fn sync(&self) -> Result<()> {
         self.sync_then(|| Ok(None))
     }
 
@@ -364,7 +364,7 @@ pub(super) fn ends_in(path: &Path, extension: &str) -> bool {
 /// A file that one living process has locked, and that is removed with it; the kernel frees the lock when the process dies. Two that do the same
 /// share the work by it, and no result depends on it.
 #[derive(Debug)]
-pub(crate) struct Claim {
+pub struct Claim {
     path: PathBuf,
     /// None where locks cannot be had: then both do the work, and who is first stands.
     _file: Option<File>,
@@ -372,7 +372,7 @@ pub(crate) struct Claim {
 
 impl Claim {
     /// None while another living process has it.
-    pub(crate) fn take(path: &Path) -> Option<Self> {
+    pub fn take(path: &Path) -> Option<Self> {
         let open = || {
             path.parent().map_or(Ok(()), fs::create_dir_all)?;
             File::options().create(true).append(true).open(path)
@@ -394,7 +394,7 @@ impl Claim {
     }
 
     /// The process that has it; none where that is not known.
-    pub(crate) fn holder(path: &Path) -> Option<u32> {
+    pub fn holder(path: &Path) -> Option<u32> {
         fs::read_to_string(path).ok()?.parse().ok()
     }
 }

@@ -15,7 +15,7 @@ use arrow::datatypes::{DataType, SchemaRef};
 use std::sync::Arc;
 
 /// A column before it is checked.
-pub(crate) type Column = ArrayRef;
+pub type Column = ArrayRef;
 
 /// Columns of one table kind, in memory, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +43,7 @@ impl FrameBuilder {
         self.columns.push((name.into(), column));
     }
     /// Adds a column of numbers, NaN for null.
-    pub(crate) fn push_numbers(
+    pub fn push_numbers(
         &mut self,
         name: impl Into<String>,
         values: impl Iterator<Item = f64>,
@@ -63,7 +63,7 @@ impl FrameBuilder {
         self.push(name, Arc::new(Float64Array::new(values.into(), nulls)));
     }
     /// Adds a column, but an optional one without a value is left out: tables that never needed it stay as they are.
-    pub(crate) fn push_present(&mut self, name: &str, column: ArrayRef) -> Result<()> {
+    pub fn push_present(&mut self, name: &str, column: ArrayRef) -> Result<()> {
         let optional = schema::of(&self.kind)?
             .fields
             .iter()
@@ -89,7 +89,7 @@ impl Frame {
         &self.schema.name
     }
     /// What it holds.
-    pub(crate) fn schema(&self) -> &'static TableSchema {
+    pub fn schema(&self) -> &'static TableSchema {
         self.schema
     }
     /// Its columns as Arrow has them.
@@ -198,11 +198,11 @@ pub struct TextCells(StringBuilder);
 
 impl TextCells {
     /// Adds a cell; none is null.
-    pub(crate) fn push(&mut self, text: Option<&str>) {
+    pub fn push(&mut self, text: Option<&str>) {
         self.0.append_option(text);
     }
     /// The column so far; what follows begins another.
-    pub(crate) fn take(&mut self) -> ArrayRef {
+    pub fn take(&mut self) -> ArrayRef {
         Arc::new(self.0.finish())
     }
 }

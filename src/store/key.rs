@@ -48,16 +48,16 @@ pub struct StageKey {
 pub struct ReadKey {
     /// The stage that wrote it, where the port takes several and the reader sees whose they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) stage: Option<String>,
-    pub(crate) table: TableHash,
+    pub stage: Option<String>,
+    pub table: TableHash,
 }
 
 /// A raw input file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FileKey {
     /// Its name without folders, which tables of rejected rows show.
-    pub(crate) name: String,
-    pub(crate) content: FileHash,
+    pub name: String,
+    pub content: FileHash,
 }
 
 /// Declares hashes by blake3, as 64 hex digits.
@@ -105,7 +105,7 @@ impl StageKey {
 
 impl FileHash {
     /// Reads to the end.
-    pub(crate) fn of_reader(mut reader: impl Read) -> std::io::Result<Self> {
+    pub fn of_reader(mut reader: impl Read) -> std::io::Result<Self> {
         let mut hasher = blake3::Hasher::new();
         let mut block = vec![0; 1 << 18];
         loop {
@@ -118,7 +118,7 @@ impl FileHash {
 }
 
 /// JSON without white space, keys in order, floats as their shortest round trip: one text per value.
-pub(crate) fn canonical(value: &Value) -> String {
+pub fn canonical(value: &Value) -> String {
     match value {
         Value::Object(map) => {
             let ordered: BTreeMap<&String, &Value> = map.iter().collect();
@@ -146,15 +146,15 @@ pub(crate) fn canonical(value: &Value) -> String {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TableRef {
     /// `name/version`.
-    pub(crate) schema: String,
+    pub schema: String,
     /// Identity of the content.
     pub table_hash: TableHash,
     /// Name of the object that holds it.
-    pub(crate) file_hash: FileHash,
+    pub file_hash: FileHash,
     /// How many.
     pub rows: u64,
     /// Size of the file, bytes.
-    pub(crate) bytes: u64,
+    pub bytes: u64,
 }
 
 /// Whether a file is the one that was published, byte for byte.

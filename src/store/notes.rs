@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 impl Store {
     /// Where a note lies; fails where a part of its place cannot be a file name.
-    pub(crate) fn place_of_note(&self, place: &[&str], name: &str) -> Result<PathBuf> {
+    pub fn place_of_note(&self, place: &[&str], name: &str) -> Result<PathBuf> {
         let mut path = self.root().to_path_buf();
         for part in place.iter().chain([&name]) {
             path.push(component(part)?);
@@ -20,7 +20,7 @@ impl Store {
     }
 
     /// A note, where there is one. One that is torn, damaged or of another kind is none.
-    pub(crate) fn note<T: DeserializeOwned>(
+    pub fn note<T: DeserializeOwned>(
         &self,
         place: &[&str],
         name: &str,
@@ -31,12 +31,12 @@ impl Store {
     }
 
     /// Writes a note over what may be there, durably.
-    pub(crate) fn put_note(&self, place: &[&str], name: &str, note: &impl Serialize) -> Result<()> {
+    pub fn put_note(&self, place: &[&str], name: &str, note: &impl Serialize) -> Result<()> {
         self.put_now(&self.place_of_note(place, name)?, &text(note)?)
     }
 
     /// Writes a note if there is none, durable after the next `sync`; false where one stands.
-    pub(crate) fn put_note_once(
+    pub fn put_note_once(
         &self,
         place: &[&str],
         name: &str,
@@ -46,12 +46,12 @@ impl Store {
     }
 
     /// Writes a file over what may be there, durable after the next `sync`.
-    pub(crate) fn put_file(&self, folder: &[&str], name: &str, bytes: &[u8]) -> Result<()> {
+    pub fn put_file(&self, folder: &[&str], name: &str, bytes: &[u8]) -> Result<()> {
         self.put(&self.place_of_note(folder, name)?, bytes)
     }
 
     /// Takes a note away; nothing where there is none.
-    pub(crate) fn drop_note(&self, place: &[&str], name: &str) -> Result<()> {
+    pub fn drop_note(&self, place: &[&str], name: &str) -> Result<()> {
         remove(&self.place_of_note(place, name)?)
     }
 }

@@ -29,7 +29,7 @@ pub struct Loose<T> {
     pub table: T,
     /// Whether the file carries the hash of its content. One that does not was written by another program: nobody can tell whether
     /// its numbers were changed.
-    pub(crate) vouched: bool,
+    pub vouched: bool,
 }
 
 /// Opens a published table whose bytes are those that were published; another file is set aside, so that the next run makes it anew.
@@ -65,7 +65,7 @@ impl PublishedTable {
     }
 
     /// How many rows.
-    pub(crate) fn rows(&self) -> usize {
+    pub fn rows(&self) -> usize {
         self.table.rows as usize
     }
 
@@ -75,7 +75,7 @@ impl PublishedTable {
     }
 
     /// Hands on all rows in their order; of a table without rows, one empty chunk. Fails where the file cannot be read.
-    pub(crate) fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
+    pub fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
         if self.rows() <= BATCH_ROWS {
             if self.whole.get().is_none() {
                 let _ = self.whole.set(self.frame()?);
@@ -162,7 +162,7 @@ pub fn read_table(path: &Path, kind: Option<&str>) -> Result<Loose<Frame>> {
 }
 
 /// The same from the bytes of the file, which `label` names in errors.
-pub(crate) fn table_of_bytes(label: &str, bytes: Vec<u8>, kind: &str) -> Result<Loose<Frame>> {
+pub fn table_of_bytes(label: &str, bytes: Vec<u8>, kind: &str) -> Result<Loose<Frame>> {
     loose(label, bytes::Bytes::from(bytes), Some(kind))
 }
 
@@ -237,7 +237,7 @@ fn set_aside(path: &Path, why: &str) -> Error {
 }
 
 /// What a file says of itself, by key, and of the units of its columns, by name.
-pub(crate) fn file_notes(
+pub fn file_notes(
     footer: &FileMetaData,
 ) -> (BTreeMap<String, String>, BTreeMap<String, String>) {
     let pairs = footer.key_value_metadata().into_iter().flatten();
@@ -276,11 +276,11 @@ impl Decoded {
     }
 
     /// The file's own key-value metadata.
-    pub(crate) fn metadata_value(&self, key: &str) -> Option<&str> {
+    pub fn metadata_value(&self, key: &str) -> Option<&str> {
         self.metadata.get(key).map(String::as_str)
     }
 
-    pub(crate) fn rows(&self) -> u64 {
+    pub fn rows(&self) -> u64 {
         self.batch.num_rows() as u64
     }
 
@@ -344,7 +344,7 @@ impl DecodedChunks {
     }
 
     /// The next rows; of a file without rows, once none.
-    pub(crate) fn next(&mut self) -> Result<Option<Decoded>, String> {
+    pub fn next(&mut self) -> Result<Option<Decoded>, String> {
         let batch =
             raw::decoded(|| self.reader.next().transpose())?.map_err(|error| error.to_string())?;
         let first = !std::mem::replace(&mut self.begun, true);

@@ -94,7 +94,7 @@ impl Store {
     }
 
     /// The store as a person names it.
-    pub(crate) fn name(&self) -> String {
+    pub fn name(&self) -> String {
         self.remote.as_ref().map_or_else(
             || self.root().display().to_string(),
             |remote| remote.bucket.name().to_string(),

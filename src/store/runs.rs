@@ -25,16 +25,16 @@ pub struct Run {
 /// A run and the seal of its manifest.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Link {
-    pub(crate) run: String,
-    pub(crate) sealed: String,
+    pub run: String,
+    pub sealed: String,
 }
 
 /// A manifest whose seal holds.
 #[derive(Debug, Clone)]
 pub struct Sealed {
     /// As it was written.
-    pub(crate) manifest: Value,
-    pub(crate) sealed: String,
+    pub manifest: Value,
+    pub sealed: String,
 }
 
 /// Hex digits of the hash that an event carries.
@@ -59,7 +59,7 @@ impl Run {
 }
 
 /// What is wrong with the events of a run, if anything; the last line of a run that was killed may be torn.
-pub(crate) fn events_fault(text: &[u8], ended: bool) -> Option<String> {
+pub fn events_fault(text: &[u8], ended: bool) -> Option<String> {
     let mut chain = blake3::Hasher::new();
     let mut lines = text
         .split_inclusive(|&byte| byte == b'\n')
@@ -214,7 +214,7 @@ impl Store {
     }
 
     /// The last run whose manifest is whole and says that it ended.
-    pub(crate) fn last_ended(&self) -> Result<Option<Link>> {
+    pub fn last_ended(&self) -> Result<Option<Link>> {
         if let Some(link) = &self.known_runs().ended {
             return Ok(Some(link.clone()));
         }
@@ -230,14 +230,14 @@ impl Store {
     }
 
     /// Whether anything of a run's manifest was written: a power cut may leave a run without, which then never ended.
-    pub(crate) fn has_manifest(&self, id: &str) -> bool {
+    pub fn has_manifest(&self, id: &str) -> bool {
         self.run_dir(id).is_ok_and(|dir| {
             fs::metadata(dir.join("manifest.json")).is_ok_and(|file| file.len() > 0)
         })
     }
 
     /// The events of a run, oldest first, as far as they were written; none where they cannot be read.
-    pub(crate) fn events(&self, id: &str) -> Vec<Value> {
+    pub fn events(&self, id: &str) -> Vec<Value> {
         let text = self
             .run_dir(id)
             .ok()
@@ -254,7 +254,7 @@ impl Store {
     }
 
     /// The manifest of a run with its seal, which holds.
-    pub(crate) fn sealed_manifest(&self, id: &str) -> Result<Sealed> {
+    pub fn sealed_manifest(&self, id: &str) -> Result<Sealed> {
         let path = self.run_dir(id)?.join("manifest.json");
         let bytes = fs::read(&path).map_err(|e| refused(&path, "read", &e))?;
         let damaged = |why: String| {

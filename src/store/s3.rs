@@ -43,7 +43,7 @@ struct S3 {
 
 impl Store {
     /// Opens `s3://BUCKET/PREFIX` with a folder below `cache` before it. `settings` are the environment's `AWS_...`.
-    pub(crate) fn open_s3(
+    pub fn open_s3(
         url: &str,
         settings: &BTreeMap<String, String>,
         cache: &Path,

@@ -49,11 +49,11 @@ pub struct TableSchema {
     pub description: String,
     /// Whether people gave its values, so that one out of range is theirs to mend; else it is a bug of the stage that made it.
     #[serde(default)]
-    pub(crate) given: bool,
+    pub given: bool,
     /// Columns that tell every row from every other.
     pub primary_key: Vec<String>,
     /// Columns that rows are in ascending order of: the primary key in some order.
-    pub(crate) sort: Vec<String>,
+    pub sort: Vec<String>,
     /// In the order of the file.
     pub fields: Vec<FieldSchema>,
 }
@@ -72,17 +72,17 @@ pub struct FieldSchema {
     pub nullable: bool,
     /// Symbol of a stored unit; `row` where the row says it in its own `unit` column.
     #[serde(default)]
-    pub(crate) unit: Option<String>,
-    pub(crate) description: String,
+    pub unit: Option<String>,
+    pub description: String,
     /// `angle`, `quaternion`, `json`, `unit`: how values compare.
     #[serde(default)]
-    pub(crate) semantic: Option<String>,
+    pub semantic: Option<String>,
     /// What values are allowed.
     #[serde(default)]
     pub constraints: Constraints,
     /// Which differences do not count.
     #[serde(default)]
-    pub(crate) diff: Tolerance,
+    pub diff: Tolerance,
     /// Whether files without the column are read too.
     #[serde(default)]
     pub optional: bool,
@@ -126,27 +126,27 @@ pub struct Constraints {
 /// Differences that a comparison of two tables overlooks, in the unit of the column, and what it measures them by.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Tolerance {
+pub struct Tolerance {
     /// In the unit of the column.
     #[serde(default)]
-    pub(crate) atol: f64,
+    pub atol: f64,
     /// As a share of the larger value.
     #[serde(default)]
-    pub(crate) rtol: f64,
+    pub rtol: f64,
     /// The column that holds one standard deviation of this one.
     #[serde(default)]
-    pub(crate) sigma: Option<String>,
+    pub sigma: Option<String>,
 }
 
 /// `major.minor.patch`: a new nullable column is a minor step, any other change of columns a major one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Version {
     /// Readers of another one refuse the table.
-    pub(crate) major: u32,
+    pub major: u32,
     /// Columns were added.
-    pub(crate) minor: u32,
+    pub minor: u32,
     /// Descriptions changed.
-    pub(crate) patch: u32,
+    pub patch: u32,
 }
 
 impl Version {
@@ -181,7 +181,7 @@ impl<'de> Deserialize<'de> for Version {
 
 impl ColumnType {
     /// The type as Arrow has it.
-    pub(crate) fn arrow(self) -> DataType {
+    pub fn arrow(self) -> DataType {
         match self {
             Self::Utf8 => DataType::Utf8,
             Self::Int64 => DataType::Int64,
@@ -203,12 +203,12 @@ impl TableSchema {
     }
 
     /// `recording/1.0.0`.
-    pub(crate) fn id(&self) -> String {
+    pub fn id(&self) -> String {
         format!("{}/{}", self.name, self.version)
     }
 
     /// The field that a column belongs to, with the joint (from 1) of a per-joint column.
-    pub(crate) fn field_of(&self, column: &str) -> Option<(&FieldSchema, Option<usize>)> {
+    pub fn field_of(&self, column: &str) -> Option<(&FieldSchema, Option<usize>)> {
         self.fields
             .iter()
             .find_map(|field| match field.joint_of(column) {
@@ -245,7 +245,7 @@ impl TableSchema {
 
 impl FieldSchema {
     /// The joint (from 1) that `column` is for, if it is a column of this per-joint field.
-    pub(crate) fn joint_of(&self, column: &str) -> Option<usize> {
+    pub fn joint_of(&self, column: &str) -> Option<usize> {
         let (prefix, suffix) = self.name.split_once("{j}")?;
         let digits = column.strip_prefix(prefix)?.strip_suffix(suffix)?;
         let joint = digits.parse::<usize>().ok()?;
@@ -261,7 +261,7 @@ impl FieldSchema {
     }
 
     /// The Arrow field of a column, with unit, description and semantic as metadata.
-    pub(crate) fn arrow(&self, joint: Option<usize>) -> Field {
+    pub fn arrow(&self, joint: Option<usize>) -> Field {
         let number = joint.map_or(String::new(), |joint| joint.to_string());
         let mut metadata = vec![(
             "description".to_string(),

@@ -1,12 +1,12 @@
 //! Everything in a store read and rehashed: objects by their names, records and manifests by their seals, the copies for people.
 
+use crate::actions::ActionRecord;
+use crate::disk::{ends_in, entries, refused};
 use crate::error::{Error, Fault, Result};
-use crate::store::actions::ActionRecord;
-use crate::store::disk::{ends_in, entries, refused};
-use crate::store::key::FileHash;
-use crate::store::notes::unseal;
-use crate::store::runs::{Sealed, events_fault};
-use crate::store::{Store, disk};
+use crate::key::FileHash;
+use crate::notes::unseal;
+use crate::runs::{Sealed, events_fault};
+use crate::{Store, disk};
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,16 +18,16 @@ use std::time::SystemTime;
 /// What a verification read, and everything that it found wrong.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Verification {
-    pub(crate) objects: u64,
-    pub(crate) bytes: u64,
-    pub(crate) actions: u64,
-    pub(crate) runs: u64,
+    pub objects: u64,
+    pub bytes: u64,
+    pub actions: u64,
+    pub runs: u64,
     /// Names that were followed.
-    pub(crate) tags: u64,
+    pub tags: u64,
     /// Files below `tables/` and `documents/`.
-    pub(crate) copies: u64,
+    pub copies: u64,
     /// Sealed notes of documents and fleets.
-    pub(crate) notes: u64,
+    pub notes: u64,
     /// What is not as it was written.
     #[serde(serialize_with = "texts")]
     pub faults: Vec<Fault>,
@@ -356,14 +356,14 @@ const HASH: usize = 64;
 /// What was swept, or would be.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Sweep {
-    pub(crate) actions: u64,
-    pub(crate) objects: u64,
+    pub actions: u64,
+    pub objects: u64,
     /// Bytes of the records and tables that go.
-    pub(crate) bytes: u64,
-    pub(crate) kept_actions: u64,
-    pub(crate) kept_objects: u64,
+    pub bytes: u64,
+    pub kept_actions: u64,
+    pub kept_objects: u64,
     /// Kept only because they are younger than the grace period.
-    pub(crate) young: u64,
+    pub young: u64,
 }
 
 impl Store {
@@ -449,7 +449,7 @@ fn remove(path: &Path, dry_run: bool) -> Result<u64> {
 
 impl Store {
     /// Runs that the records of fleets name.
-    pub(crate) fn runs_of_fleets(&self) -> Result<BTreeSet<String>> {
+    pub fn runs_of_fleets(&self) -> Result<BTreeSet<String>> {
         let mut runs = BTreeSet::new();
         for path in self.fleet_notes()? {
             runs.extend(words(&path, RUN_ID, |byte| byte.is_ascii_alphanumeric())?);

@@ -51,7 +51,7 @@ pub struct CauseGridCell {
     /// Effects, by their names.
     pub effects: Vec<String>,
     /// Whether one of them has a name.
-    pub(crate) is_named: bool,
+    pub is_named: bool,
 }
 
 impl CauseGrid {

@@ -8,13 +8,13 @@ use super::{
     FindingNumbers, FindingRow, Findings, JointDriveRow, JointDrives, RivalRow, Rivals, Table,
 };
 use crate::diagnose::VerdictKind;
-use crate::drives::mjcf::MjcfArm;
-use crate::drives::physics::{Joint, Physics};
-use crate::drives::recording::Recording;
-use crate::drives::{DriveDiagnosis, Drives};
 use crate::dynamics::Inertial;
 use crate::error::Result;
 use crate::store::frame::{Cell, Frame, FrameBuilder};
+use calib_drives::mjcf::MjcfArm;
+use calib_drives::physics::{Joint, Physics};
+use calib_drives::recording::Recording;
+use calib_drives::{DriveDiagnosis, Drives};
 
 beside_findings! { DriveDiagnosis => FindingNumbers::of_drives of FindingNumberRow, Rivals::of_drives of RivalRow }
 
@@ -211,7 +211,7 @@ impl DriveSimulation {
     }
 
     /// A number of it, with the findings; none where it is not there or nothing limits.
-    pub(crate) fn value(&self, part: &str, number: usize, quantity: &str) -> Option<f64> {
+    pub fn value(&self, part: &str, number: usize, quantity: &str) -> Option<f64> {
         let is_it = |row: &&DriveSimulationRow| {
             row.part == part && row.number == number as i64 && row.quantity == quantity
         };
@@ -219,7 +219,7 @@ impl DriveSimulation {
     }
 
     /// Names of the joints, in the order of the chain.
-    pub(crate) fn joints(&self) -> Vec<&str> {
+    pub fn joints(&self) -> Vec<&str> {
         let is_one = |row: &&DriveSimulationRow| row.part == "joint" && row.quantity == "kp";
         let mut rows: Vec<_> = self.0.iter().filter(is_one).collect();
         rows.sort_by_key(|row| row.number);
@@ -233,18 +233,18 @@ const MOST_ROWS: usize = 20_000;
 /// What was commanded, measured and simulated; key `sequence`. Angles are rad, row-major (`row * joints + joint`).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct DriveCourse {
-    pub(crate) joints: usize,
-    pub(crate) sequence: Vec<i64>,
+    pub joints: usize,
+    pub sequence: Vec<i64>,
     /// s.
-    pub(crate) time: Vec<f64>,
+    pub time: Vec<f64>,
     /// Whether nothing was fitted to the row.
-    pub(crate) held_out: Vec<bool>,
-    pub(crate) command: Vec<f64>,
-    pub(crate) measured: Vec<f64>,
+    pub held_out: Vec<bool>,
+    pub command: Vec<f64>,
+    pub measured: Vec<f64>,
     /// Of the simulation as it is.
-    pub(crate) simulated: Vec<f64>,
+    pub simulated: Vec<f64>,
     /// Of the simulation with the findings.
-    pub(crate) corrected: Vec<f64>,
+    pub corrected: Vec<f64>,
 }
 
 impl DriveCourse {

@@ -4,12 +4,12 @@ use crate::diagnose::{Diagnosis, ErrorLengths, Located, VerdictKind};
 use crate::dynamics::TorqueDiagnosis;
 use crate::effect::cause;
 use crate::observation::Dimension;
-use crate::robot::NoiseBasis;
-use crate::table::{
+use crate::{
     CellRow, Cells, FindingNumberRow, FindingNumbers, FindingRow, Findings, FormRow, Forms,
     RivalRow, Rivals, ShareRow, Shares, Spectrum, SpectrumRow, Verdict, VerdictRow,
     VerdictSentenceRow, VerdictSentences,
 };
+use calib_numerics::robot::NoiseBasis;
 
 impl FindingRow {
     /// The joint (from 1) whose range bounds it, that range as people read it, and the range's unit.
@@ -46,8 +46,8 @@ macro_rules! beside_findings {
         impl $numbers {
             /// A row for each number of each finding.
             pub fn $of(diagnosis: &$diagnosis) -> Self {
-                let rows = $crate::table::findings::ranked(&diagnosis.findings).flat_map(
-                    |(rank, finding)| {
+                let rows =
+                    $crate::findings::ranked(&diagnosis.findings).flat_map(|(rank, finding)| {
                         finding.parameters.iter().map(move |number| $number_row {
                             rank,
                             name: number.name.clone(),
@@ -55,8 +55,7 @@ macro_rules! beside_findings {
                             unit: number.unit.into(),
                             sigma: number.sigma.filter(|sigma| sigma.is_finite()),
                         })
-                    },
-                );
+                    });
                 Self(rows.collect())
             }
         }
@@ -64,8 +63,8 @@ macro_rules! beside_findings {
         impl $rivals {
             /// A row for each rival of each finding.
             pub fn $rivals_of(diagnosis: &$diagnosis) -> Self {
-                let rows = $crate::table::findings::ranked(&diagnosis.findings).flat_map(
-                    |(rank, finding)| {
+                let rows =
+                    $crate::findings::ranked(&diagnosis.findings).flat_map(|(rank, finding)| {
                         finding.rivals.iter().map(move |rival| $rival_row {
                             rank,
                             effect: rival.effect.into(),
@@ -73,8 +72,7 @@ macro_rules! beside_findings {
                             delta_bic: rival.delta_bic,
                             probability: rival.probability.into(),
                         })
-                    },
-                );
+                    });
                 let mut rows: Vec<$rival_row> = rows.collect();
                 rows.sort_by(|a, b| {
                     (a.rank, &a.effect, &a.place).cmp(&(b.rank, &b.effect, &b.place))
@@ -86,7 +84,7 @@ macro_rules! beside_findings {
                     if same {
                         kept.delta_bic = kept.delta_bic.min(next.delta_bic);
                         kept.probability =
-                            $crate::table::findings::sum(kept.probability, next.probability);
+                            $crate::findings::sum(kept.probability, next.probability);
                     }
                     same
                 });
@@ -245,7 +243,7 @@ impl Forms {
     }
 
     /// Formulas of a finding, each as its rows, cheapest first.
-    pub(crate) fn of_finding(&self, rank: i64) -> impl Iterator<Item = &[FormRow]> {
+    pub fn of_finding(&self, rank: i64) -> impl Iterator<Item = &[FormRow]> {
         let is_of_rank = move |rows: &&[FormRow]| rows.first().is_some_and(|row| row.rank == rank);
         self.0
             .chunk_by(|a, b| (a.rank, a.form) == (b.rank, b.form))
@@ -292,24 +290,24 @@ fn brief(value: f64) -> String {
 
 impl VerdictRow {
     /// Whether something is left that neither a finding nor noise explains.
-    pub(crate) fn is_unexplained(&self) -> bool {
+    pub fn is_unexplained(&self) -> bool {
         self.verdict == VerdictKind::Unexplained.name()
     }
 
     /// Whether nothing is known of the noise: neither was it stated nor measured, nor is it what the joints scatter by.
-    pub(crate) fn is_noise_assumed(&self) -> bool {
+    pub fn is_noise_assumed(&self) -> bool {
         self.is_noise_inferred() && self.repeatability_rad == 0.0
     }
 
     /// Whether the noise was neither stated nor measured.
-    pub(crate) fn is_noise_inferred(&self) -> bool {
+    pub fn is_noise_inferred(&self) -> bool {
         self.noise_basis.as_deref() == Some(NoiseBasis::Inferred.name())
     }
 }
 
 impl Verdict {
     /// What is wrong with the set-up, where a diagnosis says so: `findings` are its own.
-    pub(crate) fn wrong_setup(&self, findings: &Findings) -> Option<String> {
+    pub fn wrong_setup(&self, findings: &Findings) -> Option<String> {
         let wrong = self
             .0
             .iter()
@@ -378,7 +376,7 @@ pub enum VerdictTopic {
 
 impl VerdictTopic {
     /// As the table has it.
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::NotObservable => "not_observable",
             Self::NextMeasurement => "next_measurement",
@@ -405,7 +403,7 @@ impl VerdictSentences {
     }
 
     /// What a diagnosis of positions says, of the stage `step`.
-    pub(crate) fn of_positions(step: &str, diagnosis: &Diagnosis) -> Self {
+    pub fn of_positions(step: &str, diagnosis: &Diagnosis) -> Self {
         let unseen = (VerdictTopic::NotObservable, &diagnosis.not_observable[..]);
         let next = (
             VerdictTopic::NextMeasurement,
@@ -415,7 +413,7 @@ impl VerdictSentences {
     }
 
     /// The same of a diagnosis of torques.
-    pub(crate) fn of_torques(step: &str, diagnosis: &TorqueDiagnosis) -> Self {
+    pub fn of_torques(step: &str, diagnosis: &TorqueDiagnosis) -> Self {
         let unseen = (VerdictTopic::NotObservable, &diagnosis.not_observable[..]);
         let remarks = (VerdictTopic::Remark, &diagnosis.remarks[..]);
         Self::of(step, &[unseen, remarks])

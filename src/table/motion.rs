@@ -1,44 +1,44 @@
 //! An arm that moves: joints and their torques or motor currents, in the order of time. SI in Rust, mm and rad in the table.
 
+use crate::Table;
 use crate::dynamics::TorqueDiagnosis;
 use crate::error::Result;
+use crate::recording::{declared, interleaved, numbers, prismatic, push_numbers};
 use crate::store::frame::{Cell, Frame, FrameBuilder};
-use crate::table::Table;
-use crate::table::recording::{declared, interleaved, numbers, prismatic, push_numbers};
 use crate::units::Unit;
 use std::collections::BTreeMap;
 
 /// Rows in the order of time; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ArmMotion {
-    pub(crate) joints: usize,
-    pub(crate) prismatic: Vec<bool>,
+    pub joints: usize,
+    pub prismatic: Vec<bool>,
     /// From 1.
-    pub(crate) sequence: Vec<i64>,
+    pub sequence: Vec<i64>,
     /// Stretch of the recording, from 1.
-    pub(crate) trajectory: Vec<i64>,
+    pub trajectory: Vec<i64>,
     /// What rows may be for.
-    pub(crate) usages: Vec<String>,
+    pub usages: Vec<String>,
     /// Which of [`ArmMotion::usages`] a row is for; none where the recording says nothing.
-    pub(crate) usage: Vec<Option<u16>>,
+    pub usage: Vec<Option<u16>>,
     /// s, ascending in a trajectory.
-    pub(crate) time: Vec<f64>,
+    pub time: Vec<f64>,
     /// rad or m.
-    pub(crate) q: Vec<f64>,
+    pub q: Vec<f64>,
     /// rad/s or m/s.
-    pub(crate) velocity: Option<Vec<f64>>,
+    pub velocity: Option<Vec<f64>>,
     /// A, of the motors.
-    pub(crate) current: Option<Vec<f64>>,
+    pub current: Option<Vec<f64>>,
     /// Nm, on the side of the joints.
-    pub(crate) torque: Option<Vec<f64>>,
+    pub torque: Option<Vec<f64>>,
     /// Nm, on the side of the joints, by another simulation.
-    pub(crate) simulated: Option<Vec<f64>>,
+    pub simulated: Option<Vec<f64>>,
     /// C; NaN where a row has none.
-    pub(crate) temperature: Option<Vec<f64>>,
+    pub temperature: Option<Vec<f64>>,
 }
 
 impl ArmMotion {
-    pub(crate) fn rows(&self) -> usize {
+    pub fn rows(&self) -> usize {
         self.sequence.len()
     }
 }
@@ -135,25 +135,25 @@ fn at_joint(name: &str, joint: usize) -> String {
 /// The judged rows; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TorqueCourse {
-    pub(crate) joints: usize,
+    pub joints: usize,
     /// Which joints slide: m and N in the place of rad and Nm.
-    pub(crate) prismatic: Vec<bool>,
-    pub(crate) sequence: Vec<i64>,
+    pub prismatic: Vec<bool>,
+    pub sequence: Vec<i64>,
     /// s.
-    pub(crate) time: Vec<f64>,
+    pub time: Vec<f64>,
     /// Whether no step was fitted to the row.
-    pub(crate) held_out: Vec<bool>,
+    pub held_out: Vec<bool>,
     /// Whether something pushed on the arm.
-    pub(crate) in_event: Vec<bool>,
-    pub(crate) rest: Vec<bool>,
+    pub in_event: Vec<bool>,
+    pub rest: Vec<bool>,
     /// rad/s.
-    pub(crate) velocity: Vec<f64>,
+    pub velocity: Vec<f64>,
     /// Nm.
-    pub(crate) measured: Vec<f64>,
+    pub measured: Vec<f64>,
     /// Nm: of the rigid arm alone.
-    pub(crate) simulated: Vec<f64>,
+    pub simulated: Vec<f64>,
     /// Nm: with the findings.
-    pub(crate) corrected: Vec<f64>,
+    pub corrected: Vec<f64>,
 }
 
 impl TorqueCourse {
@@ -180,7 +180,7 @@ impl TorqueCourse {
     }
 
     /// A joint's part of a row-major list, by row.
-    pub(crate) fn of_joint<'a, T: Copy>(
+    pub fn of_joint<'a, T: Copy>(
         &self,
         all: &'a [T],
         joint: usize,

@@ -10,14 +10,14 @@ pub const UNFOLDED: &str = "unfolded";
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FitContext {
     /// Rank of the geometry, found and by theory, where all of it was asked for.
-    pub(crate) geometry: Option<(usize, usize)>,
+    pub geometry: Option<(usize, usize)>,
     /// Standard deviation of the joints that rows are weighted by, rad.
-    pub(crate) repeatability: Option<f64>,
-    pub(crate) folds: Option<usize>,
+    pub repeatability: Option<f64>,
+    pub folds: Option<usize>,
     /// Poses that were too few, or too many, for the cross-validation that was asked for.
-    pub(crate) unfolded: Option<usize>,
+    pub unfolded: Option<usize>,
     /// Parameters of the model whose covariance is an earlier step's.
-    pub(crate) earlier: usize,
+    pub earlier: usize,
 }
 
 impl Observability {

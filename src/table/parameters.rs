@@ -10,9 +10,9 @@ use crate::error::{Error, Result};
 use crate::estimate::{
     CONFLICT, Covariance, Determined, Fitted, Model, ParameterStatus, PriorCheck, beyond_tolerance,
 };
-use crate::robot::{Anchor, MeasurementSetup, RobotModel, Shape, Target};
 use crate::spatial::Pose;
 use crate::units::Unit;
+use calib_numerics::robot::{Anchor, MeasurementSetup, RobotModel, Shape, Target};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -153,7 +153,7 @@ impl Parameters {
     }
 
     /// The same with what would show a parameter (by name) added to its remark.
-    pub(crate) fn with_advice(mut self, advice: &BTreeMap<String, String>) -> Self {
+    pub fn with_advice(mut self, advice: &BTreeMap<String, String>) -> Self {
         for row in &mut self.0 {
             row.remark = joined([row.remark.take(), advice.get(&row.name).cloned()]);
         }
@@ -161,7 +161,7 @@ impl Parameters {
     }
 
     /// The same, with what they correct, which their remarks tell people.
-    pub(crate) fn correcting(mut self, corrected: Corrected) -> Self {
+    pub fn correcting(mut self, corrected: Corrected) -> Self {
         if corrected == Corrected::OutsideSimulation {
             for row in &mut self.0 {
                 row.corrects = Some(Corrected::OUTSIDE.into());
@@ -191,7 +191,7 @@ impl Parameters {
     }
 
     /// The effects of the whole arm in this model, in the registry's order.
-    pub(crate) fn effects(&self) -> Vec<&'static str> {
+    pub fn effects(&self) -> Vec<&'static str> {
         let has = |name: &&str| {
             self.0
                 .iter()
@@ -217,7 +217,7 @@ impl Parameters {
     }
 
     /// What belongs to the arm and not to the measurement by which it was identified. Fails where a form cannot be read.
-    pub(crate) fn of_the_arm(&self) -> Result<Self> {
+    pub fn of_the_arm(&self) -> Result<Self> {
         let mut rows = Vec::with_capacity(self.0.len());
         for row in &self.0 {
             let form = row.form.as_deref().map(read_form).transpose()?;
@@ -229,7 +229,7 @@ impl Parameters {
     }
 
     /// [`Parameters::model`] of a robot whose base stands elsewhere.
-    pub(crate) fn model_standing(
+    pub fn model_standing(
         &self,
         base: Pose,
         robot: RobotModel,
@@ -360,7 +360,7 @@ impl Parameters {
     }
 
     /// The same of a robot whose base stands elsewhere in the tracker's frame.
-    pub(crate) fn standing_at(mut self, base: &Pose) -> Self {
+    pub fn standing_at(mut self, base: &Pose) -> Self {
         let (translation, rotation) = (base.translation, base.rotation_vector());
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             for (ending, value, unit) in [
@@ -378,7 +378,7 @@ impl Parameters {
     }
 
     /// Where the base stands in the tracker's frame; the identity without `base_frame`.
-    pub(crate) fn base_pose(&self) -> Pose {
+    pub fn base_pose(&self) -> Pose {
         let value = |axis: &str, unit: Unit| {
             let name = format!("{}.{axis}", names::BASE_FRAME);
             self.0

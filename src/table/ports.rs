@@ -27,7 +27,7 @@ pub struct Port {
     /// How many tables it takes.
     pub arity: Arity,
     /// Whether its table is read chunk by chunk.
-    pub(crate) chunked: bool,
+    pub chunked: bool,
 }
 
 /// What a field of a `reads!` struct may be: `T`, `Option<T>`, `Vec<Labelled<T>>`, `Chunks<T>`, or `Chunks<T>` with their labels.
@@ -122,6 +122,7 @@ pub enum Output {
 }
 
 /// Declares input ports: `reads! { pub struct IdentifyReads { robot: Robot, parameters: Option<Parameters>, } }`.
+#[macro_export]
 macro_rules! reads {
     ($(#[$doc:meta])* pub struct $name:ident { $( $field:ident: $ty:ty, )* }) => {
         $(#[$doc])*
@@ -129,14 +130,14 @@ macro_rules! reads {
             #[doc = concat!("The port `", stringify!($field), "`.")]
             pub $field: $ty,
         )* }
-        impl crate::table::ports::Reads for $name {
-            fn ports() -> Vec<crate::table::ports::Port> {
-                vec![ $( crate::table::ports::Port { name: stringify!($field), kind: <$ty as crate::table::ports::PortValue>::KIND, arity: <$ty as crate::table::ports::PortValue>::ARITY, chunked: <$ty as crate::table::ports::PortValue>::CHUNKED } ),* ]
+        impl $crate::ports::Reads for $name {
+            fn ports() -> Vec<$crate::ports::Port> {
+                vec![ $( $crate::ports::Port { name: stringify!($field), kind: <$ty as $crate::ports::PortValue>::KIND, arity: <$ty as $crate::ports::PortValue>::ARITY, chunked: <$ty as $crate::ports::PortValue>::CHUNKED } ),* ]
             }
             #[allow(unused_mut, unused_variables)]
-            fn take(inputs: Vec<Vec<(String, crate::table::ports::InputTable)>>) -> crate::error::Result<Self> {
+            fn take(inputs: Vec<Vec<(String, $crate::ports::InputTable)>>) -> ::calib_foundation::error::Result<Self> {
                 let mut inputs = inputs.into_iter();
-                Ok(Self { $( $field: <$ty as crate::table::ports::PortValue>::take(inputs.next().expect("one entry per port"))?, )* })
+                Ok(Self { $( $field: <$ty as $crate::ports::PortValue>::take(inputs.next().expect("one entry per port"))?, )* })
             }
         }
     };
@@ -157,6 +158,7 @@ impl<T: Table> Produced for T {
 }
 
 /// Declares output ports: `writes! { pub struct IdentifyWrites { parameters: Parameters, } }`.
+#[macro_export]
 macro_rules! writes {
     ($(#[$doc:meta])* pub struct $name:ident { $( $field:ident: $ty:ty, )* }) => {
         $(#[$doc])*
@@ -164,18 +166,16 @@ macro_rules! writes {
             #[doc = concat!("The port `", stringify!($field), "`.")]
             pub $field: $ty,
         )* }
-        impl crate::table::ports::Writes for $name {
-            fn ports() -> Vec<crate::table::ports::Port> {
-                vec![ $( crate::table::ports::Port { name: stringify!($field), kind: <$ty as crate::table::ports::Produced>::KIND, arity: crate::table::ports::Arity::One, chunked: false } ),* ]
+        impl $crate::ports::Writes for $name {
+            fn ports() -> Vec<$crate::ports::Port> {
+                vec![ $( $crate::ports::Port { name: stringify!($field), kind: <$ty as $crate::ports::Produced>::KIND, arity: $crate::ports::Arity::One, chunked: false } ),* ]
             }
-            fn give(self) -> crate::error::Result<Vec<crate::table::ports::Output>> {
-                Ok(vec![ $( crate::table::ports::Produced::give(self.$field)? ),* ])
+            fn give(self) -> ::calib_foundation::error::Result<Vec<$crate::ports::Output>> {
+                Ok(vec![ $( $crate::ports::Produced::give(self.$field)? ),* ])
             }
         }
     };
 }
-
-pub(crate) use {reads, writes};
 
 /// A table written chunk by chunk, for what does not fit into memory.
 pub struct Streamed {
@@ -190,7 +190,7 @@ pub struct StreamedTable<T>(Streamed, PhantomData<fn() -> T>);
 
 impl<T: Table> StreamedTable<T> {
     /// A finished table of this kind; panics where it is another.
-    pub(crate) fn new(streamed: Streamed) -> Self {
+    pub fn new(streamed: Streamed) -> Self {
         assert_eq!(streamed.kind, T::KIND, "a sink of another kind");
         Self(streamed, PhantomData)
     }
@@ -246,12 +246,12 @@ impl InputTable {
 pub struct Chunks<T>(InputTable, PhantomData<fn() -> T>);
 
 impl<T: Table> Chunks<T> {
-    pub(crate) fn rows(&self) -> usize {
+    pub fn rows(&self) -> usize {
         self.0.rows()
     }
 
     /// Hands on all rows in their order, chunk by chunk.
-    pub(crate) fn each(&self, mut take: impl FnMut(T) -> Result<()>) -> Result<()> {
+    pub fn each(&self, mut take: impl FnMut(T) -> Result<()>) -> Result<()> {
         self.0.chunks(&mut |frame| take(T::from_frame(frame)?))
     }
 }

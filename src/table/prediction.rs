@@ -3,10 +3,10 @@
 use crate::error::counted;
 use crate::estimate::{Covariance, Fitted, Model, Screening, Suspect, SuspectKind};
 use crate::observation::{KINDS, noise};
-use crate::robot::{Measurements, NoiseBasis};
-use crate::table::{
+use crate::{
     Corrections, Prediction, PredictionRow, Recording, Split, StatisticsRow, Suspects, SuspectsRow,
 };
+use calib_numerics::robot::{Measurements, NoiseBasis};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -68,7 +68,7 @@ impl Prediction {
     }
 
     /// Whether these are the points of a recording: its rows, names and measured points.
-    pub(crate) fn is_of(&self, recording: &Recording) -> bool {
+    pub fn is_of(&self, recording: &Recording) -> bool {
         let measured = |row: &PredictionRow| {
             [
                 row.x_mm + row.dx_mm,
@@ -117,7 +117,7 @@ impl Prediction {
     }
 
     /// Mean squared one-sigma length of the noise of the points that the step was fitted to, mm2; zero of none.
-    pub(crate) fn mean_square_noise_mm2(&self) -> f64 {
+    pub fn mean_square_noise_mm2(&self) -> f64 {
         let (sum, count) = self
             .fitted_points()
             .fold((0.0, 0usize), |(sum, count), row| {
@@ -127,7 +127,7 @@ impl Prediction {
     }
 
     /// The same with errors larger by a factor, by row: of rows that had a part in what they were brought to.
-    pub(crate) fn with_places(mut self, inflation: &BTreeMap<usize, f64>) -> Self {
+    pub fn with_places(mut self, inflation: &BTreeMap<usize, f64>) -> Self {
         inflation
             .iter()
             .filter(|(_, by)| by.is_finite())
@@ -136,7 +136,7 @@ impl Prediction {
     }
 
     /// The same with the errors of `rows` under fits without them.
-    pub(crate) fn with_folds<'a>(
+    pub fn with_folds<'a>(
         mut self,
         rows: impl Iterator<Item = (&'a usize, (&'a f64, &'a f64))>,
     ) -> Self {
@@ -148,7 +148,7 @@ impl Prediction {
     }
 
     /// The same with the weights of `rows` in a fit to them; 0 of those that were set aside.
-    pub(crate) fn with_weights(mut self, rows: &[usize], fitted: &Fitted) -> Self {
+    pub fn with_weights(mut self, rows: &[usize], fitted: &Fitted) -> Self {
         rows.iter().for_each(|row| {
             self.0[*row].weight = Some(fitted.downweighted.get(row).copied().unwrap_or(1.0))
         });
@@ -160,7 +160,7 @@ impl Prediction {
     }
 
     /// The same with a remark for each row behind what is said already; nothing where there is none.
-    pub(crate) fn with_remarks(
+    pub fn with_remarks(
         mut self,
         remarks: impl IntoIterator<Item = Option<String>>,
     ) -> Self {
@@ -171,7 +171,7 @@ impl Prediction {
     }
 
     /// The same with the rows marked that a screen set aside, and why those are in no headline that bear another row's name.
-    pub(crate) fn with_suspects(mut self, screening: &Screening) -> Self {
+    pub fn with_suspects(mut self, screening: &Screening) -> Self {
         for row in screening.set_aside() {
             self.0[row].suspect = true;
         }
@@ -266,7 +266,7 @@ fn remark(suspect: &Suspect, partner: Option<&str>) -> String {
 }
 
 /// E.g. `25.4 times too far`.
-pub(crate) fn slip(factor: f64) -> String {
+pub fn slip(factor: f64) -> String {
     let digits = |factor: f64| format!("{factor:.1}").trim_end_matches(".0").to_string();
     if factor > 1.0 {
         format!("{} times too far", digits(factor))
@@ -300,7 +300,7 @@ impl StatisticsRow {
     }
 
     /// Whether it is of rows of contact constraints: folds are places then.
-    pub(crate) fn is_contact(&self) -> bool {
+    pub fn is_contact(&self) -> bool {
         let is_named = |word: &str| self.set.ends_with(&format!("({word})"));
         KINDS
             .iter()
@@ -308,14 +308,14 @@ impl StatisticsRow {
     }
 
     /// Whether its figures of noise rest on nothing that was stated or measured again.
-    pub(crate) fn is_inferred(&self) -> bool {
+    pub fn is_inferred(&self) -> bool {
         self.noise_basis.as_deref() == Some(NoiseBasis::Inferred.name())
     }
 }
 
 impl Corrections {
     /// Root mean square error (mm) of the training rows under the rival that was kept, each row unseen; none where it could not be tried.
-    pub(crate) fn rms_mm(&self) -> Option<f64> {
+    pub fn rms_mm(&self) -> Option<f64> {
         self.0.iter().find(|row| row.chosen)?.rms_mm
     }
 }

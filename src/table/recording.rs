@@ -1,15 +1,15 @@
 //! The recording: joints as commanded or logged, and what was measured of the tool. SI in Rust, mm and rad in the table.
 
 use super::Split;
+use crate::Table;
 use crate::error::{Error, Result, instead};
 use crate::observation::{DeclaredColumn, KINDS};
-use crate::robot::{
+use crate::store::frame::{Cell, Column, Frame, FrameBuilder};
+use crate::units::Unit;
+use calib_numerics::robot::{
     CIRCUMSTANCES, Measurements, Memories, Named, NoiseBasis, PointReadings, START, Sequence,
     SigmaSource, law_columns,
 };
-use crate::store::frame::{Cell, Column, Frame, FrameBuilder};
-use crate::table::Table;
-use crate::units::Unit;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -134,7 +134,7 @@ impl Recording {
     }
 
     /// The name of what holds a row's target, where that contact is what was measured.
-    pub(crate) fn contact(&self, row: usize) -> Option<&str> {
+    pub fn contact(&self, row: usize) -> Option<&str> {
         let settings = KINDS
             .iter()
             .filter(|kind| kind.is_contact())
@@ -372,7 +372,7 @@ pub(super) fn interleaved<T: Copy>(columns: &[Vec<T>]) -> Vec<T> {
 
 impl Split {
     /// Rows of the recording in any of `sets`. A set without rows, or a split of another recording, is an error.
-    pub(crate) fn rows(&self, recording: &Recording, sets: &[String]) -> Result<Vec<usize>> {
+    pub fn rows(&self, recording: &Recording, sets: &[String]) -> Result<Vec<usize>> {
         let same = self.0.len() == recording.rows()
             && self
                 .0

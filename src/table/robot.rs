@@ -6,8 +6,8 @@ use crate::description::{
     RobotDescription,
 };
 use crate::error::{Error, Result};
-use crate::robot::{Bound, CountedCoupling, JointConvention};
 use crate::units::Unit;
+use calib_numerics::robot::{Bound, CountedCoupling, JointConvention};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -393,7 +393,7 @@ impl JointConventions {
     }
 
     /// The convention that the rows hold; fails where a zero is missing, a sign is none, or a joint is named that is not there.
-    pub(crate) fn to_convention(&self) -> Result<JointConvention> {
+    pub fn to_convention(&self) -> Result<JointConvention> {
         let fault = |row: &JointConventionRow, message: String| {
             Error::data(format!("table convention, joint {}", row.joint), message)
         };
@@ -515,7 +515,7 @@ macro_rules! of_one_robot {
     ($table:ident, $kind:literal) => {
         impl $table {
             /// The same as the model of this robot.
-            pub(crate) fn of_robot(mut self, robot: &RobotDescription) -> Self {
+            pub fn of_robot(mut self, robot: &RobotDescription) -> Self {
                 let RobotIdentity { name, kinematics } = RobotIdentity::of(robot);
                 for row in &mut self.0 {
                     (row.robot, row.kinematics) = (Some(name.clone()), Some(kinematics.clone()));
@@ -524,14 +524,14 @@ macro_rules! of_one_robot {
             }
 
             /// Whether the table says of which robot it is.
-            pub(crate) fn says_its_robot(&self) -> bool {
+            pub fn says_its_robot(&self) -> bool {
                 self.0
                     .iter()
                     .all(|row| row.robot.is_some() && row.kinematics.is_some())
             }
 
             /// Fails where the table says that it is the model of another robot.
-            pub(crate) fn must_be_of(&self, robot: &RobotDescription) -> Result<()> {
+            pub fn must_be_of(&self, robot: &RobotDescription) -> Result<()> {
                 let other = RobotIdentity::of(robot);
                 let mut stated = self
                     .0

@@ -35,38 +35,38 @@ pub struct Unseen {
 
 /// A step that predicts.
 pub struct Step {
-    pub(crate) id: String,
+    pub id: String,
     /// Whether it has a model of its own; else it learned on the step before it that has.
-    pub(crate) is_identified: bool,
+    pub is_identified: bool,
     /// Its errors at rows that its fits have not seen.
-    pub(crate) unseen: Unseen,
+    pub unseen: Unseen,
 }
 
 /// The step that stands.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Standing {
     /// Id of the stage that stands for the run.
-    pub(crate) step: String,
+    pub step: String,
     /// The step whose parameters it rests on: itself, or the one that it learned on.
-    pub(crate) model: String,
+    pub model: String,
     /// Later steps that were worse.
-    pub(crate) withdrawn: Vec<Withdrawn>,
+    pub withdrawn: Vec<Withdrawn>,
     /// An earlier step that is better at points that no step was fitted to.
-    pub(crate) contradicted: Option<Contradicted>,
+    pub contradicted: Option<Contradicted>,
 }
 
 /// A step that was worse than one before it, rms of the same points.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Withdrawn {
     /// Id of the stage that is withdrawn.
-    pub(crate) step: String,
+    pub step: String,
     /// Its rms at the points that both predict without having seen them.
-    pub(crate) rms_mm: f64,
+    pub rms_mm: f64,
     /// Id of the earlier stage.
-    pub(crate) than: String,
+    pub than: String,
     /// The rms of that one at the same points.
-    pub(crate) than_rms_mm: f64,
-    pub(crate) points: usize,
+    pub than_rms_mm: f64,
+    pub points: usize,
 }
 
 /// The same of the step that stands, at points that choose nothing.
@@ -107,7 +107,7 @@ impl fmt::Display for Contradicted {
 
 impl Standing {
     /// What a person must know of the choice, a sentence each.
-    pub(crate) fn warnings(&self) -> impl Iterator<Item = String> + '_ {
+    pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
         self.withdrawn
             .iter()
             .map(ToString::to_string)
@@ -130,7 +130,7 @@ impl Unseen {
     }
 
     /// The same from a table `prediction` of which nothing else is read.
-    pub(crate) fn of_frame(frame: &Frame) -> Result<Self> {
+    pub fn of_frame(frame: &Frame) -> Result<Self> {
         let (sequence, error) = (
             frame.read::<i64>("sequence")?,
             frame.read::<f64>("error_mm")?,

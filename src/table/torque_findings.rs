@@ -68,7 +68,7 @@ impl JointTorques {
 
 impl TorqueVerdictRow {
     /// Whether files and robot do not belong together as they are read.
-    pub(crate) fn is_wrong_setup(&self) -> bool {
+    pub fn is_wrong_setup(&self) -> bool {
         self.verdict == VerdictKind::WrongSetup.name()
     }
 }

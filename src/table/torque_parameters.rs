@@ -129,7 +129,7 @@ impl TorqueParameters {
 
     /// Dry friction of each joint (n, Nm); `None` where none was found, or less than is sure: what an arm has in the model without a name may
     /// as well be nothing, and says nothing of where a joint rests.
-    pub(crate) fn dry_friction(&self, joints: usize) -> Vec<Option<f64>> {
+    pub fn dry_friction(&self, joints: usize) -> Vec<Option<f64>> {
         let at = |joint: usize| {
             let place = Place::Joint(joint).to_string();
             let here = |row: &&TorqueParameterRow| {
@@ -142,7 +142,7 @@ impl TorqueParameters {
     }
 
     /// The model, without its covariance. Fails where rows that every model has are missing or not understood.
-    pub(crate) fn to_model(&self) -> Result<TorqueModel> {
+    pub fn to_model(&self) -> Result<TorqueModel> {
         let joints = (1..)
             .take_while(|joint| {
                 self.value(&format!("{SEEN}.j{joint}.{}", RANGE[0].0))
@@ -373,7 +373,7 @@ impl TorqueCovariance {
     }
 
     /// Covariance of a model's numbers in the order of its names, row-major. Fails where a pair is missing or a term has no cause.
-    pub(crate) fn of_model(&self, model: &TorqueModel) -> Result<Vec<f64>> {
+    pub fn of_model(&self, model: &TorqueModel) -> Result<Vec<f64>> {
         let names = model.names()?;
         let width = names.len();
         let places: BTreeMap<&str, usize> = names

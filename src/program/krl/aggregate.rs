@@ -20,7 +20,7 @@ pub(super) struct Type {
 }
 
 impl Type {
-    pub(crate) const FRAME: Self = Self {
+    pub const FRAME: Self = Self {
         axes: false,
         externals: 0,
         status: false,
@@ -44,7 +44,7 @@ impl Type {
         })
     }
 
-    pub(crate) fn is_of_axes(self) -> bool {
+    pub fn is_of_axes(self) -> bool {
         self.axes
     }
 
@@ -72,7 +72,7 @@ pub(super) struct Aggregate<'t, 'p> {
 type Field = (String, f64, Range<usize>);
 
 impl<'t, 'p> Aggregate<'t, 'p> {
-    pub(crate) fn new(tokens: &'t [Token<'p>]) -> Self {
+    pub fn new(tokens: &'t [Token<'p>]) -> Self {
         let mut inner = &tokens[1..tokens.len() - 1];
         let mut prefix = None;
         if let [name, colon, tail @ ..] = inner
@@ -101,7 +101,7 @@ impl<'t, 'p> Aggregate<'t, 'p> {
     }
 
     /// What it is as operand of a motion.
-    pub(crate) fn by_fields(&self) -> Type {
+    pub fn by_fields(&self) -> Type {
         let axes = self.has_axes();
         Type {
             axes,
@@ -111,14 +111,14 @@ impl<'t, 'p> Aggregate<'t, 'p> {
     }
 
     /// X, Y, Z, A, B, C and nothing else: a FRAME as much as a POS.
-    pub(crate) fn is_frame(&self) -> bool {
+    pub fn is_frame(&self) -> bool {
         let names: Vec<String> = self.names().collect();
         names.iter().any(|name| name == "X")
             && names.iter().all(|name| FRAME.contains(&name.as_str()))
     }
 
     /// Whether its fields are those of a target.
-    pub(crate) fn may_be_target(&self) -> bool {
+    pub fn may_be_target(&self) -> bool {
         let names: Vec<String> = self.names().collect();
         let is_of = |sets: &[&[&str]], name: &String| sets.concat().contains(&name.as_str());
         let all = |sets: &[&[&str]]| names.iter().all(|name| is_of(sets, name));
@@ -133,7 +133,7 @@ impl<'t, 'p> Aggregate<'t, 'p> {
     }
 
     /// How its type is stated.
-    pub(crate) fn advice(&self) -> &'static str {
+    pub fn advice(&self) -> &'static str {
         if self.has_axes() {
             "`{E6AXIS: ...}`"
         } else {
@@ -142,7 +142,7 @@ impl<'t, 'p> Aggregate<'t, 'p> {
     }
 
     /// Takes it as a target of type `kind`, or says everything that is wrong with it.
-    pub(crate) fn take(&self, kind: Type, found: &mut Gathered) {
+    pub fn take(&self, kind: Type, found: &mut Gathered) {
         let before = found.faults.len();
         let mut numbers: Vec<Field> = Vec::new();
         let mut at = self.tokens[0].end;

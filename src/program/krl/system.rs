@@ -48,7 +48,7 @@ pub(super) struct SystemData {
 /// The state of a program: what is in force, and the point whose data come next.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct SystemState {
-    pub(crate) force: InForce,
+    pub force: InForce,
     point: Option<String>,
     /// Why the robot does not carry the tool in `$BASE`.
     not_in_base: Setting<String>,
@@ -70,14 +70,14 @@ impl JoinedState for SystemState {
 
 impl SystemState {
     /// At the beginning of a program.
-    pub(crate) const START: Self = Self {
+    pub const START: Self = Self {
         force: InForce::NOTHING,
         point: None,
         not_in_base: Setting::Unset,
     };
 
     /// What is in force at a motion.
-    pub(crate) fn at_motion(&self) -> InForce {
+    pub fn at_motion(&self) -> InForce {
         let base = match &self.not_in_base {
             Setting::Unset => return self.force.clone(),
             Setting::Known(why, _) if why.is_empty() => return self.force.clone(),
@@ -104,7 +104,7 @@ fn note<K: Ord, T: PartialEq + Copy>(known: &mut BTreeMap<K, Option<T>>, key: K,
 
 impl SystemData {
     /// Adds what the lines of a file declare.
-    pub(crate) fn declare(&mut self, lines: &[&[Token]]) {
+    pub fn declare(&mut self, lines: &[&[Token]]) {
         for line in lines {
             if let Some((name, number, value)) = entry(line) {
                 match name.as_str() {
@@ -142,7 +142,7 @@ impl SystemData {
 
     /// Adds the routines of other files. What a routine calls may be declared behind it, or in a file behind its own: all are read until no
     /// further one is found to set anything.
-    pub(crate) fn declare_routines(&mut self, files: &[Vec<&[Token]>]) {
+    pub fn declare_routines(&mut self, files: &[Vec<&[Token]>]) {
         loop {
             let before = self.routines.clone();
             files
@@ -168,7 +168,7 @@ impl SystemData {
     }
 
     /// Whether a line sets what is in force.
-    pub(crate) fn sets(&self, line: &[Token]) -> bool {
+    pub fn sets(&self, line: &[Token]) -> bool {
         const SET: [&str; 7] = [
             "$BASE",
             "$TOOL",
@@ -364,7 +364,7 @@ impl SystemData {
     }
 
     /// Frames of tools by their names, as the files declare them.
-    pub(crate) fn tools(&self) -> impl Iterator<Item = ToolInForce> + '_ {
+    pub fn tools(&self) -> impl Iterator<Item = ToolInForce> + '_ {
         self.tools.keys().map(|number| self.tool_of(*number))
     }
 

@@ -18,7 +18,7 @@ pub(super) enum Want {
 }
 
 impl Want {
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         if self == Self::Joints {
             "jointtarget"
         } else {
@@ -54,7 +54,7 @@ impl<'t, 'p> Item<'t, 'p> {
 pub(super) struct List<'t, 'p> {
     span: Range<usize>,
     /// How many it has, brackets included.
-    pub(crate) tokens: usize,
+    pub tokens: usize,
     items: Vec<Item<'t, 'p>>,
 }
 
@@ -118,7 +118,7 @@ impl<'t, 'p> List<'t, 'p> {
     }
 
     /// The list that is item `k`.
-    pub(crate) fn list(&self, k: usize) -> Option<&List<'t, 'p>> {
+    pub fn list(&self, k: usize) -> Option<&List<'t, 'p>> {
         self.items.get(k)?.list()
     }
 
@@ -131,12 +131,12 @@ impl<'t, 'p> List<'t, 'p> {
     }
 
     /// Whether item `k` is a word, in any case.
-    pub(crate) fn is_word(&self, k: usize, word: &str) -> bool {
+    pub fn is_word(&self, k: usize, word: &str) -> bool {
         matches!(self.items.get(k), Some(Item::Leaf([token])) if token.is_word(&[word]))
     }
 
     /// What it, or a list inside it, has the form of: names may stand for some of its lists.
-    pub(crate) fn has_form(&self) -> Option<Want> {
+    pub fn has_form(&self) -> Option<Want> {
         let form = |want: &Want| {
             let fits = |(item, size): (&Item, &usize)| {
                 let of_size = |list: &List| list.items.len() == *size && list.is_flat();
@@ -160,7 +160,7 @@ impl<'t, 'p> List<'t, 'p> {
     }
 
     /// Takes the targets in it, those of an array where that is allowed, or says everything that is wrong.
-    pub(crate) fn take(&self, want: Want, array: bool, found: &mut Gathered) {
+    pub fn take(&self, want: Want, array: bool, found: &mut Gathered) {
         if !array || self.lists().all(List::is_flat) {
             return self.target(want, found);
         }

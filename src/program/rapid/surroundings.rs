@@ -38,7 +38,7 @@ pub(super) struct DeclaredSurroundings {
 
 impl DeclaredSurroundings {
     /// Adds what the statements of a file declare, and the loads that they grip.
-    pub(crate) fn declare_all(&mut self, statements: &[&[Token]]) {
+    pub fn declare_all(&mut self, statements: &[&[Token]]) {
         for statement in statements {
             match declaration(statement) {
                 Some(declared) => {
@@ -104,7 +104,7 @@ impl DeclaredSurroundings {
     }
 
     /// Frames of tools by their names, as the files declare them.
-    pub(crate) fn tools(&self) -> impl Iterator<Item = ToolInForce> + '_ {
+    pub fn tools(&self) -> impl Iterator<Item = ToolInForce> + '_ {
         self.tools.iter().map(|(name, frame)| ToolInForce {
             name: name.clone(),
             frame: frame.clone().ok(),

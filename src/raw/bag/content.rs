@@ -3,23 +3,23 @@
 use super::message::{self, KINDS};
 use super::{ENCODINGS, Message, Messages, Topic};
 use crate::error::{self, Error, Result, counted};
-use crate::raw::{InputSource, failed};
+use crate::{InputSource, failed};
 use std::collections::BTreeMap;
 
 /// What a bag holds of one topic; of one of frames, of one pair of them.
 #[derive(Debug, Clone, Default)]
 pub struct BagTopic {
     /// As the setting `topic` names it.
-    pub(crate) name: String,
-    pub(crate) kind: String,
+    pub name: String,
+    pub kind: String,
     encoding: String,
     /// Whether messages of this type, encoded so, are read.
-    pub(crate) is_read: bool,
-    pub(crate) messages: u64,
+    pub is_read: bool,
+    pub messages: u64,
     /// When the first and the last were received, s since 1970.
-    pub(crate) received: [f64; 2],
+    pub received: [f64; 2],
     /// The longest time between two of them, s.
-    pub(crate) gap: f64,
+    pub gap: f64,
 }
 
 impl BagTopic {
@@ -33,7 +33,7 @@ impl BagTopic {
         self.messages += 1;
     }
     /// In a line: type, number, rate, longest gap.
-    pub(crate) fn account(&self) -> String {
+    pub fn account(&self) -> String {
         let span = self.received[1] - self.received[0];
         let rate = if span > 0.0 {
             let (hertz, gap) = ((self.messages - 1) as f64 / span, self.gap);
@@ -54,8 +54,8 @@ impl BagTopic {
 
 /// What a bag holds.
 pub struct BagContent {
-    pub(crate) topics: Vec<BagTopic>,
-    pub(crate) loss: Option<String>,
+    pub topics: Vec<BagTopic>,
+    pub loss: Option<String>,
     source: Box<dyn InputSource>,
 }
 

@@ -1,7 +1,7 @@
 //! Messages of an MCAP file from its first byte to its last whole record: what the index at its end says is not needed.
 
 use super::{BagSource, Container, Message, Topic};
-use crate::raw::decoded;
+use crate::decoded;
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};

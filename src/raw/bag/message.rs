@@ -24,10 +24,10 @@ pub(super) enum FieldType {
 }
 
 pub(super) struct MessageKind {
-    pub(crate) name: &'static str,
+    pub name: &'static str,
     /// It holds any number of them; its two frames select the one that is read.
-    pub(crate) of_frames: bool,
-    pub(crate) parts: &'static [FieldType],
+    pub of_frames: bool,
+    pub parts: &'static [FieldType],
 }
 
 use FieldType::{Dimensions, Header, List, Names, Numbers, OfNames, Text};
@@ -165,10 +165,10 @@ pub(super) enum FieldValue {
 /// The columns that messages have, and the cells of the present one.
 #[derive(Default)]
 pub(super) struct MessageCells {
-    pub(crate) names: Vec<String>,
-    pub(crate) cells: Vec<FieldValue>,
+    pub names: Vec<String>,
+    pub cells: Vec<FieldValue>,
     /// New names make no columns any more.
-    pub(crate) is_closed: bool,
+    pub is_closed: bool,
     places: HashMap<String, usize>,
     /// Names of the joints of the last message as they stand in it, and the columns that are theirs, by name and kind of list.
     joints: Vec<u8>,

@@ -3,7 +3,7 @@
 //! table would know of, and it refuses a file that was cut, of which all pages that are there are read here.
 
 use super::{BagSource, Container, Message, Topic};
-use crate::raw::InputSource;
+use crate::InputSource;
 use std::collections::BTreeMap;
 use std::io::SeekFrom;
 use std::sync::Arc;

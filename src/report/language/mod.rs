@@ -48,10 +48,10 @@ fn entries(table: &'static str) -> impl Iterator<Item = (&'static str, &'static 
 
 impl PageLanguage {
     /// All of them.
-    pub(crate) const ALL: [Self; 2] = [Self::English, Self::German];
+    pub const ALL: [Self; 2] = [Self::English, Self::German];
 
     /// As settings and the command line name it.
-    pub(crate) fn code(self) -> &'static str {
+    pub fn code(self) -> &'static str {
         match self {
             Self::English => "en",
             Self::German => "de",
@@ -59,7 +59,7 @@ impl PageLanguage {
     }
 
     /// The language of a code.
-    pub(crate) fn of_code(code: &str) -> Option<Self> {
+    pub fn of_code(code: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.code() == code)
     }
 
@@ -262,14 +262,14 @@ const HOLES: [(&str, Piece); 3] = [
 ];
 
 /// The patterns of one language.
-pub(crate) struct StoredSentences {
+pub struct StoredSentences {
     whole: BTreeMap<&'static str, &'static str>,
     /// With their translation; those with most letters first.
     patterns: Vec<(Vec<Piece>, &'static str)>,
 }
 
 impl StoredSentences {
-    pub(crate) fn of(table: impl Iterator<Item = (&'static str, &'static str)>) -> Self {
+    pub fn of(table: impl Iterator<Item = (&'static str, &'static str)>) -> Self {
         let all = table.map(|(key, other)| (key, pieces(key), other));
         let (whole, patterns): (Vec<_>, Vec<_>) =
             all.partition(|(_, pieces, _)| matches!(pieces[..], [] | [Piece::Letters(_)]));
@@ -294,7 +294,7 @@ impl StoredSentences {
     }
 
     /// A text in the other language; none where the table does not have it.
-    pub(crate) fn translated(&self, text: &str) -> Option<String> {
+    pub fn translated(&self, text: &str) -> Option<String> {
         let known = RefCell::default();
         Reading { table: self, known }.text(text, 0)
     }

@@ -2,9 +2,9 @@
 
 use super::DriveColumns;
 use crate::error::{Error, Fault, Result, did_you_mean, listed};
+use crate::ingest::{TableLayout, records};
 use crate::raw::{DecimalMark, Record, TextLayout};
-use crate::stage::ingest::{TableLayout, records};
-use crate::stage::{Context, OpenedInput, RawFile};
+use crate::{Context, OpenedInput, RawFile};
 use std::ops::Range;
 
 /// What was read of one.
@@ -64,7 +64,7 @@ fn is_of_each(column: &str) -> bool {
 }
 
 /// A joint's name without the ending by which robot files tell joints from links.
-pub(crate) fn short(name: &str) -> &str {
+pub fn short(name: &str) -> &str {
     name.strip_suffix("_joint").unwrap_or(name)
 }
 

@@ -5,7 +5,7 @@ use super::{AngleUnit, DiagnoseDrives, DriveFile, DriveHoldOut, DriveRecording, 
 use crate::drives::mjcf::MjcfArm;
 use crate::drives::recording::{Recording, Trajectory};
 use crate::error::{Error, Fault, Result};
-use crate::stage::{Context, RawFile};
+use crate::{Context, RawFile};
 
 /// A recording's files, each with its place below `with`.
 pub(super) struct Source<'a> {

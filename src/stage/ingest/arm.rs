@@ -12,12 +12,12 @@ pub(super) const UNLIMITED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 pub(super) struct RobotJoints {
     /// Names of the joints; none where no robot is known.
-    pub(crate) names: Vec<String>,
-    pub(crate) prismatic: Vec<bool>,
+    pub names: Vec<String>,
+    pub prismatic: Vec<bool>,
     /// Travel of each joint, rad or m.
-    pub(crate) limits: Vec<[f64; 2]>,
+    pub limits: Vec<[f64; 2]>,
     /// The layout of its rows.
-    pub(crate) slots: Slots,
+    pub slots: Slots,
 }
 
 impl RobotJoints {
@@ -88,22 +88,22 @@ impl RobotJoints {
 pub(super) struct Slots {
     columns: Vec<(&'static DeclaredColumn, Range<usize>)>,
     texts: Vec<&'static str>,
-    pub(crate) count: usize,
-    pub(crate) time: usize,
-    pub(crate) q: Range<usize>,
-    pub(crate) velocity: Range<usize>,
-    pub(crate) point: Range<usize>,
-    pub(crate) kinds: Vec<KindSlots>,
+    pub count: usize,
+    pub time: usize,
+    pub q: Range<usize>,
+    pub velocity: Range<usize>,
+    pub point: Range<usize>,
+    pub kinds: Vec<KindSlots>,
 }
 
 pub(super) struct KindSlots {
-    pub(crate) kind: &'static dyn MeasurementKind,
-    pub(crate) values: Vec<usize>,
-    pub(crate) sigma: Vec<usize>,
+    pub kind: &'static dyn MeasurementKind,
+    pub values: Vec<usize>,
+    pub sigma: Vec<usize>,
     /// Whether each reading needs its standard deviation.
-    pub(crate) own_sigma: bool,
+    pub own_sigma: bool,
     /// Among the row's texts: the name of the place that holds the target, of a contact constraint.
-    pub(crate) name: Option<usize>,
+    pub name: Option<usize>,
 }
 
 impl Slots {

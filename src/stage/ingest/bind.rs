@@ -20,32 +20,32 @@ const SHOWN: usize = 60;
 /// Where a file's quantities stand, resolved against its header.
 #[derive(Default)]
 pub(super) struct Binding {
-    pub(crate) width: usize,
-    pub(crate) id: Option<TextBinding>,
+    pub width: usize,
+    pub id: Option<TextBinding>,
     /// In the order of the row's texts.
-    pub(crate) texts: Vec<Option<TextBinding>>,
+    pub texts: Vec<Option<TextBinding>>,
     /// Those that the file has.
-    pub(crate) worded: Vec<usize>,
+    pub worded: Vec<usize>,
     /// Quantities of several numbers: where they are, and how they are read.
-    pub(crate) conventions: Vec<(Range<usize>, &'static DeclaredColumn, &'static Convention)>,
+    pub conventions: Vec<(Range<usize>, &'static DeclaredColumn, &'static Convention)>,
     /// Whether the file has what a kind of measurement measured.
-    pub(crate) measures: bool,
-    pub(crate) sequence: Option<usize>,
-    pub(crate) cells: Vec<NumberBinding>,
+    pub measures: bool,
+    pub sequence: Option<usize>,
+    pub cells: Vec<NumberBinding>,
     /// The point of each target of a wide row.
-    pub(crate) points: Vec<(String, [NumberBinding; 3])>,
+    pub points: Vec<(String, [NumberBinding; 3])>,
     /// Numbers that are the same in every row, SI.
-    pub(crate) constants: Vec<(usize, f64)>,
+    pub constants: Vec<(usize, f64)>,
     /// The place of a time that is the row's number over a rate, Hz.
-    pub(crate) rated: Option<(usize, f64)>,
+    pub rated: Option<(usize, f64)>,
     /// Torques of dc motors.
-    pub(crate) motors: Vec<MotorBinding>,
+    pub motors: Vec<MotorBinding>,
     /// Joints (from 0) from which so many times another one is taken off.
-    pub(crate) coupled: Vec<(usize, usize, f64)>,
+    pub coupled: Vec<(usize, usize, f64)>,
     /// Places of a row's numbers that may be filled, ascending.
-    pub(crate) filled: Vec<usize>,
+    pub filled: Vec<usize>,
     /// Optional columns that the file does not have, for a note.
-    pub(crate) missing: Vec<String>,
+    pub missing: Vec<String>,
 }
 
 /// Text from a column, or for every row the same.
@@ -56,40 +56,40 @@ pub(super) enum TextBinding {
 
 pub(super) struct NumberBinding {
     /// Place in a row's numbers.
-    pub(crate) index: usize,
-    pub(crate) column: usize,
-    pub(crate) unit: Unit,
+    pub index: usize,
+    pub column: usize,
+    pub unit: Unit,
     /// What a recording may hold, SI.
-    pub(crate) range: [f64; 2],
+    pub range: [f64; 2],
     /// A direction: 1, -1 or 0.
-    pub(crate) is_direction: bool,
-    pub(crate) optional: bool,
+    pub is_direction: bool,
+    pub optional: bool,
     /// What the file's number is divided by: how many standard deviations an uncertainty is.
-    pub(crate) divisor: f64,
+    pub divisor: f64,
     /// What is taken off, SI, and the sign of what remains.
-    pub(crate) zero: f64,
-    pub(crate) sign: f64,
+    pub zero: f64,
+    pub sign: f64,
     /// The column, as people call it: `x_mm`, or `column 4`.
-    pub(crate) name: String,
-    pub(crate) difference: Option<Difference>,
+    pub name: String,
+    pub difference: Option<Difference>,
     /// Whether it holds clock times as text.
-    pub(crate) is_clock: bool,
+    pub is_clock: bool,
     /// The setting that states its unit.
-    pub(crate) unit_setting: &'static str,
+    pub unit_setting: &'static str,
 }
 
 /// The torque of a dc motor by its voltage, which is a duty times a supply where one is.
 pub(super) struct MotorBinding {
     /// Places of torque and velocity in a row's numbers.
-    pub(crate) torque: usize,
-    pub(crate) velocity: usize,
+    pub torque: usize,
+    pub velocity: usize,
     /// The voltage, or the duty.
-    pub(crate) drive: NumberBinding,
-    pub(crate) supply: Option<SupplyBinding>,
+    pub drive: NumberBinding,
+    pub supply: Option<SupplyBinding>,
     /// Nm/V.
-    pub(crate) per_volt: f64,
+    pub per_volt: f64,
     /// Nm s/rad.
-    pub(crate) per_speed: f64,
+    pub per_speed: f64,
 }
 
 /// Volts.
@@ -103,10 +103,10 @@ const MOST_VOLTS: f64 = 2e3;
 
 /// A column whose numbers are added to those of another, times the sign.
 pub(super) struct Difference {
-    pub(crate) column: usize,
-    pub(crate) sign: f64,
-    pub(crate) unit: Unit,
-    pub(crate) name: String,
+    pub column: usize,
+    pub sign: f64,
+    pub unit: Unit,
+    pub name: String,
 }
 
 impl Binding {
@@ -164,11 +164,11 @@ impl Binding {
 
 /// The names of a file's columns, if it has a header, else how many there are.
 pub(super) struct FileHeader {
-    pub(crate) label: String,
+    pub label: String,
     /// Line of the header, or of the first data row.
-    pub(crate) line: u64,
-    pub(crate) width: usize,
-    pub(crate) names: Option<Vec<String>>,
+    pub line: u64,
+    pub width: usize,
+    pub names: Option<Vec<String>>,
 }
 
 struct Binder<'a> {

@@ -2,13 +2,13 @@
 //!
 //! Nothing is guessed: an unmapped column is ignored, a mapped one that is not there is an error unless it is `optional`.
 
-use crate::observation::{ColumnShape, Convention, Conventions, DeclaredColumn};
-use crate::raw::DecimalMark;
-use crate::stage::RawFile;
-use crate::stage::ingest::mapped::{
+use crate::RawFile;
+use crate::ingest::mapped::{
     ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn,
     UncertaintyColumn,
 };
+use crate::observation::{ColumnShape, Convention, Conventions, DeclaredColumn};
+use crate::raw::DecimalMark;
 use crate::table::recording_columns;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
@@ -338,41 +338,41 @@ pub struct FileLayout {
     /// (.xlsx, .xlsm), a sheet of which is read as text is; a file of columns (Parquet; Feather and streams of Arrow, uncompressed or by zstd; arrays of NumPy, .npz), for which only
     /// `columns` matters: a list of numbers in it is a column for each, `state[1]`, `state[2]` and so on; JSON (a list of objects, or an object a line); or a recording of ROS 2 (.mcap, .db3,
     /// or the folder of its parts).
-    pub(crate) file: RawFile,
+    pub file: RawFile,
     /// The sheet of a workbook; without it the only visible one with rows of numbers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) sheet: Option<String>,
+    pub sheet: Option<String>,
     /// The topic of a recording of ROS 2 (.mcap, .db3), e.g. `/joint_states`; without it the only one whose type is read. Its fields are the
     /// columns: `received` and `stamp` (s), and by type `shoulder_pan_joint.position`, `point.x`, `data[1]` and so on. Transforms are named
     /// with their frames: `/tf base->tool0`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) topic: Option<String>,
+    pub topic: Option<String>,
     /// What stands between fields: one ASCII character, `tab`, or `whitespace` (any run of blanks and tabs).
     #[serde(default = "comma")]
-    pub(crate) delimiter: String,
+    pub delimiter: String,
     /// The decimal mark of the numbers.
     #[serde(default)]
-    pub(crate) decimal: DecimalMark,
+    pub decimal: DecimalMark,
     /// Whether a row of column names stands above the data.
-    #[serde(default = "crate::stage::yes")]
-    pub(crate) header: bool,
+    #[serde(default = "crate::yes")]
+    pub header: bool,
     /// Lines to skip above the header (above the data where there is no header).
     #[serde(default)]
-    pub(crate) skip: u64,
+    pub skip: u64,
     /// Lines to skip between header and data, e.g. a row of units.
     #[serde(default)]
-    pub(crate) skip_below_header: u64,
+    pub skip_below_header: u64,
     /// Lines that begin with this text are skipped, e.g. `#`.
     #[serde(default)]
-    pub(crate) comment: Option<String>,
+    pub comment: Option<String>,
     /// The header is written as a comment: it begins with the text of `comment`, which is no part of the first name.
     #[serde(default, skip_serializing_if = "is_false")]
-    pub(crate) header_in_comment: bool,
+    pub header_in_comment: bool,
     /// Where several targets stand side by side in a row, the columns of each, instead of x, y, z and target under `columns`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) targets: Option<WideTargets>,
+    pub targets: Option<WideTargets>,
     /// Which column holds which quantity.
-    pub(crate) columns: Columns,
+    pub columns: Columns,
 }
 
 /// What a wide row holds of a recording.
@@ -386,10 +386,10 @@ pub(super) const SIMULATED: [&str; 3] = ["sim_x", "sim_y", "sim_z"];
 #[serde(deny_unknown_fields)]
 pub struct WideTargets {
     /// Unit of the file's numbers, e.g. `mm`.
-    pub(crate) unit: String,
+    pub unit: String,
     /// The columns of x, y and z by the target's name, e.g. `{smr1: [X1, Y1, Z1], smr2: [X2, Y2, Z2]}`; blank cells, or a point at 0, 0, 0,
     /// are a target that was not seen.
-    pub(crate) columns: BTreeMap<String, [ColumnRef; 3]>,
+    pub columns: BTreeMap<String, [ColumnRef; 3]>,
 }
 
 impl FileLayout {

@@ -2,8 +2,8 @@
 
 use super::Ingest;
 use super::columns::FileLayout;
+use crate::RawFile;
 use crate::error::{Place, counted};
-use crate::stage::RawFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Component, PathBuf};
@@ -13,14 +13,14 @@ use std::path::{Component, PathBuf};
 #[serde(deny_unknown_fields)]
 pub struct LaterFiles {
     /// A path for each of `files`, in their order.
-    pub(crate) files: Vec<RawFile>,
+    pub files: Vec<RawFile>,
     /// Where the clock of these files starts again: from the last row before to their first one, s.
     #[serde(default = "hour")]
-    pub(crate) gap_s: f64,
+    pub gap_s: f64,
     /// The target that these files measured, where several reflectors were measured in the same poses, each into a file: it stands for
     /// the `target` of `files`. A file of joints may then be the same, and rows keep their times.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) target: Option<String>,
+    pub target: Option<String>,
 }
 
 impl LaterFiles {
@@ -136,13 +136,13 @@ impl Default for Continuation {
 
 impl Continuation {
     /// Before the first row of a later measurement; without a gap its clock is that of the rows before.
-    pub(crate) fn begin(&mut self, gap_s: Option<f64>) {
+    pub fn begin(&mut self, gap_s: Option<f64>) {
         (self.begun, self.sequence_by, self.time_by) = (Some(gap_s), 0, 0.0);
     }
 
     /// The place and the time of the next row in the recording, from those of its file. `Err` holds the place of the row before where
     /// the row does not follow it.
-    pub(crate) fn next(&mut self, sequence: i64, time: f64) -> Result<(i64, f64), (i64, i64)> {
+    pub fn next(&mut self, sequence: i64, time: f64) -> Result<(i64, f64), (i64, i64)> {
         if let Some(gap) = self.begun.take() {
             let last = self.last.filter(|last| sequence <= *last);
             self.sequence_by = last.map_or(0, |last| last.saturating_sub(sequence - 1));

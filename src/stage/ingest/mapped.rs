@@ -33,24 +33,24 @@ impl fmt::Display for ColumnRef {
 pub struct TextColumn {
     /// Name or number of the column.
     #[serde(default)]
-    pub(crate) column: Option<ColumnRef>,
+    pub column: Option<ColumnRef>,
     /// The text of every row, instead of a column.
     #[serde(default)]
-    pub(crate) value: Option<String>,
+    pub value: Option<String>,
     /// The text of every row by the path of the file: what stands for the braces at its end, e.g. `"{position}/hole_{n}.csv"` names the
     /// rows of `data/front/hole_0.csv` `front/0`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) path: Option<String>,
+    pub path: Option<String>,
     /// The column may be missing from the file, and its cells may be blank.
     #[serde(default)]
-    pub(crate) optional: bool,
+    pub optional: bool,
     /// What of a name counts, for `point_id`: `number` for its last whole number, so that `Pose 17` and `pt_017` are one point; without
     /// it, the whole name.
     #[serde(default, rename = "match", skip_serializing_if = "Option::is_none")]
-    pub(crate) matching: Option<NameMatch>,
+    pub matching: Option<NameMatch>,
     /// What is taken off the beginning of every name, for `point_id`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) strip: Option<String>,
+    pub strip: Option<String>,
 }
 
 /// What of a point's name counts.
@@ -89,7 +89,7 @@ pub fn last_number(name: &str) -> Option<&str> {
 #[serde(deny_unknown_fields)]
 pub struct CountColumn {
     /// Name or number of the column.
-    pub(crate) column: ColumnRef,
+    pub column: ColumnRef,
 }
 
 /// A column of numbers, or the same number for every row of the file.
@@ -98,29 +98,29 @@ pub struct CountColumn {
 pub struct ScalarColumn {
     /// Name or number of the column.
     #[serde(default)]
-    pub(crate) column: Option<ColumnRef>,
+    pub column: Option<ColumnRef>,
     /// A column whose number is taken off, for lengths: where the file holds the target in `column` and, instead of the measured
     /// point, target less measured point here.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) minus: Option<ColumnRef>,
+    pub minus: Option<ColumnRef>,
     /// A column whose number is added, for lengths: measured point less target.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) plus: Option<ColumnRef>,
+    pub plus: Option<ColumnRef>,
     /// Unit of the column `minus` or `plus`; without it `unit`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) difference_unit: Option<String>,
+    pub difference_unit: Option<String>,
     /// The number of every row, instead of a column.
     #[serde(default)]
-    pub(crate) value: Option<f64>,
+    pub value: Option<f64>,
     /// For `time`, instead of a column: rows a second, Hz, of a file whose rows come evenly; the first is at 0 s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) rate: Option<f64>,
+    pub rate: Option<f64>,
     /// Unit of the file's numbers, e.g. `mm`; `clock` where a time is a time of day (08:15:03) or a date with a time (ISO 8601).
     #[serde(default)]
-    pub(crate) unit: Option<String>,
+    pub unit: Option<String>,
     /// The column may be missing from the file, and its cells may be blank.
     #[serde(default)]
-    pub(crate) optional: bool,
+    pub optional: bool,
 }
 
 /// A column of uncertainties, or the same uncertainty for every row of the file.
@@ -129,19 +129,19 @@ pub struct ScalarColumn {
 pub struct UncertaintyColumn {
     /// Name or number of the column.
     #[serde(default)]
-    pub(crate) column: Option<ColumnRef>,
+    pub column: Option<ColumnRef>,
     /// The uncertainty of every row, instead of a column.
     #[serde(default)]
-    pub(crate) value: Option<f64>,
+    pub value: Option<f64>,
     /// Unit of the file's numbers, e.g. `mm`.
     #[serde(default)]
-    pub(crate) unit: Option<String>,
+    pub unit: Option<String>,
     /// How many standard deviations the numbers are; without it 2 for `u95`, 1 for `u`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) coverage_factor: Option<f64>,
+    pub coverage_factor: Option<f64>,
     /// The column may be missing from the file, and its cells may be blank.
     #[serde(default)]
-    pub(crate) optional: bool,
+    pub optional: bool,
 }
 
 /// Columns of numbers, one for each joint.
@@ -151,51 +151,51 @@ pub struct JointColumns {
     /// A pattern for the names, `{j}` being the joint's number from 1: `q{j}_deg`; `{name}` is its name in the robot file:
     /// `{name}.position`.
     #[serde(default)]
-    pub(crate) column: Option<String>,
+    pub column: Option<String>,
     /// Names or numbers of the columns from the first joint to the last, instead of a pattern.
     #[serde(default)]
-    pub(crate) columns: Option<Vec<ColumnRef>>,
+    pub columns: Option<Vec<ColumnRef>>,
     /// Unit of the file's numbers; for positions and velocities that of the revolute joints, e.g. `deg`.
     #[serde(default)]
-    pub(crate) unit: Option<String>,
+    pub unit: Option<String>,
     /// What an encoder counts in a turn of the joint, instead of `unit` for positions and velocities of revolute joints, e.g. 4096.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) counts_per_turn: Option<f64>,
+    pub counts_per_turn: Option<f64>,
     /// Unit of the positions, velocities or forces of prismatic joints, e.g. `mm`, `mm/s`, `N`.
     #[serde(default)]
-    pub(crate) linear_unit: Option<String>,
+    pub linear_unit: Option<String>,
     /// 1 or -1 for each joint: -1 where the file counts the other way than the robot file, e.g. `[1, 1, -1, 1, 1, 1]`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(crate) sign: Vec<f64>,
+    pub sign: Vec<f64>,
     /// What the file shows where the robot file has its zero; for positions alone, for each joint in the unit of the column, e.g.
     /// `[0, -90, 0, 0, 0, 0]`. A position is `sign * (file - zero)`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(crate) zero: Vec<f64>,
+    pub zero: Vec<f64>,
     /// Positions that hold a part of another joint's, as where a controller reports joint 3 against the horizon; the part is taken off.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(crate) coupled: Vec<CoupledColumn>,
+    pub coupled: Vec<CoupledColumn>,
     /// For `torque`, instead of its columns: the duty (share of the supply) that a dc motor is driven with, a pattern or a list of columns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) duty: Option<JointNames>,
+    pub duty: Option<JointNames>,
     /// What the file shows at full duty, e.g. 100 for percent; without it 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) full_duty: Option<f64>,
+    pub full_duty: Option<f64>,
     /// For `torque`, instead of its columns: the voltage of a dc motor, V, a pattern or a list of columns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) voltage: Option<JointNames>,
+    pub voltage: Option<JointNames>,
     /// The supply of the motors, V: a number, or a column.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) supply: Option<Supply>,
+    pub supply: Option<Supply>,
     /// Nm at the joint per volt (torque constant over resistance, times the ratio of the gear), for all joints or for each.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) kt_over_r: Option<PerJoint>,
+    pub kt_over_r: Option<PerJoint>,
     /// Nm s/rad at the joint that the voltage of the turning motor takes (torque constant squared over resistance, times the ratio squared);
     /// without it, it is found as viscous friction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) kt2_over_r: Option<PerJoint>,
+    pub kt2_over_r: Option<PerJoint>,
     /// The columns may be missing from the file, and their cells may be blank.
     #[serde(default)]
-    pub(crate) optional: bool,
+    pub optional: bool,
 }
 
 /// Columns, one for each joint.
@@ -226,10 +226,10 @@ pub enum Supply {
 #[serde(deny_unknown_fields)]
 pub struct SupplyColumn {
     /// Name or number of the column.
-    pub(crate) column: ColumnRef,
+    pub column: ColumnRef,
     /// V per unit of the file, e.g. 0.1 where it counts tenths; without it 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) scale: Option<f64>,
+    pub scale: Option<f64>,
 }
 
 /// A number for all joints, or one for each.
@@ -275,11 +275,11 @@ impl JointColumns {
 #[serde(deny_unknown_fields)]
 pub struct CoupledColumn {
     /// Number of the joint, from 1.
-    pub(crate) joint: usize,
+    pub joint: usize,
     /// Number of the joint whose position is in its column, from 1.
-    pub(crate) by: usize,
+    pub by: usize,
     /// How often it is, e.g. 1 or -1.
-    pub(crate) ratio: f64,
+    pub ratio: f64,
 }
 
 /// Columns of a quantity of several numbers, by convention.
@@ -287,12 +287,12 @@ pub struct CoupledColumn {
 pub struct ConventionColumns {
     /// Setting -> columns of the file.
     #[serde(flatten)]
-    pub(crate) columns: BTreeMap<&'static str, Vec<ColumnRef>>,
+    pub columns: BTreeMap<&'static str, Vec<ColumnRef>>,
     /// Unit of the numbers, e.g. `deg`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) unit: Option<String>,
+    pub unit: Option<String>,
     /// The cells may be blank: the row has none.
-    pub(crate) optional: bool,
+    pub optional: bool,
 }
 
 impl ScalarColumn {

@@ -4,8 +4,8 @@
 //! that is worth is seen from the same with neighbours twice as far (Richardson: the difference is three times the error).
 
 use super::arm::RobotJoints;
+use crate::Context;
 use crate::error::{Error, Result, counted};
-use crate::stage::Context;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,13 +16,13 @@ use serde::{Deserialize, Serialize};
 pub struct VelocitySettings {
     /// Longer steps in time between rows are gaps, s; five times the usual step if not given.
     #[serde(default)]
-    pub(crate) gap_s: Option<f64>,
+    pub gap_s: Option<f64>,
     /// Least time from the first to the last row of a parabola, s: more than two steps where joints are logged coarsely.
     #[serde(default)]
-    pub(crate) over_s: f64,
+    pub over_s: f64,
     /// How much later the points were measured than the joints beside them, s, as `diagnose` says it: joints are carried there.
     #[serde(default)]
-    pub(crate) later_s: f64,
+    pub later_s: f64,
 }
 
 /// Steps beyond so many usual ones are gaps.
@@ -36,11 +36,11 @@ const OTHER_UNIT: f64 = 3.0;
 /// Times and joints of a file's usable rows.
 #[derive(Default)]
 pub(super) struct JointSamples {
-    pub(crate) rows: Vec<usize>,
-    pub(crate) time: Vec<f64>,
-    pub(crate) q: Vec<f64>,
+    pub rows: Vec<usize>,
+    pub time: Vec<f64>,
+    pub q: Vec<f64>,
     /// Velocities that the file gives.
-    pub(crate) given: Vec<f64>,
+    pub given: Vec<f64>,
 }
 
 /// Velocity and acceleration of the joints by data row. 16 bytes a joint and row.

@@ -5,7 +5,7 @@ use super::arm::Slots;
 use super::columns::Join;
 use crate::error::{Place, did_you_mean};
 use crate::observation::Part;
-use crate::robot::{INSTRUMENTS, Instrument, START, SigmaSource};
+use calib_numerics::robot::{INSTRUMENTS, Instrument, START, SigmaSource};
 use nalgebra::Vector3;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::MapAccessDeserializer;
@@ -74,7 +74,7 @@ impl JsonSchema for InstrumentSetting {
         "InstrumentSetting".into()
     }
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let named = |known: &crate::robot::PublishedInstrument| {
+        let named = |known: &calib_numerics::robot::PublishedInstrument| {
             json_schema!({ "const": known.name, "description": known.source }).to_value()
         };
         let mut all: Vec<serde_json::Value> = INSTRUMENTS.iter().map(named).collect();

@@ -1,11 +1,11 @@
 //! Duplicates within a file, and partners across several: every other file is joined to the first.
 
+use crate::ingest::Ingest;
+use crate::ingest::arm::RobotJoints;
+use crate::ingest::columns::{Duplicates, Join};
+use crate::ingest::refusal::{Reason, RowRefusal};
+use crate::ingest::rows::{FileRows, GivenUp};
 use crate::observation::{KINDS, Part};
-use crate::stage::ingest::Ingest;
-use crate::stage::ingest::arm::RobotJoints;
-use crate::stage::ingest::columns::{Duplicates, Join};
-use crate::stage::ingest::refusal::{Reason, RowRefusal};
-use crate::stage::ingest::rows::{FileRows, GivenUp};
 use std::collections::{BTreeSet, HashMap};
 
 /// By file but the first, the row that belongs to each row of the first. Empty without a join.
@@ -191,11 +191,11 @@ fn nearest(from: &[(f64, usize)], to: &[(f64, usize)]) -> Vec<Option<usize>> {
 
 /// All files of a measurement, as they were read, and what they decide together.
 pub(super) struct Measurement<'a> {
-    pub(crate) settings: &'a Ingest,
-    pub(crate) arm: &'a RobotJoints,
-    pub(crate) files: Vec<FileRows>,
-    pub(crate) partners: Partners,
-    pub(crate) names: &'a [String],
+    pub settings: &'a Ingest,
+    pub arm: &'a RobotJoints,
+    pub files: Vec<FileRows>,
+    pub partners: Partners,
+    pub names: &'a [String],
 }
 
 /// Rows of files that are one row of the recording: file and row, from 0, the first being the one that leads.

@@ -1,19 +1,19 @@
 //! One reading of one file from top to bottom, row by row: what kind of file it is, and who hands out its rows.
 
 use crate::error::{Error, Fault, Result, counted};
+use crate::ingest::arm::{RobotJoints, UNLIMITED};
+use crate::ingest::bind::{Binding, FileHeader, bind};
+use crate::ingest::columns::{FileLayout, LimitPolicy};
+use crate::ingest::external::ExternalAxes;
+use crate::ingest::refusal::RowRefusal;
+use crate::ingest::row::{RecordedRow, RowReader};
 use crate::program::{JointList, Language, MOST_BYTES, joint_list, listing as language};
 use crate::raw::{
     self, BagRows, ColumnRows, DecimalMark, Delimiter, InputSource, JsonRows, Record, RecordReader,
     TextLayout, TextRows, Workbook, failed, has_columns, is_bag, is_json, is_workbook, not_read,
 };
-use crate::stage::ingest::arm::{RobotJoints, UNLIMITED};
-use crate::stage::ingest::bind::{Binding, FileHeader, bind};
-use crate::stage::ingest::columns::{FileLayout, LimitPolicy};
-use crate::stage::ingest::external::ExternalAxes;
-use crate::stage::ingest::refusal::RowRefusal;
-use crate::stage::ingest::row::{RecordedRow, RowReader};
-use crate::stage::{Context, OpenedInput};
 use crate::table::{IntakeRow, Robot};
+use crate::{Context, OpenedInput};
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
 
@@ -26,18 +26,18 @@ const BUFFER: usize = 1 << 16;
 #[derive(Default)]
 pub struct TableLayout<'l> {
     /// The sheet, of a workbook.
-    pub(crate) sheet: Option<&'l str>,
+    pub sheet: Option<&'l str>,
     /// The topic, of a recording of ROS 2.
-    pub(crate) topic: Option<&'l str>,
+    pub topic: Option<&'l str>,
     /// How its rows are written, of text.
-    pub(crate) text: TextLayout,
+    pub text: TextLayout,
     /// The decimal mark of its numbers, of text and workbooks.
-    pub(crate) decimal: DecimalMark,
+    pub decimal: DecimalMark,
 }
 
 /// What a file is.
 #[derive(Clone, Copy)]
-pub(crate) enum FileKind {
+pub enum FileKind {
     Workbook,
     Bag,
     /// A controller's, which declares joints.
@@ -51,7 +51,7 @@ pub(crate) enum FileKind {
 
 impl FileKind {
     /// By its name and how it begins.
-    pub(crate) fn of(name: &str, head: &[u8]) -> Self {
+    pub fn of(name: &str, head: &[u8]) -> Self {
         if is_workbook(head) {
             Self::Workbook
         } else if is_bag(head) {
@@ -117,7 +117,7 @@ pub fn records(
 
 /// An opened file below its header.
 pub(super) struct OpenedFile<'a> {
-    pub(crate) label: String,
+    pub label: String,
     reader: Box<dyn RecordReader>,
     judge: RowReader<'a>,
     /// The present row as it stands.
@@ -127,8 +127,8 @@ pub(super) struct OpenedFile<'a> {
     /// What was left out of the file as a whole.
     remark: Option<String>,
     /// Axes in addition to the arm's that nothing is read from.
-    pub(crate) external: ExternalAxes,
-    pub(crate) row: RecordedRow,
+    pub external: ExternalAxes,
+    pub row: RecordedRow,
 }
 
 impl<'a> OpenedFile<'a> {

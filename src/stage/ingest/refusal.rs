@@ -2,9 +2,9 @@
 
 use crate::error::Result;
 use crate::raw::RecordFault;
-use crate::stage::{Context, Sink, StreamedTable};
 use crate::table::{Rejected, RejectedRow, Table};
 use crate::units::Unit;
+use crate::{Context, Sink, StreamedTable};
 use std::collections::BTreeMap;
 
 /// Why a row is not used; the stable word in the table `rejected`.
@@ -60,10 +60,10 @@ impl From<RecordFault> for Reason {
 /// A row that is not used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct RowRefusal {
-    pub(crate) reason: Reason,
-    pub(crate) detail: String,
+    pub reason: Reason,
+    pub detail: String,
     /// The setting of a unit, and the unit in which the number is in range.
-    pub(crate) misread: Option<(&'static str, Unit)>,
+    pub misread: Option<(&'static str, Unit)>,
 }
 
 impl RowRefusal {
@@ -102,9 +102,9 @@ pub(super) fn beginning(row: &[u8]) -> String {
 /// How many rows were refused for a reason, and the first of them.
 #[derive(Debug, Clone)]
 pub(super) struct RefusalCount {
-    pub(crate) rows: u64,
-    pub(crate) first_line: u64,
-    pub(crate) first_detail: String,
+    pub rows: u64,
+    pub first_line: u64,
+    pub first_detail: String,
 }
 
 pub(super) type RefusalCounts = BTreeMap<Reason, RefusalCount>;

@@ -6,8 +6,8 @@ use super::columns::LimitPolicy;
 use super::refusal::{Reason, RowRefusal, refuse};
 use super::stretch::{ALLOWED, ClockColumn, ClockTime};
 use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
-use crate::robot::ONE_AND_A_HALF_TURNS;
 use crate::units::Unit;
+use calib_numerics::robot::ONE_AND_A_HALF_TURNS;
 
 /// Numbers of rows go up to here: the targets of wide rows have room beyond.
 const LARGEST_SEQUENCE: i64 = 1 << 52;
@@ -16,25 +16,25 @@ const LARGEST_SEQUENCE: i64 = 1 << 52;
 #[derive(Default)]
 pub(super) struct RecordedRow {
     /// Number of the data row in its file, from 1.
-    pub(crate) number: u64,
-    pub(crate) line: u64,
+    pub number: u64,
+    pub line: u64,
     /// Empty where there is none.
-    pub(crate) id: String,
+    pub id: String,
     /// By [`Slots::texts`]; empty where there is none.
     ///
     /// [`Slots::texts`]: super::arm::Slots::texts
-    pub(crate) texts: Vec<String>,
-    pub(crate) sequence: Option<i64>,
+    pub texts: Vec<String>,
+    pub sequence: Option<i64>,
     /// SI, by the places of the arm's slots; NaN where missing.
-    pub(crate) values: Vec<f64>,
+    pub values: Vec<f64>,
     /// The point of each target of a wide row, SI; NaN where it was not seen.
-    pub(crate) points: Vec<[f64; 3]>,
+    pub points: Vec<[f64; 3]>,
     /// The first joint beyond its limits, from 0.
-    pub(crate) beyond: Option<usize>,
+    pub beyond: Option<usize>,
     /// The first revolute joint beyond one and a half turns, from 0, and its angle, rad; also where the row is refused.
-    pub(crate) turned: Option<(usize, f64)>,
+    pub turned: Option<(usize, f64)>,
     /// Nothing stands in any of its fields.
-    pub(crate) is_blank: bool,
+    pub is_blank: bool,
 }
 
 impl RecordedRow {
@@ -51,7 +51,7 @@ impl RecordedRow {
 
 /// Reads rows of one file.
 pub(super) struct RowReader<'a> {
-    pub(crate) binding: Binding,
+    pub binding: Binding,
     mark: DecimalMark,
     limits: LimitPolicy,
     arm: &'a RobotJoints,

@@ -8,8 +8,8 @@ use super::reading::{OpenedFile, STRIDE};
 use super::refusal::{Refusals, beginning};
 use super::row::RecordedRow;
 use super::turns::{TurnCounter, within_limits};
+use crate::Context;
 use crate::error::{Error, Result, counted};
-use crate::stage::Context;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -39,8 +39,8 @@ impl Texts {
 /// Rows that say something odd about the whole file, with the first of them: its line, a joint and its position.
 #[derive(Debug, Clone, Default)]
 pub(super) struct FileOddities {
-    pub(crate) rows: u64,
-    pub(crate) first: Option<(u64, usize, f64)>,
+    pub rows: u64,
+    pub first: Option<(u64, usize, f64)>,
 }
 
 impl FileOddities {
@@ -66,13 +66,13 @@ pub(super) enum GivenUp {
 /// The rows of a file, counted from 0.
 #[derive(Default)]
 pub(super) struct FileRows {
-    pub(crate) label: String,
-    pub(crate) lines: u64,
+    pub label: String,
+    pub lines: u64,
     /// Rows up to the last that is not blank all over, as a spreadsheet leaves them at the end.
-    pub(crate) filled: u64,
+    pub filled: u64,
     /// Places of a row's numbers that the file fills, ascending; those of them that it has columns or values for.
     places: Vec<usize>,
-    pub(crate) slots: Vec<usize>,
+    pub slots: Vec<usize>,
     values: Vec<f64>,
     /// The points of wide rows, of so many targets each.
     points: Vec<[f64; 3]>,
@@ -86,17 +86,17 @@ pub(super) struct FileRows {
     /// How rows that may be refused begin.
     begin: Texts,
     /// Rows that cannot be used, and those that other rows are a reason not to use.
-    pub(crate) refused: Refusals,
-    pub(crate) given_up: BTreeMap<usize, GivenUp>,
+    pub refused: Refusals,
+    pub given_up: BTreeMap<usize, GivenUp>,
     /// Revolute joints beyond one and a half turns.
-    pub(crate) turns: FileOddities,
-    pub(crate) beyond: FileOddities,
+    pub turns: FileOddities,
+    pub beyond: FileOddities,
     /// Largest angle of a revolute joint, rad.
-    pub(crate) largest: f64,
+    pub largest: f64,
     /// Least and largest position of each joint, rad or m.
     ranges: Vec<[f64; 2]>,
     /// Where the arm moves: of the file with the joints.
-    pub(crate) track: Option<Track>,
+    pub track: Option<Track>,
     /// Whether the file holds what was measured.
     measures: bool,
     /// What could not be read of the file.

@@ -3,19 +3,19 @@
 //! Rows keep their order. A stretch of the table is a trajectory without a gap of the clock; per file, accepted + rejected = read.
 
 use crate::error::{Error, Fault, Place, Result, counted};
-use crate::stage::ingest::arm::RobotJoints;
-use crate::stage::ingest::columns::{FileLayout, LimitPolicy};
-use crate::stage::ingest::reading::{OpenedFile, STRIDE};
-use crate::stage::ingest::refusal::{
+use crate::ingest::arm::RobotJoints;
+use crate::ingest::columns::{FileLayout, LimitPolicy};
+use crate::ingest::reading::{OpenedFile, STRIDE};
+use crate::ingest::refusal::{
     Reason, RefusalCounts, Rejections, RowRefusal, beginning, refuse, tally,
 };
-use crate::stage::ingest::row::RecordedRow;
-use crate::stage::ingest::rows::NO_ROW;
-use crate::stage::ingest::stretch::Stretches;
-use crate::stage::ingest::turns::TurnCounter;
-use crate::stage::ingest::{check, reading};
-use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable};
+use crate::ingest::row::RecordedRow;
+use crate::ingest::rows::NO_ROW;
+use crate::ingest::stretch::Stretches;
+use crate::ingest::turns::TurnCounter;
+use crate::ingest::{check, reading};
 use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, Robot, RobotRow, Table};
+use crate::{Context, RawFile, Sink, Stage, StreamedTable};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -25,16 +25,16 @@ use serde::{Deserialize, Serialize};
 pub struct IngestTorques {
     /// The raw files, each with all quantities; one continues the other. `q`, `time`, and one of `torque` and `current` are needed;
     /// `simulated`, `trajectory`, `usage`, `velocity` and `temperature` are used where they are mapped.
-    pub(crate) files: Vec<FileLayout>,
+    pub files: Vec<FileLayout>,
     /// On which side of the gears `torque` is stated.
     #[serde(default)]
-    pub(crate) torque_side: TorqueSide,
+    pub torque_side: TorqueSide,
     /// What becomes of rows with a joint beyond the robot's limits.
     #[serde(default)]
-    pub(crate) limits: LimitPolicy,
+    pub limits: LimitPolicy,
     /// A file of which more than this share of rows is rejected is an error.
     #[serde(default = "few")]
-    pub(crate) max_rejected_fraction: f64,
+    pub max_rejected_fraction: f64,
 }
 
 /// On which side of the gears a torque is.
@@ -59,7 +59,7 @@ const CHUNK: usize = 1 << 16;
 /// More labels than these are no labels: another column is mapped.
 const MOST_LABELS: usize = 100;
 
-crate::stage::stage! {
+crate::stage! {
     IngestTorques, "ingest_torques", 3, "reads joint positions with torques or motor currents of an arm that moves",
         IngestTorquesReads {
             robot: Robot,

@@ -6,10 +6,10 @@ use super::columns::{Columns, Join, LimitPolicy};
 use super::pair::Measurement;
 use super::refusal::{Reason, RefusalCount, RefusalCounts, tally};
 use super::rows::{FileRows, GivenUp};
+use crate::Context;
 use crate::error::{Error, Fault, Result, counted};
-use crate::robot::too_far;
-use crate::stage::Context;
 use crate::units::Unit;
+use calib_numerics::robot::too_far;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Beyond this largest angle, deg, a file in degrees is believed to be one.

@@ -9,10 +9,10 @@ use super::refusal::Rejections;
 use super::rows::FileRows;
 use crate::error::{Error, Result, counted};
 use crate::observation::{KINDS, Part};
-use crate::robot::{START, SigmaSource};
-use crate::stage::{Context, Sink, StreamedTable};
 use crate::table::{Recording, Rejected, SIGMA_SOURCE, Table, TextCells, recording_frame};
 use crate::units::Unit;
+use crate::{Context, Sink, StreamedTable};
+use calib_numerics::robot::{START, SigmaSource};
 use std::borrow::Cow;
 
 /// Rows of the recording in memory at once.

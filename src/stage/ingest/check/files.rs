@@ -1,9 +1,9 @@
 //! Faults of the files of a recording together: what is mapped in none of them, how they are joined, what a moving arm needs.
 
 use crate::error::Place;
+use crate::ingest::Ingest;
+use crate::ingest::columns::{Columns, Duplicates, FileLayout, Join};
 use crate::observation::{KINDS, MeasurementKind, Part};
-use crate::stage::ingest::Ingest;
-use crate::stage::ingest::columns::{Columns, Duplicates, FileLayout, Join};
 
 pub(super) fn faults(settings: &Ingest, at: &mut Place) {
     axes(settings, at);

@@ -19,8 +19,8 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 mod columns;
-pub(crate) mod parquet;
-pub(crate) mod text;
+pub mod parquet;
+pub mod text;
 mod trajectory;
 
 /// Faults that are named of one file.
@@ -31,19 +31,19 @@ const BATCH: usize = 1 << 13;
 /// What holds for a whole table.
 pub struct Layout<'a> {
     /// For messages: the file's name, or `stdin`.
-    pub(crate) place: &'a str,
+    pub place: &'a str,
     /// Whose joint names columns may carry.
-    pub(crate) robot: &'a RobotDescription,
+    pub robot: &'a RobotDescription,
     /// Units of columns that name none.
-    pub(crate) units: Units,
+    pub units: Units,
     /// Appends nothing: joints are replaced, all else stays.
-    pub(crate) plain: bool,
+    pub plain: bool,
     /// Poses are the targets though there are joints.
-    pub(crate) cartesian: bool,
+    pub cartesian: bool,
     /// The largest load that was measured (kg), where the model depends on it and none is stated for targets without a payload.
-    pub(crate) load: Option<f64>,
+    pub load: Option<f64>,
     /// Takes a table that calib corrected already.
-    pub(crate) force: bool,
+    pub force: bool,
 }
 
 /// A column that calib appends.
@@ -160,9 +160,9 @@ fn corrected(
 
 /// The targets of a table that are not reached; their joints are empty.
 #[derive(Debug, Default)]
-pub(crate) struct Unreached {
-    pub(crate) count: u64,
-    pub(crate) faults: Vec<Fault>,
+pub struct Unreached {
+    pub count: u64,
+    pub faults: Vec<Fault>,
 }
 
 impl Unreached {
@@ -178,8 +178,8 @@ impl Unreached {
 /// A target and the point that was measured, m, tracker's frame.
 #[derive(Debug, Clone)]
 pub struct MeasuredTarget {
-    pub(crate) target: CommandTarget,
-    pub(crate) point: Vector3<f64>,
+    pub target: CommandTarget,
+    pub point: Vector3<f64>,
 }
 
 /// Reads a whole table. Fails with the faults of its header, or of its rows with their lines.

@@ -10,16 +10,21 @@
 //!
 //! A robot that is measured at the positions of a program logs no joints: the program holds them. Instructions are not looked at.
 
-pub use crate::program::correct::{
-    ProgramFile, ProgramLoad, ProgramRules, corrected, has_mark, with_mark,
-};
-use crate::program::literal::ToolInForce;
-pub use crate::program::literal::{Literal, TargetKind};
-pub use crate::program::pose::solve;
-pub use crate::program::stated::PostureStatement;
-use crate::program::token::{Token, tokens};
-pub use crate::program::tools::RobotTool;
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+use calib_foundation::{description, error, statistics, units};
+use calib_numerics::{compensate, robot, spatial};
+use {calib_dynamics as dynamics, calib_raw as raw};
+
+pub use crate::correct::{ProgramFile, ProgramLoad, ProgramRules, corrected, has_mark, with_mark};
+use crate::literal::ToolInForce;
+pub use crate::literal::{Literal, TargetKind};
+pub use crate::pose::solve;
 use crate::robot::RobotModel;
+pub use crate::stated::PostureStatement;
+use crate::token::{Token, tokens};
+pub use crate::tools::RobotTool;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -31,6 +36,7 @@ mod literal;
 mod pose;
 mod rapid;
 mod stated;
+pub mod targets;
 mod token;
 mod tools;
 mod urscript;
@@ -487,7 +493,7 @@ pub struct ListedJoints {
     /// Six joints, deg.
     pub joints: Vec<f64>,
     /// Six external axes, deg or mm; none where one is not connected or not given.
-    pub(crate) external: Vec<Option<f64>>,
+    pub external: Vec<Option<f64>>,
 }
 
 /// All joint positions that a program declares, in its order.

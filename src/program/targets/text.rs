@@ -22,7 +22,7 @@ const LONGEST: u64 = 16 << 20;
 const DECIMALS: usize = 7;
 
 /// Reads targets from `input` to its end and writes them corrected.
-pub(crate) fn stream(
+pub fn stream(
     input: &mut dyn BufRead,
     output: &mut dyn Write,
     layout: &Layout,
@@ -139,11 +139,11 @@ pub(super) fn texts(fields: &[TextField]) -> Vec<String> {
 }
 
 pub(super) struct TableText<'t> {
-    pub(crate) delimiter: char,
-    pub(crate) header: &'t str,
-    pub(crate) names: Vec<TextField<'t>>,
+    pub delimiter: char,
+    pub header: &'t str,
+    pub names: Vec<TextField<'t>>,
     /// With their numbers, from 1.
-    pub(crate) rows: Vec<(usize, &'t str)>,
+    pub rows: Vec<(usize, &'t str)>,
 }
 
 /// Takes a table apart; fails where it has no header, and then `expected` something.

@@ -28,7 +28,7 @@ pub(super) enum ColumnRole {
 
 impl ColumnRole {
     /// Whether a target without it is none.
-    pub(crate) fn is_needed(self) -> bool {
+    pub fn is_needed(self) -> bool {
         matches!(
             self,
             Self::Joint(_) | Self::Axis(_) | Self::Quaternion(_) | Self::Turn(_)
@@ -72,22 +72,22 @@ pub(super) fn read_columns<U>(
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Units {
     /// Unit of angles whose column names none.
-    pub(crate) angle: Option<Unit>,
+    pub angle: Option<Unit>,
     /// Unit of lengths whose column names none.
-    pub(crate) length: Option<Unit>,
+    pub length: Option<Unit>,
 }
 
 /// The columns of a file of targets.
 #[derive(Debug, Clone)]
 pub(super) struct TargetColumns {
-    pub(crate) count: usize,
-    pub(crate) read: Vec<ReadColumn<Unit>>,
+    pub count: usize,
+    pub read: Vec<ReadColumn<Unit>>,
     /// Column and unit of each joint; empty where joints are not given.
-    pub(crate) joints: Vec<(usize, Unit)>,
-    pub(crate) point: bool,
-    pub(crate) quaternion: bool,
+    pub joints: Vec<(usize, Unit)>,
+    pub point: bool,
+    pub quaternion: bool,
     /// A, B, C.
-    pub(crate) turns: bool,
+    pub turns: bool,
 }
 
 /// What columns of joints may be called beside the robot's own names.
@@ -231,14 +231,14 @@ fn role(
 #[derive(Default)]
 pub(super) struct TargetRow {
     target: CommandTarget,
-    pub(crate) point: [f64; 3],
+    pub point: [f64; 3],
     quaternion: [f64; 4],
     turns: [f64; 3],
 }
 
 impl TargetRow {
     /// Takes a number, SI.
-    pub(crate) fn take(&mut self, role: ColumnRole, value: f64, joints: usize) {
+    pub fn take(&mut self, role: ColumnRole, value: f64, joints: usize) {
         let put = |slot: &mut Option<Vec<f64>>, joint: usize, value: f64| {
             slot.get_or_insert_with(|| vec![0.0; joints])[joint] = value
         };
@@ -256,7 +256,7 @@ impl TargetRow {
         }
     }
 
-    pub(crate) fn target(
+    pub fn target(
         mut self,
         columns: &TargetColumns,
         layout: &Layout,
@@ -313,7 +313,7 @@ pub(super) struct FarTurned {
 
 impl FarTurned {
     /// Counts a row; what the robot's own limits allow is not far.
-    pub(crate) fn count(
+    pub fn count(
         &mut self,
         place: impl FnOnce() -> String,
         target: &CommandTarget,

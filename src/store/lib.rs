@@ -4,7 +4,13 @@
 //! people | `tmp/`. Objects and records are written aside and moved into place, then made durable in groups; a crash leaves nothing
 //! visible by half, and what a power cut tears is told by its hash.
 
-pub(crate) mod actions;
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+use calib_foundation::{error, units};
+use calib_raw as raw;
+
+pub mod actions;
 mod check;
 mod disk;
 pub mod frame;
@@ -12,23 +18,23 @@ pub mod key;
 mod notes;
 mod reader;
 mod remote;
-pub(crate) mod runs;
+pub mod runs;
 #[cfg(feature = "s3")]
 mod s3;
 pub mod schema;
 mod verify;
-pub(crate) mod writer;
+pub mod writer;
 
 pub use actions::{Account, ActionRecord, Lookup, PendingTable, Published};
 pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableHash, TableRef};
 pub use reader::{Loose, PublishedTable, read_table};
-pub(crate) use reader::{file_notes, table_of_bytes};
+pub use reader::{file_notes, table_of_bytes};
 pub use runs::{Link, Run, Sealed};
 pub use verify::{Sweep, Verification};
 pub use writer::{FinishedFile, TableWriter};
 
 use crate::error::{Error, Result};
-pub(crate) use disk::Claim;
+pub use disk::Claim;
 use disk::{Durability, Workspace, entries, make_dir, put_if_absent, sync_dir};
 pub use remote::Bucket;
 use remote::Remote;

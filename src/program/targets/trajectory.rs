@@ -125,7 +125,7 @@ impl<'a> Trajectory<'a> {
 
     /// The lines with torques (Nm), currents (A) where `per_ampere` says what an ampere is, uncertainties (Nm) where they are known, and
     /// the remarks of each row; a row that is refused has no torques.
-    pub(crate) fn written(
+    pub fn written(
         &self,
         needed: &NeededTorques,
         per_ampere: Option<&[f64]>,
@@ -164,7 +164,7 @@ impl<'a> Trajectory<'a> {
     }
 
     /// The place of a row in its text.
-    pub(crate) fn place(&self, row: usize, file: &str) -> String {
+    pub fn place(&self, row: usize, file: &str) -> String {
         format!("{file}:{}", self.lines[row].0)
     }
 }

@@ -5,6 +5,11 @@
 //!
 //! A pipe or a device may never end, and may wait for a writer for ever. The decoder of Parquet panics on some damaged files.
 
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+use calib_foundation::error;
+
 mod arrays;
 mod bag;
 mod columns;
@@ -34,7 +39,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// What a file's name ends in, in small letters, without the dot; nothing where it has none.
-pub(crate) fn ending(path: &Path) -> String {
+pub fn ending(path: &Path) -> String {
     path.extension()
         .and_then(|ending| ending.to_str())
         .unwrap_or_default()
@@ -42,13 +47,13 @@ pub(crate) fn ending(path: &Path) -> String {
 }
 
 /// Whether two names are of one file that is there.
-pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
+pub fn same_file(a: &Path, b: &Path) -> bool {
     let found = |path: &Path| path.canonicalize().ok();
     found(a).is_some() && found(a) == found(b)
 }
 
 /// Opens a regular file; a folder, a pipe or a device is refused.
-pub(crate) fn open(path: &Path) -> io::Result<File> {
+pub fn open(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
     if kind.is_file() {
         return File::open(path);
@@ -66,7 +71,7 @@ pub fn text(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
-pub(crate) fn bytes(path: &Path) -> io::Result<Vec<u8>> {
+pub fn bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.read_to_end(&mut bytes)?;
     Ok(bytes)
@@ -93,7 +98,7 @@ fn what(kind: FileType) -> &'static str {
 }
 
 /// What a decoder gives; its panic is told in words.
-pub(crate) fn decoded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
+pub fn decoded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(decode)).map_err(|panic| {
         let text = panic
             .downcast_ref::<&str>()
@@ -106,13 +111,13 @@ pub(crate) fn decoded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
-pub(crate) type Batches = Box<dyn Iterator<Item = Result<RecordBatch, String>> + Send>;
+pub type Batches = Box<dyn Iterator<Item = Result<RecordBatch, String>> + Send>;
 
 /// A file of columns, batch by batch; what is wrong with it comes in words, once.
 pub struct BatchFile {
-    pub(crate) schema: SchemaRef,
+    pub schema: SchemaRef,
     /// Rows, where the file says it.
-    pub(crate) rows: Option<u64>,
+    pub rows: Option<u64>,
     batches: Batches,
 }
 
@@ -137,7 +142,7 @@ impl Iterator for BatchFile {
 }
 
 impl BatchFile {
-    pub(crate) fn of(reader: impl RecordBatchReader + Send + 'static) -> Self {
+    pub fn of(reader: impl RecordBatchReader + Send + 'static) -> Self {
         let schema = reader.schema();
         // A decoder that gave up is not asked again.
         let mut reader = Some(reader);

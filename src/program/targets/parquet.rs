@@ -15,7 +15,7 @@ use std::io::Write;
 use std::sync::Arc;
 
 /// Reads targets from a Parquet file and writes them corrected as another.
-pub(crate) fn stream(
+pub fn stream(
     input: File,
     output: impl Write + Send,
     layout: &Layout,

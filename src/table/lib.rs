@@ -3,6 +3,14 @@
 //! Most tables are a list of rows, and a row is a struct whose fields are the columns of the schema file (schemas/build.rs reads it); only
 //! tables with columns for each joint are written by hand. A file of this folder says how tables are filled and what is made of them.
 
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+use calib_foundation::{description, error, units};
+use calib_numerics::{effect, estimate, observation, spatial};
+use calib_store as store;
+use {calib_diagnose as diagnose, calib_dynamics as dynamics};
+
 use crate::error::Result;
 pub use crate::store::Loose;
 use crate::store::frame::{Cell, FrameBuilder};
@@ -15,7 +23,6 @@ pub use motion::{ArmMotion, TorqueCourse};
 pub use observability::{FitContext, UNFOLDED};
 pub use parameters::Corrected;
 pub use ports::Labelled;
-pub(crate) use ports::{reads, writes};
 pub use recording::{
     Recording, SOURCE as SIGMA_SOURCE, columns as recording_columns, frame as recording_frame,
 };
@@ -50,7 +57,7 @@ fn typed<T: Table>(loose: Loose<Frame>) -> Result<Loose<T>> {
 }
 
 /// A text that a spreadsheet would run as a formula gets a quote in front, as spreadsheets mark a text.
-pub(crate) fn inert(text: std::borrow::Cow<str>) -> String {
+pub fn inert(text: std::borrow::Cow<str>) -> String {
     let runs = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
     if runs {
         format!("'{text}")
@@ -60,17 +67,17 @@ pub(crate) fn inert(text: std::borrow::Cow<str>) -> String {
 }
 
 /// Tables of one stage by their kind, none of what it did not write.
-pub(crate) type TablesByKind<'a> = dyn Fn(&str) -> Result<Option<Frame>> + 'a;
+pub type TablesByKind<'a> = dyn Fn(&str) -> Result<Option<Frame>> + 'a;
 
 /// The table of a kind as Rust values, if there is one.
-pub(crate) fn of_kind<T: Table>(tables: &TablesByKind) -> Result<Option<T>> {
+pub fn of_kind<T: Table>(tables: &TablesByKind) -> Result<Option<T>> {
     tables(T::KIND)?
         .map(|frame| T::from_frame(&frame))
         .transpose()
 }
 
 /// A row as JSON with these of its columns, separated by blanks; `where=place` is the column `place` under the name `where`.
-pub(crate) fn picked(row: &impl serde::Serialize, columns: &str) -> serde_json::Value {
+pub fn picked(row: &impl serde::Serialize, columns: &str) -> serde_json::Value {
     let mut row = serde_json::json!(row);
     let column = |column: &str| {
         let (name, column) = column.split_once('=').unwrap_or((column, column));
@@ -81,7 +88,7 @@ pub(crate) fn picked(row: &impl serde::Serialize, columns: &str) -> serde_json::
 }
 
 /// Rows as JSON, each as [`picked`] has it.
-pub(crate) fn picked_of<'a, R: serde::Serialize + 'a>(
+pub fn picked_of<'a, R: serde::Serialize + 'a>(
     rows: impl IntoIterator<Item = &'a R>,
     columns: &str,
 ) -> serde_json::Value {
@@ -141,7 +148,7 @@ mod standing;
 mod torque_findings;
 mod torque_parameters;
 
-pub(crate) use prediction::slip;
+pub use prediction::slip;
 
 tables! {
     acceptance => Acceptance of AcceptanceRow,

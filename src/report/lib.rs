@@ -2,6 +2,12 @@
 //!
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
 
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+use calib_foundation::{error, units};
+use calib_table as table;
+
 mod achieved;
 mod arm;
 mod certificate;
@@ -18,20 +24,20 @@ mod followed;
 mod language;
 mod number;
 mod parameters;
-pub(crate) mod result;
+pub mod result;
 mod svg;
 mod torques;
 mod workspace;
 
 pub use achieved::{AchievedTables, achieved_page};
-pub(crate) use arm::{PlacedArm, shown_row};
+pub use arm::{PlacedArm, shown_row};
 pub use drives::ReportDrivesReads;
-pub(crate) use drives::drive_page;
-pub(crate) use findings::diagnosed_page;
+pub use drives::drive_page;
+pub use findings::diagnosed_page;
 pub use language::PageLanguage;
 use language::{Locale, say};
 pub use torques::ReportTorquesReads;
-pub(crate) use torques::torque_page;
+pub use torques::torque_page;
 
 use crate::error::Result;
 use crate::table::{
@@ -62,7 +68,7 @@ impl Page {
 }
 
 /// A warning for each text of a page that its language lacks.
-pub(crate) fn untranslated(missing: &[String], language: PageLanguage) -> Vec<String> {
+pub fn untranslated(missing: &[String], language: PageLanguage) -> Vec<String> {
     let language = language.code();
     let texts = missing.iter();
     texts
@@ -155,21 +161,21 @@ crate::table::reads! {
 }
 
 /// The same with what follows from it.
-pub(crate) struct Tables {
+pub struct Tables {
     /// As the ports gave it; parameters are of the model that stands.
-    pub(crate) reads: ReportReads,
+    pub reads: ReportReads,
     /// What the controller counts otherwise than the robot file, where it does.
-    pub(crate) counting: Option<String>,
+    pub counting: Option<String>,
     /// Findings over what reveals them.
-    pub(crate) curves: Curves,
+    pub curves: Curves,
     /// The step that the report speaks of; without one, the last.
-    pub(crate) standing: Option<String>,
+    pub standing: Option<String>,
     /// Later steps that are worse on the same held-out points.
-    pub(crate) withdrawn: Vec<Withdrawn>,
+    pub withdrawn: Vec<Withdrawn>,
     /// The arm where it stands; none where too few points tell.
-    pub(crate) arm: Option<PlacedArm>,
+    pub arm: Option<PlacedArm>,
     /// Content hashes of the tables that the report rests on.
-    pub(crate) hashes: Vec<(String, String)>,
+    pub hashes: Vec<(String, String)>,
 }
 
 impl Deref for Tables {
@@ -205,20 +211,20 @@ impl Tables {
 }
 
 /// The report as HTML and as JSON.
-pub(crate) struct Pages {
+pub struct Pages {
     /// One file that needs no other.
-    pub(crate) html: String,
-    pub(crate) json: String,
+    pub html: String,
+    pub json: String,
     /// The held-out points of the certificate, as text for spreadsheets.
-    pub(crate) points: String,
+    pub points: String,
     /// The user's limits and what was found.
-    pub(crate) acceptance: Acceptance,
+    pub acceptance: Acceptance,
     /// What the page says in English since its language lacks it.
-    pub(crate) missing: Vec<String>,
+    pub missing: Vec<String>,
 }
 
 /// The report; fails where `asked.set` is no held-out set.
-pub(crate) fn pages(tables: &Tables, asked: &Report) -> Result<Pages> {
+pub fn pages(tables: &Tables, asked: &Report) -> Result<Pages> {
     let set = asked.set.as_deref();
     let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref());
     let judgement = certificate::Judgement::new(tables, &asked.limits, set);

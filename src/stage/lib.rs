@@ -2,6 +2,14 @@
 //!
 //! Stages without their types, so that a pipeline can hold any of them.
 
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+use calib_foundation::{description, error, statistics, units};
+use calib_numerics::{compensate, criteria, effect, estimate, observation, spatial, yaml};
+use {calib_drives as drives, calib_dynamics as dynamics, calib_engine as engine};
+use {calib_program as program, calib_raw as raw, calib_table as table, calib_twin as twin};
+
 use crate::error::{Error, Fault, Place, Result};
 use crate::raw::InputSource;
 use crate::yaml::{Node, Trouble, typed};
@@ -27,7 +35,7 @@ mod identified;
 mod identify;
 pub mod ingest;
 mod known_cell;
-pub(crate) mod learn;
+pub mod learn;
 mod masses;
 mod optimise;
 mod remarks;
@@ -39,7 +47,7 @@ pub mod split;
 mod transfer;
 mod validate;
 
-pub use crate::report::{
+pub use calib_report::{
     Accepted, Report, ReportDrivesReads, ReportPages, ReportReads, ReportTorquesReads,
 };
 pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given, TorqueEvidence};
@@ -47,13 +55,13 @@ pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};
 use diagnose::AskedRows;
 pub use diagnose::{CellPrior, Diagnose, DiagnoseReads};
-pub(crate) use diagnose_drives::short;
+pub use diagnose_drives::short;
 pub use diagnose_drives::{DiagnoseDrives, DiagnoseDrivesReads, DiagnoseDrivesWrites};
 pub use diagnose_torques::{
     ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut,
     InertialSetting,
 };
-pub(crate) use dynamic_arm::{dynamic_arm, must_be_bodies, must_turn, torque_per_ampere};
+pub use dynamic_arm::{dynamic_arm, must_be_bodies, must_turn, torque_per_ampere};
 pub use identify::{Identify, IdentifyReads};
 pub use identify::{Stiffness, StiffnessReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
@@ -62,7 +70,7 @@ pub use optimise::{BenchmarkProblem, Optimise, OptimiseReads};
 pub use report::{ReportDrives, ReportDrivesWrites, ReportTorques, ReportTorquesWrites};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use settings::FoldSetting;
-pub(crate) use settings::matches;
+pub use settings::matches;
 pub use simulate::{Remainder, Simulate, SimulateReads, SimulateWrites};
 pub use transfer::{Transfer, TransferReads};
 pub use validate::{Validate, ValidateReads};
@@ -127,19 +135,19 @@ pub struct Context<'a> {
 
 impl Context<'_> {
     /// As [`Services::note`].
-    pub(crate) fn note(&self, line: impl Into<String>) {
+    pub fn note(&self, line: impl Into<String>) {
         self.services.note(line.into());
     }
     /// As [`Services::warn`].
-    pub(crate) fn warn(&self, line: impl Into<String>) {
+    pub fn warn(&self, line: impl Into<String>) {
         self.services.warn(line.into());
     }
     /// The same of every line.
-    pub(crate) fn warn_each(&self, lines: impl IntoIterator<Item = String>) {
+    pub fn warn_each(&self, lines: impl IntoIterator<Item = String>) {
         lines.into_iter().for_each(|line| self.services.warn(line));
     }
     /// Takes the lines of a search whose length nobody knows: each is noted, and is a step of what is shown of it.
-    pub(crate) fn searching(&self, what: &str) -> impl Fn(String) + '_ {
+    pub fn searching(&self, what: &str) -> impl Fn(String) + '_ {
         self.services.begin(what, None, "steps");
         let steps = AtomicU64::new(0);
         move |line| {
@@ -149,7 +157,7 @@ impl Context<'_> {
         }
     }
     /// The label and content of a file that should hold `what`, a text of at most so many bytes.
-    pub(crate) fn text(&self, file: &RawFile, what: &str, most: u64) -> Result<(String, String)> {
+    pub fn text(&self, file: &RawFile, what: &str, most: u64) -> Result<(String, String)> {
         let OpenedInput { label, reader, .. } = self.services.open(file)?;
         let mut bytes = Vec::new();
         let read = reader.take(most + 1).read_to_end(&mut bytes);
@@ -242,7 +250,7 @@ fn on(sets: &[String]) -> Vec<(String, String)> {
 }
 
 /// Stages whose tables are a diagnosis, as `calib diagnose` runs and shows them.
-pub(crate) const DIAGNOSES: [&str; 3] =
+pub const DIAGNOSES: [&str; 3] =
     [Diagnose::NAME, DiagnoseTorques::NAME, DiagnoseDrives::NAME];
 
 /// Every kind of stage, one line each.
@@ -330,7 +338,7 @@ impl<T: Stage> ErasedStage for T {
 }
 
 /// A stage whose settings are typed, or all their faults.
-pub(crate) type ParsedStage = Result<Box<dyn ErasedStage>, Vec<Trouble>>;
+pub type ParsedStage = Result<Box<dyn ErasedStage>, Vec<Trouble>>;
 
 /// One kind of stage, as the pipeline's YAML names it.
 #[derive(Debug, Clone, Copy)]
@@ -348,12 +356,12 @@ pub struct StageEntry {
     /// Types the settings; all their faults, with paths below `with`.
     pub parse: fn(&Node) -> ParsedStage,
     /// The JSON Schema of its settings.
-    pub(crate) schema: fn(&mut SchemaGenerator) -> Schema,
+    pub schema: fn(&mut SchemaGenerator) -> Schema,
 }
 
 impl StageEntry {
     /// The entry of a stage.
-    pub(crate) const fn of<T: Stage>() -> Self {
+    pub const fn of<T: Stage>() -> Self {
         Self {
             name: T::NAME,
             summary: T::SUMMARY,
@@ -379,7 +387,7 @@ macro_rules! stage {
             #[doc = concat!("Output ports of `", $name, "`.")]
             pub struct $writes { $($written)* }
         })?
-        impl crate::stage::DeclaredStage for $stage {
+        impl crate::DeclaredStage for $stage {
             const NAME: &'static str = $name;
             const SUMMARY: &'static str = $summary;
             const IMPLEMENTATION: u32 = $implementation;
