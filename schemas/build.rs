@@ -1,4 +1,4 @@
-//! Writes what the code takes from `schemas/*.json`: the list of them for `store::schema`, and for `table` a macro a kind that has its
+//! Writes what the code takes from `*.json`: the list of them for `store::schema`, and for `table` a macro a kind that has its
 //! columns as fields of Rust, so that columns, their types and what they mean are stated once.
 #![expect(
     clippy::disallowed_methods,
@@ -7,11 +7,10 @@
 
 use serde_json::Value;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 fn main() {
-    let folder =
-        Path::new(&std::env::var("CARGO_MANIFEST_DIR").expect("cargo says it")).join("../../schemas");
+    let folder = PathBuf::from(std::env::var("CARGO_MANIFEST_DIR").expect("cargo says it"));
     let out = PathBuf::from(std::env::var("OUT_DIR").expect("cargo says it"));
     println!("cargo::rerun-if-changed={}", folder.display());
     let entries = std::fs::read_dir(&folder).expect("schemas are a folder");
@@ -41,7 +40,7 @@ fn main() {
 fn fields(schema: &Value) -> String {
     let kind = text(schema, "name");
     let mut out = format!(
-        "#[allow(unused_macros)] macro_rules! {kind} {{ ($table:ident, $row:ident) => {{ rows! {{ {kind:?}, \
+        "#[doc(hidden)] #[macro_export] macro_rules! {kind} {{ ($table:ident, $row:ident) => {{ rows! {{ {kind:?}, \
          #[doc = {:?}] pub struct $table of $row {{\n",
         escaped(text(schema, "description"))
     );

@@ -25,10 +25,14 @@
 //! # The map
 //! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> observation -> estimate -> diagnose`)
 //! has no files and no frames: the package `calib-numerics` in `src/numerics`, and above it `calib-diagnose`, `calib-dynamics`,
-//! `calib-engine` and `calib-drives` in folders of that. The **twin** is another package, `calib-twin` in `src/twin`, which does not depend on them. What both use is the package
-//! `calib-foundation` in `src/foundation`. All seven are handed on here, and the compiler keeps their walls. **Columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
-//! [`stage`] is the only place where both towers are used; [`pipeline`] is the only caller of stages. Data goes one way:
-//! YAML -> draft -> `Plan` -> stage -> tables -> report. Nothing is updated in place, no layer calls back up.
+//! `calib-engine` and `calib-drives` in folders of that. The **twin** (`calib-twin`) does not depend on them. **Columns** (`raw`, `store`)
+//! have no robots. [`table`] is the only bridge between a Parquet row and a Rust value; [`stage`] is the only place where both towers are used;
+//! [`pipeline`] is the only caller of stages. Data goes one way: YAML -> draft -> `Plan` -> stage -> tables -> report. Nothing is updated in
+//! place, no layer calls back up.
+//!
+//! Layers with a `Cargo.toml` in their folder are packages (`calib-raw`, `calib-store`, `calib-table`, `calib-report`, `calib-program`,
+//! `calib-stage`, `calib-foundation` for what all may use, `calib-schemas` in `schemas`): they compile side by side, and the compiler keeps
+//! their walls. All are handed on here; the rest is this package.
 //!
 //! | layer | what it holds | may use |
 //! |---|---|---|
@@ -102,10 +106,10 @@
 //! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose` |
 //! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; with `.in_laws()` declared effects read it by its name |
-//! | kind of raw file | `src/raw/<name>.rs`, which hands out records, the header first | its `mod` in `src/raw.rs`; in `src/stage/ingest/reading.rs` a variant of `FileKind`, how a file is known to be one (`of`, the first that fits), and a line in `records`; `init` follows |
+//! | kind of raw file | `src/raw/<name>.rs`, which hands out records, the header first | its `mod` in `src/raw/lib.rs`; in `src/stage/ingest/reading.rs` a variant of `FileKind`, how a file is known to be one (`of`, the first that fits), and a line in `records`; `init` follows |
 //! | number that decides | a row of `src/numerics/criteria/<class>.rs` | the code that says `*NAME` |
 //! | stage | `src/stage/<name>.rs`, declared with its ports by `stage!` | one line in [`stage::STAGES`] |
-//! | table | `schemas/<kind>.json`, of which its rows are made; `src/table/<kind>.rs` for what fills them | one line in [`table::TABLES`] |
+//! | table | `schemas/<kind>.json`, of which its rows are made; `src/table/<kind>.rs` for what fills them | one line in `tables!` of `src/table/lib.rs` |
 //! | export format | `src/export/<name>.rs`, which declares an `export::Format`; the file begins with `Export::head`, by which `check-export` knows it | its `mod` and one line in `FORMATS`, both in `src/export/mod.rs` |
 //! | figure of a page | - | the template in `src/report`: it has the rows of tables with all their columns, and the filters `mm`, `count`, `fixed`, `significant` |
 //! | sentence of a page | - | `_("...", name=...)` in its template, or `say!` in `src/report`; its German in `src/report/language/de.po`, of sentences in tables in `de_stored.po` |

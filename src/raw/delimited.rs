@@ -186,6 +186,7 @@ fn unquoted(field: &[u8]) -> Cow<'_, [u8]> {
 /// How a delimited text is written; without more, commas between fields and a header on the first line.
 #[derive(Debug, Clone)]
 pub struct TextLayout {
+    /// What stands between two fields.
     pub delimiter: Delimiter,
     /// How lines begin that are no rows.
     pub comment: Option<String>,

@@ -71,6 +71,7 @@ pub fn text(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
+/// The bytes of a regular file.
 pub fn bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.read_to_end(&mut bytes)?;
@@ -111,10 +112,12 @@ pub fn decoded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
+/// Batches of rows; an error is what a person is told of a damaged file.
 pub type Batches = Box<dyn Iterator<Item = Result<RecordBatch, String>> + Send>;
 
 /// A file of columns, batch by batch; what is wrong with it comes in words, once.
 pub struct BatchFile {
+    /// Its columns.
     pub schema: SchemaRef,
     /// Rows, where the file says it.
     pub rows: Option<u64>,
@@ -142,6 +145,7 @@ impl Iterator for BatchFile {
 }
 
 impl BatchFile {
+    /// A file that is being read.
     pub fn of(reader: impl RecordBatchReader + Send + 'static) -> Self {
         let schema = reader.schema();
         // A decoder that gave up is not asked again.

@@ -43,6 +43,7 @@ impl Record {
         self.is_quoted = false;
         self.fault = None;
     }
+    /// Another field behind the last.
     pub fn push(&mut self, field: &[u8]) {
         if !self.fields.is_empty() {
             self.text.push(b',');
@@ -51,6 +52,7 @@ impl Record {
         self.text.extend_from_slice(field);
         self.fields.push(start..self.text.len());
     }
+    /// Number of fields.
     pub fn len(&self) -> usize {
         self.fields.len()
     }

@@ -8,6 +8,7 @@ use serde_json::json;
 
 /// What the page shows; lengths in mm.
 pub struct AchievedTables<'a> {
+    /// Heading.
     pub title: &'a str,
     /// Where the model is from.
     pub model: &'a str,

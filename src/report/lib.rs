@@ -214,6 +214,7 @@ impl Tables {
 pub struct Pages {
     /// One file that needs no other.
     pub html: String,
+    /// What the first page states, for programs.
     pub json: String,
     /// The held-out points of the certificate, as text for spreadsheets.
     pub points: String,

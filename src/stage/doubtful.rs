@@ -78,10 +78,7 @@ const FAR_BELOW: f64 = 5.0;
 const FEWEST_VALUES: f64 = 10.0;
 
 /// What to tell the person where whole points miss the model by far less than their noise, both mm; `parameters` were fitted to them.
-pub fn suspicion(
-    points: impl Iterator<Item = [f64; 2]>,
-    parameters: usize,
-) -> Option<String> {
+pub fn suspicion(points: impl Iterator<Item = [f64; 2]>, parameters: usize) -> Option<String> {
     let (mut count, mut error, mut noise) = (0usize, 0.0, 0.0);
     for [missed, expected] in points {
         count += 1;

@@ -373,6 +373,7 @@ pub fn sentence(comparison: &RivalComparison, learnt: bool) -> String {
     )
 }
 
+/// How the learned corrections compare, a row each.
 pub fn comparison_table(
     step: &str,
     contest: &RivalContest,

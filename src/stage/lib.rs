@@ -6,7 +6,7 @@
 #![warn(missing_docs)]
 
 use calib_foundation::{description, error, statistics, units};
-use calib_numerics::{compensate, criteria, effect, estimate, observation, spatial, yaml};
+use calib_numerics::{compensate, effect, estimate, observation, spatial, yaml};
 use {calib_drives as drives, calib_dynamics as dynamics, calib_engine as engine};
 use {calib_program as program, calib_raw as raw, calib_table as table, calib_twin as twin};
 
@@ -250,8 +250,7 @@ fn on(sets: &[String]) -> Vec<(String, String)> {
 }
 
 /// Stages whose tables are a diagnosis, as `calib diagnose` runs and shows them.
-pub const DIAGNOSES: [&str; 3] =
-    [Diagnose::NAME, DiagnoseTorques::NAME, DiagnoseDrives::NAME];
+pub const DIAGNOSES: [&str; 3] = [Diagnose::NAME, DiagnoseTorques::NAME, DiagnoseDrives::NAME];
 
 /// Every kind of stage, one line each.
 pub const STAGES: &[StageEntry] = &[

@@ -19,6 +19,7 @@ const RECORD_FORMAT: u32 = 1;
 /// What a stage made, and how it went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionRecord {
+    /// Version of the layout of records.
     pub record_format: u32,
     /// Hash of the key.
     pub id: ActionId,

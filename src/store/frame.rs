@@ -43,11 +43,7 @@ impl FrameBuilder {
         self.columns.push((name.into(), column));
     }
     /// Adds a column of numbers, NaN for null.
-    pub fn push_numbers(
-        &mut self,
-        name: impl Into<String>,
-        values: impl Iterator<Item = f64>,
-    ) {
+    pub fn push_numbers(&mut self, name: impl Into<String>, values: impl Iterator<Item = f64>) {
         let mut values: Vec<f64> = values.collect();
         let nulls = values.iter().any(|value| value.is_nan()).then(|| {
             let present = values

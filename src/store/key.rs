@@ -49,6 +49,7 @@ pub struct ReadKey {
     /// The stage that wrote it, where the port takes several and the reader sees whose they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stage: Option<String>,
+    /// Hash of its content.
     pub table: TableHash,
 }
 
@@ -57,6 +58,7 @@ pub struct ReadKey {
 pub struct FileKey {
     /// Its name without folders, which tables of rejected rows show.
     pub name: String,
+    /// Hash of its bytes.
     pub content: FileHash,
 }
 

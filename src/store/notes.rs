@@ -20,11 +20,7 @@ impl Store {
     }
 
     /// A note, where there is one. One that is torn, damaged or of another kind is none.
-    pub fn note<T: DeserializeOwned>(
-        &self,
-        place: &[&str],
-        name: &str,
-    ) -> Result<Option<T>> {
+    pub fn note<T: DeserializeOwned>(&self, place: &[&str], name: &str) -> Result<Option<T>> {
         let bytes = super::disk::read(&self.place_of_note(place, name)?)?;
         let note = bytes.and_then(|bytes| read(&bytes));
         Ok(note.and_then(|note| serde_json::from_value(note).ok()))
@@ -36,12 +32,7 @@ impl Store {
     }
 
     /// Writes a note if there is none, durable after the next `sync`; false where one stands.
-    pub fn put_note_once(
-        &self,
-        place: &[&str],
-        name: &str,
-        note: &impl Serialize,
-    ) -> Result<bool> {
+    pub fn put_note_once(&self, place: &[&str], name: &str, note: &impl Serialize) -> Result<bool> {
         self.put_once(&self.place_of_note(place, name)?, &text(note)?)
     }
 

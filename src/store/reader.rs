@@ -237,9 +237,7 @@ fn set_aside(path: &Path, why: &str) -> Error {
 }
 
 /// What a file says of itself, by key, and of the units of its columns, by name.
-pub fn file_notes(
-    footer: &FileMetaData,
-) -> (BTreeMap<String, String>, BTreeMap<String, String>) {
+pub fn file_notes(footer: &FileMetaData) -> (BTreeMap<String, String>, BTreeMap<String, String>) {
     let pairs = footer.key_value_metadata().into_iter().flatten();
     let notes: BTreeMap<String, String> = pairs
         .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)))

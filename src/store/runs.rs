@@ -25,7 +25,9 @@ pub struct Run {
 /// A run and the seal of its manifest.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Link {
+    /// Id of the run.
     pub run: String,
+    /// Hex digits of the seal.
     pub sealed: String,
 }
 
@@ -34,6 +36,7 @@ pub struct Link {
 pub struct Sealed {
     /// As it was written.
     pub manifest: Value,
+    /// Hex digits of the seal.
     pub sealed: String,
 }
 

@@ -43,11 +43,7 @@ struct S3 {
 
 impl Store {
     /// Opens `s3://BUCKET/PREFIX` with a folder below `cache` before it. `settings` are the environment's `AWS_...`.
-    pub fn open_s3(
-        url: &str,
-        settings: &BTreeMap<String, String>,
-        cache: &Path,
-    ) -> Result<Self> {
+    pub fn open_s3(url: &str, settings: &BTreeMap<String, String>, cache: &Path) -> Result<Self> {
         let bucket = S3::open(url, settings)?;
         let root = cache.join(bucket.folder());
         Self::open_before(root, Arc::new(bucket))

@@ -12,9 +12,7 @@ use arrow::datatypes::{DataType, Field};
 
 use crate::error::{Error, Result};
 use crate::units::Unit;
-
-/// The schema files, one per table kind, as schemas/build.rs lists them.
-const SCHEMAS: &[&str] = include!(concat!(env!("OUT_DIR"), "/schemas.rs"));
+use calib_schemas::SCHEMAS;
 
 static PARSED: LazyLock<BTreeMap<String, TableSchema>> = LazyLock::new(|| {
     let parse = |text: &&str| TableSchema::parse(text).expect("embedded schemas are valid");
@@ -73,6 +71,7 @@ pub struct FieldSchema {
     /// Symbol of a stored unit; `row` where the row says it in its own `unit` column.
     #[serde(default)]
     pub unit: Option<String>,
+    /// What the column means.
     pub description: String,
     /// `angle`, `quaternion`, `json`, `unit`: how values compare.
     #[serde(default)]

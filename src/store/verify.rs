@@ -18,9 +18,13 @@ use std::time::SystemTime;
 /// What a verification read, and everything that it found wrong.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Verification {
+    /// Number of tables.
     pub objects: u64,
+    /// Bytes of the tables.
     pub bytes: u64,
+    /// Number of records of what stages made.
     pub actions: u64,
+    /// Number of runs.
     pub runs: u64,
     /// Names that were followed.
     pub tags: u64,
@@ -356,11 +360,15 @@ const HASH: usize = 64;
 /// What was swept, or would be.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Sweep {
+    /// Number of records of what stages made.
     pub actions: u64,
+    /// Number of tables.
     pub objects: u64,
     /// Bytes of the records and tables that go.
     pub bytes: u64,
+    /// Records that stay.
     pub kept_actions: u64,
+    /// Tables that stay.
     pub kept_objects: u64,
     /// Kept only because they are younger than the grace period.
     pub young: u64,

@@ -233,13 +233,17 @@ const MOST_ROWS: usize = 20_000;
 /// What was commanded, measured and simulated; key `sequence`. Angles are rad, row-major (`row * joints + joint`).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct DriveCourse {
+    /// Number of joints.
     pub joints: usize,
+    /// Number of the row, from 1.
     pub sequence: Vec<i64>,
     /// s.
     pub time: Vec<f64>,
     /// Whether nothing was fitted to the row.
     pub held_out: Vec<bool>,
+    /// As commanded.
     pub command: Vec<f64>,
+    /// As measured.
     pub measured: Vec<f64>,
     /// Of the simulation as it is.
     pub simulated: Vec<f64>,

@@ -122,12 +122,10 @@ macro_rules! rows {
         }
     };
 }
-include!(concat!(env!("OUT_DIR"), "/columns.rs"));
-
 /// Declares every table kind, in the order of their names; one without `of` has columns for each joint and is written by hand.
 macro_rules! tables {
     ($( $kind:ident => $table:ident $(of $row:ident)?, )+) => {
-        $( $( $kind! { $table, $row } )? )+
+        $( $( calib_schemas::$kind! { $table, $row } )? )+
         /// Every table kind; `schemas/<kind>.json` holds its schema.
         pub const TABLES: &[&str] = &[$( $table::KIND, )+];
     };

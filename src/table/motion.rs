@@ -11,7 +11,9 @@ use std::collections::BTreeMap;
 /// Rows in the order of time; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ArmMotion {
+    /// Number of joints.
     pub joints: usize,
+    /// Which joints slide.
     pub prismatic: Vec<bool>,
     /// From 1.
     pub sequence: Vec<i64>,
@@ -38,6 +40,7 @@ pub struct ArmMotion {
 }
 
 impl ArmMotion {
+    /// Number of rows.
     pub fn rows(&self) -> usize {
         self.sequence.len()
     }
@@ -135,9 +138,11 @@ fn at_joint(name: &str, joint: usize) -> String {
 /// The judged rows; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TorqueCourse {
+    /// Number of joints.
     pub joints: usize,
     /// Which joints slide: m and N in the place of rad and Nm.
     pub prismatic: Vec<bool>,
+    /// Number of the row, from 1.
     pub sequence: Vec<i64>,
     /// s.
     pub time: Vec<f64>,
@@ -145,6 +150,7 @@ pub struct TorqueCourse {
     pub held_out: Vec<bool>,
     /// Whether something pushed on the arm.
     pub in_event: Vec<bool>,
+    /// Whether the arm rests.
     pub rest: Vec<bool>,
     /// rad/s.
     pub velocity: Vec<f64>,

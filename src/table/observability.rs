@@ -13,6 +13,7 @@ pub struct FitContext {
     pub geometry: Option<(usize, usize)>,
     /// Standard deviation of the joints that rows are weighted by, rad.
     pub repeatability: Option<f64>,
+    /// Folds of the cross-validation, where there was one.
     pub folds: Option<usize>,
     /// Poses that were too few, or too many, for the cross-validation that was asked for.
     pub unfolded: Option<usize>,

@@ -246,6 +246,7 @@ impl InputTable {
 pub struct Chunks<T>(InputTable, PhantomData<fn() -> T>);
 
 impl<T: Table> Chunks<T> {
+    /// Number of rows.
     pub fn rows(&self) -> usize {
         self.0.rows()
     }

@@ -160,10 +160,7 @@ impl Prediction {
     }
 
     /// The same with a remark for each row behind what is said already; nothing where there is none.
-    pub fn with_remarks(
-        mut self,
-        remarks: impl IntoIterator<Item = Option<String>>,
-    ) -> Self {
+    pub fn with_remarks(mut self, remarks: impl IntoIterator<Item = Option<String>>) -> Self {
         for (row, remark) in self.0.iter_mut().zip(remarks) {
             row.remark = joined([row.remark.take(), remark]);
         }

@@ -35,6 +35,7 @@ pub struct Unseen {
 
 /// A step that predicts.
 pub struct Step {
+    /// Its id in the pipeline.
     pub id: String,
     /// Whether it has a model of its own; else it learned on the step before it that has.
     pub is_identified: bool,
@@ -66,6 +67,7 @@ pub struct Withdrawn {
     pub than: String,
     /// The rms of that one at the same points.
     pub than_rms_mm: f64,
+    /// Number of these points.
     pub points: usize,
 }
 

@@ -156,7 +156,7 @@ fn every_table_is_tested_and_has_exactly_one_schema() {
     assert_eq!(
         embedded,
         table::TABLES,
-        "SCHEMAS of src/store/schema.rs and TABLES of src/table/mod.rs, by name"
+        "schemas/*.json and TABLES of src/table/lib.rs, by name"
     );
     let folder = root("schemas");
     let mut files: Vec<String> = std::fs::read_dir(folder)
@@ -334,7 +334,7 @@ fn every_stage_is_in_the_list() {
     assert_eq!(
         stages,
         STAGES.len(),
-        "a stage is missing in STAGES (src/stage/mod.rs)"
+        "a stage is missing in STAGES (src/stage/lib.rs)"
     );
 }
 

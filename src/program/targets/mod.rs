@@ -161,7 +161,9 @@ fn corrected(
 /// The targets of a table that are not reached; their joints are empty.
 #[derive(Debug, Default)]
 pub struct Unreached {
+    /// How many.
     pub count: u64,
+    /// The first of them with their lines.
     pub faults: Vec<Fault>,
 }
 
@@ -178,7 +180,9 @@ impl Unreached {
 /// A target and the point that was measured, m, tracker's frame.
 #[derive(Debug, Clone)]
 pub struct MeasuredTarget {
+    /// As the table states it.
     pub target: CommandTarget,
+    /// The measured point.
     pub point: Vector3<f64>,
 }
 

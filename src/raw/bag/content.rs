@@ -11,10 +11,12 @@ use std::collections::BTreeMap;
 pub struct BagTopic {
     /// As the setting `topic` names it.
     pub name: String,
+    /// Type of its messages.
     pub kind: String,
     encoding: String,
     /// Whether messages of this type, encoded so, are read.
     pub is_read: bool,
+    /// How many messages.
     pub messages: u64,
     /// When the first and the last were received, s since 1970.
     pub received: [f64; 2],
@@ -54,7 +56,9 @@ impl BagTopic {
 
 /// What a bag holds.
 pub struct BagContent {
+    /// By topic.
     pub topics: Vec<BagTopic>,
+    /// What of it could not be read, in words.
     pub loss: Option<String>,
     source: Box<dyn InputSource>,
 }

@@ -38,14 +38,19 @@ pub struct TableLayout<'l> {
 /// What a file is.
 #[derive(Clone, Copy)]
 pub enum FileKind {
+    /// A workbook of a spreadsheet.
     Workbook,
+    /// A recording of ROS 2.
     Bag,
     /// A controller's, which declares joints.
     Program(Language),
+    /// Parquet or Feather.
     Columns,
+    /// JSON, or lines of it.
     Json,
     /// What is known and not read, and why.
     NotRead(&'static str),
+    /// Delimited text.
     Text,
 }
 
