@@ -10,6 +10,8 @@ criteria! {
     NAMELESS: f64 = 0.1, "share of the gain", "judgement: a tenth", "changes nothing on 2";
     /// The radius, and the place along the axis, may change by this share of the displacement.
     CONSTANT: f64 = 0.1, "share", "judgement: a tenth", "";
+    /// The misfit of a curve without a name is this share of what it explains.
+    NEARLY_RIGHT: f64 = 0.01, "share of the evidence", "judgement: its shape is right to a tenth of its size", "";
     /// Causes of a round that are named.
     NAMED: usize = 4, "causes", "judgement: length of a line", "";
     /// Faults of single rows are seen as such or not at all.

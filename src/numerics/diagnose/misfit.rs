@@ -34,6 +34,9 @@ pub(crate) struct Misfit {
     left_here: f64,
     /// Rms size of what is left at held-out rows that belong, where it is more than what was fitted and the noise allow.
     pub(crate) not_carried: Option<f64>,
+    /// Sum of squares of what is left at `rows`, in standard deviations, and how many values these are.
+    pub(crate) square: f64,
+    pub(crate) values: usize,
 }
 
 /// What is left of all that a row measured.
@@ -126,6 +129,8 @@ impl Misfit {
             kinds.find_map(|kind| kind.instrument(data, *row))
         };
         Self {
+            square: whitened(&rows),
+            values: values(&rows),
             dimension,
             held_out,
             noise_floor: rms(rows.iter().map(|row| noise(data, *row, dimension))),
@@ -142,6 +147,12 @@ impl Misfit {
             rows,
             sizes: left.iter().map(|row| row.size).collect(),
         }
+    }
+
+    /// Sum of squares of what another model leaves at `rows`, in standard deviations.
+    pub(crate) fn square_of(&self, model: &Model, data: &Measurements) -> f64 {
+        let left = left(model, data, self.dimension);
+        self.rows.iter().map(|row| left[*row].whitened).sum()
     }
 
     /// The noise, of which an inferred one is at least the instrument's and no more than what is left.

@@ -18,6 +18,7 @@ use findings::findings;
 use not_observable::{next, not_observable, not_tried, stand_out_in_number};
 use std::collections::BTreeMap;
 
+mod doubts;
 mod findings;
 mod not_observable;
 mod windup;
@@ -26,7 +27,7 @@ pub(crate) use findings::LastRound;
 pub use not_observable::other_means;
 
 /// Draws the conclusions of the last round; `before` is what the base model leaves of every row.
-pub(crate) fn conclude(last: LastRound, before: &[Option<f64>]) -> Diagnosis {
+pub(crate) fn conclude(mut last: LastRound, before: &[Option<f64>]) -> Diagnosis {
     let fitter = last.view.fitter;
     let (data, state) = (&fitter.data, &last.state);
     // What is predicted outside of the fitted rows is what is reported, and what programs are corrected with.
@@ -38,6 +39,8 @@ pub(crate) fn conclude(last: LastRound, before: &[Option<f64>]) -> Diagnosis {
         &model,
         state.fitted.singular.len(),
     );
+    doubts::weigh(&mut last, &misfit);
+    let state = &last.state;
     let basis = basis(fitter, &state.screening.kept);
     // Repeats know the noise: what poses leave beyond it is no noise, even without structure.
     let lack_of_fit = state

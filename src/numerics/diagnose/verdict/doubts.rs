@@ -1,0 +1,76 @@
+//! What speaks against the name of a finding though the fitted rows are for it: the held-out rows, which judge and choose nothing, and a curve
+//! without a name beside it that is only nearly right.
+
+use super::LastRound;
+use crate::criteria::words::NEARLY_RIGHT;
+use crate::effect::names;
+use crate::misfit::Misfit;
+use crate::table::FoundCell;
+
+/// Findings more probably nothing than what they are say why.
+const REFUTED: f64 = 0.5;
+
+/// Lowers the probabilities of findings by what speaks against them.
+pub(super) fn weigh(last: &mut LastRound, misfit: &Misfit) {
+    let held_out = by_held_out_rows(last, misfit);
+    let beside = beside_nameless(&last.answer.found);
+    let found = last.answer.found.iter_mut();
+    for ((found, held_out), beside) in found.zip(held_out).zip(beside) {
+        doubt(
+            found,
+            held_out,
+            "held-out points are predicted better without it",
+        );
+        doubt(
+            found,
+            beside,
+            "what has no name is so much larger that its misfit may look like this",
+        );
+    }
+}
+
+/// Multiplies the odds of a finding by a likelihood ratio below one, given as its ln.
+fn doubt(found: &mut FoundCell, log_ratio: f64, why: &'static str) {
+    let none = found.probabilities.none;
+    let there = (1.0 - none) * log_ratio.min(0.0).exp();
+    if there + none <= 0.0 || log_ratio >= 0.0 || none >= 1.0 {
+        return;
+    }
+    let refuted = none / (none + there);
+    found.or_nothing((refuted - none) / (1.0 - none));
+    if refuted > REFUTED {
+        found.against = Some(why);
+    }
+}
+
+/// ln of the likelihood ratio of the held-out rows with each finding and without it, everything else fitted anew, the noise being what is left
+/// of them. Zero where the model is what was recorded there.
+fn by_held_out_rows(last: &LastRound, misfit: &Misfit) -> Vec<f64> {
+    let (fitter, state) = (last.view.fitter, &last.state);
+    let log_ratio = |found: &FoundCell| {
+        let kept = (0..state.causes.len()).filter(|cause| !found.members.contains(cause));
+        let kept = kept.map(|cause| state.causes[cause].clone()).collect();
+        let without = fitter.fit(&state.model, kept);
+        let rows = &without.screening.kept;
+        let model = without.model.held_within(&fitter.data, rows);
+        let without = misfit.square_of(&model, &fitter.data);
+        0.5 * misfit.values as f64 * (without / misfit.square).ln()
+    };
+    let found = last.answer.found.iter();
+    match misfit.not_carried {
+        Some(_) => found.map(log_ratio).collect(),
+        None => vec![0.0; found.len()],
+    }
+}
+
+/// ln of what the misfit of curves without a name takes of the evidence of each named finding, where it takes all of that; else zero.
+fn beside_nameless(found: &[FoundCell]) -> Vec<f64> {
+    let is_nameless = |found: &&FoundCell| found.effect == names::UNKNOWN;
+    let nameless: f64 = found.iter().filter(is_nameless).map(|one| one.log).sum();
+    let taken = *NEARLY_RIGHT * nameless;
+    let of_one = |one: &FoundCell| match one.effect == names::UNKNOWN {
+        true => 0.0,
+        false => one.log - taken,
+    };
+    found.iter().map(|one| of_one(one).min(0.0)).collect()
+}
