@@ -36,6 +36,7 @@ mod problem;
 mod recording;
 mod refine;
 mod scene;
+mod search;
 mod seen_gravity;
 mod sliding;
 mod solve;

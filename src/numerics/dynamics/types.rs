@@ -59,6 +59,8 @@ pub struct TorqueFinding {
     pub effect: &'static str,
     /// Where it acts.
     pub place: Place,
+    /// The kind of variable that it follows: own speed, own angle, other angle, load, acceleration, time, temperature, constant.
+    pub follows: &'static str,
     /// The finding in a sentence, with its size.
     pub statement: String,
     /// Fitted numbers, in units that people read.

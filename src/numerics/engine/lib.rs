@@ -13,10 +13,10 @@ mod rows;
 mod search;
 
 pub use rows::{Block, Rows, ranked};
-pub use search::{Answer, Options, diagnose};
+pub use search::{Answer, Options, diagnose, dropped, findings};
 
 /// A cause: a row of the table.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cause {
     /// In tables and JSON.
     pub name: &'static str,
@@ -45,13 +45,15 @@ pub struct Cell<K> {
     /// What the problem knows it by.
     pub key: K,
     /// Its cause.
-    pub cause: &'static Cause,
+    pub cause: Cause,
     /// Where it acts, in words: `joint 2`.
     pub place: String,
     /// ln of its prior odds.
     pub log_prior: f64,
     /// How it may look.
     pub shapes: Vec<Shape>,
+    /// Cells that it modifies, and without which it is nothing.
+    pub needs: Vec<K>,
 }
 
 /// A shape of a cell: where its numbers begin, and how far they usually are from there.
@@ -139,7 +141,8 @@ pub trait Problem: Sync {
         around: &Self::Around,
         out: Option<usize>,
     ) -> Vec<Scanned<Self::Key>>;
-    /// Everything fitted at once, from the numbers of the set and the fit before; it may stop where the evidence cannot reach `least`.
+    /// Everything fitted at once, from the numbers of the set and the fit before; it may stop where the evidence cannot reach `least`, and what
+    /// comes out as it cannot be is in the set no more.
     fn fit(&self, set: &[Accepted<Self::Key>], before: Option<&Self::Fit>, least: f64)
     -> Self::Fit;
     /// The same with every derivative made anew, to the end: a trial among many may reuse those of the fit before.
@@ -152,6 +155,6 @@ pub trait Problem: Sync {
     fn log_evidence(&self, fit: &Self::Fit, independence: f64) -> f64;
     /// ln of the odds of a member of the set against nothing, to first order; `None` where only a fit without it tells.
     fn odds(&self, fit: &Self::Fit, member: usize, independence: f64) -> Option<f64>;
-    /// Whether two cells do the same in these rows' words, so that one must not stand beside the other.
-    fn excludes(&self, one: &Self::Key, other: &Self::Key) -> bool;
+    /// Whether two cells in their shapes do the same in these rows' words, so that one must not stand beside the other.
+    fn excludes(&self, one: &Accepted<Self::Key>, other: &Accepted<Self::Key>) -> bool;
 }

@@ -101,6 +101,8 @@ pub(super) fn slope(size: f64, function: impl Fn(f64) -> f64) -> f64 {
 pub(super) struct TorqueCause {
     /// Canonical.
     pub(crate) name: &'static str,
+    /// The kind of variable that it follows.
+    pub(crate) follows: &'static str,
     /// What its coefficients are called in a model, and their units; wrong masses, which are in the inertial numbers, have none.
     pub(crate) coefficients: &'static [CoefficientName],
     /// -2 ln of the prior odds of a form of it, relative to a common one.
@@ -201,6 +203,7 @@ impl ColumnOf<'_> {
 /// What most causes are.
 const PLAIN: TorqueCause = TorqueCause {
     name: "",
+    follows: "",
     coefficients: &[],
     price: |_| 6.0,
     modifies: &[],
