@@ -48,8 +48,8 @@
 //! | [`program`] | programs of controllers (KRL, RAPID), read strictly: rewritten in the numbers of their targets, or as lists of joints | compensate, robot, spatial |
 //! | [`targets`] | tables of targets (text, Parquet) with their joints replaced, planned motions with their torques | compensate, dynamics, raw, robot |
 //! | [`diagnose`] | where recording and simulation differ, which cause explains it | criteria, effect, estimate, observation, robot, spatial |
-//! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | criteria, diagnose, effect, estimate, spatial |
 //! | [`engine`] | one search for what a model lacks, whatever was recorded | diagnose |
+//! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | criteria, diagnose, effect, engine, estimate, spatial |
 //! | [`drives`] | robots from MJCF, their drives rolled out along commands, and which physics that simulation lacks | dynamics, engine |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | raw |

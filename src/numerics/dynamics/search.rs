@@ -56,18 +56,18 @@ impl Problem for TorqueTable<'_, '_> {
             form: self.cells[one.cell.key].forms[one.shape],
             amplitude: one.numbers[0],
         };
-        let mut components: Vec<TorqueComponent> = set.iter().map(component).collect();
-        while let Some(place) = self.backfit(&mut components) {
-            components.remove(place);
-        }
-        TorqueFit {
-            log: self.total(&components),
-            components,
-        }
+        self.fitted(set.iter().map(component).collect())
     }
 
     fn settled(&self, fit: &TorqueFit) -> TorqueFit {
-        fit.clone()
+        let mut fit = fit.clone();
+        for _ in 0..*EXCHANGES {
+            let Some(reshaped) = self.reshaped(&fit.components) else {
+                break;
+            };
+            fit = self.fitted(reshaped);
+        }
+        fit
     }
 
     fn set(&self, fit: &TorqueFit) -> Vec<Accepted<usize>> {
@@ -100,6 +100,36 @@ impl Problem for TorqueTable<'_, '_> {
 }
 
 impl TorqueTable<'_, '_> {
+    /// Components with their amplitudes, without those that cannot be.
+    fn fitted(&self, mut components: Vec<TorqueComponent>) -> TorqueFit {
+        while let Some(place) = self.backfit(&mut components) {
+            components.remove(place);
+        }
+        TorqueFit {
+            log: self.total(&components),
+            components,
+        }
+    }
+
+    /// Components with one of them in a shape of its cell that is more probable; none where there is none.
+    fn reshaped(&self, components: &[TorqueComponent]) -> Option<Vec<TorqueComponent>> {
+        let kappa = self.state(components, None).known.kappa;
+        (0..components.len()).find_map(|place| {
+            let here = components[place].form;
+            let state = self.state(&without(components, place), Some(kappa));
+            let now = self
+                .form(here, &state)
+                .map_or(f64::NEG_INFINITY, |found| found.0);
+            let shapes = self.shapes(self.cell_of[&here], &state);
+            let (log, best) = shapes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+            (log > now + *SWAPS).then(|| {
+                let mut components = components.to_vec();
+                components[place] = best;
+                components
+            })
+        })
+    }
+
     /// A component as the engine has it.
     fn accepted(&self, component: &TorqueComponent) -> Accepted<usize> {
         let key = self.cell_of[&component.form];
@@ -190,8 +220,9 @@ impl TorqueTable<'_, '_> {
     }
 
     /// The best set that steps from a start lead to.
-    fn searched(&self, start: &[usize]) -> TorqueFit {
-        calib_engine::diagnose(self, &self.members(start), &options(), |_| ()).after
+    fn searched(&self, start: &[usize], tell: &mut dyn FnMut(String)) -> TorqueFit {
+        let start = self.settled(&self.fit(&self.members(start), None, f64::NEG_INFINITY));
+        calib_engine::diagnose(self, &self.set(&start), &options(), tell).after
     }
 
     /// What each of a set is, and what else could be in its place.
@@ -227,7 +258,7 @@ fn options() -> Options {
 
 /// The best set from what hardly an arm is without. One factor on the whole torque of each joint is asked before masses: where factors explain as
 /// much, it is these.
-pub(super) fn from_common(choice: &CauseChoice) -> Vec<usize> {
+pub(super) fn from_common(choice: &CauseChoice, tell: &mut dyn FnMut(String)) -> Vec<usize> {
     let table = TorqueTable::new(choice);
     let is_drive = |form: &TorqueForm| form.cause.name == TORQUE_CONSTANT;
     let has_masses = |fit: &TorqueFit| {
@@ -235,7 +266,7 @@ pub(super) fn from_common(choice: &CauseChoice) -> Vec<usize> {
             form.cause.inertial && !is_drive(form)
         })
     };
-    let masses = table.searched(&choice.common());
+    let masses = table.searched(&choice.common(), tell);
     let drives = (0..choice.open).filter(|number| {
         let form = choice.form(*number);
         is_drive(form) && form.shape.is_empty()
@@ -244,7 +275,7 @@ pub(super) fn from_common(choice: &CauseChoice) -> Vec<usize> {
     if !has_masses(&masses) || start == choice.common() {
         return forms(&masses.components);
     }
-    let scaled = table.searched(&start);
+    let scaled = table.searched(&start, tell);
     let most = match has_masses(&scaled) {
         true => 0.0,
         false => 0.5 * *APART,
@@ -254,8 +285,12 @@ pub(super) fn from_common(choice: &CauseChoice) -> Vec<usize> {
 }
 
 /// The best set from a start.
-pub(super) fn search(choice: &CauseChoice, start: &[usize]) -> Vec<usize> {
-    forms(&TorqueTable::new(choice).searched(start).components)
+pub(super) fn search(
+    choice: &CauseChoice,
+    start: &[usize],
+    tell: &mut dyn FnMut(String),
+) -> Vec<usize> {
+    forms(&TorqueTable::new(choice).searched(start, tell).components)
 }
 
 /// 1 / variance beforehand of the columns of a set, by the amplitudes that the rows show.
