@@ -173,10 +173,14 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let cells = keys.into_iter().map(|((name, _, place, _), forms)| {
             let prices = forms.iter().map(|number| choice.form(*number));
             let prices = prices.map(|form| (form.cause.price)(form));
+            let open = match name == UNKNOWN {
+                true => choice.problem.openness,
+                false => 0.0,
+            };
             TorqueCell {
                 name,
                 place,
-                log_prior: COMMON.ln() - 0.5 * prices.fold(f64::INFINITY, f64::min),
+                log_prior: COMMON.ln() - 0.5 * prices.fold(f64::INFINITY, f64::min) + open,
                 forms,
                 needs: Vec::new(),
             }

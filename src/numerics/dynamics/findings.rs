@@ -109,7 +109,7 @@ impl<'a> FittedSet<'a> {
         TorqueFinding {
             effect: form.cause.name,
             place: form.place,
-            follows: form.cause.follows,
+            follows: (form.cause.follows)(form),
             statement: (form.cause.statement)(form, &fitted, unit),
             parameters,
             evidence: Evidence {
@@ -307,6 +307,7 @@ impl FittedSet<'_> {
             let form = choice.form(*number);
             TorqueTerm {
                 effect: form.cause.name.into(),
+                declared: form.cause.declared.cloned(),
                 place: form.place,
                 with: form.with,
                 shape: form.shape.clone(),

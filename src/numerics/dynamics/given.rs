@@ -125,7 +125,10 @@ impl TorqueTable<'_, '_> {
             shape: None,
             effect: name,
             place,
-            follows: self.choice.form(form).cause.follows,
+            follows: {
+                let form = self.choice.form(form);
+                (form.cause.follows)(form)
+            },
             log: log_odds - log_prior,
             log_prior,
             size,

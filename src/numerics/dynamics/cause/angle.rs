@@ -30,7 +30,7 @@ const USUAL_TIME: f64 = 15.0;
 /// comes only as the sensor warms up.
 pub(crate) static CURRENT_OFFSET: TorqueCause = TorqueCause {
     name: OFFSET,
-    follows: "constant",
+    follows: |_| "constant",
     coefficients: &[("offset", "Nm"), ("cold", "Nm")],
     price: |form| if form.width == 1 { 0.0 } else { 4.0 },
     of_angle: true,
@@ -87,7 +87,7 @@ pub(super) static CABLE_STIFFNESS: TorqueCause = SPRING;
 /// and greatest angle, rad.
 const SPRING: TorqueCause = TorqueCause {
     name: "cable_stiffness",
-    follows: "own angle",
+    follows: |_| "own angle",
     coefficients: &[
         ("stiffness", "Nm/rad"),
         ("at_zero", "Nm"),
@@ -168,7 +168,7 @@ fn waves(q: f64) -> [f64; 5] {
 /// is the same torque: there it is a balancer, with the ripple as its rival. Shape: least and greatest angle of the joint, rad.
 pub(super) static BALANCER: TorqueCause = TorqueCause {
     name: SPRING_BALANCE_NAME,
-    follows: "own angle",
+    follows: |_| "own angle",
     of_turn: true,
     coefficients: &[
         ("cosine", "Nm"),
@@ -225,7 +225,7 @@ const WITH_OVERTONE: usize = 4;
 /// plain wave those of twice the order; `with` holds the order and whether it is of the motor. Shape: turns of the motor in one of the joint.
 pub(super) static RIPPLE: TorqueCause = TorqueCause {
     name: "torque_ripple",
-    follows: "own angle",
+    follows: |_| "own angle",
     of_turn: true,
     coefficients: &[
         ("cosine", "Nm"),
@@ -291,7 +291,7 @@ const CURVES: [usize; 2] = [5, 9];
 /// the recorded one, as cosines have no slope at its ends. Shape: the ends of that range and of the recorded one, rad.
 pub(super) static ONE_ANGLE: TorqueCause = TorqueCause {
     name: UNKNOWN,
-    follows: "own angle",
+    follows: |_| "own angle",
     coefficients: &[
         ("mean", "Nm"),
         ("half_waves_1", "Nm"),
@@ -330,7 +330,7 @@ pub(super) static ONE_ANGLE: TorqueCause = TorqueCause {
 /// A smooth torque at a joint, in the angles of two joints: products of sine and cosine of one angle and of twice another; `with` holds the two.
 pub(super) static TWO_ANGLES: TorqueCause = TorqueCause {
     name: UNKNOWN,
-    follows: "other angle",
+    follows: |_| "other angle",
     coefficients: &[
         ("sin_sin", "Nm"),
         ("sin_cos", "Nm"),
