@@ -33,7 +33,6 @@ pub(crate) static CURRENT_OFFSET: TorqueCause = TorqueCause {
     follows: |_| "constant",
     coefficients: &[("offset", "Nm"), ("cold", "Nm")],
     price: |form| if form.width == 1 { 0.0 } else { 4.0 },
-    of_angle: true,
     rich: |form| form.width == 1 || form.shape[0] == USUAL_TIME,
     forms: |cause, scene| {
         let mut forms = at_each_joint(cause, scene, 1, &[&[]]);
@@ -94,7 +93,6 @@ const SPRING: TorqueCause = TorqueCause {
         ("square", "Nm/rad2"),
         ("cube", "Nm/rad3"),
     ],
-    of_angle: true,
     rich: |form| form.width == SPRINGS[0],
     lengths: &[2],
     forms: |cause, scene| {
@@ -178,7 +176,6 @@ pub(super) static BALANCER: TorqueCause = TorqueCause {
         ("constant", "Nm"),
     ],
     price: |_| 4.0,
-    of_angle: true,
     lengths: &[2],
     forms: |cause, scene| {
         at_joints(cause, balanced(scene), &BALANCERS, |joint| {
@@ -234,7 +231,6 @@ pub(super) static RIPPLE: TorqueCause = TorqueCause {
         ("overtone_sine", "Nm"),
     ],
     may_repeat: true,
-    of_angle: true,
     rich: |form| form.width == 2 && form.with[1] == 0 && form.with[0] <= USUAL_ORDER,
     forms: |cause, scene| {
         let mut forms = Vec::new();
@@ -305,7 +301,6 @@ pub(super) static ONE_ANGLE: TorqueCause = TorqueCause {
     ],
     price: |_| 10.0,
     may_repeat: true,
-    of_angle: true,
     lengths: &[4],
     forms: |cause, scene| {
         at_joints(cause, 0..scene.joints(), &CURVES, |joint| {

@@ -138,8 +138,6 @@ pub(super) struct TorqueCause {
     pub(crate) positive: bool,
     /// Whether it brakes, so that its coefficient is positive unless a curve of speed without a name is in the model too, with which it is a sum.
     pub(crate) brakes: bool,
-    /// Whether it is, like others of its kind, a torque over its joint's angle: one curve looks like several of others.
-    pub(crate) of_angle: bool,
     /// Whether it is, like others of its kind, a wrong mass, drive or mounting: one such error looks like several of others.
     pub(crate) inertial: bool,
     /// Whether it is made by turning: no joint that slides has it.
@@ -234,7 +232,6 @@ const PLAIN: TorqueCause = TorqueCause {
     rich: |_| false,
     positive: false,
     brakes: false,
-    of_angle: false,
     inertial: false,
     of_turn: false,
     alike_at_joints: false,
