@@ -99,7 +99,7 @@
 //! | add | new | touch |
 //! |---|---|---|
 //! | effect | a row of [`effect::CAUSES`] in `src/numerics/effect/table.rs`; what no row follows yet is a variant of `Follows` in `law_row.rs` | its short sentence in `src/summary/text/phrases.txt`, the German of the long one in `src/report/language/de_stored.po`; then `CALIB_UPDATE=1 cargo test --test it forms pages language` |
-//! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose` |
+//! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose`, or `diagnose_torques` |
 //! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; with `.in_laws()` declared effects read it by its name |
 //! | kind of raw file | `src/raw/<name>.rs`, which hands out records, the header first | its `mod` in `src/raw.rs`; in `src/stage/ingest/reading.rs` a variant of `FileKind`, how a file is known to be one (`of`, the first that fits), and a line in `records`; `init` follows |

@@ -23,10 +23,6 @@ impl Problem for TorqueTable<'_, '_> {
 
     fn around(&self, _fit: &TorqueFit, _before: Option<&()>) {}
 
-    fn informed(&self, fit: TorqueFit, _around: &()) -> TorqueFit {
-        fit
-    }
-
     fn scan(&self, fit: &TorqueFit, _around: &(), out: Option<usize>) -> Vec<Scanned<usize>> {
         let components = &fit.components;
         let whole = self.state(components, None);
@@ -75,10 +71,6 @@ impl Problem for TorqueTable<'_, '_> {
             .iter()
             .map(|component| self.accepted(component))
             .collect()
-    }
-
-    fn independence(&self, _fit: &TorqueFit) -> f64 {
-        1.0
     }
 
     fn log_evidence(&self, fit: &TorqueFit, _independence: f64) -> f64 {
@@ -148,12 +140,7 @@ impl TorqueTable<'_, '_> {
             shape: cell.forms.iter().position(here).unwrap_or_default(),
             cell: Cell {
                 key,
-                cause: Cause {
-                    name: cell.name,
-                    sentence: "",
-                    numbers: &[],
-                    log_prior: cell.log_prior,
-                },
+                cause: Cause::named(cell.name),
                 place: cell.place.to_string(),
                 log_prior: cell.log_prior,
                 shapes: cell.forms.iter().map(shape).collect(),
@@ -220,9 +207,9 @@ impl TorqueTable<'_, '_> {
     }
 
     /// The best set that steps from a start lead to.
-    fn searched(&self, start: &[usize], tell: &mut dyn FnMut(String)) -> TorqueFit {
+    fn searched(&self, start: &[usize]) -> TorqueFit {
         let start = self.settled(&self.fit(&self.members(start), None, f64::NEG_INFINITY));
-        calib_engine::diagnose(self, &self.set(&start), &options(), tell).after
+        calib_engine::diagnose(self, &self.set(&start), &options(), |_| ()).after
     }
 
     /// What each of a set is, and what else could be in its place.
@@ -258,7 +245,7 @@ fn options() -> Options {
 
 /// The best set from what hardly an arm is without. One factor on the whole torque of each joint is asked before masses: where factors explain as
 /// much, it is these.
-pub(super) fn from_common(choice: &CauseChoice, tell: &mut dyn FnMut(String)) -> Vec<usize> {
+pub(super) fn from_common(choice: &CauseChoice) -> Vec<usize> {
     let table = TorqueTable::new(choice);
     let is_drive = |form: &TorqueForm| form.cause.name == TORQUE_CONSTANT;
     let has_masses = |fit: &TorqueFit| {
@@ -266,7 +253,7 @@ pub(super) fn from_common(choice: &CauseChoice, tell: &mut dyn FnMut(String)) ->
             form.cause.inertial && !is_drive(form)
         })
     };
-    let masses = table.searched(&choice.common(), tell);
+    let masses = table.searched(&choice.common());
     let drives = (0..choice.open).filter(|number| {
         let form = choice.form(*number);
         is_drive(form) && form.shape.is_empty()
@@ -275,7 +262,7 @@ pub(super) fn from_common(choice: &CauseChoice, tell: &mut dyn FnMut(String)) ->
     if !has_masses(&masses) || start == choice.common() {
         return forms(&masses.components);
     }
-    let scaled = table.searched(&start, tell);
+    let scaled = table.searched(&start);
     let most = match has_masses(&scaled) {
         true => 0.0,
         false => 0.5 * *APART,
@@ -285,12 +272,8 @@ pub(super) fn from_common(choice: &CauseChoice, tell: &mut dyn FnMut(String)) ->
 }
 
 /// The best set from a start.
-pub(super) fn search(
-    choice: &CauseChoice,
-    start: &[usize],
-    tell: &mut dyn FnMut(String),
-) -> Vec<usize> {
-    forms(&TorqueTable::new(choice).searched(start, tell).components)
+pub(super) fn search(choice: &CauseChoice, start: &[usize]) -> Vec<usize> {
+    forms(&TorqueTable::new(choice).searched(start).components)
 }
 
 /// 1 / variance beforehand of the columns of a set, by the amplitudes that the rows show.

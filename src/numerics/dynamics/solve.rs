@@ -62,10 +62,10 @@ pub(super) fn solve<'a>(
     problem.events = first_contacts(&problem);
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted(&[]);
-    let mut set = from_common(&CauseChoice::named(&problem, &weighted), tell);
+    let mut set = from_common(&CauseChoice::named(&problem, &weighted));
     tell(explained_by(&problem, &set));
     refine(&mut problem, &mut weighted, &mut set);
-    set = again(&mut problem, &mut weighted, set, tell);
+    set = again(&mut problem, &mut weighted, set);
     let residual = left_by(&problem, &weighted, &set);
     problem.events = contacts(&problem, &residual, &problem.noise, true);
     learn(&mut problem, &set);
@@ -75,7 +75,7 @@ pub(super) fn solve<'a>(
         if !take_out_ends(&mut problem, &mut weighted, &mut set) {
             break;
         }
-        set = again(&mut problem, &mut weighted, set, tell);
+        set = again(&mut problem, &mut weighted, set);
         polish(&mut problem, &mut weighted, &mut set);
     }
     weighted = problem.weighted(&set);
@@ -90,7 +90,7 @@ pub(super) fn solve<'a>(
             problem.barred.push(problem.all.forms[form].clone());
         }
         // Something else may be in their place.
-        set = again(&mut problem, &mut weighted, set, tell);
+        set = again(&mut problem, &mut weighted, set);
         polish(&mut problem, &mut weighted, &mut set);
         weighted = problem.weighted(&set);
     }
@@ -152,7 +152,6 @@ fn again(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
     set: Vec<usize>,
-    tell: &mut dyn FnMut(String),
 ) -> Vec<usize> {
     let choice = CauseChoice::new(problem, weighted);
     let solution = choice.base.with(&set).solution();
@@ -161,9 +160,9 @@ fn again(
     problem.refresh();
     learn(problem, &set);
     *weighted = problem.weighted(&set);
-    let mut set = search(&CauseChoice::new(problem, weighted), &set, tell);
+    let mut set = search(&CauseChoice::new(problem, weighted), &set);
     if refine(problem, weighted, &mut set) {
-        set = search(&CauseChoice::new(problem, weighted), &set, tell);
+        set = search(&CauseChoice::new(problem, weighted), &set);
     }
     set
 }

@@ -63,16 +63,22 @@ pub(super) static OVER_ROWS: TorqueCause = TorqueCause {
     cell: |form| form.with,
     torque: ColumnTorque::Row(half_wave),
     statement: |form, _, _| {
-        let what = match form.with {
-            [LOAD, _] => "the load of the joint".to_string(),
-            [ANGLE, other] => format!("the angle of joint {}", other + 1),
-            [TIME, _] => "time".to_string(),
-            _ => "the temperature".to_string(),
-        };
-        format!(
-            "something without a name acts at {}; it depends on {what}",
-            form.place
-        )
+        let place = form.place;
+        match form.with {
+            [LOAD, _] => {
+                format!(
+                    "something without a name acts at {place}; it depends on the load of the joint"
+                )
+            }
+            [ANGLE, other] => format!(
+                "something without a name acts at {place}; it depends on the angle of joint {}",
+                other + 1
+            ),
+            [TIME, _] => {
+                format!("something without a name acts at {place}; it depends on time")
+            }
+            _ => format!("something without a name acts at {place}; it depends on the temperature"),
+        }
     },
     ..PLAIN
 };
