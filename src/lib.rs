@@ -52,8 +52,8 @@
 //! | [`program`] | programs of controllers (KRL, RAPID), read strictly: rewritten in the numbers of their targets, or as lists of joints | compensate, robot, spatial |
 //! | [`targets`] | tables of targets (text, Parquet) with their joints replaced, planned motions with their torques | compensate, dynamics, raw, robot |
 //! | [`diagnose`] | where recording and simulation differ, which cause explains it | criteria, effect, estimate, observation, robot, spatial |
-//! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | criteria, diagnose, effect, estimate, spatial |
 //! | [`engine`] | one search for what a model lacks, whatever was recorded | diagnose |
+//! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | criteria, diagnose, effect, engine, estimate, spatial |
 //! | [`drives`] | robots from MJCF, their drives rolled out along commands, and which physics that simulation lacks | dynamics, engine |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | raw |
@@ -103,7 +103,7 @@
 //! | add | new | touch |
 //! |---|---|---|
 //! | effect | a row of [`effect::CAUSES`] in `src/numerics/effect/table.rs`; what no row follows yet is a variant of `Follows` in `law_row.rs` | its short sentence in `src/summary/text/phrases.txt`, the German of the long one in `src/report/language/de_stored.po`; then `CALIB_UPDATE=1 cargo test --test it forms pages language` |
-//! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose` |
+//! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose`, or `diagnose_torques` |
 //! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; with `.in_laws()` declared effects read it by its name |
 //! | kind of raw file | `src/raw/<name>.rs`, which hands out records, the header first | its `mod` in `src/raw/lib.rs`; in `src/stage/ingest/reading.rs` a variant of `FileKind`, how a file is known to be one (`of`, the first that fits), and a line in `records`; `init` follows |

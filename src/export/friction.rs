@@ -177,6 +177,7 @@ mod tests {
     fn held(effect: &str, shape: &[f64], value: f64) -> Option<(f64, String)> {
         let (place, coefficients) = (Place::Joint(1), vec![value]);
         let term = TorqueTerm {
+            declared: None,
             effect: effect.into(),
             place,
             with: [0; 2],

@@ -1,64 +1,19 @@
 //! The table of causes of torques and drives: places down the chain, what the cause follows across, as that of points has them.
-//!
-//! Their tables of findings have no column of what a cause follows, since a cause of them is one law at a place: its name says it.
 
 use serde_json::{Value, json};
 
-/// What torques and angles follow, as columns of the table, each with the causes that do.
-const FOLLOWED: [(&str, &[&str]); 8] = [
-    (
-        "own speed",
-        &[
-            "viscous_friction",
-            "coulomb_friction",
-            "asymmetric_friction",
-            "stribeck_friction",
-            "presliding_friction",
-            "backlash_spikes",
-            "wrist_coupling",
-            "drive_damping",
-        ],
-    ),
-    (
-        "load",
-        &[
-            "load_friction",
-            "torque_constant",
-            "torque_limit",
-            "voltage_sag",
-            "backlash",
-            "joint_coupling",
-        ],
-    ),
-    (
-        "own angle",
-        &[
-            "torque_ripple",
-            "spring_balance",
-            "cable_stiffness",
-            "link_mass",
-            "link_com",
-            "payload_error",
-            "gravity_direction",
-        ],
-    ),
-    (
-        "acceleration",
-        &["rotor_inertia", "link_inertia", "joint_elasticity"],
-    ),
-    (
-        "error of the drive",
-        &["drive_gain", "integral_action", "dead_band"],
-    ),
-    ("command", &["command_delay", "command_hold", "speed_limit"]),
-    ("time", &["warmup_friction", "contact", "current_latency"]),
-    ("constant", &["current_offset", "command_offset"]),
-];
-/// What a cause without a name follows is the end of its statement.
-const DEPENDS: [(&str, &str); 3] = [
-    ("the angle of the joint", "own angle"),
-    ("the velocity of the joint", "own speed"),
-    ("the load of the joint", "load"),
+/// What torques and angles follow, as columns of the table.
+const COLUMNS: [&str; 10] = [
+    "own speed",
+    "load",
+    "own angle",
+    "other angle",
+    "acceleration",
+    "error of the drive",
+    "command",
+    "time",
+    "temperature",
+    "constant",
 ];
 const OTHER: &str = "other";
 /// Shares of the largest finding from which a cell has the next colour.
@@ -66,38 +21,28 @@ const SHADES: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 0.6, 0.9];
 
 /// A finding as the table shows it.
 pub(super) struct FollowedFinding<'a> {
-    effect: &'a str,
-    place: &'a str,
-    statement: &'a str,
-    size: f64,
+    pub(super) effect: &'a str,
+    pub(super) place: &'a str,
+    /// The kind of variable that it follows.
+    pub(super) follows: &'a str,
+    /// In the unit of the table.
+    pub(super) size: f64,
 }
 
-impl<'a> FollowedFinding<'a> {
-    /// A finding of a size in the unit of the table.
-    pub(super) fn new((effect, place, statement): (&'a str, &'a str, &'a str), size: f64) -> Self {
-        Self {
-            effect,
-            place,
-            statement,
-            size,
-        }
-    }
-
+impl FollowedFinding<'_> {
     fn column(&self) -> &'static str {
-        let of_name = |(_, names): &&(&str, &[&str])| names.contains(&self.effect);
-        let statement = self.statement.trim_end_matches('.');
-        let depends = DEPENDS.iter().find(|(end, _)| statement.ends_with(end));
-        let named = FOLLOWED.iter().find(of_name).map(|(column, _)| *column);
-        named
-            .or(depends.map(|(_, column)| *column))
+        let mut known = COLUMNS.into_iter();
+        known
+            .find(|column| *column == self.follows)
             .unwrap_or(OTHER)
     }
 }
 
 /// The table: size and names in each cell.
 pub(super) fn grid(findings: &[FollowedFinding]) -> Value {
-    let columns = FOLLOWED.iter().map(|(column, _)| *column).chain([OTHER]);
-    let columns: Vec<&str> = columns
+    let columns: Vec<&str> = COLUMNS
+        .into_iter()
+        .chain([OTHER])
         .filter(|column| findings.iter().any(|finding| finding.column() == *column))
         .collect();
     let mut places: Vec<&str> = findings.iter().map(|finding| finding.place).collect();
@@ -134,36 +79,19 @@ fn place_order(place: &str) -> (i64, String) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calib_drives::CAUSES;
-
-    #[test]
-    fn every_cause_of_drives_stands_in_a_column() {
-        let finding = |effect| FollowedFinding {
-            effect,
-            place: "joint 1",
-            statement: "",
-            size: 1.0,
-        };
-        let others: Vec<&str> = CAUSES
-            .iter()
-            .map(|cause| cause.name)
-            .filter(|name| *name != "unknown" && finding(name).column() == OTHER)
-            .collect();
-        assert_eq!(others, Vec::<&str>::new());
-    }
 
     #[test]
     fn places_go_down_the_chain_and_a_cell_has_all_its_names() {
-        let finding = |effect, place, size| FollowedFinding {
+        let finding = |effect, place, follows, size| FollowedFinding {
             effect,
             place,
-            statement: "something acts; it depends on the angle of the joint",
+            follows,
             size,
         };
         let grid = grid(&[
-            finding("coulomb_friction", "joint 10", 2.0),
-            finding("viscous_friction", "joint 10", 1.0),
-            finding("unknown", "joint 2", 0.1),
+            finding("coulomb_friction", "joint 10", "own speed", 2.0),
+            finding("viscous_friction", "joint 10", "own speed", 1.0),
+            finding("unknown", "joint 2", "own angle", 0.1),
         ]);
         assert_eq!(grid["columns"], json!(["own speed", "own angle"]));
         assert_eq!(grid["rows"][0]["place"], "joint 2");

@@ -61,8 +61,11 @@ pub fn torque_page(
         .findings
         .0
         .iter()
-        .map(|row| {
-            FollowedFinding::new((&row.effect, &row.place, &row.statement), row.effect_rms_nm)
+        .map(|row| FollowedFinding {
+            effect: &row.effect,
+            place: &row.place,
+            follows: &row.follows,
+            size: row.effect_rms_nm,
         })
         .collect();
     let page = json!({

@@ -78,7 +78,7 @@ impl Stage for CellEvidence {
 }
 
 crate::stage! {
-    TorqueEvidence, "torque_evidence", 8, "says what every possible cause explains of the torques of one robot",
+    TorqueEvidence, "torque_evidence", 9, "says what every possible cause explains of the torques of one robot",
         DiagnoseTorquesReads -> CellEvidenceWrites
 }
 
@@ -86,6 +86,13 @@ impl Stage for TorqueEvidence {
     fn faults(&self, at: &mut Place) {
         self.diagnose.faults(&mut at.at("diagnose"));
         must_have_sizes(&self.given, at);
+    }
+
+    fn files(&self) -> Vec<(String, RawFile)> {
+        let files = Stage::files(&self.diagnose).into_iter();
+        files
+            .map(|(place, file)| (format!("diagnose.{place}"), file))
+            .collect()
     }
 
     fn run(&self, reads: DiagnoseTorquesReads, context: &Context) -> Result<CellEvidenceWrites> {

@@ -11,9 +11,11 @@
 //! unit: arcsec                    # of the law's coefficient
 //! sentence: "{place} is worn near {centre} rad, by {value}"
 //! ```
+//!
+//! Torques have the same words with a joint as their place: `law: velocity^3`, a coefficient in Nm.
 
 use super::{Context, RawFile};
-use crate::effect::{DeclaredCause, EffectDeclaration};
+use crate::effect::{DeclarationFault, EffectDeclaration};
 use crate::error::{Error, Result};
 use crate::yaml::{self, Node, Trouble, YamlValue, typed};
 use std::collections::BTreeMap;
@@ -24,18 +26,21 @@ const FORMAT: i128 = 1;
 const VERSION: &str = "calib_effect";
 const LIST: &str = "effects";
 
+/// How a declaration is understood, or everything that is wrong with it.
+type Understand<T> = fn(&EffectDeclaration) -> std::result::Result<T, Vec<DeclarationFault>>;
+
 /// The declared effects of some files, in their order. Fails with every fault of all files.
-pub(super) fn declared_effects(
+pub(super) fn declared_effects<T>(
     files: &[RawFile],
+    understand: Understand<T>,
     context: &Context,
-) -> Result<Vec<&'static DeclaredCause>> {
+) -> Result<Vec<T>> {
     let (mut causes, mut faults) = (Vec::new(), Vec::new());
     let mut names: BTreeMap<String, String> = BTreeMap::new();
     for file in files {
         let (label, content) = context.text(file, "effects declared in YAML", MOST_BYTES)?;
         let mut troubles = Vec::new();
-        for (path, node, cause) in read(&content, &mut troubles) {
-            let name = cause.declaration().name.clone();
+        for (path, node, name, cause) in read(&content, understand, &mut troubles) {
             if let Some(other) = names.insert(name.clone(), label.clone()) {
                 let message = format!(
                     "`{name}` is declared in {other} already; give each effect a name of its own"
@@ -51,8 +56,11 @@ pub(super) fn declared_effects(
     Ok(causes)
 }
 
-/// The effects of a text that are right, with their paths and places; what is wrong goes to `troubles`.
-fn read(text: &str, troubles: &mut Vec<Trouble>) -> Vec<(String, Node, &'static DeclaredCause)> {
+/// An effect with its path, its place in the text, and its name.
+type Found<T> = (String, Node, String, T);
+
+/// The effects of a text that are right; what is wrong goes to `troubles`.
+fn read<T>(text: &str, understand: Understand<T>, troubles: &mut Vec<Trouble>) -> Vec<Found<T>> {
     let (root, found) = yaml::parse(text);
     troubles.extend(found);
     let Some(root) = root else { return Vec::new() };
@@ -96,16 +104,17 @@ fn read(text: &str, troubles: &mut Vec<Trouble>) -> Vec<(String, Node, &'static 
     };
     one.into_iter()
         .chain(listed)
-        .filter_map(|(path, node)| declared(path, node, troubles))
+        .filter_map(|(path, node)| declared(path, node, understand, troubles))
         .collect()
 }
 
 /// One effect, where nothing is wrong with it.
-fn declared(
+fn declared<T>(
     path: String,
     node: Node,
+    understand: Understand<T>,
     troubles: &mut Vec<Trouble>,
-) -> Option<(String, Node, &'static DeclaredCause)> {
+) -> Option<Found<T>> {
     let declaration: EffectDeclaration = match typed(&node) {
         Ok(declaration) => declaration,
         Err(found) => {
@@ -113,8 +122,8 @@ fn declared(
             return None;
         }
     };
-    match DeclaredCause::of(&declaration) {
-        Ok(cause) => Some((path, node, cause)),
+    match understand(&declaration) {
+        Ok(cause) => Some((path, node, declaration.name, cause)),
         Err(found) => {
             troubles.extend(found.into_iter().map(|fault| {
                 let trouble = Trouble::new(fault.message).at(node.nearest_mark(&fault.path));

@@ -83,7 +83,7 @@ fn as_believed() -> f64 {
     1.0
 }
 
-fn open_world() -> f64 {
+pub(super) fn open_world() -> f64 {
     0.3
 }
 
@@ -93,6 +93,14 @@ const HEAVIEST: f64 = 10.0;
 /// Priors between which evidence still decides.
 const MOST_CLOSED: f64 = 0.001;
 const MOST_OPEN: f64 = 0.999;
+
+/// Says it where a prior of what nobody listed is one that no evidence moves.
+pub(super) fn must_be_a_prior(open_world: f64, at: &mut Place) {
+    at.at("open_world").must(
+        (MOST_CLOSED..=MOST_OPEN).contains(&open_world),
+        format!("expected a probability from {MOST_CLOSED} to {MOST_OPEN}"),
+    );
+}
 
 crate::stage! {
     Diagnose, "diagnose", 52, "locates where simulation and recording differ, and names the physics that the model leaves out",
@@ -124,10 +132,7 @@ impl Stage for Diagnose {
             (0.0..=HEAVIEST).contains(&self.prior_weight),
             format!("expected a number from 0 to {HEAVIEST}"),
         );
-        at.at("open_world").must(
-            (MOST_CLOSED..=MOST_OPEN).contains(&self.open_world),
-            format!("expected a probability from {MOST_CLOSED} to {MOST_OPEN}"),
-        );
+        must_be_a_prior(self.open_world, at);
         for (k, prior) in self.prior.iter().enumerate() {
             let sizes = [prior.size_mm, prior.size_mm + prior.spread_mm];
             let possible =
@@ -166,7 +171,7 @@ impl Stage for Diagnose {
         _reads: Option<DiagnoseReads>,
         context: &Context,
     ) -> Result<Option<DiagnoseWrites>> {
-        declared_effects(&self.effects, context).map(|_| None)
+        declared_effects(&self.effects, DeclaredCause::of, context).map(|_| None)
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
@@ -307,7 +312,7 @@ pub(super) struct AskedRows {
 impl AskedRows {
     /// Of the tables of a stage with these settings; fails where they do not place the robot.
     pub fn of(settings: &Diagnose, reads: &DiagnoseReads, context: &Context) -> Result<Self> {
-        let declared = declared_effects(&settings.effects, context)?;
+        let declared = declared_effects(&settings.effects, DeclaredCause::of, context)?;
         let asked = reads.split.rows(&reads.recording, &settings.on)?;
         let (data, corrected) = mismatch(reads, &asked, context)?;
         if data.sequence.is_some() {

@@ -1,14 +1,17 @@
 //! `diagnose_torques`: which physics the rigid inverse dynamics of the robot file lacks while the arm moves.
 
+use crate::declared_effects::declared_effects;
+use crate::diagnose::must_be_a_prior;
 use crate::dynamic_arm::{HeldOut, RecordedTorques, dynamic_arm, must_be_bodies};
-use crate::dynamics::{DynamicArm, TorqueQuestion, diagnose};
+use crate::dynamics::{DynamicArm, TorqueQuestion, diagnose, is_cause};
+use crate::effect::{DeclarationFault, DeclaredTorque, EffectDeclaration};
 use crate::error::{Error, Place, Result, counted};
 use crate::table::{
     ArmMotion, BodyConsistencies, Contacts, FrictionCurves, Inertials, JointTorques, Robot,
     TorqueCourse, TorqueCovariance, TorqueFindings, TorqueNumbers, TorqueParameters, TorqueRivals,
     TorqueVerdict, VerdictSentences,
 };
-use crate::{Chunks, Context, Stage};
+use crate::{Chunks, Context, RawFile, Stage};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -37,6 +40,13 @@ pub struct DiagnoseTorques {
     /// Names that are not given: what such a cause explains is `unknown` at its place.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
+    /// Prior probability that what acts somewhere is no cause of the list: 0.1 for an arm like many, 0.5 where little is known of it. Its odds
+    /// scale those of causes without a name.
+    #[serde(default = "crate::diagnose::open_world")]
+    pub open_world: f64,
+    /// Files with laws of torque of your own, which are compared with those of the library.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<RawFile>,
 }
 
 /// Which rows are held out.
@@ -77,7 +87,7 @@ pub enum ConsistencySetting {
 const LAST: f64 = 0.3;
 
 crate::stage! {
-    DiagnoseTorques, "diagnose_torques", 22, "names the physics that the simulated torques of a moving arm lack",
+    DiagnoseTorques, "diagnose_torques", 23, "names the physics that the simulated torques of a moving arm lack",
         DiagnoseTorquesReads {
             robot: Robot,
             motion: Chunks<ArmMotion>,
@@ -99,6 +109,13 @@ crate::stage! {
 }
 
 impl Stage for DiagnoseTorques {
+    fn files(&self) -> Vec<(String, RawFile)> {
+        let files = self.effects.iter().enumerate();
+        files
+            .map(|(k, file)| (format!("effects[{k}]"), file.clone()))
+            .collect()
+    }
+
     fn faults(&self, at: &mut Place) {
         crate::must_name_sets(&self.on, "fit", at);
         match &self.hold_out {
@@ -116,11 +133,20 @@ impl Stage for DiagnoseTorques {
         let possible = self.cutoff_hz.is_none_or(|hz| hz > 0.0 && hz.is_finite());
         at.at("cutoff_hz")
             .must(possible, "expected a frequency above 0, Hz");
+        must_be_a_prior(self.open_world, at);
         at.at("consistency").must(
             self.consistency == ConsistencySetting::Report || self.inertials == InertialSetting::Declared,
             "`enforce` needs declared masses: base parameters stand for many arms, of which some are bodies; allowed with \
              `inertials: free`: report",
         );
+    }
+
+    fn look(
+        &self,
+        _reads: Option<DiagnoseTorquesReads>,
+        context: &Context,
+    ) -> Result<Option<DiagnoseTorquesWrites>> {
+        declared_effects(&self.effects, law, context).map(|_| None)
     }
 
     fn run(&self, reads: DiagnoseTorquesReads, context: &Context) -> Result<DiagnoseTorquesWrites> {
@@ -150,6 +176,21 @@ impl Stage for DiagnoseTorques {
     }
 }
 
+/// A law of a user's own, under a name that the library of torques does not have.
+fn law(
+    declaration: &EffectDeclaration,
+) -> std::result::Result<DeclaredTorque, Vec<DeclarationFault>> {
+    if is_cause(&declaration.name) {
+        let message = format!(
+            "`{}` is a cause of calib's own library; give yours another name",
+            declaration.name
+        );
+        let path = "name".into();
+        return Err(vec![DeclarationFault { path, message }]);
+    }
+    DeclaredTorque::of(declaration)
+}
+
 impl DiagnoseTorques {
     /// The arm, its recording, and what is asked of it.
     pub(super) fn asked<'r>(
@@ -176,6 +217,8 @@ impl DiagnoseTorques {
             free_inertials: free,
             cutoff: self.cutoff_hz,
             without: self.without.clone(),
+            open_world: self.open_world,
+            effects: declared_effects(&self.effects, law, context)?,
             enforce_bodies,
         };
         Ok((arm, recording, question))

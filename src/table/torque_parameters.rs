@@ -4,7 +4,7 @@ use super::{TorqueCovariance, TorqueCovarianceRow, TorqueParameterRow, TorquePar
 use crate::dynamics::{
     COULOMB, INERTIAL_NAMES, INERTIAL_NUMBERS, JointRange, TorqueModel, TorqueTerm, unit_at,
 };
-use crate::effect::Place;
+use crate::effect::{DeclaredTorque, EffectDeclaration, Place};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -14,6 +14,9 @@ use std::collections::BTreeMap;
 struct TermForm {
     with: [usize; 2],
     shape: Vec<f64>,
+    /// The law of a user's own that it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    declared: Option<EffectDeclaration>,
 }
 
 /// Standard deviations from which on dry friction is sure.
@@ -103,6 +106,7 @@ impl TorqueParameters {
             let form = serde_json::to_string(&TermForm {
                 with: term.with,
                 shape: term.shape.clone(),
+                declared: term.declared.as_ref().map(|law| law.declaration().clone()),
             });
             let form = form.map_err(|error| Error::Bug(error.to_string()))?;
             for (value, named) in term.coefficients.iter().zip(numbers.by_ref()) {
@@ -318,7 +322,13 @@ fn term(rows: &[&TorqueParameterRow]) -> Result<TorqueTerm> {
     let form = first.form.as_deref().unwrap_or_default();
     let form: TermForm = serde_json::from_str(form)
         .map_err(|error| fault(format!("{}: form `{form}`: {error}", first.name)))?;
+    let declared = form.declared.as_ref().map(DeclaredTorque::of).transpose();
+    let declared = declared.map_err(|faults| {
+        let messages: Vec<String> = faults.into_iter().map(|fault| fault.message).collect();
+        fault(format!("{}: {}", first.name, messages.join("; ")))
+    })?;
     let mut term = TorqueTerm {
+        declared,
         effect: first.effect.clone(),
         place,
         with: form.with,

@@ -8,6 +8,7 @@ mod friction;
 mod hostile;
 mod masses;
 mod nulls;
+mod own_laws;
 mod recordings;
 mod results;
 mod rigid;

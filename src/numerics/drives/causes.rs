@@ -77,10 +77,11 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64) -> Vec<Cell<Key>> 
             let log_prior = cause.log_prior - (places as f64).ln();
             all.push(Cell {
                 key,
-                cause,
+                cause: *cause,
                 place,
                 log_prior,
                 shapes,
+                needs: Vec::new(),
             });
         };
     let joint = |j: usize| format!("joint {}", j + 1);

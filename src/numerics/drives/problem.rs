@@ -322,7 +322,7 @@ impl Problem for Drives {
         fit.odds(member, independence)
     }
 
-    fn excludes(&self, one: &Key, other: &Key) -> bool {
-        one.excludes(*other)
+    fn excludes(&self, one: &Accepted<Key>, other: &Accepted<Key>) -> bool {
+        one.cell.key.excludes(other.cell.key)
     }
 }

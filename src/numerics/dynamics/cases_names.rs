@@ -6,6 +6,115 @@ use super::cases::{
 use super::cause::{TORQUE_CAUSES, TorqueForm};
 use super::*;
 
+/// A recording diagnosed with settings that differ from the usual ones.
+fn asked(
+    change: impl Fn(&mut TorqueQuestion),
+    extra: &dyn Fn(super::cases::Row) -> f64,
+) -> TorqueDiagnosis {
+    let mut question = TorqueQuestion::default();
+    change(&mut question);
+    diagnose(&arm(), &record(&arm(), 0.0, extra), &question, &mut |_| ()).unwrap()
+}
+
+#[test]
+fn a_law_of_a_users_own_is_found_with_its_size_and_shape_and_stays_in_the_model() {
+    let declaration = crate::effect::EffectDeclaration {
+        name: "worn_seal".into(),
+        place: "joint".into(),
+        law: crate::effect::Laws(vec!["exp(-((q - centre) / 0.2)^2)".into()]),
+        shape: [(
+            "centre".to_string(),
+            crate::effect::ShapeRange {
+                from: -1.0,
+                to: 1.0,
+                ..Default::default()
+            },
+        )]
+        .into(),
+        sentence: Some("{place} has a worn seal near {centre} rad: {value}".into()),
+        ..Default::default()
+    };
+    let law = crate::effect::DeclaredTorque::of(&declaration).expect("a law");
+    let diagnosis =
+        asked(
+            |question| question.effects = vec![law.clone()],
+            &|(joint, _, angle, velocity, ..)| {
+                let hump = 6.0 * libm::exp(-((angle - 0.3) / 0.2).powi(2));
+                5.0 * sign(velocity) + if joint == 2 { hump } else { 0.0 }
+            },
+        );
+    let mut at_joint = found(&diagnosis);
+    at_joint.retain(|name| name.ends_with("joint 3"));
+    assert_eq!(at_joint, ["coulomb_friction joint 3", "worn_seal joint 3"]);
+    let finding = of_name(&diagnosis, "worn_seal");
+    assert_eq!(finding.follows, "own angle");
+    assert!(
+        finding
+            .statement
+            .starts_with("joint 3 has a worn seal near 0.3"),
+        "{}",
+        finding.statement
+    );
+    for (name, truth) in [("coefficient", 6.0), ("centre", 0.3)] {
+        let value = parameter(finding, name).value;
+        assert!((value / truth - 1.0).abs() < 0.05, "{name}: {value}");
+    }
+    let mut terms = diagnosis.model.terms.iter();
+    let term = terms
+        .find(|term| term.effect == "worn_seal")
+        .expect("a term");
+    assert_eq!(term.declared.as_ref(), Some(&law));
+    assert!(term.names().is_ok());
+}
+
+#[test]
+fn what_a_left_out_name_explains_is_without_one_at_its_place_and_stays_in_the_model() {
+    let extra = |(joint, _, angle, velocity, ..): super::cases::Row| {
+        5.0 * sign(velocity) + if joint == 3 { 2.0 * angle } else { 0.0 }
+    };
+    let diagnosis = asked(
+        |question| question.without = vec!["cable_stiffness".into()],
+        &extra,
+    );
+    let mut at_joint = found(&diagnosis);
+    at_joint.retain(|name| name.ends_with("joint 4"));
+    assert_eq!(at_joint, ["coulomb_friction joint 4", "unknown joint 4"]);
+    let usual = asked(|_| (), &extra);
+    assert_eq!(usual.after, diagnosis.after);
+}
+
+#[test]
+fn a_more_open_world_names_less_and_says_more_often_that_nobody_listed_it() {
+    let nameless = |open_world: f64, size: f64| {
+        let hump = |(joint, _, angle, velocity, ..): super::cases::Row| {
+            let hump = size * libm::exp(-((angle - 0.3) / 0.3).powi(2));
+            5.0 * sign(velocity) + if joint == 2 { hump } else { 0.0 }
+        };
+        let diagnosis = asked(|question| question.open_world = open_world, &hump);
+        let mut findings = diagnosis.findings.iter();
+        findings.any(|finding| finding.effect == "unknown")
+    };
+    let sizes = [0.12, 0.16, 0.2, 0.25];
+    let [closed, open] = [0.001, 0.999].map(|open_world| {
+        let of_size = |size: &&f64| nameless(open_world, **size);
+        sizes.iter().filter(of_size).count()
+    });
+    assert!(closed < open, "{closed} {open}");
+}
+
+#[test]
+fn a_torque_over_what_no_cause_follows_is_one_without_a_name_that_says_what_it_follows() {
+    let diagnosis = diagnosed_with(&|(joint, _, _, velocity, _, rigid)| {
+        let bent = 4.0 * (0.05 * rigid).sin().powi(2);
+        5.0 * sign(velocity) + if joint == 1 { bent } else { 0.0 }
+    });
+    let finding = of_name(&diagnosis, "unknown");
+    assert_eq!(
+        (finding.place, finding.follows),
+        (crate::effect::Place::Joint(1), "load")
+    );
+}
+
 /// The value of a parameter of a finding at a joint.
 fn number(diagnosis: &TorqueDiagnosis, effect: &str, joint: usize, name: &str) -> f64 {
     let place = crate::effect::Place::Joint(joint);

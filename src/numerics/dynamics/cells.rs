@@ -1,21 +1,18 @@
-//! Torques by the evidence of the table of causes: a cell is a cause at a place in every shape that it may have; what was accepted stands in the
+//! Cells of torques and their evidence: a cell is a cause at a place in every shape that it may have; what was accepted stands in the
 //! covariance with its amplitude, and every other cell is compared given these. Of the forms of a problem: which may stand together, which in
 //! each other's place.
 
-use super::cause::{COULOMB, TORQUE_CONSTANT, TorqueForm, UNKNOWN, VISCOUS};
+use super::cause::{COULOMB, TorqueForm, UNKNOWN, VISCOUS};
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
-use crate::criteria::cells::{COMMON, NU, SWAPS};
-use crate::criteria::torque::{APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, USUAL};
-use crate::diagnose::table::{
-    AMPLITUDES, ComponentSearch, EvidenceRows, KnownState, evidence, log_sum,
-};
+use crate::criteria::cells::{COMMON, NU};
+use crate::criteria::torque::{LEAST_NOISE, PER_METRE};
+use crate::diagnose::table::{AMPLITUDES, EvidenceRows, KnownState, evidence, log_sum};
 use crate::effect::Place;
 use nalgebra::{DMatrix, DVector};
-use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::sync::OnceLock;
 
 /// The forms of one problem, with the base model that is fitted with all of them.
 pub(super) struct CauseChoice<'a> {
@@ -72,37 +69,23 @@ impl<'a> CauseChoice<'a> {
             && (cause.is_possible)(form, &values())
     }
 
-    /// Whether a form may join a set: once a name and place, and what modifies a friction after it.
+    /// Whether a form may not stand beside another: a name once at a place, and one curve of speed.
+    pub(super) fn excludes(&self, number: usize, other: usize) -> bool {
+        let [form, known] = [number, other].map(|number| self.form(number));
+        let is_same = form.is_called_as(known)
+            && (!form.cause.may_repeat || form.with == known.with || number == other);
+        is_same || form.is_one_curve_with(known)
+    }
+
+    /// Whether a form may join a set: nothing of it excludes the form, and it is not barred.
     fn may_join(&self, number: usize, set: &[usize]) -> bool {
         let form = self.form(number);
-        let taken = |other: &usize| {
-            let other_form = self.form(*other);
-            *other == number
-                || (form.is_called_as(other_form)
-                    && (!form.cause.may_repeat || form.with == other_form.with))
-        };
         let is_barred = || self.problem.barred.iter().any(|one| form.is_of_kind(one));
-        !set.iter().any(taken)
-            && self.has_what_it_modifies(number, set)
-            && !self.has(set, |other| form.is_one_curve_with(other))
-            && !is_barred()
-    }
-
-    /// Whether the frictions that a form modifies are in a set.
-    fn has_what_it_modifies(&self, number: usize, set: &[usize]) -> bool {
-        let form = self.form(number);
-        let mut modified = form.cause.modifies.iter();
-        modified.all(|name| self.has(set, |other| other.is_called(name, form.place)))
-    }
-
-    /// Whether all of a set have what they modify.
-    fn is_whole(&self, set: &[usize]) -> bool {
-        set.iter()
-            .all(|number| self.has_what_it_modifies(*number, set))
+        !set.iter().any(|other| self.excludes(number, *other)) && !is_barred()
     }
 
     /// Viscous and Coulomb friction of every joint: hardly an arm is without.
-    fn common(&self) -> Vec<usize> {
+    pub(super) fn common(&self) -> Vec<usize> {
         let common = |number: &usize| [VISCOUS, COULOMB].contains(&self.form(*number).cause.name);
         (0..self.open).filter(common).collect()
     }
@@ -140,6 +123,8 @@ pub(super) struct TorqueCell {
     pub(super) log_prior: f64,
     /// Numbers of its forms.
     pub(super) forms: Vec<usize>,
+    /// Cells that it modifies; one that is none where there is none.
+    pub(super) needs: Vec<usize>,
 }
 
 /// A form in the covariance.
@@ -171,40 +156,8 @@ pub(super) struct TorqueTable<'a, 'b> {
     unit: Vec<f64>,
     /// Forms that do not leave.
     pub(super) kept: Vec<usize>,
-    /// What the base leaves of the products of components' columns with all others.
-    left: RefCell<BTreeMap<usize, Rc<Vec<f64>>>>,
-}
-
-impl ComponentSearch for TorqueTable<'_, '_> {
-    type Component = TorqueComponent;
-
-    fn least(&self) -> f64 {
-        0.5 * *APART
-    }
-
-    fn noise(&self, components: &[TorqueComponent]) -> f64 {
-        self.state(components, None).known.kappa
-    }
-
-    fn odds(&self, components: &[TorqueComponent], place: usize, kappa: f64) -> Option<f64> {
-        let is_free = !self.kept.contains(&components[place].form)
-            && self.choice.is_whole(&forms(&without(components, place)));
-        is_free.then(|| self.odds_of(components, place, kappa))
-    }
-
-    fn best(&mut self, components: &[TorqueComponent]) -> Option<TorqueComponent> {
-        let state = (components.len() < *COMPONENTS).then(|| self.state(components, None))?;
-        let (log_odds, best) = self.strongest(0..self.cells.len(), &state)?;
-        (log_odds >= self.least()).then_some(best)
-    }
-
-    fn with_newest(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        self.backfit(components)
-    }
-
-    fn anew(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        self.backfit(components)
-    }
+    /// What the base leaves of the products of each column with all others, of those that were asked for.
+    left: Vec<OnceLock<Vec<f64>>>,
 }
 
 impl<'a, 'b> TorqueTable<'a, 'b> {
@@ -220,14 +173,34 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let cells = keys.into_iter().map(|((name, _, place, _), forms)| {
             let prices = forms.iter().map(|number| choice.form(*number));
             let prices = prices.map(|form| (form.cause.price)(form));
+            let open = match name == UNKNOWN {
+                true => choice.problem.openness,
+                false => 0.0,
+            };
             TorqueCell {
                 name,
                 place,
-                log_prior: COMMON.ln() - 0.5 * prices.fold(f64::INFINITY, f64::min),
+                log_prior: COMMON.ln() - 0.5 * prices.fold(f64::INFINITY, f64::min) + open,
                 forms,
+                needs: Vec::new(),
             }
         });
-        let cells: Vec<TorqueCell> = cells.collect();
+        let mut cells: Vec<TorqueCell> = cells.collect();
+        let of_name = |name: &str, place: Place| {
+            let mut all = cells.iter();
+            all.position(|cell| cell.name == name && cell.place == place)
+        };
+        let needs = |cell: &TorqueCell| -> Vec<usize> {
+            let names = choice.form(cell.forms[0]).cause.modifies.iter();
+            let none = cells.len();
+            names
+                .map(|name| of_name(name, cell.place).unwrap_or(none))
+                .collect()
+        };
+        let needs: Vec<Vec<usize>> = cells.iter().map(needs).collect();
+        for (cell, needs) in cells.iter_mut().zip(needs) {
+            cell.needs = needs;
+        }
         let mut cell_of = BTreeMap::new();
         for (number, cell) in cells.iter().enumerate() {
             cell_of.extend(cell.forms.iter().map(|form| (*form, number)));
@@ -269,18 +242,13 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             forms,
             unit,
             kept: Vec::new(),
-            left: RefCell::default(),
+            left: all.columns.iter().map(|_| OnceLock::new()).collect(),
         }
     }
 
     /// What the base leaves of the products of a column with all others.
-    fn left_of(&self, column: usize) -> Rc<Vec<f64>> {
-        let fresh = || Rc::new(self.choice.base.left_of(column));
-        self.left
-            .borrow_mut()
-            .entry(column)
-            .or_insert_with(fresh)
-            .clone()
+    fn left_of(&self, column: usize) -> &[f64] {
+        self.left[column].get_or_init(|| self.choice.base.left_of(column))
     }
 
     /// Components in the covariance, with the noise that fits them or a stated one.
@@ -295,7 +263,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         };
         let columns: Vec<(usize, f64)> = components.iter().flat_map(columns_of).collect();
         let left = columns.iter().map(|(column, _)| self.left_of(*column));
-        let left: Vec<Rc<Vec<f64>>> = left.collect();
+        let left: Vec<&[f64]> = left.collect();
         let count = columns.len();
         let gram = DMatrix::from_fn(count, count, |a, b| {
             left[a][columns[b].0] * columns[a].1 * columns[b].1
@@ -318,7 +286,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             .columns
             .iter()
             .map(|(column, _)| self.left_of(*column));
-        let left: Vec<Rc<Vec<f64>>> = left.collect();
+        let left: Vec<&[f64]> = left.collect();
         let product =
             |a: usize, b: usize| left[a][columns[b]] * state.columns[a].1 * self.unit[columns[b]];
         let products = DMatrix::from_fn(left.len(), columns.len(), product);
@@ -379,21 +347,15 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
 
     /// ln of the posterior odds of a cell given a state, and its best shape.
     pub(super) fn cell(&self, cell: usize, state: &TorqueState) -> Option<(f64, TorqueComponent)> {
+        let taken = |cell: &usize| state.set.iter().any(|form| self.cell_of[form] == *cell);
+        if !self.cells[cell].needs.iter().all(taken) {
+            return None;
+        }
         let all = self.shapes(cell, state);
         let (_, best) = *all.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
         let logs: Vec<f64> = all.iter().map(|(log, _)| *log).collect();
         let log = log_sum(&logs) - self.log_count(cell);
         Some((self.cells[cell].log_prior + log, best))
-    }
-
-    /// The most probable of some cells given a state.
-    fn strongest(
-        &self,
-        cells: impl IntoIterator<Item = usize>,
-        state: &TorqueState,
-    ) -> Option<(f64, TorqueComponent)> {
-        let all = cells.into_iter().filter_map(|cell| self.cell(cell, state));
-        all.max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// ln of the odds of a component given the others.
@@ -410,25 +372,6 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         grid.map_or(log, |(grid, _)| grid.max(log))
     }
 
-    /// Amplitudes anew, each given all others.
-    fn backfit(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        for _ in 0..2 {
-            let kappa = self.state(&components, None).known.kappa;
-            let mut changed = false;
-            for place in 0..components.len() {
-                let state = self.state(&without(&components, place), Some(kappa));
-                if let Some((_, amplitude)) = self.form(components[place].form, &state) {
-                    changed |= components[place].amplitude != amplitude;
-                    components[place].amplitude = amplitude;
-                }
-            }
-            if !changed {
-                break;
-            }
-        }
-        components
-    }
-
     /// ln of the posterior of a set of components, up to a constant.
     pub(super) fn total(&self, components: &[TorqueComponent]) -> f64 {
         let state = self.state(components, Some(1.0)).known;
@@ -440,98 +383,12 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         log - 0.5 * (self.rows.freedom + *NU) * (*NU + state.rows.square).ln()
     }
 
-    /// Exchanges components for cells that are more probable in their place.
-    fn swap(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        'rounds: for _ in 0..*EXCHANGES {
-            let kappa = self.state(&components, None).known.kappa;
-            for place in 0..components.len() {
-                let here = components[place].form;
-                let others = without(&components, place);
-                let state = self.state(&others, Some(kappa));
-                let stays = self.odds_of(&components, place, kappa);
-                let Some((log_odds, best)) = self.strongest(self.competing(here), &state) else {
-                    continue;
-                };
-                let is_same = self.cell_of[&best.form] == self.cell_of[&here];
-                let gain = match is_same {
-                    // Another shape of the same cell: by itself, against the present one.
-                    true => {
-                        let log = |form: usize| self.form(form, &state).map(|found| found.0);
-                        let log = |form: usize| log(form).unwrap_or(f64::NEG_INFINITY);
-                        log(best.form) - log(here)
-                    }
-                    false => log_odds - stays,
-                };
-                let mut next = others.clone();
-                next.insert(place, best);
-                if gain <= *SWAPS || !self.choice.is_whole(&forms(&next)) {
-                    continue;
-                }
-                let next = self.backfit(next);
-                if is_same || self.total(&next) > self.total(&components) {
-                    components = next;
-                    continue 'rounds;
-                }
-            }
-            break;
-        }
-        components
-    }
-
     /// Cells that may stand in the place of a form.
     pub(super) fn competing(&self, form: usize) -> impl Iterator<Item = usize> {
         let may = move |cell: &usize| self.choice.compete(self.cells[*cell].forms[0], form);
         (0..self.cells.len()).filter(may)
     }
-
-    /// Components of given forms.
-    pub(super) fn components(&self, set: &[usize]) -> Vec<TorqueComponent> {
-        let component = |form: &usize| TorqueComponent {
-            form: *form,
-            amplitude: *USUAL,
-        };
-        self.backfit(set.iter().map(component).collect())
-    }
-
-    /// The best components that steps from a start lead to.
-    pub(super) fn searched(&mut self, start: &[usize]) -> Vec<TorqueComponent> {
-        let components = self.add(self.components(start));
-        let components = self.settled(components);
-        let components = self.add(components);
-        self.prune(components)
-    }
-
-    /// Exchanges and removals.
-    pub(super) fn settled(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        // What an arm cannot have is first exchanged for what it can have.
-        let components = self.swap(components);
-        let components = self.prune(components);
-        let components = self.swap(components);
-        self.prune(components)
-    }
-
-    /// ln of the posterior odds of a component, and of other names and places that could stand in its place.
-    pub(crate) fn odds_in_place(&self, components: &[TorqueComponent], form: usize) -> CellOdds {
-        let here = |component: &TorqueComponent| component.form == form;
-        let Some(place) = components.iter().position(here) else {
-            return (0.0, Vec::new());
-        };
-        let kappa = self.state(components, None).known.kappa;
-        let log_odds = self.odds_of(components, place, kappa);
-        let state = self.state(&without(components, place), Some(kappa));
-        let rivals = self
-            .competing(form)
-            .filter(|cell| *cell != self.cell_of[&form]);
-        let rival = |cell: usize| {
-            let TorqueCell { name, place, .. } = self.cells[cell];
-            Some(((name, place), self.cell(cell, &state)?.0))
-        };
-        (log_odds, rivals.filter_map(rival).collect())
-    }
 }
-
-/// ln of posterior odds, and those of rivals.
-pub(super) type CellOdds = (f64, Vec<((&'static str, Place), f64)>);
 
 /// A set without a form.
 pub(super) fn all_but(set: &[usize], form: usize) -> Vec<usize> {
@@ -544,65 +401,4 @@ pub(super) fn forms(components: &[TorqueComponent]) -> Vec<usize> {
 
 pub(super) fn without(components: &[TorqueComponent], place: usize) -> Vec<TorqueComponent> {
     [&components[..place], &components[place + 1..]].concat()
-}
-
-/// The best set from what hardly an arm is without. One factor on the whole torque of each joint is asked before masses: where factors explain as
-/// much, it is these.
-pub(super) fn from_common(choice: &CauseChoice) -> Vec<usize> {
-    let mut table = TorqueTable::new(choice);
-    let is_drive = |number: &usize| choice.form(*number).cause.name == TORQUE_CONSTANT;
-    let has_masses = |set: &[TorqueComponent]| {
-        let masses = |number: &usize| choice.form(*number).cause.inertial && !is_drive(number);
-        forms(set).iter().any(masses)
-    };
-    let masses = table.searched(&choice.common());
-    let drives =
-        (0..choice.open).filter(|number| is_drive(number) && choice.form(*number).shape.is_empty());
-    let start: Vec<usize> = choice.common().into_iter().chain(drives).collect();
-    if !has_masses(&masses) || start == choice.common() {
-        return forms(&masses);
-    }
-    let scaled = table.searched(&start);
-    let worse = table.total(&masses) - table.total(&scaled);
-    let most = match has_masses(&scaled) {
-        true => 0.0,
-        false => 0.5 * *APART,
-    };
-    forms(if worse <= most { &scaled } else { &masses })
-}
-
-/// The best set from a start.
-pub(super) fn search(choice: &CauseChoice, start: &[usize]) -> Vec<usize> {
-    forms(&TorqueTable::new(choice).searched(start))
-}
-
-/// A set after exchanges and removals.
-pub(super) fn settle(choice: &CauseChoice, set: &[usize]) -> Vec<usize> {
-    let mut table = TorqueTable::new(choice);
-    let components = table.components(set);
-    forms(&table.settled(components))
-}
-
-/// 1 / variance beforehand of the columns of a set, by the amplitudes that the rows show.
-pub(super) fn priors(choice: &CauseChoice, set: &[usize]) -> Vec<(usize, f64)> {
-    let table = TorqueTable::new(choice);
-    let state = table.state(&table.components(set), None);
-    let seen = state.columns.iter().filter(|(_, root)| *root > 0.0);
-    seen.map(|(column, root)| (*column, root.powi(-2)))
-        .collect()
-}
-
-/// What of a set would not be found under the present noise; `silent` stays in any case.
-pub(super) fn faint(choice: &CauseChoice, set: &[usize], silent: &[usize]) -> Vec<usize> {
-    let mut table = TorqueTable::new(choice);
-    table.kept = silent.to_vec();
-    let components = table.components(set);
-    let clear = table.prune(components);
-    let kappa = table.noise(&clear);
-    // What others need stays in the set, but not for itself.
-    let pays = |place: &usize| table.odds_of(&clear, *place, kappa) > table.least();
-    let clear = (0..clear.len()).filter(pays).map(|place| clear[place].form);
-    let clear: Vec<usize> = clear.collect();
-    let is_faint = |number: &usize| !clear.contains(number) && !silent.contains(number);
-    set.iter().copied().filter(is_faint).collect()
 }

@@ -19,6 +19,7 @@ use crate::criteria::torque::NAMED;
 use crate::effect::Place;
 use crate::error::{Error, Result};
 use crate::estimate::tail;
+use calib_engine::{Accepted, Cause, Cell, Options, Problem, Scanned};
 
 /// Residual rows of a test, at most: beyond it the tail does not change.
 const FREEDOM: f64 = 1e4;
@@ -103,8 +104,9 @@ pub fn changes(
     let both = StackedColumns::new(&problems, shared.len());
     let forms = first.model.places()?.forms;
     let moved = problems[1].friction_moved(|scene| first.model.friction(&forms, scene));
-    let mut set = both.clear(both.search(), &problems[1], &moved);
-    let fit = both.fit(&set);
+    let found = calib_engine::diagnose(&both, &[], &both.options(), |_| ()).after;
+    let mut set = both.clear(found, &problems[1], &moved);
+    let fit = both.with(&set);
     let solution = fit.solution();
     set.sort_by(|a, b| {
         let gain = |form: usize| fit.loss(form, &solution).square;
@@ -126,7 +128,7 @@ pub fn changes(
         let with = fit.with(&[form]);
         changes.extend(change(&problems[1], &both, &with, form, None));
     }
-    let [before, after] = [&both.fit(&[]), &fit].map(|fit| both.residual_rms(fit));
+    let [before, after] = [&both.with(&[]), &fit].map(|fit| both.residual_rms(fit));
     let rms = before.into_iter().zip(after);
     Ok(TorqueChanges {
         changes,
@@ -301,6 +303,50 @@ struct StackedColumns {
     reach: f64,
 }
 
+/// Which forms changed, as a problem of the one engine: its evidence is Schwarz's (1978), which is half of what they gain less their penalties.
+impl Problem for StackedColumns {
+    /// Number of the form.
+    type Key = usize;
+    type Fit = Vec<usize>;
+    type Around = ();
+
+    fn around(&self, _fit: &Vec<usize>, _before: Option<&()>) {}
+
+    fn scan(&self, fit: &Vec<usize>, _around: &(), out: Option<usize>) -> Vec<Scanned<usize>> {
+        let out = out.map(|member| fit[member]);
+        let set = fit.iter().copied().filter(|form| Some(*form) != out);
+        let now = self.with(&set.collect::<Vec<usize>>());
+        let scanned = |form: usize| Scanned {
+            accepted: self.accepted(form),
+            log_odds: 0.5 * (now.square - now.with(&[form]).square - self.penalty(form)),
+        };
+        let others = (0..self.all.forms.len())
+            .filter(|form| !fit.contains(form) && self.is_body(&now, *form));
+        let mut all: Vec<Scanned<usize>> = others.map(scanned).collect();
+        all.retain(|one| one.log_odds > 0.0);
+        all.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
+        all
+    }
+
+    fn fit(
+        &self,
+        set: &[Accepted<usize>],
+        _before: Option<&Vec<usize>>,
+        _least: f64,
+    ) -> Vec<usize> {
+        set.iter().map(|one| one.cell.key).collect()
+    }
+
+    fn set(&self, fit: &Vec<usize>) -> Vec<Accepted<usize>> {
+        fit.iter().map(|form| self.accepted(*form)).collect()
+    }
+
+    fn log_evidence(&self, fit: &Vec<usize>, _independence: f64) -> f64 {
+        let penalties: f64 = fit.iter().map(|form| self.penalty(*form)).sum();
+        -0.5 * (self.with(fit).square + penalties)
+    }
+}
+
 impl StackedColumns {
     /// Of two problems whose columns are alike; both have the first `shared` forms.
     fn new(problems: &[TorqueProblem; 2], shared: usize) -> Self {
@@ -376,6 +422,33 @@ impl StackedColumns {
         }
     }
 
+    /// A form as the engine has it.
+    fn accepted(&self, form: usize) -> Accepted<usize> {
+        let TorqueForm { cause, place, .. } = &self.all.forms[form];
+        Accepted {
+            cell: Cell {
+                key: form,
+                cause: Cause::named(cause.name),
+                place: place.to_string(),
+                log_prior: -0.5 * PRICE,
+                shapes: Vec::new(),
+                needs: Vec::new(),
+            },
+            shape: 0,
+            numbers: Vec::new(),
+        }
+    }
+
+    /// What gains more than its penalty is in, whatever else.
+    fn options(&self) -> Options {
+        Options {
+            joins: 0.0,
+            leaves: 0.0,
+            most: self.all.forms.len(),
+            ..Options::default()
+        }
+    }
+
     /// What a form must gain.
     fn penalty(&self, form: usize) -> f64 {
         let rows = [0, self.joints].map(|joint| self.weighted.measured[joint].len());
@@ -386,38 +459,8 @@ impl StackedColumns {
     }
 
     /// Common numbers and some forms.
-    fn fit(&self, set: &[usize]) -> SweptColumns<'_> {
+    fn with(&self, set: &[usize]) -> SweptColumns<'_> {
         SweptColumns::base(&self.all, &self.weighted).with(set)
-    }
-
-    /// Adds the best form while it is worth its penalty, then removes what is not.
-    fn search(&self) -> Vec<usize> {
-        let mut set: Vec<usize> = Vec::new();
-        loop {
-            let now = self.fit(&set);
-            let worth = |form: usize| now.square - now.with(&[form]).square - self.penalty(form);
-            let others = (0..self.all.forms.len())
-                .filter(|form| !set.contains(form) && self.is_body(&now, *form));
-            let best = others
-                .map(|form| (form, worth(form)))
-                .max_by(|a, b| a.1.total_cmp(&b.1));
-            match best {
-                Some((form, worth)) if worth > 0.0 => set.push(form),
-                _ => return set,
-            }
-            loop {
-                let now = self.fit(&set);
-                let solution = now.solution();
-                // Not by rounding alone: what is removed so would be added again, for ever.
-                let idle = |form: &usize| {
-                    now.loss(*form, &solution).square < (1.0 - 1e-6) * self.penalty(*form)
-                };
-                let Some(place) = set.iter().position(idle) else {
-                    break;
-                };
-                set.remove(place);
-            }
-        }
     }
 
     /// What of a set is more than what the filter of the positions makes of friction in the second recording, Nm.
@@ -430,7 +473,7 @@ impl StackedColumns {
         let made = SweptColumns::base(&self.all, &weighted)
             .with(&set)
             .solution();
-        let solution = self.fit(&set).solution();
+        let solution = self.with(&set).solution();
         let square = |form: usize, solution: &[(usize, f64)]| -> f64 {
             let mut torques = self
                 .measured
@@ -490,7 +533,7 @@ impl StackedColumns {
             return Vec::new();
         }
         let others: Vec<usize> = set.iter().copied().filter(|one| *one != form).collect();
-        let without = self.fit(&others);
+        let without = self.with(&others);
         let is_other = |one: &usize| {
             *one != form
                 && !set.contains(one)

@@ -149,6 +149,10 @@ impl TorqueModel {
         scene.turn_over(self.sign_width);
         scene.turn_each_over(self.range.iter().map(|range| range.sign_width));
         scene.friction_lead = self.friction_lead;
+        // Where a temperature is not known, the arm is as warm as it was in the middle.
+        let usual = self.temperature.map(|[least, most]| 0.5 * (least + most));
+        let usual = usual.map_or_else(Vec::new, |usual| vec![usual; motion.time.len()]);
+        scene.temperature = motion.temperature.clone().unwrap_or(usual);
         // A warm arm began to move longer ago than any time constant: what fades has faded.
         let begun = motion.since_start.unwrap_or(f64::INFINITY);
         scene.time.iter_mut().for_each(|time| *time += begun);

@@ -4,7 +4,7 @@ use super::arm::INERTIAL_NUMBERS;
 use super::cause::{
     COULOMB, FittedNumber, TorqueForm, TorqueParameter, VISCOUS, line_of_power, plain, shape, slope,
 };
-use super::cells::{CauseChoice, CellOdds, TorqueTable, all_but};
+use super::cells::{CauseChoice, TorqueTable, all_but};
 use super::model::{COVERAGE, JointRange, TorqueModel, TorqueTerm};
 use super::problem::TorqueProblem;
 use super::recording::{ends, largest};
@@ -57,18 +57,19 @@ impl<'a> FittedSet<'a> {
             let mut silent = silent.iter();
             silent.any(|one| choice.form(*one).is_called_as(form))
         };
-        let table = TorqueTable::new(choice);
-        let components = table.components(self.set);
-        let named = self.set.iter().copied();
-        let named = named.filter(|number| !is_silent(choice.form(*number)));
-        let found = named.map(|number| {
-            let odds = table.odds_in_place(&components, number);
-            let log = odds.0 - table.log_prior(number);
+        let mut table = TorqueTable::new(choice);
+        // What stands was decided under the noise of the whole search.
+        table.kept = self.set.to_vec();
+        let found = table.findings(self.set).into_iter();
+        let found = found.filter(|(number, _)| !is_silent(choice.form(*number)));
+        let found = found.map(|(number, one)| {
             let mut finding = self.finding(number, held_out);
-            if log.is_finite() {
-                finding.evidence.delta_bic = 2.0 * log;
-            }
-            weighed(finding, odds)
+            finding.evidence.delta_bic = 2.0 * (one.log_odds - table.log_prior(number));
+            let rivals = one.rivals.iter().map(|rival| {
+                let cell = &table.cells[rival.accepted.cell.key];
+                ((cell.name, cell.place), one.log_odds + rival.log_odds)
+            });
+            weighed(finding, (one.log_odds, rivals.collect()))
         });
         let is_named = |finding: &TorqueFinding| {
             [VISCOUS, COULOMB].contains(&finding.effect) || finding.probabilities.name >= *RIVAL
@@ -108,6 +109,7 @@ impl<'a> FittedSet<'a> {
         TorqueFinding {
             effect: form.cause.name,
             place: form.place,
+            follows: (form.cause.follows)(form),
             statement: (form.cause.statement)(form, &fitted, unit),
             parameters,
             evidence: Evidence {
@@ -194,6 +196,9 @@ fn evidence(gain: f64, numbers: f64) -> Evidence {
     }
 }
 
+/// ln of posterior odds, and those of rivals.
+type CellOdds = (f64, Vec<((&'static str, Place), f64)>);
+
 /// A finding with its probabilities: those of its name, of all that could stand in its place, and of nothing.
 fn weighed(mut finding: TorqueFinding, (log_odds, rivals): CellOdds) -> TorqueFinding {
     let logs = rivals.iter().map(|(_, log)| *log).chain([log_odds, 0.0]);
@@ -237,7 +242,7 @@ fn held_out_gain(
     rms(without) - rms(solution)
 }
 
-/// A finding that has no rivals in the pool: a latency, a contact.
+/// A finding of a time that has no rivals in the pool: a latency, a contact.
 pub(super) fn plain_finding(
     effect: &'static str,
     place: Place,
@@ -249,6 +254,7 @@ pub(super) fn plain_finding(
     let finding = TorqueFinding {
         effect,
         place,
+        follows: "time",
         statement,
         parameters,
         evidence: evidence(gain, columns),
@@ -301,6 +307,7 @@ impl FittedSet<'_> {
             let form = choice.form(*number);
             TorqueTerm {
                 effect: form.cause.name.into(),
+                declared: form.cause.declared.cloned(),
                 place: form.place,
                 with: form.with,
                 shape: form.shape.clone(),

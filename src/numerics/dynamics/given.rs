@@ -1,11 +1,13 @@
 //! What every cell of torques says of one robot given cells that its fleet has accepted: the numbers that a fleet sums.
 
 use super::cause::{TorqueForm, UNKNOWN};
-use super::cells::{CauseChoice, TorqueCell, TorqueComponent, TorqueState, TorqueTable, without};
+use super::cells::{
+    CauseChoice, TorqueCell, TorqueComponent, TorqueState, TorqueTable, forms, without,
+};
 use super::solve::SolvedTorques;
 use crate::criteria::fleet::LEAST_EVIDENCE;
 use crate::criteria::torque::PER_METRE;
-use crate::diagnose::table::{ComponentSearch, log_sum, rms_size};
+use crate::diagnose::table::{log_sum, rms_size};
 use crate::diagnose::{CellAnswer, GivenCell};
 use std::collections::BTreeMap;
 
@@ -99,7 +101,7 @@ impl TorqueTable<'_, '_> {
                 self.kept.push(form);
             }
         }
-        self.prune(components)
+        self.dropped(&forms(&components))
     }
 
     /// What the cell of a form says, with ln of its posterior odds and its size, Nm.
@@ -123,7 +125,10 @@ impl TorqueTable<'_, '_> {
             shape: None,
             effect: name,
             place,
-            follows: follows(self.choice.form(form)),
+            follows: {
+                let form = self.choice.form(form);
+                (form.cause.follows)(form)
+            },
             log: log_odds - log_prior,
             log_prior,
             size,
@@ -195,17 +200,5 @@ fn shape_key(form: &TorqueForm) -> String {
     match form.with {
         [0, 0] => String::new(),
         [one, two] => format!("{one},{two}"),
-    }
-}
-
-/// The kind of variable that a form follows, as of positions.
-fn follows(form: &TorqueForm) -> &'static str {
-    let cause = form.cause;
-    match () {
-        () if cause.inertial || cause.of_rigid => "load",
-        () if cause.brakes || cause.of_sign => "speed",
-        () if cause.alike_at_joints => "other angle",
-        () if cause.of_angle => "own angle",
-        () => "constant",
     }
 }

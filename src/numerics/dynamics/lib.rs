@@ -36,6 +36,7 @@ mod problem;
 mod recording;
 mod refine;
 mod scene;
+mod search;
 mod seen_gravity;
 mod sliding;
 mod solve;
@@ -47,7 +48,7 @@ mod used;
 mod weighted;
 
 pub use arm::{DynamicArm, INERTIAL_NAMES, INERTIAL_NUMBERS, Inertial, InertialTolerance};
-pub use cause::{COULOMB, FittedNumber, TorqueParameter};
+pub use cause::{COULOMB, FittedNumber, TorqueParameter, is_cause};
 pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
 pub use excite::{ExciteRequest, ExcitingMotion, ExpectedSigma, excite};
 pub use feed_forward::{JudgedRow, NeededTorques, PlannedMotion, TorqueGate, TorqueRemark};

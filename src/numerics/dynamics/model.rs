@@ -2,10 +2,10 @@
 
 use super::arm::{INERTIAL_NUMBERS, inertial_name, inertial_unit};
 use super::cause::{
-    COULOMB, FittedNumber, TORQUE_CAUSES, TorqueForm, VISCOUS, line_of_power, slope,
+    COULOMB, FittedNumber, TORQUE_CAUSES, TorqueForm, VISCOUS, declared, line_of_power, slope,
 };
 use super::sliding::unit_at;
-use crate::effect::Place;
+use crate::effect::{DeclaredTorque, Place};
 use crate::error::{Error, Result};
 
 /// A cause that adds torque at joints, with its numbers.
@@ -15,6 +15,8 @@ pub struct TorqueTerm {
     pub effect: String,
     /// Where it acts.
     pub place: Place,
+    /// The law of a user's own that it is.
+    pub declared: Option<DeclaredTorque>,
     /// Further joints (from 0) or an order, as the cause reads them.
     pub with: [usize; 2],
     /// Numbers that enter nonlinearly, SI.
@@ -107,9 +109,10 @@ const SIGN_WIDTH: &str = "recording.sign_width";
 impl TorqueTerm {
     /// Its form. Fails where no cause has its name or its numbers are too few.
     pub(super) fn form(&self) -> Result<TorqueForm> {
-        let cause = TORQUE_CAUSES
+        let mut causes = TORQUE_CAUSES
             .into_iter()
-            .find(|cause| cause.name == self.effect && cause.has_shape(&self.shape));
+            .chain(self.declared.as_ref().map(declared));
+        let cause = causes.find(|cause| cause.name == self.effect && cause.has_shape(&self.shape));
         let cause = cause.ok_or_else(|| {
             Error::data(
                 "torque model",
@@ -367,6 +370,7 @@ mod tests {
                 .filter(|_| !cause.coefficients.is_empty())
             {
                 let term = TorqueTerm {
+                    declared: None,
                     effect: cause.name.into(),
                     place: form.place,
                     with: form.with,
@@ -395,6 +399,7 @@ mod tests {
     #[test]
     fn friction_that_grows_with_another_power_of_speed_has_the_numbers_of_the_line_of_both() {
         let term = |effect: &str, shape: &[f64], value: f64| TorqueTerm {
+            declared: None,
             effect: effect.into(),
             place: Place::Joint(0),
             with: [0; 2],

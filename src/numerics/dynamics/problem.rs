@@ -2,8 +2,8 @@
 
 use super::arm::{DynamicArm, INERTIAL_NUMBERS};
 use super::cause::{
-    COULOMB, OFFSET, ROTOR, TORQUE_CAUSES, TorqueCause, TorqueForm, VISCOUS, friction_of,
-    of_greatest_load,
+    COULOMB, OFFSET, ROTOR, TORQUE_CAUSES, TorqueCause, TorqueForm, UNKNOWN, VISCOUS, declared,
+    friction_of, of_greatest_load,
 };
 use super::columns::{ReducedRegressor, Reduction, TorqueColumn, TorqueColumns, columns_of};
 use super::recording::{
@@ -13,9 +13,9 @@ use super::scene::DynamicScene;
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{JointNoise, NoiseMemory, Weighing, WeightedColumns};
-use crate::criteria::cells::FAR;
+use crate::criteria::cells::{FAR, USUAL};
 use crate::criteria::torque::MISLED;
-use crate::effect::Place;
+use crate::effect::{DeclaredTorque, Place};
 use crate::statistics::nearest;
 use std::ops::Range;
 
@@ -69,6 +69,10 @@ pub(super) struct TorqueProblem<'a> {
     /// Causes at their places that are none: only a number at an end of its search would explain the torques, or cross-validation
     /// did not confirm them.
     pub(crate) barred: Vec<TorqueForm>,
+    /// Laws of a user's own.
+    own: Vec<DeclaredTorque>,
+    /// ln by which causes without a name are more probable than usual.
+    pub(crate) openness: f64,
     /// Whether the width of a sign has changed since columns of forms outside a set were made.
     is_stale: bool,
     /// Least and greatest, C, where it was recorded.
@@ -116,6 +120,8 @@ impl<'a> TorqueProblem<'a> {
             events: Vec::new(),
             noise: Vec::new(),
             barred: Vec::new(),
+            own: question.effects.clone(),
+            openness: log_odds(question.open_world) - log_odds(*USUAL),
             is_stale: false,
             temperature: temperature.filter(|[least, most]| least <= most),
         };
@@ -139,7 +145,12 @@ impl<'a> TorqueProblem<'a> {
     /// Forms the columns: of the base, and of all forms of all causes.
     pub(crate) fn form(&mut self) {
         self.form_base();
-        for cause in TORQUE_CAUSES {
+        let (nameless, mut causes): (Vec<_>, Vec<&'static TorqueCause>) = TORQUE_CAUSES
+            .iter()
+            .partition(|cause| cause.name == UNKNOWN);
+        causes.extend(self.own.iter().map(declared));
+        causes.extend(nameless);
+        for cause in causes {
             for form in (cause.forms)(cause, &self.scene) {
                 if !form.needs_turn(&self.scene.arm.prismatic) {
                     self.push(form);
@@ -442,6 +453,11 @@ impl<'a> TorqueProblem<'a> {
         }
         left
     }
+}
+
+/// ln of the odds of a probability.
+fn log_odds(probability: f64) -> f64 {
+    (probability / (1.0 - probability)).ln()
 }
 
 /// s about a row over which what numerics make is taken for as large as the largest of it: a jump of an acceleration is not exactly at a row.

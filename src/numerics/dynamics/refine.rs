@@ -59,7 +59,7 @@ fn try_grid(
         let step = half * f64::from(point) / f64::from(POINTS);
         let moved = match span.by_ratio {
             true => now * step.exp(),
-            false => now + step,
+            false => now + step * span.size(now),
         };
         if moved >= span.least && moved <= span.most {
             trials.push(push(problem, weighted, form.with_shape(span.index, moved)));
@@ -131,7 +131,9 @@ fn step(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [
             continue;
         };
         match *number {
-            ShapeNumber::SignWidth => problem.scene.sign_width = moved(width, *change, WIDTHS),
+            ShapeNumber::SignWidth => {
+                problem.scene.sign_width = moved(width, *change, width, WIDTHS);
+            }
             ShapeNumber::Of(form, index) => {
                 let place = before.iter().position(|known| *known == form);
                 let spans = problem.all.forms[form].shape_numbers();
@@ -140,7 +142,8 @@ fn step(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [
                     continue;
                 };
                 let form = &problem.all.forms[set[place]];
-                let value = moved(form.shape[index], *change, [span.least, span.most]);
+                let value = form.shape[index];
+                let value = moved(value, *change, span.size(value), [span.least, span.most]);
                 set[place] = problem.push(form.with_shape(index, value));
             }
         }
@@ -157,10 +160,10 @@ fn step(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [
     false
 }
 
-/// A number after a change, within its ends.
-fn moved(value: f64, change: f64, [least, most]: [f64; 2]) -> f64 {
-    let ratio = (1.0 + change / value).clamp(1.0 / FARTHEST, FARTHEST);
-    (value * ratio).clamp(least, most)
+/// A number of a size after a change, within its ends.
+fn moved(value: f64, change: f64, size: f64, [least, most]: [f64; 2]) -> f64 {
+    let change = change.clamp((1.0 / FARTHEST - 1.0) * size, (FARTHEST - 1.0) * size);
+    (value + change).clamp(least, most)
 }
 
 /// Takes forms with a number at an end of its search out of a set, and their causes out of the search at their places; tells whether any was.
@@ -225,7 +228,7 @@ impl ShapeSlopes {
             let spans = form.shape_numbers().into_iter();
             numbers.extend(spans.map(|span| {
                 let shape_number = ShapeNumber::Of(*number, span.index);
-                (shape_number, form.shape[span.index])
+                (shape_number, span.size(form.shape[span.index]))
             }));
         }
         numbers.push((ShapeNumber::SignWidth, problem.scene.sign_width));
@@ -284,10 +287,11 @@ pub(super) fn planned_slopes<C: AsRef<[f64]>>(
     let (mut slopes, mut next) = (Vec::new(), 0);
     for (form, values) in forms.iter().zip(coefficients) {
         for span in form.shape_numbers() {
-            let size = form.shape[span.index];
+            let value = form.shape[span.index];
+            let size = span.size(value);
             for joint in form.acts_on(scene.joints()) {
-                let [less, more] = [1.0 - SHARE, 1.0 + SHARE].map(|share| {
-                    let moved = form.with_shape(span.index, share * size);
+                let [less, more] = [-SHARE, SHARE].map(|share| {
+                    let moved = form.with_shape(span.index, value + share * size);
                     torque_at(&moved, values.as_ref(), scene, joint)
                 });
                 slopes.push((next, joint, difference(less, &more, 2.0 * SHARE * size)));

@@ -4,6 +4,7 @@ use super::arm::{DeclaredInertials, DynamicArm, INERTIAL_NUMBERS};
 use super::filter::{ZeroPhase, derivatives};
 use super::newton_euler::{InverseDynamics, MotionRow, turn};
 use super::recording::{RecordingClock, TorqueRecording, add, by_joint};
+use crate::effect::Variable;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
 
@@ -20,6 +21,8 @@ pub(super) struct DynamicScene<'a> {
     /// s from the first row.
     pub(crate) time: Vec<f64>,
     pub(crate) stretches: Vec<Range<usize>>,
+    /// C, a value a row; empty where it is not known.
+    pub(crate) temperature: Vec<f64>,
     /// rad.
     pub(crate) position: Vec<Vec<f64>>,
     /// rad/s.
@@ -86,6 +89,7 @@ impl<'a> DynamicScene<'a> {
             rate: clock.rate,
             time: recording.time.iter().map(|time| time - first).collect(),
             stretches: clock.stretches.clone(),
+            temperature: recording.temperature.clone().unwrap_or_default(),
             position: by_joint(&recording.position, n),
             velocity: nothing(),
             acceleration: nothing(),
@@ -140,6 +144,19 @@ impl<'a> DynamicScene<'a> {
     /// Number of rows.
     pub(crate) fn rows(&self) -> usize {
         self.time.len()
+    }
+
+    /// What a row says of a variable; nothing of one that rows of torques do not have.
+    pub(crate) fn says(&self, variable: Variable, row: usize) -> Option<f64> {
+        let of_joint = |courses: &[Vec<f64>], joint: usize| Some(courses.get(joint)?[row]);
+        match variable {
+            Variable::Angle { joint } => of_joint(&self.position, joint),
+            Variable::Velocity { joint } => of_joint(&self.velocity, joint),
+            Variable::Load { joint } => of_joint(&self.rigid, joint),
+            Variable::Temperature => self.temperature.get(row).copied(),
+            Variable::Time => Some(self.time[row]),
+            _ => None,
+        }
     }
 
     /// Smoothed sign of a velocity.

@@ -2,7 +2,7 @@
 
 use super::arm::DynamicArm;
 use super::cause::UNKNOWN;
-use super::cells::{CauseChoice, all_but, faint, from_common, priors, search, settle};
+use super::cells::{CauseChoice, all_but};
 use super::contact::contacts;
 use super::latency::{Latency, latency, take_friction_lead};
 use super::problem::{
@@ -11,6 +11,7 @@ use super::problem::{
 };
 use super::recording::{RecordingClock, TorqueRecording};
 use super::refine::{ShapeSlopes, polish, refine, take_out_ends, take_sign_widths};
+use super::search::{faint, from_common, priors, search};
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{NoiseMemory, WeightedColumns};
@@ -161,7 +162,7 @@ fn again(
     *weighted = problem.weighted(&set);
     let mut set = search(&CauseChoice::new(problem, weighted), &set);
     if refine(problem, weighted, &mut set) {
-        set = settle(&CauseChoice::new(problem, weighted), &set);
+        set = search(&CauseChoice::new(problem, weighted), &set);
     }
     set
 }

@@ -3,10 +3,10 @@
 use super::cause::TorqueParameter;
 use super::model::{FrictionCurve, TorqueModel};
 use crate::diagnose::{Evidence, Probabilities, RivalCause, VerdictKind};
-use crate::effect::Place;
+use crate::effect::{DeclaredTorque, Place};
 
 /// How a recording of torques is to be diagnosed.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TorqueQuestion {
     /// Whether masses are identified without regard to what is declared.
     pub free_inertials: bool,
@@ -15,8 +15,25 @@ pub struct TorqueQuestion {
     pub cutoff: Option<f64>,
     /// Names that are not given: what such a cause explains is without a name at its place.
     pub without: Vec<String>,
+    /// Prior probability that what acts somewhere is no cause of the list: its odds scale those of causes without a name.
+    pub open_world: f64,
+    /// Laws of a user's own, which are compared with those of the library.
+    pub effects: Vec<DeclaredTorque>,
     /// Whether the numbers of declared links are moved to the nearest that bodies have.
     pub enforce_bodies: bool,
+}
+
+impl Default for TorqueQuestion {
+    fn default() -> Self {
+        Self {
+            free_inertials: false,
+            cutoff: None,
+            without: Vec::new(),
+            open_world: *crate::criteria::cells::USUAL,
+            effects: Vec::new(),
+            enforce_bodies: false,
+        }
+    }
 }
 
 /// What the simulated torques rest on.
@@ -59,6 +76,8 @@ pub struct TorqueFinding {
     pub effect: &'static str,
     /// Where it acts.
     pub place: Place,
+    /// The kind of variable that it follows: own speed, own angle, other angle, load, acceleration, time, temperature, constant.
+    pub follows: &'static str,
     /// The finding in a sentence, with its size.
     pub statement: String,
     /// Fitted numbers, in units that people read.

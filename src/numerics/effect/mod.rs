@@ -36,7 +36,8 @@ mod words;
 pub use basis::Basis;
 pub use cause::{ArmEffectOf, Cause, Measure, OwnMotion, arm_effect, cause, identified};
 pub use declared::{
-    DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclaration, Laws, ShapeRange, Starts,
+    DeclarationFault, DeclaredCause, DeclaredForm, DeclaredTorque, EffectDeclaration, Laws,
+    ShapeRange, Starts,
 };
 pub use deflection::{BeyondRange, Deflection, Direction};
 pub use form::{Form, NumberSpec, Placed, Term, is_own_table};

@@ -13,10 +13,10 @@ mod rows;
 mod search;
 
 pub use rows::{Block, Rows, ranked};
-pub use search::{Answer, Options, diagnose};
+pub use search::{Answer, Options, diagnose, dropped, findings};
 
 /// A cause: a row of the table.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cause {
     /// In tables and JSON.
     pub name: &'static str,
@@ -26,6 +26,18 @@ pub struct Cause {
     pub numbers: &'static [Number],
     /// ln of the prior odds that it is there, of all its places together.
     pub log_prior: f64,
+}
+
+impl Cause {
+    /// One of which a problem says all but the name itself.
+    pub const fn named(name: &'static str) -> Self {
+        Self {
+            name,
+            sentence: "",
+            numbers: &[],
+            log_prior: 0.0,
+        }
+    }
 }
 
 /// A number of a cause.
@@ -45,13 +57,15 @@ pub struct Cell<K> {
     /// What the problem knows it by.
     pub key: K,
     /// Its cause.
-    pub cause: &'static Cause,
+    pub cause: Cause,
     /// Where it acts, in words: `joint 2`.
     pub place: String,
     /// ln of its prior odds.
     pub log_prior: f64,
     /// How it may look.
     pub shapes: Vec<Shape>,
+    /// Cells that it modifies, and without which it is nothing.
+    pub needs: Vec<K>,
 }
 
 /// A shape of a cell: where its numbers begin, and how far they usually are from there.
@@ -119,7 +133,8 @@ pub struct Finding<K> {
     pub rivals: Vec<Rival<K>>,
 }
 
-/// What was recorded, and how a model of it is fitted.
+/// What was recorded, and how a model of it is fitted. Where a fit is linear in all but which cells are in it, and rows are independent, what has
+/// an answer here already holds.
 pub trait Problem: Sync {
     /// What it knows cells by.
     type Key: Clone + PartialEq + Send + Sync;
@@ -131,7 +146,9 @@ pub trait Problem: Sync {
     /// The cells of the table linearised around a fit; columns of an earlier linearisation that still hold may be reused.
     fn around(&self, fit: &Self::Fit, before: Option<&Self::Around>) -> Self::Around;
     /// The fit with its number of effective rows, estimated from the linearisation around it.
-    fn informed(&self, fit: Self::Fit, around: &Self::Around) -> Self::Fit;
+    fn informed(&self, fit: Self::Fit, _around: &Self::Around) -> Self::Fit {
+        fit
+    }
     /// Cells by their evidence around a fit, those of no use left out; member `out` of its set is left out to first order. Likeliest first.
     fn scan(
         &self,
@@ -139,19 +156,28 @@ pub trait Problem: Sync {
         around: &Self::Around,
         out: Option<usize>,
     ) -> Vec<Scanned<Self::Key>>;
-    /// Everything fitted at once, from the numbers of the set and the fit before; it may stop where the evidence cannot reach `least`.
+    /// Everything fitted at once, from the numbers of the set and the fit before; it may stop where the evidence cannot reach `least`, and what
+    /// comes out as it cannot be is in the set no more.
     fn fit(&self, set: &[Accepted<Self::Key>], before: Option<&Self::Fit>, least: f64)
     -> Self::Fit;
     /// The same with every derivative made anew, to the end: a trial among many may reuse those of the fit before.
-    fn settled(&self, fit: &Self::Fit) -> Self::Fit;
+    fn settled(&self, fit: &Self::Fit) -> Self::Fit {
+        fit.clone()
+    }
     /// The set with its numbers as fitted.
     fn set(&self, fit: &Self::Fit) -> Vec<Accepted<Self::Key>>;
     /// How far noise is from independent around a fit: effective rows a row.
-    fn independence(&self, fit: &Self::Fit) -> f64;
+    fn independence(&self, _fit: &Self::Fit) -> f64 {
+        1.0
+    }
     /// ln of the evidence of a fit, priors of its cells included, where so large a share of the rows is independent.
     fn log_evidence(&self, fit: &Self::Fit, independence: f64) -> f64;
     /// ln of the odds of a member of the set against nothing, to first order; `None` where only a fit without it tells.
-    fn odds(&self, fit: &Self::Fit, member: usize, independence: f64) -> Option<f64>;
-    /// Whether two cells do the same in these rows' words, so that one must not stand beside the other.
-    fn excludes(&self, one: &Self::Key, other: &Self::Key) -> bool;
+    fn odds(&self, _fit: &Self::Fit, _member: usize, _independence: f64) -> Option<f64> {
+        None
+    }
+    /// Whether two cells in their shapes do the same in these rows' words, so that one must not stand beside the other.
+    fn excludes(&self, _one: &Accepted<Self::Key>, _other: &Accepted<Self::Key>) -> bool {
+        false
+    }
 }

@@ -15,6 +15,8 @@ pub struct Options {
     pub exchanges: f64,
     /// Cells that are fitted in a round: a linear scan ranks, only a fit decides.
     pub tried: usize,
+    /// Exchanges at most: each is for the better, so none comes twice.
+    pub exchanged: usize,
     /// Cells in all; more is a model of nothing.
     pub most: usize,
     /// Rivals less probable are not told.
@@ -27,6 +29,7 @@ impl Default for Options {
             joins: 3.0,
             leaves: 2.0,
             exchanges: 0.5,
+            exchanged: 8,
             tried: 8,
             most: 12,
             told: 5e-3,
@@ -45,8 +48,6 @@ pub struct Answer<P: Problem> {
     pub findings: Vec<Finding<P::Key>>,
 }
 
-/// Exchanges at most: each is for the better, so none comes twice.
-const EXCHANGES: usize = 8;
 /// ln by which a linear scan may be wrong, and the share of it: what is further behind is not fitted.
 const BLUR: f64 = 20.0;
 const BLUR_SHARE: f64 = 0.5;
@@ -72,6 +73,17 @@ struct Trial<P: Problem> {
     cell: Cell<P::Key>,
 }
 
+/// Whether every cell of a set has those that it needs.
+fn is_whole<K: PartialEq>(set: &[Accepted<K>]) -> bool {
+    let has = |key: &K| set.iter().any(|one| one.cell.key == *key);
+    set.iter().all(|one| one.cell.needs.iter().all(has))
+}
+
+/// A set without a member.
+fn without<K: Clone>(set: &[Accepted<K>], member: usize) -> Vec<Accepted<K>> {
+    [&set[..member], &set[member + 1..]].concat()
+}
+
 /// Cells of a scan that a set allows, the first of each name and place, as many as are tried; `least` is the linear evidence below which
 /// none is.
 fn candidates<P: Problem>(
@@ -82,9 +94,10 @@ fn candidates<P: Problem>(
     options: &Options,
 ) -> Vec<Scanned<P::Key>> {
     let free = |one: &Scanned<P::Key>| {
-        let key = &one.accepted.cell.key;
-        set.iter()
-            .all(|other| !problem.excludes(key, &other.cell.key))
+        let new = &one.accepted;
+        let whole = [set, std::slice::from_ref(new)].concat();
+        let apart = |other| !problem.excludes(new, other);
+        set.iter().all(apart) && is_whole(&whole)
     };
     let mut kept: Vec<Scanned<P::Key>> = Vec::new();
     for one in scanned.into_iter().filter(free) {
@@ -103,8 +116,8 @@ fn candidates<P: Problem>(
     kept
 }
 
-/// Fits of a set with each of some cells added, best first; a fit may stop early where its evidence cannot reach `least`, or that of the
-/// likeliest less `margin`.
+/// Fits of a set with each of some cells added, best first, of those that are still in their fit; a fit may stop early where its evidence
+/// cannot reach `least`, or that of the likeliest less `margin`.
 fn trials<P: Problem>(
     problem: &P,
     fit: &P::Fit,
@@ -131,8 +144,16 @@ fn trials<P: Problem>(
     let rest = rest.into_par_iter().map(|one| tried(one, least));
     let mut trials: Vec<Trial<P>> = rest.collect();
     trials.push(first);
+    let stands = |trial: &Trial<P>| standing(problem, trial).is_some();
+    trials.retain(stands);
     trials.sort_by(|a, b| b.log.total_cmp(&a.log));
     trials
+}
+
+/// The new member of a trial as fitted; none where it is not in the fit.
+fn standing<P: Problem>(problem: &P, trial: &Trial<P>) -> Option<Accepted<P::Key>> {
+    let mut set = problem.set(&trial.fit).into_iter().rev();
+    set.find(|one| one.cell.key == trial.cell.key)
 }
 
 /// The likeliest set from a fit on: a pure function of the problem and its start.
@@ -167,38 +188,40 @@ fn search<P: Problem>(
             "{} at {} joins",
             best.cell.cause.name, best.cell.place
         ));
-        let fit = revised(problem, problem.settled(&best.fit), options, tell);
+        let fit = problem.settled(&best.fit);
+        let newest = problem.set(&fit).len().saturating_sub(1);
+        let fit = revised(problem, fit, newest, options, tell);
         stand = Stand::new(problem, fit, Some(&stand.around));
     }
     stand
 }
 
-/// Earlier members are dropped where the later ones made them useless.
+/// Of the first `count` members those are dropped that the others made useless; what others need stays.
 fn revised<P: Problem>(
     problem: &P,
     mut fit: P::Fit,
+    mut count: usize,
     options: &Options,
     tell: &mut impl FnMut(String),
 ) -> P::Fit {
     let mut at = 0;
-    while at + 1 < problem.set(&fit).len() {
+    while at < count.min(problem.set(&fit).len()) {
         let independence = problem.independence(&fit);
+        let set = problem.set(&fit);
+        let rest = without(&set, at);
         let odds = problem.odds(&fit, at, independence);
-        if odds.is_some_and(|odds| odds > options.leaves + BLUR) {
+        if odds.is_some_and(|odds| odds > options.leaves + BLUR) || !is_whole(&rest) {
             at += 1;
             continue;
         }
         let now = problem.log_evidence(&fit, independence);
-        let mut rest = problem.set(&fit);
-        let out = rest.remove(at);
         let without = problem.fit(&rest, Some(&fit), now - options.leaves);
         let log = problem.log_evidence(&without, independence);
         if now - log < options.leaves {
-            tell(format!(
-                "{} at {} leaves",
-                out.cell.cause.name, out.cell.place
-            ));
+            let cell = &set[at].cell;
+            tell(format!("{} at {} leaves", cell.cause.name, cell.place));
             fit = problem.settled(&without);
+            count -= 1;
             continue;
         }
         at += 1;
@@ -219,11 +242,22 @@ struct Change<P: Problem> {
     fit: P::Fit,
 }
 
-/// What stands, each with what else could stand in its place; up to the first that is useless, or where `exchange` worse than another.
+/// Which changes for the better end the question what else could stand.
+#[derive(Clone, Copy, PartialEq)]
+enum Until {
+    /// A member that is useless, or one that another explains better.
+    Better,
+    /// A member that is useless.
+    Useless,
+    /// None: the set is what it is.
+    End,
+}
+
+/// What stands, each with what else could stand in its place; up to the first change for the better that is asked for.
 fn posterior<P: Problem>(
     problem: &P,
     stand: &Stand<P>,
-    exchange: bool,
+    until: Until,
     options: &Options,
 ) -> Posterior<P> {
     let fit = &stand.fit;
@@ -233,8 +267,7 @@ fn posterior<P: Problem>(
     let mut findings: Vec<Finding<P::Key>> = Vec::new();
     for (at, accepted) in set.iter().enumerate() {
         let own = &accepted.cell;
-        let mut rest = set.clone();
-        rest.remove(at);
+        let rest = without(&set, at);
         let without = problem.fit(&rest, Some(fit), f64::NEG_INFINITY);
         let none = problem.log_evidence(&without, independence);
         let scanned = problem.scan(fit, &stand.around, Some(at));
@@ -243,7 +276,7 @@ fn posterior<P: Problem>(
             cell.cause.name != own.cause.name || cell.place != own.place
         });
         let lost = now - none;
-        if lost < options.leaves {
+        if lost < options.leaves && until != Until::End && is_whole(&rest) {
             let better = Some(Change {
                 out: own.clone(),
                 into: None,
@@ -263,7 +296,7 @@ fn posterior<P: Problem>(
             (log_sum(&[now, none]) + told, -told),
         );
         let is_better = |trial: &Trial<P>| trial.log - now > options.exchanges;
-        if exchange && others.first().is_some_and(is_better) {
+        if until == Until::Better && others.first().is_some_and(is_better) {
             let other = others.remove(0);
             let better = Some(Change {
                 out: own.clone(),
@@ -286,10 +319,7 @@ fn posterior<P: Problem>(
         let rivals = others
             .iter()
             .map(|trial| Rival {
-                accepted: problem
-                    .set(&trial.fit)
-                    .pop()
-                    .unwrap_or_else(|| accepted.clone()),
+                accepted: standing(problem, trial).unwrap_or_else(|| accepted.clone()),
                 probability: share(trial.log),
                 log_odds: trial.log - now,
             })
@@ -311,6 +341,28 @@ fn posterior<P: Problem>(
     }
 }
 
+/// What a set says as it is, each member with what else could stand in its place, strongest first.
+pub fn findings<P: Problem>(
+    problem: &P,
+    set: &[Accepted<P::Key>],
+    options: &Options,
+) -> Vec<Finding<P::Key>> {
+    let fit = problem.fit(set, None, f64::NEG_INFINITY);
+    let stand = Stand::new(problem, fit, None);
+    posterior(problem, &stand, Until::End, options).findings
+}
+
+/// The fit of a set without its members that are useless; what others need stays.
+pub fn dropped<P: Problem>(
+    problem: &P,
+    set: &[Accepted<P::Key>],
+    options: &Options,
+    mut tell: impl FnMut(String),
+) -> P::Fit {
+    let fit = problem.fit(set, None, f64::NEG_INFINITY);
+    revised(problem, fit, set.len(), options, &mut tell)
+}
+
 /// Searches from a set on until nothing changes, and says what stands.
 pub fn diagnose<P: Problem>(
     problem: &P,
@@ -326,7 +378,11 @@ pub fn diagnose<P: Problem>(
     let mut stand = search(problem, begun, None, options, &mut tell);
     let mut exchanges = 0;
     let findings = loop {
-        let found = posterior(problem, &stand, exchanges < EXCHANGES, options);
+        let until = match exchanges < options.exchanged {
+            true => Until::Better,
+            false => Until::Useless,
+        };
+        let found = posterior(problem, &stand, until, options);
         let Some(Change { out, into, fit }) = found.better else {
             break found.findings;
         };
@@ -335,8 +391,10 @@ pub fn diagnose<P: Problem>(
             Some(into) => format!("{} at {} in place of {gone}", into.cause.name, into.place),
             None => format!("{gone} leaves"),
         });
-        let fit = revised(problem, problem.settled(&fit), options, &mut tell);
-        stand = match exchanges < EXCHANGES {
+        let fit = problem.settled(&fit);
+        let newest = problem.set(&fit).len().saturating_sub(1);
+        let fit = revised(problem, fit, newest, options, &mut tell);
+        stand = match exchanges < options.exchanged {
             true => search(problem, fit, Some(&stand.around), options, &mut tell),
             false => Stand::new(problem, fit, Some(&stand.around)),
         };

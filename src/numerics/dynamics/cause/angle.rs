@@ -30,9 +30,9 @@ const USUAL_TIME: f64 = 15.0;
 /// comes only as the sensor warms up.
 pub(crate) static CURRENT_OFFSET: TorqueCause = TorqueCause {
     name: OFFSET,
+    follows: |_| "constant",
     coefficients: &[("offset", "Nm"), ("cold", "Nm")],
     price: |form| if form.width == 1 { 0.0 } else { 4.0 },
-    of_angle: true,
     rich: |form| form.width == 1 || form.shape[0] == USUAL_TIME,
     forms: |cause, scene| {
         let mut forms = at_each_joint(cause, scene, 1, &[&[]]);
@@ -86,13 +86,13 @@ pub(super) static CABLE_STIFFNESS: TorqueCause = SPRING;
 /// and greatest angle, rad.
 const SPRING: TorqueCause = TorqueCause {
     name: "cable_stiffness",
+    follows: |_| "own angle",
     coefficients: &[
         ("stiffness", "Nm/rad"),
         ("at_zero", "Nm"),
         ("square", "Nm/rad2"),
         ("cube", "Nm/rad3"),
     ],
-    of_angle: true,
     rich: |form| form.width == SPRINGS[0],
     lengths: &[2],
     forms: |cause, scene| {
@@ -166,6 +166,7 @@ fn waves(q: f64) -> [f64; 5] {
 /// is the same torque: there it is a balancer, with the ripple as its rival. Shape: least and greatest angle of the joint, rad.
 pub(super) static BALANCER: TorqueCause = TorqueCause {
     name: SPRING_BALANCE_NAME,
+    follows: |_| "own angle",
     of_turn: true,
     coefficients: &[
         ("cosine", "Nm"),
@@ -175,7 +176,6 @@ pub(super) static BALANCER: TorqueCause = TorqueCause {
         ("constant", "Nm"),
     ],
     price: |_| 4.0,
-    of_angle: true,
     lengths: &[2],
     forms: |cause, scene| {
         at_joints(cause, balanced(scene), &BALANCERS, |joint| {
@@ -222,6 +222,7 @@ const WITH_OVERTONE: usize = 4;
 /// plain wave those of twice the order; `with` holds the order and whether it is of the motor. Shape: turns of the motor in one of the joint.
 pub(super) static RIPPLE: TorqueCause = TorqueCause {
     name: "torque_ripple",
+    follows: |_| "own angle",
     of_turn: true,
     coefficients: &[
         ("cosine", "Nm"),
@@ -230,7 +231,6 @@ pub(super) static RIPPLE: TorqueCause = TorqueCause {
         ("overtone_sine", "Nm"),
     ],
     may_repeat: true,
-    of_angle: true,
     rich: |form| form.width == 2 && form.with[1] == 0 && form.with[0] <= USUAL_ORDER,
     forms: |cause, scene| {
         let mut forms = Vec::new();
@@ -287,6 +287,7 @@ const CURVES: [usize; 2] = [5, 9];
 /// the recorded one, as cosines have no slope at its ends. Shape: the ends of that range and of the recorded one, rad.
 pub(super) static ONE_ANGLE: TorqueCause = TorqueCause {
     name: UNKNOWN,
+    follows: |_| "own angle",
     coefficients: &[
         ("mean", "Nm"),
         ("half_waves_1", "Nm"),
@@ -300,7 +301,6 @@ pub(super) static ONE_ANGLE: TorqueCause = TorqueCause {
     ],
     price: |_| 10.0,
     may_repeat: true,
-    of_angle: true,
     lengths: &[4],
     forms: |cause, scene| {
         at_joints(cause, 0..scene.joints(), &CURVES, |joint| {
@@ -325,6 +325,7 @@ pub(super) static ONE_ANGLE: TorqueCause = TorqueCause {
 /// A smooth torque at a joint, in the angles of two joints: products of sine and cosine of one angle and of twice another; `with` holds the two.
 pub(super) static TWO_ANGLES: TorqueCause = TorqueCause {
     name: UNKNOWN,
+    follows: |_| "other angle",
     coefficients: &[
         ("sin_sin", "Nm"),
         ("sin_cos", "Nm"),

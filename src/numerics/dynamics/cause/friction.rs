@@ -18,6 +18,7 @@ pub(crate) const VISCOUS: &str = "viscous_friction";
 /// Friction that grows with the velocity of a joint. Shape: its exponent, 1 but where the data show another: grease that thins with speed.
 pub(crate) static VISCOUS_FRICTION: TorqueCause = TorqueCause {
     name: VISCOUS,
+    follows: |_| "own speed",
     coefficients: &[("viscous", "Nm s/rad")],
     price: |_| 0.0,
     rich: |_| true,
@@ -76,6 +77,7 @@ fn power(form: &TorqueForm, velocity: f64) -> f64 {
 /// Friction of one size against the direction of motion.
 pub(crate) static COULOMB_FRICTION: TorqueCause = TorqueCause {
     name: COULOMB,
+    follows: |_| "own speed",
     coefficients: &[("coulomb", "Nm")],
     price: |_| 0.0,
     of_sign: true,
@@ -96,6 +98,7 @@ pub(crate) static COULOMB_FRICTION: TorqueCause = TorqueCause {
 /// Friction that is greater in one direction of motion.
 pub(super) static ASYMMETRIC: TorqueCause = TorqueCause {
     name: "asymmetric_friction",
+    follows: |_| "own speed",
     coefficients: &[("asymmetry", "Nm")],
     of_sign: true,
     rich: |_| true,
@@ -134,6 +137,7 @@ const NARROWEST: f64 = 2.0;
 /// (Armstrong-Helouvry, 1991, 1994).
 pub(super) static STRIBECK: TorqueCause = TorqueCause {
     name: "stribeck_friction",
+    follows: |_| "own speed",
     coefficients: &[("stribeck", "Nm")],
     price: |form| match form.shape.get(1) {
         Some(exponent) if *exponent != 1.0 => 10.0,
@@ -192,6 +196,7 @@ const LOAD_SHAPE: usize = 2;
 /// of which shares are; tables of linear friction alone have none.
 pub(super) static LOAD: TorqueCause = TorqueCause {
     name: "load_friction",
+    follows: |_| "load",
     coefficients: &[("share", "1"), ("share_driven_back", "1")],
     of_sign: true,
     rich: |form| form.width == 1 && power_of_load(form) == LINEAR,
@@ -305,6 +310,7 @@ const USUAL_TIME: f64 = 18.0;
 /// form that stands in the rich model.
 pub(super) static WARMUP: TorqueCause = TorqueCause {
     name: "warmup_friction",
+    follows: |_| "time",
     coefficients: &[("viscous_cold", "Nm s/rad"), ("coulomb_cold", "Nm")],
     of_sign: true,
     modifies: &[VISCOUS, COULOMB],
@@ -357,6 +363,7 @@ const WRIST: usize = 3;
 /// likely to share a gear.
 pub(super) static WRIST_COUPLING: TorqueCause = TorqueCause {
     name: "wrist_coupling",
+    follows: |_| "own speed",
     of_turn: true,
     coefficients: &[("viscous", "Nm s/rad"), ("coulomb", "Nm")],
     price: |form| if form.with[1] == 1 { 6.0 } else { 30.0 },
@@ -443,6 +450,7 @@ const STILL: f64 = 0.02;
 /// further numbers each): that line is viscous and Coulomb friction, which so are those of the whole curve.
 pub(super) static BY_SPEED: TorqueCause = TorqueCause {
     name: UNKNOWN,
+    follows: |_| "own speed",
     coefficients: &[
         ("half_wave_sin", "Nm"),
         ("half_wave_cos", "Nm"),
@@ -512,6 +520,7 @@ const ORDERS: usize = 4;
 /// the sign of the velocity; shape: least and greatest angle of the joint, rad.
 pub(super) static BY_ANGLE: TorqueCause = TorqueCause {
     name: UNKNOWN,
+    follows: |_| "own angle",
     of_turn: true,
     coefficients: &[("drag_cosine", "Nm"), ("drag_sine", "Nm")],
     price: |_| 30.0,

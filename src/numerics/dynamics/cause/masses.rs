@@ -35,6 +35,7 @@ const PAYLOADS: [usize; 3] = [1, 4, INERTIAL_NUMBERS];
 /// it is a point on the way to the tool, as of [`ADDED_MASS`], where no payload is declared.
 pub(crate) static PAYLOAD: TorqueCause = TorqueCause {
     name: "payload_error",
+    follows: |_| "own angle",
     price: |_| 4.0,
     rich: |form| form.width != POINT,
     inertial: true,
@@ -282,6 +283,7 @@ fn point_statement(what: &str, length: f64, fitted: &[FittedNumber]) -> String {
 /// square. Shape: from the joint's point to the next one, to the tool of the last link, m.
 pub(crate) static ADDED_MASS: TorqueCause = TorqueCause {
     name: "added_mass",
+    follows: |_| "own angle",
     coefficients: &[("mass", "kg"), ("moment", "kg m"), ("inertia", "kg m2")],
     price: |_| 10.0,
     inertial: true,
@@ -344,6 +346,7 @@ const MASSES: std::ops::RangeInclusive<f64> = -0.7..=1.0;
 /// of [`ADDED_MASS`].
 pub(super) static LINK_MASS: TorqueCause = TorqueCause {
     name: "link_mass",
+    follows: |_| "own angle",
     inertial: true,
     forms: |cause, scene| {
         let mut forms = at_each_link(cause, scene, 1);
@@ -401,6 +404,7 @@ fn seen_inertias(fitted: &[FittedNumber]) -> Vec<(&'static str, FittedNumber)> {
 /// A link whose centre of mass is elsewhere, by three coordinates.
 pub(super) static LINK_CENTRE: TorqueCause = TorqueCause {
     name: "link_com",
+    follows: |_| "own angle",
     price: |_| 8.0,
     inertial: true,
     forms: |cause, scene| at_each_link(cause, scene, 3),
@@ -438,6 +442,7 @@ pub(super) static LINK_CENTRE: TorqueCause = TorqueCause {
 /// A link whose inertia is not the declared one: six numbers about the joint's point.
 pub(super) static LINK_INERTIA: TorqueCause = TorqueCause {
     name: "link_inertia",
+    follows: |_| "acceleration",
     price: |_| 8.0,
     inertial: true,
     forms: |cause, scene| at_each_link(cause, scene, INERTIA),
@@ -478,6 +483,7 @@ fn tilt(fitted: &[FittedNumber]) -> FittedNumber {
 /// turned by more than some degrees are refused before.
 pub(super) static GRAVITY_DIRECTION: TorqueCause = TorqueCause {
     name: "gravity_direction",
+    follows: |_| "own angle",
     coefficients: &[("side_x", "1"), ("side_y", "1")],
     price: |_| 4.0,
     rich: |_| true,
@@ -523,6 +529,7 @@ pub(crate) const TORQUE_CONSTANT: &str = "torque_constant";
 /// Inertia of a motor and its gear, as the joint feels it.
 pub(super) static ROTOR_INERTIA: TorqueCause = TorqueCause {
     name: ROTOR,
+    follows: |_| "acceleration",
     coefficients: &[("inertia", "kg m2")],
     price: |_| 2.0,
     rich: |_| true,
@@ -550,6 +557,7 @@ const LARGEST: f64 = 0.6;
 /// torque, to half at so many Nm: iron saturates, and a table of a drive is right at its rated current.
 pub(super) static WRONG_CONSTANT: TorqueCause = TorqueCause {
     name: TORQUE_CONSTANT,
+    follows: |_| "load",
     coefficients: &[("relative", "1")],
     price: |form| if form.shape.is_empty() { 4.0 } else { 10.0 },
     inertial: true,

@@ -28,6 +28,7 @@ fn kept_after(kept: f64, moved: f64, travel: f64) -> f64 {
 /// 1968); where bristles differ, the same over a longer travel, too.
 pub(super) static PRESLIDING: TorqueCause = TorqueCause {
     name: "presliding_friction",
+    follows: |_| "own speed",
     coefficients: &[("kept", "Nm"), ("kept_longer", "Nm")],
     price: |_| 25.0,
     of_sign: true,
@@ -83,6 +84,7 @@ const DRAG_TRAVELS: [&[f64]; 3] = [&[0.08, 0.05, 1.0], &[0.2, 0.05, 1.0], &[0.5,
 /// Drag without a name that turns over only after a travel of a good part of a radian: hoses and cable guides that bend with their joint.
 pub(super) static HYSTERESIS: TorqueCause = TorqueCause {
     name: UNKNOWN,
+    follows: |_| "own angle",
     coefficients: &[("kept", "Nm")],
     price: |_| 30.0,
     positive: true,
@@ -123,6 +125,7 @@ const OVER: f64 = 20.0;
 /// Lost motion, a knock after each reversal of a joint: (t / T) exp(1 - t / T) with the new direction's sign.
 pub(super) static SPIKES: TorqueCause = TorqueCause {
     name: "backlash_spikes",
+    follows: |_| "own speed",
     coefficients: &[("height", "Nm")],
     price: |_| 25.0,
     positive: true,
@@ -175,6 +178,7 @@ const DAMPING: [f64; 2] = [0.05, 0.15];
 /// side against the base does not.
 pub(super) static ELASTICITY: TorqueCause = TorqueCause {
     name: "joint_elasticity",
+    follows: |_| "acceleration",
     coefficients: &[("share", "1"), ("transmitted_damping", "1")],
     price: |_| 8.0,
     of_rigid: true,

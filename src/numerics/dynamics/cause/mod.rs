@@ -4,7 +4,9 @@
 //! columns are functions of a row; what remembers rows before writes whole courses.
 
 mod angle;
+mod declared;
 mod friction;
+mod generated;
 mod masses;
 mod memory;
 
@@ -13,8 +15,9 @@ use super::recording::add;
 use super::scene::DynamicScene;
 use super::sliding::UnitAt;
 use crate::criteria::torque::AT_END;
-use crate::effect::Place;
+use crate::effect::{DeclaredTorque, Place};
 pub(super) use angle::{CURRENT_OFFSET, OFFSET, UNKNOWN};
+pub(super) use declared::declared;
 pub use friction::COULOMB;
 pub(super) use friction::{
     COULOMB_FRICTION, VISCOUS, VISCOUS_FRICTION, line_of_power, of_greatest_load,
@@ -35,7 +38,7 @@ pub struct TorqueParameter {
 }
 
 /// All causes with columns; latency and contacts are looked for before. What has no name comes last.
-pub(super) static TORQUE_CAUSES: [&TorqueCause; 27] = [
+pub(super) static TORQUE_CAUSES: [&TorqueCause; 29] = [
     &friction::VISCOUS_FRICTION,
     &friction::COULOMB_FRICTION,
     &angle::CURRENT_OFFSET,
@@ -63,7 +66,14 @@ pub(super) static TORQUE_CAUSES: [&TorqueCause; 27] = [
     &friction::BY_SPEED,
     &friction::BY_ANGLE,
     &memory::HYSTERESIS,
+    &generated::OVER_ROWS,
+    &generated::DRY_OVER_TEMPERATURE,
 ];
+
+/// Whether a cause of the library has a name.
+pub fn is_cause(name: &str) -> bool {
+    TORQUE_CAUSES.iter().any(|cause| cause.name == name)
+}
 
 /// A shape number that is refined.
 #[derive(Debug, Clone, Copy)]
@@ -82,9 +92,20 @@ pub(super) struct ShapeSpan {
 }
 
 impl ShapeSpan {
+    /// The size of a number by which it is moved: of one that goes in differences, which may be nothing, at least a share of the search.
+    pub(crate) fn size(&self, value: f64) -> f64 {
+        match self.by_ratio {
+            true => value.abs(),
+            false => value.abs().max(LITTLE * (self.most - self.least)),
+        }
+    }
+
     /// Whether a number is at an end of what is looked for.
     fn ends_at(&self, value: f64) -> bool {
-        let near = |end: f64| (value / end).ln().abs() < *AT_END;
+        let near = |end: f64| match self.by_ratio {
+            true => (value / end).ln().abs() < *AT_END,
+            false => (value - end).abs() < *AT_END * self.size(end),
+        };
         near(self.least) || near(self.most)
     }
 }
@@ -101,6 +122,10 @@ pub(super) fn slope(size: f64, function: impl Fn(f64) -> f64) -> f64 {
 pub(super) struct TorqueCause {
     /// Canonical.
     pub(crate) name: &'static str,
+    /// The kind of variable that it follows.
+    pub(crate) follows: fn(&TorqueForm) -> &'static str,
+    /// The law that a user has declared; none of a cause of the library.
+    pub(crate) declared: Option<&'static DeclaredTorque>,
     /// What its coefficients are called in a model, and their units; wrong masses, which are in the inertial numbers, have none.
     pub(crate) coefficients: &'static [CoefficientName],
     /// -2 ln of the prior odds of a form of it, relative to a common one.
@@ -113,8 +138,6 @@ pub(super) struct TorqueCause {
     pub(crate) positive: bool,
     /// Whether it brakes, so that its coefficient is positive unless a curve of speed without a name is in the model too, with which it is a sum.
     pub(crate) brakes: bool,
-    /// Whether it is, like others of its kind, a torque over its joint's angle: one curve looks like several of others.
-    pub(crate) of_angle: bool,
     /// Whether it is, like others of its kind, a wrong mass, drive or mounting: one such error looks like several of others.
     pub(crate) inertial: bool,
     /// Whether it is made by turning: no joint that slides has it.
@@ -201,13 +224,14 @@ impl ColumnOf<'_> {
 /// What most causes are.
 const PLAIN: TorqueCause = TorqueCause {
     name: "",
+    follows: |_| "",
+    declared: None,
     coefficients: &[],
     price: |_| 6.0,
     modifies: &[],
     rich: |_| false,
     positive: false,
     brakes: false,
-    of_angle: false,
     inertial: false,
     of_turn: false,
     alike_at_joints: false,
@@ -563,6 +587,9 @@ fn at_each_link(
     };
     (0..links).map(form).collect()
 }
+
+/// Share of a search's width below which a number is as good as nothing.
+const LITTLE: f64 = 0.2;
 
 /// A shape number that is refined by ratios between two ends.
 fn span(name: &'static str, unit: &'static str, [least, most]: [f64; 2]) -> ShapeSpan {

@@ -83,7 +83,7 @@ impl ShapeRange {
     }
 
     /// Whether it goes in ratios: over more than a power of ten of positive numbers.
-    pub(crate) fn is_of_ratios(&self) -> bool {
+    pub fn is_of_ratios(&self) -> bool {
         self.from > 0.0 && self.to >= 10.0 * self.from
     }
 }

@@ -8,7 +8,9 @@ mod form;
 mod formula;
 mod pattern;
 mod quantity;
+mod torque;
 
 pub use declaration::{EffectDeclaration, Laws, ShapeRange, Starts};
 pub use form::{DeclaredCause, DeclaredForm};
 pub use pattern::DeclarationFault;
+pub use torque::DeclaredTorque;

@@ -305,17 +305,25 @@ const SHAPE: usize = 3;
 const STARTS: usize = 200;
 /// The faults found so far.
 #[derive(Default)]
-struct DeclarationFaults(Vec<DeclarationFault>);
+pub(super) struct DeclarationFaults(Vec<DeclarationFault>);
 
 impl DeclarationFaults {
-    fn add(&mut self, path: impl Into<String>, message: impl Into<String>) {
+    /// Fails with the faults so far, where there are any.
+    pub(super) fn none(self) -> Result<(), Vec<DeclarationFault>> {
+        match self.0.is_empty() {
+            true => Ok(()),
+            false => Err(self.0),
+        }
+    }
+
+    pub(super) fn add(&mut self, path: impl Into<String>, message: impl Into<String>) {
         self.0.push(DeclarationFault {
             path: path.into(),
             message: message.into(),
         });
     }
 
-    fn name(&mut self, name: &str) {
+    pub(super) fn name(&mut self, name: &str) {
         if cause(name).is_some() {
             self.add(
                 "name",
@@ -329,7 +337,7 @@ impl DeclarationFaults {
         }
     }
 
-    fn seat(&mut self, place: &str) -> Option<Seat> {
+    pub(super) fn seat(&mut self, place: &str) -> Option<Seat> {
         let seat = Seat::read(place);
         if seat.is_none() {
             self.add(
@@ -363,7 +371,7 @@ impl DeclarationFaults {
         found
     }
 
-    fn shape(&mut self, declaration: &EffectDeclaration) {
+    pub(super) fn shape(&mut self, declaration: &EffectDeclaration) {
         if declaration.shape.len() > SHAPE {
             self.add(
                 "shape",
@@ -416,7 +424,11 @@ impl DeclarationFaults {
         }
     }
 
-    fn laws(&mut self, declaration: &EffectDeclaration, names: &[String]) -> Vec<Formula> {
+    pub(super) fn laws(
+        &mut self,
+        declaration: &EffectDeclaration,
+        names: &[String],
+    ) -> Vec<Formula> {
         let texts = &declaration.law.0;
         if texts.is_empty() || texts.len() > LAWS {
             self.add(
@@ -512,7 +524,7 @@ impl DeclarationFaults {
         }
     }
 
-    fn sentence(&mut self, sentence: &str, names: &[String]) {
+    pub(super) fn sentence(&mut self, sentence: &str, names: &[String]) {
         let words = || {
             ["place", "value", "values"]
                 .into_iter()
@@ -540,7 +552,7 @@ impl DeclarationFaults {
     }
 }
 
-fn law_path(k: usize, laws: usize) -> String {
+pub(super) fn law_path(k: usize, laws: usize) -> String {
     if laws == 1 {
         "law".into()
     } else {
