@@ -4,6 +4,7 @@ use super::types::Question;
 use super::words::Ground;
 use crate::criteria::noise::{MAX_CHI_SQUARE, MAX_CHI_SQUARE_OF_STRUCTURE};
 use crate::criteria::search::SIGNIFICANT;
+use crate::criteria::words::FAR_OFF;
 use crate::effect::PlacementBuffers;
 use crate::estimate::{Model, Screening, noise, tail};
 use crate::observation::{
@@ -147,6 +148,11 @@ impl Misfit {
             rows,
             sizes: left.iter().map(|row| row.size).collect(),
         }
+    }
+
+    /// Whether the model misses `rows` by much more than those that were fitted, not only by a curve that is a little off.
+    pub(crate) fn is_far_off(&self) -> bool {
+        self.square / self.values.max(1) as f64 > *FAR_OFF * self.chi_square.max(1.0)
     }
 
     /// Sum of squares of what another model leaves at `rows`, in standard deviations.

@@ -44,7 +44,7 @@ fn doubt(found: &mut FoundCell, log_ratio: f64, why: &'static str) {
 }
 
 /// ln of the likelihood ratio of the held-out rows with each finding and without it, everything else fitted anew, the noise being what is left
-/// of them. Zero where the model is what was recorded there.
+/// of them. Zero where the model is nearly what was recorded there.
 fn by_held_out_rows(last: &LastRound, misfit: &Misfit) -> Vec<f64> {
     let (fitter, state) = (last.view.fitter, &last.state);
     let log_ratio = |found: &FoundCell| {
@@ -57,9 +57,9 @@ fn by_held_out_rows(last: &LastRound, misfit: &Misfit) -> Vec<f64> {
         0.5 * misfit.values as f64 * (without / misfit.square).ln()
     };
     let found = last.answer.found.iter();
-    match misfit.not_carried {
-        Some(_) => found.map(log_ratio).collect(),
-        None => vec![0.0; found.len()],
+    match misfit.not_carried.is_some() && misfit.is_far_off() {
+        true => found.map(log_ratio).collect(),
+        false => vec![0.0; found.len()],
     }
 }
 
