@@ -21,16 +21,18 @@ fn a_law_of_a_users_own_is_found_with_its_size_and_shape_and_stays_in_the_model(
     let declaration = crate::effect::EffectDeclaration {
         name: "worn_seal".into(),
         place: "joint".into(),
-        law: crate::effect::Laws(vec!["exp(-((q - centre) / 0.2)^2)".into()]),
-        shape: [(
-            "centre".to_string(),
-            crate::effect::ShapeRange {
-                from: -1.0,
-                to: 1.0,
-                ..Default::default()
-            },
-        )]
-        .into(),
+        law: crate::effect::Laws(vec!["exp(-((q - centre) / width)^2)".into()]),
+        // Starts apart: the law between them must be found all the same.
+        shape: [("centre", [-2.0, 2.0]), ("width", [0.05, 0.8])]
+            .map(|(name, [from, to])| {
+                let range = crate::effect::ShapeRange {
+                    from,
+                    to,
+                    ..Default::default()
+                };
+                (name.to_string(), range)
+            })
+            .into(),
         sentence: Some("{place} has a worn seal near {centre} rad: {value}".into()),
         ..Default::default()
     };
@@ -55,7 +57,7 @@ fn a_law_of_a_users_own_is_found_with_its_size_and_shape_and_stays_in_the_model(
         "{}",
         finding.statement
     );
-    for (name, truth) in [("coefficient", 6.0), ("centre", 0.3)] {
+    for (name, truth) in [("coefficient", 6.0), ("centre", 0.3), ("width", 0.2)] {
         let value = parameter(finding, name).value;
         assert!((value / truth - 1.0).abs() < 0.05, "{name}: {value}");
     }

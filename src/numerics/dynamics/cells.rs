@@ -21,6 +21,8 @@ pub(super) struct CauseChoice<'a> {
     pub(crate) base: SweptColumns<'a>,
     /// Forms that may be chosen; trial forms of a refinement are none of them.
     pub(crate) open: usize,
+    /// Whether those without a name are none of them.
+    is_named: bool,
 }
 
 impl<'a> CauseChoice<'a> {
@@ -31,17 +33,21 @@ impl<'a> CauseChoice<'a> {
             weighted,
             base: SweptColumns::base(&problem.all, weighted),
             open: problem.all.listed,
+            is_named: false,
         }
     }
 
     /// Over those with a name: a curve without one would be a push, or several causes at once.
     pub(crate) fn named(problem: &'a TorqueProblem<'a>, weighted: &'a WeightedColumns) -> Self {
-        let mut forms = problem.all.forms[..problem.all.listed].iter();
-        let open = forms.position(|form| form.cause.name == UNKNOWN);
         Self {
-            open: open.unwrap_or(problem.all.listed),
+            is_named: true,
             ..Self::new(problem, weighted)
         }
+    }
+
+    /// Whether a form may be chosen.
+    pub(super) fn is_open(&self, number: usize) -> bool {
+        number < self.open && !(self.is_named && self.form(number).cause.name == UNKNOWN)
     }
 
     pub(crate) fn form(&self, number: usize) -> &TorqueForm {
@@ -330,7 +336,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     /// Shapes of a cell that may be chosen.
     pub(super) fn open(&self, cell: usize) -> impl Iterator<Item = usize> {
         let forms = self.cells[cell].forms.iter().copied();
-        forms.filter(|form| *form < self.choice.open)
+        forms.filter(|form| self.choice.is_open(*form))
     }
 
     /// ln of the evidence of every shape of a cell that may join a state.

@@ -381,6 +381,16 @@ impl TorqueColumns {
             .powi(2)
     }
 
+    /// Forgets forms from a number on.
+    pub(crate) fn forget(&mut self, from: usize) {
+        let columns = self.first.get(from).copied();
+        let columns = columns.unwrap_or(self.columns.len());
+        self.forms.truncate(from);
+        self.first.truncate(from);
+        self.columns.truncate(columns);
+        self.prior.truncate(columns);
+    }
+
     /// Takes other columns for a form.
     pub(crate) fn replace(&mut self, form: usize, columns: &[TorqueColumn]) {
         let range = self.of(form);

@@ -160,6 +160,11 @@ impl<'a> TorqueProblem<'a> {
         self.all.listed = self.all.forms.len();
     }
 
+    /// Whether a user has declared laws.
+    pub(crate) fn has_own_laws(&self) -> bool {
+        !self.own.is_empty()
+    }
+
     /// Columns of a form.
     fn columns_of(&self, form: &TorqueForm) -> Vec<TorqueColumn> {
         columns_of(form, &self.scene, &self.reduction, &self.regressor)

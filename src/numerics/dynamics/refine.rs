@@ -3,7 +3,7 @@
 
 use super::cause::{SHARE, ShapeSpan, TorqueForm};
 use super::columns::TorqueColumn;
-use super::problem::TorqueProblem;
+use super::problem::{TorqueProblem, basic_forms};
 use super::recording::{add, square};
 use super::scene::{DynamicScene, SIGN_WIDTHS};
 use super::sweep::SweptColumns;
@@ -24,18 +24,63 @@ pub(super) fn refine(
 ) -> bool {
     let before = set.to_vec();
     for place in 0..set.len() {
-        let form = &problem.all.forms[set[place]];
-        for span in (form.cause.spans)(form) {
-            for half in HALVES {
-                try_grid(problem, weighted, set, place, span, half);
-                // What the coarsest grid leaves as it usually is stays so.
-                if span.usual == Some(problem.all.forms[set[place]].shape[span.index]) {
-                    break;
-                }
+        refine_at(problem, weighted, set, place);
+    }
+    before != set
+}
+
+/// The same of the form at one place of a set.
+fn refine_at(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &mut [usize],
+    place: usize,
+) {
+    let form = &problem.all.forms[set[place]];
+    for span in (form.cause.spans)(form) {
+        for half in HALVES {
+            try_grid(problem, weighted, set, place, span, half);
+            // What the coarsest grid leaves as it usually is stays so.
+            if span.usual == Some(problem.all.forms[set[place]].shape[span.index]) {
+                break;
             }
         }
     }
-    before != set
+}
+
+/// Rounds of grids from the best start of a law of a user's own.
+const OWN_ROUNDS: usize = 2;
+
+/// Lists laws of a user's own also in the shape in which each explains most at its joint beside what hardly an arm is without: a law between its
+/// starts would look like a sum of others. Products that were formed before are those of other columns then.
+pub(super) fn list_own_shapes(problem: &mut TorqueProblem, mut weighted: WeightedColumns) {
+    let listed = problem.all.listed;
+    let forms = problem.all.forms[..listed].to_vec();
+    let is_own = |form: &usize| {
+        let form = &forms[*form];
+        form.cause.declared.is_some() && !form.shape.is_empty()
+    };
+    let own: Vec<usize> = (0..listed).filter(is_own).collect();
+    let (mut set, mut found) = (basic_forms(problem), Vec::new());
+    let place = set.len();
+    for starts in own.chunk_by(|a, b| forms[*a].is_called_as(&forms[*b])) {
+        let sweep = SweptColumns::base(&problem.all, &weighted).with(&set[..place]);
+        let gains = starts.iter().map(|start| (*start, sweep.gain(*start)));
+        let Some((best, _)) = gains.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+            continue;
+        };
+        set.truncate(place);
+        set.push(best);
+        for _ in 0..OWN_ROUNDS {
+            refine_at(problem, &mut weighted, &mut set, place);
+        }
+        found.push(problem.all.forms[set[place]].clone());
+    }
+    problem.all.forget(listed);
+    for form in found {
+        problem.push(form);
+    }
+    problem.all.listed = problem.all.forms.len();
 }
 
 /// One grid about the present number.

@@ -4,7 +4,7 @@ use super::cause::{TORQUE_CONSTANT, TorqueForm};
 use super::cells::{CauseChoice, TorqueComponent, TorqueTable, forms, without};
 use crate::criteria::cells::{RIVAL, SWAPS};
 use crate::criteria::torque::{APART, COMPONENTS, EXCHANGES, USUAL};
-use calib_engine::{Accepted, Cause, Cell, Finding, Options, Problem, Scanned, Shape};
+use calib_engine::{Accepted, Cause, Cell, Finding, Options, Problem, Scanned};
 
 /// A set of forms in the covariance.
 #[derive(Clone)]
@@ -126,15 +126,6 @@ impl TorqueTable<'_, '_> {
     fn accepted(&self, component: &TorqueComponent) -> Accepted<usize> {
         let key = self.cell_of[&component.form];
         let cell = &self.cells[key];
-        let log_weight = -self.log_count(key);
-        let shape = |form: &usize| Shape {
-            start: self.choice.form(*form).shape.clone(),
-            usual: Vec::new(),
-            centre: Vec::new(),
-            bounds: Vec::new(),
-            columns: Vec::new(),
-            log_weight,
-        };
         let here = |form: &usize| *form == component.form;
         Accepted {
             shape: cell.forms.iter().position(here).unwrap_or_default(),
@@ -143,7 +134,8 @@ impl TorqueTable<'_, '_> {
                 cause: Cause::named(cell.name),
                 place: cell.place.to_string(),
                 log_prior: cell.log_prior,
-                shapes: cell.forms.iter().map(shape).collect(),
+                // Which forms it has, and what each weighs, the table knows.
+                shapes: Vec::new(),
                 needs: cell.needs.clone(),
             },
             numbers: vec![component.amplitude],
@@ -152,7 +144,7 @@ impl TorqueTable<'_, '_> {
 
     /// Amplitudes anew, each given all others; the member that cannot be, the newest last, or that misses what it needs.
     fn backfit(&self, components: &mut [TorqueComponent]) -> Option<usize> {
-        for round in 0..BACKFITS {
+        for _ in 0..BACKFITS {
             let kappa = self.state(components, None).known.kappa;
             let mut changed = false;
             // The newest first: of its size nothing is known.
@@ -163,7 +155,7 @@ impl TorqueTable<'_, '_> {
                 changed |= amplitude.is_some_and(|size| size != components[place].amplitude);
                 components[place].amplitude = amplitude.unwrap_or(components[place].amplitude);
             }
-            if !changed || round + 1 == BACKFITS {
+            if !changed {
                 break;
             }
         }
@@ -182,26 +174,24 @@ impl TorqueTable<'_, '_> {
         (0..components.len()).find(is_none)
     }
 
-    /// A set as the engine has it.
-    fn members(&self, set: &[usize]) -> Vec<Accepted<usize>> {
-        let member = |form: &usize| {
-            self.accepted(&TorqueComponent {
-                form: *form,
-                amplitude: *USUAL,
-            })
+    /// Components of given forms, of which no size is known.
+    fn begun(&self, set: &[usize]) -> Vec<TorqueComponent> {
+        let begun = |form: &usize| TorqueComponent {
+            form: *form,
+            amplitude: *USUAL,
         };
-        set.iter().map(member).collect()
+        set.iter().map(begun).collect()
     }
 
-    /// Components of given forms.
+    /// A set as the engine has it.
+    fn members(&self, set: &[usize]) -> Vec<Accepted<usize>> {
+        let begun = self.begun(set);
+        begun.iter().map(|one| self.accepted(one)).collect()
+    }
+
+    /// Components of given forms with their amplitudes.
     pub(super) fn components(&self, set: &[usize]) -> Vec<TorqueComponent> {
-        let mut components: Vec<TorqueComponent> = set
-            .iter()
-            .map(|form| TorqueComponent {
-                form: *form,
-                amplitude: *USUAL,
-            })
-            .collect();
+        let mut components = self.begun(set);
         self.backfit(&mut components);
         components
     }

@@ -10,7 +10,9 @@ use super::problem::{
     rich_forms,
 };
 use super::recording::{RecordingClock, TorqueRecording};
-use super::refine::{ShapeSlopes, polish, refine, take_out_ends, take_sign_widths};
+use super::refine::{
+    ShapeSlopes, list_own_shapes, polish, refine, take_out_ends, take_sign_widths,
+};
 use super::search::{faint, from_common, priors, search};
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
@@ -61,6 +63,10 @@ pub(super) fn solve<'a>(
     problem.let_come_later();
     problem.events = first_contacts(&problem);
     learn(&mut problem, &[]);
+    if problem.has_own_laws() {
+        let weighted = problem.weighted(&[]);
+        list_own_shapes(&mut problem, weighted);
+    }
     let mut weighted = problem.weighted(&[]);
     let mut set = from_common(&CauseChoice::named(&problem, &weighted));
     tell(explained_by(&problem, &set));

@@ -53,12 +53,14 @@ fn found(answer: &Value) -> Vec<String> {
 fn a_law_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    worn(here, 1.5, 0.9);
+    worn(here, 1.0, 0.3);
     let law = read(root("pipelines/dynamics/effects/worn_seal.yaml"));
     put(here, "worn_seal.yaml", law);
     pipeline(here, "effects: [worn_seal.yaml]");
-    let run = "diagnose p.yaml --json --quiet --set case=case --store s";
-    let answer = calib(here, run).code(0).json();
+    let set = "--quiet --set case=case --store s";
+    calib(here, &format!("run p.yaml {set}")).code(0);
+    let answer = calib(here, &format!("diagnose p.yaml --json {set}"));
+    let answer = answer.code(0).json();
     let found = found(&answer);
     assert!(
         found.contains(&"worn_seal at joint 3".to_string()),
