@@ -16,6 +16,7 @@ mod around;
 mod causes;
 pub mod chain;
 mod columns;
+pub mod excite;
 mod fit;
 mod independence;
 mod key;
