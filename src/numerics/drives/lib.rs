@@ -21,10 +21,12 @@ mod fit;
 mod independence;
 mod key;
 pub mod mjcf;
+mod normal;
 pub mod physics;
 mod problem;
 pub mod recording;
 pub mod rollout;
+mod sizes;
 
 pub use answer::{DriveDiagnosis, DriveFinding, DriveNumber, DriveRival, JointError, diagnose};
 pub use around::Around;
