@@ -1,7 +1,12 @@
-//! Which motion to record for torques: an exciting one for a robot file, as a file and as a statement of what it will tell.
+//! Which motion to record for torques: an exciting one for a robot file, as a file and as a statement of what it will tell. And which commands to
+//! send to drives.
+
+mod drives;
+
+pub use drives::{CommandsAsked, CommandsProposal, exciting_commands};
 
 use crate::description::JointDescription;
-use crate::dynamics::{DynamicArm, ExciteRequest, ExcitingMotion, excite};
+use crate::dynamics::{ExciteRequest, ExcitingMotion, excite};
 use crate::error::{Error, Fault, Result};
 use crate::identified::robot_file;
 use crate::stage::{dynamic_arm, must_be_bodies, must_turn};
@@ -59,17 +64,8 @@ pub fn exciting_motion(asked: &MotionRequest) -> Result<MotionProposal> {
     let (arm, _) = dynamic_arm(&robot)?;
     let n = robot.joints.len();
     let mut faults = Vec::new();
-    let mut list = |option: &str, values: &[f64], unit: f64| match values {
-        [one] => vec![one * unit; n],
-        all if all.len() == n => all.iter().map(|value| value * unit).collect(),
-        all => {
-            faults.push(Fault::new(
-                option,
-                format!("has {} numbers; give one, or {n}: one a joint", all.len()),
-            ));
-            Vec::new()
-        }
-    };
+    let mut list =
+        |option: &str, values: &[f64], unit: f64| one_a_joint(option, values, unit, n, &mut faults);
     let degrees = 1f64.to_radians();
     let (speed, acceleration) = (
         list("--speed", &asked.speed, degrees),
@@ -109,7 +105,7 @@ pub fn exciting_motion(asked: &MotionRequest) -> Result<MotionProposal> {
         seed: asked.seed,
         jobs: asked.jobs,
     };
-    let motion = found(&arm, &request)?;
+    let motion = excite(&arm, &request).map_err(as_options)?;
     Ok(MotionProposal {
         robot: robot.name,
         request,
@@ -118,16 +114,34 @@ pub fn exciting_motion(asked: &MotionRequest) -> Result<MotionProposal> {
     })
 }
 
-fn found(arm: &DynamicArm, request: &ExciteRequest) -> Result<ExcitingMotion> {
-    excite(arm, request).map_err(|error| match error {
-        Error::Spec(faults) => Error::Spec(
-            faults
-                .into_iter()
-                .map(|fault| Fault::new(format!("--{}", fault.place), fault.message))
-                .collect(),
-        ),
+/// Numbers of an option in another unit, one a joint where there is one for all.
+fn one_a_joint(
+    option: &str,
+    values: &[f64],
+    unit: f64,
+    n: usize,
+    faults: &mut Vec<Fault>,
+) -> Vec<f64> {
+    match values {
+        [one] => vec![one * unit; n],
+        all if all.len() == n => all.iter().map(|value| value * unit).collect(),
+        all => {
+            faults.push(Fault::new(
+                option,
+                format!("has {} numbers; give one, or {n}: one a joint", all.len()),
+            ));
+            Vec::new()
+        }
+    }
+}
+
+/// Faults of a request at the options of the command.
+fn as_options(error: Error) -> Error {
+    let option = |fault: Fault| Fault::new(format!("--{}", fault.place), fault.message);
+    match error {
+        Error::Spec(faults) => Error::Spec(faults.into_iter().map(option).collect()),
         other => other,
-    })
+    }
 }
 
 /// Ranges of the robot file, rad.

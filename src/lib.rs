@@ -65,7 +65,7 @@
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, program, raw, stage, store, targets, table, numerics, yaml |
 //! | `export` | the identified model for other programs, one file per format | compensate, criteria, drives, dynamics, effect, estimate, identified, raw, robot, spatial, table, text, yaml |
 //! | `init` | what given files are, and the pipeline that reads them | drives, program, raw, robot, stage, yaml |
-//! | [`excitation`] | which motion to record for torques, for a robot file | identified, numerics, stage |
+//! | [`excitation`] | which motion to record for torques, for a robot file; which commands to send to drives, for an MJCF | drives, identified, init, numerics, stage |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, causes, tables | criteria, effect, estimate, pipeline, raw, report, shell, stage, store, table, yaml |
 //! | [`audit`] | runs shown, explained, compared, asked, traced, swept | diff, pipeline, raw, shell, stage, store |
 //! | `proof` | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |

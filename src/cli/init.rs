@@ -37,7 +37,7 @@ pub(super) struct InitArguments {
     /// Its last link
     #[arg(long, value_name = "LINK", requires = "urdf", default_value = "tool0")]
     tip: String,
-    /// Of commands and measured angles: the MJCF that is simulated; the recording is one CSV, two, or their folder
+    /// Of commands and measured angles: the MJCF that is simulated; the recording is one CSV or Parquet, two, their folder, or that of a LeRobot data set
     #[arg(long, value_name = "FILE", requires = "data", conflicts_with_all = ["robot", "urdf"])]
     mjcf: Option<PathBuf>,
 }
@@ -50,6 +50,7 @@ const EXAMPLES: &str = "Examples:
   calib init cell7 --data measurements.csv --urdf arm.urdf --tip flange
   calib init cell7 --data measurements.csv --robot ur10e
   calib init arm --data recording.csv --mjcf so101.xml
+  calib init arm --data lerobot/so101_pick --mjcf so101.xml
   calib init --robot seven";
 
 /// Typical robots as values of an option, each with its line of help; arms of the library are taken by name and listed by `calib robots`.

@@ -4,6 +4,7 @@ mod companions;
 mod compensate;
 mod diagnose;
 mod diff;
+mod excite;
 mod export;
 mod feed_forward;
 mod fleet;
@@ -58,7 +59,7 @@ enum Verb {
     Lineage(log::LineageArguments),
     Schema(query::SchemaArguments),
     Poses(poses::PosesArguments),
-    Excite(poses::ExciteArguments),
+    Excite(excite::ExciteArguments),
     Fleet(fleet::FleetArguments),
     Tag(log::TagArguments),
     Verify(log::VerifyArguments),

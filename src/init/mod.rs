@@ -3,6 +3,7 @@
 
 mod arm;
 mod columns;
+mod lerobot;
 mod names;
 mod of_drives;
 mod pipeline;
@@ -11,7 +12,7 @@ mod sheet;
 mod together;
 
 pub(crate) use arm::{TYPICAL, typical};
-pub(crate) use of_drives::start_drives;
+pub(crate) use of_drives::{chain, start_drives};
 pub(crate) use pipeline::{MarkedLines, marked};
 
 use crate::error::{Error, Result};

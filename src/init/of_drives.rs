@@ -1,10 +1,11 @@
 //! A recording of commands and measured angles, with the MJCF that is simulated: which columns are which, the rate, the encoder's steps, and
 //! the files that `diagnose_drives` takes.
 
+use super::lerobot::{self, DataSet};
 use super::pipeline::{from_folder, name_of};
 use crate::drives::mjcf::{self, MjcfArm, MjcfText};
 use crate::error::{Error, Result, listed};
-use crate::raw;
+use crate::raw::{self, ColumnRows, Record, RecordReader};
 use crate::stage::short;
 use crate::yaml::quoted;
 use serde_json::json;
@@ -103,6 +104,33 @@ fn has(text: &str, list: &[&str]) -> bool {
 
 impl Table {
     fn read(path: &Path) -> Result<Self> {
+        match raw::ending(path).as_str() {
+            "csv" => Self::of_text(path),
+            _ => Self::of_columns(path),
+        }
+    }
+
+    /// A Parquet file; its lists are a column for each number.
+    fn of_columns(path: &Path) -> Result<Self> {
+        let label = path.display().to_string();
+        let file = raw::open(path).map_err(|error| Error::unreadable(&label, &error))?;
+        let mut reader = ColumnRows::open(file, &label)?;
+        let mut record = Record::default();
+        let mut lines: Vec<Vec<String>> = Vec::new();
+        while lines.len() <= LOOKED_AT && reader.next(&mut record)? {
+            let cells = (0..record.len()).map(|k| String::from_utf8_lossy(record.field(k)).into());
+            lines.push(cells.collect());
+        }
+        let mut lines = lines.into_iter();
+        Ok(Self {
+            path: path.to_path_buf(),
+            label,
+            head: lines.next().unwrap_or_default(),
+            rows: lines.collect(),
+        })
+    }
+
+    fn of_text(path: &Path) -> Result<Self> {
         let label = path.display().to_string();
         let text = raw::text(path).map_err(|error| Error::unreadable(&label, &error))?;
         let mut reader = csv::ReaderBuilder::new()
@@ -209,8 +237,11 @@ impl Table {
     }
 }
 
-/// The chain of the first joints of an MJCF that are one, in its order, and the names of all.
-fn chain(path: &Path) -> Result<(MjcfArm, Vec<String>, Vec<PathBuf>)> {
+/// The chain of these joints of an MJCF, or of the first that are one, in its order; the names of all, and the files that it includes.
+pub(crate) fn chain(
+    path: &Path,
+    wanted: &[String],
+) -> Result<(MjcfArm, Vec<String>, Vec<PathBuf>)> {
     let label = path.display().to_string();
     let read = |path: &Path| {
         let label = path.display().to_string();
@@ -244,8 +275,8 @@ fn chain(path: &Path) -> Result<(MjcfArm, Vec<String>, Vec<PathBuf>)> {
             all.extend(joints.filter_map(|node| node.attribute("name").map(String::from)));
         }
     }
-    let mut names: Vec<String> = Vec::new();
-    for name in &all {
+    let mut names: Vec<String> = wanted.to_vec();
+    for name in all.iter().filter(|_| wanted.is_empty()) {
         let more = [names.as_slice(), std::slice::from_ref(name)].concat();
         if mjcf::read(file, &others, &more).is_ok() {
             names = more;
@@ -256,29 +287,33 @@ fn chain(path: &Path) -> Result<(MjcfArm, Vec<String>, Vec<PathBuf>)> {
     Ok((arm, all, includes))
 }
 
-/// CSV files of the recording; of a folder those in it.
-fn tables(data: &[PathBuf]) -> Result<Vec<Table>> {
+/// Files of the recording: CSV or Parquet, of a folder those in it, of a data set its first.
+fn tables(data: &[PathBuf], set: Option<&DataSet>) -> Result<Vec<Table>> {
+    if let Some(set) = set {
+        return Ok(vec![Table::read(&set.first)?]);
+    }
+    let is_read = |path: &Path| ["csv", "parquet"].contains(&raw::ending(path).as_str());
     let mut files = Vec::new();
     for path in data {
         if path.is_dir() {
             let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
             let mut inside: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
-            inside.retain(|path| raw::ending(path) == "csv");
+            inside.retain(|path| is_read(path));
             inside.sort();
             files.extend(inside);
         } else {
             files.push(path.clone());
         }
     }
-    if files.is_empty() || files.len() > 2 || files.iter().any(|path| raw::ending(path) != "csv") {
+    if files.is_empty() || files.len() > 2 || !files.iter().all(|path| is_read(path)) {
         let names: Vec<String> = files
             .iter()
             .map(|path| path.display().to_string())
             .collect();
         let message = format!(
-            "{}; with --mjcf allowed: one CSV of commands and angles, or two, the commands' and the angles'",
+            "{}; with --mjcf allowed: one CSV or Parquet of commands and angles, or two, the commands' and the angles', or the folder of a LeRobot data set",
             if names.is_empty() {
-                "no CSV".into()
+                "neither CSV nor Parquet, nor meta/info.json".into()
             } else {
                 names.join(", ")
             }
@@ -290,8 +325,13 @@ fn tables(data: &[PathBuf]) -> Result<Vec<Table>> {
 
 /// Looks at a recording of commands and angles. Fails where one of them is not found.
 pub(crate) fn start_drives(folder: &Path, data: &[PathBuf], robot: &Path) -> Result<DriveStart> {
-    let (arm, all, includes) = chain(robot)?;
-    let tables = tables(data)?;
+    let (arm, all, includes) = chain(robot, &[])?;
+    let set = match data {
+        [folder] => DataSet::open(folder)?,
+        _ => None,
+    };
+    let set = set.as_ref();
+    let tables = tables(data, set)?;
     let recorded = |names: &[String]| -> Option<[(usize, Found); 2]> {
         let commanded = |table: &Table, column: &str| {
             let file = table.path.file_stem().unwrap_or_default().to_string_lossy();
@@ -347,20 +387,28 @@ pub(crate) fn start_drives(folder: &Path, data: &[PathBuf], robot: &Path) -> Res
     })?;
     let rate = (1e3 / step).round() / 1e3;
     let rate = if rate > 20.0 { rate.round() } else { rate };
+    let rate = set.map_or(rate, |set| set.fps);
     let largest = angle
         .values
         .iter()
         .flatten()
         .fold(0.0, |most: f64, one| most.max(one.abs()));
-    let unit = if largest > DEGREES { "deg" } else { "rad" };
-    let by = if unit == "deg" {
-        1f64.to_radians()
-    } else {
-        1.0
+    let unit = match set {
+        _ if largest <= DEGREES => "rad",
+        Some(set) if set.may_be_per_cent(largest) => "percent",
+        _ => "deg",
+    };
+    if let Some(set) = set {
+        set.must_be_in_order(&names)?;
+    }
+    let by = |joint: usize| match (unit, arm.joints[joint].range) {
+        ("rad", _) => 1.0,
+        ("percent", Some([low, high])) => 0.005 * (high - low),
+        _ => 1f64.to_radians(),
     };
     let joints = names.iter().enumerate().map(|(k, name)| {
         let servo = arm.joints[k].servo;
-        let step = by * encoder(angle.values.iter().map(|row| row[k]));
+        let step = by(k) * encoder(angle.values.iter().map(|row| row[k]));
         json!({
             "joint": name, "kp": servo.map(|servo| servo.kp), "kd": servo.map(|servo| servo.kd), "kd_on": "speed",
             "torque_limit_nm": servo.map(|servo| servo.limit).filter(|limit| limit.is_finite()),
@@ -399,10 +447,14 @@ pub(crate) fn start_drives(folder: &Path, data: &[PathBuf], robot: &Path) -> Res
         true => "gains and limits are those of its actuators",
         false => "state kp of each joint, null there",
     };
-    lines.push(format!("      drives: drives.json   # CHECK {gains}; {rate} Hz from the stamps; steps of the encoders from the values"));
+    let (stated, recording) = match set {
+        Some(set) => ("of meta/info.json", set.files()),
+        None => ("from the stamps", table.path.clone()),
+    };
+    lines.push(format!("      drives: drives.json   # CHECK {gains}; {rate} Hz {stated}; steps of the encoders from the values"));
     lines.push(format!(
         "      recording: {}",
-        from_folder(folder, &table.path)
+        from_folder(folder, &recording)
     ));
     if of_commands != of_angles {
         let path = &tables[of_commands].path;
@@ -414,13 +466,32 @@ pub(crate) fn start_drives(folder: &Path, data: &[PathBuf], robot: &Path) -> Res
         format!("        time_unit: {time_unit}   # CHECK"),
         format!("        command: {}   # CHECK", quoted(&command.column)),
         format!("        angle: {}   # CHECK", quoted(&angle.column)),
-        format!("        unit: {unit}   # CHECK"),
+        format!(
+            "        unit: {unit}   # CHECK{}",
+            match unit {
+                "percent" =>
+                    ": -100 to 100 of each joint's range; or deg, which the data set does not say",
+                _ => "",
+            }
+        ),
     ]);
-    if !table.head.iter().any(|column| column == "use") {
+    if set.is_some() {
+        lines.push(format!("        trajectory: {}", quoted(lerobot::EPISODE)));
+        lines.push("      hold_out: {last: 0.25}   # CHECK the end of each episode judges".into());
+    } else if !table.head.iter().any(|column| column == "use") {
         lines.push("        # usage: use   # CHECK a column that says `fit` or `validate`; without it all rows are fitted, and the errors flatter".into());
     }
     lines.push("  - uses: report_drives".into());
     let mut notes = arm.notes.clone();
+    if let Some(set) = set {
+        notes.push("stamps of a LeRobot data set are the number of the row over fps, not measured: an uneven rate shows as delay and friction".into());
+        if set.names.len() > names.len() {
+            notes.push(format!(
+                "not read: {}, which no joint of the chain is",
+                set.names[names.len()..].join(", ")
+            ));
+        }
+    }
     let others: Vec<&str> = all
         .iter()
         .filter(|name| !names.contains(name))

@@ -1,12 +1,13 @@
 //! Recordings of drives in tables of other kinds and units: Parquet with lists (LeRobot), arrays of NumPy, degrees, counts, per cent.
 
-use crate::answer::{Answer, calib, put};
+use crate::answer::{Answer, calib, put, read};
 use crate::drives::{Folder, folder};
 use arrow::array::{ArrayRef, Float64Array, Int64Array, ListArray, RecordBatch};
 use arrow::datatypes::Float64Type;
 use serde_json::{Value, json};
 use std::io::{Cursor, Write};
 use std::sync::Arc;
+use tempfile::TempDir;
 
 /// Time, command and angle of each row of the plain folder.
 fn rows(folder: &Folder) -> Vec<[f64; 3]> {
@@ -200,4 +201,127 @@ fn degrees_counts_and_per_cent_of_the_range_are_the_same_angles() {
     );
     folder.robot = folder.robot.replace("axis=", "range=\"-1 3\" axis=");
     same(&folder, "percent", &|x| 50.0 * (x - 1.0));
+}
+
+/// A data set of LeRobot of two files with the angles in another unit.
+fn data_set(folder: &Folder, data_path: &str, names: &Value, of: impl Fn(f64) -> f64) -> TempDir {
+    let set = tempfile::tempdir().unwrap();
+    let feature = json!({ "dtype": "float32", "shape": [2], "names": names });
+    let info = json!({
+        "fps": 100, "data_path": data_path,
+        "features": { "action": feature, "observation.state": feature, "timestamp": { "dtype": "float32", "shape": [1], "names": null } },
+    });
+    std::fs::create_dir_all(set.path().join("meta")).unwrap();
+    put(set.path(), "meta/info.json", info.to_string());
+    std::fs::create_dir_all(set.path().join("data/chunk-000")).unwrap();
+    let rows: Vec<[f64; 3]> = rows(folder)
+        .into_iter()
+        .map(|[time, command, angle]| [time, of(command), of(angle)])
+        .collect();
+    for file in 0..2 {
+        let kind = if data_path.contains("file-") {
+            "file"
+        } else {
+            "episode"
+        };
+        let digits = if kind == "file" { 3 } else { 6 };
+        let name = format!("data/chunk-000/{kind}_{file:0digits$}.parquet");
+        let name = name.replace("file_", "file-");
+        put(set.path(), name, parquet(&rows, 2 * file));
+    }
+    put(set.path(), "robot.xml", &folder.robot);
+    set
+}
+
+#[test]
+fn the_folder_of_a_lerobot_data_set_becomes_a_pipeline_of_its_episodes() {
+    let mut folder = folder();
+    folder.robot = folder.robot.replace("axis=", "range=\"-1 3\" axis=");
+    let three = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet";
+    let two = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet";
+    let motors = json!({ "motors": ["main_j1", "main_gripper"] });
+    let per_cent = data_set(&folder, three, &json!(["j1.pos", "gripper.pos"]), |x| {
+        50.0 * (x - 1.0)
+    });
+    let degrees = data_set(&folder, two, &motors, f64::to_degrees);
+    let mut rms = Vec::new();
+    for (set, unit, files) in [
+        (per_cent, "percent", "chunk-*/file-*.parquet"),
+        (degrees, "deg", "chunk-*/episode_*.parquet"),
+    ] {
+        let here = set.path();
+        std::fs::create_dir_all(here.join("arm")).unwrap();
+        put(here, "arm/drives.json", folder.drives.to_string());
+        let answer = calib(here, "init arm --data . --mjcf robot.xml");
+        assert_eq!(answer.code, Some(0), "{}", answer.both());
+        assert!(answer.both().contains("gripper") && answer.both().contains("100 Hz"));
+        let pipeline = read(here.join("arm/pipeline.yaml"));
+        let lines = [
+            files,
+            "command: \"action[{j}]\"",
+            "angle: \"observation.state[{j}]\"",
+            "trajectory: \"episode_index\"",
+            &format!("unit: {unit}   # CHECK"),
+        ];
+        for line in lines {
+            assert!(pipeline.contains(line), "expected `{line}` in {pipeline}");
+        }
+        let diagnosed = calib(
+            here,
+            "diagnose --quiet --json arm/pipeline.yaml --store store",
+        );
+        let (error, _) = before(&diagnosed);
+        rms.push(error);
+    }
+    assert!((rms[0] / rms[1] - 1.0).abs() < 1e-6, "{rms:?}");
+    let turned = data_set(&folder, three, &json!(["gripper.pos", "j1.pos"]), |x| x);
+    let refused = calib(turned.path(), "init arm --data . --mjcf robot.xml");
+    assert!(
+        refused.err.contains("is number 2 of `observation.state`"),
+        "{}",
+        refused.both()
+    );
+}
+
+#[test]
+fn commands_by_which_causes_are_seen_hold_their_limits_and_say_what_each_part_is_for() {
+    let folder = folder();
+    let desk = tempfile::tempdir().unwrap();
+    put(desk.path(), "robot.xml", &folder.robot);
+    let excite = "excite --mjcf robot.xml --speed 90 --seconds 30 --rate 50 --out commands.csv";
+    let none = calib(desk.path(), excite);
+    assert!(none.err.contains("no range of j1"), "{}", none.both());
+    let limits = format!("{excite} --limits -40:20 --home 5");
+    let answer = calib(desk.path(), &limits);
+    assert_eq!(answer.code, Some(0), "{}", answer.both());
+    for word in ["slow", "sines", "ramps", "holds", "judge", "will not show"] {
+        assert!(answer.out.contains(word), "no {word}: {}", answer.out);
+    }
+    let text = read(desk.path().join("commands.csv"));
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("time_s,traj,use,part,cmd1_rad"));
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 1500);
+    let command: Vec<f64> = rows.iter().map(|row| row[4].parse().unwrap()).collect();
+    let [most, home] = [90f64, 5.0].map(f64::to_radians);
+    for (pair, rows) in command.windows(2).zip(rows.windows(2)) {
+        let speed = 50.0 * (pair[1] - pair[0]).abs();
+        assert!(speed < 1.0001 * most, "{speed} in {:?}", rows[0]);
+    }
+    let in_limits = |angle: &f64| (-40.0..=20.0).contains(&angle.to_degrees());
+    assert!(command.iter().all(in_limits));
+    for traj in 1..=5 {
+        let of_it = |row: &&Vec<&str>| row[1] == traj.to_string();
+        let mut part = rows.iter().filter(of_it);
+        let first: f64 = part.next().unwrap()[4].parse().unwrap();
+        let last: f64 = part.next_back().unwrap()[4].parse().unwrap();
+        assert!((first - home).abs() < 1e-6 && (last - home).abs() < 1e-6);
+    }
+    let widest = command
+        .iter()
+        .fold(0.0_f64, |most, angle| most.max((angle - home).abs()));
+    assert!(widest.to_degrees() > 25.0, "moves by {widest} rad only");
+    assert_eq!(calib(desk.path(), &limits).out, answer.out);
+    let fast = calib(desk.path(), &format!("{limits} --harmonics 3"));
+    assert!(fast.err.contains("cannot be used with"), "{}", fast.err);
 }

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pathlib
 import signal
 import subprocess
 import sys
@@ -243,6 +244,20 @@ def test_a_pipeline_is_run_with_progress_and_its_tables_are_read(run_by_command)
     assert run.model("identify").predict(np.zeros((2, 6)), payload_kg=0.0).shape == (2, 3)
     with pytest.raises(calib.SpecError, match="has no table `predictions`"):
         run.table("predictions")
+
+
+def test_drives_are_diagnosed_from_arrays():
+    example = pathlib.Path(__file__).parents[2] / "pipelines" / "drives" / "example"
+    log = pandas.read_csv(example / "recording.csv")
+    described = json.loads((example / "drives.json").read_text())
+    command, angle = (log[[f"{name}{joint}_rad" for joint in (1, 2, 3)]].to_numpy() for name in ("cmd", "q"))
+    time_s, judges = log["time_s"].to_numpy(), (log["use"] != "fit").to_numpy()
+    diagnosis = calib.drives(example / "robot.xml", described, time_s, command, angle, trajectory=log["traj"].to_numpy(), held_out=judges)
+    concealed = json.loads((example / "truth.json").read_text())["effects"]
+    assert {(one["effect"], one["where"]) for one in diagnosis.findings} == {(one["effect"], one["where"]) for one in concealed}
+    assert len(diagnosis.table("joints")) == 3
+    with pytest.raises(calib.DataError, match="expected .* of both"):
+        calib.drives(example / "robot.xml", described, time_s, command[:, 0], angle)
 
 
 def test_a_callable_that_fails_and_ctrl_c_end_the_work_at_once(arm, arrays):

@@ -150,7 +150,7 @@ pub fn diagnose(
         .map(|joint| problem.errors(Some(joint), [&before, &after]))
         .collect();
     let rows = problem.fitted().count();
-    let squares = problem.squares(&after);
+    let squares = problem.noise_squares(&after);
     for (joint, square) in joints.iter_mut().zip(&squares) {
         joint.over_noise = (square / rows as f64).sqrt();
     }
@@ -240,14 +240,6 @@ impl Drives {
                 }
             })
             .collect();
-        if let Key::Ripple(_, waves) = cell.key {
-            parameters.push(DriveNumber {
-                name: "waves per turn".into(),
-                value: f64::from(waves),
-                unit: "1",
-                sigma: None,
-            });
-        }
         if let Key::Coupling(_, by) = cell.key {
             parameters.push(DriveNumber {
                 name: "by joint".into(),

@@ -2,12 +2,14 @@
 //! one linearisation serves the cells that may join the set and those that may replace a member.
 
 use crate::causes::cells;
-use crate::fit::{Anew, DriveFit, Normal};
+use crate::fit::{Anew, DriveFit};
 use crate::independence::Rich;
 use crate::key::Key;
+use crate::normal::Normal;
 use crate::physics::Physics;
 use crate::problem::Drives;
 use crate::rollout::{Direction, Which, roll};
+use crate::sizes::furthest;
 use calib_engine::{Block, Cell, Rows, Scanned, ranked};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -72,7 +74,7 @@ impl Drives {
     fn candidates(&self, fit: &DriveFit) -> Vec<Candidate> {
         let n = self.chain.joints();
         let rows_a_joint = self.fitted().count() as f64;
-        let squares = self.squares(&fit.angles);
+        let squares = self.squares(fit);
         let level = rows_a_joint * (1.0 + ABOVE_NOISE * (2.0 / rows_a_joint).sqrt());
         let above = |joint: usize| squares[joint] > level;
         let any = (0..n).any(above);
@@ -104,7 +106,7 @@ impl Drives {
             let wanted = !self.without.iter().any(|name| name == cell.cause.name);
             (seen && wanted).then_some(Candidate { cell, instead })
         };
-        let all = cells(&self.base, &self.usual, self.recording.period);
+        let all = cells(&self.base, &self.usual, self.recording.period, self.shown);
         all.into_iter().filter_map(candidate).collect()
     }
 
@@ -196,7 +198,7 @@ impl Around {
             |row| {
                 for joint in 0..n {
                     let at = row.row * n + joint;
-                    let sigma = drives.sigma[at];
+                    let sigma = drives.sigma[at] * fit.doubt[joint];
                     let residual = (drives.recording.angle[at] - row.angle[joint]) / sigma;
                     base.at(at, row.change[joint], sigma, &mut b[..nb]);
                     for (to, effect) in b[nb..].iter_mut().zip(&effects) {
@@ -392,7 +394,7 @@ fn begun(shape: &calib_engine::Shape, log: f64, size: &[f64]) -> (f64, Vec<f64>)
         }
     }
     for (k, number) in numbers.iter_mut().enumerate() {
-        let (at, wide) = (shape.centre[k], 3.0 * shape.usual[k]);
+        let (at, wide) = (shape.centre[k], furthest(shape, k));
         let [low, high] = shape.bounds[k];
         *number = number.clamp(at - wide, at + wide).clamp(low, high);
     }

@@ -20,7 +20,7 @@ causes! {
     GAIN = "drive_gain", -3.9, "the gain of the drive at {} is another one", ["factor" "1" true];
     DAMPING = "drive_damping", -3.9, "the damping gain of the drive at {} is another one", ["factor" "1" true];
     ROTOR = "rotor_inertia", -3.9, "the rotor's inertia at {} is another one", ["factor" "1" true];
-    INTEGRAL = "integral_action", -5.3, "the drive at {} integrates its error", ["ki" "Nm/(rad s)" true, "imax" "Nm" true];
+    INTEGRAL = "integral_action", -5.3, "the drive at {} integrates its error", ["ki" "Nm/(rad s)" true, "imax" "Nm" true, "at the beginning" "Nm" false];
     DEAD_BAND = "dead_band", -5.3, "the drive at {} does not see small errors", ["width" "rad" true];
     TORQUE_LIMIT = "torque_limit", -5.3, "the drive at {} gives less torque than simulated", ["limit" "Nm" true];
     SPEED_LIMIT = "speed_limit", -5.3, "the set point at {} moves no faster than a limit", ["limit" "rad/s" true];
@@ -34,7 +34,7 @@ causes! {
     BACKLASH = "backlash", -5.3, "the gear at {} has play", ["play" "rad" true, "stiffness" "Nm/rad" true];
     ELASTICITY = "joint_elasticity", -5.3, "the gear at {} yields", ["stiffness" "Nm/rad" true, "damping" "Nm s/rad" true];
     CABLE = "cable_stiffness", -5.3, "a spring pulls on {}", ["stiffness" "Nm/rad" false, "rest angle" "rad" false];
-    RIPPLE = "torque_ripple", -5.3, "torque at {} comes in waves over the angle", ["cosine" "Nm" false, "sine" "Nm" false];
+    RIPPLE = "torque_ripple", -5.3, "torque at {} comes in waves over the angle", ["cosine" "Nm" false, "sine" "Nm" false, "waves per turn" "1" true];
     COUPLING = "joint_coupling", -6.2, "the torque of another drive is felt at {}", ["share" "1" false];
     PAYLOAD = "payload_error", -4.6, "what hangs on the {} is another body", ["mass" "kg" false, "moment x" "kg m" false, "moment y" "kg m" false, "moment z" "kg m" false];
     MASS = "link_mass", -5.3, "{} has another mass", ["factor" "1" true];
@@ -60,8 +60,8 @@ pub struct Usual {
     pub range: [f64; 2],
 }
 
-/// The cells of an arm: `period` of commands, s.
-pub fn cells(physics: &Physics, usual: &[Usual], period: f64) -> Vec<Cell<Key>> {
+/// The cells of an arm: `period` of commands, s; `shown`, s from the beginning of a recording to the last row that is fitted.
+pub fn cells(physics: &Physics, usual: &[Usual], period: f64, shown: f64) -> Vec<Cell<Key>> {
     let n = usual.len();
     let mut all = Vec::new();
     let mut add =
@@ -218,11 +218,13 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64) -> Vec<Cell<Key>> 
         );
         add(Key::Offset(j), &OFFSET, vec![line(&[2e-3], &[0.01])]);
         add(Key::Rotor(j), &ROTOR, vec![line(&[0.05], &[0.3])]);
-        let ki = |per_s: f64| [(p.kp.max(1e-6) * per_s).ln(), (0.2 * top).ln()];
+        let ki = |per_s: f64| [(p.kp.max(1e-6) * per_s).ln(), (0.2 * top).ln(), 0.0];
         add(
             Key::Integral(j),
             &INTEGRAL,
-            vec![at(&ki(0.3), &[1.0, 1.0]), at(&ki(1.5), &[1.0, 1.0])],
+            [0.3, 1.5]
+                .map(|per_s| at(&ki(per_s), &[1.0, 1.0, 0.3 * top]))
+                .to_vec(),
         );
         add(
             Key::DeadBand(j),
@@ -303,8 +305,11 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64) -> Vec<Cell<Key>> 
         }
         // Of what there is: a share of nothing has no size.
         let shares = [p.friction, p.damping].map(|friction| if friction > 0.0 { 0.7 } else { 0.0 });
-        if shares != [0.0; 2] {
-            let warm_up = WARM.map(|time| {
+        if shares != [0.0; 2] && shown > SOONEST_WARM {
+            // What takes longer than the recording is friction that stays.
+            let mut times: Vec<f64> = WARM.into_iter().filter(|time| *time < shown).collect();
+            times.push(shown);
+            let warm_up = times.into_iter().map(|time| {
                 let start = vec![0.0, 0.0, time.ln()];
                 let columns = (0..2).filter(|k| shares[*k] > 0.0).map(|k| {
                     let mut column = start.clone();
@@ -317,15 +322,11 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64) -> Vec<Cell<Key>> 
                     start: start.clone(),
                     usual: vec![shares[0], shares[1], 0.7],
                     // What is cold is stiffer: oil thins as it warms.
-                    bounds: vec![
-                        FREE,
-                        [0.0, f64::INFINITY],
-                        [SOONEST_WARM.ln(), f64::INFINITY],
-                    ],
+                    bounds: vec![FREE, [0.0, f64::INFINITY], [SOONEST_WARM.ln(), shown.ln()]],
                     log_weight: 0.0,
                 }
             });
-            add(Key::WarmUp(j), &WARM_UP, warm_up.to_vec());
+            add(Key::WarmUp(j), &WARM_UP, warm_up.collect());
         }
         let gear = 40.0 * p.kp.max(1e-6);
         for link in [false, true] {
@@ -356,9 +357,20 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64) -> Vec<Cell<Key>> 
         cable.columns = vec![vec![spring, 0.0]];
         add(Key::Cable(j), &CABLE, vec![cable]);
         for waves in RIPPLES {
+            let start = vec![0.0, 0.0, f64::from(waves).ln()];
             let shape = Shape {
                 log_weight: -(RIPPLES.len() as f64).ln(),
-                ..line(&[0.02 * torque; 2], &[0.1 * torque; 2])
+                centre: start.clone(),
+                columns: [0, 1]
+                    .map(|k| {
+                        let mut column = start.clone();
+                        column[k] = 0.02 * torque;
+                        column
+                    })
+                    .to_vec(),
+                usual: vec![0.1 * torque, 0.1 * torque, BETWEEN_RIPPLES],
+                bounds: vec![FREE; 3],
+                start,
             };
             add(Key::Ripple(j, waves), &RIPPLE, vec![shape]);
         }
@@ -406,8 +418,9 @@ const SOONEST_WARM: f64 = 10.0;
 pub(crate) const FAR: [f64; 4] = [1.0 / 64.0, 1.0 / 16.0, 0.25, 4.0];
 const FAR_SHARE: f64 = 0.1;
 
-/// Waves a turn that are looked for.
+/// Waves a turn from which a fit begins, and how far, by the logarithm, the true ones may be from the nearest.
 const RIPPLES: [u32; 14] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48];
+const BETWEEN_RIPPLES: f64 = 0.12;
 /// Knots of curves over the own angle or time, over another joint's, and of a line.
 const OWN: usize = 14;
 const FEW: usize = 5;

@@ -192,9 +192,14 @@ impl<'a> Columns<'a> {
         self.count == 0
     }
 
-    /// At the beginning of a recording no drive has integrated anything.
+    /// At the beginning of a recording.
     pub(crate) fn begin(&mut self) {
-        self.slots.iter_mut().for_each(|slot| slot.integral = 0.0);
+        for slot in &mut self.slots {
+            slot.integral = match &slot.change {
+                Change::Joint(changed) => changed.begun(),
+                _ => 0.0,
+            };
+        }
     }
 
     /// At the beginning of a trajectory, which is measured; integrals run on.

@@ -2,8 +2,10 @@
 
 use crate::independence::independent;
 use crate::key::Key;
+use crate::normal::Normal;
 use crate::problem::{Drives, FREE};
 use crate::rollout::{Direction, Which, roll};
+use crate::sizes::{Sizes, furthest};
 use calib_engine::Accepted;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -33,6 +35,11 @@ const STANDS: Patience = Patience {
 /// Times what a linear step promises that a fit may still gain.
 const REACH: f64 = 3.0;
 
+/// Share of its effect, rms, by which the form of a cause may err, and in how many independent ways: friction, gears and integrators of real
+/// arms follow no formula to a hundredth.
+const FORM_ERRS: f64 = 0.02;
+const WAYS: f64 = 10.0;
+
 /// A fitted model.
 #[derive(Debug, Clone)]
 pub struct DriveFit {
@@ -50,6 +57,8 @@ pub struct DriveFit {
     pub independence: f64,
     /// The same from the residual of a rich model, the largest estimate so far.
     pub rich: f64,
+    /// By joint, times that the noise is larger by what the forms of the causes may err.
+    pub doubt: Vec<f64>,
     /// Squared distance of all numbers from where they are expected, in their usual sizes.
     pub penalty: f64,
     /// One standard deviation of each number of the set, as it is fitted.
@@ -82,42 +91,6 @@ pub(crate) enum Anew {
     Causes,
     /// Those of which no response is known.
     Unknown,
-}
-
-/// Sums of products of columns.
-pub(crate) struct Normal {
-    count: usize,
-    gram: Vec<f64>,
-    pub(crate) gradient: Vec<f64>,
-    pub(crate) square: f64,
-}
-
-impl Normal {
-    pub(crate) fn new(count: usize) -> Self {
-        Self {
-            count,
-            gram: vec![0.0; count * count],
-            gradient: vec![0.0; count],
-            square: 0.0,
-        }
-    }
-
-    pub(crate) fn add(&mut self, x: &[f64], residual: f64) {
-        self.square += residual * residual;
-        for i in 0..self.count {
-            if x[i] != 0.0 {
-                self.gradient[i] += x[i] * residual;
-                let line = &mut self.gram[i * self.count..(i + 1) * self.count];
-                line.iter_mut()
-                    .zip(x)
-                    .for_each(|(sum, x_k)| *sum += x[i] * x_k);
-            }
-        }
-    }
-
-    pub(crate) fn gram_matrix(&self) -> DMatrix<f64> {
-        DMatrix::from_row_slice(self.count, self.count, &self.gram)
-    }
 }
 
 /// Where a column comes from: a direction, or a roll-out of its own (rows x joints, rad); and the size of the change.
@@ -191,11 +164,9 @@ impl DriveFit {
     pub fn odds(&self, member: usize, independence: f64) -> Option<f64> {
         let one = &self.set[member];
         let shape = &one.cell.shapes[one.shape];
-        let sizes: Vec<usize> = (0..one.numbers.len())
-            .filter(|k| shape.start[*k] == 0.0 && shape.centre[*k] == 0.0)
-            .filter(|k| shape.columns.iter().any(|column| column[*k] != 0.0))
-            .collect();
+        let sizes = Sizes::of(one);
         let columns: Option<Vec<usize>> = sizes
+            .numbers
             .iter()
             .map(|k| {
                 self.numbers
@@ -210,12 +181,17 @@ impl DriveFit {
         let variance = DMatrix::from_fn(count, count, |i, k| {
             inverse[(nb + columns[i], nb + columns[k])]
         });
-        let size = DVector::from_fn(count, |i, _| one.numbers[sizes[i]] / shape.usual[sizes[i]]);
+        let width = sizes.precision().sqrt();
+        let size = DVector::from_fn(count, |i, _| {
+            let k = sizes.numbers[i];
+            one.numbers[k] * width / shape.usual[k]
+        });
         let factor = variance.cholesky()?;
         let half_log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
         Some(
             0.5 * size.dot(&factor.solve(&size))
                 + half_log_det
+                + sizes.log_tail()
                 + one.cell.log_prior
                 + shape.log_weight,
         )
@@ -237,7 +213,9 @@ impl DriveFit {
                 .map(|d| d.ln())
                 .sum::<f64>()
         });
+        let tails: f64 = self.set.iter().map(|one| Sizes::of(one).log_tail()).sum();
         log_likelihood(self.square, self.freedom, independence) - 0.5 * self.penalty - 0.5 * log_det
+            + tails
             + self.log_prior
     }
 }
@@ -270,13 +248,19 @@ impl Drives {
         }
         for (c, accepted) in fit.set.iter().enumerate() {
             let shape = &accepted.cell.shapes[accepted.shape];
+            let sizes = Sizes::of(accepted);
             for (k, usual) in shape
                 .usual
                 .iter()
                 .enumerate()
                 .filter(|(_, usual)| **usual > 0.0)
             {
-                columns.precision.push(1.0 / (usual * usual));
+                let by = if sizes.numbers.contains(&k) {
+                    sizes.precision()
+                } else {
+                    1.0
+                };
+                columns.precision.push(by / (usual * usual));
                 columns.numbers.push((c, k));
                 let known = fit.known(accepted.cell.key, k);
                 if let Some(at) = known.filter(|_| anew == Anew::Unknown) {
@@ -313,16 +297,44 @@ impl Drives {
         columns
     }
 
-    /// Simulated angles of a set, and their whitened square; infinite where the simulation runs away.
-    fn evaluated(&self, inertia: &[f64], set: &[Accepted<Key>]) -> (Vec<f64>, f64) {
-        let angles = self.angles(&self.physics(inertia, set), Which::Fitted);
-        let square: f64 = self.squares(&angles).iter().sum();
-        let square = if square.is_finite() {
+    /// Simulates a fit as it is: its angles and their whitened square; infinite where the simulation runs away.
+    fn evaluate(&self, fit: &mut DriveFit) {
+        fit.angles = self.angles(&self.physics(&fit.inertia, &fit.set), Which::Fitted);
+        let square: f64 = self.squares(fit).iter().sum();
+        fit.square = if square.is_finite() {
             square
         } else {
             f64::INFINITY
         };
-        (angles, square)
+    }
+
+    /// By joint, times that the noise is larger by what the causes of a fit may err there: a share of their effect, in a few independent ways
+    /// where noise errs in as many as there are independent rows.
+    fn doubt(&self, fit: &DriveFit) -> Vec<f64> {
+        let n = self.chain.joints();
+        if fit.set.is_empty() {
+            return vec![1.0; n];
+        }
+        let without = self.angles(&self.physics(&fit.inertia, &[]), Which::Fitted);
+        let mut effects = vec![0.0; n];
+        for row in self.fitted() {
+            for (joint, effect) in effects.iter_mut().enumerate() {
+                let at = row * n + joint;
+                let [low, high] = self.usual[joint].range;
+                // Where the one or the other runs away no effect is larger than the motion.
+                let most = high - low;
+                let change = fit.angles[at] - without[at];
+                let change = if change.is_finite() {
+                    change.abs().min(most)
+                } else {
+                    most
+                };
+                *effect += (change / self.sigma[at]).powi(2);
+            }
+        }
+        let errs = FORM_ERRS * FORM_ERRS * fit.share() / WAYS;
+        let times = |effect: f64| (1.0 + errs * effect).sqrt();
+        effects.into_iter().map(times).collect()
     }
 
     /// Fits inertials and a set's numbers from where they are; stops where evidence `least` is out of reach.
@@ -346,6 +358,7 @@ impl Drives {
             freedom,
             independence: before.map_or(1.0, |fit| fit.independence),
             rich: before.map_or(0.0, |fit| fit.rich),
+            doubt: before.map_or_else(|| vec![1.0; n], |fit| fit.doubt.clone()),
             penalty: 0.0,
             sigma: Vec::new(),
             log_prior: set
@@ -361,13 +374,20 @@ impl Drives {
             let key = one.cell.key;
             key.has_memory() && (anew || fit.known(key, 0).is_none())
         });
-        if dear {
-            (fit.angles, fit.square) = self.evaluated(&fit.inertia, set);
+        let stands = anew && !set.is_empty();
+        if dear || stands {
+            self.evaluate(&mut fit);
+        }
+        if stands {
+            if before.is_none() {
+                fit.independence = self.independence_of(&fit);
+            }
+            fit.doubt = self.doubt(&fit);
         }
         let first = if anew { Anew::All } else { Anew::Unknown };
         let (mut columns, mut normal) = self.looked(&mut fit, first);
         if before.is_none() {
-            fit.independence = self.independence_of(&fit.angles);
+            fit.independence = self.independence_of(&fit);
         }
         let weigh = |fit: &DriveFit| fit.share() / (fit.square / freedom).max(1.0);
         let mut is_new = true;
@@ -410,14 +430,13 @@ impl Drives {
                         numbers,
                     } = &mut trial.set[*c];
                     let shape = &cell.shapes[*shape];
-                    // No further than the linear model can be believed.
-                    let most = 3.0 * shape.usual[*k];
+                    let most = furthest(shape, *k);
                     let [low, high] = shape.bounds[*k];
                     let number = numbers[*k] + (by * by_column).clamp(-most, most);
                     numbers[*k] = number.clamp(low, high);
                 }
                 let seen = if dear {
-                    (trial.angles, trial.square) = self.evaluated(&trial.inertia, &trial.set);
+                    self.evaluate(&mut trial);
                     None
                 } else {
                     Some(self.looked(&mut trial, again))
@@ -435,14 +454,19 @@ impl Drives {
             fit = next;
             (columns, normal) = seen.unwrap_or_else(|| self.looked(&mut fit, again));
             is_new = again == Anew::All;
-            if fall < patience.fall.max(patience.share * objective) {
+            // What is doubted is fitted as well as what is not.
+            let doubt = fit
+                .doubt
+                .iter()
+                .fold(1.0, |most: f64, doubt| most.max(*doubt));
+            if fall < patience.fall.max(patience.share * objective) / (doubt * doubt) {
                 break;
             }
         }
         if anew && !is_new {
             (columns, normal) = self.looked(&mut fit, Anew::All);
         }
-        fit.independence = self.independence_of(&fit.angles);
+        fit.independence = self.independence_of(&fit);
         fit.penalty = self.penalty(&fit);
         fit.numbers.clone_from(&columns.numbers);
         let roots: Vec<f64> = columns.precision.iter().map(|p| 1.0 / p.sqrt()).collect();
@@ -482,7 +506,7 @@ impl Drives {
         let mut normal = Normal::new(count);
         let mut x = vec![0.0; count];
         let mut changes = vec![vec![0.0; fit.angles.len()]; if kept { count } else { 0 }];
-        let angles = &mut fit.angles;
+        let (angles, doubt) = (&mut fit.angles, &fit.doubt);
         roll(
             &self.chain,
             &physics,
@@ -492,7 +516,7 @@ impl Drives {
             |row| {
                 for joint in 0..n {
                     let at = row.row * n + joint;
-                    let sigma = self.sigma[at];
+                    let sigma = self.sigma[at] * doubt[joint];
                     angles[at] = row.angle[joint];
                     columns.at(at, row.change[joint], sigma, &mut x);
                     changes
@@ -535,17 +559,20 @@ impl Drives {
             .iter()
             .map(|one| {
                 let shape = &one.cell.shapes[one.shape];
-                let all = one.numbers.iter().zip(&shape.centre).zip(&shape.usual);
-                all.filter(|(_, usual)| **usual > 0.0)
-                    .map(|((x, at), usual)| ((x - at) / usual).powi(2))
-                    .sum::<f64>()
+                let sizes = Sizes::of(one);
+                let others = (0..one.numbers.len())
+                    .filter(|k| shape.usual[*k] > 0.0 && !sizes.numbers.contains(k));
+                let others: f64 = others
+                    .map(|k| ((one.numbers[k] - shape.centre[k]) / shape.usual[k]).powi(2))
+                    .sum();
+                others + sizes.penalty()
             })
             .sum();
         inertia + numbers
     }
 
     /// Effective rows a row, by the correlation of the residual from row to row.
-    fn independence_of(&self, angles: &[f64]) -> f64 {
+    fn independence_of(&self, fit: &DriveFit) -> f64 {
         let n = self.chain.joints();
         let (mut next, mut own) = (0.0, 0.0);
         let is_fitted = |row: usize| !self.recording.held_out[row];
@@ -556,7 +583,10 @@ impl Drives {
                 .filter(|row| is_fitted(*row))
                 .flat_map(|row| row * n..(row + 1) * n)
             {
-                let whitened = |at: usize| (self.recording.angle[at] - angles[at]) / self.sigma[at];
+                let whitened = |at: usize| {
+                    (self.recording.angle[at] - fit.angles[at])
+                        / (self.sigma[at] * fit.doubt[at % n])
+                };
                 let here = whitened(at);
                 own += here * here;
                 if at >= (rows.start + 1) * n && is_fitted(at / n - 1) {

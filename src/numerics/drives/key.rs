@@ -49,7 +49,7 @@ pub enum Key {
     Elasticity(usize),
     /// A spring over the own angle.
     Cable(usize),
-    /// Waves a turn.
+    /// Waves over the angle, of about so many a turn.
     Ripple(usize, u32),
     /// Torque of another drive is felt.
     Coupling(usize, usize),
@@ -104,7 +104,10 @@ impl Key {
                 .iter_mut()
                 .for_each(|joint| joint.kd *= x[0].exp()),
             Self::Rotor(j) => joints[j].armature *= x[0].exp(),
-            Self::Integral(j) => joints[j].integral = [x[0].exp(), x[1].exp()],
+            Self::Integral(j) => {
+                joints[j].integral = [x[0].exp(), x[1].exp()];
+                joints[j].integral_start = x[2];
+            }
             Self::DeadBand(j) => joints[j].dead_band = x[0].exp(),
             Self::TorqueLimit(j) => joints[j].limit = joints[j].limit.min(x[0].exp()),
             Self::SpeedLimit(j) => joints[j].speed_limit = x[0].exp(),
@@ -149,7 +152,7 @@ impl Key {
                 };
                 joints[j].spring = [whole, rest];
             }
-            Self::Ripple(j, waves) => joints[j].ripple.push([f64::from(waves), x[0], x[1]]),
+            Self::Ripple(j, _) => joints[j].ripple.push([x[2].exp(), x[0], x[1]]),
             Self::Coupling(j, by) => joints[j].coupling.push((by, x[0])),
             Self::Payload => {
                 let last = physics.bodies.links.len() - 1;

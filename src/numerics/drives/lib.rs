@@ -16,14 +16,17 @@ mod around;
 mod causes;
 pub mod chain;
 mod columns;
+pub mod excite;
 mod fit;
 mod independence;
 mod key;
 pub mod mjcf;
+mod normal;
 pub mod physics;
 mod problem;
 pub mod recording;
 pub mod rollout;
+mod sizes;
 
 pub use answer::{DriveDiagnosis, DriveFinding, DriveNumber, DriveRival, JointError, diagnose};
 pub use around::Around;

@@ -86,6 +86,8 @@ pub struct Joint {
     pub speed_limit: f64,
     /// Nm/(rad s), and the most of it, Nm.
     pub integral: [f64; 2],
+    /// Nm of it where a recording begins: a drive that has held a pose has integrated what the pose needs.
+    pub integral_start: f64,
     /// Nm s/rad.
     pub damping: f64,
     /// Nm.
@@ -223,6 +225,7 @@ impl Default for Joint {
             dead_band: 0.0,
             speed_limit: f64::INFINITY,
             integral: [0.0; 2],
+            integral_start: 0.0,
             damping: 0.0,
             friction: 0.0,
             stribeck: [0.0, 1.0],
@@ -242,6 +245,12 @@ impl Default for Joint {
 }
 
 impl Joint {
+    /// Nm of the integral of the error where a recording begins.
+    pub(crate) fn begun(&self) -> f64 {
+        self.integral_start
+            .clamp(-self.integral[1], self.integral[1])
+    }
+
     /// What the drive of joint `joint` gives, whose rotor is degree of freedom `rotor`; `sag` scales it.
     pub fn drive(
         &self,

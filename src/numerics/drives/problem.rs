@@ -36,8 +36,9 @@ pub struct Drives {
     pub without: Vec<String>,
     pub(crate) sigma: Vec<f64>,
     pub(crate) usual: Vec<Usual>,
-    /// s.
+    /// s from the beginning of a recording to its last row, and to the last that is fitted.
     pub(crate) duration: f64,
+    pub(crate) shown: f64,
 }
 
 impl Drives {
@@ -52,6 +53,11 @@ impl Drives {
         chain.step = step(&chain, &base, &recording, &sigma);
         let lasts = |t: &Trajectory| recording.time[t.rows.end - 1] - t.began;
         let duration = recording.trajectories.iter().map(lasts).fold(0.0, f64::max);
+        let fitted = recording.trajectories.iter().filter_map(|t| {
+            let last = t.rows.clone().rfind(|row| !recording.held_out[*row])?;
+            Some(recording.time[last] - t.began)
+        });
+        let shown = fitted.fold(0.0, f64::max);
         let usual = usual(&chain, &base, &recording);
         Self {
             chain,
@@ -62,6 +68,7 @@ impl Drives {
             sigma,
             usual,
             duration,
+            shown,
         }
     }
 
@@ -175,8 +182,17 @@ impl Drives {
         rows.filter(|row| !self.recording.held_out[*row])
     }
 
-    /// Whitened squared residual of fitted rows, joint by joint.
-    pub(crate) fn squares(&self, angles: &[f64]) -> Vec<f64> {
+    /// Squared residual of a fit's rows, joint by joint, whitened by the noise and by what its forms may err.
+    pub(crate) fn squares(&self, fit: &DriveFit) -> Vec<f64> {
+        let squares = self.noise_squares(&fit.angles).into_iter();
+        squares
+            .zip(&fit.doubt)
+            .map(|(square, doubt)| square / (doubt * doubt))
+            .collect()
+    }
+
+    /// The same of angles, whitened by the noise alone.
+    pub(crate) fn noise_squares(&self, angles: &[f64]) -> Vec<f64> {
         let n = self.chain.joints();
         let mut squares = vec![0.0; n];
         for row in self.fitted() {

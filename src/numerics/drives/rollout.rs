@@ -111,7 +111,9 @@ pub fn roll(
             continue;
         }
         if began.replace(trajectory.began) != Some(trajectory.began) {
-            roller.integral = [0.0; MOST];
+            for (integral, joint) in roller.integral.iter_mut().zip(&physics.joints) {
+                *integral = joint.begun();
+            }
             roller.columns.begin();
         }
         let commands = recording.commands(trajectory, physics.hold);

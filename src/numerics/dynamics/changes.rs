@@ -445,6 +445,7 @@ impl StackedColumns {
             joins: 0.0,
             leaves: 0.0,
             most: self.all.forms.len(),
+            regroups: false,
             ..Options::default()
         }
     }

@@ -229,6 +229,7 @@ fn options() -> Options {
         exchanged: *EXCHANGES,
         most: *COMPONENTS,
         told: *RIVAL,
+        regroups: false,
         ..Options::default()
     }
 }

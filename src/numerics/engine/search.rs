@@ -17,6 +17,8 @@ pub struct Options {
     pub tried: usize,
     /// Exchanges at most: each is for the better, so none comes twice.
     pub exchanged: usize,
+    /// Whether one cell may replace all members of a place at once: where causes are fitted with numbers of their own, several can imitate one.
+    pub regroups: bool,
     /// Cells in all; more is a model of nothing.
     pub most: usize,
     /// Rivals less probable are not told.
@@ -31,6 +33,7 @@ impl Default for Options {
             exchanges: 0.5,
             exchanged: 8,
             tried: 8,
+            regroups: true,
             most: 12,
             told: 5e-3,
         }
@@ -48,6 +51,8 @@ pub struct Answer<P: Problem> {
     pub findings: Vec<Finding<P::Key>>,
 }
 
+/// Members of a place that one may replace at once: for a single one that is an exchange.
+const SEVERAL: usize = 2;
 /// ln by which a linear scan may be wrong, and the share of it: what is further behind is not fitted.
 const BLUR: f64 = 20.0;
 const BLUR_SHARE: f64 = 0.5;
@@ -116,16 +121,17 @@ fn candidates<P: Problem>(
     kept
 }
 
-/// Fits of a set with each of some cells added, best first, of those that are still in their fit; a fit may stop early where its evidence
-/// cannot reach `least`, or that of the likeliest less `margin`.
+/// Fits of a set with each of some cells added, best first, of those that are still in their fit, and the share of independent rows at which
+/// they are compared. A fit may stop early where its evidence cannot reach `least`, or what `near` makes of the evidence of the likeliest.
 fn trials<P: Problem>(
     problem: &P,
     fit: &P::Fit,
     set: &[Accepted<P::Key>],
     candidates: Vec<Scanned<P::Key>>,
-    independence: f64,
-    (least, margin): (f64, f64),
-) -> Vec<Trial<P>> {
+    least: f64,
+    near: impl Fn(f64) -> f64,
+) -> (Vec<Trial<P>>, f64) {
+    let independence = problem.independence(fit);
     let tried = |one: Scanned<P::Key>, least: f64| {
         let cell = one.accepted.cell.clone();
         let mut with = set.to_vec();
@@ -136,18 +142,36 @@ fn trials<P: Problem>(
     };
     let mut candidates = candidates.into_iter();
     let Some(likeliest) = candidates.next() else {
-        return Vec::new();
+        return (Vec::new(), independence);
     };
     let first = tried(likeliest, least);
-    let least = least.max(first.log - margin);
+    let least = least.max(near(first.log));
     let rest: Vec<Scanned<P::Key>> = candidates.collect();
     let rest = rest.into_par_iter().map(|one| tried(one, least));
     let mut trials: Vec<Trial<P>> = rest.collect();
     trials.push(first);
     let stands = |trial: &Trial<P>| standing(problem, trial).is_some();
     trials.retain(stands);
+    let independence = compared_at(problem, fit, &trials);
+    for trial in &mut trials {
+        trial.log = problem.log_evidence(&trial.fit, independence);
+    }
     trials.sort_by(|a, b| b.log.total_cmp(&a.log));
-    trials
+    (trials, independence)
+}
+
+/// The share of independent rows at which models are compared: that of the best of them. What a worse one lacks lasts from row to row in its
+/// residual, and would pass for noise.
+fn compared_at<P: Problem>(problem: &P, fit: &P::Fit, trials: &[Trial<P>]) -> f64 {
+    let all = || std::iter::once(fit).chain(trials.iter().map(|trial| &trial.fit));
+    let most = all()
+        .map(|fit| problem.independence(fit))
+        .fold(0.0, f64::max);
+    let best = all()
+        .map(|fit| (problem.log_evidence(fit, most), fit))
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    let of_best = best.map_or(most, |(_, fit)| problem.independence(fit));
+    of_best.max(problem.independence(fit))
 }
 
 /// The new member of a trial as fitted; none where it is not in the fit.
@@ -171,8 +195,10 @@ fn search<P: Problem>(
         let set = problem.set(&stand.fit);
         let scanned = problem.scan(&stand.fit, &stand.around, None);
         let asked = candidates(problem, scanned, &set, f64::NEG_INFINITY, options);
-        let least = (now + options.joins, 0.0);
-        let tried = trials(problem, &stand.fit, &set, asked, independence, least);
+        let least = now + options.joins;
+        let near = |first: f64| now + (1.0 - BLUR_SHARE) * (first - now);
+        let (tried, independence) = trials(problem, &stand.fit, &set, asked, least, near);
+        let now = problem.log_evidence(&stand.fit, independence);
         for trial in tried.iter().take(4) {
             let (name, place) = (trial.cell.cause.name, &trial.cell.place);
             tell(format!(
@@ -235,10 +261,9 @@ struct Posterior<P: Problem> {
     better: Option<Change<P>>,
 }
 
-/// A member that goes, what comes in its place, and the fit then.
+/// What goes and comes, in words, and the fit then.
 struct Change<P: Problem> {
-    out: Cell<P::Key>,
-    into: Option<Cell<P::Key>>,
+    said: String,
     fit: P::Fit,
 }
 
@@ -251,6 +276,50 @@ enum Until {
     Useless,
     /// None: the set is what it is.
     End,
+}
+
+impl<P: Problem> Change<P> {
+    fn of(trial: Trial<P>, gone: &str) -> Self {
+        let (name, place) = (trial.cell.cause.name, trial.cell.place);
+        Self {
+            said: format!("{name} at {place} in place of {gone}"),
+            fit: trial.fit,
+        }
+    }
+}
+
+/// One cell in place of all members of a place that has several: causes that stand for parts of another each explain what the others leave, so
+/// that it can replace none of them alone.
+fn grouped<P: Problem>(problem: &P, stand: &Stand<P>, options: &Options) -> Option<Change<P>> {
+    let set = problem.set(&stand.fit);
+    let mut places: Vec<&str> = set.iter().map(|one| one.cell.place.as_str()).collect();
+    places.sort_unstable();
+    places.dedup();
+    for place in places {
+        let elsewhere = |one: &&Accepted<P::Key>| one.cell.place != place;
+        let rest: Vec<Accepted<P::Key>> = set.iter().filter(elsewhere).cloned().collect();
+        if set.len() - rest.len() < SEVERAL {
+            continue;
+        }
+        let without = problem.fit(&rest, Some(&stand.fit), f64::NEG_INFINITY);
+        let around = problem.around(&without, Some(&stand.around));
+        let scanned = problem.scan(&without, &around, None);
+        let asked = candidates(problem, scanned, &rest, f64::NEG_INFINITY, options);
+        let least = problem.log_evidence(&without, problem.independence(&without));
+        let near = |first: f64| least + (1.0 - BLUR_SHARE) * (first - least);
+        let (tried, compared) = trials(problem, &without, &rest, asked, least, near);
+        let compared = compared.max(problem.independence(&stand.fit));
+        let of = |fit: &P::Fit| problem.log_evidence(fit, compared);
+        let best = tried
+            .into_iter()
+            .max_by(|a, b| of(&a.fit).total_cmp(&of(&b.fit)));
+        if let Some(best) = best
+            && of(&best.fit) - of(&stand.fit) > options.exchanges
+        {
+            return Some(Change::of(best, &format!("all at {place}")));
+        }
+    }
+    None
 }
 
 /// What stands, each with what else could stand in its place; up to the first change for the better that is asked for.
@@ -278,8 +347,7 @@ fn posterior<P: Problem>(
         let lost = now - none;
         if lost < options.leaves && until != Until::End && is_whole(&rest) {
             let better = Some(Change {
-                out: own.clone(),
-                into: None,
+                said: format!("{} at {} leaves", own.cause.name, own.place),
                 fit: without,
             });
             return Posterior { findings, better };
@@ -287,22 +355,17 @@ fn posterior<P: Problem>(
         let least = lost - BLUR.max(BLUR_SHARE * lost);
         let asked = candidates(problem, others.collect(), &rest, least, options);
         let told = options.told.ln();
-        let mut others = trials(
-            problem,
-            fit,
-            &rest,
-            asked,
-            independence,
-            (log_sum(&[now, none]) + told, -told),
-        );
+        let least = log_sum(&[now, none]) + told;
+        let (mut others, compared) =
+            trials(problem, fit, &rest, asked, least, |first| first + told);
+        let now = problem.log_evidence(fit, compared);
+        let none = problem.log_evidence(&without, compared);
+        let lost = now - none;
         let is_better = |trial: &Trial<P>| trial.log - now > options.exchanges;
         if until == Until::Better && others.first().is_some_and(is_better) {
             let other = others.remove(0);
-            let better = Some(Change {
-                out: own.clone(),
-                into: Some(other.cell),
-                fit: other.fit,
-            });
+            let gone = format!("{} at {}", own.cause.name, own.place);
+            let better = Some(Change::of(other, &gone));
             return Posterior { findings, better };
         }
         let logs: Vec<f64> = [now, none]
@@ -383,14 +446,15 @@ pub fn diagnose<P: Problem>(
             false => Until::Useless,
         };
         let found = posterior(problem, &stand, until, options);
-        let Some(Change { out, into, fit }) = found.better else {
+        let better = found.better.or_else(|| {
+            (until == Until::Better && options.regroups)
+                .then(|| grouped(problem, &stand, options))
+                .flatten()
+        });
+        let Some(Change { said, fit }) = better else {
             break found.findings;
         };
-        let gone = format!("{} at {}", out.cause.name, out.place);
-        tell(match &into {
-            Some(into) => format!("{} at {} in place of {gone}", into.cause.name, into.place),
-            None => format!("{gone} leaves"),
-        });
+        tell(said);
         let fit = problem.settled(&fit);
         let newest = problem.set(&fit).len().saturating_sub(1);
         let fit = revised(problem, fit, newest, options, &mut tell);

@@ -11,6 +11,7 @@ import json
 import os
 import signal
 import sys
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
@@ -22,7 +23,7 @@ from . import _calib
 from ._calib import DataError, SpecError, StoreError, __version__, robots
 
 __all__ = [
-    "Commands", "DataError", "Diagnosis", "Model", "Proposal", "Robot", "Run", "SpecError", "StoreError", "Table", "__version__", "effects", "open_run",
+    "Commands", "DataError", "Diagnosis", "Model", "Proposal", "Robot", "Run", "SpecError", "StoreError", "Table", "__version__", "drives", "effects", "open_run",
     "robots", "run",
 ]
 
@@ -176,6 +177,8 @@ class Diagnosis:
         #: A table by its name: findings, rivals, cells, shares, parameters, prediction, ...
         self.table: Callable[[str], Table] = table
         self._text = text
+        #: Where its tables are, if they go with it.
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
 
     @property
     def verdict(self) -> str:
@@ -394,6 +397,56 @@ def run(
     shown = {name: value if isinstance(value, str) else json.dumps(value) for name, value in (set or {}).items()}
     overrides = [f"{name}={value}" for name, value in shown.items()]
     return Run(_calib.run(pipeline, overrides, store, jobs, progress))
+
+
+def drives(
+    mjcf: Path, described: Mapping[str, Any], time: Array, command: Array, angle: Array, *, trajectory: Sequence[int] | NDArray[np.int_] | None = None,
+    held_out: Sequence[bool] | NDArray[np.bool_] | None = None, settings: Mapping[str, Any] | None = None, jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Says which physics the simulation of commanded joints lacks, from commands and measured angles: the stage `diagnose_drives`.
+
+    mjcf: the robot as it is simulated, a file.
+    described: as drives.json: {"command_rate_hz": 50, "joints": [{"joint": "lift", "kp": 20, "kd": 0.5, "kd_on": "speed", "torque_limit_nm": 3,
+        "encoder_rad": 0.0015, "noise_rad": 0.0003}, ...]}, joints from the base outwards.
+    time: shape (rows,), s.
+    command, angle: shape (rows, joints), rad; an angle is measured at its time, then the command is sent, which holds until the next row.
+    trajectory: a number a row, another one where a trajectory begins; without it all rows are one.
+    held_out: a boolean a row: fitted to by nothing, these rows judge.
+    settings: further ones of the stage, e.g. {"without": ["backlash"]}.
+
+    Raises ValueError (DataError, SpecError) where shapes or numbers are wrong.
+    """
+    rows = len(time)
+    commands, angles = np.asarray(command, dtype=float), np.asarray(angle, dtype=float)
+    if commands.ndim != 2 or commands.shape != angles.shape or len(commands) != rows:
+        raise DataError(f"command {commands.shape} and angle {angles.shape}: expected ({rows}, joints) of both")
+    count = commands.shape[1]
+    tells = np.zeros(rows, dtype=int) if trajectory is None else np.asarray(trajectory)
+    judges = np.zeros(rows, dtype=bool) if held_out is None else np.asarray(held_out, dtype=bool)
+    if len(tells) != rows or len(judges) != rows:
+        raise DataError(f"trajectory {len(tells)} and held_out {len(judges)}: expected {rows}, one a row")
+    names = [f"{name}{joint}_rad" for name in ("cmd", "q") for joint in range(1, count + 1)]
+    lines = [",".join(["time_s", "traj", "use", *names])]
+    for row in range(rows):
+        numbers = [float(number) for number in (*commands[row], *angles[row])]
+        use = "validate" if judges[row] else "fit"
+        lines.append(",".join([repr(float(time[row])), str(tells[row]), use, *map(repr, numbers)]))
+    folder = tempfile.TemporaryDirectory()
+    stage = {
+        "uses": "diagnose_drives",
+        "with": {"robot": os.path.abspath(mjcf), "drives": "drives.json", "recording": "recording.csv", **(settings or {})},
+    }
+    # JSON is YAML.
+    pipeline = {"calib": 1, "name": "drives", "seed": 1, "stages": [stage]}
+    texts = {"recording.csv": "\n".join(lines) + "\n", "drives.json": json.dumps(dict(described)), "pipeline.yaml": json.dumps(pipeline)}
+    for name, text in texts.items():
+        with open(os.path.join(folder.name, name), "w", encoding="utf-8") as file:
+            file.write(text)
+    done = run(os.path.join(folder.name, "pipeline.yaml"), store=os.path.join(folder.name, "store"), jobs=jobs, progress=progress)
+    diagnosis = done.diagnosis()
+    diagnosis._folder = folder
+    return diagnosis
 
 
 def open_run(name: str = "HEAD", *, store: Path | None = None) -> Run:

@@ -348,8 +348,11 @@ impl DriveCase {
                     },
                 )
             }
-            // No servo is warm sooner than in ten seconds.
-            13 => Law::WarmUp(j, [draw.uniform(0.6, 1.5), draw.uniform(12.0, 40.0)]),
+            // From a few grams of grease to a gear that the whole recording does not warm: what looks so may assume less.
+            13 => Law::WarmUp(
+                j,
+                [draw.uniform(0.6, 1.5), 6.0 * draw.uniform(0.0, 3.0).exp()],
+            ),
             14 => Law::Cable(
                 j,
                 [servo.kp * draw.uniform(0.05, 0.15), draw.uniform(-0.3, 0.3)],

@@ -2,7 +2,6 @@
 //! Recordings are integrated in steps so fine that finer ones change nothing that the noise would show.
 
 use super::rig::{Rig, Servo};
-use crate::way::JointState;
 
 /// s of a step at most: the first of what is recorded, of what only compares, and of that where a gear yields.
 const FINE: f64 = 2.5e-4;
@@ -69,19 +68,26 @@ pub(super) fn angles(rig: &Rig, commands: &[f64], period: f64, step: f64) -> Vec
     out
 }
 
+/// Degrees of freedom at most: links, and a rotor of each gear that yields.
+const MOST: usize = 8;
+type Row = [f64; MOST];
+type Square = [Row; MOST];
+
 /// Links come first, then rotors that move by themselves.
 struct Now {
+    /// Degrees of freedom.
+    freedoms: usize,
     /// By joint, what its drive turns.
     rotor: Vec<usize>,
-    q: Vec<f64>,
-    v: Vec<f64>,
-    a: Vec<f64>,
-    set_point: Vec<f64>,
-    integral: Vec<f64>,
+    q: Row,
+    v: Row,
+    a: Row,
+    set_point: Row,
+    integral: Row,
     /// -1 to 1: how far friction is bent.
-    bent: Vec<f64>,
+    bent: Row,
     /// Nm that gears give to their links.
-    given: Vec<f64>,
+    given: Row,
     /// Nm that all drives give, as the supply has followed.
     drawn: f64,
 }
@@ -89,56 +95,59 @@ struct Now {
 impl Now {
     fn new(rig: &Rig, home: &[f64]) -> Self {
         let n = rig.joints();
-        let (mut rotor, mut q): (Vec<usize>, Vec<f64>) = ((0..n).collect(), home.to_vec());
+        let mut at_home = [0.0; MOST];
+        at_home[..n].copy_from_slice(home);
+        let (mut rotor, mut q, mut freedoms) = ((0..n).collect::<Vec<usize>>(), at_home, n);
         for joint in (0..n).filter(|joint| rig.servos[*joint].gear.is_some()) {
-            rotor[joint] = q.len();
-            q.push(home[joint]);
+            rotor[joint] = freedoms;
+            q[freedoms] = home[joint];
+            freedoms += 1;
         }
-        let m = q.len();
         Self {
+            freedoms,
             rotor,
             q,
-            v: vec![0.0; m],
-            a: vec![0.0; m],
-            set_point: home.to_vec(),
-            integral: vec![0.0; n],
-            bent: vec![0.0; n],
-            given: vec![0.0; n],
+            v: [0.0; MOST],
+            a: [0.0; MOST],
+            set_point: at_home,
+            integral: [0.0; MOST],
+            bent: [0.0; MOST],
+            given: [0.0; MOST],
             drawn: 0.0,
         }
     }
 
     fn step(&mut self, rig: &Rig, commands: &[f64], period: f64, time: f64, h: f64) {
-        let (n, m) = (rig.joints(), self.q.len());
-        let still = vec![0.0; n];
-        let middle: Vec<f64> = (0..m).map(|i| self.q[i] + 0.5 * h * self.v[i]).collect();
-        // What stopped in the last step does not go back by it.
-        let lead = |i: usize| match self.v[i] {
-            0.0 => 0.0,
-            v => v + 0.5 * h * self.a[i],
-        };
-        let ahead: Vec<f64> = (0..m).map(lead).collect();
-        let torque = |v: &[f64], a: &[f64]| {
-            rig.machine.torque(&JointState {
-                q: middle[..n].to_vec(),
-                v: v.to_vec(),
-                a: a.to_vec(),
-            })
+        let (n, m) = (rig.joints(), self.freedoms);
+        let still = [0.0; MOST];
+        let (mut middle, mut ahead) = ([0.0; MOST], [0.0; MOST]);
+        for i in 0..m {
+            middle[i] = self.q[i] + 0.5 * h * self.v[i];
+            // What stopped in the last step does not go back by it.
+            if self.v[i] != 0.0 {
+                ahead[i] = self.v[i] + 0.5 * h * self.a[i];
+            }
+        }
+        let pose = rig.machine.pose(&middle[..n]);
+        let torque = |v: &Row, a: &Row| {
+            let mut torque = [0.0; MOST];
+            rig.machine.torque_at(&pose, &v[..n], &a[..n], &mut torque);
+            torque
         };
         let weight = torque(&still, &still);
-        let bias = torque(&ahead[..n], &still);
-        let mut mass = vec![vec![0.0; m]; m];
+        let bias = torque(&ahead, &still);
+        let mut mass = [[0.0; MOST]; MOST];
         for k in 0..n {
-            let mut unit = still.clone();
+            let mut unit = still;
             unit[k] = 1.0;
             let column = torque(&still, &unit);
             for i in 0..n {
                 mass[i][k] = column[i] - weight[i];
             }
         }
-        let links = mass.clone();
+        let links = mass;
         let drives = self.drives(rig, commands, period, (time, h), (&middle, &ahead));
-        let (mut force, mut limit) = (vec![0.0; m], vec![0.0; m]);
+        let (mut force, mut limit) = ([0.0; MOST], [0.0; MOST]);
         for (j, servo) in rig.servos.iter().enumerate() {
             let r = self.rotor[j];
             let felt = servo.coupled.map_or(0.0, |(by, share)| share * drives[by]);
@@ -172,9 +181,16 @@ impl Now {
                 }
             }
         }
-        let free = solve(&mass, &force);
-        let start: Vec<f64> = self.v.iter().zip(&free).map(|(v, a)| v + h * a).collect();
-        let new = stuck(&mass, &start, &self.v, &limit, h);
+        // What the forces do, and unit forces at each freedom.
+        let mut moves = [[0.0; MOST]; MOST + 1];
+        moves[0] = force;
+        (0..m).for_each(|k| moves[1 + k][k] = 1.0);
+        solve(&mass, m, &mut moves[..=m]);
+        let mut start = self.v;
+        for i in 0..m {
+            start[i] += h * moves[0][i];
+        }
+        let new = stuck(&moves[1..=m], &start, &self.v, &limit, h);
         for i in 0..m {
             self.q[i] = middle[i] + 0.5 * h * new[i];
             self.a[i] = (new[i] - self.v[i]) / h;
@@ -184,8 +200,10 @@ impl Now {
             let inertial: f64 = (0..n).map(|k| links[j][k] * self.a[k]).sum();
             self.given[j] = bias[j] + inertial;
         }
-        let total: f64 = drives.iter().map(|drive| drive.abs()).sum();
-        self.drawn += (total - self.drawn) * (1.0 - (-h / SUPPLY).exp());
+        if rig.sag != 0.0 {
+            let total: f64 = drives[..n].iter().map(|drive| drive.abs()).sum();
+            self.drawn += (total - self.drawn) * (1.0 - (-h / SUPPLY).exp());
+        }
     }
 
     /// What the drives give in the middle of a step, Nm.
@@ -195,8 +213,8 @@ impl Now {
         commands: &[f64],
         period: f64,
         (time, h): (f64, f64),
-        (middle, ahead): (&[f64], &[f64]),
-    ) -> Vec<f64> {
+        (middle, ahead): (&Row, &Row),
+    ) -> Row {
         let n = rig.joints();
         let supply = 1.0 - (rig.sag * self.drawn).clamp(0.0, 0.9);
         let drive = |(j, servo): (usize, &Servo)| {
@@ -223,7 +241,13 @@ impl Now {
             let demand = servo.kp * felt + servo.kd * (rate - ahead[r]) + sum;
             supply * demand.clamp(-servo.limit, servo.limit)
         };
-        rig.servos.iter().enumerate().map(drive).collect()
+        let mut drives = [0.0; MOST];
+        let given = rig.servos.iter().enumerate().map(drive);
+        drives
+            .iter_mut()
+            .zip(given)
+            .for_each(|(to, given)| *to = given);
+        drives
     }
 }
 
@@ -257,68 +281,71 @@ fn commanded(
     std::array::from_fn(|k| share * first[k] + (1.0 - share) * last[k])
 }
 
-/// Springs, waves and bumps.
+/// Springs, waves and bumps; what has no size costs no sine and no exponential.
 fn passive(servo: &Servo, q: f64) -> f64 {
     let [size, waves, phase] = servo.ripple;
     let [bump, centre, width] = servo.bump;
-    let from = (q - centre) / width;
-    size * (waves * q + phase).sin() + bump * (-0.5 * from * from).exp()
-        - servo.spring[0] * (q - servo.spring[1])
+    let mut torque = 0.0;
+    if size != 0.0 {
+        torque += size * (waves * q + phase).sin();
+    }
+    if bump != 0.0 {
+        let from = (q - centre) / width;
+        torque += bump * (-0.5 * from * from).exp();
+    }
+    torque - servo.spring[0] * (q - servo.spring[1])
 }
 
 fn dry(servo: &Servo, v: f64, drive: f64, time: f64) -> f64 {
-    let slow = v / servo.stribeck[1];
-    let cold = servo.warm_up[0] * (-time.max(0.0) / servo.warm_up[1]).exp();
-    let own = (servo.friction + servo.stribeck[0] * (-slow * slow).exp()) * (1.0 + cold);
+    let mut own = servo.friction;
+    if servo.stribeck[0] != 0.0 {
+        let slow = v / servo.stribeck[1];
+        own += servo.stribeck[0] * (-slow * slow).exp();
+    }
+    if servo.warm_up[0] != 0.0 {
+        own *= 1.0 + servo.warm_up[0] * (-time.max(0.0) / servo.warm_up[1]).exp();
+    }
     let back = usize::from(drive * v < 0.0);
     own + servo.load[back] * drive.abs()
 }
 
-/// Speeds after a step with dry friction: joints stick where friction can hold them, the others slide against it.
-fn stuck(mass: &[Vec<f64>], free: &[f64], before: &[f64], limit: &[f64], h: f64) -> Vec<f64> {
-    let n = free.len();
-    let direction = |j: usize| {
-        if before[j] != 0.0 {
-            before[j].signum()
-        } else {
-            free[j].signum()
-        }
-    };
-    let mut slides: Vec<f64> = (0..n).map(direction).collect();
-    let mut sticks: Vec<bool> = (0..n).map(|j| limit[j] > 0.0).collect();
-    let inverse: Vec<Vec<f64>> = (0..n)
-        .map(|k| {
-            solve(
-                mass,
-                &(0..n)
-                    .map(|i| f64::from(u8::from(i == k)))
-                    .collect::<Vec<_>>(),
-            )
-        })
-        .collect();
-    let mut new = free.to_vec();
+/// Speeds after a step with dry friction, of `inverse` rows each what a unit force at a freedom does: joints stick where friction can hold
+/// them, the others slide against it.
+fn stuck(inverse: &[Row], free: &Row, before: &Row, limit: &Row, h: f64) -> Row {
+    let n = inverse.len();
+    let mut slides = [0.0; MOST];
+    let mut sticks = [false; MOST];
+    for j in 0..n {
+        let from = if before[j] != 0.0 { before[j] } else { free[j] };
+        slides[j] = from.signum();
+        sticks[j] = limit[j] > 0.0;
+    }
+    let mut new = *free;
     for _ in 0..EXCHANGES {
-        let held: Vec<usize> = (0..n).filter(|j| sticks[*j]).collect();
+        let (mut held, mut count) = ([0; MOST], 0);
+        for j in (0..n).filter(|j| sticks[*j]) {
+            held[count] = j;
+            count += 1;
+        }
+        let held = &held[..count];
         let against = |j: usize| if sticks[j] { 0.0 } else { limit[j] * slides[j] };
-        let sliding: Vec<f64> = (0..n)
-            .map(|i| free[i] - h * (0..n).map(|k| inverse[k][i] * against(k)).sum::<f64>())
-            .collect();
-        let inner: Vec<Vec<f64>> = held
-            .iter()
-            .map(|i| held.iter().map(|k| h * inverse[*k][*i]).collect())
-            .collect();
-        let right: Vec<f64> = held.iter().map(|i| sliding[*i]).collect();
-        let hold = solve(&inner, &right);
-        new = (0..n)
-            .map(|i| {
-                sliding[i]
-                    - held
-                        .iter()
-                        .zip(&hold)
-                        .map(|(k, f)| h * inverse[*k][i] * f)
-                        .sum::<f64>()
-            })
-            .collect();
+        let mut sliding = *free;
+        for (i, speed) in sliding[..n].iter_mut().enumerate() {
+            *speed -= h * (0..n).map(|k| inverse[k][i] * against(k)).sum::<f64>();
+        }
+        let (mut inner, mut hold) = ([[0.0; MOST]; MOST], [[0.0; MOST]]);
+        for (a, i) in held.iter().enumerate() {
+            for (b, k) in held.iter().enumerate() {
+                inner[a][b] = h * inverse[*k][*i];
+            }
+            hold[0][a] = sliding[*i];
+        }
+        solve(&inner, count, &mut hold);
+        let [hold] = hold;
+        for i in 0..n {
+            let by = held.iter().zip(&hold);
+            new[i] = sliding[i] - by.map(|(k, f)| h * inverse[*k][i] * f).sum::<f64>();
+        }
         // The joint that asks most breaks loose; one that turns round sticks again.
         let over = held
             .iter()
@@ -342,29 +369,30 @@ fn stuck(mass: &[Vec<f64>], free: &[f64], before: &[f64], limit: &[f64], h: f64)
     new
 }
 
-/// Gauss with the largest pivot.
-fn solve(matrix: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
-    let n = right.len();
-    let mut rows: Vec<Vec<f64>> = matrix.to_vec();
-    let mut x = right.to_vec();
+/// Gauss with the largest pivot, of the first `n` rows and columns; right sides become solutions.
+fn solve(matrix: &Square, n: usize, sides: &mut [Row]) {
+    let mut rows = *matrix;
     for k in 0..n {
         let pivot = (k..n)
             .max_by(|a, b| rows[*a][k].abs().total_cmp(&rows[*b][k].abs()))
             .unwrap_or(k);
         rows.swap(k, pivot);
-        x.swap(k, pivot);
-        let pivot_row = rows[k].clone();
+        sides.iter_mut().for_each(|x| x.swap(k, pivot));
+        let pivot_row = rows[k];
         for i in k + 1..n {
             let by = rows[i][k] / pivot_row[k];
-            for (value, above) in rows[i].iter_mut().zip(&pivot_row) {
+            for (value, above) in rows[i][..n].iter_mut().zip(&pivot_row) {
                 *value -= by * above;
             }
-            x[i] -= by * x[k];
+            for x in &mut *sides {
+                x[i] -= by * x[k];
+            }
         }
     }
-    for k in (0..n).rev() {
-        let sum: f64 = (k + 1..n).map(|c| rows[k][c] * x[c]).sum();
-        x[k] = (x[k] - sum) / rows[k][k];
+    for x in sides {
+        for k in (0..n).rev() {
+            let sum: f64 = (k + 1..n).map(|c| rows[k][c] * x[c]).sum();
+            x[k] = (x[k] - sum) / rows[k][k];
+        }
     }
-    x
 }

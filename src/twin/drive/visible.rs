@@ -64,17 +64,18 @@ impl DriveCase {
                 column(simulated(&self.rig(&rest)), 1.0, None)
             })
             .collect();
-        let rivals: Vec<(Law, Column)> = (0..n)
-            .flat_map(|joint| self.rivals(joint))
-            .chain([
-                Law::Delay(None, 2e-3),
-                Law::Payload(0.02 * self.stated.machine.links[n - 1].mass),
-            ])
-            .map(|law| {
-                let mut rig = whole_rig.clone();
-                law.change(&mut rig);
-                let moved = column(simulated(&rig), 1.0, None);
-                (law, moved)
+        let rivals: Vec<(Rival, Column)> = (0..n)
+            .flat_map(|joint| KINDS.map(|kind| Rival { kind, joint }))
+            .chain(ARM.map(|kind| Rival { kind, joint: n - 1 }))
+            .map(|rival| {
+                (
+                    rival,
+                    column(
+                        simulated(&with(&whole_rig, &self.law_of(rival, 1.0))),
+                        1.0,
+                        None,
+                    ),
+                )
             })
             .collect();
         let seen = |index: usize| {
@@ -82,37 +83,88 @@ impl DriveCase {
             let visible = shadow.outside(effects[index].clone());
             let l = length(&visible).powi(2);
             let law = &self.laws[index];
-            let same = rivals.iter().filter(|(rival, column)| {
-                if (rival.name(), rival.place()) == (law.name(), law.place()) {
-                    return false;
+            // What of the effect a rival leaves, and how large it is in its place.
+            let left = |moved: &Column| {
+                let moved = shadow.outside(moved.clone());
+                let size = dot(&moved, &visible) / dot(&moved, &moved).max(f64::MIN_POSITIVE);
+                let rest: Column = visible
+                    .iter()
+                    .zip(&moved)
+                    .map(|(a, b)| a - size * b)
+                    .collect();
+                (length(&rest).powi(2), size)
+            };
+            let bar = SAME.max(SAME_SHARE * l);
+            let is_same = |(rival, moved): &(Rival, Column)| {
+                let named = self.law_of(*rival, 1.0);
+                if (named.name(), named.place()) == (law.name(), law.place()) {
+                    return None;
                 }
-                let mut space = Shadow::default();
-                space.add(shadow.outside(column.clone()));
-                length(&space.outside(visible.clone())).powi(2) < SAME.max(SAME_SHARE * l)
-            });
+                let (mut least, mut size) = left(moved);
+                // A small effect may grow by another way than a large one: again from as large a one, in the place of the law.
+                for _ in 0..AGAIN {
+                    if least < bar || least > FAR_SHARE * l {
+                        break;
+                    }
+                    let mut laws = self.laws.clone();
+                    laws[index] = self.law_of(*rival, -size);
+                    let instead = column(simulated(&self.rig(&laws)), 1.0, None);
+                    let mut moved = effects[index].clone();
+                    moved.iter_mut().zip(&instead).for_each(|(a, b)| *a -= b);
+                    let (now, by) = left(&moved);
+                    (least, size) = (least.min(now), size * by);
+                }
+                (least < bar).then(|| (named.name(), named.place()))
+            };
             Visible {
                 l,
                 before: length(&effects[index]).powi(2),
-                same: same
-                    .map(|(rival, _)| (rival.name(), rival.place()))
-                    .collect(),
+                same: rivals.iter().filter_map(is_same).collect(),
             }
         };
         (0..self.laws.len()).map(seen).collect()
     }
 
-    /// Small effects of a joint.
-    fn rivals(&self, joint: usize) -> Vec<Law> {
+    /// A rival so many times its small size.
+    fn law_of(&self, Rival { kind, joint }: Rival, size: f64) -> Law {
         let servo = &self.stated.servos[joint];
-        vec![
-            Law::Delay(Some(joint), 2e-3),
-            Law::Offset(joint, 1e-3),
-            Law::Gain(joint, 1.02),
-            Law::Damping(joint, 1.05),
-            Law::Rotor(joint, 1.05),
-            Law::Viscous(joint, 0.05 * servo.kd),
-            Law::Coulomb(joint, 0.05 * servo.friction),
-            Law::Cable(joint, [0.01 * servo.kp, 0.0]),
-        ]
+        match kind {
+            "delay" => Law::Delay(Some(joint), 2e-3 * size),
+            "offset" => Law::Offset(joint, 1e-3 * size),
+            "gain" => Law::Gain(joint, (0.02 * size).exp()),
+            "damping" => Law::Damping(joint, (0.05 * size).exp()),
+            "rotor" => Law::Rotor(joint, (0.05 * size).exp()),
+            "viscous" => Law::Viscous(joint, 0.05 * servo.kd * size),
+            "coulomb" => Law::Coulomb(joint, 0.05 * servo.friction * size),
+            "cable" => Law::Cable(joint, [0.01 * servo.kp * size, 0.0]),
+            "delay of all" => Law::Delay(None, 2e-3 * size),
+            _ => Law::Payload(0.02 * self.stated.machine.links[joint].mass * size),
+        }
     }
+}
+
+/// Another name, and the joint where it would act.
+#[derive(Debug, Clone, Copy)]
+struct Rival {
+    kind: &'static str,
+    joint: usize,
+}
+
+/// Rivals of a joint, and of the arm.
+const KINDS: [&str; 8] = [
+    "delay", "offset", "gain", "damping", "rotor", "viscous", "coulomb", "cable",
+];
+const ARM: [&str; 2] = ["delay of all", "payload"];
+/// Times that a rival is made anew as large as it would have to be, and the share of an effect that one may leave before.
+const AGAIN: usize = 2;
+const FAR_SHARE: f64 = 0.3;
+
+fn with(rig: &Rig, law: &Law) -> Rig {
+    let mut rig = rig.clone();
+    law.change(&mut rig);
+    rig
+}
+
+fn dot(a: &Column, b: &Column) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -384,14 +384,14 @@ struct Load {
 }
 
 /// Axes and points of the joints and the frames of the links as they are now.
-struct Pose {
+pub(crate) struct Pose {
     axes: Vec<Vector>,
     points: Vec<Vector>,
     frames: Vec<Matrix>,
 }
 
 impl Machine {
-    fn pose(&self, q: &[f64]) -> Pose {
+    pub(crate) fn pose(&self, q: &[f64]) -> Pose {
         let mut pose = Pose {
             axes: Vec::new(),
             points: Vec::new(),
@@ -411,7 +411,13 @@ impl Machine {
 
     /// Nm that each joint needs for this motion, no friction.
     pub fn torque(&self, state: &JointState) -> Vec<f64> {
-        let pose = self.pose(&state.q);
+        let mut torque = vec![0.0; self.axes.len()];
+        self.torque_at(&self.pose(&state.q), &state.v, &state.a, &mut torque);
+        torque
+    }
+
+    /// The same at a pose, of speeds (rad/s) and accelerations (rad/s2).
+    pub(crate) fn torque_at(&self, pose: &Pose, v: &[f64], a: &[f64], torque: &mut [f64]) {
         let n = self.axes.len();
         let (mut spin, mut turn, mut push) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         let mut before = pose.points[0];
@@ -420,8 +426,8 @@ impl Machine {
             let arm = minus(pose.points[j], before);
             push = add(push, add(cross(turn, arm), cross(spin, cross(spin, arm))));
             before = pose.points[j];
-            let rate = scale(pose.axes[j], state.v[j]);
-            let gain = add(scale(pose.axes[j], state.a[j]), cross(spin, rate));
+            let rate = scale(pose.axes[j], v[j]);
+            let gain = add(scale(pose.axes[j], a[j]), cross(spin, rate));
             turn = add(turn, gain);
             spin = add(spin, rate);
             let last = self.payload.as_ref().filter(|_| j + 1 == n);
@@ -430,15 +436,14 @@ impl Machine {
                 loads.push((j, load));
             }
         }
-        let about = |j: usize| -> f64 {
+        for (j, torque) in torque[..n].iter_mut().enumerate() {
             let moment = |load: &Load| {
                 let arm = minus(load.centre, pose.points[j]);
                 dot(pose.axes[j], add(load.moment, cross(arm, load.force)))
             };
             let beyond = loads.iter().filter(|(link, _)| *link >= j);
-            beyond.map(|(_, load)| moment(load)).sum()
-        };
-        (0..n).map(about).collect()
+            *torque = beyond.map(|(_, load)| moment(load)).sum();
+        }
     }
 
     fn load(
