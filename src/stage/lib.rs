@@ -375,18 +375,19 @@ impl StageEntry {
 
 /// Declares a stage with its ports: `stage! { Identify, "identify", 18, "identifies geometry", IdentifyReads { robot: Robot, } -> Identified }`. A
 /// struct of ports without fields is declared elsewhere.
+#[macro_export]
 macro_rules! stage {
     ($stage:ty, $name:literal, $implementation:literal, $summary:literal,
      $reads:ident $({ $($read:tt)* })? -> $writes:ident $({ $($written:tt)* })?) => {
-        $(crate::table::reads! {
+        $(::calib_table::reads! {
             #[doc = concat!("Input ports of `", $name, "`.")]
             pub struct $reads { $($read)* }
         })?
-        $(crate::table::writes! {
+        $(::calib_table::writes! {
             #[doc = concat!("Output ports of `", $name, "`.")]
             pub struct $writes { $($written)* }
         })?
-        impl crate::DeclaredStage for $stage {
+        impl $crate::DeclaredStage for $stage {
             const NAME: &'static str = $name;
             const SUMMARY: &'static str = $summary;
             const IMPLEMENTATION: u32 = $implementation;
@@ -395,4 +396,3 @@ macro_rules! stage {
         }
     };
 }
-pub(crate) use stage;
