@@ -56,6 +56,10 @@ impl Record {
     pub fn len(&self) -> usize {
         self.fields.len()
     }
+    /// Whether it has none.
+    pub fn is_empty(&self) -> bool {
+        self.fields.is_empty()
+    }
     /// A field without the blanks around it; empty beyond the last.
     pub fn field(&self, index: usize) -> &[u8] {
         let bytes = if self.is_quoted {

@@ -64,7 +64,7 @@ pub fn torque_page(
         .map(|row| FollowedFinding {
             effect: &row.effect,
             place: &row.place,
-            follows: &row.follows,
+            follows: row.follows.as_deref().unwrap_or_default(),
             size: row.effect_rms_nm,
         })
         .collect();

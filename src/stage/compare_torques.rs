@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 pub struct CompareTorques {}
 
 crate::stage! {
-    CompareTorques, "compare_torques", 7, "tests what changed between recordings of an arm's torques: what it carries, friction, offsets",
+    CompareTorques, "compare_torques", 8, "tests what changed between recordings of an arm's torques: what it carries, friction, offsets",
         CompareTorquesReads {
             robot: Robot,
             motion: Labelled<Chunks<ArmMotion>>,
@@ -198,7 +198,7 @@ impl<'r> Compared<'r> {
                     [from, to].map(|one| RecordedTorques::of(self.all[one].motion, self.robot));
                 let [first, second] = torques;
                 let (first, second) = (first?, second?);
-                let events = [from, to].map(|one| events(&self.all[one].contacts));
+                let events = [from, to].map(|one| events(self.all[one].contacts));
                 let diagnosed = |recording, place: usize, one: usize| DiagnosedRecording {
                     recording,
                     model: &self.models[one],

@@ -22,7 +22,7 @@ impl TorqueFindings {
             rank,
             effect: finding.effect.into(),
             place: finding.place.to_string(),
-            follows: finding.follows.into(),
+            follows: Some(finding.follows.into()),
             statement: finding.statement.clone(),
             gain: finding.evidence.gain,
             f_statistic: finding.evidence.f_statistic,

@@ -138,7 +138,9 @@ pub(super) fn rows(
         })
         .collect();
     Error::if_data(faults)?;
-    for column in wanted.iter().filter(|column| column.contains("{j}")) {
+    // What a list has beyond the joints (a gripper) is not of the arm.
+    let of_columns = |column: &&&str| column.contains("{j}") && !column.ends_with("[{j}]");
+    for column in wanted.iter().filter(of_columns) {
         let more = of_joint(column, names.len(), "");
         if find(&more).is_some() {
             let (n, most) = (names.len(), names.len() + 1);

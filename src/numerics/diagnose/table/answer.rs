@@ -33,8 +33,6 @@ pub(crate) struct FoundCell {
     pub(crate) rivals: Vec<RivalCause>,
     /// Of each member: whether its coefficients are positive, and the largest of them (SI).
     pub(crate) bounds: Vec<(bool, f64)>,
-    /// Why it is not what it is called, though the fitted rows are for it.
-    pub(crate) against: Option<&'static str>,
 }
 
 impl FoundCell {
@@ -225,7 +223,6 @@ impl CauseTable<'_, '_> {
             probabilities,
             rivals,
             bounds: bounds.collect(),
-            against: None,
         };
         (found, better)
     }

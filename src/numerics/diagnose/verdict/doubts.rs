@@ -1,5 +1,5 @@
-//! What speaks against the name of a finding though the fitted rows are for it: the held-out rows, which judge and choose nothing, and a curve
-//! without a name beside it that is only nearly right.
+//! What speaks against the name of a finding: the held-out rows, which judge how probable it is and choose nothing, and a curve without a name
+//! beside it that is only nearly right.
 
 use super::LastRound;
 use crate::criteria::words::NEARLY_RIGHT;
@@ -7,39 +7,23 @@ use crate::effect::names;
 use crate::misfit::Misfit;
 use crate::table::FoundCell;
 
-/// Findings more probably nothing than what they are say why.
-const REFUTED: f64 = 0.5;
-
-/// Lowers the probabilities of findings by what speaks against them.
+/// Lowers the probabilities of findings by what speaks against them; names, numbers and model stay.
 pub(super) fn weigh(last: &mut LastRound, misfit: &Misfit) {
     let held_out = by_held_out_rows(last, misfit);
     let beside = beside_nameless(&last.answer.found);
     let found = last.answer.found.iter_mut();
     for ((found, held_out), beside) in found.zip(held_out).zip(beside) {
-        doubt(
-            found,
-            held_out,
-            "held-out points are predicted better without it",
-        );
-        doubt(
-            found,
-            beside,
-            "what has no name is so much larger that its misfit may look like this",
-        );
+        doubt(found, held_out.min(0.0) + beside);
     }
 }
 
-/// Multiplies the odds of a finding by a likelihood ratio below one, given as its ln.
-fn doubt(found: &mut FoundCell, log_ratio: f64, why: &'static str) {
+/// Multiplies the odds of a finding by a likelihood ratio of at most one, given as its ln.
+fn doubt(found: &mut FoundCell, log_ratio: f64) {
     let none = found.probabilities.none;
-    let there = (1.0 - none) * log_ratio.min(0.0).exp();
-    if there + none <= 0.0 || log_ratio >= 0.0 || none >= 1.0 {
-        return;
-    }
-    let refuted = none / (none + there);
-    found.or_nothing((refuted - none) / (1.0 - none));
-    if refuted > REFUTED {
-        found.against = Some(why);
+    let there = (1.0 - none) * log_ratio.exp();
+    if log_ratio < 0.0 && none < 1.0 && none + there > 0.0 {
+        let refuted = none / (none + there);
+        found.or_nothing((refuted - none) / (1.0 - none));
     }
 }
 

@@ -225,12 +225,9 @@ fn modelled(last: &LastRound, called: &'static str, forms: &[Form]) -> Option<Mo
     (!last.excludes(modelled.same.0)).then_some(modelled)
 }
 
-/// Why causes are not what they are called: other rows speak against it, or a number that the fit of the whole model puts beyond what physics
-/// allows, or beyond what the recording holds.
+/// Why causes cannot be what they are called: a number that the fit of the whole model puts beyond what physics allows, or beyond what the
+/// recording holds.
 fn impossible(last: &LastRound, found: &FoundCell) -> Option<String> {
-    if let Some(why) = found.against {
-        return Some(why.into());
-    }
     if let Some(loads) = turns_back(last, found) {
         let [from, to] = loads.map(|load| figure(load, 0));
         return Some(format!(
