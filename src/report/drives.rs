@@ -97,7 +97,17 @@ const FOLLOWED: [(&str, &[&str]); 8] = [
             "joint_coupling",
         ],
     ),
-    ("own angle", &["torque_ripple", "spring_balance"]),
+    (
+        "own angle",
+        &[
+            "torque_ripple",
+            "cable_stiffness",
+            "link_mass",
+            "link_com",
+            "payload_error",
+            "gravity_direction",
+        ],
+    ),
     ("acceleration", &["rotor_inertia", "joint_elasticity"]),
     (
         "error of the drive",
