@@ -3,7 +3,7 @@
 
 mod drives;
 
-pub use drives::{CommandsAsked, CommandsProposal, exciting_commands};
+pub use drives::{CommandsProposal, DriveCommandRequest, exciting_commands};
 
 use crate::description::JointDescription;
 use crate::dynamics::{ExciteRequest, ExcitingMotion, excite};

@@ -4,7 +4,7 @@ use super::poses::{Ranges, ranges};
 use crate::cli::surroundings::cores;
 use crate::cli::{emit, emit_json, put};
 use crate::error::{Error, Result};
-use crate::excitation::{CommandsAsked, MotionRequest, exciting_commands, exciting_motion};
+use crate::excitation::{DriveCommandRequest, MotionRequest, exciting_commands, exciting_motion};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -16,8 +16,8 @@ use std::path::PathBuf;
 /// The file has time_s, q1_deg .., dq1_deg_s .., ddq1_deg_s2 .. in even steps.
 ///
 /// With --mjcf commands for simulated drives instead, of which only position and speed are limited: slow reversals, sines, ramps, holds, and another
-/// motion that judges; reported is what each part shows. The file has time_s, traj, use, part, cmd1_rad ..; with the measured angles beside them,
-/// q1_rad .., it is the recording that `diagnose_drives` reads.
+/// motion that judges; reported is what each part shows. The file has time_s, traj, use, part, cmd1_rad ..; with columns of
+/// measured angles, q1_rad .., it is the recording that `diagnose_drives` reads.
 ///
 /// SELF-COLLISION IS NOT CHECKED, nor collision with the cell or torque limits: drive the motion slowly first.
 #[derive(Args)]
@@ -117,7 +117,7 @@ impl ExciteArguments {
         let limits = self.limits.as_ref().map(|limits| limits.0.clone());
         let (csv, document, text) = match (&self.robot, &self.mjcf) {
             (_, Some(mjcf)) => {
-                let proposal = exciting_commands(&CommandsAsked {
+                let proposal = exciting_commands(&DriveCommandRequest {
                     mjcf: mjcf.clone(),
                     joints: self.joints.clone(),
                     seconds: self.seconds.unwrap_or(SECONDS[1]),

@@ -142,11 +142,9 @@ fn remarks_on(torques: &IdentifiedTorques, trajectory: &Trajectory, rows: usize)
         (None, Some(_)) => derived("velocities"),
         (None, None) => derived("velocities and accelerations"),
     };
-    let mut terms = torques.model.terms.iter();
-    let is_warming = terms.any(|term| term.effect == "warmup_friction");
-    let warm = match (is_warming, motion.since_start) {
+    let warm = match (torques.model.follows_time(), motion.since_start) {
         (true, None) => {
-            "friction is that of a warm arm (--since-start says how long ago it began to move)\n"
+            "torques that follow time are those of a warm arm (--since-start: how long ago it began to move)\n"
         }
         _ => "",
     };

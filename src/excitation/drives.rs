@@ -1,4 +1,4 @@
-//! Which commands to send to the drives of a simulated arm, as a file that `diagnose_drives` reads once the measured angles stand beside them.
+//! Commands for the drives of a simulated arm, as a file that `diagnose_drives` reads once columns of measured angles are added.
 
 use super::one_a_joint;
 use crate::drives::excite::{CommandRequest, Commanding, commands};
@@ -8,9 +8,9 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::PathBuf;
 
-/// What is asked; angles in deg. A list of one number holds for all joints.
+/// For which arm commands are wanted, and within which limits; angles in deg. A list of one number holds for all joints.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CommandsAsked {
+pub struct DriveCommandRequest {
     /// The MJCF that is simulated.
     pub mjcf: PathBuf,
     /// Joints of it, in the order of the chain; empty: the first that are one.
@@ -37,7 +37,7 @@ pub struct CommandsProposal {
     mjcf: String,
     /// Joints, in the order of the columns.
     pub joints: Vec<String>,
-    /// What was asked, SI.
+    /// The request, SI.
     pub request: CommandRequest,
     /// The commands.
     pub commands: Commanding,
@@ -45,19 +45,19 @@ pub struct CommandsProposal {
 
 /// What no single recording shows, a sentence each.
 const UNSEEN: [&str; 2] = [
-    "friction that goes as a joint warms up over minutes: send the same commands again when it is warm",
-    "what hangs on the tool apart from the last link: send them with and without it",
+    "warm-up over minutes: send the same commands again when the joints are warm",
+    "payload apart from the last link: send them with and without it",
 ];
 
 /// Commands by which most causes are seen. Fails with the faults of the request.
-pub fn exciting_commands(asked: &CommandsAsked) -> Result<CommandsProposal> {
-    let (arm, all, _) = chain(&asked.mjcf, &asked.joints)?;
+pub fn exciting_commands(wanted: &DriveCommandRequest) -> Result<CommandsProposal> {
+    let (arm, all, _) = chain(&wanted.mjcf, &wanted.joints)?;
     let n = arm.joints.len();
-    let mjcf = asked.mjcf.display().to_string();
+    let mjcf = wanted.mjcf.display().to_string();
     let mut faults = Vec::new();
     let degrees = 1f64.to_radians();
-    let speed = one_a_joint("--speed", &asked.speed, degrees, n, &mut faults);
-    let range: Vec<[f64; 2]> = match &asked.limits {
+    let speed = one_a_joint("--speed", &wanted.speed, degrees, n, &mut faults);
+    let range: Vec<[f64; 2]> = match &wanted.limits {
         Some(limits) if limits.len() == n => {
             limits.iter().map(|one| one.map(f64::to_radians)).collect()
         }
@@ -84,11 +84,11 @@ pub fn exciting_commands(asked: &CommandsAsked) -> Result<CommandsProposal> {
         }
     };
     let inside = |[least, most]: [f64; 2]| {
-        let left = 0.01 * asked.margin * (most - least);
+        let left = 0.01 * wanted.margin * (most - least);
         [least + left, most - left]
     };
     let range: Vec<[f64; 2]> = range.into_iter().map(inside).collect();
-    let home = match &asked.home {
+    let home = match &wanted.home {
         Some(home) => one_a_joint("--home", home, degrees, n, &mut faults),
         None => range
             .iter()
@@ -97,12 +97,12 @@ pub fn exciting_commands(asked: &CommandsAsked) -> Result<CommandsProposal> {
     };
     Error::if_spec(faults)?;
     let request = CommandRequest {
-        rate: asked.rate,
-        seconds: asked.seconds,
+        rate: wanted.rate,
+        seconds: wanted.seconds,
         range,
         home,
         speed,
-        seed: asked.seed,
+        seed: wanted.seed,
     };
     let commands = commands(&request).map_err(super::as_options)?;
     Ok(CommandsProposal {

@@ -50,7 +50,7 @@ pub fn drive_page(
         .map(|row| FollowedFinding {
             effect: &row.effect,
             place: &row.place,
-            follows: followed(&row.effect, &row.statement),
+            follows: row.follows.as_deref().unwrap_or_default(),
             size: MRAD * row.effect_rms_rad.unwrap_or_default(),
         })
         .collect();
@@ -72,68 +72,6 @@ pub fn drive_page(
 
 /// mrad of a rad.
 const MRAD: f64 = 1e3;
-
-/// What drives follow, each with the causes that do.
-const FOLLOWED: [(&str, &[&str]); 8] = [
-    (
-        "own speed",
-        &[
-            "viscous_friction",
-            "coulomb_friction",
-            "asymmetric_friction",
-            "stribeck_friction",
-            "presliding_friction",
-            "drive_damping",
-        ],
-    ),
-    (
-        "load",
-        &[
-            "load_friction",
-            "torque_constant",
-            "torque_limit",
-            "voltage_sag",
-            "backlash",
-            "joint_coupling",
-        ],
-    ),
-    (
-        "own angle",
-        &[
-            "torque_ripple",
-            "cable_stiffness",
-            "link_mass",
-            "link_com",
-            "payload_error",
-            "gravity_direction",
-        ],
-    ),
-    ("acceleration", &["rotor_inertia", "joint_elasticity"]),
-    (
-        "error of the drive",
-        &["drive_gain", "integral_action", "dead_band"],
-    ),
-    ("command", &["command_delay", "command_hold", "speed_limit"]),
-    ("time", &["warmup_friction"]),
-    ("constant", &["command_offset"]),
-];
-/// What a cause without a name follows is the end of its statement.
-const DEPENDS: [(&str, &str); 3] = [
-    ("the angle of the joint", "own angle"),
-    ("the velocity of the joint", "own speed"),
-    ("the load of the joint", "load"),
-];
-
-/// What a finding follows.
-fn followed(effect: &str, statement: &str) -> &'static str {
-    let of_name = |(_, names): &&(&str, &[&str])| names.contains(&effect);
-    let statement = statement.trim_end_matches('.');
-    let depends = DEPENDS.iter().find(|(end, _)| statement.ends_with(end));
-    let named = FOLLOWED.iter().find(of_name).map(|(column, _)| *column);
-    named
-        .or(depends.map(|(_, column)| *column))
-        .unwrap_or_default()
-}
 
 /// Of held-out rows, of all where none are.
 fn pictures(locale: &Locale, course: &DriveCourse, joint: usize, names: &[&str]) -> Value {
@@ -198,19 +136,4 @@ fn speeds(time: &[f64], angle: &[f64]) -> Vec<f64> {
     let rows = 0..time.len();
     rows.map(|row| if row == 0 { None } else { of_row(row) }.unwrap_or_default())
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::followed;
-    use calib_drives::CAUSES;
-
-    #[test]
-    fn every_cause_of_drives_stands_in_a_column() {
-        let named = CAUSES.iter().map(|cause| cause.name);
-        let others: Vec<&str> = named
-            .filter(|name| *name != "unknown" && followed(name, "").is_empty())
-            .collect();
-        assert_eq!(others, Vec::<&str>::new());
-    }
 }

@@ -79,6 +79,17 @@ fn place_order(place: &str) -> (i64, String) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use calib_drives::CAUSES;
+
+    #[test]
+    fn every_cause_of_drives_stands_in_a_column() {
+        let others: Vec<&str> = CAUSES
+            .iter()
+            .filter(|cause| cause.name != "unknown" && !COLUMNS.contains(&cause.follows))
+            .map(|cause| cause.name)
+            .collect();
+        assert_eq!(others, Vec::<&str>::new());
+    }
 
     #[test]
     fn places_go_down_the_chain_and_a_cell_has_all_its_names() {

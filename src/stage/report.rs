@@ -300,7 +300,7 @@ pub struct ReportDrives {
 }
 
 crate::stage! {
-    ReportDrives, "report_drives", 3, "writes one self-contained HTML file: commanded, measured and simulated angles before and after, what was found",
+    ReportDrives, "report_drives", 4, "writes one self-contained HTML file: commanded, measured and simulated angles before and after, what was found",
         ReportDrivesReads -> ReportDrivesWrites {
             document: Document,
         }

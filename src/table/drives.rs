@@ -25,6 +25,7 @@ impl Findings {
             rank,
             effect: finding.effect.into(),
             place: finding.place.clone(),
+            follows: Some(finding.follows.into()),
             statement: finding.statement.clone(),
             delta_bic: Some(finding.delta_bic),
             effect_rms_rad: Some(finding.effect_rms),

@@ -10,10 +10,10 @@ criteria! {
     NAMELESS: f64 = 0.1, "share of the gain", "judgement: a tenth", "changes nothing on 2";
     /// The radius, and the place along the axis, may change by this share of the displacement.
     CONSTANT: f64 = 0.1, "share", "judgement: a tenth", "";
-    /// Held-out rows judge the findings where they are off by this many times the square of what fitted ones are.
-    FAR_OFF: f64 = 2.0, "ratio of squares", "judgement: beyond that something else is there, not a curve that is a little off", "";
-    /// The misfit of a curve without a name is this share of what it explains.
-    NEARLY_RIGHT: f64 = 0.01, "share of the evidence", "judgement: its shape is right to a tenth of its size", "";
+    /// Held-out rows lower probabilities where their mean squared residual is this many times that of the fitted rows.
+    FAR_OFF: f64 = 2.0, "ratio of squares", "judgement: an inexact curve explains less", "";
+    /// The model error of an unnamed finding is this share of its evidence.
+    MODEL_ERROR: f64 = 0.01, "share of the evidence", "judgement: its curve is right to a tenth of its size", "";
     /// Causes of a round that are named.
     NAMED: usize = 4, "causes", "judgement: length of a line", "";
     /// Faults of single rows are seen as such or not at all.

@@ -35,7 +35,7 @@ pub(crate) struct Misfit {
     left_here: f64,
     /// Rms size of what is left at held-out rows that belong, where it is more than what was fitted and the noise allow.
     pub(crate) not_carried: Option<f64>,
-    /// Sum of squares of what is left at `rows`, in standard deviations, and how many values these are.
+    /// Sum of squared residuals of `rows`, in standard deviations, and their number.
     pub(crate) square: f64,
     pub(crate) values: usize,
 }
@@ -150,12 +150,12 @@ impl Misfit {
         }
     }
 
-    /// Whether the model misses `rows` by much more than those that were fitted, not only by a curve that is a little off.
+    /// Whether the residuals of `rows` exceed those of the fitted rows by more than an inexact curve explains.
     pub(crate) fn is_far_off(&self) -> bool {
         self.square / self.values.max(1) as f64 > *FAR_OFF * self.chi_square.max(1.0)
     }
 
-    /// Sum of squares of what another model leaves at `rows`, in standard deviations.
+    /// Sum of squared residuals of another model at `rows`, in standard deviations.
     pub(crate) fn square_of(&self, model: &Model, data: &Measurements) -> f64 {
         let left = left(model, data, self.dimension);
         self.rows.iter().map(|row| left[*row].whitened).sum()

@@ -41,6 +41,8 @@ pub struct DriveFinding {
     pub effect: &'static str,
     /// Where it acts.
     pub place: String,
+    /// The kind of variable that it follows: own speed, own angle, load, acceleration, error of the drive, command, time, constant ..
+    pub follows: &'static str,
     /// A sentence for a person.
     pub statement: String,
     /// Its numbers.
@@ -251,6 +253,7 @@ impl Drives {
         DriveFinding {
             effect: cell.cause.name,
             place: cell.place.clone(),
+            follows: cell.key.variable().unwrap_or(cell.cause.follows),
             statement: sentence(cell),
             parameters,
             effect_rms: (rows.iter().sum::<f64>() / rows.len().max(1) as f64).sqrt(),

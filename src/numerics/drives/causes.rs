@@ -5,8 +5,8 @@ use crate::physics::{Over, Physics};
 use calib_engine::{Cause, Cell, Number, Shape};
 
 macro_rules! causes {
-    ($( $id:ident = $name:literal, $odds:literal, $sentence:literal, [$( $number:literal $unit:literal $log:literal ),*]; )*) => {
-        $( static $id: Cause = Cause { name: $name, sentence: $sentence, log_prior: $odds,
+    ($( $id:ident = $name:literal, $follows:literal, $odds:literal, $sentence:literal, [$( $number:literal $unit:literal $log:literal ),*]; )*) => {
+        $( static $id: Cause = Cause { name: $name, follows: $follows, sentence: $sentence, log_prior: $odds,
             numbers: &[$( Number { name: $number, unit: $unit, by_logarithm: $log } ),*] }; )*
         /// Every cause, a row each.
         pub static CAUSES: &[&Cause] = &[$( &$id ),*];
@@ -14,33 +14,33 @@ macro_rules! causes {
 }
 
 causes! {
-    DELAY = "command_delay", -3.9, "commands reach {} later than simulated", ["delay" "s" false];
-    OFFSET = "command_offset", -3.9, "the zero of the command or of the encoder is off at {}", ["offset" "rad" false];
-    HOLD = "command_hold", -5.3, "{} takes commands more rarely than they are sent", ["period" "s" true];
-    GAIN = "drive_gain", -3.9, "the gain of the drive at {} is another one", ["factor" "1" true];
-    DAMPING = "drive_damping", -3.9, "the damping gain of the drive at {} is another one", ["factor" "1" true];
-    ROTOR = "rotor_inertia", -3.9, "the rotor's inertia at {} is another one", ["factor" "1" true];
-    INTEGRAL = "integral_action", -5.3, "the drive at {} integrates its error", ["ki" "Nm/(rad s)" true, "imax" "Nm" true, "at the beginning" "Nm" false];
-    DEAD_BAND = "dead_band", -5.3, "the drive at {} does not see small errors", ["width" "rad" true];
-    TORQUE_LIMIT = "torque_limit", -5.3, "the drive at {} gives less torque than simulated", ["limit" "Nm" true];
-    SPEED_LIMIT = "speed_limit", -5.3, "the set point at {} moves no faster than a limit", ["limit" "rad/s" true];
-    SAG = "voltage_sag", -5.3, "the supply gives way under the load of all drives: {}", ["share per torque" "1/Nm" false];
-    VISCOUS = "viscous_friction", -3.9, "friction at {} grows with speed", ["b" "Nm s/rad" false];
-    COULOMB = "coulomb_friction", -3.9, "dry friction at {} is another one", ["c" "Nm" false];
-    STRIBECK = "stribeck_friction", -5.3, "friction at {} falls as the joint begins to move", ["s" "Nm" false, "speed" "rad/s" true];
-    LOAD = "load_friction", -5.3, "friction at {} grows with the load", ["driving" "1" false, "driven back" "1" false];
-    PRESLIDING = "presliding_friction", -5.3, "friction at {} bends before it slides", ["travel" "rad" true];
-    WARM_UP = "warmup_friction", -6.2, "friction at {} goes as the joint warms up", ["share of dry friction" "1" false, "share of viscous friction" "1" false, "time constant" "s" true];
-    BACKLASH = "backlash", -5.3, "the gear at {} has play", ["play" "rad" true, "stiffness" "Nm/rad" true];
-    ELASTICITY = "joint_elasticity", -5.3, "the gear at {} yields", ["stiffness" "Nm/rad" true, "damping" "Nm s/rad" true];
-    CABLE = "cable_stiffness", -5.3, "a spring pulls on {}", ["stiffness" "Nm/rad" false, "rest angle" "rad" false];
-    RIPPLE = "torque_ripple", -5.3, "torque at {} comes in waves over the angle", ["cosine" "Nm" false, "sine" "Nm" false, "waves per turn" "1" true];
-    COUPLING = "joint_coupling", -6.2, "the torque of another drive is felt at {}", ["share" "1" false];
-    PAYLOAD = "payload_error", -4.6, "what hangs on the {} is another body", ["mass" "kg" false, "moment x" "kg m" false, "moment y" "kg m" false, "moment z" "kg m" false];
-    MASS = "link_mass", -5.3, "{} has another mass", ["factor" "1" true];
-    CENTRE = "link_com", -5.3, "the mass of {} is elsewhere", ["x" "m" false, "y" "m" false, "z" "m" false];
-    GRAVITY = "gravity_direction", -4.6, "gravity points elsewhere: {} is not level", ["turn x" "rad" false, "turn y" "rad" false];
-    UNKNOWN = "unknown", -6.2, "a torque at {} that no cause of the list makes", [];
+    DELAY = "command_delay", "command", -3.9, "commands reach {} later than simulated", ["delay" "s" false];
+    OFFSET = "command_offset", "constant", -3.9, "the zero of the command or of the encoder is off at {}", ["offset" "rad" false];
+    HOLD = "command_hold", "command", -5.3, "{} takes commands more rarely than they are sent", ["period" "s" true];
+    GAIN = "drive_gain", "error of the drive", -3.9, "the gain of the drive at {} is another one", ["factor" "1" true];
+    DAMPING = "drive_damping", "own speed", -3.9, "the damping gain of the drive at {} is another one", ["factor" "1" true];
+    ROTOR = "rotor_inertia", "acceleration", -3.9, "the rotor's inertia at {} is another one", ["factor" "1" true];
+    INTEGRAL = "integral_action", "error of the drive", -5.3, "the drive at {} integrates its error", ["ki" "Nm/(rad s)" true, "imax" "Nm" true, "at the beginning" "Nm" false];
+    DEAD_BAND = "dead_band", "error of the drive", -5.3, "the drive at {} does not see small errors", ["width" "rad" true];
+    TORQUE_LIMIT = "torque_limit", "load", -5.3, "the drive at {} gives less torque than simulated", ["limit" "Nm" true];
+    SPEED_LIMIT = "speed_limit", "command", -5.3, "the set point at {} moves no faster than a limit", ["limit" "rad/s" true];
+    SAG = "voltage_sag", "load", -5.3, "the supply gives way under the load of all drives: {}", ["share per torque" "1/Nm" false];
+    VISCOUS = "viscous_friction", "own speed", -3.9, "friction at {} grows with speed", ["b" "Nm s/rad" false];
+    COULOMB = "coulomb_friction", "own speed", -3.9, "dry friction at {} is another one", ["c" "Nm" false];
+    STRIBECK = "stribeck_friction", "own speed", -5.3, "friction at {} falls as the joint begins to move", ["s" "Nm" false, "speed" "rad/s" true];
+    LOAD = "load_friction", "load", -5.3, "friction at {} grows with the load", ["driving" "1" false, "driven back" "1" false];
+    PRESLIDING = "presliding_friction", "own speed", -5.3, "friction at {} bends before it slides", ["travel" "rad" true];
+    WARM_UP = "warmup_friction", "time", -6.2, "friction at {} goes as the joint warms up", ["share of dry friction" "1" false, "share of viscous friction" "1" false, "time constant" "s" true];
+    BACKLASH = "backlash", "load", -5.3, "the gear at {} has play", ["play" "rad" true, "stiffness" "Nm/rad" true];
+    ELASTICITY = "joint_elasticity", "acceleration", -5.3, "the gear at {} yields", ["stiffness" "Nm/rad" true, "damping" "Nm s/rad" true];
+    CABLE = "cable_stiffness", "own angle", -5.3, "a spring pulls on {}", ["stiffness" "Nm/rad" false, "rest angle" "rad" false];
+    RIPPLE = "torque_ripple", "own angle", -5.3, "torque at {} comes in waves over the angle", ["cosine" "Nm" false, "sine" "Nm" false, "waves per turn" "1" true];
+    COUPLING = "joint_coupling", "load", -6.2, "the torque of another drive is felt at {}", ["share" "1" false];
+    PAYLOAD = "payload_error", "own angle", -4.6, "what hangs on the {} is another body", ["mass" "kg" false, "moment x" "kg m" false, "moment y" "kg m" false, "moment z" "kg m" false];
+    MASS = "link_mass", "own angle", -5.3, "{} has another mass", ["factor" "1" true];
+    CENTRE = "link_com", "own angle", -5.3, "the mass of {} is elsewhere", ["x" "m" false, "y" "m" false, "z" "m" false];
+    GRAVITY = "gravity_direction", "own angle", -4.6, "gravity points elsewhere: {} is not level", ["turn x" "rad" false, "turn y" "rad" false];
+    UNKNOWN = "unknown", "", -6.2, "a torque at {} that no cause of the list makes", [];
 }
 
 /// What the simulation as it is does at a joint: sizes of what is usual.

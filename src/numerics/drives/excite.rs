@@ -50,27 +50,27 @@ const PARTS: [(&str, f64, &str); 5] = [
     (
         "slow",
         0.35,
-        "dry friction and how it falls with speed, grows with load and bends before it slides; play; springs and waves over the angle",
+        "friction over speed and load, presliding, backlash, springs, ripple",
     ),
     (
         "sines",
         0.2,
-        "inertia of rotors, gains and damping of drives, viscous friction, delay, gears that yield, torque of another joint",
+        "inertia, gains, damping, viscous friction, delay, elasticity, coupling",
     ),
     (
         "ramps",
         0.15,
-        "limits of torque and speed, delay and hold of commands, a supply that gives way",
+        "limits of torque and speed, delay and hold of commands, voltage sag",
     ),
     (
         "holds",
         0.15,
-        "zeros, masses and gravity, dead bands, integrals of the error",
+        "offsets, masses, gravity, dead bands, integral action",
     ),
     (
         "judge",
         0.15,
-        "another motion, which is not fitted: its error is that of the simulation",
+        "another motion, held out: its error is that of the simulation",
     ),
 ];
 

@@ -35,7 +35,7 @@ const STANDS: Patience = Patience {
 /// Times what a linear step promises that a fit may still gain.
 const REACH: f64 = 3.0;
 
-/// Share of its effect, rms, by which the form of a cause may err, and in how many independent ways: friction, gears and integrators of real
+/// Model error of a cause, a share of the rms of its effect, and its degrees of freedom: friction, gears and integrators of real
 /// arms follow no formula to a hundredth.
 const FORM_ERRS: f64 = 0.02;
 const WAYS: f64 = 10.0;
@@ -57,7 +57,7 @@ pub struct DriveFit {
     pub independence: f64,
     /// The same from the residual of a rich model, the largest estimate so far.
     pub rich: f64,
-    /// By joint, times that the noise is larger by what the forms of the causes may err.
+    /// By joint, the factor by which the model error of the causes increases the noise.
     pub doubt: Vec<f64>,
     /// Squared distance of all numbers from where they are expected, in their usual sizes.
     pub penalty: f64,
@@ -308,8 +308,8 @@ impl Drives {
         };
     }
 
-    /// By joint, times that the noise is larger by what the causes of a fit may err there: a share of their effect, in a few independent ways
-    /// where noise errs in as many as there are independent rows.
+    /// By joint, the factor by which the model error of a fit's causes increases the noise: a share of their effect with few degrees of
+    /// freedom, where noise has as many as there are independent rows.
     fn doubt(&self, fit: &DriveFit) -> Vec<f64> {
         let n = self.chain.joints();
         if fit.set.is_empty() {

@@ -265,6 +265,23 @@ impl Key {
         Some(format!("{kind} over {what}"))
     }
 
+    /// The kind of variable that a torque without a name follows; nothing of one that has a name.
+    pub(crate) fn variable(self) -> Option<&'static str> {
+        let Self::Unknown(joint, over, _) = self else {
+            return None;
+        };
+        let of = |by: usize, own: &'static str, other: &'static str| match by == joint {
+            true => own,
+            false => other,
+        };
+        Some(match over {
+            Over::Angle(by) => of(by, "own angle", "other angle"),
+            Over::Speed(by) | Over::Velocity(by) => of(by, "own speed", "other speed"),
+            Over::Acceleration(_) => "acceleration",
+            Over::Time => "time",
+        })
+    }
+
     /// Whether two cells exclude each other: they set the same field of the physics.
     pub fn excludes(self, other: Self) -> bool {
         match (self, other) {

@@ -182,7 +182,7 @@ impl Drives {
         rows.filter(|row| !self.recording.held_out[*row])
     }
 
-    /// Squared residual of a fit's rows, joint by joint, whitened by the noise and by what its forms may err.
+    /// Squared residual of a fit's rows, joint by joint, whitened by noise and model error.
     pub(crate) fn squares(&self, fit: &DriveFit) -> Vec<f64> {
         let squares = self.noise_squares(&fit.angles).into_iter();
         squares

@@ -67,6 +67,37 @@ fn a_law_of_a_users_own_is_found_with_its_size_and_shape_and_stays_in_the_model(
         .expect("a term");
     assert_eq!(term.declared.as_ref(), Some(&law));
     assert!(term.names().is_ok());
+    // Of a law over time nobody knows the torque unless it is known how long ago the arm began to move.
+    let over_time = crate::effect::EffectDeclaration {
+        name: "drift".into(),
+        place: "joint".into(),
+        law: crate::effect::Laws(vec!["time".into()]),
+        ..Default::default()
+    };
+    let mut model = diagnosis.model.clone();
+    model.terms = vec![TorqueTerm {
+        effect: "drift".into(),
+        declared: crate::effect::DeclaredTorque::of(&over_time).ok(),
+        shape: Vec::new(),
+        coefficients: vec![1.0],
+        ..term.clone()
+    }];
+    model.covariance.clear();
+    let joints = model.joints();
+    let rows = 0..20;
+    let mut motion = PlannedMotion {
+        joints,
+        time: rows.clone().map(|row| 0.01 * f64::from(row)).collect(),
+        position: vec![0.0; joints * rows.len()],
+        velocity: None,
+        acceleration: None,
+        temperature: None,
+        since_start: None,
+    };
+    let refused = model.needed(&arm(), &motion).unwrap_err();
+    assert!(refused.to_string().contains("follows time"), "{refused}");
+    motion.since_start = Some(5.0);
+    assert!(model.needed(&arm(), &motion).is_ok());
 }
 
 #[test]

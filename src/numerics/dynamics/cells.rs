@@ -75,7 +75,7 @@ impl<'a> CauseChoice<'a> {
             && (cause.is_possible)(form, &values())
     }
 
-    /// Whether a form may not stand beside another: a name once at a place, and one curve of speed.
+    /// Whether two forms exclude each other: a name once at a place, and one curve of speed.
     pub(super) fn excludes(&self, number: usize, other: usize) -> bool {
         let [form, known] = [number, other].map(|number| self.form(number));
         let is_same = form.is_called_as(known)

@@ -75,6 +75,18 @@ impl TorqueModel {
         }
         let places = self.places()?;
         let forms = &places.forms;
+        if motion.since_start.is_none()
+            && let Some(law) = forms
+                .iter()
+                .filter_map(|form| form.cause.declared)
+                .find(|law| law.asks_time())
+        {
+            let message = format!(
+                "the law `{}` of the model follows time: state how long ago the arm began to move (--since-start)",
+                law.declaration().name
+            );
+            return Err(Error::data("motion", message));
+        }
         let mut scene = self.scene(arm, motion);
         let declared = match &scene.declared {
             Some(declared) => scene.torques_of(&declared.theta),

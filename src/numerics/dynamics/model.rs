@@ -179,6 +179,13 @@ pub(super) struct CovariancePlaces {
 }
 
 impl TorqueModel {
+    /// Whether a torque of it follows time, so that it depends on how long ago the arm began to move.
+    pub fn follows_time(&self) -> bool {
+        let forms = self.terms.iter().filter_map(|term| term.form().ok());
+        let mut follow = forms.map(|form| (form.cause.follows)(&form));
+        follow.any(|variable| variable == "time")
+    }
+
     /// Where the numbers of its terms stand in the covariance. Fails where no cause has a term's name.
     pub(super) fn places(&self) -> Result<CovariancePlaces> {
         let forms = self.terms.iter().map(|term| term.form());

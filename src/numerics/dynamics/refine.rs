@@ -51,8 +51,8 @@ fn refine_at(
 /// Rounds of grids from the best start of a law of a user's own.
 const OWN_ROUNDS: usize = 2;
 
-/// Lists laws of a user's own also in the shape in which each explains most at its joint beside what hardly an arm is without: a law between its
-/// starts would look like a sum of others. Products that were formed before are those of other columns then.
+/// Lists laws of a user's own also in the shape in which each explains most at its joint in addition to viscous and Coulomb friction: a law
+/// between its starts would look like a sum of others. Products that were formed before are those of other columns then.
 pub(super) fn list_own_shapes(problem: &mut TorqueProblem, mut weighted: WeightedColumns) {
     let listed = problem.all.listed;
     let forms = problem.all.forms[..listed].to_vec();

@@ -234,8 +234,8 @@ fn options() -> Options {
     }
 }
 
-/// The best set from what hardly an arm is without. One factor on the whole torque of each joint is asked before masses: where factors explain as
-/// much, it is these.
+/// The best set from viscous and Coulomb friction of every joint. One factor on the whole torque of each joint is tried before masses, and preferred where it
+/// explains as much.
 pub(super) fn from_common(choice: &CauseChoice) -> Vec<usize> {
     let table = TorqueTable::new(choice);
     let is_drive = |form: &TorqueForm| form.cause.name == TORQUE_CONSTANT;

@@ -20,6 +20,8 @@ pub use search::{Answer, Options, diagnose, dropped, findings};
 pub struct Cause {
     /// In tables and JSON.
     pub name: &'static str,
+    /// The kind of variable that it follows: own speed, load, time ..; empty where each cell has its own.
+    pub follows: &'static str,
     /// What it does at a place `{}`, for a person.
     pub sentence: &'static str,
     /// Its numbers.
@@ -33,6 +35,7 @@ impl Cause {
     pub const fn named(name: &'static str) -> Self {
         Self {
             name,
+            follows: "",
             sentence: "",
             numbers: &[],
             log_prior: 0.0,
@@ -176,7 +179,7 @@ pub trait Problem: Sync {
     fn odds(&self, _fit: &Self::Fit, _member: usize, _independence: f64) -> Option<f64> {
         None
     }
-    /// Whether two cells in their shapes do the same in these rows' words, so that one must not stand beside the other.
+    /// Whether two cells in their shapes exclude each other: both change the same term of the model.
     fn excludes(&self, _one: &Accepted<Self::Key>, _other: &Accepted<Self::Key>) -> bool {
         false
     }

@@ -30,7 +30,6 @@ pub(crate) use generated::places;
 pub use given::{CellAnswer, GivenCell};
 pub(crate) use given::{answers, given_causes};
 pub(crate) use listed::forms_of;
-pub use search::ComponentSearch;
 pub use size::rms_size;
 pub use state::KnownState;
 

@@ -12,26 +12,9 @@ use crate::criteria::cells::{
 use crate::effect::{Form, Variable, names};
 use std::collections::BTreeSet;
 
-/// A search for what rows show, of components each with its evidence given all others.
-pub trait ComponentSearch {
-    /// What is found.
-    type Component: Clone;
-
-    /// ln of the odds below which a component leaves.
-    fn least(&self) -> f64;
-    /// The standard deviation of the noise given some components, over what is stated.
-    fn noise(&self, components: &[Self::Component]) -> f64;
-    /// ln of the odds of a component given all others, at a noise; none of one that others need.
-    fn odds(&self, components: &[Self::Component], place: usize, noise: f64) -> Option<f64>;
-    /// What pays most given some components, if anything does.
-    fn best(&mut self, components: &[Self::Component]) -> Option<Self::Component>;
-    /// Components after the last of them has come.
-    fn with_newest(&mut self, components: Vec<Self::Component>) -> Vec<Self::Component>;
-    /// All components anew.
-    fn anew(&mut self, components: Vec<Self::Component>) -> Vec<Self::Component>;
-
+impl CauseTable<'_, '_> {
     /// Adds components while they pay.
-    fn add(&mut self, mut components: Vec<Self::Component>) -> Vec<Self::Component> {
+    pub(crate) fn add(&mut self, mut components: Vec<Component>) -> Vec<Component> {
         while let Some(best) = self.best(&components) {
             components.push(best);
             components = self.with_newest(components);
@@ -40,39 +23,33 @@ pub trait ComponentSearch {
     }
 
     /// Drops components that no longer pay.
-    fn prune(&mut self, mut components: Vec<Self::Component>) -> Vec<Self::Component> {
+    pub(crate) fn prune(&mut self, mut components: Vec<Component>) -> Vec<Component> {
         while !components.is_empty() {
             let noise = self.noise(&components);
-            let odds = (0..components.len())
-                .filter_map(|place| Some((place, self.odds(&components, place, noise)?)));
+            let odds =
+                (0..components.len()).map(|place| (place, self.odds(&components, place, noise)));
             match odds.min_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some((place, odds)) if odds <= self.least() => _ = components.remove(place),
+                Some((place, odds)) if odds <= *LEAVES => _ = components.remove(place),
                 _ => break,
             }
             components = self.anew(components);
         }
         components
     }
-}
 
-impl ComponentSearch for CauseTable<'_, '_> {
-    type Component = Component;
-
-    fn least(&self) -> f64 {
-        *LEAVES
-    }
-
+    /// The standard deviation of the noise given some components, over what is stated.
     fn noise(&self, components: &[Component]) -> f64 {
         self.state(components, None).kappa
     }
 
-    fn odds(&self, components: &[Component], i: usize, kappa: f64) -> Option<f64> {
+    /// ln of the odds of a component given all others, at a noise.
+    fn odds(&self, components: &[Component], i: usize, kappa: f64) -> f64 {
         let state = self.state(&without(components, &[i]), Some(kappa));
         let prior = self.log_prior(components[i].cell, &state.components);
-        Some(prior + self.log_evidence(&components[i], &state))
+        prior + self.log_evidence(&components[i], &state)
     }
 
-    /// What is smaller than the second order of what this round has found already waits for the next round, which is around a model that has
+    /// What pays most given some components, if anything does. What is smaller than the second order of what this round has found already waits for the next round, which is around a model that has
     /// that in it.
     fn best(&mut self, components: &[Component]) -> Option<Component> {
         let state = self.state(components, None);
@@ -112,12 +89,11 @@ impl ComponentSearch for CauseTable<'_, '_> {
         self.backfit_some(components, &some, 1)
     }
 
+    /// All components anew.
     fn anew(&mut self, components: Vec<Component>) -> Vec<Component> {
         self.backfit(components, 2)
     }
-}
 
-impl CauseTable<'_, '_> {
     /// Every component anew given all others: shape and amplitude.
     pub(crate) fn backfit(&mut self, components: Vec<Component>, rounds: usize) -> Vec<Component> {
         let all = (0..components.len()).collect::<Vec<_>>();

@@ -1,20 +1,20 @@
-//! What speaks against the name of a finding: the held-out rows, which judge how probable it is and choose nothing, and a curve without a name
-//! beside it that is only nearly right.
+//! Evidence against findings: held-out rows, which lower their probabilities and choose nothing, and the model error of unnamed findings.
 
 use super::LastRound;
-use crate::criteria::words::NEARLY_RIGHT;
+use crate::criteria::words::MODEL_ERROR;
 use crate::effect::names;
 use crate::misfit::Misfit;
 use crate::table::FoundCell;
 
-/// Lowers the probabilities of findings by what speaks against them; names, numbers and model stay.
-pub(super) fn weigh(last: &mut LastRound, misfit: &Misfit) {
+/// Lowers the probabilities of findings by the evidence against them; names, numbers and model stay. Tells whether held-out rows contradict one.
+pub(super) fn weigh(last: &mut LastRound, misfit: &Misfit) -> bool {
     let held_out = by_held_out_rows(last, misfit);
-    let beside = beside_nameless(&last.answer.found);
+    let model_error = by_model_error(&last.answer.found);
     let found = last.answer.found.iter_mut();
-    for ((found, held_out), beside) in found.zip(held_out).zip(beside) {
-        doubt(found, held_out.min(0.0) + beside);
+    for ((found, held_out), model_error) in found.zip(&held_out).zip(model_error) {
+        doubt(found, held_out.min(0.0) + model_error);
     }
+    held_out.iter().any(|log_ratio| *log_ratio < 0.0)
 }
 
 /// Multiplies the odds of a finding by a likelihood ratio of at most one, given as its ln.
@@ -27,8 +27,8 @@ fn doubt(found: &mut FoundCell, log_ratio: f64) {
     }
 }
 
-/// ln of the likelihood ratio of the held-out rows with each finding and without it, everything else fitted anew, the noise being what is left
-/// of them. Zero where the model is nearly what was recorded there.
+/// ln of the likelihood ratio of the held-out rows with each finding and without it, all else fitted anew, with the variance of their
+/// residuals as that of the noise. Zero where the model predicts these rows nearly as well as the fitted ones.
 fn by_held_out_rows(last: &LastRound, misfit: &Misfit) -> Vec<f64> {
     let (fitter, state) = (last.view.fitter, &last.state);
     let log_ratio = |found: &FoundCell| {
@@ -47,14 +47,14 @@ fn by_held_out_rows(last: &LastRound, misfit: &Misfit) -> Vec<f64> {
     }
 }
 
-/// ln of what the misfit of curves without a name takes of the evidence of each named finding, where it takes all of that; else zero.
-fn beside_nameless(found: &[FoundCell]) -> Vec<f64> {
+/// Of each named finding ln of its evidence less the model error of the unnamed ones, where that is more than all of it; else zero.
+fn by_model_error(found: &[FoundCell]) -> Vec<f64> {
     let is_nameless = |found: &&FoundCell| found.effect == names::UNKNOWN;
     let nameless: f64 = found.iter().filter(is_nameless).map(|one| one.log).sum();
-    let taken = *NEARLY_RIGHT * nameless;
+    let error = *MODEL_ERROR * nameless;
     let of_one = |one: &FoundCell| match one.effect == names::UNKNOWN {
         true => 0.0,
-        false => one.log - taken,
+        false => one.log - error,
     };
     found.iter().map(|one| of_one(one).min(0.0)).collect()
 }

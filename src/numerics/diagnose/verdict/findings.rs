@@ -52,8 +52,7 @@ pub(super) fn findings(
 /// at its place, or a trace of the largest of all, is a misfit of their shapes. So is, as long as the residual exceeds the noise, whatever is
 /// weaker at the place of a finding without a name.
 fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Vec<usize>)> {
-    let mut found = last.answer.found.clone();
-    name_repeated_steps(&mut found);
+    let found = last.answer.found.clone();
     let sized = |found: FoundCell| (size(last, &found.members), found, Vec::new());
     let mut all: Vec<(f64, FoundCell, Vec<usize>)> = found.into_iter().map(sized).collect();
     let logs = last.answer.found.iter().map(|found| found.log);
@@ -96,7 +95,7 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
 
 /// Every cause is searched once. A second step of the same cause (a tool that was taken off twice) is therefore found as unknown, with that cause
 /// as its likeliest rival: it gets the name of the cause.
-fn name_repeated_steps(all: &mut [FoundCell]) {
+pub(super) fn name_repeated_steps(all: &mut [FoundCell]) {
     let named: Vec<(&'static str, Place)> = all
         .iter()
         .map(|found| (found.effect, found.place))

@@ -14,7 +14,7 @@ use crate::robot::NoiseBasis;
 use crate::round::{FitState, Fitter};
 use crate::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
 use crate::words::{Ground, hidden, slower_than_noise, statement};
-use findings::findings;
+use findings::{findings, name_repeated_steps};
 use not_observable::{next, not_observable, not_tried, stand_out_in_number};
 use std::collections::BTreeMap;
 
@@ -39,7 +39,8 @@ pub(crate) fn conclude(mut last: LastRound, before: &[Option<f64>]) -> Diagnosis
         &model,
         state.fitted.singular.len(),
     );
-    doubts::weigh(&mut last, &misfit);
+    name_repeated_steps(&mut last.answer.found);
+    let contradicted = doubts::weigh(&mut last, &misfit);
     let state = &last.state;
     let basis = basis(fitter, &state.screening.kept);
     // Repeats know the noise: what poses leave beyond it is no noise, even without structure.
@@ -81,6 +82,7 @@ pub(crate) fn conclude(mut last: LastRound, before: &[Option<f64>]) -> Diagnosis
             "held-out points are off by more than the fitted ones and the noise allow: something differs there \
              (another time, another region) that the fitted points do not show"
         }),
+        contradicted.then_some("held-out points are predicted better without some of the findings, which makes these less probable"),
     ];
     let signature = signature(&last, something_left, remarks);
     let mut not_observable = not_observable(last.survey, &last.view.problem.reach());
@@ -210,7 +212,7 @@ fn verdict(
 }
 
 /// The pattern of the residual, where it is not noise, and what else supports it.
-fn signature(last: &LastRound, something_left: bool, remarks: [Option<&str>; 2]) -> Option<String> {
+fn signature(last: &LastRound, something_left: bool, remarks: [Option<&str>; 3]) -> Option<String> {
     let next = last.answer.next.as_deref().filter(|_| something_left);
     let parts: Vec<&str> = next
         .into_iter()

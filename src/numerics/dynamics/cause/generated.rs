@@ -7,7 +7,7 @@ use crate::recording::ends;
 use crate::scene::DynamicScene;
 use std::f64::consts::PI;
 
-/// What a curve is over, as `with` holds it beside a joint.
+/// Variables of a curve, the first number of `with`; the second is the other joint of `ANGLE`.
 const LOAD: usize = 0;
 const ANGLE: usize = 1;
 const TIME: usize = 2;
@@ -18,8 +18,9 @@ const DRIFT: usize = 2;
 /// C over which a temperature must change.
 const LEAST_WARMTH: f64 = 1.0;
 
-/// A curve of the load of a joint, of the angle of another one, of time or of temperature: half waves over the variable's range, which stay
-/// what they are beyond it; the constant is an offset. Shape: the ends of the range, and noughts, by which it is told from others.
+/// A curve of the load of a joint, of the angle of another one, of time or of temperature: half waves over the variable's range, constant
+/// beyond it; the constant is an offset. Shape: the ends of the range, then zeros: a stored model identifies the cause by the number of shape
+/// values.
 pub(super) static OVER_ROWS: TorqueCause = TorqueCause {
     name: UNKNOWN,
     follows: |form| match form.with[0] {
@@ -83,7 +84,7 @@ pub(super) static OVER_ROWS: TorqueCause = TorqueCause {
     ..PLAIN
 };
 
-/// Friction over the temperature. Shape: the ends of its range, and noughts.
+/// Friction over the temperature. Shape: the ends of its range, then zeros.
 pub(super) static DRY_OVER_TEMPERATURE: TorqueCause = TorqueCause {
     name: UNKNOWN,
     follows: |_| "temperature",
@@ -113,7 +114,7 @@ pub(super) static DRY_OVER_TEMPERATURE: TorqueCause = TorqueCause {
     ..PLAIN
 };
 
-/// A form with the range of its variable and so many numbers in all; none where the variable hardly changes.
+/// A form with the range of its variable, padded with zeros to so many shape values; none where the variable does not change.
 fn ranged(form: TorqueForm, scene: &DynamicScene, numbers: usize) -> Option<TorqueForm> {
     let values = (0..scene.rows()).filter_map(|row| over(&form, scene, row));
     let [least, most] = ends(values);

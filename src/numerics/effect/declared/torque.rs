@@ -118,11 +118,21 @@ impl DeclaredTorque {
 
     /// Whether a formula asks for a load.
     pub fn asks_load(&self) -> bool {
-        let is_load = |part: &Formula| matches!(part, Formula::Row(quantity) if matches!(quantity.asked.1, Variable::Load { .. }));
-        self.laws.iter().any(|law| law.any(is_load))
+        self.asks(|variable| matches!(variable, Variable::Load { .. }))
     }
 
-    /// The value of a formula (from 0) at a joint of an arm of so many, by what a row says; `None` where it is no number.
+    /// Whether a formula asks for time.
+    pub fn asks_time(&self) -> bool {
+        self.asks(|variable| matches!(variable, Variable::Time))
+    }
+
+    fn asks(&self, is_it: fn(&Variable) -> bool) -> bool {
+        let asks =
+            |part: &Formula| matches!(part, Formula::Row(quantity) if is_it(&quantity.asked.1));
+        self.laws.iter().any(|law| law.any(asks))
+    }
+
+    /// The value of a formula (from 0) for a joint, given the number of joints and the variables of a row; `None` where it is no number.
     pub fn value(
         &self,
         law: usize,
