@@ -94,7 +94,7 @@ pub(super) struct ExciteArguments {
     /// Writes the motion to this file, delimited text
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Prints one JSON document on stdout, with the motion
+    /// Prints one JSON document on stdout, with the motion or the commands
     #[arg(long)]
     json: bool,
 }

@@ -160,7 +160,7 @@ impl CommandsProposal {
         text
     }
 
-    /// The same as one JSON document, without the commands.
+    /// The same as one JSON document, with the commands, a list of joints a row.
     pub(crate) fn document(&self) -> Value {
         let parts = self.commands.parts.iter().map(|part| {
             json!({ "name": part.name, "shows": part.shows, "rows": [part.rows.start, part.rows.end] })
@@ -169,6 +169,7 @@ impl CommandsProposal {
             "robot": self.mjcf, "joints": self.joints, "seconds": self.request.seconds, "rate_hz": self.request.rate,
             "seed": self.request.seed, "home_rad": self.request.home, "range_rad": self.request.range, "speed_rad_s": self.request.speed,
             "parts": parts.collect::<Vec<_>>(), "will_not_show": UNSEEN,
+            "command_rad": self.commands.command.chunks(self.joints.len()).collect::<Vec<_>>(),
         })
     }
 }
