@@ -1,6 +1,6 @@
 //! What the sums of a fleet mean: causes of groups with their size, spread and trend; robots that lack one, or have another size, or one alone.
 
-use super::cause_sums::{CellTotal, GroupSums, each};
+use super::cause_sums::{CellSays, CellTotal, GroupSums, each};
 use super::ledger::{Ending, RobotRecord};
 use super::round::Round;
 use super::{Fleet, Ledger};
@@ -40,11 +40,11 @@ pub(super) fn of(
     let mut sums: BTreeMap<String, GroupSums> = BTreeMap::new();
     let mut sized: BTreeMap<(String, String), Vec<FleetCellRow>> = BTreeMap::new();
     let mut follows: BTreeMap<String, String> = BTreeMap::new();
-    each(fleet, ledger, records, &mut |robot, rows| {
+    each(fleet, ledger, records, &mut |robot, cells| {
         let group = round.by.of(&robot.groups).to_string();
         let given = round.groups.get(&group).map_or(&[][..], Vec::as_slice);
-        sums.entry(group.clone()).or_default().add(rows, given);
-        for row in rows {
+        sums.entry(group.clone()).or_default().add(cells, given);
+        for CellSays { row, .. } in cells {
             let Some(sigma) = row.sigma else { continue };
             follows
                 .entry(row.cell.clone())

@@ -1,13 +1,16 @@
-//! Log evidence summed over the robots of a group: a robot may lack a cause, and what is one in one robot alone is none of the group.
+//! Log evidence summed over the robots of a group at each amplitude, since robots of a model share the size of a cause: a robot may lack it, and
+//! what is one in one robot alone is none of the group.
 
 use super::ledger::{Ledger, RobotRecord};
 use super::{Fleet, FleetRobot};
-use crate::criteria::fleet::LEAST_EVIDENCE;
-use crate::error::Result;
-use crate::stage::Given;
-use crate::table::{CellEvidence, CellEvidenceRow, Table};
+use crate::criteria::fleet::{LEAST_EVIDENCE, WRITTEN};
+use crate::effect::names;
+use crate::error::{Error, Result};
+use crate::stage::{Given, STEPS, amplitude_step};
+use crate::table::{CellAmplitudeRow, CellAmplitudes, CellEvidence, CellEvidenceRow, Table};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 /// Robots whose tables are in memory at once.
 const CHUNK: usize = 64;
@@ -24,10 +27,65 @@ fn shares() -> impl Iterator<Item = f64> + Clone {
     (1..=SHARES).map(|k| k as f64 / SHARES as f64)
 }
 
-fn log_mean(logs: impl Iterator<Item = f64> + Clone) -> f64 {
-    let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);
-    let count = logs.clone().count() as f64;
-    most + (logs.map(|log| (log - most).exp()).sum::<f64>() / count).ln()
+/// ln of what robots contribute at each amplitude and share.
+type Grid = [[f64; SHARES]; STEPS];
+
+/// What a robot contributes by its log evidence at each amplitude.
+fn grid_of(at: &[f64; STEPS]) -> Grid {
+    let mut grid = [[0.0; SHARES]; STEPS];
+    for (row, log) in grid.iter_mut().zip(at) {
+        for (value, share) in row.iter_mut().zip(shares()) {
+            *value = mixed(*log, share);
+        }
+    }
+    grid
+}
+
+/// ln of the mean over all amplitudes and shares.
+fn log_mean(grid: &Grid) -> f64 {
+    let most = grid
+        .as_flattened()
+        .iter()
+        .copied()
+        .fold(f64::NEG_INFINITY, f64::max);
+    let whole: f64 = grid
+        .as_flattened()
+        .iter()
+        .map(|log| (log - most).exp())
+        .sum();
+    most + (whole / (STEPS * SHARES) as f64).ln()
+}
+
+/// What a cell contributes of which no row is written, with a name or else: one column that hides nothing, so well seen that it is just not
+/// written.
+static UNWRITTEN: LazyLock<[Grid; 2]> = LazyLock::new(|| {
+    (*WRITTEN).map(|limit| {
+        // Up to an amplitude that the rows just see ln of the evidence is 0, beyond it falls by one for each e-fold.
+        let nothing = |seen: f64| -> [f64; STEPS] {
+            let beyond = |k: usize| 2.0 * (k as f64 - seen) * amplitude_step();
+            std::array::from_fn(|k| -0.5 * beyond(k).exp().ln_1p())
+        };
+        let is_less = |at: &[f64; STEPS]| {
+            at.iter().map(|log| log.exp()).sum::<f64>() < STEPS as f64 * limit.exp()
+        };
+        let (mut low, mut high) = (-(STEPS as f64), STEPS as f64);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            match is_less(&nothing(middle)) {
+                true => low = middle,
+                false => high = middle,
+            }
+        }
+        grid_of(&nothing(low))
+    })
+});
+
+/// What a cell, or a shape of it, says of a robot.
+#[derive(Debug, Clone)]
+pub(super) struct CellSays {
+    pub(super) row: CellEvidenceRow,
+    /// ln of its evidence at each amplitude.
+    pub(super) at: [f64; STEPS],
 }
 
 /// What a cell, or one of its shapes, says of a group.
@@ -37,12 +95,14 @@ pub(super) struct Sum {
     pub(crate) place: String,
     pub(crate) follows: String,
     pub(crate) log_prior: f64,
-    /// At each share, over that of robots of which no more is known than the least.
-    logs: [f64; SHARES],
-    /// Of the robot in which it is plainest.
-    strongest: f64,
-    /// Sizes weighed by how plain they are, and the weights.
-    sized: (f64, f64),
+    /// Over that of robots of which no row is written.
+    grid: Box<Grid>,
+    /// What robots contribute of which no row is written.
+    unwritten: &'static Grid,
+    /// What the robot in which it is plainest contributes, and its log evidence.
+    strongest: (f64, Box<Grid>),
+    /// Sum of ln of what a unit of amplitude is in the unit of the sizes, and of how many robots.
+    unit: (f64, f64),
     /// Robots, and sums of what its log evidence is less than that of the cell in whose place it is asked: differences, their squares.
     less: [f64; 3],
     /// Sums of that cell's log evidence in the same robots, and of its square.
@@ -53,21 +113,24 @@ pub(super) struct Sum {
 
 impl Sum {
     fn new(row: &CellEvidenceRow) -> Self {
+        let has_name = row.shape.is_empty() && row.effect != names::UNKNOWN;
+        let unwritten = &UNWRITTEN[usize::from(!has_name)];
         Self {
             effect: row.effect.clone(),
             place: row.place.clone(),
             follows: row.follows.clone(),
             log_prior: row.log_prior,
-            logs: [0.0; SHARES],
-            strongest: *LEAST_EVIDENCE,
-            sized: (0.0, 0.0),
+            grid: Box::new([[0.0; SHARES]; STEPS]),
+            unwritten,
+            strongest: (*LEAST_EVIDENCE, Box::new(*unwritten)),
+            unit: (0.0, 0.0),
             less: [0.0; 3],
             owner: [0.0; 2],
             found: 0,
         }
     }
 
-    fn add(&mut self, row: &CellEvidenceRow, owner: f64) {
+    fn add(&mut self, CellSays { row, at }: &CellSays, owner: f64) {
         let log = row.log_evidence.max(*LEAST_EVIDENCE);
         let less = owner - log;
         for (sum, value) in self.less.iter_mut().zip([1.0, less, less * less]) {
@@ -76,27 +139,47 @@ impl Sum {
         self.found += usize::from(row.given.is_empty() && row.sigma.is_some());
         self.owner[0] += owner;
         self.owner[1] += owner * owner;
-        for (sum, share) in self.logs.iter_mut().zip(shares()) {
-            *sum += mixed(log, share) - mixed(*LEAST_EVIDENCE, share);
+        let grid = grid_of(at);
+        let new = grid
+            .as_flattened()
+            .iter()
+            .zip(self.unwritten.as_flattened());
+        for (sum, (value, unwritten)) in self.grid.as_flattened_mut().iter_mut().zip(new) {
+            *sum += value - unwritten;
         }
-        self.strongest = self.strongest.max(log);
-        let weight = 1.0 / (1.0 + (-log).exp());
-        self.sized.0 += weight * row.size.max(1e-6).ln();
-        self.sized.1 += weight;
+        if log > self.strongest.0 {
+            self.strongest = (log, Box::new(grid));
+        }
+        if row.sigma.is_none() && row.size > 0.0 {
+            let likeliest = (0..STEPS).max_by(|a, b| at[*a].total_cmp(&at[*b]));
+            self.unit.0 += row.size.ln() - likeliest.unwrap_or(0) as f64 * amplitude_step();
+            self.unit.1 += 1.0;
+        }
+    }
+
+    /// At each amplitude and share, of so many robots.
+    fn of_all(&self, robots: usize) -> Grid {
+        let mut all = *self.grid;
+        let unwritten = self.unwritten.as_flattened();
+        for (sum, one) in all.as_flattened_mut().iter_mut().zip(unwritten) {
+            *sum += robots as f64 * one;
+        }
+        all
     }
 
     /// ln of the evidence for it over that of nothing, of so many robots.
     pub(crate) fn total(&self, robots: usize) -> f64 {
-        let at = |(log, share): (&f64, f64)| log + robots as f64 * mixed(*LEAST_EVIDENCE, share);
-        log_mean(self.logs.iter().zip(shares()).map(at))
+        log_mean(&self.of_all(robots))
     }
 
     /// The same without the robot in which it is plainest.
     pub(crate) fn of_the_others(&self, robots: usize) -> f64 {
-        let at = |(log, share): (&f64, f64)| {
-            log + robots as f64 * mixed(*LEAST_EVIDENCE, share) - mixed(self.strongest, share)
-        };
-        log_mean(self.logs.iter().zip(shares()).map(at))
+        let mut all = self.of_all(robots);
+        let strongest = self.strongest.1.as_flattened();
+        for (sum, one) in all.as_flattened_mut().iter_mut().zip(strongest) {
+            *sum -= one;
+        }
+        log_mean(&all)
     }
 
     /// Variance of the sum of what it says less than its owner, whose sums over so many robots are given, by the scatter from robot to robot.
@@ -110,9 +193,18 @@ impl Sum {
         (square - sum * sum / count.max(1.0)).max(0.0)
     }
 
-    /// A usual size, in its unit.
-    pub(crate) fn size(&self) -> f64 {
-        (self.sized.0 / self.sized.1.max(f64::MIN_POSITIVE))
+    /// The size that robots share, in its unit.
+    pub(crate) fn size(&self, robots: usize) -> f64 {
+        let all = self.of_all(robots);
+        let whole = log_mean(&all);
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (k, shares) in all.iter().enumerate() {
+            let weight: f64 = shares.iter().map(|log| (log - whole).exp()).sum();
+            sum += weight * k as f64 * amplitude_step();
+            weights += weight;
+        }
+        let unit = self.unit.0 / self.unit.1.max(1.0);
+        (unit + sum / weights.max(f64::MIN_POSITIVE))
             .exp()
             .clamp(1e-3, 1e5)
     }
@@ -143,23 +235,34 @@ pub(super) struct CellTotal<'a> {
     pub(crate) scatter: f64,
 }
 
+impl CellTotal<'_> {
+    /// The size that robots share, in its unit.
+    pub(crate) fn size(&self, sums: &GroupSums) -> f64 {
+        self.sum.size(sums.robots)
+    }
+}
+
 impl GroupSums {
     /// Takes a robot that was asked with some given cells.
-    pub(crate) fn add(&mut self, rows: &[CellEvidenceRow], given: &[Given]) {
+    pub(crate) fn add(&mut self, cells: &[CellSays], given: &[Given]) {
         self.robots += 1;
         let mut logs: BTreeMap<&str, f64> = BTreeMap::new();
         for one in given {
             let shape = one.shape.as_deref().unwrap_or_default();
-            let is_own = |row: &&CellEvidenceRow| {
+            let is_own = |says: &&CellSays| {
+                let row = &says.row;
                 row.given == one.cell && row.cell == one.cell && row.shape == shape
             };
-            let present = rows.iter().find(is_own);
-            let log = present.map_or(*LEAST_EVIDENCE, |row| row.log_evidence.max(*LEAST_EVIDENCE));
+            let present = cells.iter().find(is_own);
+            let log = present.map_or(*LEAST_EVIDENCE, |says| {
+                says.row.log_evidence.max(*LEAST_EVIDENCE)
+            });
             logs.insert(&one.cell, log);
             let sums = self.owners.entry(one.cell.clone()).or_default();
             (sums[0], sums[1]) = (sums[0] + log, sums[1] + log * log);
         }
-        for row in rows {
+        for says in cells {
+            let row = &says.row;
             let key = (row.given.clone(), row.cell.clone(), row.shape.clone());
             let owner = logs
                 .get(row.given.as_str())
@@ -168,7 +271,7 @@ impl GroupSums {
             self.sums
                 .entry(key)
                 .or_insert_with(|| Sum::new(row))
-                .add(row, owner);
+                .add(says, owner);
         }
     }
 
@@ -218,24 +321,44 @@ pub(super) fn each(
     fleet: &Fleet,
     ledger: &Ledger,
     records: &[Option<RobotRecord>],
-    take: &mut dyn FnMut(&FleetRobot, &[CellEvidenceRow]),
+    take: &mut dyn FnMut(&FleetRobot, &[CellSays]),
 ) -> Result<()> {
     let robots: Vec<_> = fleet.roster.0.iter().zip(records).collect();
     for some in robots.chunks(CHUNK) {
-        let tables: Vec<Option<CellEvidence>> = some
+        let tables: Vec<Option<Vec<CellSays>>> = some
             .par_iter()
             .map(|(_, record)| {
-                let record = record.as_ref();
-                ledger.load(record.and_then(|record| record.last(CellEvidence::KIND)))
+                let table = |kind| record.as_ref().and_then(|record| record.last(kind));
+                let rows: Option<CellEvidence> = ledger.load(table(CellEvidence::KIND))?;
+                let at: Option<CellAmplitudes> = ledger.load(table(CellAmplitudes::KIND))?;
+                rows.zip(at).map(says).transpose()
             })
             .collect::<Result<_>>()?;
-        for ((robot, _), table) in some.iter().zip(tables) {
-            if let Some(table) = table {
-                take(robot, &table.0);
+        for ((robot, _), cells) in some.iter().zip(tables) {
+            if let Some(cells) = cells {
+                take(robot, &cells);
             }
         }
     }
     Ok(())
+}
+
+/// The rows of both tables, which have one order.
+fn says((rows, amplitudes): (CellEvidence, CellAmplitudes)) -> Result<Vec<CellSays>> {
+    let (steps, rest) = amplitudes.0.as_chunks::<STEPS>();
+    let is_own = |(row, steps): (&CellEvidenceRow, &[CellAmplitudeRow; STEPS])| {
+        let [first, ..] = steps;
+        (&first.given, &first.cell, &first.shape) == (&row.given, &row.cell, &row.shape)
+    };
+    let all = rows.0.len() == steps.len() && rest.is_empty();
+    if !all || !rows.0.iter().zip(steps).all(is_own) {
+        return Err(Error::Bug("cell_amplitudes is not of cell_evidence".into()));
+    }
+    let cells = rows.0.into_iter().zip(steps).map(|(row, steps)| CellSays {
+        row,
+        at: std::array::from_fn(|k| steps[k].log_evidence),
+    });
+    Ok(cells.collect())
 }
 
 fn log_add(a: f64, b: f64) -> f64 {
@@ -247,8 +370,8 @@ fn log_add(a: f64, b: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn row(log: f64) -> CellEvidenceRow {
-        CellEvidenceRow {
+    fn row(log: f64) -> CellSays {
+        let row = CellEvidenceRow {
             cell: "backlash@joint 2".into(),
             effect: "backlash".into(),
             place: "joint 2".into(),
@@ -257,7 +380,9 @@ mod tests {
             size: 0.05,
             unit: "mm".into(),
             ..CellEvidenceRow::default()
-        }
+        };
+        let at = [log; STEPS];
+        CellSays { row, at }
     }
 
     fn odds(logs: &[f64], robots: usize) -> (f64, f64) {
@@ -281,10 +406,10 @@ mod tests {
     #[test]
     fn the_scatter_of_a_difference_is_that_of_its_terms() {
         let mut sums = GroupSums::default();
-        let given = |cell: &str, log: f64| CellEvidenceRow {
-            given: "a".into(),
-            cell: cell.into(),
-            ..row(log)
+        let given = |cell: &str, log: f64| {
+            let mut says = row(log);
+            (says.row.given, says.row.cell) = ("a".into(), cell.into());
+            says
         };
         // Differences 1, 4 and, where the rival has no row, 5 + 3.3.
         let asked = [Given {
@@ -300,6 +425,50 @@ mod tests {
         let by_hand: f64 = [1.0f64, 4.0, 8.3].iter().map(|d| (d - mean).powi(2)).sum();
         assert!((cells[1].scatter - by_hand).abs() < 1e-9);
         assert_eq!(cells[0].scatter, 0.0);
+    }
+
+    /// A column whose coefficient is seen to so many standard deviations, one of which is the 5th amplitude.
+    fn seen_to(deviations: f64) -> CellSays {
+        let at: [f64; STEPS] = std::array::from_fn(|k| {
+            let signal = (2.0 * (k as f64 - 5.0) * amplitude_step()).exp();
+            0.5 * (deviations * deviations * signal / (1.0 + signal) - signal.ln_1p())
+        });
+        let mut says = row(0.0);
+        let whole: f64 = at.iter().map(|log| log.exp()).sum();
+        says.row.log_evidence = (whole / STEPS as f64).ln();
+        says.at = at;
+        says
+    }
+
+    #[test]
+    fn what_no_robot_shows_twenty_of_one_size_do() {
+        let total = |deviations: f64, robots: usize| {
+            let mut sums = GroupSums::default();
+            (0..robots).for_each(|_| sums.add(&[seen_to(deviations)], &[]));
+            sums.cells("").next().expect("a cell").odds
+        };
+        let alone = seen_to(2.4).row.log_evidence;
+        assert!(alone < 1.0, "{alone}");
+        // 20 times a fit of 0.5 x 2.4 x 2.4 for a determinant and a price of the amplitude and share.
+        assert!(total(2.4, 20) > 20.0 && total(2.4, 20) < 20.0 * 2.88);
+        assert!(total(0.0, 20) < 0.0 && total(1.0, 20) < 1.0);
+    }
+
+    #[test]
+    fn a_size_that_robots_share_is_where_they_say_most_together() {
+        let mut sums = GroupSums::default();
+        for deviations in [1.0, 2.0, 3.0, 4.0] {
+            let mut says = seen_to(deviations);
+            // The likeliest amplitude of each, as one of mm.
+            let at = says.at;
+            let best = (0..STEPS).max_by(|a, b| at[*a].total_cmp(&at[*b]));
+            says.row.size = 1e-3 * (best.unwrap_or(0) as f64 * amplitude_step()).exp();
+            sums.add(&[says], &[]);
+        }
+        // By their sum of squares, a^2 = (1 + 4 + 9 + 16) / 4 - 1 standard errors.
+        let size = sums.cells("").next().expect("a cell").size(&sums);
+        let by_hand = 1e-3 * (5.0 * amplitude_step()).exp() * 6.5f64.sqrt();
+        assert!((size / by_hand).ln().abs() < 0.5, "{size} {by_hand}");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! pays; then what single robots show alone.
 
 use super::cause_answers::{self, Answers};
-use super::cause_sums::{CellTotal, GroupSums, each};
+use super::cause_sums::{CellSays, CellTotal, GroupSums, each};
 use super::ledger::RobotRecord;
 use super::round::{GroupColumn, Round};
 use super::{Fleet, Ledger};
@@ -14,7 +14,7 @@ use crate::error::{Result, visible};
 use crate::report::fleet_causes as page;
 use crate::stage::Given;
 use crate::store::TableRef;
-use crate::table::{CellEvidence, CellEvidenceRow, Table};
+use crate::table::{CellEvidence, Table};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -77,11 +77,11 @@ impl CauseSearch {
         self.rounds += 1;
         let mut sums: BTreeMap<String, GroupSums> = BTreeMap::new();
         let mut alone: BTreeMap<String, Vec<Alone>> = BTreeMap::new();
-        each(fleet, ledger, records, &mut |robot, rows| {
+        each(fleet, ledger, records, &mut |robot, cells| {
             let group = self.round.by.of(&robot.groups).to_string();
             let known = self.round.robots.get(&robot.name);
             if known.is_none_or(|known| known.len() < *ALONE)
-                && let Some(given) = likeliest(rows)
+                && let Some(given) = likeliest(cells)
             {
                 let robot = robot.name.clone();
                 let one = Alone { robot, given };
@@ -89,7 +89,7 @@ impl CauseSearch {
             }
             let given = self.round.groups.get(&group);
             let given = given.map_or(&[][..], Vec::as_slice);
-            sums.entry(group).or_default().add(rows, given);
+            sums.entry(group).or_default().add(cells, given);
         })?;
         let mut goes_on = false;
         for (group, sums) in &sums {
@@ -115,13 +115,15 @@ impl CauseSearch {
 }
 
 /// The cell that a robot by itself shows next to those in its model, if its odds alone are strong.
-fn likeliest(rows: &[CellEvidenceRow]) -> Option<Given> {
-    let odds = |row: &CellEvidenceRow| row.log_evidence + row.log_prior;
-    let best = rows
+fn likeliest(cells: &[CellSays]) -> Option<Given> {
+    let odds = |says: &CellSays| says.row.log_evidence + says.row.log_prior;
+    let best = cells
         .iter()
-        .filter(|row| row.given.is_empty() && row.shape.is_empty() && row.sigma.is_none())
+        .filter(|CellSays { row, .. }| {
+            row.given.is_empty() && row.shape.is_empty() && row.sigma.is_none()
+        })
         .max_by(|a, b| odds(a).total_cmp(&odds(b)))?;
-    (odds(best) >= *JOINS).then(|| given(&best.cell, None, best.size))
+    (odds(best) >= *JOINS).then(|| given(&best.row.cell, None, best.row.size))
 }
 
 /// A cell with a size of two digits: equal rounds have equal keys.
@@ -183,7 +185,7 @@ impl GroupSearch {
                 continue;
             };
             let mut next = self.given.clone();
-            next[i] = given(best.cell, best.shape, best.sum.size());
+            next[i] = given(best.cell, best.shape, best.size(sums));
             // Of two sets of which each is left for the other one, that stays which gains less by it.
             let gain = best.odds - stays;
             if self.left.get(&Self::key(&next)).is_none_or(|by| gain > *by) {
@@ -230,13 +232,13 @@ impl GroupSearch {
                 .iter()
                 .filter(|total| total.sum.effect == names::JOINT_COMPLIANCE);
             self.given = yields
-                .map(|total| given(total.cell, None, total.sum.size()))
+                .map(|total| given(total.cell, None, total.size(sums)))
                 .collect();
         }
         for total in joining {
             if !self.given.iter().any(|given| given.cell == total.cell) {
                 self.given
-                    .push(given(total.cell, total.shape, total.sum.size()));
+                    .push(given(total.cell, total.shape, total.size(sums)));
             }
         }
         true
@@ -308,9 +310,11 @@ pub(super) fn noted<T: Table>(ledger: &Ledger, port: &str) -> Result<Option<T>> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stage::STEPS;
+    use crate::table::CellEvidenceRow;
 
-    fn row(present: &str, (cell, log_evidence): (&str, f64)) -> CellEvidenceRow {
-        CellEvidenceRow {
+    fn row(present: &str, (cell, log_evidence): (&str, f64)) -> CellSays {
+        let row = CellEvidenceRow {
             given: present.into(),
             cell: cell.into(),
             effect: "backlash".into(),
@@ -320,7 +324,9 @@ mod tests {
             size: 0.05,
             unit: "mm".into(),
             ..CellEvidenceRow::default()
-        }
+        };
+        let at = [log_evidence; STEPS];
+        CellSays { row, at }
     }
 
     /// Sums of one robot that was asked in the place of a cell.

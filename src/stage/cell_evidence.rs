@@ -3,12 +3,16 @@
 
 use crate::dynamics;
 use crate::error::{Error, Place, Result};
-use crate::table::{CellEvidence as CellEvidenceTable, CellEvidenceRow};
+use crate::table::{
+    CellAmplitudeRow, CellAmplitudes, CellEvidence as CellEvidenceTable, CellEvidenceRow,
+};
 use crate::{
     AskedRows, Context, Diagnose, DiagnoseReads, DiagnoseTorques, DiagnoseTorquesReads, RawFile,
     Stage,
 };
+use calib_diagnose::table::AMPLITUDES;
 use calib_diagnose::{CellAnswer, GivenCell, cell_evidence};
+use calib_numerics::criteria::cells::{LARGEST, SMALLEST};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -42,9 +46,10 @@ pub struct Given {
 }
 
 crate::stage! {
-    CellEvidence, "cell_evidence", 8, "says what every possible cause explains of one robot, for the sum over a fleet",
+    CellEvidence, "cell_evidence", 9, "says what every possible cause explains of one robot, for the sum over a fleet",
         DiagnoseReads -> CellEvidenceWrites {
             cell_evidence: CellEvidenceTable,
+            cell_amplitudes: CellAmplitudes,
         }
 }
 
@@ -71,14 +76,12 @@ impl Stage for CellEvidence {
         let question = asked.question(&self.diagnose, context.seed);
         let answers = cell_evidence(&question, &cells(&self.given, 1e-3))
             .map_err(|message| Error::data("table recording", message))?;
-        Ok(CellEvidenceWrites {
-            cell_evidence: table(answers, ("mm", 1e3)),
-        })
+        Ok(tables(answers, ("mm", 1e3)))
     }
 }
 
 crate::stage! {
-    TorqueEvidence, "torque_evidence", 9, "says what every possible cause explains of the torques of one robot",
+    TorqueEvidence, "torque_evidence", 10, "says what every possible cause explains of the torques of one robot",
         DiagnoseTorquesReads -> CellEvidenceWrites
 }
 
@@ -100,9 +103,7 @@ impl Stage for TorqueEvidence {
         let given = cells(&self.given, 1.0);
         let tell = &mut |line| context.note(line);
         let answers = dynamics::cell_evidence(&arm, &recording, &question, &given, tell)?;
-        Ok(CellEvidenceWrites {
-            cell_evidence: table(answers, ("Nm", 1.0)),
-        })
+        Ok(tables(answers, ("Nm", 1.0)))
     }
 }
 
@@ -125,32 +126,63 @@ fn cells(given: &[Given], unit: f64) -> Vec<GivenCell> {
     given.iter().map(cell).collect()
 }
 
-fn table(answers: Vec<CellAnswer>, (unit, per_si): (&str, f64)) -> CellEvidenceTable {
+/// Of the amplitudes at which evidence is computed, which are written: a cause shows much the same at its neighbours.
+const EVERY: usize = 2;
+
+/// Amplitudes that are written.
+pub const STEPS: usize = AMPLITUDES / EVERY;
+
+/// ln of one of them over that before it.
+pub fn amplitude_step() -> f64 {
+    EVERY as f64 * (*LARGEST / *SMALLEST).ln() / (AMPLITUDES - 1) as f64
+}
+
+/// What is less at an amplitude is as impossible as this.
+const IMPOSSIBLE: f64 = -100.0;
+
+fn tables(mut answers: Vec<CellAnswer>, (unit, per_si): (&str, f64)) -> CellEvidenceWrites {
+    let key = |answer: &CellAnswer| {
+        let shape = answer.shape.clone().unwrap_or_default();
+        let given = answer.left_out.clone().unwrap_or_default();
+        (given, answer.cell.clone(), shape)
+    };
+    answers.retain(CellAnswer::counts);
+    answers.sort_by_cached_key(key);
+    answers.dedup_by_key(|answer| key(answer));
     // So many digits decide nothing, and they would fill the store.
     let rounded = |value: f64| (1e3 * value).round() / 1e3;
-    let row = |answer: CellAnswer| CellEvidenceRow {
-        given: answer.left_out.unwrap_or_default(),
-        cell: answer.cell,
-        shape: answer.shape.unwrap_or_default(),
-        effect: answer.effect.into(),
-        place: answer.place.to_string(),
-        follows: answer.follows.into(),
-        log_evidence: rounded(answer.log),
-        log_prior: rounded(answer.log_prior),
-        size: rounded(1e3 * per_si * answer.size) / 1e3,
-        sigma: answer
-            .sigma
-            .map(|sigma| rounded(1e3 * per_si * sigma) / 1e3),
-        log_ratio: answer.log_ratio.map(rounded),
-        unit: unit.into(),
-    };
-    let mut rows: Vec<CellEvidenceRow> = answers
-        .into_iter()
-        .filter(CellAnswer::counts)
-        .map(row)
-        .collect();
-    let key = |row: &CellEvidenceRow| (row.given.clone(), row.cell.clone(), row.shape.clone());
-    rows.sort_by_cached_key(key);
-    rows.dedup_by_key(|row| key(row));
-    CellEvidenceTable(rows)
+    let (mut rows, mut amplitudes) = (Vec::new(), Vec::new());
+    for answer in answers {
+        let (given, cell, shape) = key(&answer);
+        let at = answer.at_amplitudes.iter().step_by(EVERY);
+        for (step, log) in at.take(STEPS).enumerate() {
+            amplitudes.push(CellAmplitudeRow {
+                given: given.clone(),
+                cell: cell.clone(),
+                shape: shape.clone(),
+                step: step as i64,
+                log_evidence: (1e2 * log.max(IMPOSSIBLE)).round() / 1e2,
+            });
+        }
+        rows.push(CellEvidenceRow {
+            given,
+            cell,
+            shape,
+            effect: answer.effect.into(),
+            place: answer.place.to_string(),
+            follows: answer.follows.into(),
+            log_evidence: rounded(answer.log),
+            log_prior: rounded(answer.log_prior),
+            size: rounded(1e3 * per_si * answer.size) / 1e3,
+            sigma: answer
+                .sigma
+                .map(|sigma| rounded(1e3 * per_si * sigma) / 1e3),
+            log_ratio: answer.log_ratio.map(rounded),
+            unit: unit.into(),
+        });
+    }
+    CellEvidenceWrites {
+        cell_evidence: CellEvidenceTable(rows),
+        cell_amplitudes: CellAmplitudes(amplitudes),
+    }
 }

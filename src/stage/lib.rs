@@ -50,7 +50,9 @@ mod validate;
 pub use calib_report::{
     Accepted, Report, ReportDrivesReads, ReportPages, ReportReads, ReportTorquesReads,
 };
-pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given, TorqueEvidence};
+pub use cell_evidence::{
+    CellEvidence, CellEvidenceWrites, Given, STEPS, TorqueEvidence, amplitude_step,
+};
 pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};
 use diagnose::AskedRows;

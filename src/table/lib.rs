@@ -151,6 +151,7 @@ pub use prediction::slip;
 tables! {
     acceptance => Acceptance of AcceptanceRow,
     body_consistency => BodyConsistencies of BodyConsistencyRow,
+    cell_amplitudes => CellAmplitudes of CellAmplitudeRow,
     cell_evidence => CellEvidence of CellEvidenceRow,
     cells => Cells of CellRow,
     changes => Changes of ChangeRow,

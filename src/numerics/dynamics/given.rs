@@ -7,7 +7,7 @@ use super::cells::{
 use super::solve::SolvedTorques;
 use crate::criteria::fleet::LEAST_EVIDENCE;
 use crate::criteria::torque::PER_METRE;
-use crate::diagnose::table::{log_sum, rms_size};
+use crate::diagnose::table::{AMPLITUDES, evidence_at, log_sum, log_sums, rms_size};
 use crate::diagnose::{CellAnswer, GivenCell};
 use std::collections::BTreeMap;
 
@@ -104,7 +104,14 @@ impl TorqueTable<'_, '_> {
         self.dropped(&forms(&components))
     }
 
-    /// What the cell of a form says, with ln of its posterior odds and its size, Nm.
+    /// ln of the evidence of a form given a state at each amplitude.
+    fn at_amplitudes(&self, form: usize, state: &TorqueState) -> [f64; AMPLITUDES] {
+        let (gram, along) = self.seen(form, state);
+        let shares = vec![1.0 / along.len() as f64; along.len()];
+        evidence_at(&gram, &along, &shares, state.known.rows, ANY)
+    }
+
+    /// What the cell of a form says, with ln of its posterior odds and its size, Nm; not yet at each amplitude.
     fn whole_answer(
         &self,
         form: usize,
@@ -130,6 +137,7 @@ impl TorqueTable<'_, '_> {
                 (form.cause.follows)(form)
             },
             log: log_odds - log_prior,
+            at_amplitudes: [f64::NEG_INFINITY; AMPLITUDES],
             log_prior,
             size,
             sigma: None,
@@ -143,9 +151,17 @@ impl TorqueTable<'_, '_> {
             return Vec::new();
         };
         let size = best.amplitude * self.newton_metres(best.form);
+        let joining = self.shapes(cell, state).into_iter();
+        let joining = joining.map(|(log, TorqueComponent { form, .. })| {
+            let at = self.at_amplitudes(form, state);
+            (shape_key(self.choice.form(form)), (log, at))
+        });
+        let joining: Vec<(String, (f64, [f64; AMPLITUDES]))> = joining.collect();
+        let all = log_sums(joining.iter().map(|(_, (_, at))| *at));
         let whole = self.whole_answer(best.form, log_odds, size, left_out);
+        let whole = whole.at(all, self.log_count(cell));
         // Forms of each shape, and ln of the evidence of those that may be.
-        let mut shapes: BTreeMap<String, (usize, Vec<f64>)> = BTreeMap::new();
+        let mut shapes: BTreeMap<String, (usize, Vec<(f64, [f64; AMPLITUDES])>)> = BTreeMap::new();
         for form in self.open(cell) {
             let key = shape_key(self.choice.form(form));
             shapes.entry(key).or_default().0 += 1;
@@ -153,19 +169,20 @@ impl TorqueTable<'_, '_> {
         if shapes.len() < 2 {
             return vec![whole];
         }
-        for (log, component) in self.shapes(cell, state) {
-            let key = shape_key(self.choice.form(component.form));
-            shapes.entry(key).or_default().1.push(log);
+        for (key, says) in joining {
+            shapes.entry(key).or_default().1.push(says);
         }
         let shapes = shapes.into_iter().filter(|(_, (_, logs))| !logs.is_empty());
-        let shapes = shapes.map(|(key, (count, logs))| {
+        let shapes = shapes.map(|(key, (count, says))| {
             let count = (count as f64).ln();
+            let logs: Vec<f64> = says.iter().map(|(log, _)| *log).collect();
             CellAnswer {
                 log: log_sum(&logs) - count,
                 log_prior: count - self.log_count(cell),
                 shape: Some(key),
                 ..whole.clone()
             }
+            .at(log_sums(says.iter().map(|(_, at)| *at)), count)
         });
         let shapes: Vec<CellAnswer> = shapes.collect();
         [vec![whole], shapes].concat()
@@ -186,6 +203,8 @@ impl TorqueTable<'_, '_> {
         let unit = self.newton_metres(component.form);
         let log_odds = self.odds_of(components, place, kappa);
         let whole = self.whole_answer(component.form, log_odds, found.size * unit, left_out);
+        let at = self.at_amplitudes(component.form, state);
+        let whole = whole.at(at, 0.0);
         Some(CellAnswer {
             log: whole.log.max(*LEAST_EVIDENCE),
             sigma: Some(found.sigma * unit),
@@ -194,6 +213,9 @@ impl TorqueTable<'_, '_> {
         })
     }
 }
+
+/// No amplitude is too small or too large.
+const ANY: [f64; 2] = [0.0, f64::INFINITY];
 
 /// Key of a shape that robots of a model may share: an order, or which joints.
 fn shape_key(form: &TorqueForm) -> String {

@@ -59,57 +59,81 @@ pub(crate) fn evidence_between(
     gradient: &DVector<f64>,
     shares: &[f64],
     rows: EvidenceRows,
-    [low, high]: [f64; 2],
+    between: [f64; 2],
 ) -> GroupEvidence {
-    let kept: Vec<usize> = (0..shares.len()).filter(|k| shares[*k] > 0.0).collect();
-    if let [k] = kept[..] {
-        let (diagonal, along) = ([shares[k] * gram[(k, k)]], [shares[k].sqrt() * gradient[k]]);
-        return over_amplitudes((&diagonal, &[], &along), rows, [low, high]);
+    let Some((logs, fits)) = at_each(gram, gradient, shares, rows, between) else {
+        return GroupEvidence::NONE;
+    };
+    let best = (0..AMPLITUDES)
+        .max_by(|a, b| logs[*a].total_cmp(&logs[*b]))
+        .unwrap_or(0);
+    GroupEvidence {
+        log: log_sum(&logs) - (possible(between).max(1) as f64).ln(),
+        amplitude: GRID[best],
+        fit: fits[best],
     }
-    let roots: Vec<f64> = kept.iter().map(|k| shares[*k].sqrt()).collect();
-    let matrix = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
-        roots[i] * gram[(kept[i], kept[j])] * roots[j]
-    });
-    let along = kept.iter().zip(&roots);
-    let mut along: Vec<f64> = along.map(|(k, root)| root * gradient[*k]).collect();
-    let (diagonal, off_diagonal) = tridiagonal(matrix, &mut along);
-    over_amplitudes((&diagonal, &off_diagonal, &along), rows, [low, high])
 }
 
-/// The evidence of a Gram matrix in tridiagonal form over all amplitudes.
-fn over_amplitudes(
-    (diagonal, off_diagonal, along): (&[f64], &[f64], &[f64]),
+/// ln of the evidence at each amplitude of the grid; of one that cannot be, minus infinity.
+pub fn evidence_at(
+    gram: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    shares: &[f64],
+    rows: EvidenceRows,
+    between: [f64; 2],
+) -> [f64; AMPLITUDES] {
+    at_each(gram, gradient, shares, rows, between).map_or([0.0; AMPLITUDES], |(logs, _)| logs)
+}
+
+/// How many amplitudes of the grid lie between two.
+fn possible([low, high]: [f64; 2]) -> usize {
+    let is_possible = |amplitude: &&f64| **amplitude >= low && **amplitude <= high;
+    GRID.iter().filter(is_possible).count()
+}
+
+/// At each amplitude ln of the evidence and what is explained of the squared residual; none of columns that the rows do not see.
+fn at_each(
+    gram: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    shares: &[f64],
     rows: EvidenceRows,
     [low, high]: [f64; 2],
-) -> GroupEvidence {
-    let trace: f64 = diagonal.iter().sum();
+) -> Option<([f64; AMPLITUDES], [f64; AMPLITUDES])> {
+    let kept: Vec<usize> = (0..shares.len()).filter(|k| shares[*k] > 0.0).collect();
+    let squares = GRID.map(|amplitude| amplitude * amplitude);
+    let (trace, (fits, determinants)) = if let [k] = kept[..] {
+        let (diagonal, along) = (shares[k] * gram[(k, k)], shares[k].sqrt() * gradient[k]);
+        (
+            diagonal,
+            at_amplitudes(&squares, &[diagonal], &[], &[along]),
+        )
+    } else {
+        let roots: Vec<f64> = kept.iter().map(|k| shares[*k].sqrt()).collect();
+        let matrix = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
+            roots[i] * gram[(kept[i], kept[j])] * roots[j]
+        });
+        let along = kept.iter().zip(&roots);
+        let mut along: Vec<f64> = along.map(|(k, root)| root * gradient[*k]).collect();
+        let (diagonal, off_diagonal) = tridiagonal(matrix, &mut along);
+        (
+            diagonal.iter().sum::<f64>(),
+            at_amplitudes(&squares, &diagonal, &off_diagonal, &along),
+        )
+    };
     if trace.is_nan() || trace <= 0.0 {
-        return GroupEvidence::NONE;
+        return None;
     }
     let (whole, half) = (*NU + rows.square, 0.5 * (rows.freedom + *NU));
-    let squares = GRID.map(|amplitude| amplitude * amplitude);
-    let (fits, determinants) = at_amplitudes(&squares, diagonal, off_diagonal, along);
     let mut logs = [f64::NEG_INFINITY; AMPLITUDES];
-    let is_possible = |k: usize| GRID[k] >= low && GRID[k] <= high;
-    for k in (0..AMPLITUDES).filter(|k| is_possible(*k)) {
+    for k in (0..AMPLITUDES).filter(|k| GRID[*k] >= low && GRID[*k] <= high) {
         // Noise is always left: what leaves none is rounding.
         let left = 1.0 - fits[k] / whole;
         if left > 1e-9 && squares[k] * trace < *EXACT {
             logs[k] = -0.5 * determinants[k] - half * left.ln();
         }
     }
-    if logs.iter().all(|log| *log == f64::NEG_INFINITY) {
-        return GroupEvidence::NONE;
-    }
-    let best = (0..AMPLITUDES)
-        .max_by(|a, b| logs[*a].total_cmp(&logs[*b]))
-        .unwrap_or(0);
-    let possible = (0..AMPLITUDES).filter(|k| is_possible(*k)).count();
-    GroupEvidence {
-        log: log_sum(&logs) - (possible.max(1) as f64).ln(),
-        amplitude: GRID[best],
-        fit: fits[best],
-    }
+    let is_seen = logs.iter().any(|log| *log > f64::NEG_INFINITY);
+    is_seen.then_some((logs, fits))
 }
 
 /// The diagonal and the entries next to it of a symmetric matrix brought to tridiagonal form by reflections (Householder, 1958), which turn
@@ -205,6 +229,12 @@ pub fn log_sum(logs: &[f64]) -> f64 {
     } else {
         most + logs.iter().map(|log| (log - most).exp()).sum::<f64>().ln()
     }
+}
+
+/// At each amplitude ln of a sum of exponentials.
+pub fn log_sums(all: impl Iterator<Item = [f64; AMPLITUDES]>) -> [f64; AMPLITUDES] {
+    let all: Vec<[f64; AMPLITUDES]> = all.collect();
+    std::array::from_fn(|k| log_sum(&all.iter().map(|logs| logs[k]).collect::<Vec<_>>()))
 }
 
 /// ln of a mean of exponentials: equal prior odds.

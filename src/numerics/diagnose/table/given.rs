@@ -3,7 +3,7 @@
 use super::cause_table::CauseTable;
 use super::cell::CauseCell;
 use super::component::{CellColumns, Component, SeenGroup, shape_keys};
-use super::evidence::log_sum;
+use super::evidence::{AMPLITUDES, log_sum, log_sums};
 use super::frame::SearchRows;
 use super::noise_shape::NoiseShape;
 use super::search::without;
@@ -15,6 +15,7 @@ use crate::criteria::fleet::{LEAST_EVIDENCE, WRITTEN};
 use crate::diagnose::round::{EstimatedCause, RoundView};
 use crate::effect::{Basis, Form, Place, Term, names};
 use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A cell that is taken to be in the robot.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,6 +45,8 @@ pub struct CellAnswer {
     pub follows: &'static str,
     /// ln of the evidence for it over that of nothing.
     pub log: f64,
+    /// The same at each amplitude of the grid, of which that is the mean over those that can be: robots that share a cause share its size, too.
+    pub at_amplitudes: [f64; AMPLITUDES],
     /// ln of its prior odds; of a shape ln of its weight within its cell.
     pub log_prior: f64,
     /// Rms motion at the tool, m, or torque, Nm: the likeliest amplitude, of a given cell its estimate.
@@ -55,6 +58,17 @@ pub struct CellAnswer {
 }
 
 impl CellAnswer {
+    /// The same with its evidence at each amplitude, by that of its columns and ln of their weight in it. What they say at the smallest one, which
+    /// moves nothing that is seen, as masses that motor currents show may, speaks for no cause.
+    pub fn at(self, amplitudes: [f64; AMPLITUDES], log_weight: f64) -> Self {
+        let [least, ..] = amplitudes;
+        let least = if least.is_finite() { least } else { log_weight };
+        Self {
+            at_amplitudes: amplitudes.map(|log| log - least),
+            ..self
+        }
+    }
+
     /// Whether a sum over robots has to know it: what is missing there counts as the least evidence.
     pub fn counts(&self) -> bool {
         let is_plain = self.shape.is_none() && self.effect != names::UNKNOWN;
@@ -114,9 +128,10 @@ pub(crate) fn answers(view: &RoundView, given: &[GivenCell]) -> Vec<CellAnswer> 
                 alike.retain(|cell| !is_given(cell));
                 alike.push(component.cell);
                 let mut rivals = table.answers(&alike, &state, Some(&left_out));
-                rivals.retain(|rival| rival.cell != left_out || rival.shape.is_some());
+                let is_own = |rival: &CellAnswer| rival.cell == left_out && rival.shape.is_none();
+                let own = rivals.iter().position(is_own).map(|at| rivals.remove(at));
                 out.extend(rivals);
-                out.extend(table.given_answer(component, &state, left_out));
+                out.extend(own.and_then(|own| table.given_answer(component, &state, own)));
             }
             out
         },
@@ -156,7 +171,8 @@ impl CauseTable<'_, '_> {
         out
     }
 
-    /// What some cells say given a state, and each shape of those with a name; closely of the likeliest.
+    /// What some cells say given a state, and each shape of those with a name; closely of the likeliest. What a sum does not have to know is left
+    /// out.
     fn answers(
         &self,
         cells: &[usize],
@@ -185,21 +201,23 @@ impl CauseTable<'_, '_> {
                 place: cell.place,
                 follows,
                 log: log_sum(&logs),
+                at_amplitudes: [f64::NEG_INFINITY; AMPLITUDES],
                 log_prior: cell.log_prior,
                 size: best.1,
                 sigma: None,
                 log_ratio: None,
             };
             let shared = cell.is_named() && logs.len() > 1;
-            let shape = |((seen, log), key): ((&SeenGroup, &f64), String)| {
+            let shape = |(group, ((seen, log), key)): (usize, ((&SeenGroup, &f64), String))| {
                 let weights = seen.group.shapes.iter().map(|shape| shape.log_weight);
                 let weight = log_sum(&weights.collect::<Vec<_>>());
-                CellAnswer {
+                let shape = CellAnswer {
                     shape: Some(key),
                     log: log - weight,
                     log_prior: weight,
                     ..whole.clone()
-                }
+                };
+                (group, shape)
             };
             let steps =
                 |form: &Form| matches!(form.term().map(Term::basis), Some(Basis::After { .. }));
@@ -208,13 +226,14 @@ impl CauseTable<'_, '_> {
                 true => shape_keys(&block.groups),
                 false => Vec::new(),
             };
-            let shapes = block.groups.iter().zip(&logs).zip(keys);
-            let shapes = shapes
-                .filter(|((seen, log), _)| log.is_finite() && !seen.group.forms.iter().any(steps));
-            let shapes: Vec<CellAnswer> = shapes.map(shape).collect();
+            let shapes = block.groups.iter().zip(&logs).zip(keys).enumerate();
+            let shapes = shapes.filter(|(_, ((seen, log), _))| {
+                log.is_finite() && !seen.group.forms.iter().any(steps)
+            });
+            let shapes: Vec<(usize, CellAnswer)> = shapes.map(shape).collect();
             (whole, shapes)
         };
-        let mut out: Vec<(CellAnswer, Vec<CellAnswer>)> =
+        let mut out: Vec<(CellAnswer, Vec<(usize, CellAnswer)>)> =
             (0..cells.len()).into_par_iter().map(answer).collect();
         let mut order: Vec<usize> = (0..out.len()).collect();
         order.retain(|k| out[*k].0.log.is_finite());
@@ -222,48 +241,82 @@ impl CauseTable<'_, '_> {
         order.sort_by(|a, b| odds(b).total_cmp(&odds(a)).then(a.cmp(b)));
         order.truncate(*CLOSELY);
         order.retain(|k| self.cells[cells[*k]].is_coarse());
-        let closely = |k: &usize| Some((*k, self.closely(cells[*k], state)?));
+        let closely = |k: &usize| {
+            let found = self.closely(cells[*k], state)?;
+            (found.log > out[*k].0.log).then_some((*k, found))
+        };
         let closely: Vec<_> = order.par_iter().filter_map(closely).collect();
+        let mut finely = BTreeSet::new();
         for (k, found) in closely {
-            if found.log > out[k].0.log {
-                (out[k].0.log, out[k].0.size) = (found.log, found.amplitude);
-            }
+            (out[k].0.log, out[k].0.size) = (found.log, found.amplitude);
+            finely.insert(k);
         }
         // What moves the tool by less than anything sees, as masses that motor currents show may, is no cause of its errors.
         let is_seen =
             |whole: &CellAnswer| whole.size > *SMALLEST || whole.size > 0.0 && whole.log <= 0.0;
-        out.into_iter()
-            .filter(|(whole, _)| whole.log.is_finite() && is_seen(whole))
-            .flat_map(|(whole, shapes)| std::iter::once(whole).chain(shapes))
+        let written =
+            |(k, (whole, mut shapes)): (usize, (CellAnswer, Vec<(usize, CellAnswer)>))| {
+                shapes.retain(|(_, shape)| shape.counts());
+                if !whole.counts() && shapes.is_empty() {
+                    return Vec::new();
+                }
+                let block = &self.coarse[cells[k]];
+                let groups = state.at_amplitudes(block, &across, first[k]);
+                let groups: BTreeMap<usize, [f64; AMPLITUDES]> = groups.into_iter().collect();
+                let all = match finely.contains(&k) {
+                    true => self.at_amplitudes(self.fine(cells[k]), state),
+                    false => log_sums(groups.values().copied()),
+                };
+                let all = whole.at(all, 0.0);
+                let shapes = shapes.into_iter().filter_map(|(group, shape)| {
+                    let weight = shape.log_prior;
+                    Some(shape.at(*groups.get(&group)?, weight))
+                });
+                std::iter::once(all)
+                    .filter(CellAnswer::counts)
+                    .chain(shapes)
+                    .collect()
+            };
+        out.into_par_iter()
+            .enumerate()
+            .filter(|(_, (whole, _))| whole.log.is_finite() && is_seen(whole))
+            .flat_map_iter(written)
             .collect()
     }
 
-    /// What a given cell says given the others, and its size.
+    /// What a given cell says given the others, and its size, by what its cell says without.
     fn given_answer(
         &self,
         component: &Component,
         state: &KnownState,
-        key: String,
+        own: CellAnswer,
     ) -> Option<CellAnswer> {
-        let cell = &self.cells[component.cell];
-        let found = self.closely(component.cell, state)?;
         let alone = self.component_evidence(component, state);
-        let log = alone.map_or(found.log, |(log, _)| log.max(found.log));
+        let alone = alone.filter(|(log, _)| *log > own.log);
+        let own = match alone {
+            Some((log, _)) => {
+                let block = CellColumns::of_component(component, self.frame);
+                CellAnswer { log, ..own }.at(self.at_amplitudes(&block, state), 0.0)
+            }
+            None => own,
+        };
         let found_size = self.sized(component, state)?;
         Some(CellAnswer {
-            left_out: Some(key.clone()),
-            cell: key,
-            shape: None,
-            effect: cell.name,
-            place: cell.place,
-            follows: component.forms.first()?.follows(cell.place),
+            follows: component.forms.first()?.follows(own.place),
             // A sum takes no less for what is less.
-            log: log.max(*LEAST_EVIDENCE),
-            log_prior: cell.log_prior,
+            log: own.log.max(*LEAST_EVIDENCE),
             size: found_size.size,
             sigma: Some(found_size.sigma),
             log_ratio: Some(found_size.log_ratio),
+            ..own
         })
+    }
+
+    /// ln of the evidence of all shapes of a block together at each amplitude.
+    fn at_amplitudes(&self, block: &CellColumns, state: &KnownState) -> [f64; AMPLITUDES] {
+        let across = self.across_block(block, state);
+        let groups = state.at_amplitudes(block, &across, 0);
+        log_sums(groups.into_iter().map(|(_, at)| at))
     }
 
     /// Rms motion of a component given others, m.

@@ -25,7 +25,9 @@ mod state;
 mod stepped;
 
 pub(crate) use answer::{Answer, FoundCell};
-pub use evidence::{AMPLITUDES, EvidenceRows, GroupEvidence, evidence, log_sum};
+pub use evidence::{
+    AMPLITUDES, EvidenceRows, GroupEvidence, evidence, evidence_at, log_sum, log_sums,
+};
 pub(crate) use generated::places;
 pub use given::{CellAnswer, GivenCell};
 pub(crate) use given::{answers, given_causes};

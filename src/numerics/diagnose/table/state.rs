@@ -4,7 +4,9 @@
 //! component is left out, or another one put in, without a pass over the rows.
 
 use super::component::{CellColumns, Component, PartProducts, SeenGroup};
-use super::evidence::{EvidenceRows, GroupEvidence, evidence_between};
+use super::evidence::{
+    AMPLITUDES, EvidenceRows, GroupEvidence, evidence_at, evidence_between, log_sums,
+};
 use super::factored::unit;
 use super::frame::SearchRows;
 use crate::criteria::cells::{NU, UNEXPLAINED};
@@ -310,19 +312,8 @@ impl KnownState {
         first: usize,
     ) -> Vec<(usize, usize, GroupEvidence)> {
         let mut out = Vec::new();
-        for (g, group) in block.groups.iter().enumerate() {
-            let (gram, gradient) = self.seen(group, across, first);
-            let single = gradient.len() == 1;
-            if single {
-                let coefficient = gradient[0]
-                    / gram[(0, 0)].max(f64::MIN_POSITIVE)
-                    / block.square[group.range.start].sqrt();
-                let wrong = group.group.positive && coefficient < 0.0;
-                if wrong || coefficient.abs() > 1.5 * group.group.largest {
-                    continue;
-                }
-            }
-            for (s, shape) in group.group.shapes.iter().enumerate() {
+        for (g, (gram, gradient)) in self.possible(block, across, first) {
+            for (s, shape) in block.groups[g].group.shapes.iter().enumerate() {
                 let mut found =
                     evidence_between(&gram, &gradient, &shape.shares, self.rows, block.between);
                 found.log += shape.log_weight;
@@ -330,6 +321,47 @@ impl KnownState {
             }
         }
         out
+    }
+
+    /// The same at each amplitude, all shapes of a group together: ln of their evidence with their weights, by the group.
+    pub(super) fn at_amplitudes(
+        &self,
+        block: &CellColumns,
+        across: &DMatrix<f64>,
+        first: usize,
+    ) -> Vec<(usize, [f64; AMPLITUDES])> {
+        let of_group = |(g, (gram, gradient)): (usize, (DMatrix<f64>, DVector<f64>))| {
+            let shapes = block.groups[g].group.shapes.iter().map(|shape| {
+                evidence_at(&gram, &gradient, &shape.shares, self.rows, block.between)
+                    .map(|log| log + shape.log_weight)
+            });
+            (g, log_sums(shapes))
+        };
+        let groups = self.possible(block, across, first);
+        groups.map(of_group).collect()
+    }
+
+    /// Gram matrices and gradients of the groups of a block but those whose coefficient would have a size that it cannot have.
+    fn possible(
+        &self,
+        block: &CellColumns,
+        across: &DMatrix<f64>,
+        first: usize,
+    ) -> impl Iterator<Item = (usize, (DMatrix<f64>, DVector<f64>))> {
+        let groups = block.groups.iter().enumerate();
+        groups.filter_map(move |(g, group)| {
+            let (gram, gradient) = self.seen(group, across, first);
+            if gradient.len() == 1 {
+                let coefficient = gradient[0]
+                    / gram[(0, 0)].max(f64::MIN_POSITIVE)
+                    / block.square[group.range.start].sqrt();
+                let wrong = group.group.positive && coefficient < 0.0;
+                if wrong || coefficient.abs() > 1.5 * group.group.largest {
+                    return None;
+                }
+            }
+            Some((g, (gram, gradient)))
+        })
     }
 }
 
