@@ -309,7 +309,7 @@ const UNTRANSLATED: &str = "the page says this in English, as `de` lacks it: ";
 /// What the tables of these tests say and no stage does.
 const MADE_UP: [&str; 11] = [
     "temperature: none was recorded",
-    "tracker_scale: <measure> a scale bar",
+    "tracker scale: <measure> a scale bar",
     "joint 2 turns unevenly, twice a turn by 25 arcsec <b>",
     "the measured point lies on the axis of joint 6",
     "does the same as link_geometry.l2.z with joint_offset.j2",
