@@ -490,8 +490,8 @@ fn a_text_of_a_german_spreadsheet_is_read_and_pauses_of_its_stamps_part_trajecto
         "delimiter: \";\"",
         "decimal: comma",
         "trajectory: \"Fahrt\"",
-        "command: \"soll_{name} [rad]\"",
-        "angle: \"ist_{name} [rad]\"",
+        "command: \"soll_j{j} [rad]\"",
+        "angle: \"ist_j{j} [rad]\"",
     ] {
         assert!(pipeline.contains(line), "expected `{line}` in {pipeline}");
     }
