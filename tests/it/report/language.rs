@@ -168,10 +168,11 @@ fn every_message_of_templates_and_sources_has_its_german_and_none_is_left_over()
 }
 
 /// The templates of pages that have languages.
-const TEMPLATES: [&str; 7] = [
+const TEMPLATES: [&str; 8] = [
     include_str!("../../../src/report/report.html"),
     include_str!("../../../src/report/head.html"),
     include_str!("../../../src/report/torques.html"),
+    include_str!("../../../src/report/achieved.html"),
     include_str!("../../../src/report/drives.html"),
     include_str!("../../../src/report/diagnosed.html"),
     include_str!("../../../src/report/fleet.html"),
